@@ -29,11 +29,10 @@ import numpy as np
 from benchmarks import timing
 from benchmarks.live_link import Other
 from benchmarks.sections import print_aligned
+from contextdb.motion import write_game_clips
 from contextdb.telemetry.link import doors
-from examples.playground.__main__ import TABLES
-from examples.playground.clips import write_clips
+from examples.playground.__main__ import RATE, TABLES
 from examples.playground.game import Game
-from examples.playground.headless import RATE
 from examples.playground.stick import REST, Stick
 
 STATES = ("no link", "off", "on", "saved")
@@ -110,7 +109,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary) / "tables"
         shutil.copytree(TABLES, folder, ignore=shutil.ignore_patterns("*.bvh", ".contextdb-cache"))
-        write_clips(folder / "clips")
+        write_game_clips(folder / "clips")
         report["playground"] = found = measure(folder, 10.0 if options.quick else 60.0)
     print("\nA frame of two characters; milliseconds\n")
     heads = [f"{name}{of}" for of in ("", " CPU") for name in ("median", "99 %", "longest")]

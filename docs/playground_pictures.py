@@ -18,14 +18,12 @@ from png_files import Picture, halved, write_png
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
-from examples.playground.__main__ import TABLES
+from contextdb.motion import write_game_clips
+from examples.playground.__main__ import RATE, TABLES
 from examples.playground.actor import Actor
-from examples.playground.clips import write_clips
 from examples.playground.game import Game
-from examples.playground.headless import RATE
-from examples.playground.screen import SIZE
 from examples.playground.stick import REST, Stick
-from examples.playground.window import Window
+from examples.playground.window import SIZE, Window
 
 FOLDER = Path(__file__).parent / "pictures"
 PER_SECOND = 12
@@ -65,7 +63,7 @@ MOMENTS = {
     "playground-turn": Moment((1.5, -3.0, 0.0), [(1.6, pushed(0)), (0.5, pushed(80))], turn=-25.0),
     "playground-vault": Moment((-3.0, -2.0, 0.0), [(5.0, pushed(0, run=True))], 70.0, until=is_over_the_wall),
     "playground-ramp": Moment((4.5, 0.6, 0.0), [(3.2, pushed(0))], -50.0, 15.0, 4.6),
-    "playground-contest": Moment((-1.4, -1.5, 0.0), [(2.2, pushed(0)), (6.0, REST)], 55.0, 12.0, 5.5, until=is_caught),
+    "playground-contest": Moment((-1.4, -1.5, 0.0), [(2.2, pushed(0)), (6.0, REST)], 160.0, 12.0, 6.2, until=is_caught),
     "playground-tired": Moment((0.0, -9.0, 0.0), [(3.0, pushed(0, run=True))], 50.0, 10.0, 4.4, stamina=0.06),
     "playground-gap": Moment((0.0, 0.0, 0.0), [(1.2, pushed(0)), (1.2, pushed(180, strafe=True))], 25.0),
 }
@@ -122,7 +120,7 @@ def drawn(game: Game, words: float = SIZE) -> Iterator[Window]:
 
 def main(folder: Path = FOLDER) -> None:
     """Draw all of them."""
-    write_clips(TABLES / "clips")
+    write_game_clips(TABLES / "clips")
     for name in MOMENTS:
         write_png(folder / f"{name}.png", moment(name))
     write_png(folder / "playground.png", *film(), per_second=PER_SECOND)

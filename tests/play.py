@@ -12,11 +12,10 @@ from pathlib import Path
 import oracles
 
 from contextdb import Project
-from examples.playground.__main__ import TABLES
+from contextdb.motion import write_game_clips
+from examples.playground.__main__ import TABLES, played
 from examples.playground.actor import Stock
-from examples.playground.clips import write_clips
 from examples.playground.game import Game
-from examples.playground.headless import played
 from examples.playground.stick import StickFile
 
 STICK = """\
@@ -41,7 +40,7 @@ def clips() -> Path:
     folder = Path(tempfile.mkdtemp(prefix="playground-clips-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     shutil.copytree(TABLES / "clips", folder, ignore=shutil.ignore_patterns("*.bvh"), dirs_exist_ok=True)
-    write_clips(folder)
+    write_game_clips(folder)
     return folder
 
 
@@ -80,7 +79,7 @@ def checked(game: Game, seconds: float, stick: StickFile) -> Iterator[Game]:
             decision, facts = actor.moved.decision, actor.moved.facts
             assert decision.playing is not None
             if frame % ORACLE_EVERY == 0:
-                assert list(actor.valid) == oracles.rows(table, facts)
-            is_right = decision.playing.asset in actor.valid.assets
-            assert is_right or decision.held or not actor.valid, (actor.name, decision.playing.asset, facts)
+                assert list(actor.readout.valid) == oracles.rows(table, facts)
+            is_right = decision.playing.asset in actor.readout.valid.assets
+            assert is_right or decision.held or not actor.readout.valid, (actor.name, decision.playing.asset, facts)
         yield each

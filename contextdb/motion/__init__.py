@@ -18,6 +18,7 @@ from contextdb.motion.characters.character import Character, CharacterState, Upd
 from contextdb.motion.characters.crowd import Crowd
 from contextdb.motion.characters.facts import FACTS, Moment
 from contextdb.motion.characters.paths import path_from
+from contextdb.motion.characters.readout import Readout
 from contextdb.motion.clips.clip import Clip, load_bvh, load_clips, parse_bvh, write_bvh
 from contextdb.motion.clips.doubts import ClipFinding, doubts_of
 from contextdb.motion.clips.feet import Footfalls, footfalls
@@ -38,6 +39,7 @@ from contextdb.motion.features.schema import CustomFunction, FeatureSchema
 from contextdb.motion.joint.database import JointDatabase
 from contextdb.motion.joint.hit import JointHit
 from contextdb.motion.joint.searcher import JointSearcher
+from contextdb.motion.made.game import write_game_clips
 from contextdb.motion.made.joint import JOINT_RECIPES, make_joint_clip, write_joint_clips
 from contextdb.motion.made.recipes import (
     ABOUT_TURNS,
@@ -197,6 +199,7 @@ __all__ = [
     "Poses",
     "Proposal",
     "QueryError",
+    "Readout",
     "Reasked",
     "ReaskedDecision",
     "ReaskedSearch",
@@ -285,6 +288,7 @@ __all__ = [
     "with_paths",
     "write_arrays",
     "write_bvh",
+    "write_game_clips",
     "write_joint_clips",
     "write_made_clips",
     "write_poses",

@@ -8,7 +8,6 @@ from bisect import bisect_right
 from dataclasses import dataclass
 from pathlib import Path
 
-Ground = tuple[float, float]
 WALK_MPS, RUN_MPS, TIRED_MPS = 1.4, 3.6, 2.6
 GAITS = ("Idle", "Walk", "Run")
 DEAD = 0.15
@@ -26,21 +25,14 @@ class Stick:
     camera: float = 0.0
 
     @property
-    def is_at_rest(self) -> bool:
-        """Whether nobody pushes it."""
-        return math.hypot(self.x, self.z) < DEAD
-
-    @property
     def gait(self) -> str:
         """The fact of this name."""
-        return GAITS[0 if self.is_at_rest else 2 if self.run else 1]
+        return GAITS[0 if math.hypot(self.x, self.z) < DEAD else 2 if self.run else 1]
 
-    def velocity(self, tired: bool = False) -> Ground:
+    def velocity(self, tired: bool = False) -> tuple[float, float]:
         """The velocity over the ground that it asks for, m/s."""
-        if self.is_at_rest:
-            return 0.0, 0.0
-        speed = (TIRED_MPS if tired else RUN_MPS) if self.run else WALK_MPS
-        share = speed / max(1.0, math.hypot(self.x, self.z))
+        pace = {"Idle": 0.0, "Walk": WALK_MPS, "Run": TIRED_MPS if tired else RUN_MPS}[self.gait]
+        share = pace / max(1.0, math.hypot(self.x, self.z))
         return self.x * share, self.z * share
 
 

@@ -8,11 +8,8 @@ from dataclasses import dataclass, replace
 from contextdb.motion import Steered
 
 Normal = tuple[float, float, float]
-UP: Normal = (0.0, 1.0, 0.0)
-RADIUS_M = 0.35
-"""How near a body comes to a wall."""
-HIGHEST_STEP_M = 0.35
-EDGE_M = 18.0
+RADIUS_M, HIGHEST_STEP_M, EDGE_M = 0.35, 0.35, 18.0
+"""How near a body comes to a wall, onto what it steps, and how far the world goes."""
 
 
 @dataclass(frozen=True)
@@ -32,13 +29,6 @@ class Box:
         """How high it is there."""
         return self.near_m + (self.far_m - self.near_m) * (z - self.z[0]) / (self.z[1] - self.z[0])
 
-    @property
-    def normal(self) -> Normal:
-        """Upwards from it."""
-        rise, run = self.far_m - self.near_m, self.z[1] - self.z[0]
-        length = math.hypot(rise, run)
-        return 0.0, run / length, -rise / length
-
 
 RAMP = Box((3.0, 6.0), (2.0, 6.5), 0.0, 1.2)
 TOP = Box((3.0, 6.0), (6.5, 9.0), 1.2, 1.2)
@@ -49,24 +39,21 @@ WALL = Box((-5.0, -1.0), (5.85, 6.15), 0.9, 0.9)
 
 def ground(x: float, z: float) -> tuple[float, Normal]:
     """The height and the normal below a place, as a pose stream asks for them."""
-    for floor in FLOORS:
-        if floor.holds(x, z):
-            return floor.height(z), floor.normal
-    return 0.0, UP
+    floor = next((floor for floor in FLOORS if floor.holds(x, z)), None)
+    if floor is None:
+        return 0.0, (0.0, 1.0, 0.0)
+    slope = math.atan2(floor.far_m - floor.near_m, floor.z[1] - floor.z[0])
+    return floor.height(z), (0.0, math.cos(slope), -math.sin(slope))
 
 
 def moved(before: Steered, after: Steered) -> Steered:
     """A body that has moved, as far as it may: it slides along walls and along what is too high to step on."""
-    (x, z), (new_x, new_z) = before.position, after.position
-    for place in ((new_x, new_z), (new_x, z), (x, new_z)):
-        if is_free(before.position, place):
-            break
-    else:
-        place = x, z
-    if place == after.position:
+    (x, z), (new_x, new_z), (vx, vz) = before.position, after.position, after.velocity
+    if is_free(before.position, after.position):
         return after
-    stopped = tuple(v if now == wished else 0.0 for v, now, wished in zip(after.velocity, place, after.position, strict=True))
-    return replace(after, position=place, velocity=(stopped[0], stopped[1]), acceleration=(0.0, 0.0))
+    ways = [((new_x, z), (vx, 0.0)), ((x, new_z), (0.0, vz))]
+    place, velocity = next((way for way in ways if is_free(before.position, way[0])), ((x, z), (0.0, 0.0)))
+    return replace(after, position=place, velocity=velocity, acceleration=(0.0, 0.0))
 
 
 def is_free(here: tuple[float, float], there: tuple[float, float]) -> bool:
@@ -76,24 +63,11 @@ def is_free(here: tuple[float, float], there: tuple[float, float]) -> bool:
     return ground(*there)[0] - ground(*here)[0] <= HIGHEST_STEP_M
 
 
-@dataclass(frozen=True)
-class Ahead:
-    """The wall ahead of a body: where it would come over it, which way is straight, and how far that is from its own way."""
-
-    place: tuple[float, float]
-    heading: float
-    angle_deg: float
-
-
-def wall_ahead(x: float, z: float, way: float, within_m: float = 6.0) -> Ahead | None:
-    """The wall, for a body that goes some way; None where it does not lead there."""
+def wall_ahead(x: float, z: float, way: float, within_m: float = 6.0) -> tuple[float, float, float, float] | None:
+    """Where a body that goes some way would be on the wall (x, z), straight over it, and degrees off that; None if not there."""
     middle = sum(WALL.z) / 2.0
     heading = 0.0 if z < middle else math.pi
     angle = math.remainder(way - heading, math.tau)
-    away = abs(middle - z)
-    if abs(angle) > math.radians(60.0) or away > within_m:
-        return None
-    at = x + away * math.tan(angle) * (1.0 if z < middle else -1.0)
-    if not WALL.x[0] + RADIUS_M < at < WALL.x[1] - RADIUS_M:
-        return None
-    return Ahead((at, middle), heading, math.degrees(angle))
+    at = x + (middle - z) * math.tan(angle)
+    is_near = abs(angle) < math.radians(60.0) and abs(middle - z) < within_m
+    return (at, middle, heading, math.degrees(angle)) if is_near and abs(at + 3.0) < 2.0 - RADIUS_M else None

@@ -19,6 +19,7 @@ from contextdb.motion import (
     make_clip,
     poses_of,
     root_trajectory,
+    write_game_clips,
     write_made_clips,
 )
 from contextdb.motion.clips.quaternions import rotate
@@ -204,6 +205,14 @@ def test_written_clips_read_as_the_same_motion(tmp_path):
         again, made = load_bvh(path), MADE[path.stem]
         assert again.name == made.name
         assert np.abs(poses_of(again).positions - poses_of(made.clip).positions).max() < 1e-6
+
+
+def test_the_clips_of_a_contest_end_face_to_face(tmp_path):
+    written = {path.stem: path for path in write_game_clips(tmp_path)}
+    assert {"walk_about_left", "jog_strafe", "walk_back", "vault_run", "catch_high"} < set(written)
+    one, other = (root_trajectory(poses_of(load_bvh(written[f"catch_contested.{role}"]))) for role in ("Catcher", "Other"))
+    assert other.positions[-1] - one.positions[-1] == pytest.approx((0.0, 0.8), abs=0.05)
+    assert np.cos(other.headings[-1] - one.headings[-1]) == pytest.approx(-1.0, abs=0.01)
 
 
 def test_an_unknown_clip_is_refused_with_the_nearest():

@@ -273,6 +273,7 @@ CALLS: dict[str, Call] = {
     "JointPlay.decision(role)": lambda x: MET.decision(x),
     "JointPlay.decision(database)": lambda x: isinstance(x, str) or MET.decision("Host", x),
     "make_joint_clip(name)": lambda x: motion.make_joint_clip(x),
+    "write_game_clips(folder)": lambda x: isinstance(x, (str, Path)) or motion.write_game_clips(x),
     "write_joint_clips(folder)": lambda x: isinstance(x, (str, Path)) or motion.write_joint_clips(x),
     "MatchGate(over)": lambda x: motion.MatchGate(x, 1.0),
     "MatchGate(threshold)": lambda x: motion.MatchGate(DATABASE, x),
@@ -420,6 +421,9 @@ CALLS: dict[str, Call] = {
     "Character.update(path)": lambda x: PLAYER.copy().update(0.1, path=x),
     "Character.update(tags)": lambda x: PLAYER.copy().update(0.1, tags=x),
     "Character.update(valid)": lambda x: PLAYER.copy().update(0.1, valid=x),
+    "Readout.update(updated)": lambda x: motion.Readout().update(x, 0),  # type: ignore[arg-type]
+    "Readout.update(table)": lambda x: motion.Readout().update(PLAYER.copy().update(0.1), x),
+    "Readout.update(shown)": lambda x: motion.Readout().update(PLAYER.copy().update(0.1), 0, x),  # type: ignore[arg-type]
     "path_from(root)": lambda x: motion.path_from(x, PATH),
     "path_from(path)": lambda x: motion.path_from((0.0, 0.0, 0.0), x),
     "path_from(halflife_s)": lambda x: motion.path_from((0.0, 0.0, 1.0), PATH, halflife_s=x),

@@ -1,4 +1,7 @@
-"""The whole loop: a game in which no row is valid, the editor that sees it live and makes the row, and the game that plays it."""
+"""The whole loop: a game in which no row is valid, the editor that sees it live and makes the row, and the game that plays it.
+
+The keys are those of section 9 of docs/tutorial.md.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +14,9 @@ from pathlib import Path
 import pytest
 from terminal import press, said, screen_text, with_editor
 from test_following import until
+from test_tutorial import BLOCK, keys_of, section
 
-from examples.playground.headless import RATE
+from examples.playground.__main__ import RATE
 from examples.playground.stick import Stick
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
@@ -32,6 +36,8 @@ def tables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 def test_the_editor_sees_the_gap_live_makes_its_row_and_the_game_plays_it(tables: Path):
+    watch, look, fill = ([*keys_of(text)] for _, text in BLOCK.findall(section(9)))
+
     async def script(app, pilot):
         with play.opened(tables, "playground") as game:
 
@@ -42,20 +48,20 @@ def test_the_editor_sees_the_gap_live_makes_its_row_and_the_game_plays_it(tables
             for _ in range(30):
                 step()
             seen = [(list(game.player.valid), game.player.playing)]
-            await press(pilot, "alt+u")
+            await press(pilot, *watch[0])
             dialog = app.screen
             await until(pilot, lambda: step() or dialog.show() or len(dialog._lines) == 2)
-            await press(pilot, "enter")
+            await press(pilot, *watch[1])
             query, following = app.main.session.sheet.query, app.main.following
             await until(pilot, lambda: step() or following.tick() or query.texts.get("strafe") == "True")
             seen.append((screen_text(app), query.bits))
-            await press(pilot, "alt+4", "l")
+            await press(pilot, *(key for keys in look for key in keys))
             pane = app.main._pane("coverage")
             await until(pilot, lambda: not pane.played.reading)
             seen.append(screen_text(app))
-            await press(pilot, "enter")  # a row for the gap
+            await press(pilot, *fill[0])  # a row for the gap
             seen.append(said(app))
-            await press(pilot, "home", *"walk_back", "enter", "ctrl+s")
+            await press(pilot, *(key for keys in fill[1:] for key in keys))
             seen.append(said(app))
             await until(pilot, lambda: step() or game.player.playing == "walk_back")
             await until(pilot, lambda: step() or following.tick() or "the game plays walk_back" in screen_text(app))
@@ -65,7 +71,7 @@ def test_the_editor_sees_the_gap_live_makes_its_row_and_the_game_plays_it(tables
     before, (screen, bits), gaps, asked, saved, number = with_editor(tables / "moves.csv", script, (130, 45))
     assert before == ([], "idle")
     assert "playground · player" in screen
-    assert "0 of 30 rows valid" in screen
+    assert "0 of 34 rows valid" in screen
     assert bits == 0
     assert "direction: (100..-100), strafe: True" in gaps
     assert asked == "A new row fills the gap: enter its asset."

@@ -41,7 +41,7 @@ def make_joint_clip(name: str) -> dict[str, Clip]:
     poses = poses_of(host)
     contact = poses.n_frames - 1 - round(HOLD_S * poses.rate)
     hand = poses.positions[contact, host.skeleton.index("RightHand")]
-    return {"Host": host, "Guest": replace(host, name=f"{name}.Guest", values=_turned(host, hand))}
+    return {"Host": host, "Guest": replace(host, name=f"{name}.Guest", values=half_turned(host, hand[0], hand[2]))}
 
 
 def joint_contact_s(clip: Clip) -> float:
@@ -69,21 +69,21 @@ def _reaching(clip: Clip) -> Floats:
     values = clip.values.copy()
     for joint, (lift, turn) in REACH.items():
         for channel, degrees in (("Xrotation", lift), ("Yrotation", turn)):
-            values[:, _column(clip, joint, channel)] += share * degrees
+            values[:, column(clip, joint, channel)] += share * degrees
     return values
 
 
-def _turned(clip: Clip, centre: Floats) -> Floats:
-    """The values of a clip turned half a turn about the upright line through a point."""
+def half_turned(clip: Clip, x: float, z: float) -> Floats:
+    """The values of a clip turned half a turn about the upright line through a point of the ground, in metres."""
     values = clip.values.copy()
-    for channel, middle in (("Xposition", centre[0]), ("Zposition", centre[2])):
-        column = _column(clip, "Hips", channel)
-        values[:, column] = 2.0 * middle / CENTIMETRE - values[:, column]
-    values[:, _column(clip, "Hips", "Yrotation")] += 180.0
+    for channel, middle in (("Xposition", x), ("Zposition", z)):
+        at = column(clip, "Hips", channel)
+        values[:, at] = 2.0 * middle / CENTIMETRE - values[:, at]
+    values[:, column(clip, "Hips", "Yrotation")] += 180.0
     return values
 
 
-def _column(clip: Clip, joint: str, channel: str) -> int:
+def column(clip: Clip, joint: str, channel: str) -> int:
     """Where a joint's channel is in the values."""
     at = clip.skeleton.index(joint)
     return int(clip.skeleton.channel_starts[at]) + clip.skeleton.channels[at].index(channel)

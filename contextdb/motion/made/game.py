@@ -1,0 +1,104 @@
+"""Made clips for a small game, beyond those of `RECIPES`: turns about, strafing, backwards, vaults, catches. Made, not captured.
+
+Each is another made clip with some of its channels raised for a while. What a table and a search choose among is in the folder,
+what plays once and ends at a target in `once/`, and what two play together, one clip for each role, in `contest/`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from contextdb.cells.arguments import require_path
+from contextdb.motion.clips.clip import CENTIMETRE, Clip, write_bvh
+from contextdb.motion.made.joint import column, half_turned
+from contextdb.motion.made.recipes import ABOUT_TURNS, make_clip, write_made_clips
+
+Bump = tuple[str, str, float, float, float]
+"""A joint, its channel, from when to when in seconds, and by how much in between, in centimetres or degrees."""
+
+SIDEWAYS = BACKWARDS = ("walk", "jog")
+"""Who strafes turns hips and legs to the way; see `path_alignment` of `[output.NAME]`. Backwards a clip is played from its end."""
+LEGS_UP: list[Bump] = [
+    (f"{side}{joint}", "Xrotation", 0.85, 1.65, bend)
+    for side in ("Left", "Right")
+    for joint, bend in (("UpLeg", -75.0), ("Leg", 95.0), ("Arm", -35.0))
+]
+
+
+def _hands_up(from_s: float, to_s: float) -> list[Bump]:
+    return [(f"{side}Arm", "Xrotation", from_s, to_s, -160.0) for side in ("Left", "Right")]
+
+
+Bent = tuple[str, float, float, list[Bump]]
+"""A made clip, from when to when it is taken, and what is raised."""
+ONCE: dict[str, Bent] = {
+    "vault_run": ("run", 0.0, 2.4, [("Hips", "Yposition", 0.8, 1.7, 72.0), ("Chest", "Xrotation", 0.6, 1.6, 25.0), *LEGS_UP]),
+    "vault_walk": (
+        "walk_fast",
+        *(0.0, 2.6),
+        [("Hips", "Yposition", 0.7, 1.9, 74.0), ("Chest", "Xrotation", 0.5, 1.8, 35.0), *LEGS_UP],
+    ),
+    "catch_high": ("idle", 0.0, 1.5, [("Hips", "Yposition", 0.35, 0.9, 28.0), *_hands_up(0.1, 1.2)]),
+}
+CONTESTS: dict[str, dict[str, Bent]] = {
+    "catch_contested": {
+        "Catcher": ("stop_walk", 3.2, 4.9, [("Hips", "Yposition", 0.9, 1.5, 45.0), *_hands_up(0.7, 1.7)]),
+        "Other": ("stop_walk", 3.2, 4.9, [("Chest", "Xrotation", 0.8, 1.6, 25.0), *_hands_up(0.7, 1.7)[:1]]),
+    }
+}
+"""The clips of each role. Both come to a stand, `APART_M` from each other, face to face."""
+APART_M = 0.8
+
+
+def write_game_clips(folder: str | PathLike[str]) -> list[Path]:
+    """Write all made clips of a small game below a folder, which is made; the paths, in order.
+
+    Raises FileError where they cannot be written.
+    """
+    place = require_path(folder, "folder")
+    for each in (place, place / "once", place / "contest"):
+        each.mkdir(parents=True, exist_ok=True)
+    paths = write_made_clips(place)
+    for name, clip in _others():
+        paths.append(place / f"{name}.bvh")
+        write_bvh(clip, paths[-1])
+    return paths
+
+
+def _others() -> Iterator[tuple[str, Clip]]:
+    """All clips that `RECIPES` does not name, and where they are written."""
+    for name in ABOUT_TURNS:
+        yield name, make_clip(name).clip
+    for name in SIDEWAYS:
+        yield f"{name}_strafe", make_clip(name).clip
+    for name in BACKWARDS:
+        clip = make_clip(name).clip
+        yield f"{name}_back", replace(clip, values=clip.values[::-1].copy())
+    for name, bent in ONCE.items():
+        yield f"once/{name}", _bent(name, *bent)
+    for name, roles in CONTESTS.items():
+        for role, bent in roles.items():
+            clip = _bent(f"{name}.{role}", *bent)
+            yield f"contest/{clip.name}", clip if role == "Catcher" else _opposite(clip)
+
+
+def _bent(name: str, base: str, from_s: float, to_s: float, bumps: list[Bump]) -> Clip:
+    """A piece of a made clip with some of its channels raised for a while."""
+    clip = make_clip(base).clip
+    values = clip.values[round(from_s / clip.frame_time_s) : round(to_s / clip.frame_time_s) + 1].copy()
+    times_s = np.arange(len(values)) * clip.frame_time_s
+    for joint, channel, begins_s, ends_s, amount in bumps:
+        share = np.clip((times_s - begins_s) / (ends_s - begins_s), 0.0, 1.0)
+        values[:, column(clip, joint, channel)] += amount * np.sin(np.pi * share) ** 2
+    return replace(clip, name=name, values=values)
+
+
+def _opposite(clip: Clip) -> Clip:
+    """The same from the other side, so that both end `APART_M` from each other."""
+    x, z = clip.values[-1, [column(clip, "Hips", "Xposition"), column(clip, "Hips", "Zposition")]] * CENTIMETRE
+    return replace(clip, values=half_turned(clip, float(x), float(z) + 0.5 * APART_M))

@@ -256,6 +256,21 @@ def test_a_failure_says_the_fact_with_its_unit_and_the_cell_as_it_is_written():
     assert str(PLAYS.explain({"state": "Ground", "speed": 5}).row(0)) == "run: valid"
 
 
+@pytest.mark.parametrize(
+    ("kind", "text", "fact", "told"),
+    [
+        ("number", "2.8..4.6", 1.3165655792130349, "1.317"),
+        ("number", "1.3166..2", 1.3165655792130349, "1.31657"),
+        ("number", "2..3", 1.25, "1.25"),
+        ("angle", "-90..90", 179.56952959920164, "179.6"),
+        ("angle", "-90..90", -179.99999999920164, "-179.999999999"),
+    ],
+)
+def test_a_failure_says_a_number_of_many_digits_in_as_few_as_mean_the_same(kind: str, text: str, fact: float, told: str):
+    (failure,) = table_of(kind, text).explain({"x": fact}).row(0).failures
+    assert failure.fact == told
+
+
 def test_an_explanation_as_text_says_how_many_rows_are_valid_and_lists_the_first_ten():
     many = Table.from_columns({"Asset": [f"a{i}" for i in range(12)], "x": ["1"] * 11 + ["2"]}, {"x": {"type": "number"}}).compile()
     lines = str(many.explain({"x": 2})).splitlines()

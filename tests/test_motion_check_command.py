@@ -239,6 +239,13 @@ def test_the_json_document_of_bones_has_every_bone_with_its_parent_and_pairs(gam
     assert (foot["parent"], foot["mirrored_to"], foot["found_as"]) == ("LeftLeg", "RightFoot", ["foot"])
 
 
+def test_bones_of_a_folder_are_those_of_the_files_in_it(game: Path):
+    files = sorted((game / "clips").glob("*.bvh"))
+    assert run("motion", "bones", game / "clips").out == run("motion", "bones", *files).out
+    (game / "none").mkdir()
+    assert "there is no BVH file in this folder or below it. Accepted: *.bvh." in run("motion", "bones", game / "none").err
+
+
 def test_bones_of_no_file_or_a_broken_one_are_bad_use(game: Path):
     assert run("motion", "bones", "gone.bvh").code == 2
     (game / "broken.bvh").write_text("HIERARCHY\nROOT", encoding="utf-8")

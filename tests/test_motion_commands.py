@@ -687,6 +687,7 @@ def test_a_name_leaves_what_it_fits():
         (["session.parquet", "--at", "soon"], 'there is no decision at "soon".'),
         (["session.parquet", "--at", "2.5"], 'there is no decision at "2.5".'),
         (["session.parquet", "--at", "2.5"], 'Did you mean "2.5s"?'),
+        (["session.parquet", "--at", "-1"], "or a time from 0.00s to 5.00s.\n"),
         (["session.parquet", "--at", "nans"], 'there is no decision at "nans".'),
         (["session.parquet", "--view", "pose"], "--view shows the costs of one decision."),
         (["session.parquet", "--at", "0", "--view", "poes"], 'Did you mean "pose"?'),

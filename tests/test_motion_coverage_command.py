@@ -13,7 +13,7 @@ import pytest
 from running import Result, run
 
 import contextdb as cdb
-from contextdb.motion import make_clip, write_bvh
+from contextdb.motion import make_clip, make_joint_clip, write_bvh
 from contextdb.motion.measuring.moves import MAPS
 
 TOML = """
@@ -321,3 +321,23 @@ def test_python_gives_what_the_command_prints():
         {key: value for key, value in table.items() if key not in ("baseline", "gates")} for table in before()["tables"]
     ]
     assert found.unlisted == ("unlisted_<b>",)
+
+
+def test_joint_clips_are_left_out_and_told(tmp_path: Path):
+    (tmp_path / "clips").mkdir()
+    for role, clip in make_joint_clip("greet_walk").items():
+        write_bvh(clip, tmp_path / "clips" / f"greet_walk.{role}.bvh")
+    (tmp_path / "greetings.csv").write_text("Asset\ngreet_walk\n")
+    joint = '[databases.greetings]\nroles = ["Host", "Guest"]\ntable = "greetings"\nclips = "clips/greet*.bvh"\nfeatures = "loco"\n'
+    loco = TOML[TOML.index("[features") : TOML.index("[databases")]
+    (tmp_path / "contextdb.toml").write_text(loco + joint)
+    result = run("motion", "coverage", tmp_path)
+    assert result.code == 2
+    assert "all databases hold joint clips, which follow no stick." in result.err
+    write_bvh(make_clip("jog").clip, tmp_path / "clips" / "jog.bvh")
+    free = TOML[TOML.index("[databases.free") :]
+    (tmp_path / "contextdb.toml").write_text(loco + joint + free)
+    result = run("motion", "coverage", tmp_path)
+    assert result.code == 0
+    assert 'contextdb: left out: the joint clips of "greetings": they follow no stick.' in result.err
+    assert "greet" not in result.out

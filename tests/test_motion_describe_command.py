@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from running import Result, run
 
-from contextdb.motion import make_clip, write_bvh
+from contextdb.motion import make_clip, make_joint_clip, write_bvh
 
 NAMES = ("idle", "walk", "walk_turn_left_90", "walk_turn_right_90", "jog", "start_walk", "stop_walk")
 COLUMNS = ["Asset Name", "gait", "speed", "direction", "turn", "style", "duration_s", "start", "end"]
@@ -193,3 +193,53 @@ def test_the_table_of_all_captured_clips_checks_and_drives(tmp_path: Path, monke
     assert len(sessions) >= 10
     assert max(session["path_rms_m"] for session in sessions) < 0.2
     assert max(session["jumps_per_s"] for session in sessions) < 6.0
+
+
+# ---- several databases
+
+
+JOINT = """
+[features.pose]
+rate = 30.0
+channels = [{ type = "velocity", bone = "Hips" }]
+[databases.alone]
+table = "alone"
+clips = "clips/*.bvh"
+features = "pose"
+[databases.other]
+table = "other"
+clips = "more/*.bvh"
+features = "pose"
+[databases.greetings]
+table = "greetings"
+clips = "joint/*.bvh"
+features = "pose"
+roles = ["Host", "Guest"]
+"""
+
+
+@pytest.fixture
+def meeting(game: Path) -> Path:
+    for folder in ("more", "joint"):
+        (game / folder).mkdir()
+    write_bvh(make_clip("run").clip, game / "more" / "run.bvh")
+    for role, clip in make_joint_clip("greet_walk").items():
+        write_bvh(clip, game / "joint" / f"greet_walk.{role}.bvh")
+    for table in ("alone", "other", "greetings"):
+        (game / f"{table}.csv").write_text("Asset Name\n")
+    (game / "contextdb.toml").write_text(JOINT)
+    return game
+
+
+def test_joint_clips_make_no_rows(meeting: Path):
+    result = describe("game")
+    assert sorted(line.split(",")[0] for line in result.lines[1:]) == sorted([*NAMES, "run"])
+    assert result.err == (
+        'contextdb: left out: the joint clips of "greetings": what the actors of each role do is no cell of a row.\n'
+    )
+    assert 'contextdb: "greetings" holds joint clips' in describe("game", "--into", "game/greetings.csv", code=2).err
+
+
+def test_a_table_gets_rows_of_the_clips_of_its_own_databases(meeting: Path):
+    describe("game", "--into", "game/other.csv")
+    assert [row[0] for row in rows(meeting / "other.csv")[1:]] == ["run"]

@@ -1,17 +1,21 @@
 """Show the bones of clips as a tree, with their channels and heights, and which are found as hips, spine, head, feet and toes.
 
-Files of one rig are shown together. The settings of [features.NAME] and [databases.NAME] name bones as they are listed here.
+Files of one rig are shown together; a folder means the BVH files in it and below. The settings of [features.NAME] and
+[databases.NAME] name bones as they are listed here.
 
   contextdb motion bones clips/walk.bvh
-  contextdb motion bones clips/*.bvh --json
+  contextdb motion bones clips --json
   contextdb motion bones robot.bvh --metres-per-unit 1 --up z
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 from collections.abc import Iterator
+from pathlib import Path
 
+from contextdb.commands.motion_clips import bvh_files
 from contextdb.console import ExitCode, aligned, output, printable
 from contextdb.errors import plural
 from contextdb.motion.clips.clip import CENTIMETRE, UPS, Clip, load_clips
@@ -23,7 +27,7 @@ HEADER = ("bone", "channels", "height m", "found as", "mirrored to")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The arguments of the command."""
-    parser.add_argument("files", metavar="FILE", nargs="+", help="BVH files")
+    parser.add_argument("files", metavar="FILE", nargs="+", help="BVH files, or folders of them")
     parser.add_argument(
         "--metres-per-unit", metavar="M", type=_unit, default=CENTIMETRE, help="the unit of the files in metres (default: 0.01)"
     )
@@ -33,12 +37,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Show the rigs of some files."""
-    clips = load_clips(arguments.files, metres_per_unit=arguments.metres_per_unit, up=arguments.up)
+    files = [file for each in arguments.files for file in (bvh_files(Path(each)) if os.path.isdir(each) else [each])]
+    clips = load_clips(files, metres_per_unit=arguments.metres_per_unit, up=arguments.up)
     rigs: dict[tuple[object, ...], list[int]] = {}
     for i, clip in enumerate(clips):
         key = (clip.skeleton.names, tuple(clip.skeleton.parents.tolist()), clip.skeleton.channels)
         rigs.setdefault(key, []).append(i)
-    found = [([str(arguments.files[i]) for i in members], clips[members[0]]) for members in rigs.values()]
+    found = [([str(files[i]) for i in members], clips[members[0]]) for members in rigs.values()]
     with output():
         if arguments.json:
             print(as_json({"format": 1, "rigs": [_document(files, clip) for files, clip in found]}), end="")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -18,10 +18,14 @@ from contextdb.motion.clips.clip import CENTIMETRE, UPS, Clip, Up, load_bvh
 from contextdb.motion.clips.doubts import LEAST_BODY_M, UNITS, USUAL_BODY_M, measure
 from contextdb.motion.storage.clip_files import paths_of
 from contextdb.motion.storage.config import MotionConfig
+from contextdb.motion.storage.database_settings import DatabaseSettings
 from contextdb.tables.project import SCHEMA_FILE, read_folder_schema
 
 MARKUP = "marks.csv"
 """The markup of a folder of clips."""
+Databases = Mapping[str, DatabaseSettings]
+Wanted = Callable[[Databases], Databases]
+"""What leaves of the databases of a project those that are wanted: one or more."""
 LEAST_USUAL_M, MOST_USUAL_M = 0.9, 2.6
 """How tall a body is, in a unit that may be right."""
 
@@ -72,8 +76,8 @@ def unit_of(text: str) -> float:
     return value
 
 
-def clips_of(path: str, metres_per_unit: float | None, up: Up | None) -> FolderClips:
-    """Read the clips of a folder.
+def clips_of(path: str, metres_per_unit: float | None, up: Up | None, wants: Wanted | None = None) -> FolderClips:
+    """Read the clips of a folder; of a project with `wants` those of the databases that it leaves of all.
 
     Raises
     ------
@@ -85,6 +89,8 @@ def clips_of(path: str, metres_per_unit: float | None, up: Up | None) -> FolderC
     if (folder / SCHEMA_FILE).is_file():
         schema = read_folder_schema(folder)
         found.config = MotionConfig.from_dict(schema.motion, file=schema.file)
+    if wants is not None and found.config.databases:
+        found.config = replace(found.config, databases=wants(found.config.databases))
     files = _files(found, metres_per_unit, up)
     if not files:
         raise FileError(Fault("there is no BVH file in this folder or below it.", "*.bvh", place=Place(str(folder))))
@@ -103,6 +109,20 @@ def clips_of(path: str, metres_per_unit: float | None, up: Up | None) -> FolderC
     if metres_per_unit is None and not found.config.databases:
         _guess_units(found)
     return found
+
+
+def bvh_files(folder: Path) -> list[Path]:
+    """The BVH files in a folder and below it.
+
+    Raises
+    ------
+    FileError
+        There is none.
+    """
+    files = sorted(Path(at) / name for at, _, names in os.walk(folder) for name in names if name.lower().endswith(".bvh"))
+    if not files:
+        raise FileError(Fault("there is no BVH file in this folder or below it.", "*.bvh", place=Place(str(folder))))
+    return files
 
 
 @contextmanager
@@ -137,8 +157,7 @@ def _files(found: FolderClips, unit: float | None, up: Up | None) -> dict[Path, 
             files.setdefault(file, (settings.metres_per_unit if unit is None else unit, up or settings.up))
     if found.config.databases:
         return files
-    every = (Path(at) / name for at, _, names in os.walk(found.folder) for name in names if name.lower().endswith(".bvh"))
-    return dict.fromkeys(sorted(every), (unit, up or "y"))
+    return dict.fromkeys(bvh_files(found.folder), (unit, up or "y"))
 
 
 def _read(found: FolderClips, file: Path, unit: float, up: Up) -> None:

@@ -98,6 +98,8 @@ def _results(arguments: argparse.Namespace, earlier: Mapping[str, Earlier] | Non
             near_cost=arguments.near,
             progress=progress,
         )
+    if joint := [name for name, settings in project.config.databases.items() if settings.roles]:
+        print(f"contextdb: left out: the joint clips of {some(joint)}: they follow no stick.", file=sys.stderr)
     measured = []
     for motion in found.tables:
         gates = [] if arguments.fail_under is None else [fail_under(motion, arguments.fail_under)]

@@ -21,14 +21,14 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from contextdb.commands.motion_clips import MARKUP, FolderClips, add_clip_arguments, below, clips_of, progress_of
+from contextdb.commands.motion_clips import MARKUP, Databases, FolderClips, add_clip_arguments, below, clips_of, progress_of
 from contextdb.commands.motion_describe_table import ASSET, DescribedTable, filled_table, new_table
 from contextdb.console import ExitCode, output, printable
 from contextdb.errors import ContextDBError, Fault, plural, some
 from contextdb.files.toml_text import as_toml
 from contextdb.motion.preparing.describing import COLUMNS, Described, Sections, by_rig, describe, mirror_of, motion_sections
 from contextdb.report.render_json import as_json
-from contextdb.tables.project import schema_for
+from contextdb.tables.project import schema_for, settings_of
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -48,7 +48,11 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         raise ContextDBError(Fault("--out makes a table, --into fills one.", "one of the two"))
     if arguments.update and not arguments.into:
         raise ContextDBError(Fault("--update replaces cells of a table.", "--into TABLE --update"))
-    found = clips_of(arguments.path, arguments.metres_per_unit, arguments.up)
+    left_out: list[str] = []
+    found = clips_of(
+        arguments.path, arguments.metres_per_unit, arguments.up, lambda all_of: _playing_alone(all_of, arguments.into, left_out)
+    )
+    found.notes += left_out
     if not found.clips:
         raise ContextDBError(*(Fault(message) for message in found.left_out))
     with progress_of("describing") as tell:
@@ -75,6 +79,25 @@ def run(arguments: argparse.Namespace) -> ExitCode:
             print("\n".join(printable(line) for line in _lines(found, made, arguments)))
     differs = made is not None and made.differences and not arguments.update
     return ExitCode.FOUND if found.left_out or differs or not is_playable else ExitCode.OK
+
+
+def _playing_alone(databases: Databases, table: str | None, notes: list[str]) -> Databases:
+    """The databases whose clips are described: those of the table that is filled, where it has any; none of joint clips.
+
+    The clips of several actors are one row, which asks each of them for facts; what one of them does says little of it.
+    """
+    path = None if table is None else Path(table)
+    name = None if path is None else settings_of(path, *schema_for(path)).name
+    if any(settings.table == name for settings in databases.values() if name is not None):
+        databases = {each: settings for each, settings in databases.items() if settings.table == name}
+    found = {each: settings for each, settings in databases.items() if not settings.roles}
+    joint = some([each for each in databases if each not in found])
+    if not found:
+        said = f"{joint} holds joint clips, each of several actors; a row of its table asks the actor of each role for facts."
+        raise ContextDBError(Fault(said, "clips that one character plays alone"))
+    if len(found) < len(databases):
+        notes.append(f"left out: the joint clips of {joint}: what the actors of each role do is no cell of a row.")
+    return found
 
 
 def _is_mirrored(found: FolderClips) -> bool:

@@ -226,7 +226,8 @@ def place_of(text: str, trace: Trace, file: str) -> int:
             return max(0, bisect_right(times_s, time_s + 0.005) - 1)
     elif text.isdecimal() and int(text) in ticks:
         return ticks.index(int(text))
-    mend = in_quotes(f"{text}s") if _number(text) is not None and not text.isdecimal() else ""
+    seconds = None if text.isdecimal() else _number(text)
+    mend = in_quotes(f"{text}s") if seconds is not None and times_s[0] <= seconds <= times_s[-1] else ""
     raise QueryError(Fault(f"there is no decision at {in_quotes(text)}.", accepted, mend, place))
 
 

@@ -240,7 +240,7 @@ class Explanation:
     def _failures(self, at: int, row: int) -> Iterator[Failure]:
         condition = self._compiled.conditions[at]
         fact = self.facts[condition.name]
-        yield from cell_failures(self._compiled, at, row, fact, _with_unit(describe_fact(fact, condition), condition))
+        yield from cell_failures(self._compiled, at, row, fact, _with_unit(told_fact(self._compiled, at, fact), condition))
 
 
 def explain(compiled: CompiledData, context: Context, unknown: Unknown = "error") -> Explanation:
@@ -313,6 +313,25 @@ def describe_fact(fact: Fact, condition: Condition) -> str:
     if isinstance(fact, Cell):
         return format_cell(fact, condition.domain)
     return describe(fact, condition.domain)
+
+
+def told_fact(compiled: CompiledData, at: int, fact: Fact) -> str:
+    """A fact as `describe_fact` says it; a number of many digits, as a game computes it, in the fewest from four on with which all
+    cells of its column say what they say with the fact."""
+    condition, masks = compiled.conditions[at], compiled.masks[at]
+    if isinstance(masks, (NumberMasks, WideMasks)) and isinstance(fact, float) and compiled.ways is None:
+        fact = _in_few_digits(fact, masks, condition.domain)
+    return describe_fact(fact, condition)
+
+
+def _in_few_digits(fact: float, masks: NumberMasks | WideMasks, domain: Domain) -> float:
+    """A number in the fewest digits that leave it in its class; itself where people write it so, and a date."""
+    if len(repr(fact)) <= FEW_DIGITS or not math.isfinite(fact) or domain.kind not in ("number", "angle"):
+        return fact
+    ends = (-180.0, 180.0) if domain.type.is_circular else (-math.inf, math.inf)
+    rounded = (float(f"{fact:.{digits}g}") for digits in range(ROUNDED_DIGITS, 17))
+    same = (each for each in rounded if masks.codes(each) == masks.codes(fact) and ends[0] < each < ends[1])
+    return next(same, fact)
 
 
 def mended(text: str, fact: Fact, domain: Domain) -> str:

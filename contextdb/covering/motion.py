@@ -13,7 +13,7 @@ from typing import Any
 from contextdb.cells.arguments import require_kind, require_mapping
 from contextdb.covering.clip_contexts import TableContexts, asked_axes, clip_contexts, is_axis
 from contextdb.covering.space import require_counts
-from contextdb.errors import ContextError, Fault, in_quotes, nearest, some
+from contextdb.errors import ContextError, Fault, MotionError, in_quotes, nearest, some
 from contextdb.motion.measuring.coverage import ContextCoverage, MotionCoverage, coverage
 from contextdb.motion.measuring.moves import DIRECTION, MAPS, SPEED, TURN
 from contextdb.motion.measuring.near_clips import NEAR_COST
@@ -139,6 +139,8 @@ def motion_coverage(
 ) -> ProjectMotion:
     """Measure where in speed, turn and direction the clips of a project have nothing, for all contexts of its tables.
 
+    Joint clips do not count: they follow no stick.
+
     Parameters
     ----------
     project : Project
@@ -158,7 +160,7 @@ def motion_coverage(
     Raises
     ------
     MotionError, FileError, SchemaError
-        What building the databases raises; also when none is declared.
+        What building the databases raises; also when none is declared, or all are of joint clips.
     ContextError
         An argument of another type, or a condition of `axes` that no table with clips has.
     """
@@ -174,8 +176,10 @@ def motion_coverage(
     missing, unlisted = unmatched(config.databases.values(), project.folder, assets)
     groups: dict[str | None, dict[str, MotionDatabase]] = {}
     for name, settings in config.databases.items():
-        if name in built:
+        if name in built and not settings.roles:
             groups.setdefault(settings.table, {})[name] = built[name]
+    if built and not groups:
+        raise MotionError(Fault("all databases hold joint clips, which follow no stick.", "clips that one character plays alone"))
     tables = {name: table for name, table in project.tables.items() if name in groups}
     asked = _axes(tables, axes)
     options: dict[str, Any] = {"pattern": pattern, "near_cost": near_cost, "progress": progress}

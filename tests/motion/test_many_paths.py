@@ -139,3 +139,13 @@ def test_sticks_that_fit_no_crowd_are_refused():
         steered_paths([], np.zeros((0, 2)))
     with pytest.raises(MotionError, match="different numbers of bodies"):
         steered_paths([bodies, ManySteered.of([Steered()])], [[0.0, 1.0]])
+
+
+def test_a_stick_or_facing_that_is_no_number_is_refused_with_its_body():
+    bodies = ManySteered.of([Steered()] * 2)
+    with pytest.raises(
+        MotionError, match=r"the velocity \[nan, 0.0\] is asked of body 1. Accepted: numbers from -1e\+09 to 1e\+09"
+    ):
+        bodies.moved(0.1, [[0.0, 1.0], [np.nan, 0.0]])
+    with pytest.raises(MotionError, match=r"the facing inf is asked of body 0. Accepted: radians"):
+        bodies.moved(0.1, [[0.0, 1.0]] * 2, [np.inf, 0.0])

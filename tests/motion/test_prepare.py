@@ -42,15 +42,33 @@ def test_the_clips_that_loop_are_found_and_no_others():
     assert {each.tag for each in of("loops")} == {ReservedTag.LOOPING}
 
 
+def test_loops_of_one_cycle_are_found_whose_feet_come_down_at_an_end():
+    gaits = [
+        motion.Gait(name, [motion.Cycle.of(CLIPS[each]) for each in own])
+        for name, own in (("walk", ("walk", "walk_fast")), ("run", ("jog", "run")))
+    ]
+    clips = motion.walked_clips(gaits, speeds_mps=[1.3, 1.4, 1.55, 2.5], turns_dps=[0, 45])
+    assert {each.asset for each in motion.prepare(clips, kinds=["loops"])} == {clip.name for clip in clips}
+
+
 def test_the_contacts_are_those_of_the_recipe_within_a_frame_or_two():
     tags = {"LeftFoot": ReservedTag.CONTACT_LEFT, "RightFoot": ReservedTag.CONTACT_RIGHT}
     for made in (made for made in MADE if made.recipe.change == "steady" and made.recipe.gait == "Walk"):
         for foot, tag in tags.items():
-            own = np.array([(each.from_s, each.to_s) for each in of("contacts") if (each.asset, each.tag) == (made.name, tag)])
+            mine = [each for each in of("contacts") if (each.asset, each.tag) == (made.name, tag)]
+            own = np.array([(e.from_s or 0.0, made.clip.duration_s if e.to_s is None else e.to_s) for e in mine])
             known = made.footfalls.down[foot]
             known = known[np.diff(known, axis=1)[:, 0] > 0.1]
             assert own.shape == known.shape, (made.name, foot)
             assert np.abs(own - known).max() <= 2.01 * FRAME_S, (made.name, foot)
+
+
+def test_contacts_that_are_written_hold_no_foot_longer_than_what_is_found():
+    schema = motion.FeatureSchema.from_dict("p", {"rate": 30, "channels": [{"type": "phase"}]})
+    clips = [CLIPS[name] for name in ("walk", "run", "start_walk")]
+    plain, marked = (motion.PoseBank.build(clips, schema, markup=markup) for markup in (None, as_markup(of("contacts"))))
+    assert marked.contacts.any(axis=0).all()
+    assert np.array_equal(marked.contacts, plain.contacts)
 
 
 def test_starts_play_as_a_whole_and_stands_are_not_entered():

@@ -17,7 +17,7 @@ from contextdb.compiled.casting.facts import Ask, Offer
 from contextdb.compiled.casting.rules import CastRules
 from contextdb.compiled.casting.stage import CastMatches, Stage, set_stage
 from contextdb.compiled.data import CompiledData
-from contextdb.compiled.explain import Explanation, Failure, RowExplanation, cell_failures, describe_fact, rules_that_fail
+from contextdb.compiled.explain import Explanation, Failure, RowExplanation, cell_failures, rules_that_fail, told_fact
 from contextdb.expressions.rules import WhenRules, told_facts
 
 
@@ -117,7 +117,7 @@ class CastExplanation(Explanation):
         for at, fact in offer.facts.items():
             bits, _ = self._compiled.condition_bits(at, fact, self._stage.unknown)
             if not bits >> row & 1:
-                told = f"{describe_fact(fact, self._compiled.conditions[at])} of {offer.name}"
+                told = f"{told_fact(self._compiled, at, fact)} of {offer.name}"
                 yield from cell_failures(self._compiled, at, row, fact, told)
 
 

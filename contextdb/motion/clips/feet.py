@@ -28,6 +28,8 @@ ContactMark = Sequence[tuple[float, float, bool]]
 ContactMarks = tuple[ContactMark | None, ContactMark | None]
 """Those of the left and of the right foot; None of a foot without."""
 NO_MARKS: ContactMarks = (None, None)
+ALIKE_S = 0.05
+"""A mark whose ends are so near to those of a stance that is found says the same."""
 LONGEST_STEP_S = 1.5
 """A foot that stays down, or up, for longer stands and takes no step."""
 
@@ -117,10 +119,33 @@ def footfalls_of(
 
 
 def flat_feet_of(poses: Poses, bones: FootBones = UNDECLARED, marks: ContactMarks = NO_MARKS) -> Footfalls:
-    """When each foot stands flat, heel and toe on the ground, so that it can be held there; marks are those of the footfalls."""
+    """When each foot stands flat, heel and toe on the ground, so that it can be held there.
+
+    A mark holds its foot all the time; but one that only says when the foot rests, as it is found too, changes nothing.
+    """
     feet = bones.found_in(poses.skeleton)
-    left, right = (ground_points(poses, foot) for foot in feet)
-    return _with_marks(feet, stances((left, right), poses.rate, flat=True), marks, max(0, poses.n_frames - 1) / poses.rate)
+    points = ground_points(poses, feet[0]), ground_points(poses, feet[1])
+    flat = stances(points, poses.rate, flat=True)
+    falls = _with_marks(feet, flat, marks, max(0, poses.n_frames - 1) / poses.rate)
+    if marks == NO_MARKS:
+        return falls
+    rests = stances(points, poses.rate)
+    held = [
+        intervals if mark is None else _held(intervals, *found)
+        for intervals, mark, *found in zip(falls.down.values(), marks, rests, flat, strict=True)
+    ]
+    return Footfalls(falls.duration_s, dict(zip(falls.feet, held, strict=True)))
+
+
+def _held(marked: Floats, rests: Floats, flat: Floats) -> Floats:
+    """The marked intervals [n, 2], those that are found to rest too without what of them is not flat."""
+    held: list[list[float]] = []
+    for interval in marked:
+        is_found = (np.abs(rests - interval) <= ALIKE_S).all(axis=1).any()
+        middles = flat.mean(axis=1)
+        inside = flat[(interval[0] <= middles) & (middles <= interval[1])]
+        held += inside.tolist() if is_found else [interval.tolist()]
+    return np.array(held, np.float64).reshape(-1, 2)
 
 
 def _with_marks(feet: tuple[Foot, Foot], found: tuple[Floats, Floats], marks: ContactMarks, duration_s: float) -> Footfalls:

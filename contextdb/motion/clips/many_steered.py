@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from contextdb.cells.arguments import require_many_of, require_numbers, require_real
+from contextdb.cells.arguments import MOST, require_many_of, require_numbers, require_real
 from contextdb.errors import Fault, MotionError
 from contextdb.motion.clips.many_paths import ManyTrajectories
 from contextdb.motion.clips.poses import LEAST_RATE, MOST_RATE
@@ -97,12 +97,17 @@ class ManySteered:
         if velocities.shape != self.positions.shape:
             found = f"the velocities that are asked for have shape {velocities.shape}."
             raise MotionError(Fault(found, f"{self.positions.shape}, x and z for each body"))
+        if (unfit := np.flatnonzero(~(np.abs(velocities) <= MOST).all(axis=1))).size:
+            found = f"the velocity {velocities[unfit[0]].tolist()} is asked of body {unfit[0]}."
+            raise MotionError(Fault(found, f"numbers from {-MOST:g} to {MOST:g}"))
         if facing is None:
             is_going = np.hypot(velocities[:, 0], velocities[:, 1]) >= STANDING_MPS
             return velocities, np.where(is_going, np.arctan2(velocities[:, 0], velocities[:, 1]), self.headings)
         headings = require_numbers(facing, "facing")
         if headings.shape != self.headings.shape:
             raise MotionError(Fault(f"the facing has shape {headings.shape}.", f"{self.headings.shape}, a heading for each body"))
+        if (unfit := np.flatnonzero(~np.isfinite(headings))).size:
+            raise MotionError(Fault(f"the facing {headings[unfit[0]]} is asked of body {unfit[0]}.", "radians"))
         return velocities, headings
 
 

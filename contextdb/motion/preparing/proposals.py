@@ -44,6 +44,9 @@ LOOP_M, LOOP_MPS = 0.03, 0.3
 """A clip loops where its joints are so near at both ends, and so alike in speed: root mean squares."""
 LOOP_SHARE = 0.15
 """Of the body's speed: so unlike may these speeds be, where that is more."""
+SMOOTH_SHARE = 0.95
+"""Or where speeds change no more from its end to its start than in this share of its frames: a foot that comes down there changes
+them at once."""
 LEAST_LOOP_S = 0.5
 FEWEST_TO_CUT = 6
 MOST_FRAMES = 400
@@ -279,7 +282,8 @@ def _contacts(look: Look) -> Iterator[Proposal]:
     for foot, tag in zip(look.falls.feet, CONTACTS, strict=True):
         for begin, end in look.falls.down[foot].tolist():
             reason = f"{foot} rests for {end - begin:.2f} s"
-            yield look.said("contacts", tag, round(begin * look.rate), round(end * look.rate), reason, end - begin)
+            first, last = round(begin * look.rate) or None, round(end * look.rate)
+            yield look.said("contacts", tag, first, last if last < look.poses.n_frames - 1 else None, reason, end - begin)
 
 
 # ---- loops
@@ -289,9 +293,18 @@ def _loops(look: Look) -> Iterator[Proposal]:
     """A clip whose last pose is its first."""
     if look.clip.duration_s >= LEAST_LOOP_S:
         apart_m, apart_mps = _apart(look, 0, -1)
-        if apart_m <= LOOP_M and apart_mps <= look.loop_mps:
+        if apart_m <= LOOP_M and (apart_mps <= look.loop_mps or _is_smooth(look)):
             reason = f"its ends are {100.0 * apart_m:.1f} cm and {apart_mps:.2f} m/s apart"
             yield look.said("loops", ReservedTag.LOOPING, None, None, reason, apart_m)
+
+
+def _is_smooth(look: Look) -> bool:
+    """Whether speeds change no more from the last step of a clip to its first than they do between its frames."""
+    speeds = np.diff(look.own, axis=0)
+    ways = np.linalg.norm(np.diff(look.path.positions, axis=0), axis=-1)
+    across = np.concatenate((np.linalg.norm(speeds[0] - speeds[-1], axis=-1), [ways[0] - ways[-1]]))
+    within = np.column_stack((np.linalg.norm(np.diff(speeds, axis=0), axis=-1), np.diff(ways)))
+    return bool(np.mean(across**2) <= np.quantile(np.mean(within**2, axis=1), SMOOTH_SHARE))
 
 
 def _cuts(look: Look) -> Iterator[Proposal]:

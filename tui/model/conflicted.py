@@ -6,6 +6,7 @@ deleted would be a new row of the other. An edge: this reads and writes the disk
 
 from __future__ import annotations
 
+import contextlib
 import subprocess
 from pathlib import Path
 
@@ -29,10 +30,8 @@ def conflicts_in(path: str | Path) -> Merge[Table] | None:
         base, ours, theirs = (table_of(Table, raw, str(path), schema, settings) for raw in versions)
     except ContextDBError:
         return None
-    try:
+    with contextlib.suppress(ContextDBError):  # of a version of before that is no table
         base = table_of(Table, _before(Path(path)) or versions[0], str(path), schema, settings)
-    except ContextDBError:
-        pass  # the file had marks or was no table then, too
     return merge(base, ours, theirs)
 
 

@@ -178,8 +178,8 @@ class Renames:
 
     def _written(self, said: str) -> None:
         row, column = self.screen.session.sheet.cursor
+        self.screen.workspace.session(self.screen.table_name).sheet.go(row, column)
         self.screen.app.open_table(self.screen.table_name)
-        self.screen.app.main.session.sheet.go(row, column)
         self.screen.app.say_renamed(said)
 
 

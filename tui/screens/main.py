@@ -222,7 +222,8 @@ class MainScreen(Screen[None]):
     async def action_tab(self, name: str) -> None:
         """Go to a tab, which is made when it is first gone to."""
         if not self.query(f"#{name}"):
-            await self.query_one("#panes", ContentSwitcher).mount(self._new_pane(name))
+            with self.app.batch_update():
+                await self.query_one("#panes", ContentSwitcher).mount(self._new_pane(name))
         self._switch_to(name)
 
     def _switch_to(self, name: str) -> None:

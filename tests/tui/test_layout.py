@@ -198,3 +198,4 @@ def test_several_frozen_columns_share_half_of_the_window_and_none_vanishes_for_a
     assert layout([18, 17, *wide], 2, 9, 80).widths[:2] == (18, 17)
     assert layout([30, 20, *wide], 2, 9, 80).widths[:2] == (18, 18)
     assert layout([30, 7, *wide], 2, 9, 80).widths[:2] == (29, 7)
+    assert layout(wide, 2, 9, 0).n_frozen == 0  # before the window has a size

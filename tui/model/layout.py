@@ -115,7 +115,8 @@ def layout(widths: Sequence[int], n_frozen: int, n_rows: int, width: int) -> Lay
     if n_frozen == 1 and gutter + sum(widths) + sum(map(bool, widths)) > width:
         room = min(room, max((width - gutter) // 3, LEAST_FROZEN))
     frozen = list(widths[:n_frozen])
-    for _ in range(sum(frozen) + sum(map(bool, frozen)) - room):
+    excess = sum(frozen) + sum(map(bool, frozen)) - room
+    for _ in range(excess if frozen else 0):
         widest = max(range(n_frozen), key=frozen.__getitem__)
         frozen[widest] = max(frozen[widest] - 1, NARROWEST)
     return Layout((*frozen, *widths[n_frozen:]), n_frozen, gutter, width)

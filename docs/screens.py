@@ -145,7 +145,6 @@ _SCENES = {
         "The sheet of columns: each column a row, with its job, type, unit, bounds and values.",
         "locomotion",
         ("alt+j", "e", "down", "down", "right", "right"),
-        (120, 30),
     ),
     "coverage-pairs": Scene(
         "A map of pairs of conditions: how well the least covered combination of their values is covered.",

@@ -257,6 +257,19 @@ def test_a_new_column_is_read_with_its_faults_by_field(table: Table, form: NewCo
         assert now.columns[1].name == form.name
 
 
+def test_f6_inserts_a_new_column_from_its_name_and_from_a_list(table: Table):
+    for keys in (["f6"], ["enter", "f6"]):
+        app = DialogApp(AddColumn(table, 0))
+        seen = press(app, *"grip", *keys)
+        assert isinstance(app.answer, Insertion), seen
+        assert app.answer.columns[0].name == "grip"
+
+
+def test_every_job_of_a_new_column_stands_apart_from_what_it_means(table: Table):
+    seen = press(DialogApp(AddColumn(table, 0)), *"grip", "enter", "enter")
+    assert "cooldown_turns  picks" in seen
+
+
 def test_a_job_that_is_taken_is_told(table: Table):
     column, found = NewColumnForm("On", "enabled").read(table)
     assert not found

@@ -195,3 +195,12 @@ def test_a_wrong_sheet_stays_open_at_the_cell_and_is_discarded_by_a_key(folder):
     assert "! A column needs a name" in wrong
     assert not is_modified
     assert depth == 2
+
+
+def test_enter_after_a_run_of_tabs_goes_to_the_name_of_the_next_column(folder):
+    async def script(app, pilot):
+        await press(pilot, "alt+j", "e", *["down"] * 6, *"hp", "tab", "tab", *"int", "enter", *"mp", "enter")
+        table = app.screen.sheet.table
+        return [column.to_list()[-3:-1] for column in table.columns[:3]]
+
+    assert with_editor(folder / "t.csv", script, (120, 36)) == [["hp", "mp"], ["", ""], ["int", ""]]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -38,6 +39,29 @@ def test_a_file_with_marks_is_decided_and_then_opens_as_a_table(path, side, text
 def test_a_file_without_marks_or_without_tables_between_them_has_no_choices(path, raw):
     path.write_bytes(raw)
     assert conflicts_in(path) is None
+
+
+def test_a_row_that_one_side_deleted_and_the_other_changed_is_asked_for(tmp_path):
+    def git(*words: str) -> None:
+        who = ["-c", "user.name=a", "-c", "user.email=a@b", "-c", "commit.gpgsign=false", "-c", "merge.conflictStyle=merge"]
+        subprocess.run(["git", *who, *words], cwd=tmp_path, capture_output=True, check=words[0] != "merge")
+
+    def commit(raw: bytes) -> None:
+        (tmp_path / "t.csv").write_bytes(raw)
+        git("add", "t.csv")
+        git("commit", "-m", "t")
+
+    git("init", "-b", "design")
+    commit(b"Asset,speed\nwalk,1\nrun,2\n")
+    git("checkout", "-b", "art")
+    commit(b"Asset,speed\nwalk,1\nrun,3\n")
+    git("checkout", "design")
+    commit(b"Asset,speed\nwalk,1\n")
+    git("merge", "art")
+    found = conflicts_in(tmp_path / "t.csv")
+    assert [(c.asset, c.kind) for c in found.conflicts] == [("run", "row")]
+    write_decided(tmp_path / "t.csv", found)
+    assert (tmp_path / "t.csv").read_bytes() == b"Asset,speed\nwalk,1\n"
 
 
 def test_a_file_that_is_not_there_has_no_choices(path):

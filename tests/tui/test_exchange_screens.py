@@ -245,7 +245,7 @@ def test_a_path_is_completed_read_and_imported_with_the_keys_alone(table: Table)
     [answer], _ = played(importing(table), script)
     assert isinstance(answer, Import)
     assert texts(answer.edit.apply(table))["Depth"] == ["", "CB", "", "FS"]
-    assert any("semicolons" in note for note in answer.notes)
+    assert any("Semicolons" in note for note in answer.notes)
 
 
 def test_a_broken_file_stays_in_the_dialog_with_its_reason(table: Table):

@@ -191,3 +191,11 @@ def test_the_end_that_all_texts_have_in_common_is_found():
     assert shared_end(TextColumn.of("a", ["V1_Controller", "V2_Controller", ""])) == len("_Controller")
     assert shared_end(TextColumn.of("a", ["V1_x", "V2_x"])) == 0
     assert shared_end(TextColumn.of("a", ["V1_Controller"])) == 0
+
+
+def test_several_frozen_columns_share_half_of_the_window_and_none_vanishes_for_another():
+    wide = [18] * 10
+    assert layout([18, 17, *wide], 2, 9, 80).widths[:2] == (18, 17)
+    assert layout([30, 20, *wide], 2, 9, 80).widths[:2] == (18, 18)
+    assert layout([30, 7, *wide], 2, 9, 80).widths[:2] == (29, 7)
+    assert layout(wide, 2, 9, 0).n_frozen == 0  # before the window has a size

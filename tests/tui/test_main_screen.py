@@ -209,3 +209,15 @@ def test_every_tab_is_shown_in_every_window(path, size):
         return shown
 
     assert [text.count("\n") + 1 for text in with_editor(path, script, size)] == [size[1]] * 5
+
+
+def test_a_message_that_is_longer_than_the_line_is_seen_whole(path):
+    async def script(app, pilot):
+        app.main.say("Renamed a to b everywhere, in " + "some files, " * 8 + "and said so. Ctrl+Z takes it back.")
+        await press(pilot)
+        long = " ".join(screen_text(app).split())
+        app.main.say("Done.")
+        await press(pilot)
+        return "Ctrl+Z takes it back." in long, "Ctrl+Z" in screen_text(app), "Done." in screen_text(app)
+
+    assert with_editor(path, script) == (True, False, True)

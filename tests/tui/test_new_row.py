@@ -38,6 +38,10 @@ def test_tab_goes_on_in_the_new_row(path):
     assert rows_after(path, "down", "down", *"jog", "tab", "t", "enter") == [*BEFORE, ["jog", "True"]]
 
 
+def test_enter_goes_back_over_cells_that_tab_left_as_they_are(path):
+    assert rows_after(path, "tab", "f", "enter", *"jog", "enter") == [["walk", "False"], ["jog", "Any"]]
+
+
 def test_a_text_that_cannot_be_read_makes_no_row(path):
     assert rows_after(path, "right", "down", "down", *"maybe", "enter", "escape") == BEFORE
 

@@ -48,6 +48,7 @@ def test_a_rename_is_written_at_once_keeps_the_test_row_and_says_how_to_take_it_
         await press(pilot, *keys)
         sheet = app.main.session.sheet
         found = said(app), sheet.query.texts, sheet.query.n_valid, sheet.is_modified
+        assert sheet.cursor == (0, 1)
         now = texts(folder)
         await press(pilot, "ctrl+z", "ctrl+z")
         nothing = said(app)

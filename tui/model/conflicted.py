@@ -1,10 +1,13 @@
 """A file in which git, or `contextdb merge`, left a conflict between marks: its versions as choices, and the file without marks.
 
-An edge: this reads and writes the disk.
+Git writes no version of before between its usual marks. While the conflict lasts its index has one; without it a row that one side
+deleted would be a new row of the other. An edge: this reads and writes the disk, and runs git.
 """
 
 from __future__ import annotations
 
+import contextlib
+import subprocess
 from pathlib import Path
 
 from contextdb.disk import read_bytes, write_atomic
@@ -27,7 +30,18 @@ def conflicts_in(path: str | Path) -> Merge[Table] | None:
         base, ours, theirs = (table_of(Table, raw, str(path), schema, settings) for raw in versions)
     except ContextDBError:
         return None
+    with contextlib.suppress(ContextDBError):  # of a version of before that is no table
+        base = table_of(Table, _before(Path(path)) or versions[0], str(path), schema, settings)
     return merge(base, ours, theirs)
+
+
+def _before(path: Path) -> bytes:
+    """What git's index calls the common ancestor of a file in conflict; empty where git knows none."""
+    try:
+        done = subprocess.run(["git", "show", f":1:./{path.name}"], cwd=path.parent, capture_output=True, timeout=10, check=False)
+    except (OSError, subprocess.SubprocessError):
+        return b""
+    return done.stdout if done.returncode == 0 else b""
 
 
 def sides_in(path: str | Path) -> tuple[str, str]:

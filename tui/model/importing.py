@@ -226,7 +226,7 @@ class Draft:
 
     def answer(self) -> Import:
         """What the dialog gives back."""
-        return Import(self.edit(), self.notes)
+        return Import(self.edit(), tuple(note[:1].upper() + note[1:] for note in self.notes))
 
     def _name(self, column: Mapped) -> str:
         return self.table.asset_column if column.job == "asset" else column.name

@@ -106,20 +106,19 @@ class Layout:
 
 
 def layout(widths: Sequence[int], n_frozen: int, n_rows: int, width: int) -> Layout:
-    """The layout of columns of these widths. Frozen ones take at most half of the window, and about a third where not all columns
-    are seen: they are narrowed, or scroll too."""
+    """The layout of columns of these widths. Frozen ones take at most half of the window, and a single one about a third where not
+    all columns are seen: the widest are narrowed, or all scroll too."""
     gutter = len(str(n_rows)) + 3
     room = (width - gutter) // 2
     if room < (NARROWEST + 1) * n_frozen:
         n_frozen = 0
-    if gutter + sum(widths) + sum(map(bool, widths)) > width:
+    if n_frozen == 1 and gutter + sum(widths) + sum(map(bool, widths)) > width:
         room = min(room, max((width - gutter) // 3, LEAST_FROZEN))
     frozen = list(widths[:n_frozen])
     excess = sum(frozen) + sum(map(bool, frozen)) - room
-    for column in sorted(range(len(frozen)), key=lambda c: -frozen[c]):
-        cut = max(0, min(excess, frozen[column] - NARROWEST))
-        frozen[column] -= cut
-        excess -= cut
+    for _ in range(excess if frozen else 0):
+        widest = max(range(n_frozen), key=frozen.__getitem__)
+        frozen[widest] = max(frozen[widest] - 1, NARROWEST)
     return Layout((*frozen, *widths[n_frozen:]), n_frozen, gutter, width)
 
 

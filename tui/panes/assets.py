@@ -62,8 +62,6 @@ class AssetsPane(Pane):
         self.clipboard = clipboard
         self._search = Search("")
         self._edited = _Place()
-        self._run: tuple[int, int, int] | None = None
-        """After Tab the cell that it went to, and the column where the run of Tabs began."""
         self._typed_test: CellTest | None = None
         """The test of the filter that is being typed, which the next letter changes."""
 
@@ -246,13 +244,13 @@ class AssetsPane(Pane):
 
     def _run_start(self, event: CellEditor.Committed) -> int | None:
         """The column that Enter goes back to after a run of Tabs in one row; None where there was no such run."""
-        row, column = self.sheet.cursor
-        run = self._run if self._run is not None and self._run[:2] == (row, column) else None
-        if event.is_tab and self.sheet.block.n_cells == 1:
-            self._run = row, column + 1, column if run is None else run[2]
+        if self.sheet.block.n_cells > 1:
             return None
-        self._run = None
-        return run[2] if run is not None and event.down == 1 and self.sheet.block.n_cells == 1 else None
+        if event.is_tab:
+            self.grid.run.tab(*self.sheet.cursor)
+            return None
+        start = self.grid.run.enter(*self.sheet.cursor)
+        return start if event.down == 1 else None
 
     @on(CellEditor.Declared)
     def _declare(self, event: CellEditor.Declared) -> None:

@@ -1,6 +1,7 @@
 """The dialog Add Column: a declared condition, what is missing of a blueprint, or a new column.
 
-One field filters what there is and names what is new. Up and Down go through the list, Enter inserts what is highlighted.
+One field filters what there is and names what is new. Up and Down go through the list, Enter inserts what is highlighted
+or goes on to what a new column is; F6 inserts from every field.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ class AddColumn(Dialog[Insertion]):
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("up", "highlight(-1)", "Up", show=False),
         Binding("down", "highlight(1)", "Down", show=False),
+        Binding("f6", "insert", "Insert", show=False, priority=True),
     ]
 
     DEFAULT_CSS = """
@@ -53,7 +55,7 @@ class AddColumn(Dialog[Insertion]):
     """
 
     title_text = "Add a column"
-    keys_text = "↑↓ choose  Enter insert  Tab next field  Esc cancel"
+    keys_text = "↑↓ Enter choose · F6 insert · Tab next field · Esc cancel"
 
     def __init__(self, table: Table, column: int) -> None:
         """`column` is that of the cursor."""
@@ -71,7 +73,8 @@ class AddColumn(Dialog[Insertion]):
         yield OptionList(id="column-list", compact=True)
         yield Static(id="column-about")
         with Vertical(id="column-form"):
-            jobs = [(f"{job:<11}{words}", job) for job, words in JOB_WORDS.items()]
+            width = max(map(len, JOB_WORDS)) + 2
+            jobs = [(f"{job:<{width}}{words}", job) for job, words in JOB_WORDS.items()]
             yield Field("What it is", Select(jobs, compact=True, allow_blank=False, id="column-job"), key="job")
             kinds = [(f"{name:<8}{kind.words}", name) for name, kind in KINDS.items()]
             yield Field("Type", Select(kinds, compact=True, allow_blank=False, id="column-type"), key="type")
@@ -161,23 +164,23 @@ class AddColumn(Dialog[Insertion]):
             self._say()
             self.query_one("#column-job").focus()
         else:
-            self._insert()
+            self.action_insert()
 
     @on(OptionList.OptionSelected)
     def _selected(self) -> None:
         if self._choice() is None:
             self.query_one("#column-job").focus()
         else:
-            self._insert()
+            self.action_insert()
 
     @on(Button.Pressed)
     def _pressed(self, event: Button.Pressed) -> None:
         if event.button.id == "column-insert":
-            self._insert()
+            self.action_insert()
         else:
             self.action_cancel()
 
-    def _insert(self) -> None:
+    def action_insert(self) -> None:
         """Give back what to insert, unless something is wrong with it: that is shown then."""
         at = int(str(self.query_one("#column-where", Select).value))
         choice = self._choice()

@@ -70,7 +70,7 @@ class Blueprints(Dialog[BlueprintAnswer]):
     """
 
     title_text = "Blueprints"
-    keys_text = "Enter insert what is missing  Del remove  Tab next  Esc cancel"
+    keys_text = "Enter insert what is missing · Del remove · Tab next · Esc cancel"
 
     def __init__(self, table: Table, selected: Sequence[str], column: int) -> None:
         """`selected` are the names of the selected columns, `column` is that of the cursor."""

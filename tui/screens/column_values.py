@@ -49,7 +49,7 @@ class ValuesDialog(Dialog[ValuesAnswer]):
         & #values-detail { height: auto; min-height: 1; max-height: 3; color: $text-muted; }
     }
     """
-    keys_text = "Enter only · N not · Space tick · M mend · R replace · E rename"
+    keys_text = "Enter only · N not · Space tick · M mend · R replace · E rename · Esc"
 
     def __init__(self, sheet: ShownTable, column: int) -> None:
         super().__init__()

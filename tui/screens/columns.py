@@ -43,7 +43,7 @@ class ColumnsDialog(Dialog[ColumnsAnswer]):
     }
     """
     title_text = "Columns"
-    keys_text = "Enter go there · Space hide · G fold · F freeze · E edit all · Esc"
+    keys_text = "Enter go · Space hide · G fold · F freeze · E edit all · Esc close"
 
     def __init__(self, sheet: ShownTable) -> None:
         super().__init__()

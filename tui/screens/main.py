@@ -79,6 +79,7 @@ class MainScreen(Screen[None]):
         layout: vertical;
         & > ContentSwitcher { height: 1fr; & > * { height: 1fr; } }
         & > #said { height: auto; max-height: 4; padding: 0 1; background: $surface; display: none; }
+        & > #said.-information { display: block; }
         & > #said.-warning { display: block; color: $text-warning; }
         & > #said.-error { display: block; color: $text-error; text-style: bold; }
     }
@@ -167,12 +168,14 @@ class MainScreen(Screen[None]):
         """Say something in the line over the footer; nothing takes away what was said."""
         is_quiet = level == "information"
         self._is_of_verb = False
-        self.query_one(StatusLine).show(text if is_quiet else "")
+        status = self.query_one(StatusLine)
+        is_short = is_quiet and status.has_room(text)
+        status.show(text if is_short else "")
         if (text, level) != self._said:
             self._said = (text, level)
             said = self.query_one("#said", Static)
-            said.set_classes("" if is_quiet else f"-{level}")
-            said.update(Text("" if is_quiet else f"! {text}"))
+            said.set_classes("" if is_short else f"-{level}")
+            said.update(Text("" if is_short else text if is_quiet else f"! {text}"))
 
     @on(Told)
     def _told(self, event: Told) -> None:
@@ -219,7 +222,8 @@ class MainScreen(Screen[None]):
     async def action_tab(self, name: str) -> None:
         """Go to a tab, which is made when it is first gone to."""
         if not self.query(f"#{name}"):
-            await self.query_one("#panes", ContentSwitcher).mount(self._new_pane(name))
+            with self.app.batch_update():
+                await self.query_one("#panes", ContentSwitcher).mount(self._new_pane(name))
         self._switch_to(name)
 
     def _switch_to(self, name: str) -> None:

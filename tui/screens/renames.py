@@ -177,6 +177,8 @@ class Renames:
         self.screen.app.push_screen(ChooseDialog(f"Rename {old} to {new}", lines, about=f"{about}\n{WRITTEN}"), chosen)
 
     def _written(self, said: str) -> None:
+        row, column = self.screen.session.sheet.cursor
+        self.screen.workspace.session(self.screen.table_name).sheet.go(row, column)
         self.screen.app.open_table(self.screen.table_name)
         self.screen.app.say_renamed(said)
 

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from textual import on
-from textual.binding import Binding, BindingType
 from textual.content import Content
 from textual.geometry import Size
 from textual.message import Message
@@ -23,10 +22,6 @@ from tui.widgets.grid import Grid
 class SmallGrid(Grid):
     """The grid of a dialog."""
 
-    BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("tab", "move(0, 1, False)", show=False),
-        Binding("shift+tab", "move(0, -1, False)", show=False),
-    ]
     has_test_row: ClassVar[bool] = False
     has_new_row: ClassVar[bool] = False
 
@@ -124,11 +119,15 @@ class SheetDialog(Dialog[Answer]):
             return
         self._close_editor()
         self.sheet.with_room()
-        row, column = self.sheet.cursor
-        if event.down > 0 and column == len(self.sheet.table.columns) - 1 and self.sheet.block.n_cells == 1:
-            self.sheet.go(row + 1, 0)  # the next actor
-        elif not event.is_fill:
+        start = None
+        if event.is_tab:
+            self.grid.run.tab(*self.sheet.cursor)
+        elif event.down == 1 and self.sheet.block.n_cells == 1:
+            start = self.grid.run.enter(*self.sheet.cursor)
+        if not event.is_fill:
             self.sheet.select(lambda s, shape: s.next_cell(event.down, event.right, shape))
+        if start is not None:
+            self.sheet.go(self.sheet.cursor[0], start)
         self.show_sheet()
 
     @on(CellEditor.Cancelled)

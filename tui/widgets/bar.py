@@ -134,6 +134,11 @@ class StatusLine(Widget):
             self._texts = texts
             self.refresh()
 
+    def has_room(self, left: str) -> bool:
+        """Whether a text at the left would be seen whole; so it is before the line has a size."""
+        right = self._texts[1]
+        return not self.size.width or cell_len(left) + 1 <= self.size.width - (cell_len(right) + 2 if right else 0)
+
     def render_line(self, y: int) -> Strip:
         left, right = self._texts
         width, style = self.size.width, self.rich_style

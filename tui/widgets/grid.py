@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from textual import events
-from textual.binding import BindingType
+from textual.binding import Binding, BindingType
 from textual.geometry import Region
 from textual.message import Message
 
@@ -21,6 +21,7 @@ from tui.messages import Edited, Told
 from tui.model.clipboard import asks_how_to_read
 from tui.model.selection import Selection
 from tui.model.sheet import Done, Sheet
+from tui.model.tab_run import TabRun
 from tui.model.views import Sort
 from tui.widgets.grid_view import GridView
 from tui.widgets.pointer import Pointer
@@ -29,7 +30,11 @@ from tui.widgets.pointer import Pointer
 class Grid(GridView, can_focus=True):
     """A spreadsheet."""
 
-    BINDINGS: ClassVar[list[BindingType]] = bindings(GRID)
+    BINDINGS: ClassVar[list[BindingType]] = [
+        *bindings(GRID),
+        Binding("tab", "tab(1)", show=False),
+        Binding("shift+tab", "tab(-1)", show=False),
+    ]
 
     @dataclass
     class EditWanted(Message):
@@ -90,6 +95,7 @@ class Grid(GridView, can_focus=True):
         super().__init__(sheet)
         self.test_name = ""
         """Where the context of the test row comes from."""
+        self.run = TabRun()
         self._pointer = Pointer(self)
 
     def post_message(self, message: Message) -> bool:
@@ -129,6 +135,14 @@ class Grid(GridView, can_focus=True):
         if self.is_in_test_row and self._move_fields(right):
             return
         self.moving(lambda: self.sheet.move(down, right, extend and not self.is_in_test_row))
+
+    def action_tab(self, by: int) -> None:
+        """Tab, and Shift+Tab: through the selected cells where there are several, else on by one."""
+        if self.sheet.block.n_cells > 1 and not self.is_in_test_row:
+            self.moving(lambda: self.sheet.select(lambda s, shape: s.next_cell(0, by, shape)))
+            return
+        self.run.tab(*self.sheet.cursor, by)
+        self.action_move(0, by, False)
 
     def _go_below(self) -> bool:
         """From the last row to the empty one, and from there to the test row; gives whether there is one to go to."""

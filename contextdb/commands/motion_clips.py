@@ -13,7 +13,7 @@ from pathlib import Path
 from contextdb.commands.progress import MANY_CLIPS, bar
 from contextdb.console import printable
 from contextdb.disk import path_in_quotes
-from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, nearest, plural
+from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, nearest, plural, some
 from contextdb.motion.clips.clip import CENTIMETRE, UPS, Clip, Up, load_bvh
 from contextdb.motion.clips.doubts import LEAST_BODY_M, UNITS, USUAL_BODY_M, measure
 from contextdb.motion.storage.clip_files import paths_of
@@ -72,8 +72,8 @@ def unit_of(text: str) -> float:
     return value
 
 
-def clips_of(path: str, metres_per_unit: float | None, up: Up | None) -> FolderClips:
-    """Read the clips of a folder.
+def clips_of(path: str, metres_per_unit: float | None, up: Up | None, *, alone: bool = False) -> FolderClips:
+    """Read the clips of a folder; with `alone` none of databases with roles, whose assets are several clips each.
 
     Raises
     ------
@@ -85,6 +85,8 @@ def clips_of(path: str, metres_per_unit: float | None, up: Up | None) -> FolderC
     if (folder / SCHEMA_FILE).is_file():
         schema = read_folder_schema(folder)
         found.config = MotionConfig.from_dict(schema.motion, file=schema.file)
+    if alone:
+        _leave_out_roles(found)
     files = _files(found, metres_per_unit, up)
     if not files:
         raise FileError(Fault("there is no BVH file in this folder or below it.", "*.bvh", place=Place(str(folder))))
@@ -139,6 +141,19 @@ def _files(found: FolderClips, unit: float | None, up: Up | None) -> dict[Path, 
         return files
     every = (Path(at) / name for at, _, names in os.walk(found.folder) for name in names if name.lower().endswith(".bvh"))
     return dict.fromkeys(sorted(every), (unit, up or "y"))
+
+
+def _leave_out_roles(found: FolderClips) -> None:
+    """Go on without databases with roles, and tell of it."""
+    databases = found.config.databases
+    joint = [name for name, settings in databases.items() if settings.roles]
+    if not joint:
+        return
+    told = f"{some(joint)} {'has' if len(joint) == 1 else 'have'} roles: an asset is a clip for each, and its row is made by hand."
+    if len(joint) == len(databases):
+        raise ContextDBError(Fault(told, "a database without roles", place=Place(found.config.file)))
+    found.notes.append(f"left out: {told}")
+    found.config = replace(found.config, databases={name: databases[name] for name in databases if name not in joint})
 
 
 def _read(found: FolderClips, file: Path, unit: float, up: Up) -> None:

@@ -23,7 +23,7 @@ from contextdb.commands import add_format_arguments
 from contextdb.commands.coverage_command import percent
 from contextdb.commands.motion_build_command import MotionProject
 from contextdb.commands.progress import building_bar
-from contextdb.console import ExitCode, output, terminal_width, wants_colour
+from contextdb.console import ExitCode, output, printable, terminal_width, wants_colour
 from contextdb.disk import read_bytes, write_atomic
 from contextdb.errors import ContextError, Fault, Place, in_quotes, nearest, some
 from contextdb.motion.measuring.near_clips import NEAR_COST
@@ -97,6 +97,10 @@ def _results(arguments: argparse.Namespace, earlier: Mapping[str, Earlier] | Non
             pattern=pattern,
             near_cost=arguments.near,
             progress=progress,
+        )
+    if joint := [name for name, settings in project.config.databases.items() if settings.roles]:
+        print(
+            printable(f"contextdb: left out: {some(joint)}, whose clips are cast and chosen together, by roles."), file=sys.stderr
         )
     measured = []
     for motion in found.tables:

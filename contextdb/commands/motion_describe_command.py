@@ -48,7 +48,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         raise ContextDBError(Fault("--out makes a table, --into fills one.", "one of the two"))
     if arguments.update and not arguments.into:
         raise ContextDBError(Fault("--update replaces cells of a table.", "--into TABLE --update"))
-    found = clips_of(arguments.path, arguments.metres_per_unit, arguments.up)
+    found = clips_of(arguments.path, arguments.metres_per_unit, arguments.up, alone=True)
     if not found.clips:
         raise ContextDBError(*(Fault(message) for message in found.left_out))
     with progress_of("describing") as tell:

@@ -16,6 +16,7 @@ from contextdb.cells.grammar import parse_cell
 from contextdb.columns import TextColumn
 from contextdb.disk.together import NewFile, write_together
 from contextdb.errors import ContextDBError, Fault, FileError, Place, TableError
+from contextdb.files.file_names import require_new_table_name
 from contextdb.files.texts import AnySource, new_source
 from contextdb.motion.preparing.cells_of_clips import CONDITIONS, OUTPUTS
 from contextdb.motion.preparing.describing import Described, Sections, condition_sections, table_section
@@ -96,13 +97,14 @@ def new_table(path: Path, rows: Sequence[Described], motion: Sections) -> Descri
     Raises
     ------
     FileError
-        The file is there already.
+        The file is there already, or no table can have its name.
     ContextDBError
         contextdb.toml cannot be read, or declares the conditions so that the cells cannot be read.
     """
     if path.exists():
         found = "the file is there already."
         raise FileError(Fault(found, "a file that is new", f"--into {path}, which fills what is missing", Place(str(path))))
+    require_new_table_name(path)
     names = (ASSET, *CONDITIONS, *OUTPUTS)
     columns = [TextColumn.of(name, ([row.asset, *row.cells.values()][i] for row in rows)) for i, name in enumerate(names)]
     return _with_settings(path, columns, rows, motion)

@@ -13,7 +13,7 @@ from typing import Any
 from contextdb.cells.arguments import require_kind, require_mapping
 from contextdb.covering.clip_contexts import TableContexts, asked_axes, clip_contexts, is_axis
 from contextdb.covering.space import require_counts
-from contextdb.errors import ContextError, Fault, in_quotes, nearest, some
+from contextdb.errors import ContextError, Fault, MotionError, Place, in_quotes, nearest, some
 from contextdb.motion.measuring.coverage import ContextCoverage, MotionCoverage, coverage
 from contextdb.motion.measuring.moves import DIRECTION, MAPS, SPEED, TURN
 from contextdb.motion.measuring.near_clips import NEAR_COST
@@ -120,6 +120,7 @@ def _context_json(each: ContextCoverage) -> dict[str, object]:
 class ProjectMotion:
     """The motion coverage of a project: of each table with clips, then of the databases without a table.
 
+    Databases with roles are left out: their clips are chosen together, so none fills a movement alone.
     `unlisted` are the clips that no table has a row for, though a database that they fit names one.
     """
 
@@ -158,7 +159,7 @@ def motion_coverage(
     Raises
     ------
     MotionError, FileError, SchemaError
-        What building the databases raises; also when none is declared.
+        What building the databases raises; also when none is declared, or each has roles.
     ContextError
         An argument of another type, or a condition of `axes` that no table with clips has.
     """
@@ -174,8 +175,11 @@ def motion_coverage(
     missing, unlisted = unmatched(config.databases.values(), project.folder, assets)
     groups: dict[str | None, dict[str, MotionDatabase]] = {}
     for name, settings in config.databases.items():
-        if name in built:
+        if name in built and not settings.roles:
             groups.setdefault(settings.table, {})[name] = built[name]
+    if built and not groups:
+        joint = "every database has roles: its clips are cast and chosen together, by facts of several actors."
+        raise MotionError(Fault(joint, "a database without roles, whose clips play alone", place=Place(config.file)))
     tables = {name: table for name, table in project.tables.items() if name in groups}
     asked = _axes(tables, axes)
     options: dict[str, Any] = {"pattern": pattern, "near_cost": near_cost, "progress": progress}

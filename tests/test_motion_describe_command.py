@@ -189,6 +189,15 @@ def test_a_table_of_clips_that_play_together_gets_no_row_for_each_role(game: Pat
     assert [line.partition(",")[0] for line in result.lines[1:]] == ["walk", "walk_turn_left_90", "walk_turn_right_90"]
 
 
+def test_a_clip_of_an_absurd_rate_is_left_out(game: Path):
+    walk = game / "clips" / "walk.bvh"
+    text = walk.read_text(encoding="utf-8")
+    time = next(line for line in text.splitlines() if line.startswith("Frame Time:"))
+    walk.write_text(text.replace(time, "Frame Time: 1e-300"), encoding="utf-8")
+    assert "walk.bvh: the frame time is 1e-300 s" in describe("game/clips", code=1).err
+    assert "left out" in run("motion", "prepare", "game/clips", "--only", "contacts").err
+
+
 def test_no_table_is_made_under_a_name_that_windows_keeps(game: Path):
     assert "Windows keeps the name con" in describe("game/clips", "--out", "game/con.csv", code=2).err
     assert sorted(path.name for path in game.iterdir()) == ["clips"]

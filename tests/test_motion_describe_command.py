@@ -189,6 +189,14 @@ def test_a_table_of_clips_that_play_together_gets_no_row_for_each_role(game: Pat
     assert [line.partition(",")[0] for line in result.lines[1:]] == ["walk", "walk_turn_left_90", "walk_turn_right_90"]
 
 
+def test_a_clip_whose_name_begins_with_an_at_sign_is_an_asset_and_no_table(game: Path):
+    put(game, "walk", "@walk")
+    describe("game/clips", "--out", "game/moves.csv")
+    assert '"@walk"' in [row[0] for row in rows(game / "moves.csv")]
+    assert run("check", "game").code == 0
+    assert "0 cells filled, 0 rows added" in describe("game", "--into", "game/moves.csv").out
+
+
 def test_a_clip_of_an_absurd_rate_is_left_out(game: Path):
     walk = game / "clips" / "walk.bvh"
     text = walk.read_text(encoding="utf-8")

@@ -97,16 +97,28 @@ def batch(reader: str, first: int) -> tuple[int, list[tuple[int, str]]]:
     with tempfile.TemporaryDirectory() as folder:
         progress = Path(folder) / "progress"
         command = [sys.executable, __file__, "--child", reader, str(first), str(progress)]
-        try:
-            code = subprocess.run(command, stderr=subprocess.DEVNULL, timeout=HANG_S, check=False).returncode
-            end = f"the process ended with {code}" if code else ""
-        except subprocess.TimeoutExpired:
-            end = f"no answer after {HANG_S:.0f} s"
+        end = how_it_ended(command, progress)
         lines = [line.partition(" ") for line in progress.read_text("utf-8").splitlines()]
     found = [(int(seed), why) for seed, _, why in lines if why]
     if end:
         found.append((int(lines[-1][0]), end))
     return len(lines), found
+
+
+def how_it_ended(command: Sequence[str], progress: Path) -> str:
+    """Run a batch to its end, or until it goes no further for HANG_S; nothing where all was read."""
+    process, told = subprocess.Popen(command, stderr=subprocess.DEVNULL), -1
+    progress.touch()
+    while (size := progress.stat().st_size) != told:
+        told = size
+        try:
+            code = process.wait(HANG_S)
+        except subprocess.TimeoutExpired:
+            continue  # a busy machine may take so long for a batch
+        return f"the process ended with {code}" if code else ""
+    process.kill()
+    process.wait()
+    return f"no answer after {HANG_S:.0f} s"
 
 
 def keep(reader: str, seed: int) -> Path:

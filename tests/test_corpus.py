@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import pytest
-from fuzz import BATCH, CORPUS, batch, input_of
+from fuzz import BATCH, CORPUS, batch, how_it_ended, input_of
 from fuzz_readers import READERS, examples, read_bytes
 
 FILES = sorted(path for path in CORPUS.rglob("*") if path.is_file())
@@ -29,3 +30,13 @@ def test_a_reader_reads_its_whole_examples_and_some_damaged_ones(reader: str):
 def test_a_seed_means_one_input_and_a_batch_finds_nothing_in_a_sound_reader():
     assert input_of("cells", 7) == input_of("cells", 7) != input_of("cells", 8)
     assert batch("journal", 0) == (BATCH, [])
+
+
+def test_a_batch_that_goes_no_further_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("fuzz.HANG_S", 0.05)
+    waits = [sys.executable, "-c", "import threading; threading.Event().wait()"]
+    assert how_it_ended(waits, tmp_path / "progress") == "no answer after 0 s"
+
+
+def test_how_a_process_ended_is_told(tmp_path: Path):
+    assert how_it_ended([sys.executable, "-c", "raise SystemExit(3)"], tmp_path / "progress") == "the process ended with 3"

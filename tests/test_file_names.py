@@ -146,6 +146,15 @@ def test_a_table_is_made_under_no_name_that_windows_keeps(tmp_path, name):
     assert sorted(os.listdir(tmp_path)) == ["f.csv"]
 
 
+@pytest.mark.parametrize("name", ["moves.notes", "moves.CASES", ".moves"])
+def test_a_table_is_made_under_no_name_that_tables_do_not_have(tmp_path, name):
+    (tmp_path / "f.csv").write_bytes(RAW)
+    result = run("import", tmp_path / "f.csv", tmp_path / f"{name}.csv")
+    assert (result.code, "saved contexts or notes" in result.err) == (2, True)
+    assert name_fault(tmp_path, name, ())
+    assert os.listdir(tmp_path) == ["f.csv"]
+
+
 @pytest.mark.parametrize("name", ["walk", "console", "com", "com10", "lpt", "null", "a.con", "mövès", "walk run", ".con"])
 def test_other_names_are_as_good_as_ever(tmp_path, name):
     assert why_unportable(f"{name}.csv") == ""

@@ -211,6 +211,14 @@ def test_a_meaning_that_cannot_be_looked_at_is_told_of_the_named_file_not_of_git
     assert "ours.csv" not in result.err
 
 
+def test_notes_are_no_table_so_that_nothing_is_told_of_their_meaning(here):
+    base = 'Asset,Column,Note,Colour\nwalk,speed,"first, note",\nrun,gait,second,\n'
+    sides = {"ours": base.replace("first", "ours"), "theirs": base.replace("second", "theirs")}
+    result = run("merge", *put(base=base, **sides), "--path", "moves.notes.csv")
+    assert (result.code, result.err) == (0, "")
+    assert read("ours.csv") == base.replace("first", "ours").replace("second", "theirs")
+
+
 def test_an_overlap_that_neither_side_had_is_told_where_the_policy_is_unique(here):
     (here / "contextdb.toml").write_text(PAIR.replace("POLICY", "unique"), encoding="utf-8")
     base = "A,speed\nslow,0..4\nfast,6..10\n"

@@ -149,6 +149,16 @@ def test_features_that_say_that_the_hips_are_the_root_are_left_alone(game: Path)
     assert prepare("game", "--only", "roots").out == ""
 
 
+def test_clips_that_play_together_are_not_taken_for_duplicates_of_each_other(game: Path):
+    for role in ("Host", "Guest"):
+        shutil.copy(game / "clips" / "stop_walk.bvh", game / "clips" / f"shake.{role}.bvh")
+    toml = TOML.replace("clips/*.bvh", "clips/shake.*.bvh") + 'roles = ["Host", "Guest"]\n'
+    (game / "contextdb.toml").write_text(toml, encoding="utf-8")
+    found = prepare("game", "--json", code=1).json["proposals"]
+    assert {each["kind"] for each in found} <= {"roots", "contacts", "noise"}
+    assert {each["asset"] for each in found if each["kind"] == "contacts"} == {"shake.Host", "shake.Guest"}
+
+
 def test_markup_that_cannot_be_read_stops_it(game: Path):
     (game / "clips" / "marks.csv").write_text("asset,tag,from,to\nwalk,DoNotChose,,\n", encoding="utf-8")
     assert "DoNotChoose" in prepare("game/clips", "--write", code=2).err

@@ -36,6 +36,13 @@ def database(path: Path) -> None:
     save_database(features, path)
 
 
+def poses(path: Path) -> None:
+    clips = [motion.make_clip("idle").clip]
+    channels = [{"type": "position", "bone": "LeftFoot"}]
+    schema = motion.FeatureSchema.from_dict("loco", {"rate": 10.0, "channels": channels})
+    motion.save_poses(motion.PoseBank.build(clips, schema), path)
+
+
 def session(path: Path) -> None:
     motion.Trace().save(path)
 
@@ -55,6 +62,7 @@ MAKERS: dict[str, Callable[[Path], None]] = {
     "t.safetensors": compiled,
     "t.parquet": table,
     "jog.motion.safetensors": database,
+    "jog.poses.safetensors": poses,
     "session.parquet": session,
     "coverage.json": report,
     "t.csv.journal": journal,
@@ -127,6 +135,12 @@ def test_what_is_no_file_of_ours_exits_with_2(name: str, said: str):
 def test_a_document_of_another_program_is_neither_whole_nor_damaged(tmp_path: Path):
     (tmp_path / "package.json").write_text('{"name": "x"}', encoding="utf-8")
     result = run("verify", str(tmp_path / "package.json"), "--json")
+    assert (result.code, result.json["files"][0]["state"]) == (0, "no-digest")
+
+
+def test_a_report_of_motion_coverage_is_not_taken_for_one_of_coverage(tmp_path: Path):
+    (tmp_path / "motion.json").write_text('{"format": 1, "passed": true, "bins": {}, "tables": []}', encoding="utf-8")
+    result = run("verify", str(tmp_path / "motion.json"), "--json")
     assert (result.code, result.json["files"][0]["state"]) == (0, "no-digest")
 
 

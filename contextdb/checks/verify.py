@@ -75,12 +75,16 @@ def _safetensors(path: Path) -> Told:
     from contextdb.compiled.artefact import COMPILED, open_artefact
     from contextdb.files.tensors import metadata_of
     from contextdb.motion.storage.feature_cache import CLIP_FEATURES
+    from contextdb.motion.storage.pose_files import STORED_POSES, open_poses
     from contextdb.motion.storage.stored import STORED, open_database
 
     keys = metadata_of(path, COMPILED)
     if STORED.key in keys:
         yield "motion database", None
         open_database(path, verify=True)
+    elif STORED_POSES.key in keys:
+        yield "pose bank", None
+        open_poses(path, verify=True)
     elif CLIP_FEATURES.key in keys:
         yield "features of a clip", "cached by a build; the next build checks them and computes altered ones again"
     else:
@@ -133,12 +137,17 @@ def _json(path: Path) -> Told:
         document = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise ArtefactError(Fault(f"the file is not JSON: {error}.", ACCEPTED)) from None
-    if not isinstance(document, dict) or not {"format", "tables"} <= document.keys():
+    if not isinstance(document, dict) or not _is_coverage(document):
         yield "JSON", "a document of another program, or of another command; nothing to compare"
         return
     read_baseline(text, str(path))
     if "digest" not in document:
         yield "coverage report", "it reads as a baseline; it was written without a digest, by an older version"
+
+
+def _is_coverage(document: Mapping[str, object]) -> bool:
+    """Whether a document is of `coverage`: that of `motion coverage` has tables too, and says how movements were put into bins."""
+    return {"format", "tables"} <= document.keys() and "bins" not in document
 
 
 def _journal(path: Path) -> Told:

@@ -33,7 +33,7 @@ from contextdb.exchange.importing import (
 )
 from contextdb.exchange.mapping import JOBS, Mapped, as_job, as_type, propose
 from contextdb.exchange.reading import Reading, listed
-from contextdb.files.file_names import why_unportable
+from contextdb.files.file_names import require_new_table_name
 from contextdb.schema.shapes import KIND_SYNONYMS
 from contextdb.tables.project import SCHEMA_FILE
 
@@ -105,8 +105,7 @@ def _target(text: str, may_overwrite: bool) -> Path:
     if target.suffix.lower() not in TABLE_SUFFIXES:
         mend = path_in_quotes(target.with_suffix(".csv")) if target.name else ""
         raise FileError(Fault("a table file does not end so.", f"a name that ends in {' or '.join(TABLE_SUFFIXES)}", mend, place))
-    if why := why_unportable(target.name):
-        raise FileError(Fault(f"this is not a valid table name: {why}.", "a name that every system can have", place=place))
+    require_new_table_name(target)
     if not os.path.isdir(target.parent):
         folder = path_in_quotes(target.parent)
         raise FileError(Fault(f"there is no folder {folder}.", "a folder of tables", place=place, rule="no-such-path"))

@@ -28,7 +28,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from contextdb.console import ExitCode, printable
-from contextdb.disk import read_bytes, write_atomic
+from contextdb.disk import names_a_table, read_bytes, write_atomic
 from contextdb.edits.diffing import diff
 from contextdb.edits.diffing.lines import merged_lines
 from contextdb.edits.diffing.markers import with_markers
@@ -100,7 +100,7 @@ def _told(found: Merge[Table], path: Path, is_text: bool, arguments: argparse.Na
 
 def _tell_meaning(found: Merge[Table], path: Path) -> bool:
     """Tell what the merge brings that neither side had, and whether that is anything."""
-    if not (diff(found.base, found.ours) and diff(found.base, found.theirs)):
+    if not names_a_table(path.name) or not (diff(found.base, found.ours) and diff(found.base, found.theirs)):
         return False
     from contextdb.checks.effects import merge_effects
     from contextdb.covering import format_percent

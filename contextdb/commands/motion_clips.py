@@ -28,6 +28,8 @@ Wanted = Callable[[Databases], Databases]
 """What leaves of the databases of a project those that are wanted: one or more."""
 LEAST_USUAL_M, MOST_USUAL_M = 0.9, 2.6
 """How tall a body is, in a unit that may be right."""
+MOST_RATE = 1e6
+"""Frames a second: speeds of a clip that has more of them are no numbers to reckon with."""
 
 
 @dataclass
@@ -168,6 +170,10 @@ def _read(found: FolderClips, file: Path, unit: float, up: Up) -> None:
         return
     if clip.n_frames == 0:
         found.left_out.append(f"{file}: the clip has no frame (Frames: 0).")
+        return
+    if clip.rate > MOST_RATE:
+        told = f"the frame time is {clip.frame_time_s!r} s."
+        found.left_out.append(str(Fault(told, f"{1.0 / MOST_RATE:g} or more", place=Place(str(file)))))
         return
     found.clips.append(clip)
     found.paths.append(file)

@@ -28,6 +28,7 @@ from contextdb.errors import ContextDBError, Fault, plural, some
 from contextdb.files.toml_text import as_toml
 from contextdb.motion.preparing.describing import COLUMNS, Described, Sections, by_rig, describe, mirror_of, motion_sections
 from contextdb.report.render_json import as_json
+from contextdb.tables.nesting.names import asset_text
 from contextdb.tables.project import schema_for, settings_of
 
 
@@ -156,7 +157,7 @@ def _text(rows: Sequence[Described]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow((ASSET, *COLUMNS))
-    writer.writerows([row.asset, *row.cells.values()] for row in rows)
+    writer.writerows([asset_text(row.asset), *row.cells.values()] for row in rows)
     return text.getvalue()
 
 

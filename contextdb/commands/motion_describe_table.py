@@ -16,12 +16,14 @@ from contextdb.cells.grammar import parse_cell
 from contextdb.columns import TextColumn
 from contextdb.disk.together import NewFile, write_together
 from contextdb.errors import ContextDBError, Fault, FileError, Place, TableError
+from contextdb.files.file_names import require_new_table_name
 from contextdb.files.texts import AnySource, new_source
 from contextdb.motion.preparing.cells_of_clips import CONDITIONS, OUTPUTS
 from contextdb.motion.preparing.describing import Described, Sections, condition_sections, table_section
 from contextdb.schema.sections import settings_to_dict
 from contextdb.schema.settings import Schema, read_schema
 from contextdb.schema.toml_edit import absent, add_sections, set_key
+from contextdb.tables.nesting.names import asset_name, asset_text
 from contextdb.tables.project import SCHEMA_FILE, load_table, schema_for, settings_of
 from contextdb.tables.table import Table
 
@@ -96,15 +98,18 @@ def new_table(path: Path, rows: Sequence[Described], motion: Sections) -> Descri
     Raises
     ------
     FileError
-        The file is there already.
+        The file is there already, or no table can have its name.
     ContextDBError
         contextdb.toml cannot be read, or declares the conditions so that the cells cannot be read.
     """
     if path.exists():
         found = "the file is there already."
         raise FileError(Fault(found, "a file that is new", f"--into {path}, which fills what is missing", Place(str(path))))
+    require_new_table_name(path)
     names = (ASSET, *CONDITIONS, *OUTPUTS)
-    columns = [TextColumn.of(name, ([row.asset, *row.cells.values()][i] for row in rows)) for i, name in enumerate(names)]
+    columns = [
+        TextColumn.of(name, ([asset_text(row.asset), *row.cells.values()][i] for row in rows)) for i, name in enumerate(names)
+    ]
     return _with_settings(path, columns, rows, motion)
 
 
@@ -118,14 +123,14 @@ def filled_table(path: Path, rows: Sequence[Described], motion: Sections, *, upd
     """
     before = load_table(path, strict=False)
     known = {row.asset: row for row in rows}
-    assets = before.assets
+    assets = [asset_name(cell) for cell in before.assets]
     columns = list(before.columns)
     columns += [TextColumn.of(name, [""] * before.n_rows) for name in (*CONDITIONS, *OUTPUTS) if name not in _names(columns)]
     added = [row for row in rows if row.asset not in set(assets)]
     filled, differences = 0, []
     for i, column in enumerate(columns):
         if column.name == before.asset_column:
-            columns[i] = column.with_inserted(before.n_rows, [row.asset for row in added])
+            columns[i] = column.with_inserted(before.n_rows, [asset_text(row.asset) for row in added])
             continue
         texts = [row.cells.get(column.name, "") for row in added]
         for at, asset in enumerate(assets):

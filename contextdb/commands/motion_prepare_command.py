@@ -42,6 +42,8 @@ from contextdb.tables.project import SCHEMA_FILE
 
 BOM = "\ufeff"
 ROOT_KEY = "root_smooth_s"
+JOINT_KINDS = ("roots", "contacts", "noise")
+"""What is proposed for clips with roles: two people may move alike, and where they meet only a person can say."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -74,6 +76,8 @@ class MarkupFile:
 
     path: Path
     clips: list[Clip] = field(default_factory=list)
+    joint: list[Clip] = field(default_factory=list)
+    """Those of databases with roles: they are entered and left together."""
     databases: list[str] = field(default_factory=list)
     """The databases that do not name it yet."""
     features: list[str] = field(default_factory=list)
@@ -96,8 +100,11 @@ def run(arguments: argparse.Namespace) -> ExitCode:
 
             old, was = _text(file.path)
             markup = Markup.parse(old, str(file.path)) if old else Markup()
-            own = prepare(file.clips, markup, kinds=_kinds(arguments.only, file), progress=told)
+            kinds = _kinds(arguments.only, file)
+            own = prepare(file.clips, markup, kinds=kinds, progress=told)
             done += len(file.clips)
+            own += prepare(file.joint, markup, kinds=[kind for kind in kinds if kind in JOINT_KINDS], progress=told)
+            done += len(file.joint)
             proposals += own
             if any(each.kind == "roots" for each in own):
                 settings |= dict.fromkeys((("features", name, ROOT_KEY) for name in file.features), ROOT_SMOOTH_S)
@@ -139,7 +146,7 @@ def _markup_files(found: FolderClips) -> list[MarkupFile]:
             continue
         path = found.folder / settings.markup if settings.markup is not None else paths[0].parent / MARKUP
         file = files.setdefault(path, MarkupFile(path))
-        file.clips += own
+        (file.joint if settings.roles else file.clips).extend(own)
         file.databases += [] if settings.markup is not None else [name]
         if settings.features not in said and settings.features not in file.features:
             file.features.append(settings.features)

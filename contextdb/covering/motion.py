@@ -120,6 +120,7 @@ def _context_json(each: ContextCoverage) -> dict[str, object]:
 class ProjectMotion:
     """The motion coverage of a project: of each table with clips, then of the databases without a table.
 
+    Databases with roles are left out: their clips are chosen together, so none fills a movement alone.
     `unlisted` are the clips that no table has a row for, though a database that they fit names one.
     """
 

@@ -8,7 +8,10 @@ from __future__ import annotations
 
 import unicodedata
 from collections.abc import Iterable, Iterator
-from pathlib import PurePath
+from pathlib import Path, PurePath
+
+from contextdb.disk import names_a_table
+from contextdb.errors import Fault, FileError, Place
 
 _DEVICES = {"con", "prn", "aux", "nul", "conin$", "conout$", *(f"{port}{n}" for port in ("com", "lpt") for n in "0123456789¹²³")}
 
@@ -31,6 +34,21 @@ def why_unportable(name: str) -> str:
     if name[-1:] in (".", " ") or PurePath(name).stem[-1:] in (".", " "):
         return "Windows drops a dot or a blank at the end of a name"
     return ""
+
+
+def why_no_table(name: str) -> str:
+    """Why no new table can have a file of this name, as the end of a sentence; empty where one can."""
+    if not names_a_table(name):
+        return "files named so are hidden, or hold the saved contexts or notes of a table"
+    return why_unportable(name)
+
+
+def require_new_table_name(path: Path) -> None:
+    """Raise FileError where no new table can have the name of a path."""
+    if why := why_no_table(path.name):
+        raise FileError(
+            Fault(f"this is not a valid table name: {why}.", "a name that every system can have", place=Place(str(path)))
+        )
 
 
 def confusable(names: Iterable[str]) -> Iterator[tuple[str, str]]:

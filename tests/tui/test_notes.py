@@ -46,6 +46,24 @@ def test_a_file_of_notes_that_is_none_says_nothing(path, text):
     assert Notes.beside(path) == Notes()
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Asset,Column,Note,Colour\n<<<<<<< ours\nb,speed,ask Ana,\n=======\nb,speed,ask Bo,\n>>>>>>> theirs\n",
+        "Asset,Column,Note,Colour,By\nb,speed,ask Ana,,Bo\n",
+    ],
+)
+def test_a_note_is_not_written_over_what_cannot_be_kept(path, text):
+    async def script(app, pilot):
+        await press(pilot, "down", "right", "shift+f2", *"hello", "enter")
+        return said(app)
+
+    notes_path(path).write_text(text)
+    told = with_editor(path, script, (100, 24))
+    assert notes_path(path).read_text() == text
+    assert notes_path(path).name in told
+
+
 def test_notes_go_along_with_a_renamed_asset(path):
     Notes().with_note("b", "speed", "ask Ana").write(path)
     asset_renaming(load_table(path), "b", "bee").write()

@@ -10,7 +10,7 @@ import numpy as np
 from contextdb.columns import TextColumn
 from contextdb.disk import TABLE_SUFFIXES
 from contextdb.errors import in_quotes
-from contextdb.files.file_names import alike, why_unportable
+from contextdb.files.file_names import alike, why_no_table
 from contextdb.files.texts import write_texts
 
 ASSET = "Asset Name"
@@ -24,8 +24,8 @@ def name_fault(folder: Path, name: str, taken: Iterable[str]) -> str:
         return "A table needs a name that does not begin with a dot."
     if any(c in _FORBIDDEN or not c.isprintable() for c in stem):
         return 'The name is that of a file, so it has no / \\ : * ? " < > |.'
-    if why := why_unportable(f"{stem}.csv"):
-        return f"{why}."
+    if why := why_no_table(f"{stem}.csv"):
+        return f"{why[0].upper()}{why[1:]}."
     if alike(stem) in map(alike, taken) or any((folder / f"{stem}{suffix}").exists() for suffix in TABLE_SUFFIXES):
         return f"There is a table {in_quotes(stem)} already."
     return ""

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from contextdb.disk import NOTES_SUFFIX, write_atomic
-from contextdb.errors import ContextDBError
+from contextdb.errors import ContextDBError, Fault, FileError, Place
 from contextdb.files.texts import read_texts
 
 COLOURS = ("red", "amber", "green", "blue", "violet")
@@ -36,13 +36,24 @@ class Notes:
     @classmethod
     def beside(cls, table: Path) -> Notes:
         """Those of a table's file; none where there is no file of them, or none that can be read."""
-        path = notes_path(table)
         try:
-            columns = {c.name: c.to_list() for c in read_texts(path)[1]} if path.is_file() else {}
+            return cls.kept(table, or_more=True)
         except ContextDBError:
             return cls()
-        if not set(FIELDS) <= set(columns):
+
+    @classmethod
+    def kept(cls, table: Path, *, or_more: bool = False) -> Notes:
+        """Those of a table's file, all that it holds.
+
+        Raises ContextDBError where there is a file that cannot be read, or that holds more, unless `or_more`: to write the notes
+        would lose it.
+        """
+        path = notes_path(table)
+        if not path.is_file():
             return cls()
+        columns = {c.name: c.to_list() for c in read_texts(path)[1]}
+        if not set(FIELDS) <= set(columns) or (len(columns) > len(FIELDS) and not or_more):
+            raise FileError(Fault("this is no file of notes.", f"the columns {', '.join(FIELDS)}", place=Place(str(path))))
         lines = list(zip(*(columns[name] for name in FIELDS), strict=True))
         texts = {(asset, column): note for asset, column, note, _ in lines if note.strip()}
         return cls(texts, {asset: colour for asset, column, _, colour in lines if not column and colour in COLOURS})

@@ -465,7 +465,7 @@ class AssetsPane(Pane):
         if sheet.path is None:
             return
         try:
-            marks = change(Notes.beside(sheet.path))
+            marks = change(Notes.kept(sheet.path))
             marks.write(sheet.path)
         except ContextDBError as error:
             self.post_message(Told(str(error), "error"))

@@ -123,7 +123,7 @@ def _rests(places: Floats, rate: float, slowest_mps: float | None, flat: bool) -
     if slowest_mps is not None:
         slow = speeds <= slowest_mps
     else:
-        top = _most_nearby(speeds, max(1, round(NEARBY_S * rate)))
+        top = _most_nearby(speeds, max(1, min(round(NEARBY_S * rate), len(speeds))))
         slow = speeds <= np.clip(SLOW_SHARE * top - (FLAT_LESS_MPS if flat else 0.0), SLOWEST_MPS, FASTEST_MPS)
     near = max(1, round(SINKS_S * rate))
     heights = places[:, 1]

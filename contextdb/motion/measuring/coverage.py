@@ -231,7 +231,12 @@ class MotionCoverage:
 
     @property
     def covered(self) -> float:
-        """The share of the wanted bins that is filled, each weighed by the share of its contexts; 1 where none is wanted."""
+        """The share of the wanted bins that is filled, each weighed by the share of its contexts.
+
+        1 where none is wanted, 0 where no context has a valid clip.
+        """
+        if not self.contexts:
+            return 0.0
         wanted = sum(float(shares.sum()) for shares in self.wanted_shares.values())
         holes = sum(float(shares.sum()) for shares in self.hole_shares.values())
         return 1.0 - holes / wanted if wanted > 0.0 and holes > 0.0 else 1.0

@@ -22,6 +22,7 @@ class Ball:
     def __init__(self, game: Game) -> None:
         stock = game.player.stock
         self.contest = motion.JointNode(stock.config.joint_searcher("contest", stock.databases))
+        self.contest.searcher.search({}, {}, casts=[])  # the first one compiles the loops: at the start, not in a frame
         self._spots = cycle(SPOTS)
         self.holder: Actor | None = None
         self.game, self.said, self.caught_s = game, "", 0.0

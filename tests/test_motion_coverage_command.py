@@ -315,22 +315,6 @@ def test_a_folder_without_databases_is_refused():
     assert "no motion database is declared" in refused()
 
 
-def test_clips_that_play_together_fill_nothing_alone():
-    toml = Path("game", "contextdb.toml")
-    text = toml.read_text(encoding="utf-8")
-    toml.write_text(
-        text.replace('clips = "clips/jog*.bvh"', 'clips = "clips/greet.*.bvh"\nroles = ["Host", "Guest"]'), encoding="utf-8"
-    )
-    for role in ("Host", "Guest"):
-        shutil.copy("game/clips/jog.bvh", f"game/clips/greet.{role}.bvh")
-    result = covered("--json")
-    assert [table["table"] for table in result.json["tables"]] == ["moves"]
-    assert '"free"' in result.err
-    free = toml.read_text(encoding="utf-8").partition("[databases.free]")
-    toml.write_text(text.partition("[databases.all]")[0] + "".join(free[1:]), encoding="utf-8")
-    assert "every database has roles" in refused()
-
-
 def test_where_no_context_has_a_valid_clip_nothing_is_covered():
     Path("game", "moves.csv").write_text("Asset,gait,speed\nswim,Any,Any\n", encoding="utf-8")
     result = covered("--json", "--fail-under", "1", code=1)

@@ -174,21 +174,6 @@ def test_a_cell_that_its_clip_contradicts_is_told_and_replaced_on_demand(game: P
     describe("game/clips", "--into", "game/moves.csv")
 
 
-def test_a_table_of_clips_that_play_together_gets_no_row_for_each_role(game: Path):
-    roles = '[features.pose]\nrate = 30.0\nchannels = [{ type = "position", bone = "LeftFoot" }]\n'
-    roles += '[databases.greet]\nclips = "clips/shake.*.bvh"\nfeatures = "pose"\nroles = ["Host", "Guest"]\n'
-    (game / "contextdb.toml").write_text(roles, encoding="utf-8")
-    (game / "greet.csv").write_text("Asset\nshake\n", encoding="utf-8")
-    put(game, "walk", "shake.Host")
-    put(game, "walk", "shake.Guest")
-    assert "has roles" in describe("game", "--into", "game/greet.csv", code=2).err
-    both = roles + '[databases.walks]\nclips = "clips/walk*.bvh"\nfeatures = "pose"\n'
-    (game / "contextdb.toml").write_text(both, encoding="utf-8")
-    result = describe("game")
-    assert "has roles" in result.err
-    assert [line.partition(",")[0] for line in result.lines[1:]] == ["walk", "walk_turn_left_90", "walk_turn_right_90"]
-
-
 def test_a_clip_whose_name_begins_with_an_at_sign_is_an_asset_and_no_table(game: Path):
     put(game, "walk", "@walk")
     describe("game/clips", "--out", "game/moves.csv")

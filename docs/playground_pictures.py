@@ -76,10 +76,17 @@ def put(actor: Actor, place: tuple[float, float, float]) -> None:
     actor.update(1.0 / RATE, REST)
 
 
+def _game() -> Game:
+    """The game, with its clips made where they are not there yet."""
+    if not (TABLES / "clips" / "walk_about_left.bvh").exists():
+        write_game_clips(TABLES / "clips")
+    return Game(TABLES)
+
+
 def moment(name: str) -> Picture:
     """The picture of a moment, 960 pixels wide."""
     wanted = MOMENTS[name]
-    with Game(TABLES) as game, drawn(game) as window:
+    with _game() as game, drawn(game) as window:
         put(game.player, wanted.place)
         game.player.stamina = wanted.stamina
         window.scene.turn, window.scene.tilt, window.scene.away = wanted.turn, wanted.tilt, wanted.away
@@ -93,7 +100,7 @@ def moment(name: str) -> Picture:
 
 def film() -> list[Picture]:
     """The pictures of the film, 480 pixels wide."""
-    with Game(TABLES) as game, drawn(game, words=0.075) as window:
+    with _game() as game, drawn(game, words=0.075) as window:
         put(game.player, (-1.5, -5.0, 0.0))
         found: list[Picture] = []
         window.scene.tilt, window.scene.away = 12.0, 5.2

@@ -326,7 +326,7 @@ def told_fact(compiled: CompiledData, at: int, fact: Fact) -> str:
 
 def _in_few_digits(fact: float, masks: NumberMasks | WideMasks, domain: Domain) -> float:
     """A number in the fewest digits that leave it in its class; itself where people write it so, and a date."""
-    if len(repr(fact)) <= FEW_DIGITS or not math.isfinite(fact) or domain.kind not in ("number", "angle"):
+    if len(repr(fact)) <= FEW_DIGITS or not math.isfinite(fact) or domain.type.is_whole:
         return fact
     ends = (-180.0, 180.0) if domain.type.is_circular else (-math.inf, math.inf)
     rounded = (float(f"{fact:.{digits}g}") for digits in range(ROUNDED_DIGITS, 17))

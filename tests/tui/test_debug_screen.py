@@ -191,8 +191,8 @@ def test_play_goes_on_and_ends_with_the_session(recording: Recording):
 
 def test_why_this_clip(recording: Recording):
     text = after(recording)
-    assert "idle is not valid any more: walk at 3.10 s costs 0.8667." in text
-    assert "walk is chosen: cost 0.8667" in text
+    assert "idle is not valid any more: walk at 3.10 s costs 0.8544." in text
+    assert "walk is chosen: cost 0.8544" in text
 
 
 def test_why_not_mine_names_the_failing_cells_and_what_it_would_take(recording: Recording):

@@ -1,4 +1,5 @@
-"""Take the pictures of the coverage pages in docs/pages/, with any Chromium on the PATH: once as wide as a desk, once as a phone.
+"""Take the pictures of the pages of coverage and of a session in docs/pages/, with any Chromium on the PATH: as wide as a desk, a
+tablet or a phone.
 
     python docs/pages.py
 
@@ -21,6 +22,15 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 SIZES = {"coverage-desk.png": (1200, 1100), "coverage-phone.png": (390, 844)}
 """Width and height in pixels."""
 MOTION_SIZES = {"motion-coverage-desk.png": (1200, 1150), "motion-coverage-phone.png": (390, 844)}
+SESSION_SIZES = {"session-desk.png": (1280, 900), "session-tablet.png": (820, 1100), "session-phone.png": (390, 844)}
+STICK = """\
+time_s,x_mps,z_mps,gait,style
+0,0,0,Idle,normal
+1,0,1.3,Walk,normal
+3,1.3,0,Walk,normal
+5,2.6,0,Run,normal
+8,0,0,Idle,normal
+"""
 LEAST_WINDOW_PX = 500
 """Chromium opens no narrower window; a narrower page stands in a frame."""
 
@@ -41,14 +51,22 @@ def write_motion_page(folder: Path) -> Path:
     return folder / "motion.html"
 
 
-def take(browser: str, page: Path, picture: Path, width: int, height: int) -> None:
-    """Write what the browser shows of a page."""
+def write_session_page(folder: Path) -> Path:
+    """The page of a session of the sample clips, in which the player walks, turns and runs."""
+    (folder / "stick.csv").write_text(STICK, encoding="utf-8")
+    for words in ("run tables player stick.csv --out run.parquet", "replay run.parquet --html session.html"):
+        subprocess.run([sys.executable, "-m", "contextdb", "motion", *words.split()], cwd=folder, check=True)
+    return folder / "session.html"
+
+
+def take(browser: str, page: Path, picture: Path, width: int, height: int, at: str = "") -> None:
+    """Write what the browser shows of a page, at a moment such as "#t=3.2"."""
     framed = page.with_name("framed.html")
     style = f"display:block;margin:0 auto;border:0;width:{width}px;height:{height}px"
-    frame = f'<body style="margin:0;background:#ccc"><iframe src="{page.name}" style="{style}"></iframe>'
+    frame = f'<body style="margin:0;background:#ccc"><iframe src="{page.name}{at}" style="{style}"></iframe>'
     framed.write_text(frame, encoding="utf-8")
     size = f"--window-size={max(width, LEAST_WINDOW_PX)},{height}"
-    headless = [browser, "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", size]
+    headless = [browser, "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--virtual-time-budget=3000", size]
     subprocess.run([*headless, f"--screenshot={picture}", framed.as_uri()], check=True, stderr=subprocess.DEVNULL)
 
 
@@ -66,6 +84,9 @@ def main() -> int:
         page = write_motion_page(Path(folder))
         for name, (width, height) in MOTION_SIZES.items():
             take(browser, page, FOLDER / name, width, height)
+        page = write_session_page(Path(folder))
+        for name, (width, height) in SESSION_SIZES.items():
+            take(browser, page, FOLDER / name, width, height, "#t=5.3")
     return 0
 
 

@@ -151,6 +151,11 @@ def test_a_change_of_what_there_is_not_is_refused(trace, changes, message):
         trace.reasked(DATABASES, **changes)
 
 
+def test_a_change_that_there_is_not_is_refused_with_the_nearest(trace):
+    with pytest.raises(MotionError, match='there is no change "weight".*Did you mean "weights"'):
+        trace.reasked(weight={"pose": 2.0})
+
+
 def test_an_asset_that_there_is_not_is_refused_with_the_nearest(trace):
     place = next(i for i, decision in enumerate(trace) if decision.searched)
     with pytest.raises(MotionError, match=r'no asset "jgo".*Did you mean "jog"'):

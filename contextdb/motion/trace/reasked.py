@@ -57,6 +57,8 @@ class Reasked(Sequence[ReaskedDecision]):
 
     def __init__(self, decisions: Sequence[Decision], about: About, stock: Stock, changes: Changes) -> None:
         self.decisions, self.about, self.stock = decisions, about, stock
+        for name in changes:
+            require_name(name, "change", set(Changes.__annotations__))
         self.thresholds = _mapping(changes.get("thresholds"), "thresholds")
         tables: Mapping[str, Edited] = _mapping(changes.get("tables"), "tables")
         weights, biases = _mapping(changes.get("weights"), "weights"), _mapping(changes.get("biases"), "biases")

@@ -152,7 +152,7 @@ def test_a_change_of_what_there_is_not_is_refused(trace, changes, message):
 
 
 def test_a_change_that_there_is_not_is_refused_with_the_nearest(trace):
-    with pytest.raises(MotionError, match='there is no change "weight".*Did you mean "weights"'):
+    with pytest.raises(MotionError, match=r'there is no change "weight".*Did you mean "weights"'):
         trace.reasked(weight={"pose": 2.0})
 
 

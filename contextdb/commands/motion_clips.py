@@ -19,6 +19,7 @@ from contextdb.motion.clips.doubts import LEAST_BODY_M, UNITS, USUAL_BODY_M, mea
 from contextdb.motion.storage.clip_files import paths_of
 from contextdb.motion.storage.config import MotionConfig
 from contextdb.motion.storage.database_settings import DatabaseSettings
+from contextdb.motion.storage.rigs import Rig
 from contextdb.tables.project import SCHEMA_FILE, read_folder_schema
 
 MARKUP = "marks.csv"
@@ -105,9 +106,9 @@ def clips_of(path: str, metres_per_unit: float | None, up: Up | None, wants: Wan
     if twice:
         raise FileError(*twice)
     with progress_of("reading clips") as tell:
-        for i, (file, (unit, axis)) in enumerate(files.items()):
+        for i, (file, (unit, axis, rig)) in enumerate(files.items()):
             tell(i, len(files), file.stem)
-            _read(found, file, CENTIMETRE if unit is None else unit, axis)
+            _read(found, file, CENTIMETRE if unit is None else unit, axis, rig)
     if metres_per_unit is None and not found.config.databases:
         _guess_units(found)
     return found
@@ -151,20 +152,22 @@ def _folder(path: Path) -> Path:
     raise FileError(Fault(found, f"a folder of clips, or of tables with {SCHEMA_FILE}", mend, Place(str(path)), "no-such-path"))
 
 
-def _files(found: FolderClips, unit: float | None, up: Up | None) -> dict[Path, tuple[float | None, Up]]:
-    """The files with unit and axis; of a file in several databases those of the first."""
-    files: dict[Path, tuple[float | None, Up]] = {}
+def _files(found: FolderClips, unit: float | None, up: Up | None) -> dict[Path, tuple[float | None, Up, Rig | None]]:
+    """The files with unit, axis and rig; of a file in several databases those of the first."""
+    files: dict[Path, tuple[float | None, Up, Rig | None]] = {}
     for settings in found.config.databases.values():
+        rig = Rig.of(settings, found.folder, found.config.file)
         for file in paths_of(settings, found.folder, found.config.file):
-            files.setdefault(file, (settings.metres_per_unit if unit is None else unit, up or settings.up))
+            files.setdefault(file, (settings.metres_per_unit if unit is None else unit, up or settings.up, rig))
     if found.config.databases:
         return files
-    return dict.fromkeys(bvh_files(found.folder), (unit, up or "y"))
+    return dict.fromkeys(bvh_files(found.folder), (unit, up or "y", None))
 
 
-def _read(found: FolderClips, file: Path, unit: float, up: Up) -> None:
+def _read(found: FolderClips, file: Path, unit: float, up: Up, rig: Rig | None) -> None:
     try:
         clip = load_bvh(file, metres_per_unit=unit, up=up)
+        clip = clip if rig is None or not clip.n_frames else rig.clip(clip)
     except ContextDBError as error:
         found.left_out += [str(fault) for fault in error.faults]
         return

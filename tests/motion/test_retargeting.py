@@ -48,12 +48,16 @@ def test_on_a_rig_twice_as_large_all_is_twice_as_large():
     np.testing.assert_allclose(again.positions, 2.0 * POSES.positions, atol=1e-6)
 
 
-@pytest.mark.parametrize("legs_by", [0.8, 1.2])
-def test_with_other_legs_the_feet_stand_where_those_of_the_clip_do_by_scale(legs_by):
-    again = motion.poses_of(motion.retargeted(CLIP, scaled(RIG, 1.0, legs_by)))
+@pytest.mark.parametrize(("legs_by", "ankles_by"), [(0.8, 1.0), (1.2, 1.0), (1.0, 0.4), (1.1, 1.6)])
+def test_with_other_legs_and_ankles_the_feet_stand_where_those_of_the_clip_do_by_scale(legs_by, ankles_by):
+    rig = scaled(RIG, 1.0, legs_by)
+    for bone in ("LeftToe", "RightToe"):
+        rig.offsets[rig.index(bone), 1] *= ankles_by
+    again = motion.poses_of(motion.retargeted(CLIP, rig))
     for bone in ("LeftFoot", "RightFoot"):
-        ankle = RIG.index(bone)
-        np.testing.assert_allclose(again.positions[:, ankle], legs_by * POSES.positions[:, ankle], atol=0.01)
+        ankle, toe = RIG.index(bone), RIG.index(bone.replace("Foot", "Toe"))
+        np.testing.assert_allclose(again.positions[:, ankle, ::2], legs_by * POSES.positions[:, ankle, ::2], atol=0.01)
+        np.testing.assert_allclose(again.positions[:, toe, 1], legs_by * POSES.positions[:, toe, 1], atol=0.01)
         for begin, end in MADE.footfalls.down[bone]:
             frames = slice(int(np.ceil(begin * 30.0)), int(end * 30.0) + 1)
             assert np.ptp(again.positions[frames, ankle], axis=0).max() < 0.01
@@ -76,6 +80,12 @@ def test_bones_of_other_names_are_named():
     np.testing.assert_allclose(again.positions, POSES.positions, atol=1e-6)
     with pytest.raises(MotionError, match="Did you mean"):
         motion.retargeted(CLIP, rig, names={"Pelvis": "Hip"})
+
+
+def test_a_rig_that_rests_with_another_axis_up_is_refused():
+    lying = replace(RIG, offsets=RIG.offsets[:, [0, 2, 1]])
+    with pytest.raises(MotionError, match='"LeftLeg" of the rig points another way at rest'):
+        motion.retargeted(CLIP, lying)
 
 
 def test_a_rig_without_legs_is_refused():

@@ -34,34 +34,43 @@ MOST_CHARACTERS = 200
 
 def nearest_bones(bone: str, names: Iterable[str], most: int) -> list[str]:
     """The bones that are most like one that is missing, the nearest first: those of the same side and core, then by spelling."""
-    side, core = side_and_core(bone)
+    side = _side_and_word(bone)[0]
 
     def likeness(name: str) -> float:
-        own_side, own_core = side_and_core(name)
-        alike = difflib.SequenceMatcher(None, core, own_core).ratio() if core != own_core else 1.0
-        return alike - (0.3 if own_side != side else 0.0)
+        return _alike(bone, name) - (0.3 if _side_and_word(name)[0] != side else 0.0)
 
     return sorted(names, key=lambda name: -likeness(name))[:most]
 
 
 def meant_bone(bone: str, names: Iterable[str]) -> str | None:
     """The bone that was probably meant: of the same side, and of the same or a similar core."""
-    side, core = side_and_core(bone)
     for name in nearest_bones(bone, names, 1):
-        own_side, own_core = side_and_core(name)
-        if own_side == side and difflib.SequenceMatcher(None, core, own_core).ratio() >= LEAST_LIKE:
+        if _side_and_word(name)[0] == _side_and_word(bone)[0] and _alike(bone, name) >= LEAST_LIKE:
             return name
     return None
 
 
+def _alike(bone: str, name: str) -> float:
+    """How alike the cores of two names are, or how they are written: 1 where rigs use both for one bone."""
+    one, other = _side_and_word(bone)[1], _side_and_word(name)[1]
+    pairs = {(one, other), (_FIRST.get(one, one), _FIRST.get(other, other))}
+    return max(difflib.SequenceMatcher(None, *pair).ratio() for pair in pairs)
+
+
 def side_and_core(name: str) -> tuple[str, str]:
     """The side of a name, "left", "right" or "", and what is left of it without side, namespace and the rig's own words."""
+    side, word = _side_and_word(name)
+    return side, _FIRST.get(word, word)
+
+
+def _side_and_word(name: str) -> tuple[str, str]:
+    """The same as the name writes it."""
     words = list(_words(name))
     side = next((SIDE_WORDS[word] for word in words if word in SIDE_WORDS), "")
     core = "".join(word for word in words if word not in SIDE_WORDS and word not in NO_WORDS)
     if not side and len(words) == 1 and words[0][:1] in "lr" and words[0][1:] in _FIRST:  # lhip, rfoot
         side, core = SIDE_WORDS[words[0][0]], words[0][1:]
-    return side, _FIRST.get(core, core)
+    return side, core
 
 
 def _words(name: str) -> Iterator[str]:

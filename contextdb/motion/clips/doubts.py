@@ -238,7 +238,7 @@ def _rules(of: Measures, usual: Shape | None) -> Iterator[tuple[str, Told]]:
     difference = None if usual is None else _difference(_shape(of.bones or {}, usual), usual)
     if difference is not None and difference > OTHER_SHAPE:
         found = f"{100.0 * difference:.0f} % of the body's length is distributed differently from the other clips."
-        mend = "the clips of one body for each database, or metres_per_unit where bones are of another unit"
+        mend = 'rig = "a clip of the usual body" in [databases.NAME], which puts the others on it, or metres_per_unit'
         yield (
             "odd-proportions",
             {"found": found, "expected": f"at most {100 * OTHER_SHAPE:g} %", "mend": mend, "measure": difference},

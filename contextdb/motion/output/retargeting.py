@@ -2,8 +2,9 @@
 
     clip ─► rotations in the world, by names ─► root moved by the scale of the legs ─► legs bent until feet stand ─► clip of the rig
 
-Both rigs must rest alike: their bones point the same way where nothing is turned, as those of one studio do. A bone that the other
-rig has not is left out, and what it turns is in the bone below it; one that the clip has not keeps its rest. F frames, J joints.
+Soles are as high above the ground as those of the clip, by scale, however high an ankle is above its own. Both rigs must rest
+alike: their bones point the same way where nothing is turned, as those of one studio do. A bone that the other rig has not is left
+out, and what it turns is in the bone below it; one that the clip has not keeps its rest. F frames, J joints.
 
 Source: Forsyth, "How a Character Should Walk", Game Tech 2004.
 """
@@ -16,8 +17,9 @@ from math import radians
 import numpy as np
 
 from contextdb.cells.arguments import require_kind, require_mapping, require_real
-from contextdb.errors import Fault, MotionError, Place, some
+from contextdb.errors import Fault, MotionError, Place, in_quotes, some
 from contextdb.motion.clips import quaternions
+from contextdb.motion.clips.bone_names import meant_bone
 from contextdb.motion.clips.clip import CENTIMETRE, Clip
 from contextdb.motion.clips.foot_bones import feet_of
 from contextdb.motion.clips.poses import LocalPoses, Poses, forward_kinematics, local_poses
@@ -28,6 +30,8 @@ from contextdb.motion.output.legs import Leg, leg_of
 from contextdb.motion.output.track import clip_of_tracks
 
 STRAIGHT = radians(170.0)
+ALIKE_AT_REST = 0.5
+"""The least cosine between a bone of the rig and that of a clip."""
 LEAST_M, MOST_M = 1e-9, 1e9
 
 
@@ -52,7 +56,7 @@ def retargeted(clip: Clip, rig: Skeleton, *, metres_per_unit: float = CENTIMETRE
     Raises
     ------
     MotionError
-        The rig or the clip has no feet or legs, or a bone of hips or legs has no counterpart.
+        The rig or the clip has no feet or legs, a bone of hips or legs has no counterpart, or points elsewhere at rest.
     ContextError
         An argument of another type.
     """
@@ -71,14 +75,21 @@ def retargeted(clip: Clip, rig: Skeleton, *, metres_per_unit: float = CENTIMETRE
         raise MotionError(
             Fault("a leg has no hip and knee of its own, or no length.", "legs of thigh, shin and foot", place=Place(clip.name))
         )
+    _require_alike_at_rest(rig, clip, legs, own)
     scale = float(lengths[:, 0].sum() / lengths[:, 1].sum())
     rotations = _rotations(rig, shown, own)
     translations = np.repeat(offsets[None], clip.n_frames, axis=0)
     placed = forward_kinematics(LocalPoses(rig, clip.rate, translations, rotations))
     translations[:, 0] = scale * shown.positions[:, own[rig.hips]] - placed.positions[:, rig.hips]
     placed = forward_kinematics(LocalPoses(rig, clip.rate, translations, rotations))
-    for leg, _ in legs:
-        _bend(rig, leg, placed, scale * shown.positions[:, own[int(leg.joints[2])]], rotations)
+    lifts = [_lifts(rig, leg, placed, shown, own, scale) for leg, _ in legs]
+    lift = float(np.median(lifts))
+    translations[:, 0, 1] += lift
+    placed.positions[..., 1] += lift
+    for (leg, _), higher in zip(legs, lifts, strict=True):
+        ankles = scale * shown.positions[:, own[int(leg.joints[2])]]
+        ankles[:, 1] += higher
+        _bend(rig, leg, placed, ankles, rotations)
     ends = tuple((joint, (x * metres_per_unit, y * metres_per_unit, z * metres_per_unit)) for joint, (x, y, z) in rig.end_sites)
     metres = Skeleton(rig.names, rig.parents, offsets, rig.channels, ends)
     return clip_of_tracks(rotations, translations, metres, [0], clip.rate, clip.name)
@@ -104,9 +115,37 @@ def _counterparts(rig: Skeleton, clip: Clip, names: Mapping[str, str], needed: l
     found = {joint: known[wanted[bone].casefold()] for joint, bone in enumerate(rig.names) if wanted[bone].casefold() in known}
     missing = [rig.names[joint] for joint in dict.fromkeys([rig.hips, *needed]) if joint not in found]
     if missing:
+        near = meant_bone(missing[0], clip.skeleton.names)
         told = f"there is no bone for {some(missing)} of the rig."
-        raise MotionError(Fault(told, "names={bone of the rig: bone of the clip}", place=Place(clip.name)))
+        accepted = f"a bone of the same name; else names={{{missing[0]!r}: BONE}}, or rig_bones in contextdb.toml"
+        raise MotionError(Fault(told, accepted, in_quotes(near) if near else "", Place(clip.name)))
     return found
+
+
+def _require_alike_at_rest(rig: Skeleton, clip: Clip, legs: list[tuple[Leg, Leg | None]], own: Mapping[int, int]) -> None:
+    """Refuse rigs whose legs point another way where nothing is turned: one lies, or has its axes otherwise."""
+    for leg, _ in legs:
+        for joint in leg.joints[1:].tolist():
+            one, other = rig.offsets[joint], clip.skeleton.offsets[own[joint]]
+            if float(one @ other) < ALIKE_AT_REST * float(np.linalg.norm(one) * np.linalg.norm(other)):
+                told = f"{in_quotes(rig.names[joint])} of the rig points another way at rest than that of the clip."
+                raise MotionError(Fault(told, "a rig that rests as the clip does, with the same axis up", place=Place(clip.name)))
+
+
+def _lifts(rig: Skeleton, leg: Leg, placed: Poses, shown: Poses, own: Mapping[int, int], scale: float) -> Floats:
+    """How much higher than by scale an ankle is to be in each frame, so that its sole is as high as by scale: [F]."""
+    ankle = int(leg.joints[2])
+    soles = [joint for joint in range(rig.n_joints) if joint in own and ankle in rig.ancestors(joint)]
+    soles = [joint for joint in soles if own[ankle] in shown.skeleton.ancestors(own[joint])]
+    if not soles:
+        return np.zeros(placed.n_frames)
+    drop = _drop(placed.positions[..., 1], ankle, soles)
+    return drop - scale * _drop(shown.positions[..., 1], own[ankle], [own[joint] for joint in soles])
+
+
+def _drop(heights: Floats, ankle: int, soles: list[int]) -> Floats:
+    """How far the lowest joint of a foot is below its ankle: [F]."""
+    return np.asarray(np.maximum(heights[:, ankle] - heights[:, soles].min(axis=1), 0.0))
 
 
 def _length(offsets: Floats, leg: Leg | None) -> float:

@@ -19,7 +19,7 @@ from contextdb.motion.markup.markup import Markup
 from contextdb.motion.storage import stored
 from contextdb.motion.storage.clip_files import ClipFile, clip_files
 from contextdb.motion.storage.config import MotionConfig
-from contextdb.motion.storage.database_settings import JOINT_KEYS, DatabaseSettings
+from contextdb.motion.storage.database_settings import JOINT_KEYS, RIG_KEYS, DatabaseSettings
 
 NOWHERE = Place()
 Assets = Mapping[str, Collection[str]]
@@ -116,7 +116,7 @@ class Inputs:
             "features": schema_to_dict(schema),
             "clips": {name: each for name, each in clips.items() if self.config.databases[name].features == settings.features},
             "markup": None if markup is None else [[s.asset, s.tag, s.from_s, s.to_s, s.value] for s in markup.spans],
-            "settings": {key: value for key, value in asdict(settings).items() if key not in JOINT_KEYS},
+            "settings": {key: value for key, value in asdict(settings).items() if key not in (*JOINT_KEYS, *RIG_KEYS)},
         }
         return hashlib.blake2b(json.dumps(about, sort_keys=True).encode(), digest_size=16).hexdigest()
 

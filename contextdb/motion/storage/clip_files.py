@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from contextdb.disk import path_in_quotes, read_bytes
@@ -23,6 +24,7 @@ from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.storage.database_settings import DatabaseSettings
 from contextdb.motion.storage.feature_cache import FeatureCache, key_of
+from contextdb.motion.storage.rigs import Rig
 
 UNEVEN_M = 0.005
 """Sides that differ by more metres are reported."""
@@ -37,6 +39,8 @@ class ClipFile:
     schema: FeatureSchema
     is_looping: bool = False
     contacts: ContactMarks = NO_MARKS
+    rig: Rig | None = None
+    """What the clip is put on."""
 
     @property
     def asset(self) -> str:
@@ -56,11 +60,9 @@ class ClipFile:
     def keys(self, content: bytes) -> list[str]:
         """For each range the key of its features."""
         unit, up = self.settings.metres_per_unit, self.settings.up
-        loops, marks = self.is_looping, self.contacts
-        return [
-            key_of(content, self.schema, metres_per_unit=unit, up=up, mirrored=side, looping=loops, contacts=marks, permutation=i)
-            for side, i in self.ranges
-        ]
+        key = partial(key_of, content, self.schema, metres_per_unit=unit, up=up, looping=self.is_looping, contacts=self.contacts)
+        rig = "" if self.rig is None else self.rig.digest
+        return [key(mirrored=side, permutation=i, rig=rig) for side, i in self.ranges]
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +94,8 @@ def clip_files(
     ------
     MotionError
         No file fits the pattern, or two of the files have one name; `file` is that of the settings in messages.
+    FileError, MotionError
+        The rig cannot be read; see `Rig.of`.
     """
     paths = paths_of(settings, folder, file)
     if not paths:
@@ -103,7 +107,8 @@ def clip_files(
         raise MotionError(*faults)
     loops = {path.stem for path in wanted if markup is not None and markup.is_looping(path.stem)}
     marks = {path.stem: NO_MARKS if markup is None else markup.contacts_of(path.stem) for path in wanted}
-    return [ClipFile(path, settings, schema, path.stem in loops, marks[path.stem]) for path in wanted]
+    rig = Rig.of(settings, folder, file)
+    return [ClipFile(path, settings, schema, path.stem in loops, marks[path.stem], rig) for path in wanted]
 
 
 def paths_of(settings: DatabaseSettings, folder: Path, file: str | None = None) -> list[Path]:
@@ -151,8 +156,7 @@ def extract(file: ClipFile, cache: FeatureCache | None = None) -> Extracted:
     kept = [_kept(file, key, side, cache) for key, (side, _) in zip(keys, file.ranges, strict=True)]
     parts = [part for part in kept if part is not None]
     if len(parts) == len(kept):
-        skeleton = _skeleton(file, content) if file.settings.mirror else None
-        unevenness = _unevenness(file, skeleton)
+        unevenness = _unevenness(file, *_rest_of(file, content)) if file.settings.mirror else {}
         return Extracted(file, [part for part, _ in parts], parts[0][1], keys, is_computed=False, unevenness=unevenness)
     clip = _parsed(file, content)
     if clip.n_frames == 0:
@@ -168,25 +172,25 @@ def extract(file: ClipFile, cache: FeatureCache | None = None) -> Extracted:
     if cache is not None:
         for key, part in zip(keys, computed, strict=True):
             cache.write(file.settings.name, key, part, measures)
-    skeleton = clip.skeleton if file.settings.mirror else None
-    return Extracted(file, computed, measures, keys, is_computed=True, unevenness=_unevenness(file, skeleton))
+    unevenness = _unevenness(file, clip.skeleton, clip.metres_per_unit) if file.settings.mirror else {}
+    return Extracted(file, computed, measures, keys, is_computed=True, unevenness=unevenness)
 
 
 def read_clip(file: ClipFile) -> clips.Clip:
-    """The clip itself; raises ClipError and FileError."""
+    """The clip itself, on the rig of its database; raises ClipError, MotionError and FileError."""
     return _parsed(file, read_bytes(file.path))
 
 
-def _skeleton(file: ClipFile, content: bytes) -> Skeleton:
-    """The skeleton of a clip whose features are known, so that it could be read."""
-    return bvh.read_skeleton(clips.text_of(content, str(file.path)))
+def _rest_of(file: ClipFile, content: bytes) -> tuple[Skeleton, float]:
+    """The skeleton and its unit of a clip whose features are known, so that it could be read."""
+    if file.rig is not None:
+        return file.rig.skeleton, file.rig.metres_per_unit
+    return bvh.read_skeleton(clips.text_of(content, str(file.path))), file.settings.metres_per_unit
 
 
-def _unevenness(file: ClipFile, skeleton: Skeleton | None) -> dict[str, float]:
-    if skeleton is None:
-        return {}
+def _unevenness(file: ClipFile, skeleton: Skeleton, metres_per_unit: float) -> dict[str, float]:
     apart = mirror.unevenness(skeleton, file.schema.mirror)
-    return {bone: metres for bone, units in apart.items() if (metres := units * file.settings.metres_per_unit) > UNEVEN_M}
+    return {bone: metres for bone, units in apart.items() if (metres := units * metres_per_unit) > UNEVEN_M}
 
 
 def _kept(file: ClipFile, key: str, is_mirrored: bool, cache: FeatureCache | None) -> tuple[ClipFeatures, Measures] | None:
@@ -196,7 +200,8 @@ def _kept(file: ClipFile, key: str, is_mirrored: bool, cache: FeatureCache | Non
 def _parsed(file: ClipFile, content: bytes) -> clips.Clip:
     place = str(file.path)
     text = clips.text_of(content, place)
-    return clips.parse_bvh(text, file.asset, file=place, metres_per_unit=file.settings.metres_per_unit, up=file.settings.up)
+    clip = clips.parse_bvh(text, file.asset, file=place, metres_per_unit=file.settings.metres_per_unit, up=file.settings.up)
+    return clip if file.rig is None or not clip.n_frames else file.rig.clip(clip)
 
 
 def _twice_named(database: str, paths: Sequence[Path], file: str | None) -> Iterator[Fault]:

@@ -17,9 +17,8 @@ from pathlib import Path
 from typing import TypedDict, TypeVar, Unpack
 
 from contextdb.cells.arguments import require_mapping, require_text
-from contextdb.errors import Fault, Place, SchemaError, in_quotes, nearest, shown, some
+from contextdb.errors import ClipError, Fault, FileError, MotionError, Place, SchemaError, in_quotes, nearest, shown, some
 from contextdb.files.toml_text import as_toml, what
-from contextdb.motion.clips import clip as clips
 from contextdb.motion.clips.clip import Clip
 from contextdb.motion.features.schema import CustomFunction, FeatureSchema
 from contextdb.motion.joint.database import JointDatabase
@@ -32,7 +31,7 @@ from contextdb.motion.selection.controller_settings import ControllerSettings, r
 from contextdb.motion.selection.decision import Recorder
 from contextdb.motion.selection.selector import Entry, Selector
 from contextdb.motion.selection.variation import Rng
-from contextdb.motion.storage.clip_files import clip_files
+from contextdb.motion.storage.clip_files import clip_files, read_clip
 from contextdb.motion.storage.database_settings import DatabaseSettings, read_databases
 
 __all__ = ["DatabaseSettings", "MotionConfig", "SelectorSettings"]
@@ -107,14 +106,23 @@ class MotionConfig:
         return _known("databases", name, self.databases, self.file)
 
     def load_clips(self, name: str, folder: str | Path, assets: Collection[str] | None = None) -> list[Clip]:
-        """Read the clips of a database, in the order of their names.
+        """Read the clips of a database on its rig, in the order of their names.
 
         `folder` is that of contextdb.toml. With `assets`, clips of these names alone are read; an asset without a clip is not
         missed.
         """
         settings = self.database(name)
         files = clip_files(settings, self.features[settings.features], Path(folder), assets, self.file)
-        return clips.load_clips([each.path for each in files], metres_per_unit=settings.metres_per_unit, up=settings.up)
+        found: list[Clip] = []
+        faults: list[Fault] = []
+        for each in files:
+            try:
+                found.append(read_clip(each))
+            except (MotionError, FileError) as error:
+                faults.extend(error.faults)
+        if faults:
+            raise ClipError(*faults)
+        return found
 
     def with_functions(self, functions: Mapping[str, CustomFunction]) -> MotionConfig:
         """The same with functions for custom channels, by the names that the channels of any schema give.

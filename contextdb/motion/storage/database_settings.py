@@ -6,6 +6,9 @@
     features = "loco"
     metres_per_unit = 0.01               # what the files leave open
     up = "y"
+    rig = "clips/idle.bvh"               # clips of other bodies are put on the bones and lengths of this one
+    rig_bones = { Pelvis = "Hips" }      # for bones of the rig those of clips that name them otherwise
+    rig_metres_per_unit = 0.01           # of the rig, where its unit is not that of the clips
     mirror = true                        # each clip a second time, left and right exchanged
     markup = "clips/marks.csv"
     base_bias = 0.0                      # added to the cost of every frame
@@ -37,6 +40,8 @@ from contextdb.motion.reading import Mapped, Section
 
 JOINT_KEYS = ("roles", "place_weight", "facing_weight")
 """What says how a database is searched for several characters at once; the database itself is the same without."""
+RIG_KEYS = ("rig", "rig_bones", "rig_metres_per_unit")
+"""What says on which body clips are put."""
 KEYS = (
     "table",
     "clips",
@@ -50,6 +55,7 @@ KEYS = (
     "continuing_bias",
     "end_s",
     "weights",
+    *RIG_KEYS,
     *JOINT_KEYS,
 )
 LOOPING_BIAS, CONTINUING_BIAS = -0.01, -0.1
@@ -59,12 +65,16 @@ END_S = 0.3
 """Seconds before the end of a range in which entering it is pointless, unless the settings say otherwise."""
 
 CLIPS = 'a pattern of files in the folder of contextdb.toml or below it, such as "clips/*.bvh"'
+RIG = 'a BVH file in the folder of contextdb.toml or below it, such as "clips/idle.bvh"'
+RIG_BONES = '{ "BONE OF THE RIG" = "BONE OF THE CLIPS" }'
+METRES = "metres, such as 0.01", 1e-9, 1e9
 MARKUP = 'a file in the folder of contextdb.toml or below it, such as "clips/marks.csv"'
 ROLES = 'two names or more, each once and without a dot, such as ["Tackler", "Carrier"]'
 WEIGHT = f"a weight from 0 to {MOST_WEIGHT:g}, such as 1.0"
 MOST_BIAS = 1e30
 NUMBERS = {
-    "metres_per_unit": ("metres, such as 0.01", 1e-9, 1e9),
+    "metres_per_unit": METRES,
+    "rig_metres_per_unit": METRES,
     "base_bias": ("a cost, such as 0.5", -MOST_BIAS, MOST_BIAS),
     "looping_bias": ("a cost, such as -0.01", -MOST_BIAS, MOST_BIAS),
     "continuing_bias": ("a cost, such as -0.1", -MOST_BIAS, MOST_BIAS),
@@ -104,6 +114,12 @@ class DatabaseSettings:
         Of clips that were recorded together, which are named ASSET.ROLE; empty for others. See `JointDatabase`.
     place_weight, facing_weight : float
         Of what these roles see of each other.
+    rig : str, optional
+        A BVH file below the folder of contextdb.toml: clips of other bodies are put on its bones and lengths; see `retargeted`.
+    rig_bones : mapping of str to str
+        For bones of the rig those of clips that name them otherwise.
+    rig_metres_per_unit : float, optional
+        Of the rig. Default: `metres_per_unit`.
     """
 
     name: str
@@ -122,6 +138,9 @@ class DatabaseSettings:
     roles: tuple[str, ...] = ()
     place_weight: float = 1.0
     facing_weight: float = 1.0
+    rig: str | None = None
+    rig_bones: Mapping[str, str] = field(default_factory=dict)
+    rig_metres_per_unit: float | None = None
 
     def asset_of(self, clip: str) -> str:
         """The asset of a clip of this name: that of its role, or the name itself."""
@@ -166,6 +185,13 @@ def _values(section: Section, features: list[str], tables: Collection[str] | Non
         yield "mirror", _read_flag(section, "mirror")
     if "roles" in part:
         yield "roles", _read_roles(section)
+    if "rig" in part:
+        yield "rig", _read_path(section, "rig", ".bvh", "this is not a BVH file", RIG)
+    for key in RIG_KEYS[1:] if "rig" not in part else ():
+        if key in part:
+            section.wrong(key, "there is no rig that it could be about", f"rig = {RIG}")
+    if "rig_bones" in part:
+        yield "rig_bones", _read_bones(section)
     if "markup" in part:
         yield "markup", _read_path(section, "markup", ".csv", "this is not a CSV file", MARKUP)
     for key, (accepted, least, most) in NUMBERS.items():
@@ -206,6 +232,14 @@ def _read_roles(section: Section) -> tuple[str, ...] | None:
     if all(isinstance(role, str) for role in listed) and not role_fault(listed):
         return tuple(listed)
     section.wrong("roles", "these are no roles of clips that play together", ROLES)
+    return None
+
+
+def _read_bones(section: Section) -> dict[str, str] | None:
+    value = section.part["rig_bones"]
+    if isinstance(value, Mapping) and all(isinstance(bone, str) for pair in value.items() for bone in pair):
+        return dict(value)
+    section.wrong("rig_bones", "these are no names of bones", RIG_BONES)
     return None
 
 

@@ -53,6 +53,7 @@ def key_of(
     looping: bool,
     contacts: ContactMarks = NO_MARKS,
     permutation: int = 0,
+    rig: str = "",
 ) -> str:
     """The key of a clip's features, from the bytes of its file and all else that they depend on."""
     about = {
@@ -66,6 +67,8 @@ def key_of(
     }
     if permutation:
         about["permutation"] = permutation
+    if rig:
+        about["rig"] = rig
     digest = hashlib.blake2b(json.dumps(about, sort_keys=True).encode(), digest_size=16)
     digest.update(content)
     return digest.hexdigest()

@@ -1,0 +1,99 @@
+"""The rig of a database: clips of other bodies become clips of it before anything else is made of them.
+
+A clip of the same bones and lengths stays what it is, to the last bit. An edge: this touches the disk.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from contextdb.disk import read_bytes
+from contextdb.errors import MotionError, Place
+from contextdb.motion.clips.clip import Clip, parse_bvh, text_of
+from contextdb.motion.clips.skeleton import Skeleton
+from contextdb.motion.output.retargeting import retargeted
+from contextdb.motion.storage.database_settings import DatabaseSettings
+
+RETARGETING = 1
+"""The version of what a clip becomes: one more whenever the same clip would become another."""
+SAME_M = 1e-4
+"""Bones that differ by less are of one body: files round their numbers."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rig:
+    """What clips are put on.
+
+    Attributes
+    ----------
+    skeleton : Skeleton
+    metres_per_unit : float
+        Of its offsets.
+    bones : mapping of str to str
+        For bones of the rig those of clips that name them otherwise.
+    digest : str
+        Of all that.
+    """
+
+    skeleton: Skeleton
+    metres_per_unit: float
+    bones: Mapping[str, str]
+    digest: str
+
+    @classmethod
+    def of(cls, settings: DatabaseSettings, folder: Path, file: str | None = None) -> Rig | None:
+        """The rig of a database; None where it has none. `file` is that of the settings in messages.
+
+        Raises
+        ------
+        FileError, ClipError
+            The rig's file cannot be read.
+        MotionError
+            It has no such bone as one of `rig_bones`.
+        """
+        if settings.rig is None:
+            return None
+        path = folder / settings.rig
+        content = read_bytes(path)
+        skeleton = parse_bvh(text_of(content, str(path)), path.stem, file=str(path)).skeleton
+        if unknown := [skeleton.missing_bone(bone) for bone in settings.rig_bones if bone not in skeleton]:
+            where = f"[databases.{settings.name}] rig_bones:"
+            raise MotionError(*(replace(fault, found=f"{where} {fault.found}", place=Place(file)) for fault in unknown))
+        unit = settings.metres_per_unit if settings.rig_metres_per_unit is None else settings.rig_metres_per_unit
+        about = json.dumps([RETARGETING, float(unit).hex(), sorted(settings.rig_bones.items())])
+        digest = hashlib.blake2b(about.encode(), digest_size=16)
+        digest.update(content)
+        return cls(skeleton, unit, settings.rig_bones, digest.hexdigest())
+
+    def clip(self, clip: Clip) -> Clip:
+        """A clip on this rig.
+
+        Raises
+        ------
+        MotionError
+            It has no counterpart of a bone of hips or legs; with the nearest.
+        """
+        if self._is_of(clip):
+            return clip
+        missing = [
+            clip.skeleton.missing_bone(other).at(Place(clip.name))
+            for bone, other in self.bones.items()
+            if other not in clip.skeleton and bone not in clip.skeleton
+        ]
+        if missing:
+            raise MotionError(*missing)
+        names = {bone: other for bone, other in self.bones.items() if other in clip.skeleton}
+        return retargeted(clip, self.skeleton, metres_per_unit=self.metres_per_unit, names=names)
+
+    def _is_of(self, clip: Clip) -> bool:
+        own, other = self.skeleton, clip.skeleton
+        if own.names != other.names or own.parents.tolist() != other.parents.tolist():
+            return False
+        apart = self.metres_per_unit * own.offsets[1:] - clip.metres_per_unit * other.offsets[1:]
+        return bool(np.abs(apart).max(initial=0.0) < SAME_M)

@@ -16,7 +16,7 @@ if __package__ in (None, ""):
 
 from benchmarks import captured, timing
 from contextdb import motion
-from contextdb.motion.preparing.proposals import KINDS
+from contextdb.motion.preparing.proposal import KINDS
 
 REPEATS = 3
 

@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 from running import Result, run
 
-from contextdb.commands.motion_prepare_command import with_marks
+from contextdb.commands import watched_work
+from contextdb.commands.motion_prepared import line_of, with_marks
 from contextdb.motion import Markup, MotionConfig, Proposal, clip_features, make_clip, write_bvh
+from contextdb.motion.preparing.proposals import Look
 
 NAMES = ("idle", "walk", "start_walk", "stop_walk")
 HAND = "tag,asset,to,from\r\nMove.Walk,walk*,,\r\nLooping,idle,,"
@@ -44,7 +46,11 @@ def prepare(*arguments: str, code: int = 0) -> Result:
 
 
 def as_bytes(folder: Path) -> dict[str, bytes]:
-    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and ".contextdb-cache" not in path.parts
+    }
 
 
 def test_without_write_nothing_changes_and_the_reasons_come_first(game: Path):
@@ -159,6 +165,94 @@ def test_clips_that_play_together_are_not_taken_for_duplicates_of_each_other(gam
     assert {each["asset"] for each in found if each["kind"] == "contacts"} == {"shake.Host", "shake.Guest"}
 
 
+def slower(game: Path, name: str = "start_walk") -> None:
+    """Save a clip as another program would: half as fast."""
+    file = game / "clips" / f"{name}.bvh"
+    file.write_text(file.read_text(encoding="utf-8").replace("Frame Time: 0.03", "Frame Time: 0.06"), encoding="utf-8")
+
+
+def looked_at(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The names of the clips that are looked at from here on."""
+    names: list[str] = []
+    at = Look.at
+    monkeypatch.setattr(Look, "at", lambda clip: names.append(clip.name) or at(clip))
+    return names
+
+
+def test_only_clips_that_changed_are_looked_at_again(game: Path, monkeypatch: pytest.MonkeyPatch):
+    prepare("game/clips", "--write")
+    looks = looked_at(monkeypatch)
+    prepare("game/clips", "--write")
+    assert looks == []
+    slower(game)
+    prepare("game/clips", "--write")
+    assert looks == ["start_walk"]
+
+
+def test_marks_of_a_clip_as_it_was_are_replaced_and_all_others_stay(game: Path):
+    prepare("game/clips", "--write")
+    file = game / "clips" / "marks.csv"
+    before = file.read_text(encoding="utf-8").splitlines()
+    slower(game)
+    told = prepare("game/clips", "--write")
+    after = file.read_text(encoding="utf-8").splitlines()
+    assert [line for line in before if "start_walk" not in line] == [line for line in after if "start_walk" not in line]
+    assert "start_walk,NextNaturalOnly,0.733,1.167,0.2" in before
+    assert "start_walk,NextNaturalOnly,1.583,2.217,0.2" in after
+    assert "start_walk changed since it was prepared" in told.err
+    assert not {line for line in before if line.startswith("start_walk,Contact")} & set(after)
+    assert "nothing to propose" in prepare("game/clips", "--write").err
+
+
+def test_a_mark_that_was_edited_stays_when_its_clip_changes(game: Path):
+    prepare("game/clips", "--write")
+    file = game / "clips" / "marks.csv"
+    edited = "start_walk,NextNaturalOnly,0.5,2,0.2"
+    file.write_text(
+        file.read_text(encoding="utf-8").replace("start_walk,NextNaturalOnly,0.733,1.167,0.2", edited), encoding="utf-8"
+    )
+    slower(game)
+    prepare("game/clips", "--write")
+    text = file.read_text(encoding="utf-8")
+    assert edited in text
+    assert text.count("start_walk,NextNaturalOnly") == 1
+
+
+@pytest.mark.parametrize("spoilt", ["", "{", '{"format": 1, "clips": {"walk": {}}}', '{"format": 9}', "[]"])
+def test_what_is_kept_and_cannot_be_read_is_as_if_it_were_not_there(game: Path, spoilt: str, monkeypatch: pytest.MonkeyPatch):
+    prepare("game/clips", "--write", "--only", "loops")
+    (game / "clips" / ".contextdb-cache" / "prepared.json").write_text(spoilt, encoding="utf-8")
+    looks = looked_at(monkeypatch)
+    prepare("game/clips", "--only", "loops")
+    assert len(looks) == len(NAMES)
+
+
+def test_watching_does_it_again_for_each_saved_clip_and_tells_what_is_wrong(game: Path, monkeypatch: pytest.MonkeyPatch):
+    (game / "contextdb.toml").write_text(TOML, encoding="utf-8")
+    marks, toml = game / "clips" / "marks.csv", game / "contextdb.toml"
+    saves = [
+        lambda: slower(game),
+        lambda: toml.write_text("[features", encoding="utf-8"),
+        lambda: toml.write_text(TOML, encoding="utf-8"),
+    ]
+    time_s = [0.0]
+
+    def sleep(seconds: float) -> None:
+        time_s[0] += seconds
+        if time_s[0] > 4.0 * (4 - len(saves)):  # the files rested long ago
+            if not saves:
+                raise KeyboardInterrupt
+            saves.pop(0)()
+
+    monkeypatch.setattr(watched_work, "sleep", sleep)
+    monkeypatch.setattr(watched_work, "clock", lambda: time_s[0])
+    told = prepare("game", "--only", "starts", "--write", "--watch")
+    assert "+start_walk,NextNaturalOnly,0.733,1.167,0.2" in told.lines
+    assert "+start_walk,NextNaturalOnly,1.583,2.217,0.2" in told.lines
+    assert "contextdb.toml, line 1" in told.err
+    assert "NextNaturalOnly,1.583" in marks.read_text(encoding="utf-8")
+
+
 def test_markup_that_cannot_be_read_stops_it(game: Path):
     (game / "clips" / "marks.csv").write_text("asset,tag,from,to\nwalk,DoNotChose,,\n", encoding="utf-8")
     assert "DoNotChoose" in prepare("game/clips", "--write", code=2).err
@@ -172,7 +266,7 @@ def test_wrong_uses_are_refused(game: Path, arguments: tuple[str, ...]):
 
 def test_marks_are_quoted_where_they_must_be():
     mark = Proposal('a,"b"', "loops", "Looping", None, None, None, "", 0.0)
-    text = with_marks("", [mark])
+    text = with_marks("", [line_of(mark)])
     assert Markup.parse(text).is_looping('a,"b"')
 
 

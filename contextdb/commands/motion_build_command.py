@@ -7,6 +7,7 @@ The features of each clip are cached in .contextdb-cache, so the next build comp
   contextdb motion build tables/ --out build/ --database jog
   contextdb motion build tables/ --keep-going            without faulty clips and databases
   contextdb motion build tables/ --poses                 and their poses, for what plays them
+  contextdb motion build tables/ --watch                 and again whenever a clip is saved
 
 If a clip cannot be read, nothing is saved, all faults are reported, and the exit code is 2. With --keep-going such clips are left
 out and reported, and the exit code is 1. Clips that only look wrong, such as a body of 170 m, give warnings.
@@ -19,9 +20,11 @@ import json
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 from contextdb.commands.progress import building_bar
+from contextdb.commands.watched_work import watched
 from contextdb.console import ExitCode, aligned, output, printable
 from contextdb.disk import make_folder
 from contextdb.errors import ContextDBError, Fault, FileError, Place, plural, some
@@ -50,11 +53,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--poses", action="store_true", help="save the poses of the clips too; not with --keep-going")
     parser.add_argument("--no-cache", action="store_true", help="compute every clip, and cache nothing")
+    parser.add_argument(
+        "--watch", action="store_true", help="build again whenever a clip, a table, markup or contextdb.toml is saved"
+    )
     parser.add_argument("--json", action="store_true", help="print a JSON document instead of a table")
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Build and save; prints a line for each database."""
+    return watched(arguments.path, partial(_build, arguments)) if arguments.watch else _build(arguments)
+
+
+def _build(arguments: argparse.Namespace) -> ExitCode:
     project = MotionProject.load(arguments.path)
     targets = project.targets(arguments.out, arguments.database)
     if arguments.poses and arguments.keep_going:

@@ -4,43 +4,47 @@ Where hips sway, root_smooth_s is proposed for the features of their databases: 
 the hips and sideways from the feet. No clip file is changed. Proposed are too contacts of the feet, loops and the cuts that would
 make one, standing ends that are not to be entered, noise that is left out, starts and turns that play as a whole, and
 near-duplicates. What the markup says already stays as it is, and nothing is proposed beside it. The diff fits the folder:
-`patch -p1` applies it there, and `patch -p1 -R` takes it back.
+`patch -p1` applies it there, and `patch -p1 -R` takes it back. With --write what was found is kept in .contextdb-cache: the next
+run looks only at clips that changed, and replaces the marks that were written for them as they were, except those that were edited.
 
 Exits with 1 if something is proposed that is not written, or a clip could not be read.
 
   contextdb motion prepare game/
   contextdb motion prepare game/ --only loops --only starts
   contextdb motion prepare game/ --write
+  contextdb motion prepare game/ --write --watch
 """
 
 from __future__ import annotations
 
 import argparse
-import csv
 import difflib
-import io
 import os
 import sys
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 from contextdb.commands.motion_clips import MARKUP, FolderClips, add_clip_arguments, below, clips_of, progress_of
+from contextdb.commands.motion_prepared import BOM, Line, Prepared, line_of, with_marks, without
+from contextdb.commands.watched_work import watched
 from contextdb.console import ExitCode, output, printable
 from contextdb.disk import read_bytes
 from contextdb.disk.together import NewFile, write_together
 from contextdb.errors import Fault, FileError, Place, plural
 from contextdb.motion.clips.clip import Clip
-from contextdb.motion.markup.file import COLUMNS, text_of
+from contextdb.motion.markup.file import text_of
 from contextdb.motion.markup.markup import Markup
-from contextdb.motion.preparing.proposals import KINDS, ROOT_SMOOTH_S, Proposal, prepare
+from contextdb.motion.preparing.proposal import KINDS, Proposal
+from contextdb.motion.preparing.proposals import ROOT_SMOOTH_S, prepare_again
 from contextdb.motion.storage.clip_files import paths_of
 from contextdb.report.render_json import as_json
 from contextdb.schema.toml_edit import set_key
 from contextdb.tables.project import SCHEMA_FILE
 
-BOM = "\ufeff"
 ROOT_KEY = "root_smooth_s"
 JOINT_KINDS = ("roots", "contacts", "noise")
 """What is proposed for clips with roles: two people may move alike, and where they meet only a person can say."""
@@ -52,6 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     told = f"propose only this: {', '.join(KINDS)}; may be repeated"
     parser.add_argument("--only", metavar="KIND", choices=KINDS, action="append", help=told)
     parser.add_argument("--write", action="store_true", help="write the marks into the markup file")
+    parser.add_argument("--watch", action="store_true", help="do it again whenever a clip, markup or contextdb.toml is saved")
     parser.add_argument("--json", action="store_true", help="print a JSON document instead of a diff")
 
 
@@ -88,7 +93,12 @@ class MarkupFile:
 
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Propose markup, and write it where that is asked for."""
+    return watched(arguments.path, partial(_prepare, arguments)) if arguments.watch else _prepare(arguments)
+
+
+def _prepare(arguments: argparse.Namespace) -> ExitCode:
     found = clips_of(arguments.path, arguments.metres_per_unit, arguments.up)
+    prepared = Prepared.load(found.folder)
     proposals, changes = [], []
     settings: dict[tuple[str, str, str], str | float] = {}
     done = 0
@@ -99,32 +109,47 @@ def run(arguments: argparse.Namespace) -> ExitCode:
                 tell(before + i, len(found.clips), name)
 
             old, was = _text(file.path)
-            markup = Markup.parse(old, str(file.path)) if old else Markup()
             kinds = _kinds(arguments.only, file)
-            own = prepare(file.clips, markup, kinds=kinds, progress=told)
-            done += len(file.clips)
-            own += prepare(file.joint, markup, kinds=[kind for kind in kinds if kind in JOINT_KINDS], progress=told)
-            done += len(file.joint)
-            proposals += own
-            if any(each.kind == "roots" for each in own):
+            wanted = [(file.clips, kinds), (file.joint, [kind for kind in kinds if kind in JOINT_KINDS])]
+            outdated = {mark: name for clips, each in wanted for mark, name in prepared.outdated(clips, each, old).items()}
+            rest = without(old, outdated)
+            markup = Markup.parse(rest, str(file.path)) if rest else Markup()
+            own = [prepare_again(clips, markup, each, told, prepared.kept) for clips, each in wanted]
+            done += len(file.clips) + len(file.joint)
+            marks = {line_of(each): each for listed in own for each in listed if each.tag is not None}
+            for clips, each in wanted:
+                prepared.take(clips, each, marks)
+            added = {line: each for line, each in marks.items() if line not in outdated}
+            proposals += [each for listed in own for each in listed if each.tag is None or line_of(each) in added]
+            gone = {line: name for line, name in outdated.items() if line not in marks}
+            found.notes += _outdated(gone)
+            if any(each.kind == "roots" for listed in own for each in listed):
                 settings |= dict.fromkeys((("features", name, ROOT_KEY) for name in file.features), ROOT_SMOOTH_S)
-            marks = [each for each in own if each.tag is not None]
-            if marks:
-                changes.append(Change(file.path, was, old, with_marks(old, marks)))
+            if added or gone:
+                rest = without(old, gone)
+                changes.append(Change(file.path, was, old, with_marks(rest, added) if added else rest))
                 Markup.parse(changes[-1].new, str(file.path))
                 name = file.path.relative_to(found.folder).as_posix()
                 settings |= dict.fromkeys((("databases", database, "markup") for database in file.databases), name)
     changes += _settings(found.folder, settings)
-    if (
-        arguments.write
-        and changes
-        and not write_together(found.folder, [NewFile(each.path, each.data, each.was) for each in changes])
-    ):
-        fault = Fault("a file was changed by somebody else in this moment.", mend="to do the same once more")
-        raise FileError(fault.at(Place(str(changes[0].path))))
+    if arguments.write:
+        _write(found, changes)
+        prepared.save(found.clips)
     _report(found, proposals, changes, arguments)
     is_open = bool(changes) and not arguments.write
     return ExitCode.FOUND if is_open or found.left_out else ExitCode.OK
+
+
+def _outdated(marks: Mapping[Line, str]) -> Iterator[str]:
+    """What is said of marks that were written for clips as they were."""
+    for name, n_marks in Counter(marks.values()).items():
+        yield f"{name} changed since it was prepared: {plural(n_marks, 'mark')} of the clip as it was taken back."
+
+
+def _write(found: FolderClips, changes: Sequence[Change]) -> None:
+    if changes and not write_together(found.folder, [NewFile(each.path, each.data, each.was) for each in changes]):
+        fault = Fault("a file was changed by somebody else in this moment.", mend="to do the same once more")
+        raise FileError(fault.at(Place(str(changes[0].path))))
 
 
 def _kinds(only: Sequence[str] | None, file: MarkupFile) -> list[str]:
@@ -166,25 +191,6 @@ def _text(path: Path) -> tuple[str, bytes | None]:
         return "", None
     raw = read_bytes(path)
     return (BOM if raw.startswith(BOM.encode()) else "") + text_of(raw, str(path)), raw
-
-
-def with_marks(text: str, marks: Sequence[Proposal]) -> str:
-    """The text of a markup file with some marks behind its own lines, in the order of its columns."""
-    end = "\r\n" if "\r\n" in text else "\n"
-    header = next((line for line in text.removeprefix(BOM).splitlines() if line.strip()), "")
-    columns = [name.strip().casefold() for name in next(csv.reader([header]))] if header else list(COLUMNS)
-    start = text if header else f"{','.join(COLUMNS)}{end}"
-    added = io.StringIO()
-    writer = csv.writer(added, lineterminator=end)
-    for mark in marks:
-        fields = {"asset": mark.asset, "tag": str(mark.tag), "from": _number(mark.from_s), "to": _number(mark.to_s)}
-        fields["value"] = _number(mark.value)
-        writer.writerow([fields[column] for column in columns])
-    return f"{start}{'' if start.endswith(end) else end}{added.getvalue()}"
-
-
-def _number(value: float | None) -> str:
-    return "" if value is None else f"{value:.3f}".rstrip("0").rstrip(".")
 
 
 def _settings(folder: Path, settings: dict[tuple[str, str, str], str | float]) -> list[Change]:

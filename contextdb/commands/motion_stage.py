@@ -32,6 +32,7 @@ from contextdb.motion.features.extraction import Features
 from contextdb.motion.markup.reserved import MOST_COST
 from contextdb.motion.reading import as_number
 from contextdb.motion.storage.config import JOINTLY
+from contextdb.motion.storage.rigs import Rig
 from contextdb.motion.trace.cost_views import View
 from contextdb.tables.project import SCHEMA_FILE, Project
 
@@ -124,6 +125,8 @@ class Stage:
         if clip.casefold().endswith(".bvh"):
             settings = self.config.database(names[0])
             loaded = load_bvh(clip, metres_per_unit=settings.metres_per_unit, up=settings.up)
+            rig = Rig.of(settings, self.folder, self.config.file)
+            loaded = loaded if rig is None else rig.clip(loaded)
             query = query_from(schema, loaded, frame_at(clip, at_s, loaded.duration_s, schema.rate))
         else:
             query = self._pose(clip, at_s, names)

@@ -75,7 +75,8 @@ from contextdb.motion.output.streams import PoseStreams
 from contextdb.motion.output.track import clip_of_poses, pose_arrays
 from contextdb.motion.preparing.clip_facts import ClipFacts, Spread
 from contextdb.motion.preparing.describing import Described, describe
-from contextdb.motion.preparing.proposals import Proposal, prepare
+from contextdb.motion.preparing.proposal import Proposal
+from contextdb.motion.preparing.proposals import prepare
 from contextdb.motion.search.candidates import Candidate, Candidates
 from contextdb.motion.search.database import Hit, MotionDatabase, build_databases
 from contextdb.motion.search.filters import Biases

@@ -11,7 +11,7 @@ import pytest
 from contextdb import motion
 from contextdb.errors import ContextDBError
 from contextdb.motion.markup.reserved import ReservedTag
-from contextdb.motion.preparing.proposals import KINDS
+from contextdb.motion.preparing.proposal import KINDS
 
 MADE = motion.made_clips()
 CLIPS = {made.name: made.clip for made in MADE}

@@ -11,9 +11,8 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
-from functools import cached_property
-from typing import Any, Literal, get_args
+from dataclasses import dataclass
+from functools import cache, cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,9 +31,7 @@ from contextdb.motion.clips.trajectory import Trajectory, root_trajectory
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.markup.reserved import CONTACTS, ReservedTag
 from contextdb.motion.preparing.clip_facts import ENDS_S, SLOW_SHARE, STANDING_MPS, Moments, falls_of, require_finite, step_of
-
-Kind = Literal["roots", "contacts", "loops", "cuts", "tails", "noise", "starts", "turns", "targets", "duplicates"]
-KINDS: tuple[Kind, ...] = get_args(Kind)
+from contextdb.motion.preparing.proposal import KINDS, N_SAMPLES, Kept, Kind, Proposal, Shape
 
 ROOT_SMOOTH_S = 0.2
 """What is proposed for `root_smooth_s`: it evens out a step, and keeps a start and a bend."""
@@ -71,40 +68,6 @@ END_SHARE = 0.1
 ALIKE_M, ALIKE_S = 0.02, 0.05
 """Clips are near-duplicates whose joints are on the mean so near at the same share of the clip, and whose lengths differ by such a
 share."""
-N_SAMPLES = 24
-
-
-@dataclass(frozen=True, slots=True)
-class Proposal:
-    """A mark that is proposed; or a cut of the clip's file or a path of its own for its root, which are no marks.
-
-    Attributes
-    ----------
-    asset : str
-    kind : str
-        One of `KINDS`.
-    tag : str or None
-        None for a cut and for a root.
-    from_s, to_s : float or None
-        Seconds since the clip's start; None is its start or its end.
-    value : float or None
-    reason : str
-    measure : float
-        The number that the reason is about.
-    """
-
-    asset: str
-    kind: Kind
-    tag: str | None
-    from_s: float | None
-    to_s: float | None
-    value: float | None
-    reason: str
-    measure: float
-
-    def to_json(self) -> dict[str, Any]:
-        """As plain data."""
-        return asdict(self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,6 +178,17 @@ def prepare(
     ContextError
         An argument is wrong, or there is no such kind.
     """
+    return prepare_again(clips, markup, kinds, progress, Kept())
+
+
+def prepare_again(
+    clips: Sequence[Clip],
+    markup: Markup | None,
+    kinds: Sequence[str] | None,
+    progress: Callable[[int, int, str], None] | None,
+    kept: Kept,
+) -> list[Proposal]:
+    """What `prepare` proposes; only clips that are not as they were when they were kept are looked at, and then kept."""
     clips = require_many_of(clips, Clip, "clips", "a list of Clip")
     if markup is not None:
         require_kind(markup, Markup, "markup", "a Markup")
@@ -224,18 +198,22 @@ def prepare(
     if faults := [Fault(f"the clip {in_quotes(clip.name)} has no frame.", "at least one") for clip in clips if not clip.n_frames]:
         raise MotionError(*faults)
     found = defaultdict[str, list[Proposal]](list)
-    shapes: list[tuple[Clip, Floats]] = []
+    shapes: list[tuple[Clip, Shape]] = []
     for i, clip in enumerate(clips):
         if progress is not None:
             progress(i, len(clips), clip.name)
-        look = Look.at(clip)
-        found[clip.name] += [each for kind in KINDS if kind in wanted and kind in _OF_ONE for each in _OF_ONE[kind](look)]
+        known, look = kept.of(clip), cache(partial(Look.at, clip))
+        for kind in (kind for kind in KINDS if kind in wanted and kind in _OF_ONE):
+            if kind not in known.found:
+                known.found[kind] = list(_OF_ONE[kind](look()))
+            found[clip.name] += known.found[kind]
         if "duplicates" in wanted:
-            shapes.append((clip, _shape(look)))
+            known.shape = _shape(look()) if known.shape is None else known.shape
+            shapes.append((clip, known.shape))
     for each in _duplicates(shapes):
         found[each.asset].append(each)
-    known = markup or Markup()
-    return [each for clip in dict.fromkeys(clip.name for clip in clips) for each in found[clip] if not _is_said(each, known)]
+    said = markup or Markup()
+    return [each for clip in dict.fromkeys(clip.name for clip in clips) for each in found[clip] if not _is_said(each, said)]
 
 
 def _wanted(kinds: Sequence[str] | None) -> set[str]:
@@ -464,15 +442,15 @@ def _moved_by(values: Floats, n: int) -> Floats:
 # ---- clips that are alike
 
 
-def _shape(look: Look) -> Floats:
-    """The poses of a clip at shares of its length: [samples, J, 3]."""
+def _shape(look: Look) -> Shape:
+    """The poses of a clip at shares of its length: float32 [samples, J, 3]."""
     at = np.linspace(0.0, look.poses.n_frames - 1, N_SAMPLES).round().astype(np.int64)
-    return look.own[at]
+    return look.own[at].astype(np.float32)
 
 
-def _duplicates(shapes: Sequence[tuple[Clip, Floats]]) -> Iterator[Proposal]:
+def _duplicates(shapes: Sequence[tuple[Clip, Shape]]) -> Iterator[Proposal]:
     """Clips that show what one before them shows."""
-    firsts: list[tuple[Clip, Floats]] = []
+    firsts: list[tuple[Clip, Shape]] = []
     for clip, shape in shapes:
         for other, seen in firsts:
             if other.skeleton.names != clip.skeleton.names or _differ(clip.duration_s, other.duration_s):

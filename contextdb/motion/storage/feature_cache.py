@@ -105,7 +105,8 @@ class FeatureCache:
         metadata = CLIP_FEATURES.metadata({"measures": said, "digest": _digest(tensors, key, said)})
         entry = self._entry(database, key)
         with suppress(FileError, OSError, ValueError):  # ValueError: no system can have a file of this name
-            self._make(entry.parent)
+            make_cache_folder(self.folder)
+            entry.parent.mkdir(exist_ok=True)
             write_atomic(entry, to_bytes(tensors, metadata), syncs=False)
 
     def prune(self, database: str, keys: Collection[str]) -> None:
@@ -124,11 +125,12 @@ class FeatureCache:
     def _entry(self, database: str, key: str) -> Path:
         return self.folder / file_name(database, FOLDER_SUFFIX) / (key + SUFFIX)
 
-    def _make(self, folder: Path) -> None:
-        if not self.folder.exists():
-            self.folder.mkdir(parents=True, exist_ok=True)
-            write_atomic(self.folder / ".gitignore", b"*\n", syncs=False)
-        folder.mkdir(exist_ok=True)
+
+def make_cache_folder(folder: Path) -> None:
+    """Make the folder of a cache, which no version control takes; raises OSError."""
+    if not folder.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        write_atomic(folder / ".gitignore", b"*\n", syncs=False)
 
 
 def _remove(folder: Path, kept: Collection[str] = ()) -> None:

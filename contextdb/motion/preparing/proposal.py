@@ -1,0 +1,87 @@
+"""One thing that is proposed for a clip, and what was found of clips, kept so that only those that changed are looked at again."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb.motion.clips.clip import Clip
+
+Kind = Literal["roots", "contacts", "loops", "cuts", "tails", "noise", "starts", "turns", "targets", "duplicates"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+Shape = NDArray[np.float32]
+
+N_SAMPLES = 24
+"""So many poses of a clip are its shape."""
+PREPARING = 1
+"""The version of what is proposed: one more whenever other marks would be for the same clip."""
+
+
+@dataclass(frozen=True, slots=True)
+class Proposal:
+    """A mark that is proposed; or a cut of the clip's file or a path of its own for its root, which are no marks.
+
+    Attributes
+    ----------
+    asset : str
+    kind : str
+        One of `KINDS`.
+    tag : str or None
+        None for a cut and for a root.
+    from_s, to_s : float or None
+        Seconds since the clip's start; None is its start or its end.
+    value : float or None
+    reason : str
+    measure : float
+        The number that the reason is about.
+    """
+
+    asset: str
+    kind: Kind
+    tag: str | None
+    from_s: float | None
+    to_s: float | None
+    value: float | None
+    reason: str
+    measure: float
+
+    def to_json(self) -> dict[str, Any]:
+        """As plain data."""
+        return asdict(self)
+
+
+@dataclass
+class KeptClip:
+    """What was found of a clip before it is compared with the markup: by kind, and its shape; as far as it was looked for."""
+
+    key: str
+    found: dict[str, list[Proposal]] = field(default_factory=dict)
+    shape: Shape | None = None
+
+
+@dataclass
+class Kept:
+    """What was found of clips, by their names. That of a clip that changed since is forgotten when it is asked for."""
+
+    clips: dict[str, KeptClip] = field(default_factory=dict)
+
+    def of(self, clip: Clip) -> KeptClip:
+        """What was found of a clip as it is now; nothing of one that is new."""
+        key = key_of(clip)
+        if clip.name not in self.clips or self.clips[clip.name].key != key:
+            self.clips[clip.name] = KeptClip(key)
+        return self.clips[clip.name]
+
+
+def key_of(clip: Clip) -> str:
+    """A digest of all that proposals for a clip depend on."""
+    rig = clip.skeleton
+    about = [PREPARING, clip.frame_time_s, clip.metres_per_unit, clip.up, rig.names, rig.parents.tolist(), rig.offsets.tolist()]
+    digest = hashlib.blake2b(json.dumps([*about, rig.channels]).encode(), digest_size=16)
+    digest.update(np.ascontiguousarray(clip.values).tobytes())
+    return digest.hexdigest()

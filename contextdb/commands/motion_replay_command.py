@@ -285,7 +285,9 @@ class _Shown:
         """The decision at a place of the session."""
         asked, trace, databases = replay.asked, replay.trace, replay.databases
         decision = trace[place]
-        needs = bool(asked.name) or (decision.searched and trace.n_candidates > 0 and not decision.candidates)
+        needs = bool(asked.name) or (
+            decision.searched and decision.together is None and trace.n_candidates > 0 and not decision.candidates
+        )
         not_asked = (replay.missing or why_not_asked(decision, trace.about, databases)) if needs else ""
         ranked, why_not = None, None
         if asked.name and not not_asked:

@@ -85,7 +85,7 @@ from contextdb.motion.selection.controller import Controller
 from contextdb.motion.selection.controller_group import ControllerGroup
 from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.controller_state import ControllerState
-from contextdb.motion.selection.decision import Action, Decision, Playing, Recorder
+from contextdb.motion.selection.decision import Action, Decision, Playing, Recorder, Together
 from contextdb.motion.selection.inputs import Inputs
 from contextdb.motion.selection.root_motion import RootMotion
 from contextdb.motion.selection.selector import Entry, Selector
@@ -224,6 +224,7 @@ __all__ = [
     "TagFilter",
     "Target",
     "ToCapture",
+    "Together",
     "Trace",
     "Trajectory",
     "TransitionCoverage",

@@ -31,6 +31,7 @@ from contextdb.motion import (
     PoseStream,
     RootMotion,
     Steered,
+    Trace,
     build,
     make_joint_clip,
     pose_schema,
@@ -42,7 +43,9 @@ from contextdb.motion.joint import searcher as searching
 from contextdb.motion.joint.alignment import aligned
 from contextdb.motion.made.joint import JOINT_ROLES, joint_contact_s
 from contextdb.motion.markup.marks import Mark, Marks, TagFilter
+from contextdb.motion.selection.decision import Together
 from contextdb.motion.selection.root_motion import between
+from contextdb.motion.trace.reasked import why_not_asked
 from contextdb.schema.settings import TableSettings
 
 ROLES = ("Tackler", "Carrier", "Judge")
@@ -377,6 +380,46 @@ def test_the_hands_of_two_streams_meet_at_the_contact(greetings):
             pose = streams[role].update(play.decision(role), step, place)
             hands[role] = pose.positions[bank.skeleton.index("RightHand")]
     assert np.linalg.norm(hands["Host"] - hands["Guest"]) < 0.01
+
+
+@pytest.fixture(scope="module")
+def session(greetings, tmp_path_factory):
+    """A recorded play of the host, and the file it was saved in."""
+    searcher = JointSearcher(greetings)
+    trace = Trace(databases=searcher.selector.databases)
+    play = entered(greetings, 60, {"casts": CAST})[0]
+    for tick in range(1, 31):
+        play.advance(1 / 30)
+        trace.record(play.decision("Host", tick=tick, time_s=5.0 + tick / 30))
+    file = tmp_path_factory.mktemp("session") / "host.parquet"
+    trace.save(file)
+    return play, file
+
+
+def test_a_session_keeps_clip_frame_cast_and_the_costs_of_all_roles(session):
+    play, file = session
+    first, *others = Trace.load(file)
+    assert (first.tick, first.action, first.searched, first.cost) == (1, "jumps", True, play.hit.cost)
+    assert first.together == Together(
+        "Host", play.hit.asset, play.hit.time_s, {"Host": "7", "Guest": "3"}, play.hit.costs, play.hit.bias
+    )
+    assert first.playing.database == "joint"
+    assert all(each.together is None and not each.searched for each in others)
+
+
+def test_replay_shows_a_joint_choice_in_a_sentence_and_in_its_parts(session):
+    play, file = session
+    sentence = "7 as Host (0.0505) and 3 as Guest (0.8108) enter greet_tired together at 2.13 s, at cost 0.8613."
+    assert play.hit.sentence == sentence
+    shown = run("motion", "replay", str(file), "--at", "1")
+    assert sentence in " ".join(shown.out.split())
+    assert "together    Host is 7:" in shown.out
+    assert "no candidates are shown" not in shown.out
+    assert "several characters at once" in why_not_asked(Trace.load(file)[0], {}, {})
+    assert "joint" in run("motion", "replay", str(file)).out
+    document = run("motion", "replay", str(file), "--at", "1", "--json").json
+    assert document["together"]["cast"] == {"Host": "7", "Guest": "3"}
+    assert "together" not in run("motion", "replay", str(file), "--at", "2", "--json").json
 
 
 # ---- clips, settings, faults

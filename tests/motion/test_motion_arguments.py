@@ -271,6 +271,8 @@ CALLS: dict[str, Call] = {
     "JointPlay.advance(dt_s)": lambda x: MET.advance(x),
     "JointPlay.at(time_s)": lambda x: MET.at(x),
     "JointPlay.decision(role)": lambda x: MET.decision(x),
+    "JointPlay.decision(tick)": lambda x: MET.decision("Host", tick=x),
+    "JointPlay.decision(time_s)": lambda x: x is None or MET.decision("Host", time_s=x),
     "JointPlay.decision(database)": lambda x: isinstance(x, str) or MET.decision("Host", x),
     "make_joint_clip(name)": lambda x: motion.make_joint_clip(x),
     "write_game_clips(folder)": lambda x: isinstance(x, (str, Path)) or motion.write_game_clips(x),

@@ -67,6 +67,17 @@ class JointHit:
     def __bool__(self) -> bool:
         return self.frame >= 0
 
+    @property
+    def sentence(self) -> str:
+        """The choice in one sentence."""
+        if not self:
+            return f"Nothing may play. {self.why}".strip()
+        roles = [f"{actor} as {role} ({math.fsum(self.costs[role].values()):.4f})" for role, actor in self.cast.items()]
+        when = f"frame {self.frame}" if self.time_s is None else f"{self.time_s:.2f} s"
+        side = " mirrored" if self.mirrored else ""
+        told = f"{', '.join(roles[:-1])} and {roles[-1]} enter {self.asset}{side} together at {when}, at cost {self.cost:.4f}"
+        return f"{told}: {self.why}" if len(self.searches) > 1 else f"{told}."
+
     def explain(self) -> str:
         """The choice in lines for people: who plays what from when, what each role costs and by what, and what is to be made up."""
         if not self:

@@ -13,12 +13,12 @@ K roles. Times are seconds. Source: the match node of Remedy's talk, for several
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Unpack
 
 import numpy as np
 
-from contextdb.cells.arguments import require_kind, require_text
+from contextdb.cells.arguments import require_kind, require_real, require_text, require_whole
 from contextdb.errors import Fault, MotionError, QueryError, in_quotes, some
 from contextdb.motion.clips.ground_place import GroundPlace
 from contextdb.motion.joint.database import JointDatabase
@@ -28,7 +28,7 @@ from contextdb.motion.markup.spans import TOLERANCE_S
 from contextdb.motion.nodes.match_node import MatchCosts, MatchPlay
 from contextdb.motion.nodes.warping import Target, Window, warped
 from contextdb.motion.search.database import Hit
-from contextdb.motion.selection.decision import Decision
+from contextdb.motion.selection.decision import Action, Decision, Together
 from contextdb.motion.selection.playhead import Playhead
 from contextdb.motion.selection.root_motion import RootMotion, between
 
@@ -85,11 +85,39 @@ class JointPlay:
         found = {role: self.starts[role].then(play.at(time_s)) for role, play in self.plays.items()}
         return {role: (place.left_m, place.ahead_m, place.turn_rad) for role, place in found.items()}
 
-    def decision(self, role: str, database: str = "") -> Decision:
-        """What a role plays now, for `PoseStream.update`; as `MatchPlay.decision`. Raises QueryError for a role that it lacks."""
+    def decision(self, role: str, database: str = "", *, tick: int = 0, time_s: float | None = None) -> Decision:
+        """What a role plays now, for `PoseStream.update` and for `Trace.record`; as `MatchPlay.decision`.
+
+        Parameters
+        ----------
+        role : str
+        database : str
+            Its name. Default: that of the hit.
+        tick : int
+            The update of the session that this is.
+        time_s : float, optional
+            Seconds of the session. Default: those since the entry.
+
+        Raises
+        ------
+        QueryError
+            There is no such role.
+        """
         if require_text(role, "role") not in self.plays:
             raise QueryError(Fault(f"there is no role {in_quotes(role)}.", some(self.plays)))
-        return self.plays[role].decision(database)
+        found = self.plays[role].decision(require_text(database, "database") or str(self.hit.database))
+        found = replace(found, tick=require_whole(tick, "tick"))
+        if time_s is not None:
+            found = replace(found, time_s=require_real(time_s, "time_s", 0.0, math.inf))
+        return self._entered(found, role) if found.action is Action.JUMP else found
+
+    def _entered(self, decision: Decision, role: str) -> Decision:
+        """The first decision, with what was chosen."""
+        hit = self.hit
+        entry_s = self.plays[role].entry_s
+        cast = {each: str(actor) for each, actor in hit.cast.items()}
+        together = Together(role, str(hit.asset), entry_s, cast, hit.costs, hit.bias)
+        return replace(decision, why=hit.sentence, searched=True, cost=hit.cost, together=together)
 
 
 class JointNode:

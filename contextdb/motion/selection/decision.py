@@ -61,6 +61,32 @@ class Action(StrEnum):
     NOTHING = "plays nothing"
 
 
+@dataclass(frozen=True, slots=True)
+class Together:
+    """A choice for several characters at once, as one of them records it.
+
+    Attributes
+    ----------
+    role : str
+        Of the character whose decision it is.
+    asset : str
+        Without the role.
+    time_s : float
+        Where it is entered: seconds since its start.
+    cast : mapping of role to str
+        Who plays it.
+    costs : mapping of role to mapping of channel to float
+    bias : float
+    """
+
+    role: str
+    asset: str
+    time_s: float
+    cast: Mapping[str, str]
+    costs: Mapping[str, Mapping[str, float]]
+    bias: float = 0.0
+
+
 @quickly_made
 @dataclass(frozen=True, slots=True)
 class Decision:
@@ -108,6 +134,8 @@ class Decision:
         candidates are asked for.
     inputs : Inputs or None
         What else the update was given; None where no candidates are asked for.
+    together : Together or None
+        Where a clip of several characters is entered: who plays it, and what each role costs.
     """
 
     tick: int
@@ -131,6 +159,7 @@ class Decision:
     play_rate: float = 1.0
     filters: tuple[tuple[str, Filter], ...] = field(default=(), compare=False, repr=False)
     inputs: Inputs | None = field(default=None, compare=False, repr=False)
+    together: Together | None = None
 
 
 class Recorder(Protocol):

@@ -26,6 +26,8 @@ Events = Mapping[tuple[str, int], Sequence[str]]
 def decision_json(decision: Decision, events: Events | None = None) -> Json:
     """A decision; its candidates are a list of databases, each with its `rows` and how many frames were `left_out`."""
     told = {field.name: as_plain(getattr(decision, field.name)) for field in fields(decision) if field.name not in LEFT}
+    if decision.together is None:
+        del told["together"]
     told["candidates"] = [candidates_json(name, found, events) for name, found in decision.candidates]
     return told
 

@@ -159,6 +159,8 @@ def why_not_asked(
     """
     if not decision.searched:
         return "nothing was searched at this update: what played, played on."
+    if decision.together is not None:
+        return "clip and cast were chosen for several characters at once: JointSearcher.candidates compares them."
     if decision.query is None or not decision.filters:
         return "the session holds no filters: an older version or code of your own recorded it, or it was to keep no candidates."
     for name, _ in decision.filters:

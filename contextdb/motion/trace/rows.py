@@ -15,6 +15,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,7 +25,7 @@ from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.search.candidates import Candidate, Candidates
 from contextdb.motion.search.database import NOTHING, Hit
 from contextdb.motion.selection.choice import Choice, Reason, Search, Status
-from contextdb.motion.selection.decision import Action, Decision, Playing
+from contextdb.motion.selection.decision import Action, Decision, Playing, Together
 from contextdb.motion.selection.root_motion import RootMotion
 from contextdb.motion.selection.worked_out import WorkedOut
 from contextdb.motion.trace.filter_rows import filter_of, filter_row, filter_type
@@ -39,11 +40,12 @@ EventsOf = Callable[[str, int], tuple[str, ...]]
 Events = dict[tuple[str, int], tuple[str, ...]]
 
 TIMINGS, FILTERS, INPUTS, HELD, PLAY_RATE = "search_us", "filters", "inputs", "held", "play_rate"
+TOGETHER = "together"
 PERMUTATION_S = "permutation_s"
 """Of a database with permutations: how far ahead each looks."""
 PLAYING = ("database", "asset", "range", "frame", "time_s", "mirrored")
 BODY = ("body_x", "body_z", "body_heading")
-OPTIONAL = (TIMINGS, FILTERS, INPUTS, *BODY, HELD, PLAY_RATE)
+OPTIONAL = (TIMINGS, FILTERS, INPUTS, *BODY, HELD, PLAY_RATE, TOGETHER)
 """The columns that a file may lack: another recording has other timings, and older versions kept none of the others."""
 
 
@@ -99,6 +101,7 @@ def columns() -> dict[str, PolarsType]:
         PLAY_RATE: number,
         FILTERS: filter_type(),
         INPUTS: text,
+        TOGETHER: text,
         TIMINGS: number,
     }
 
@@ -130,6 +133,7 @@ def row_of(decision: Decision, events_of: EventsOf) -> Row:
         PLAY_RATE: float(decision.play_rate),
         FILTERS: [filter_row(_text(name), chosen) for name, chosen in decision.filters],
         INPUTS: None if decision.inputs is None else inputs_json(decision.inputs),
+        TOGETHER: None if decision.together is None else json.dumps(asdict(decision.together)),
         TIMINGS: _number(decision.search_us),
     }
 
@@ -261,6 +265,7 @@ def decision_of(row: Row) -> Decision:
         play_rate=1.0 if row.get(PLAY_RATE) is None else float(row[PLAY_RATE]),
         filters=tuple((_known(each["database"]), filter_of(each)) for each in row.get(FILTERS) or ()),
         inputs=None if row.get(INPUTS) is None else inputs_of(row[INPUTS]),
+        together=None if row.get(TOGETHER) is None else Together(**json.loads(row[TOGETHER])),
     )
 
 

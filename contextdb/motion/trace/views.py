@@ -124,6 +124,8 @@ def _action(decision: Decision) -> str:
 
 def cause_of(decision: Decision) -> str:
     """Why there was a search, in a word or two: what the decision's sentence begins with."""
+    if decision.together is not None:
+        return "joint"
     causes = (words for cause, words in CAUSES.items() if decision.why.startswith(cause.told(decision.before)))
     return next(causes, "") if decision.searched else ""
 
@@ -184,6 +186,11 @@ def _status(decision: Decision, events: EventTexts) -> Iterator[tuple[str, str]]
     for what, cost, of in (("cost", decision.cost, playing), ("playing on", decision.continuing_cost, before)):
         if cost is not None:
             yield what, cost_text(cost) + _parts_text(decision, of)
+    if decision.together is not None:
+        for role, actor in decision.together.cast.items():
+            own = decision.together.costs[role]
+            parts = ", ".join(f"{part} {cost_text(cost)}" for part, cost in sorted(own.items(), key=lambda each: -each[1]) if cost)
+            yield "together" if role == next(iter(decision.together.cast)) else "", f"{role} is {actor}: {parts or cost_text(0.0)}"
     if decision.held:
         yield "held by", decision.held
     if playing is not None and events.get((playing.database, playing.frame)):

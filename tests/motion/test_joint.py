@@ -42,6 +42,7 @@ from contextdb.motion import (
 from contextdb.motion.joint import searcher as searching
 from contextdb.motion.joint.alignment import aligned
 from contextdb.motion.made.joint import JOINT_ROLES, joint_contact_s
+from contextdb.motion.markup.left_out import LeftOut, Skip
 from contextdb.motion.markup.marks import Mark, Marks, TagFilter
 from contextdb.motion.selection.decision import Together
 from contextdb.motion.selection.root_motion import between
@@ -99,14 +100,20 @@ def joint_moments(draw):
     places = {actor: (*(rng.integers(-4, 5, 2) / 2.0).tolist(), float(rng.uniform(-4, 4))) for actor in actors}
     every = [dict(zip(joint.roles, each, strict=True)) for each in permutations(actors, n_roles)]
     casts = None if draw(st.booleans()) else [cast for cast in every if rng.random() < 0.5]
-    return joint, queries, places, casts, rng.random(n_clips) < 0.8, every, draw(st.sampled_from([2, 512]))
+    bias = rng.integers(-2, 3, total) / 4.0 if draw(st.booleans()) else None
+    first = int(rng.integers(0, total))
+    skip = [Skip(first, first + int(rng.integers(1, 9)), LeftOut.HISTORY)] if draw(st.booleans()) else []
+    options = {"valid": rng.random(n_clips) < 0.8, "casts": casts, "bias": bias, "skip": skip}
+    return joint, queries, places, options, every, draw(st.sampled_from([2, 512]))
 
 
-def tried(joint, queries, places, cast, at, frame):
+def tried(joint, queries, places, cast, at, frame, bias, skip):
     """The cost of one cast in one joint frame, by the definition in the docstring; None where a frame may not be chosen."""
     database, n_roles = joint.database, len(joint.roles)
     frames = {role: int(database.starts[joint.ranges[at, k]]) + frame for k, role in enumerate(joint.roles)}
     if any(database.marks.kinds[number] for number in frames.values()):
+        return None
+    if any(each.start <= number < each.stop for number in frames.values() for each in skip):
         return None
     features, total = database.features, 0.0
     for role, number in frames.items():
@@ -120,17 +127,18 @@ def tried(joint, queries, places, cast, at, frame):
         chord = 2.0 * math.sin((apart[0].turn_rad - apart[1].turn_rad) / 2.0)
         total += joint.place_weight * (metres / 0.5) ** 2 + joint.facing_weight * (chord / 0.5) ** 2
     sizes = n_roles * database.n_features + n_roles * (n_roles - 1) * 2 * (joint.place_weight + joint.facing_weight)
-    return total / sizes + 0.75
+    return total / sizes + 0.75 + (0.0 if bias is None else float(np.mean([bias[number] for number in frames.values()])))
 
 
 @examples(0.5)
 @given(joint_moments())
 def test_the_search_finds_what_trying_every_cast_clip_and_frame_finds(moment):
-    joint, queries, places, casts, valid, every, at_once = moment
+    joint, queries, places, options, every, at_once = moment
+    valid, casts, bias, skip = options.values()
     with mock.patch.object(searching, "CASTS_AT_ONCE", at_once):
-        found = JointSearcher(joint).search(queries, places, valid=valid, casts=casts)
+        found = JointSearcher(joint).search(queries, places, **options)
     expected = [
-        tried(joint, queries, places, cast, at, frame)
+        tried(joint, queries, places, cast, at, frame, bias, skip)
         for cast in (every if casts is None else casts)
         for at in np.flatnonzero(valid).tolist()
         for frame in range(joint.lengths[at])
@@ -139,11 +147,13 @@ def test_the_search_finds_what_trying_every_cast_clip_and_frame_finds(moment):
     assert found.cost == pytest.approx(best, rel=1e-5)  # places are kept as float32
     if found:
         assert valid[found.range]
-        assert found.cost == pytest.approx(tried(joint, queries, places, found.cast, found.range, found.frame), rel=1e-5)
+        assert found.cost == pytest.approx(
+            tried(joint, queries, places, found.cast, found.range, found.frame, bias, skip), rel=1e-5
+        )
         parts = [cost for role in found.costs.values() for cost in role.values()]
         assert math.fsum([*parts, found.bias]) == pytest.approx(found.cost, rel=1e-9)
     with mock.patch.object(searching, "load_kernels", return_value=None):
-        scanned = JointSearcher(joint).search(queries, places, valid=valid, casts=casts)
+        scanned = JointSearcher(joint).search(queries, places, **options)
     assert (scanned.cost, scanned.range, scanned.frame, scanned.cast) == (found.cost, found.range, found.frame, found.cast)
 
 
@@ -284,6 +294,21 @@ def test_tags_must_pass_for_every_role(greetings):
     joint = JointDatabase.of(MotionDatabase.build(CLIPS, SCHEMA, markup=one_role), JOINT_ROLES)
     queries, places = recorded(joint, 0, 40)
     assert JointSearcher(joint).search(queries, places, tags=TagFilter("Polite")).asset == "greet_run"
+
+
+def test_biases_and_skips_are_of_one_database_or_by_its_name(greetings):
+    queries, places = recorded(greetings, 0, 40)
+    searcher = JointSearcher({"all": greetings})
+    bias = np.zeros(greetings.database.n_frames)
+    bias[greetings.frames[0, greetings.frame_ranges == 0]] = 2.0  # of one role: half of it counts
+    told = searcher.search(queries, places, casts=CAST, bias=bias)
+    assert told.range != 0
+    assert searcher.search(queries, places, casts=CAST, bias={"all": bias}).range == told.range
+    assert searcher.search(queries, places, casts=CAST, bias={}).range == 0
+    first = int(greetings.frames[1, 40])
+    assert searcher.search(queries, places, casts=CAST, skip=[Skip(first, first + 1, LeftOut.HISTORY)]).frame != 40
+    with pytest.raises(QueryError, match='Did you mean "all"'):
+        searcher.search(queries, places, skip={"al": []})
 
 
 # ---- alignment

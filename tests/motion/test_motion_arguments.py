@@ -262,6 +262,8 @@ CALLS: dict[str, Call] = {
     "JointSearcher.search(casts), actor": lambda x: TOGETHER.search(POSED_TWO, PLACED_TWO, casts=[{"Host": x, "Guest": 5}]),
     "JointSearcher.search(tags)": lambda x: TOGETHER.search(POSED_TWO, PLACED_TWO, tags=x),
     "JointSearcher.search(in_match_range)": lambda x: TOGETHER.search(POSED_TWO, PLACED_TWO, in_match_range=x),
+    "JointSearcher.search(bias)": lambda x: x is None or TOGETHER.search(POSED_TWO, PLACED_TWO, bias=x),
+    "JointSearcher.search(skip)": lambda x: TOGETHER.search(POSED_TWO, PLACED_TWO, skip=x),
     "JointSearcher.search(gives)": lambda x: TOGETHER.search(POSED_TWO, PLACED_TWO, gives=x),
     "JointSearcher.search(gives), one": lambda x: TOGETHER.search(POSED_TWO, PLACED_TWO, gives={"Host": x}),
     "JointSearcher.candidates(k)": lambda x: TOGETHER.candidates(POSED_TWO, PLACED_TWO, x),

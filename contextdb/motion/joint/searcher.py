@@ -19,7 +19,7 @@ from typing import Any, TypedDict, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from contextdb.cells.arguments import require_kind, require_mapping, require_whole
+from contextdb.cells.arguments import require_kind, require_many_of, require_mapping, require_whole
 from contextdb.console import announce
 from contextdb.errors import ContextError, Fault, MotionError, QueryError, in_quotes, nearest, some
 from contextdb.motion.clips.ground_place import A_BODY, GroundPlace, OfBody, place_of
@@ -32,7 +32,7 @@ from contextdb.motion.joint.casts import CastMaker, Casts
 from contextdb.motion.joint.database import FACING, PLACE, JointDatabase, seen_by
 from contextdb.motion.joint.hit import JointHit, nothing
 from contextdb.motion.joint.scan import Asked
-from contextdb.motion.markup.left_out import LeftOut
+from contextdb.motion.markup.left_out import LeftOut, Skip
 from contextdb.motion.markup.marks import TagFilter
 from contextdb.motion.reading import as_number
 from contextdb.motion.search import cost
@@ -58,6 +58,8 @@ class JointOptions(TypedDict, total=False):
     tags: TagFilter | None
     in_match_range: bool
     gives: Mapping[str, float] | None
+    bias: Mapping[str, ArrayLike] | ArrayLike | None
+    skip: Mapping[str, Sequence[Skip]] | Sequence[Skip]
 
 
 class JointSearcher:
@@ -118,6 +120,9 @@ class JointSearcher:
             Whether only frames of a match range may be chosen.
         gives : mapping of role to float, optional
             How readily each role gives way when the clip is put down in the world, 0 not at all; 1 unless it is given.
+        bias, skip : float array, shape (N,), and Skips, or mappings of database name to these, optional
+            As for `MotionDatabase.search`, by the frames of the motion database: a joint frame has the mean of the biases of its
+            roles, and none of its frames may be skipped.
 
         Raises
         ------
@@ -163,13 +168,15 @@ class JointSearcher:
         best = sorted(found, key=lambda one: one[:4])[:k]
         return tuple(self._engines[name].told(name, question, total, frame, cast) for total, _, frame, cast, name, question in best)
 
-    def _of_database(self, name: str, options: JointOptions) -> JointOptions:
+    def _of_database(self, name: str, options: JointOptions) -> dict[str, Any]:
         """The options for one database; a mapping of databases leaves those that it does not name unrestricted."""
-        valid = options.get("valid")
-        if not isinstance(valid, Mapping):
-            return options
-        self.selector.among(valid)
-        return {**options, "valid": valid.get(name)}
+        found: dict[str, Any] = {**options}
+        for key, nothing_said in (("valid", None), ("bias", None), ("skip", ())):
+            of_each = options.get(key)
+            if isinstance(of_each, Mapping):
+                self.selector.among(of_each)
+                found[key] = of_each.get(name, nothing_said)
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,6 +209,8 @@ class _Engine:
         tags: TagFilter | None = None,
         in_match_range: bool = False,
         gives: Mapping[str, float] | None = None,
+        bias: ArrayLike | None = None,
+        skip: Sequence[Skip] = (),
     ) -> _Question:
         """What a search with these arguments compares."""
         require_mapping(queries, "queries", "a mapping of actors to queries")
@@ -213,7 +222,7 @@ class _Engine:
         where = places_of(places, actors)
         numbers = {actor: i for i, actor in enumerate(actors)}
         cast_numbers = np.array([[numbers[actor] for actor in cast] for cast in found.listed], np.int64)
-        frame_biases, box_biases = self._frame_biases(tags, in_match_range)
+        frame_biases, box_biases = self._frame_biases(tags, in_match_range, bias, skip)
         asked = Asked(
             wanted,
             seen_by(where[:, None], where[None, :]),
@@ -284,18 +293,23 @@ class _Engine:
             "" if choice is None else choice.why,
         )
 
-    def _frame_biases(self, tags: TagFilter | None, in_match_range: bool) -> tuple[Floats, Floats]:
+    def _frame_biases(
+        self, tags: TagFilter | None, in_match_range: bool, bias: ArrayLike | None, skip: Sequence[Skip]
+    ) -> tuple[Floats, Floats]:
         """The bias of each joint frame, inf where it may not be chosen: [M]; the same in boxes."""
-        known = self._biases.get((tags, in_match_range))
+        is_of_moment = bias is not None or bool(require_many_of(skip, Skip, "skip", "a list of Skip"))
+        known = None if is_of_moment else self._biases.get((tags, in_match_range))
         if known is None:
             database = self._known
-            chosen = database.filter(None, tags=tags, in_match_range=in_match_range)
+            chosen = database.filter(None, tags=tags, in_match_range=in_match_range, bias=bias, skip=skip)
             of_frames = chosen.biases(database.layout.frame_ranges, database.marks.kinds)
             may = chosen.why(database.layout.frame_ranges, database.marks.kinds) == LeftOut.NO
             biases = np.where(may, of_frames, np.inf)[self.joint.frames].mean(axis=0)
+            known = biases, in_boxes(self._boxes, biases)
+            if is_of_moment:
+                return known
             if len(self._biases) >= MOST_TAGS:
                 self._biases.clear()
-            known = biases, in_boxes(self._boxes, biases)
             self._biases[tags, in_match_range] = known
         return known
 

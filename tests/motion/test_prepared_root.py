@@ -71,11 +71,11 @@ def test_a_straight_path_comes_back_within_a_centimetre_and_a_degree_and_starts_
 
 
 @pytest.mark.parametrize("name", BENDS)
-def test_a_bend_comes_back_within_three_centimetres_behind_its_ends(name):
+def test_a_bend_comes_back_within_a_centimetre_behind_its_ends(name):
     poses, (places, headings, _, _) = swaying(name), way_of(name)
     path = SMOOTH.path_of(poses)
     inside = slice(12, -12)
-    assert np.linalg.norm(path.positions - places, axis=-1)[inside].max() < 0.03
+    assert np.linalg.norm(path.positions - places, axis=-1)[inside].max() < 0.01
     assert np.rad2deg(np.abs(path.headings - headings))[inside].max() < 2.5
 
 

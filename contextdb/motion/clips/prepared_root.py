@@ -1,10 +1,11 @@
 """The path of a body, of raw capture whose hips sway: ahead from the hips, sideways from the feet, heading by hips and chest.
 
-    hips, moved sideways to the middle of both feet ─► a local parabola about each frame ─► path
+    hips, moved sideways to the middle of both feet ─► in bends evened out over a cycle ─► a local parabola about each frame ─► path
 
-A local parabola keeps bends, and evens out what goes to and fro within it. Where the body stands or nearly does it becomes as
-narrow as a frame, so that a start, a stop and a turn on the spot stay when they are. Joints do not move in the world: what leaves
-the path is in the pose, between path and hips. F frames; metres, y up.
+A local parabola keeps bends, and evens out what goes to and fro within it. The feet do not step alike in a bend: what is left of
+their steps there is evened out over a cycle, against the heading, in which the bend is straight. Where the body stands or nearly
+does, the parabola becomes as narrow as a frame, so that a start, a stop and a turn on the spot stay when they are. Joints do not
+move in the world: what leaves the path is in the pose, between path and hips. F frames; metres, y up.
 
 Source: the README of Motion-Matching-Prep; the parabola is a Savitzky-Golay filter whose weights are a Gaussian.
 """
@@ -55,8 +56,10 @@ def prepared_path(poses: Poses, path: Trajectory, smooth_s: float, feet: FootBon
     headings = path.headings if is_facing_given else _body_headings(poses, path.headings)
     even = _fitted(np.column_stack((path.positions, headings)), np.full(len(headings), widest), PARABOLA)
     shares = _shares(np.linalg.norm(rates_of_change(even[:, :2], path.rate), axis=-1) / FULL_MPS, widest)
-    bends = shares * _shares(np.abs(rates_of_change(even[:, 2], path.rate)) / FULL_RADPS, 0.0)
-    positions = path.positions + _sideways(poses, path.positions, headings, feet, bends, CYCLE * widest)
+    turns = np.abs(rates_of_change(even[:, 2], path.rate)) / FULL_RADPS
+    positions = path.positions + _sideways(poses, path.positions, headings, feet, shares * _shares(turns, 0.0), CYCLE * widest)
+    bends = shares * np.clip(2.0 * turns - 1.0, 0.0, 1.0)
+    positions += bends[:, None] * (_along(positions, even[:, 2], path.rate, CYCLE * widest) - positions)
     smooth = _fitted(np.column_stack((positions, headings)), np.maximum(widest * shares, NARROWEST), PARABOLA)
     return Trajectory(path.rate, smooth[:, :2], smooth[:, 2], path.now)
 
@@ -99,6 +102,16 @@ def _sideways(poses: Poses, hips: Floats, headings: Floats, bones: FootBones, be
     metres = ((middle - hips) * left).sum(axis=-1, keepdims=True)
     lasting = _fitted(metres, np.full(len(metres), cycle), CONSTANT)
     return np.asarray((metres - bends[:, None] * lasting) * left)
+
+
+def _along(positions: Floats, headings: Floats, rate: float, cycle: float) -> Floats:
+    """Positions evened out over a cycle along their bend: its speeds against the heading, and how far it is from them: [F, 2]."""
+    ways = np.stack((heading_vectors(headings + np.pi / 2.0), heading_vectors(headings)), axis=1)
+    deviations = np.full(len(headings), cycle)
+    speeds = _fitted(np.einsum("fwd,fd->fw", ways, rates_of_change(positions, rate)), deviations, CONSTANT)
+    steps = np.einsum("fwd,fw->fd", ways, speeds) / rate
+    bend = np.concatenate((np.zeros((1, 2)), np.cumsum((steps[1:] + steps[:-1]) / 2.0, axis=0)))
+    return bend + _fitted(positions - bend, deviations, CONSTANT)
 
 
 def _shares(values: Floats, reach: float) -> Floats:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import io
+import json
 import os
 import re
 import shutil
@@ -16,6 +17,7 @@ import pytest
 from running import Result, run
 
 from contextdb.cli import main
+from contextdb.commands import watched_work
 from contextdb.commands.motion_build_command import MotionProject
 from contextdb.files.tensors import read_tensors
 from contextdb.motion import inputs_of, make_clip, open_poses, write_bvh
@@ -129,6 +131,22 @@ def test_a_second_build_computes_nothing_and_writes_the_same_bytes(here: Path):
     again = build("game/contextdb.toml")
     assert [line.split()[-3:-1] for line in again.lines[1:]] == [["0", "2"], ["0", "1"]]
     assert Path(JOG).read_bytes() == before
+
+
+def test_watching_builds_again_with_the_clip_that_was_saved_alone(here: Path, monkeypatch: pytest.MonkeyPatch):
+    time_s = [0.0]
+
+    def sleep(seconds: float) -> None:
+        time_s[0] += seconds
+        if time_s[0] == seconds:
+            write_bvh(make_clip("run").clip, Path("game/clips/walk.bvh"))
+        if time_s[0] > 5.0:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(watched_work, "sleep", sleep)
+    monkeypatch.setattr(watched_work, "clock", lambda: time_s[0])
+    told = [json.loads(line) for line in build("game", "--json", "--watch").out.splitlines()]
+    assert [{clip for each in document["databases"] for clip in each["computed"]} for document in told][1:] == [{"walk"}]
 
 
 def test_what_is_saved_is_up_to_date(here: Path):

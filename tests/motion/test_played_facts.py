@@ -106,6 +106,15 @@ def test_a_character_gives_them_to_a_table_that_asks_and_only_then():
     assert not set(FACTS) & set(plain.facts)
 
 
+def test_they_are_recorded_in_a_session_as_they_were_given(tmp_path):
+    columns = {"Asset Name": list(NAMES), "LeftFoot.Down": ["Any"] * len(NAMES), "Playing.Speed": ["Any"] * len(NAMES)}
+    walker = character(columns, {name: FACTS[name] for name in columns if name in FACTS})
+    walker.controller.recorder = trace = motion.Trace()
+    told = [walker.update(DT, (0.0, 1.3)).facts for _ in range(10)]
+    trace.save(tmp_path / "session.parquet")
+    assert [each.context for each in motion.Trace.load(tmp_path / "session.parquet")] == told
+
+
 def test_the_game_wins_and_another_type_or_unit_is_not_answered():
     conditions = {**CONDITIONS, "Playing.Speed": {"type": "number", "unit": "km/h"}, "LeftFoot.Down": FOOT}
     columns = {**COLUMNS, "Playing.Speed": ["Any"] * len(NAMES), "LeftFoot.Down": ["True"] + ["Any"] * (len(NAMES) - 1)}

@@ -14,7 +14,7 @@ from test_debug_parts import recording_of
 from test_motion_measure_command import here, made
 from textual.pilot import Pilot
 
-from contextdb.motion import Trace
+from contextdb.motion import Action, Decision, Playing, Together, Trace
 from contextdb.motion.trace.cost_views import cost_text
 from tui.debug.app import DebugApp
 from tui.debug.recording import Recording
@@ -367,6 +367,18 @@ def test_a_session_without_its_project_says_so_and_can_be_scrubbed(here: Path):
     text = after(lone, JUMP, "plus", "w", "r", "o", "tab")
     assert "tick 61 " in text
     assert "its project is no longer there." in text
+
+
+def test_a_choice_for_several_characters_is_told_with_its_roles(here: Path):
+    trace = Trace()
+    costs = {"Host": {"Hips velocity": 0.1}, "Guest": {"Hips velocity": 0.2}}
+    entered = Together("Host", "greet", 0.5, {"Host": "7", "Guest": "3"}, costs)
+    sentence = "7 as Host (0.1000) and 3 as Guest (0.2000) enter greet together at 0.50 s, at cost 0.3000."
+    playing = Playing("joint", "greet.Host", 0, 15, 0.5, mirrored=False)
+    trace.record(Decision(1, 0.0, Action.JUMP, sentence, True, playing, None, 0.3, together=entered))
+    trace.record(Decision(2, 0.1, Action.CONTINUE, "plays greet on", False, playing, None))
+    text = after(Recording("session.parquet", trace, "", {}, ""), "end")
+    assert "7 as Host (0.1000) and 3 as Guest (0.2000) enter greet together" in text
 
 
 def test_hostile_names_are_text(here: Path):

@@ -190,4 +190,4 @@ def test_a_table_that_comes_free_is_told_once(path):
         first.close()
         app.looks(3)
 
-    assert run(path, script).said == ["The other editor has closed this table: open it again to edit it here."]
+    assert run(path, script).said == ["The other editor has closed this table: it can be saved here again."]

@@ -54,7 +54,7 @@ class DiskCare:
         if found.taken_by is not None:
             self._say_once(f"{found.taken_by} has taken over this table: you can only save it under another name.", "warning")
         elif found.is_free:
-            self._say_once("The other editor has closed this table: open it again to edit it here.")
+            self._say_once("The other editor has closed this table: it can be saved here again.")
         if found.table == "gone":
             self._say_once(f"{self._session.path.name} is no longer on disk. Saving creates it again.", "warning")
         elif found.table == "changed" and self._session.disk_stamp != self._left:

@@ -120,7 +120,9 @@ class DiskCare:
 
     def _merged(self, merged: Merge[Table], then: Callable[[], None]) -> None:
         self._changed()
-        self._say(f"Merged from disk: {diff(merged.base, merged.theirs).summary}. Ctrl+Z undoes it.")
+        changed = diff(merged.ours, self._session.sheet.table)
+        told = f"{changed.summary}. Ctrl+Z undoes it." if changed else "nothing changes here."
+        self._say(f"Merged from disk: {told}")
         then()
 
     def _reload(self) -> None:

@@ -1,15 +1,25 @@
-"""Write docs/keys.md: every command of the editor and of the debugger with its keys, out of the lists that these are made from.
+"""Write docs/keys.md: every command of the editor and of the debugger with its keys, the keys of each tab and dialog, and what
+terminals send for each, out of the lists and bindings that the program itself uses.
 
 python docs/keys.py
 """
 
 from __future__ import annotations
 
+import importlib
+import pkgutil
+import re
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+
+from textual.binding import Binding
+from textual.dom import DOMNode
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
+import tui
+from docs import terminals
 from tui.commands import COMMANDS, Command, key_names
 from tui.debug.keys import KEYS, names_of
 
@@ -18,15 +28,109 @@ HEAD = """# Keys
 
 Every command of [the editor](editor.md), with its keys, and its name for a
 [file of your own keys](editor.md#keys-and-colours-of-your-own). The first key of each command works in every terminal, the others
-[where the terminal sends them](editor.md#terminals). A command without keys is in the palette (Ctrl+P) or in the
+[where the terminal sends them](#what-terminals-send). A command without keys is in the palette (Ctrl+P) or in the
 toolbar. A dialog shows its keys at the bottom. `python docs/keys.py` writes this page.
+"""
+SECTIONS = {
+    "While a cell is edited": ("CellEditor", "Entry"),
+    "Bars over the table": ("SheetBar", "FindBar", "AssetsPane"),
+    "Every list": ("LineList",),
+    "Tab Options": ("OptionsPane",),
+    "Tab Priorities": ("PrioritiesPane",),
+    "Tab Coverage": ("CoveragePane", "GapList", "RowList", "PairMap", "HeatMap"),
+    "Tab Problems": ("ProblemsPane", "ProblemList"),
+    "Tab Motion": ("MotionPane", "SessionList"),
+    "Every dialog": ("Dialog", "AskDialog", "ChooseDialog", "StepsDialog"),
+    "A question": ("SureDialog",),
+    "Help": ("HelpDialog",),
+    "All columns": ("ColumnsDialog",),
+    "Sheet of columns": ("ColumnSheetDialog",),
+    "Values of a column": ("ValuesDialog",),
+    "Add column": ("AddColumn",),
+    "Blueprints": ("Blueprints",),
+    "Find in all tables": ("FindEverywhere",),
+    "Why, and nearest rows": ("NearestDialog",),
+    "Actors": ("ActorsDialog",),
+    "Contexts": ("ContextsDialog", "NameDialog"),
+    "Save the test row": ("KeepDialog",),
+    "Open a file of contexts": ("OpenDialog",),
+    "Follow a game": ("LiveDialog",),
+    "Import": ("ImportDialog", "ChoiceDialog"),
+    "Export": ("ExportDialog",),
+    "Unsaved edits": ("LeavingDialog",),
+    "The table is open elsewhere": ("HeldDialog",),
+    "The file was changed on disk": ("ConflictsDialog",),
+    "Panes of the debugger": ("Bars", "Channels", "Stage"),
+    "Help of the debugger": ("DebugHelp",),
+    "The debugger before a session is read": ("WaitingScreen",),
+}
+"""The widgets of each section; those of the commands and of the debugger's list have theirs."""
+LISTED = ("Grid", "MainScreen", "EditorApp", "DebugScreen")
+WORDS = {"↑": "up", "↓": "down", "←": "left", "→": "right", "Enter": "enter", "Esc": "escape", "Tab": "tab", "Space": "space"}
+WORDS |= {"Del": "delete"} | {f"F{n}": f"f{n}" for n in range(1, 13)}
+SENT = """## What terminals send
+
+*xterm* is what tmux, screen and most terminals send, too, but for Home and End (`ESC [1~`, `ESC [4~`); *kitty* is kitty's keyboard
+protocol, which the editor turns on where it is understood; *Windows* is Windows Terminal. `^A` is a control character; letters,
+digits and signs are sent as they are. Where a terminal sends the same for two keys, the table says which one the editor reads. A
+terminal may keep keys for itself: kitty most with Ctrl+Shift, Windows Terminal those with words instead of signs, and, once its
+window is split, Alt and Alt+Shift with arrows.
 """
 
 
 def page() -> str:
     """The page as it should be now."""
     groups = dict.fromkeys(command.group for command in COMMANDS)
-    return "\n".join([HEAD, *(_section(group) for group in groups), _debugger()])
+    others = [_of_widgets(title, [rows for name in names for rows in rows_of(name)]) for title, names in SECTIONS.items()]
+    return "\n".join([HEAD, *(_section(group) for group in groups), _debugger(), "## In tabs and dialogs\n", *others, _sent()])
+
+
+def widgets() -> dict[str, type[DOMNode]]:
+    """Every widget with keys of its own."""
+    for module in pkgutil.walk_packages(tui.__path__, "tui."):
+        importlib.import_module(module.name)
+    ours = [one for one in _below(DOMNode) if one.__module__.startswith("tui.")]
+    return {one.__name__: one for one in ours if vars(one).get("BINDINGS") or "keys_text" in vars(one)}
+
+
+def rows_of(name: str) -> Iterator[tuple[str, str]]:
+    """The keys of a widget, those for one thing with commas between, and what they do: what is bound, then what its foot says."""
+    widget = widgets()[name]
+    bound: dict[tuple[str, str], list[str]] = {}
+    for binding in Binding.make_bindings(vars(widget).get("BINDINGS", ())):
+        bound.setdefault((binding.action, binding.description), []).append(binding.key)
+    for (_, about), keys in bound.items():
+        yield ",".join(keys), about
+    for keys, about in told(str(vars(widget).get("keys_text", ""))):
+        if not {key for some in bound.values() for key in some} & set(keys.split(",")):
+            yield keys, about
+
+
+def told(foot: str) -> Iterator[tuple[str, str]]:
+    """The keys and what they do in a text such as "↑↓ choose · Esc"."""
+    for part in foot.split(" · "):
+        words = re.sub(r"([↑↓←→])(?=\S)", r"\1 ", part).split()
+        n = next((at for at, word in enumerate(words) if word not in WORDS and not re.fullmatch("[A-Z]", word)), len(words))
+        if n:
+            keys = [WORDS.get(word, word.lower()) for word in words[:n]]
+            yield ",".join(keys), " ".join(words[n:]) or ("close" if keys == ["escape"] else "choose")
+
+
+def all_keys() -> list[str]:
+    """Every key of the page, once."""
+    of_commands = [command.keys for command in COMMANDS] + [key.keys for key in KEYS] + ["tab,shift+tab"]
+    of_widgets = [keys for names in SECTIONS.values() for name in names for keys, _ in rows_of(name)]
+    keys = [key for some in of_commands + of_widgets for key in some.split(",") if key]
+    first: dict[str, str] = {}
+    for key in keys:
+        first.setdefault(terminals.name(key), key)
+    return list(first.values())
+
+
+def _below(widget: type[DOMNode]) -> Iterator[type[DOMNode]]:
+    for one in widget.__subclasses__():
+        yield one
+        yield from _below(one)
 
 
 def _section(group: str) -> str:
@@ -39,6 +143,20 @@ def _debugger() -> str:
     lines = [f"| {_shown(key.keys)} | {key.about} |" for key in KEYS]
     about = "Those of [the debugger](debugging.md). The arrows up and down move the cursor of the pane that has the focus."
     return "\n".join(["## In the debugger", "", about, "", "| keys | does |", "| --- | --- |", *lines, ""])
+
+
+def _of_widgets(title: str, rows: list[tuple[str, str]]) -> str:
+    merged: dict[str, list[str]] = {}
+    for keys, about in rows:
+        shown = ", ".join(dict.fromkeys(terminals.name(key) for key in keys.split(",")))
+        merged.setdefault(shown, []).append(about[:1].upper() + about[1:])
+    lines = [f"| {keys} | {'; '.join(dict.fromkeys(abouts))} |" for keys, abouts in merged.items()]
+    return "\n".join([f"### {title}", "", "| keys | does |", "| --- | --- |", *lines, ""])
+
+
+def _sent() -> str:
+    lines = [terminals.line(key) for key in all_keys() if not terminals.is_sign(key)]
+    return "\n".join([SENT, "| key | xterm | kitty | Windows |", "| --- | --- | --- | --- |", *lines, ""])
 
 
 def _shown(keys: str) -> str:

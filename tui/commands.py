@@ -97,7 +97,7 @@ GRID: tuple[Command, ...] = (
     *_moves(),
     *_jumps(),
     Command("select-rows", "alt+r,shift+space", "Select rows", "Select the whole rows of the selection.", "Select", "select_rows"),
-    Command("select-columns", "ctrl+@,alt+k,ctrl+space", "Select columns", "Select the whole columns.", "Select", "select_columns"),
+    Command("select-columns", "alt+k,ctrl+@,ctrl+space", "Select columns", "Select the whole columns.", "Select", "select_columns"),
     Command("select-all", "ctrl+a", "Select all", "Select every cell.", "Select", "select_all"),
     Command("edit", "f2,enter", "Edit", "Edit the cell; Enter accepts, Esc cancels.", "Edit", "edit", in_footer=True),
     Command("choose", "f4,alt+down", "Choose", "Open the list of accepted values.", "Edit", "choose"),

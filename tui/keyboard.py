@@ -8,7 +8,7 @@ looked up; one that nobody knows is dropped. What one key sends may come in seve
 Some keys send the same as others: Esc pressed just before a letter is Alt and that letter. Alt+F and Alt+B are what macOS sends for
 Option+Right and Option+Left, so they are Ctrl+Right and Ctrl+Left.
 
-Source: ECMA-48, section 5; "XTerm Control Sequences"; the keyboard protocol of kitty.
+Source: ECMA-48, section 5; "XTerm Control Sequences"; the keyboard protocol of kitty; Textual's issue 872.
 """
 
 from __future__ import annotations
@@ -174,6 +174,15 @@ class KeyParser(XTermParser):
             yield from self._alt(begun[1])
 
 
+class WindowsKeyParser(KeyParser):
+    """The reader for Windows, whose console sends NUL for Shift, Ctrl and Alt by themselves: no key, least of all Ctrl+Space."""
+
+    def feed(self, data: str) -> Iterable[Message]:
+        """The events of what came, but for NUL."""
+        keys = data.replace("\x00", "")
+        return super().feed(keys) if keys or not data else ()
+
+
 def _begun(data: str, at: int) -> str:
     found = _BEGUN.match(data, at)
     assert found is not None
@@ -194,5 +203,6 @@ def _said(match: re.Match[str]) -> str:
 
 def read_whole_keys() -> None:
     """Have Textual's driver of this system read the terminal with `KeyParser`."""
-    driver = importlib.import_module("textual.drivers.win32" if sys.platform == "win32" else "textual.drivers.linux_driver")
-    vars(driver)["XTermParser"] = KeyParser
+    is_windows = sys.platform == "win32"
+    driver = importlib.import_module("textual.drivers.win32" if is_windows else "textual.drivers.linux_driver")
+    vars(driver)["XTermParser"] = WindowsKeyParser if is_windows else KeyParser

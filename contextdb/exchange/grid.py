@@ -7,7 +7,7 @@ names its columns.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -84,7 +84,12 @@ def parse_block(text: str) -> Block | None:
 
 
 def columns_of(
-    grid: Grid, file: str, block: Block | None = None, row_noun: str = "row", sheet: str | None = None
+    grid: Grid,
+    file: str,
+    block: Block | None = None,
+    row_noun: str = "row",
+    sheet: str | None = None,
+    wide: Collection[int] = (),
 ) -> tuple[list[TextColumn], list[Remark]]:
     """The columns of the table in a grid, or in a block of it.
 
@@ -96,6 +101,8 @@ def columns_of(
         What a row of the grid is called in messages: "sheet row" of a workbook, "line" of a text.
     sheet : str, optional
         The name of the sheet, for messages.
+    wide : collection of int
+        Rows of the grid, from 0, with a cell that is merged over several columns: no row of names has one.
 
     Raises
     ------
@@ -103,7 +110,7 @@ def columns_of(
         There is no table, more than one, columns without a name or with one name twice, or a text that is too long.
     """
     if block is None:
-        block, remarks = _found(grid, file)
+        block, remarks = _found(grid, file, wide)
     else:
         remarks = list[Remark]()
         block = Block(block.top, block.left, min(block.bottom, len(grid)), min(block.right, len(grid[0]) if grid else 0))
@@ -173,6 +180,12 @@ def is_title(row: Sequence[str]) -> bool:
     return len(row) > 1 and len({text.strip() for text in row if text.strip()}) == 1
 
 
+def _is_groups(rows: Grid) -> bool:
+    """Whether the first of two rows groups the columns of the second: its first cell is blank, or merged with the next one."""
+    first, *_ = rows
+    return first[0] in ("", first[1], rows[-1][0]) and len(rows) > 1
+
+
 def doubts(columns: Sequence[TextColumn]) -> list[Remark]:
     """What a person should look at: names that look like values, as where a header is missing; a last row that sums up others."""
     found = []
@@ -201,7 +214,7 @@ def _require_short(columns: Sequence[TextColumn], file: str) -> None:
 # ---- where the table is
 
 
-def _found(grid: Grid, file: str) -> tuple[Block, list[Remark]]:
+def _found(grid: Grid, file: str, wide: Collection[int]) -> tuple[Block, list[Remark]]:
     try:
         blocks = blocks_of(grid)
     except TableError as error:
@@ -210,7 +223,7 @@ def _found(grid: Grid, file: str) -> tuple[Block, list[Remark]]:
         raise TableError(
             Fault("there is nothing to read.", "a row with the names of the columns, then one for each asset", place=Place(file))
         )
-    blocks, titles = _without_titles(blocks, grid)
+    blocks, titles = _without_titles(blocks, grid, wide)
     deep = [block for block in blocks if block.n_rows > 1]
     tables = [block for block in deep if block.right - block.left > 1] or deep or blocks[:1]
     if len(tables) > 1:
@@ -225,12 +238,14 @@ def _found(grid: Grid, file: str) -> tuple[Block, list[Remark]]:
     return tables[0], list(capped([*titles, *notes], "such texts"))
 
 
-def _without_titles(blocks: Sequence[Block], grid: Grid) -> tuple[list[Block], list[Remark]]:
-    """The blocks without the rows of a title that stand right above a header, and blocks that are titles alone as one row."""
+def _without_titles(blocks: Sequence[Block], grid: Grid, wide: Collection[int]) -> tuple[list[Block], list[Remark]]:
+    """The blocks without the rows of a title, or of groups, right above a header, and blocks that are titles alone as one row."""
     found, remarks = [], []
     for block in blocks:
         rows = [row[block.left : block.right] for row in grid[block.top : block.bottom]]
-        n_titles = next((at for at, row in enumerate(rows[:MOST_ABOVE]) if any(row) and not is_title(row)), len(rows[:MOST_ABOVE]))
+        above = [not any(row) or is_title(row) for row in rows[:MOST_ABOVE]]
+        above = [one or (at + block.top in wide and _is_groups(rows[at : at + 2])) for at, one in enumerate(above)]
+        n_titles = above.index(False) if False in above else len(above)
         if n_titles == len(rows):  # a title of several lines
             found.append(Block(block.top, block.left, block.top + 1, block.right))
         elif n_titles and is_header(rows[n_titles]):
@@ -239,7 +254,7 @@ def _without_titles(blocks: Sequence[Block], grid: Grid) -> tuple[list[Block], l
             found.append(block)
             continue
         for at, row in enumerate(grid[block.top : found[-1].top], block.top + 1):
-            if text := next(filter(None, row[block.left : block.right]), ""):
+            if text := ", ".join(dict.fromkeys(filter(None, row[block.left : block.right]))):
                 remarks.append(Remark(f"left out above the header: {in_quotes(text)}.", f"sheet row {at}"))
     return found, remarks
 

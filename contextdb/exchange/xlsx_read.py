@@ -53,9 +53,12 @@ def read_workbook(raw: bytes, file: str, sheet: str | None = None) -> Reading:
     remarks += _fill_errors(grid, marks, is_old(raw))
     remarks += _fill_merged(grid, sheets[name].merged, file)
     remarks += _hidden(grid, marks)
+    wide = {top for (top, left), (bottom, right) in sheets[name].merged if left < right and top == bottom}
     own = _own_block(grid) if kept is not None and block is None else None
     columns, more = (
-        (_own_columns(grid, own), []) if own else columns_of(grid, f"{file}, sheet {in_quotes(name)}", block, "sheet row", name)
+        (_own_columns(grid, own), [])
+        if own
+        else columns_of(grid, f"{file}, sheet {in_quotes(name)}", block, "sheet row", name, wide)
     )
     told += [Remark(f"the sheet {in_quotes(name)} of {len(names)}.")] if len(names) > 1 else []
     told = [*told, *remarks, *more]

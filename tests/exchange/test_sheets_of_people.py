@@ -98,6 +98,32 @@ def test_a_title_above_a_csv_is_left_out_and_said(form: str, mark: str):
     assert "line 1: left out above the header" in told(reading)
 
 
+@pytest.mark.parametrize("has_title", [False, True])
+@pytest.mark.parametrize("first", ["", "Clip"])
+def test_groups_merged_over_the_header_are_left_out_and_said(has_title: bool, first: str):
+    titles = [["Chefs of sprint 12"], ["owner: Ines"]] * has_title
+    n = len(titles)
+    header, row = ["Clip", "tool", "grip", "heat", "fill"], ["stir", "Spoon", 5, 20, 1]
+    out, book, (sheet,) = workbook([*titles, [first], header, row])
+    sheet.merge_range(n, 1, n, 2, "Hands")
+    sheet.merge_range(n, 3, n, 4, "Pan")
+    if first:
+        sheet.merge_range(n, 0, n + 1, 0, first)
+    if has_title:
+        sheet.merge_range(0, 0, 0, 4, "Chefs of sprint 12")
+    reading = reading_of(out, book)
+    assert texts(reading) == {"Clip": ["stir"], "tool": ["Spoon"], "grip": ["5"], "heat": ["20"], "fill": ["1"]}
+    said = f"{first}, Hands, Pan" if first else "Hands, Pan"
+    assert f'sheet row {n + 1}: left out above the header: "{said}".' in told(reading)
+
+
+def test_a_header_with_a_merged_name_is_no_row_of_groups():
+    out, book, (sheet,) = workbook([["Asset", "pos", ""], ["jog", "CB", "FS"]])
+    sheet.merge_range(0, 1, 0, 2, "pos")
+    with pytest.raises(TableError, match='the column name "pos" appears twice'):
+        reading_of(out, book)
+
+
 def test_a_header_that_only_looks_like_a_title_is_none():
     with pytest.raises(TableError, match="column B has no name"):
         read(b"Name,,\njog,1,2\n", "x.csv")

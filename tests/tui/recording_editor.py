@@ -1,6 +1,8 @@
 """The editor in this terminal, in which keys do nothing: what each would do is written to a file, a line for each.
 
-python recording_editor.py TABLE FILE
+python recording_editor.py TABLE FILE [HOLD]
+
+With the name of a third file keys do what they do elsewhere while there is no such file.
 """
 
 from __future__ import annotations
@@ -16,19 +18,24 @@ from tui.run import edit
 from tui.widgets.grid import Grid
 
 
-def record(table: str, file: str) -> None:
+def record(table: str, file: str, hold: str = ".") -> None:
     """Run the editor so."""
+    does_it, types_it = App.run_action, Grid._want_edit
 
     def note(text: str) -> None:
         with Path(file).open("a", encoding="utf-8") as out:
             out.write(f"{text}\n")
 
-    async def run_action(app: App[Any], action: str, *_: object, **__: object) -> bool:
+    async def run_action(app: App[Any], action: Any, *more: Any, **others: Any) -> bool:
+        if not Path(hold).exists() or str(action).startswith(("scroll_", "page_")):  # Textual's own, for what does not fit
+            return await does_it(app, action, *more, **others)
         note(action)
         return True
 
-    def want_edit(grid: Grid, text: str, *_: object, **__: object) -> None:
-        note(f"typed {text!r}")
+    def want_edit(grid: Grid, text: str, *more: Any, **others: Any) -> None:
+        if not Path(hold).exists():
+            return types_it(grid, text, *more, **others)
+        return note(f"typed {text!r}")
 
     with patch.object(App, "run_action", run_action), patch.object(Grid, "_want_edit", want_edit):
         edit(table)

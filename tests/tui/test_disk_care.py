@@ -97,6 +97,23 @@ def test_conflicts_are_asked_about_and_merged_as_decided(path):
     assert app.n_shown == 1
 
 
+def test_what_a_merge_says_counts_only_what_changed_here(path):
+    async def script(app: Host, pilot: Pilot[None]) -> None:
+        edit(app, 1, 1, "1..2")
+        replace_file(path, RAW.replace(b"5..9", b"5..8"))
+        app.looks()
+        await pilot.press("left", "enter")
+        await pilot.pause()
+        assert app.said == ["Merged from disk: nothing changes here."]
+        edit(app, 1, 1, "1..3")
+        replace_file(path, RAW.replace(b"5..9", b"5..7").replace(b"walk", b"amble"))
+        app.looks()
+        await pilot.press("left", "enter")
+        await pilot.pause()
+
+    assert run(path, script).said[1:] == ["Merged from disk: 1 row renamed. Ctrl+Z undoes it."]
+
+
 def test_conflicts_left_alone_are_asked_about_again_only_by_a_save_or_another_change(path):
     async def script(app: Host, pilot: Pilot[None]) -> None:
         edit(app, 1, 1, "1..2")
@@ -190,4 +207,4 @@ def test_a_table_that_comes_free_is_told_once(path):
         first.close()
         app.looks(3)
 
-    assert run(path, script).said == ["The other editor has closed this table: open it again to edit it here."]
+    assert run(path, script).said == ["The other editor has closed this table: it can be saved here again."]

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from textual import events
 from textual.message import Message
 
-from tui.keyboard import KeyParser
+from tui.keyboard import KeyParser, WindowsKeyParser
 
 ESC = "\x1b"
 ARROWS = {"A": "up", "B": "down", "C": "right", "D": "left"}
@@ -169,3 +169,10 @@ def test_the_mouse_the_focus_and_the_size_come_through():
     assert [type(event).__name__ for event in got] == [
         "MouseDown", "AppFocus", "AppBlur", "TerminalSupportsSynchronizedOutput", "CursorPosition",
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize("sent", ["\x00", "\x00\x1b\x00a", "\x1b[1\x00;5A", "\x00x\x00", "\x1b\x00"])
+def test_shift_ctrl_and_alt_by_themselves_are_no_keys_on_windows(sent):
+    """Its console sends NUL for them, which is Ctrl+Space elsewhere: whole columns would be selected, and filled."""
+    parser = WindowsKeyParser(clock=lambda: 0.0)
+    assert keys([*parser.feed(sent), *parser._give_up()]) == keys(read([sent.replace("\x00", "")]))

@@ -478,6 +478,39 @@ def test_a_second_editor_does_not_save_over_the_first_and_is_told_when_it_has_en
     third.close()
 
 
+def test_a_table_that_comes_free_can_be_saved_with_what_the_other_editor_saved(path):
+    first = Session(path)
+    second = Session(path)
+    type_into(first, 1, 0, "dash")
+    type_into(second, 0, 0, "amble")
+    first.save()
+    first.close()
+    second.save()
+    assert not second.is_read_only
+    assert Session(path).holder is not None
+    assert [row.split(",")[0] for row in path.read_text("utf-8").splitlines()[1:3]] == ["amble", "dash"]
+    type_into(second, 0, 0, "stroll")
+    second.lock.release()  # as when it is killed
+    third = Session(path)
+    assert third.n_recovered == 1
+    assert third.sheet.text(0, 0) == "stroll"
+    third.close()
+
+
+def test_a_table_with_unsaved_edits_of_an_editor_that_was_killed_is_not_saved_over_them(path):
+    first = Session(path)
+    second = Session(path)
+    type_into(first, 1, 0, "dash")
+    first.lock.release()  # as when it is killed
+    type_into(second, 0, 0, "amble")
+    with pytest.raises(FileError, match="the other editor has ended and left edits that are not saved"):
+        second.save()
+    second.close()
+    third = Session(path)
+    assert third.sheet.text(1, 0) == "dash"
+    third.close()
+
+
 def test_an_editor_on_another_machine_is_asked_about_and_can_be_taken_over(path):
     there = Lock(path, host="workstation-7")
     there.acquire()

@@ -84,6 +84,13 @@ class Terminal:
     def screen(self) -> str:
         return self.tmux("capture-pane", "-p")
 
+    def wait_without(self, text: str) -> None:
+        """Go on once the screen does not show this any more."""
+        end = time.monotonic() + DEADLINE_S
+        while text in (shown := self.screen):
+            assert time.monotonic() < end, f"{text} still on the screen:\n{shown}"
+            time.sleep(0.02)
+
     def wait(self, *texts: str) -> str:
         """The screen, once it shows all of these."""
         end = time.monotonic() + DEADLINE_S

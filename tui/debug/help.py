@@ -47,7 +47,7 @@ class DebugHelp(Dialog[None]):
     DebugHelp VerticalScroll { height: 1fr; scrollbar-size-vertical: 1; }
     DebugHelp Static { height: auto; }
     """
-    BINDINGS: ClassVar[list[BindingType]] = [Binding("f1,q,question_mark", "cancel", show=False)]
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("f1,q,question_mark", "cancel", "Close", show=False)]
     title_text = "Help"
     keys_text = "↑↓ scroll · Esc close"
 

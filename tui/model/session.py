@@ -25,7 +25,7 @@ from contextdb.tables.merging.merging import Merge, merge
 from contextdb.tables.project import SCHEMA_FILE, load_table, schema_for
 from contextdb.tables.saving import require_related
 from contextdb.tables.table import Table
-from tui.model.journal import Journal, finish_save, recover, set_aside
+from tui.model.journal import Journal, finish_save, journal_path, recover, set_aside
 from tui.model.kept_columns import keep_columns, kept_columns
 from tui.model.lock import Holder, Lock
 from tui.model.notes import Notes
@@ -73,7 +73,7 @@ class Session:
         self.path: Path = table.path
         self.lock = Lock(self.path)
         self.holder: Holder | None = self.lock.acquire(takes_over)
-        """The other editor that has the table open. Then nothing is brought back or saved, and no journal is kept."""
+        """The other editor that has the table open. Until it has closed it nothing is saved here, and no journal is kept."""
         self._clear_leftovers()
         if self.holder is None and finish_save(table):
             table = load_table(self.path, strict=False)
@@ -260,11 +260,14 @@ class Session:
         if self.problem is not None:
             kept = set_aside(self.path)
             self.problem = replace(self.problem, mend=f"to look at what was kept, in {path_in_quotes(kept)}")
-            table = self._history.table
-            unsaved = with_settings(diff(self.saved_table, table).edit("Unsaved edits"), self.saved_table, table)
-            self.journal.rebased(self._raw, unsaved, self._history.position)
+            self._keep_unsaved()
         elif not self.n_recovered:
             self.journal.keep_base()
+
+    def _keep_unsaved(self) -> None:
+        table = self._history.table
+        unsaved = with_settings(diff(self.saved_table, table).edit("Unsaved edits"), self.saved_table, table)
+        self.journal.rebased(self._raw, unsaved, self._history.position)
 
     def _watch_files(self) -> None:
         self._file = Watched(self.path, self._digest)
@@ -284,10 +287,23 @@ class Session:
             return other.is_held
 
     def _require_own(self) -> None:
+        if self.holder is not None and self._is_free():
+            self._take_over()
         holder = self.holder or self.lock.taken_by()
         if holder is not None:
             found = f"{holder} has this table open, so it is not saved here."
             raise FileError(Fault(found, "another file", "to save it under another name", Place(str(self.path)), "table-held"))
+
+    def _take_over(self) -> None:
+        """Have the table that another editor has closed, and keep a journal of the edits made meanwhile."""
+        if journal_path(self.path).exists():
+            found = "the other editor has ended and left edits that are not saved."
+            mend = "to save under another name; then open this table again"
+            raise FileError(Fault(found, "another file", mend, Place(str(self.path)), "table-held"))
+        self.holder = self.lock.acquire()
+        if self.holder is None:
+            self._keep_unsaved()
+            self.sheet.recorder = self.journal
 
     def _merge_first(self) -> None:
         if self._file.state != "changed":

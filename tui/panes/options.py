@@ -57,8 +57,8 @@ class OptionsPane(Pane):
     """The settings of a sheet's table."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("down", "app.focus_next", "Next field", show=False),
-        Binding("up", "app.focus_previous", "Previous field", show=False),
+        Binding("down", "app.focus_next", "Next field; a choice: open its list", show=False),
+        Binding("up", "app.focus_previous", "Previous field; a choice: open its list", show=False),
         Binding("escape", "put_back", "Reset", show=False),
     ]
 

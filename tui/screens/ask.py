@@ -55,10 +55,10 @@ class ChooseDialog(Dialog[int]):
     ChooseDialog OptionList { height: auto; max-height: 60vh; border: none; background: $surface; margin-top: 1; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("up", "move(-1)", show=False),
-        Binding("down", "move(1)", show=False),
-        Binding("pageup", "move(-10)", show=False),
-        Binding("pagedown", "move(10)", show=False),
+        Binding("up", "move(-1)", "Up", show=False),
+        Binding("down", "move(1)", "Down", show=False),
+        Binding("pageup", "move(-10)", "Page up", show=False),
+        Binding("pagedown", "move(10)", "Page down", show=False),
     ]
     keys_text = "↑↓ choose · Enter OK · Esc cancel"
 

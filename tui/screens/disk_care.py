@@ -54,7 +54,7 @@ class DiskCare:
         if found.taken_by is not None:
             self._say_once(f"{found.taken_by} has taken over this table: you can only save it under another name.", "warning")
         elif found.is_free:
-            self._say_once("The other editor has closed this table: open it again to edit it here.")
+            self._say_once("The other editor has closed this table: it can be saved here again.")
         if found.table == "gone":
             self._say_once(f"{self._session.path.name} is no longer on disk. Saving creates it again.", "warning")
         elif found.table == "changed" and self._session.disk_stamp != self._left:
@@ -120,7 +120,9 @@ class DiskCare:
 
     def _merged(self, merged: Merge[Table], then: Callable[[], None]) -> None:
         self._changed()
-        self._say(f"Merged from disk: {diff(merged.base, merged.theirs).summary}. Ctrl+Z undoes it.")
+        changed = diff(merged.ours, self._session.sheet.table)
+        told = f"{changed.summary}. Ctrl+Z undoes it." if changed else "nothing changes here."
+        self._say(f"Merged from disk: {told}")
         then()
 
     def _reload(self) -> None:

@@ -47,7 +47,7 @@ class HelpDialog(Dialog[None]):
     HelpDialog VerticalScroll { height: 1fr; scrollbar-size-vertical: 1; }
     HelpDialog Static { height: auto; }
     """
-    BINDINGS: ClassVar[list[BindingType]] = [Binding("f1,q", "cancel", show=False)]
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("f1,q", "cancel", "Close", show=False)]
     title_text = "Help"
     keys_text = "↑↓ scroll · Esc close"
 

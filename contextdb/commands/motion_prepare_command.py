@@ -26,7 +26,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from contextdb.commands.motion_clips import MARKUP, FolderClips, add_clip_arguments, below, clips_of, progress_of
+from contextdb.commands.motion_clips import add_clip_arguments, progress_of
 from contextdb.console import ExitCode, output, printable
 from contextdb.disk import read_bytes
 from contextdb.disk.together import NewFile, write_together
@@ -38,6 +38,7 @@ from contextdb.motion.preparing.proposals import KINDS, ROOT_SMOOTH_S, Proposal,
 from contextdb.motion.storage.clip_files import paths_of
 from contextdb.report.render_json import as_json
 from contextdb.schema.toml_edit import set_key
+from contextdb.tables.clip_folder import MARKUP, FolderClips, below, clips_of
 from contextdb.tables.project import SCHEMA_FILE
 
 BOM = "\ufeff"
@@ -88,7 +89,8 @@ class MarkupFile:
 
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Propose markup, and write it where that is asked for."""
-    found = clips_of(arguments.path, arguments.metres_per_unit, arguments.up)
+    with progress_of("reading clips") as tell:
+        found = clips_of(arguments.path, arguments.metres_per_unit, arguments.up, tell)
     proposals, changes = [], []
     settings: dict[tuple[str, str, str], str | float] = {}
     done = 0

@@ -25,7 +25,7 @@ def table_of(rows: list[motion.Described]) -> cdb.Table:
     columns = {"Asset Name": [row.asset for row in rows]}
     columns |= {name: [row.cells[name] for row in rows] for name in rows[0].cells}
     conditions = {name: said for (_, name), said in condition_sections(rows).items()}
-    return cdb.Table.from_columns(columns, conditions, table_section(rows, "Asset Name", "moves.csv"), "moves")
+    return cdb.Table.from_columns(columns, conditions, table_section(rows, "Asset Name"), "moves")
 
 
 # ---- what is measured

@@ -137,11 +137,11 @@ def condition_sections(rows: Sequence[Described]) -> Sections:
     }
 
 
-def table_section(rows: Sequence[Described], asset_column: str, file: str) -> dict[str, object]:
-    """What a new table of some rows is."""
+def table_section(rows: Sequence[Described], asset_column: str) -> dict[str, object]:
+    """What a new table of some rows is, beside its file."""
     outputs = {"duration_s": {"type": "number", "default": 0.0}, "start": {"type": "text"}, "end": {"type": "text"}}
     fallback = min(rows, key=lambda row: (row.facts.style != NORMAL, row.facts.speed_mps.middle), default=None)
-    said: dict[str, object] = {"file": file, "asset": asset_column, "policy": "collect", "outputs": outputs}
+    said: dict[str, object] = {"asset": asset_column, "policy": "collect", "outputs": outputs}
     return said | ({"fallback": fallback.asset} if fallback is not None else {})
 
 

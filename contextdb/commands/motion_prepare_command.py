@@ -220,7 +220,8 @@ def _report(found: FolderClips, proposals: Sequence[Proposal], changes: Sequence
         what = plural(n_marks, "mark") if n_marks else ROOT_KEY
         print(printable(f"contextdb: {what} written to {where}."), file=sys.stderr)
     elif not changes:
-        print("contextdb: nothing to propose.", file=sys.stderr)
+        nothing = "nothing to write: only you can cut the files of clips." if proposals else "nothing to propose."
+        print(f"contextdb: {nothing}", file=sys.stderr)
 
 
 def _reasons(proposals: Sequence[Proposal]) -> Iterator[str]:

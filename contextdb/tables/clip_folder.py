@@ -92,15 +92,20 @@ def clips_of(
     return found
 
 
+def clips_below(folder: Path) -> list[Path]:
+    """The BVH files in a folder and below it, if any; a folder is none, whatever its name."""
+    return sorted(Path(at) / name for at, _, names in os.walk(folder) for name in names if name.lower().endswith(".bvh"))
+
+
 def bvh_files(folder: Path) -> list[Path]:
-    """The BVH files in a folder and below it.
+    """The same, one or more.
 
     Raises
     ------
     FileError
         There is none.
     """
-    files = sorted(Path(at) / name for at, _, names in os.walk(folder) for name in names if name.lower().endswith(".bvh"))
+    files = clips_below(folder)
     if not files:
         raise FileError(Fault("there is no BVH file in this folder or below it.", "*.bvh", place=Place(str(folder))))
     return files

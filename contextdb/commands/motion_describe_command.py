@@ -23,7 +23,16 @@ from pathlib import Path
 
 from contextdb.commands.motion_clips import add_clip_arguments, progress_of
 from contextdb.console import ExitCode, output, printable
-from contextdb.edits.described_table import ASSET, DescribedTable, Filling, described_table, empty_table, filling, rows_for
+from contextdb.edits.described_table import (
+    ASSET,
+    ClipRows,
+    DescribedTable,
+    Filling,
+    described_table,
+    empty_table,
+    filling,
+    rows_for,
+)
 from contextdb.errors import ContextDBError, Fault, plural, some
 from contextdb.files.toml_text import as_toml
 from contextdb.motion.preparing.describing import COLUMNS, Described
@@ -63,7 +72,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     _tell(found, made, fills, is_playable, arguments)
     with output():
         if arguments.json:
-            print(as_json(_document(found, rows, made, fills)), end="")
+            print(as_json(_document(clips, made, fills)), end="")
         elif made is None or fills is None:
             print(_text(rows), end="")
         else:
@@ -114,18 +123,16 @@ def _text(rows: Sequence[Described]) -> str:
     return text.getvalue()
 
 
-def _document(
-    found: FolderClips, rows: Sequence[Described], made: DescribedTable | None, fills: Filling | None
-) -> dict[str, object]:
-    clips = [{"file": str(path), **row.to_json()} for path, row in zip(found.paths, rows, strict=True)]
+def _document(clips: ClipRows, made: DescribedTable | None, fills: Filling | None) -> dict[str, object]:
+    rows = [{"file": str(path), **row.to_json()} for path, row in zip(clips.files, clips.rows, strict=True)]
     differences = [] if fills is None else [difference.to_json() for difference in fills.differences]
     return {
         "format": 1,
         "table": None if made is None else str(made.path),
-        "clips": clips,
+        "clips": rows,
         "differences": differences,
         "added": [] if fills is None else [row.asset for row in fills.added],
         "without_clip": [] if fills is None else fills.without_clip,
-        "left_out": found.left_out,
-        "notes": found.notes,
+        "left_out": clips.found.left_out,
+        "notes": clips.found.notes,
     }

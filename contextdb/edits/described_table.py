@@ -29,6 +29,8 @@ from contextdb.motion.preparing.describing import (
     by_rig,
     condition_sections,
     describe,
+    joint_clips,
+    joint_row,
     mirror_of,
     motion_sections,
     table_section,
@@ -111,6 +113,8 @@ class ClipRows:
 
     found: FolderClips
     rows: list[Described]
+    files: list[Path]
+    """Of each row its clip; of joint clips that of the first role."""
 
     def motion(self, table: Path) -> TomlSections | None:
         """What contextdb.toml is to say of the motion of a table: nothing where a project says it; None where it cannot."""
@@ -147,8 +151,17 @@ def rows_for(
     found.notes += notes
     if not found.clips:
         raise ContextDBError(*(Fault(message) for message in found.left_out))
+    joint = {} if found.config.databases else joint_clips(found.clips)
+    together = {i for roles in joint.values() for i in roles.values()}
+    alone = [i for i in range(len(found.clips)) if i not in together]
     with progress("describing") as tell:
-        return ClipRows(found, describe(found.clips, mirrored=_is_mirrored(found), progress=tell))
+        clips = [found.clips[i] for i in alone]
+        rows = describe(clips, mirrored=_is_mirrored(found), progress=tell) if clips else []
+    first = {asset: next(iter(roles.values())) for asset, roles in joint.items()}
+    rows += [joint_row(asset, found.clips[i]) for asset, i in first.items()]
+    if joint:
+        found.notes.append(f"one row each for the joint clips {some(list(joint))}: its cells ask nothing of a single body.")
+    return ClipRows(found, rows, [found.paths[i] for i in (*alone, *first.values())])
 
 
 def _playing_alone(databases: Databases, path: Path | None, notes: list[str]) -> Databases:

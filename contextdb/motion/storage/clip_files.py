@@ -107,9 +107,9 @@ def clip_files(
 
 
 def paths_of(settings: DatabaseSettings, folder: Path, file: str | None = None) -> list[Path]:
-    """The files that fit the pattern of a database, sorted; a MotionError where it is none. A folder is no clip."""
+    """The files that fit the pattern of a database, sorted; a MotionError where it is none."""
     try:
-        return sorted(path for path in folder.glob(settings.clips) if not path.is_dir())
+        return sorted(folder.glob(settings.clips))
     except (ValueError, NotImplementedError):
         found = f"[databases.{settings.name}] clips = {as_toml(settings.clips)} is not a pattern."
         raise MotionError(Fault(found, '"clips/*.bvh", "clips/**/*.bvh"', place=Place(file), rule="file")) from None

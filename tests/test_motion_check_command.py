@@ -45,6 +45,15 @@ def put(game: Path, clip: Clip, name: str = "") -> None:
     write_bvh(clip, game / "clips" / f"{name or clip.name}.bvh", digits=4)
 
 
+def test_a_folder_that_is_named_like_a_clip_is_none(game: Path):
+    (game / "clips" / "roll.bvh").mkdir()
+    (game / "clips" / "roll.bvh" / "inner.bvh").write_bytes((game / "clips" / "walk.bvh").read_bytes())
+    assert "4 clips checked" in run("motion", "check", "game/clips").out
+    assert "1 clip checked" in run("motion", "check", "game/clips/roll.bvh").out
+    add_rows(game, "roll")
+    assert "this is a folder. Accepted: one file." in {finding["message"] for finding in findings()}
+
+
 def add_rows(game: Path, *names: str) -> None:
     with (game / "moves.csv").open("a", encoding="utf-8") as file:
         file.writelines(f"{name}\n" for name in names)

@@ -262,6 +262,24 @@ def test_joint_clips_make_no_rows(meeting: Path):
     assert 'contextdb: "greetings" holds joint clips' in describe("game", "--into", "game/greetings.csv", code=2).err
 
 
+def test_a_folder_of_joint_clips_gives_one_row_for_all_roles_and_a_database_with_them(game: Path):
+    for name in ("greet_walk", "greet_run"):
+        for role, clip in make_joint_clip(name).items():
+            write_bvh(clip, game / "clips" / f"{name}.{role}.bvh", digits=3)
+    put(game, "walk", "walk.v1")
+    put(game, "jog", "walk.v2")
+    told = describe("game/clips", "--out", "game/moves.csv").err
+    assert "one row each for the joint clips" in told
+    table = {row[0]: row[1:] for row in rows(game / "moves.csv")}
+    assert sorted(set(table) - set(NAMES)) == ["Asset Name", "greet_run", "greet_walk", "walk.v1", "walk.v2"]
+    assert table["greet_walk"][:5] == [""] * 5
+    assert float(table["greet_walk"][5]) > 1.0
+    assert 'roles = ["Guest", "Host"]' in (game / "contextdb.toml").read_text(encoding="utf-8")
+    assert run("check", "game", "--fail-on", "warning").code == 0
+    assert run("motion", "check", "game").code == 0
+    assert run("motion", "build", "game").code == 0
+
+
 def test_a_table_gets_rows_of_the_clips_of_its_own_databases(meeting: Path):
     describe("game", "--into", "game/other.csv")
     assert [row[0] for row in rows(meeting / "other.csv")[1:]] == ["run"]

@@ -67,9 +67,16 @@ def test_what_is_written_is_stable_when_run_again(game: Path):
     prepare("game/clips", "--write")
     before = as_bytes(game)
     again = prepare("game/clips", "--write")
-    assert "nothing to propose" in again.err
+    assert "nothing to write" in again.err
     assert as_bytes(game) == before
     assert prepare("game/clips").code == 0
+
+
+def test_where_only_cuts_are_left_there_is_nothing_to_write(game: Path):
+    cuts = prepare("game/clips", "--only", "cuts")
+    assert ": cut from " in cuts.out
+    assert cuts.err == "contextdb: nothing to write: only you can cut the files of clips.\n"
+    assert prepare("game/clips", "--only", "duplicates").err == "contextdb: nothing to propose.\n"
 
 
 def test_lines_by_hand_stay_and_their_columns_and_line_ends_are_kept(game: Path):
@@ -277,4 +284,4 @@ def test_proposals_for_captured_clips_are_stable(tmp_path: Path, monkeypatch: py
     told = prepare("clips", "--write")
     assert "NextNaturalOnly" in told.out
     assert len(Markup.load(tmp_path / "clips" / "marks.csv").spans) > 1000
-    assert "nothing to propose" in prepare("clips").err
+    assert "nothing to write" in prepare("clips").err

@@ -213,6 +213,7 @@ _OF_SCREEN = (
     Command("import", "", "Import", "Read rows from Excel, CSV, Parquet or JSON.", "File", "import"),
     Command("export", "", "Export", "Write the table for Excel or other tools.", "File", "export"),
     Command("history", "alt+z", "Undo history", "Every step; go back to any of them.", "Edit", "history"),
+    Command("autofill", "shift+f4", "Autofill", "Fill the columns that clips can say, from the clips.", "Columns", "autofill"),
     Command("add-column", "alt+c", "Add column", "Add a condition or another column.", "Columns", "add_column"),
     Command("rename-role", "", "Rename role", "Give the role of the column another name, everywhere.", "Columns", "rename_role"),
     Command("rename-asset", "", "Rename asset", "Give the asset of the row another name, everywhere.", "Rows", "rename_asset"),

@@ -15,12 +15,12 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
-from contextdb.commands.motion_clips import bvh_files
 from contextdb.console import ExitCode, aligned, output, printable
 from contextdb.errors import plural
 from contextdb.motion.clips.clip import CENTIMETRE, UPS, Clip, load_clips
 from contextdb.motion.clips.rig import Rig
 from contextdb.report.render_json import as_json
+from contextdb.tables.clip_folder import bvh_files
 
 HEADER = ("bone", "channels", "height m", "found as", "mirrored to")
 

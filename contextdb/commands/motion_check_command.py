@@ -28,6 +28,7 @@ from contextdb.motion.storage.building import CACHE_FOLDER
 from contextdb.motion.storage.checking import check_clips, check_motion
 from contextdb.motion.storage.config import MotionConfig
 from contextdb.report.results import CheckReport
+from contextdb.tables.clip_folder import clips_below
 from contextdb.tables.project import SCHEMA_FILE, Project, folder_of
 from contextdb.tables.table import leaf_assets
 
@@ -105,7 +106,8 @@ def check_path(path: str, *, cache: bool = True) -> MotionReport:
         There is no such folder.
     """
     folder = folder_of(Path(path))
-    if not (folder / SCHEMA_FILE).exists() and (clips := sorted(folder.rglob("*.bvh"))):
+    clips = clips_below(folder)
+    if clips and not (folder / SCHEMA_FILE).exists():
         return _of_clips(clips)
     try:
         project = Project.load(folder, strict=False)
@@ -115,7 +117,7 @@ def check_path(path: str, *, cache: bool = True) -> MotionReport:
     if not config.databases:
         accepted = 'a section such as [databases.jog] with features and clips = "clips/*.bvh"'
         none = Fault("no motion database is declared.", accepted, place=Place(str(folder / SCHEMA_FILE)), rule="no-databases")
-        found = _of_clips(sorted(folder.rglob("*.bvh")))
+        found = _of_clips(clips)
         return replace(found, findings=(Finding.of(none), *found.findings))
     assets = {name: leaf_assets(table) for name, table in project.tables.items()}
     with building_bar() as progress:

@@ -1,62 +1,16 @@
-"""The clips of a folder: of its databases, where it is a project, else every BVH file in it and below."""
+"""What the commands on clips share: the folder, the unit and the axis as arguments, and progress clip by clip."""
 
 from __future__ import annotations
 
 import argparse
-import math
-import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
-from pathlib import Path
 
 from contextdb.commands.progress import MANY_CLIPS, bar
 from contextdb.console import printable
-from contextdb.disk import path_in_quotes
-from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, nearest, plural
-from contextdb.motion.clips.clip import CENTIMETRE, UPS, Clip, Up, load_bvh
-from contextdb.motion.clips.doubts import LEAST_BODY_M, UNITS, USUAL_BODY_M, measure
-from contextdb.motion.storage.clip_files import paths_of
-from contextdb.motion.storage.config import MotionConfig
-from contextdb.motion.storage.database_settings import DatabaseSettings
-from contextdb.motion.storage.rigs import Rig
-from contextdb.tables.project import SCHEMA_FILE, read_folder_schema
-
-MARKUP = "marks.csv"
-"""The markup of a folder of clips."""
-Databases = Mapping[str, DatabaseSettings]
-Wanted = Callable[[Databases], Databases]
-"""What leaves of the databases of a project those that are wanted: one or more."""
-LEAST_USUAL_M, MOST_USUAL_M = 0.9, 2.6
-"""How tall a body is, in a unit that may be right."""
-MOST_RATE = 1e6
-"""Frames a second: speeds of a clip that has more of them are no numbers to reckon with."""
-
-
-@dataclass
-class FolderClips:
-    """The clips of a folder.
-
-    Attributes
-    ----------
-    folder : Path
-    clips : list of Clip
-        In the order of their paths.
-    paths : list of Path
-    left_out : list of str
-        What is wrong with files that are no clips.
-    notes : list of str
-        What was taken for granted.
-    config : MotionConfig
-        What the project says of motion; nothing of a folder of clips.
-    """
-
-    folder: Path
-    clips: list[Clip] = field(default_factory=list)
-    paths: list[Path] = field(default_factory=list)
-    left_out: list[str] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-    config: MotionConfig = field(default_factory=MotionConfig)
+from contextdb.motion.clips.clip import UPS
+from contextdb.tables.clip_folder import Tell
+from contextdb.tables.project import SCHEMA_FILE
 
 
 def add_clip_arguments(parser: argparse.ArgumentParser) -> None:
@@ -79,57 +33,8 @@ def unit_of(text: str) -> float:
     return value
 
 
-def clips_of(path: str, metres_per_unit: float | None, up: Up | None, wants: Wanted | None = None) -> FolderClips:
-    """Read the clips of a folder; of a project with `wants` those of the databases that it leaves of all.
-
-    Raises
-    ------
-    ContextDBError
-        There is no such folder, no clip in it, or two clips of one name.
-    """
-    folder = _folder(Path(path))
-    found = FolderClips(folder)
-    if (folder / SCHEMA_FILE).is_file():
-        schema = read_folder_schema(folder)
-        found.config = MotionConfig.from_dict(schema.motion, file=schema.file)
-    if wants is not None and found.config.databases:
-        found.config = replace(found.config, databases=wants(found.config.databases))
-    files = _files(found, metres_per_unit, up)
-    if not files:
-        raise FileError(Fault("there is no BVH file in this folder or below it.", "*.bvh", place=Place(str(folder))))
-    first: dict[str, Path] = {}
-    twice = []
-    for file in files:
-        if first.setdefault(file.stem, file) is not file:
-            both = f"{path_in_quotes(first[file.stem])} and {path_in_quotes(file)}"
-            twice.append(Fault(f"two clips are named {in_quotes(file.stem)}: {both}.", "a different name for each asset"))
-    if twice:
-        raise FileError(*twice)
-    with progress_of("reading clips") as tell:
-        for i, (file, (unit, axis, rig)) in enumerate(files.items()):
-            tell(i, len(files), file.stem)
-            _read(found, file, CENTIMETRE if unit is None else unit, axis, rig)
-    if metres_per_unit is None and not found.config.databases:
-        _guess_units(found)
-    return found
-
-
-def bvh_files(folder: Path) -> list[Path]:
-    """The BVH files in a folder and below it.
-
-    Raises
-    ------
-    FileError
-        There is none.
-    """
-    files = sorted(Path(at) / name for at, _, names in os.walk(folder) for name in names if name.lower().endswith(".bvh"))
-    if not files:
-        raise FileError(Fault("there is no BVH file in this folder or below it.", "*.bvh", place=Place(str(folder))))
-    return files
-
-
 @contextmanager
-def progress_of(label: str) -> Iterator[Callable[[int, int, str], None]]:
+def progress_of(label: str) -> Iterator[Tell]:
     """The progress of work on clips, one by one."""
     with bar(label, is_long=True) as shown:
 
@@ -138,74 +43,3 @@ def progress_of(label: str) -> Iterator[Callable[[int, int, str], None]]:
                 shown(done, total, f"{done}/{total} {printable(clip)}")
 
         yield tell
-
-
-def _folder(path: Path) -> Path:
-    if os.path.isdir(path):
-        return path
-    if path.name == SCHEMA_FILE and os.path.isfile(path):
-        return path.parent
-    found = "not a folder." if os.path.exists(path) else "there is no such folder."
-    siblings = [each.name for each in path.parent.iterdir() if each.is_dir()] if os.path.isdir(path.parent) else []
-    near = nearest(path.name, siblings)
-    mend = path_in_quotes(path.parent / near) if near else ""
-    raise FileError(Fault(found, f"a folder of clips, or of tables with {SCHEMA_FILE}", mend, Place(str(path)), "no-such-path"))
-
-
-def _files(found: FolderClips, unit: float | None, up: Up | None) -> dict[Path, tuple[float | None, Up, Rig | None]]:
-    """The files with unit, axis and rig; of a file in several databases those of the first."""
-    files: dict[Path, tuple[float | None, Up, Rig | None]] = {}
-    for settings in found.config.databases.values():
-        rig = Rig.of(settings, found.folder, found.config.file)
-        for file in paths_of(settings, found.folder, found.config.file):
-            files.setdefault(file, (settings.metres_per_unit if unit is None else unit, up or settings.up, rig))
-    if found.config.databases:
-        return files
-    return dict.fromkeys(bvh_files(found.folder), (unit, up or "y", None))
-
-
-def _read(found: FolderClips, file: Path, unit: float, up: Up, rig: Rig | None) -> None:
-    try:
-        clip = load_bvh(file, metres_per_unit=unit, up=up)
-        clip = clip if rig is None or not clip.n_frames else rig.clip(clip)
-    except ContextDBError as error:
-        found.left_out += [str(fault) for fault in error.faults]
-        return
-    if clip.n_frames == 0:
-        found.left_out.append(f"{file}: the clip has no frame (Frames: 0).")
-        return
-    if clip.rate > MOST_RATE:
-        told = f"the frame time is {clip.frame_time_s!r} s."
-        found.left_out.append(str(Fault(told, f"{1.0 / MOST_RATE:g} or more", place=Place(str(file)))))
-        return
-    found.clips.append(clip)
-    found.paths.append(file)
-
-
-def _guess_units(found: FolderClips) -> None:
-    """Take clips of an unlikely size for such in another unit, rig by rig, and tell of it."""
-    rigs: dict[tuple[str, ...], list[int]] = {}
-    for i, clip in enumerate(found.clips):
-        rigs.setdefault(clip.skeleton.names, []).append(i)
-    for members in rigs.values():
-        first = found.clips[members[0]]
-        size = measure(first).size_m
-        if LEAST_USUAL_M <= size <= MOST_USUAL_M or size <= 0.0:
-            continue
-        unit = min(UNITS, key=lambda unit: abs(math.log(size * unit / CENTIMETRE / USUAL_BODY_M)))
-        about = f"{first.name} and its rig ({plural(len(members), 'clip')}) would be {size:.2g} m tall in centimetres"
-        if not LEAST_USUAL_M <= size * unit / CENTIMETRE <= MOST_USUAL_M:
-            found.notes.append(f"{about}; --metres-per-unit says what a unit is. Expected: from {LEAST_BODY_M:g} m.")
-            continue
-        found.notes.append(f"{about}: a unit of {unit:g} m ({UNITS[unit]}) is taken. --metres-per-unit says otherwise.")
-        for i in members:
-            found.clips[i] = replace(found.clips[i], metres_per_unit=unit)
-
-
-def below(paths: Sequence[Path], folder: Path) -> list[str] | None:
-    """Paths as patterns of a contextdb.toml in a folder name them; None where one is elsewhere."""
-    root = Path(os.path.abspath(folder))
-    try:
-        return [Path(os.path.abspath(path)).relative_to(root).as_posix() for path in paths]
-    except ValueError:
-        return None

@@ -21,15 +21,25 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from contextdb.commands.motion_clips import MARKUP, Databases, FolderClips, add_clip_arguments, below, clips_of, progress_of
-from contextdb.commands.motion_describe_table import ASSET, DescribedTable, filled_table, new_table
+from contextdb.commands.motion_clips import add_clip_arguments, progress_of
 from contextdb.console import ExitCode, output, printable
+from contextdb.edits.described_table import (
+    ASSET,
+    ClipRows,
+    DescribedTable,
+    Filling,
+    described_table,
+    empty_table,
+    filling,
+    rows_for,
+)
 from contextdb.errors import ContextDBError, Fault, plural, some
 from contextdb.files.toml_text import as_toml
-from contextdb.motion.preparing.describing import COLUMNS, Described, Sections, by_rig, describe, mirror_of, motion_sections
+from contextdb.motion.preparing.describing import COLUMNS, Described
 from contextdb.report.render_json import as_json
+from contextdb.tables.clip_folder import FolderClips
 from contextdb.tables.nesting.names import asset_text
-from contextdb.tables.project import schema_for, settings_of
+from contextdb.tables.project import load_table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -49,83 +59,35 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         raise ContextDBError(Fault("--out makes a table, --into fills one.", "one of the two"))
     if arguments.update and not arguments.into:
         raise ContextDBError(Fault("--update replaces cells of a table.", "--into TABLE --update"))
-    left_out: list[str] = []
-    found = clips_of(
-        arguments.path, arguments.metres_per_unit, arguments.up, lambda all_of: _playing_alone(all_of, arguments.into, left_out)
-    )
-    found.notes += left_out
-    if not found.clips:
-        raise ContextDBError(*(Fault(message) for message in found.left_out))
-    with progress_of("describing") as tell:
-        rows = describe(found.clips, mirrored=_is_mirrored(found), progress=tell)
-    target = arguments.out or arguments.into
-    made, is_playable = None, True
-    if target is not None:
-        path = Path(target)
-        motion = _motion(found, path)
+    into = Path(arguments.into) if arguments.into else None
+    clips = rows_for(arguments.path, into, progress_of, arguments.metres_per_unit, arguments.up)
+    found, rows = clips.found, clips.rows
+    made, fills, is_playable = None, None, True
+    if arguments.out or into is not None:
+        fills = filling(empty_table(Path(arguments.out)) if into is None else load_table(into, strict=False), rows)
+        motion = clips.motion(into or Path(arguments.out))
         is_playable = motion is not None
-        made = (
-            filled_table(path, rows, motion or {}, updates=arguments.update)
-            if arguments.into
-            else new_table(path, rows, motion or {})
-        )
+        made = described_table(fills, motion or {}, updates=arguments.update)
         made.write()
-    _tell(found, made, is_playable, arguments)
+    _tell(found, made, fills, is_playable, arguments)
     with output():
         if arguments.json:
-            print(as_json(_document(found, rows, made)), end="")
-        elif made is None:
+            print(as_json(_document(clips, made, fills)), end="")
+        elif made is None or fills is None:
             print(_text(rows), end="")
         else:
-            print("\n".join(printable(line) for line in _lines(found, made, arguments)))
-    differs = made is not None and made.differences and not arguments.update
+            print("\n".join(printable(line) for line in _lines(made, fills, arguments)))
+    differs = fills is not None and fills.differences and not arguments.update
     return ExitCode.FOUND if found.left_out or differs or not is_playable else ExitCode.OK
 
 
-def _playing_alone(databases: Databases, table: str | None, notes: list[str]) -> Databases:
-    """The databases whose clips are described: those of the table that is filled, where it has any; none of joint clips.
-
-    The clips of several actors are one row, which asks each of them for facts; what one of them does says little of it.
-    """
-    path = None if table is None else Path(table)
-    name = None if path is None else settings_of(path, *schema_for(path)).name
-    if any(settings.table == name for settings in databases.values() if name is not None):
-        databases = {each: settings for each, settings in databases.items() if settings.table == name}
-    found = {each: settings for each, settings in databases.items() if not settings.roles}
-    joint = some([each for each in databases if each not in found])
-    if not found:
-        said = f"{joint} holds joint clips, each of several actors; a row of its table asks the actor of each role for facts."
-        raise ContextDBError(Fault(said, "clips that one character plays alone"))
-    if len(found) < len(databases):
-        notes.append(f"left out: the joint clips of {joint}: what the actors of each role do is no cell of a row.")
-    return found
-
-
-def _is_mirrored(found: FolderClips) -> bool:
-    """Whether the clips play mirrored too: as the databases of a project say, else wherever the rig has two sides."""
-    databases = found.config.databases.values()
-    if databases:
-        return all(settings.mirror for settings in databases)
-    return all(mirror_of(rig.clips[0]) for rig in by_rig(found.clips, [str(path) for path in found.paths]))
-
-
-def _motion(found: FolderClips, table: Path) -> Sections | None:
-    """What contextdb.toml is to say of the motion of a new table: nothing where a project says it already; None where it cannot."""
-    folder, schema = schema_for(table)
-    if schema.databases:
-        return {}
-    paths = below(found.paths, folder)
-    if paths is None:
-        return None
-    markup = below([found.folder / MARKUP], folder) if (found.folder / MARKUP).is_file() else None
-    return motion_sections(by_rig(found.clips, paths), table.stem, markup[0] if markup else None)
-
-
-def _tell(found: FolderClips, made: DescribedTable | None, is_playable: bool, arguments: argparse.Namespace) -> None:
+def _tell(
+    found: FolderClips, made: DescribedTable | None, fills: Filling | None, is_playable: bool, arguments: argparse.Namespace
+) -> None:
     """Say on standard error what was taken for granted or left out."""
     lines = [*found.notes, *(f"left out: {message}" for message in found.left_out)]
-    if made is not None and made.without_clip:
-        lines.append(f"no clip for {plural(len(made.without_clip), 'row')}: {some(made.without_clip)}")
+    if fills is not None and fills.without_clip:
+        lines.append(f"no clip for {plural(len(fills.without_clip), 'row')}: {some(fills.without_clip)}")
     if not is_playable:
         lines.append(
             f"no database is declared: the clips are not in {made.folder if made else ''} or below it. "
@@ -139,17 +101,17 @@ def _tell(found: FolderClips, made: DescribedTable | None, is_playable: bool, ar
         print(printable(f"contextdb: {line}"), file=sys.stderr)
 
 
-def _lines(found: FolderClips, made: DescribedTable, arguments: argparse.Namespace) -> Sequence[str]:
+def _lines(made: DescribedTable, fills: Filling, arguments: argparse.Namespace) -> Sequence[str]:
     """What was written, and where cells say other than their clips."""
     if arguments.out:
         return [f"{plural(made.table.n_rows, 'row')} written to {made.path}, and what they mean to {made.toml_path}."]
     done = [
-        f"{made.path}: {plural(made.filled, 'cell')} filled, {plural(len(made.added), 'row')} added.",
-        *(str(difference) for difference in made.differences),
+        f"{made.path}: {plural(len(fills.empty), 'cell')} filled, {plural(len(fills.added), 'row')} added.",
+        *(str(difference) for difference in fills.differences),
     ]
-    if made.differences:
-        n = plural(len(made.differences), "cell")
-        done.append(f"{n} replaced." if arguments.update else f"{n} {'say' if len(made.differences) > 1 else 'says'} otherwise.")
+    if fills.differences:
+        n = plural(len(fills.differences), "cell")
+        done.append(f"{n} replaced." if arguments.update else f"{n} {'say' if len(fills.differences) > 1 else 'says'} otherwise.")
     return done
 
 
@@ -161,16 +123,16 @@ def _text(rows: Sequence[Described]) -> str:
     return text.getvalue()
 
 
-def _document(found: FolderClips, rows: Sequence[Described], made: DescribedTable | None) -> dict[str, object]:
-    clips = [{"file": str(path), **row.to_json()} for path, row in zip(found.paths, rows, strict=True)]
-    differences = [] if made is None else [difference.to_json() for difference in made.differences]
+def _document(clips: ClipRows, made: DescribedTable | None, fills: Filling | None) -> dict[str, object]:
+    rows = [{"file": str(path), **row.to_json()} for path, row in zip(clips.files, clips.rows, strict=True)]
+    differences = [] if fills is None else [difference.to_json() for difference in fills.differences]
     return {
         "format": 1,
         "table": None if made is None else str(made.path),
-        "clips": clips,
+        "clips": rows,
         "differences": differences,
-        "added": [] if made is None else made.added,
-        "without_clip": [] if made is None else made.without_clip,
-        "left_out": found.left_out,
-        "notes": found.notes,
+        "added": [] if fills is None else [row.asset for row in fills.added],
+        "without_clip": [] if fills is None else fills.without_clip,
+        "left_out": clips.found.left_out,
+        "notes": clips.found.notes,
     }

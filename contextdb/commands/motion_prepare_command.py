@@ -28,7 +28,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-from contextdb.commands.motion_clips import MARKUP, FolderClips, add_clip_arguments, below, clips_of, progress_of
+from contextdb.commands.motion_clips import add_clip_arguments, progress_of
 from contextdb.commands.motion_prepared import BOM, Line, Prepared, line_of, with_marks, without
 from contextdb.commands.watched_work import watched
 from contextdb.console import ExitCode, output, printable
@@ -43,6 +43,7 @@ from contextdb.motion.preparing.proposals import ROOT_SMOOTH_S, prepare_again
 from contextdb.motion.storage.clip_files import paths_of
 from contextdb.report.render_json import as_json
 from contextdb.schema.toml_edit import set_key
+from contextdb.tables.clip_folder import MARKUP, FolderClips, below, clips_of
 from contextdb.tables.project import SCHEMA_FILE
 
 ROOT_KEY = "root_smooth_s"
@@ -97,7 +98,8 @@ def run(arguments: argparse.Namespace) -> ExitCode:
 
 
 def _prepare(arguments: argparse.Namespace) -> ExitCode:
-    found = clips_of(arguments.path, arguments.metres_per_unit, arguments.up)
+    with progress_of("reading clips") as tell:
+        found = clips_of(arguments.path, arguments.metres_per_unit, arguments.up, tell)
     prepared = Prepared.load(found.folder)
     proposals, changes = [], []
     settings: dict[tuple[str, str, str], str | float] = {}
@@ -224,7 +226,8 @@ def _report(found: FolderClips, proposals: Sequence[Proposal], changes: Sequence
         what = plural(n_marks, "mark") if n_marks else ROOT_KEY
         print(printable(f"contextdb: {what} written to {where}."), file=sys.stderr)
     elif not changes:
-        print("contextdb: nothing to propose.", file=sys.stderr)
+        nothing = "nothing to write: only you can cut the files of clips." if proposals else "nothing to propose."
+        print(f"contextdb: {nothing}", file=sys.stderr)
 
 
 def _reasons(proposals: Sequence[Proposal]) -> Iterator[str]:

@@ -83,7 +83,10 @@ def _lines(
     asked: argparse.Namespace,
 ) -> Iterator[str]:
     if valid is not None:
-        yield f"{len(valid):,} of {plural(valid.n_rows, 'row')} valid in {printable(str(stage.config.databases[name].table))}"
+        table = printable(str(stage.config.databases[name].table))
+        has_mirror = valid.mirrored is not valid and bool(stage.databases[name].mirrored.any())
+        mirrored = f", {len(valid.mirrored):,} mirrored" if has_mirror else ""
+        yield f"{len(valid):,} of {plural(valid.n_rows, 'row')} valid in {table}{mirrored}"
     yield f"{n_free:,} of {plural(stage.databases[name].n_frames, 'frame')} of {printable(name)} may play"
     if found.counts:
         yield f"left out: {left_out_text(found)}"

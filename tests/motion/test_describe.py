@@ -11,9 +11,11 @@ import pytest
 import contextdb as cdb
 from contextdb import motion
 from contextdb.errors import ContextDBError
+from contextdb.motion.clips.feet import Footfalls
 from contextdb.motion.clips.poses import poses_of
 from contextdb.motion.clips.trajectory import Trajectory, root_trajectory
-from contextdb.motion.preparing.clip_facts import Moments, common_words, style_of
+from contextdb.motion.preparing.cells_of_clips import cells_of
+from contextdb.motion.preparing.clip_facts import Moments, Spread, common_words, gait_of, is_moving, style_of
 from contextdb.motion.preparing.describing import condition_sections, patterns_of, table_section
 
 MADE = motion.made_clips()
@@ -25,7 +27,7 @@ def table_of(rows: list[motion.Described]) -> cdb.Table:
     columns = {"Asset Name": [row.asset for row in rows]}
     columns |= {name: [row.cells[name] for row in rows] for name in rows[0].cells}
     conditions = {name: said for (_, name), said in condition_sections(rows).items()}
-    return cdb.Table.from_columns(columns, conditions, table_section(rows, "Asset Name", "moves.csv"), "moves")
+    return cdb.Table.from_columns(columns, conditions, table_section(rows, "Asset Name"), "moves")
 
 
 # ---- what is measured
@@ -160,6 +162,31 @@ def test_neighbours_overlap_a_little_and_far_ones_do_not():
     assert steady & set(compiled.query({**context, "speed": 1.3}).assets) == {"walk"}
     assert steady & set(compiled.query({**context, "speed": 1.05}).assets) == {"walk_slow", "walk"}
     assert steady & set(compiled.query({**context, "speed": 0.6}).assets) == {"walk_slow"}
+
+
+def turning(*spreads: tuple[float, float, float], mirrored: bool = False) -> list[str]:
+    """The turn cells of clips that are alike but for how they turn."""
+    walk = ROWS["walk"].facts
+    facts = [replace(walk, asset=f"c{i}", turn_dps=Spread(*spread)) for i, spread in enumerate(spreads)]
+    return [cells["turn"] for cells in cells_of(facts, ["rig"] * len(facts), mirrored)]
+
+
+def test_a_clip_that_turns_for_a_while_is_the_one_for_turns_where_no_other_turns():
+    assert turning((-3.0, 0.0, 3.0), (-2.0, 10.0, 82.0)) == ["<=51", ">=-12"]
+    assert turning((-3.0, 0.0, 3.0), (-2.0, 10.0, 82.0), mirrored=True) == ["-51..51", ">=-12"]
+    assert turning((-3.0, 0.0, 3.0), (-2.0, 10.0, 82.0), (-46.0, -9.0, 0.0)) == ["-30..51", ">=-12", "<=7"]
+
+
+def test_a_clip_that_turns_for_a_while_keeps_its_own_range_where_another_turns_all_the_time():
+    assert turning((-3.0, 0.0, 3.0), (38.0, 43.0, 45.0), (-2.0, 10.0, 82.0)) == ["<=28", ">=15", "-12..92"]
+
+
+def test_a_slow_clip_moves_where_its_name_says_so_and_slow_hops_are_no_run():
+    slow, still = (Spread(0.0, 0.2, 0.33), Spread(0.0, 0.1, 0.2))
+    assert [is_moving(name, slow, 0.3) for name in ("sneak_walk", "look")] == [True, False]
+    assert not is_moving("walk_up_and_wait", still, 0.0)
+    hops = Footfalls(1.0, {"L": np.array([[0.0, 0.4]]), "R": np.array([[0.6, 0.9]])})
+    assert [gait_of("hops", Spread(0.4, speed, speed), hops) for speed in (0.5, 2.5)] == ["Walk", "Run"]
 
 
 def test_a_mirrored_turn_leaves_the_other_side_to_its_mirror():

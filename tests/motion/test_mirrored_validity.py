@@ -190,6 +190,7 @@ def test_the_commands_search_and_run_go_by_the_mirror(project, tmp_path_factory)
     rows = found.json["rows"]
     valid = {(row["asset"], row["mirrored"]) for row in rows if row["left_out"] == LeftOut.NO.text}
     assert valid == {(TURNS[0], False), (TURNS[1], True)}
+    assert run("motion", "search", project, "turns", "direction=88", *asked[:2]).lines[0].endswith(", 1 mirrored")
     stick = tmp_path_factory.mktemp("stick") / "moves.csv"
     lines = "".join(f"{i / 10},1.2,{88 if i < 20 else -88}\n" for i in range(40))
     stick.write_text(f"time_s,speed_mps,direction\n{lines}", encoding="utf-8")

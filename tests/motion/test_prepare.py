@@ -11,7 +11,9 @@ import pytest
 from contextdb import motion
 from contextdb.errors import ContextDBError
 from contextdb.motion.markup.reserved import ReservedTag
+from contextdb.motion.markup.spans import TOLERANCE_S
 from contextdb.motion.preparing.proposal import KINDS
+from contextdb.motion.preparing.proposals import span_of_frames
 
 MADE = motion.made_clips()
 CLIPS = {made.name: made.clip for made in MADE}
@@ -89,6 +91,18 @@ def test_clips_that_come_to_a_stand_may_be_bent_to_a_target_until_they_stand_and
         assert entered.from_s is bent.from_s is None
         assert made.clip.duration_s - 0.5 >= bent.to_s > entered.to_s > made.clip.duration_s - 0.5 - 1.1  # a rest, a ramp
     assert {each.asset for each in of("targets")} == {made.name for made in MADE if made.recipe.change == "stop"}
+
+
+@pytest.mark.parametrize("rate", [24.0, 30.0, 60000 / 1001, 120.0, 240.0])
+def test_a_span_holds_its_frames_and_no_other(rate: float):
+    times = np.arange(500) / rate
+    for first in range(500):
+        begin, end = span_of_frames(first, 499 - first, rate)
+        assert begin is not None
+        assert end is not None
+        assert np.searchsorted(times, begin - TOLERANCE_S) == first
+        assert np.searchsorted(times, end + TOLERANCE_S, side="right") == 500 - first
+        assert (float(f"{begin:.3f}"), float(f"{end:.3f}")) == (begin, end)
 
 
 def test_a_cut_that_is_proposed_makes_a_loop():

@@ -27,6 +27,7 @@ from contextdb.tables.nesting.names import inner_name
 from contextdb.tables.table import Table
 from tui.model.alignment import indent_of, shared_end
 from tui.model.asked import Offered
+from tui.model.clip_cells import ClipCells
 from tui.model.columns_shown import ColumnsShown
 from tui.model.fact_steps import FactSteps
 from tui.model.notes import Notes
@@ -75,6 +76,8 @@ class ShownTable:
         self.version = 0
         self.marks = Notes()
         """Notes on cells, and colours of rows."""
+        self.clips = ClipCells()
+        """What Autofill knows of the clips."""
         self.played: int | None = None
         """The row of the file that a game which is followed has picked."""
         self._places: dict[str, tuple[TextColumn, int]] = {}
@@ -276,11 +279,17 @@ class ShownTable:
         return found
 
     def marked(self, row: int, column: int) -> str:
-        """The note on a cell of a row of the file, and the colour of the row, in words."""
-        asset = self.table.columns[self.asset_at][row]
-        note = self.marks.texts.get((asset, self.table.columns[column].name), "")
+        """The note on a cell of a row of the file, what its clip says, and the colour of the row, in words."""
+        asset, texts = self.table.columns[self.asset_at][row], self.table.columns[column]
+        note, clip = self.marks.texts.get((asset, texts.name), ""), self.clips.said(asset, texts.name, texts[row])
         colour = self.marks.colours.get(asset, "")
-        return " · ".join(filter(None, (f"note: {note}" if note else "", f"marked {colour}" if colour else "")))
+        return " · ".join(filter(None, (f"note: {note}" if note else "", clip, f"marked {colour}" if colour else "")))
+
+    def clip_mark(self, row: int, column: int) -> str:
+        """What stands before the text of a cell as its clip has it: a space where the clip says nothing of it."""
+        if not self.clips.cells:
+            return " "
+        return self.clips.mark(self.text(row, self.asset_at), self.table.columns[column].name, self.text(row, column)) or " "
 
     def said_of(self, row: int) -> str:
         """Who is cast for a row of the file, whether it is picked, and how much is valid of the table that it is for."""

@@ -15,6 +15,7 @@ from textual.screen import Screen
 from textual.widgets import ContentSwitcher, Static
 
 from contextdb.disk import write_atomic
+from contextdb.edits.schema_file import schema_path
 from contextdb.errors import ContextDBError, in_quotes, plural
 from contextdb.tables.changes import Edit
 from contextdb.tables.table import Table
@@ -62,8 +63,8 @@ CELL_MENU = (
     "insert-copied", "duplicate", "delete-rows", "enable", "colour-rows", "filter-same", "values", "rename-asset", "nearest",
 )  # fmt: skip
 COLUMN_MENU = (
-    "values", "sort", "sort-then", "hide-columns", "fold", "freeze", "columns", "column-sheet", "mend-all", "rename-column",
-    "rename-role", "add-column", "column-left", "column-right", "delete-columns",
+    "values", "autofill", "sort", "sort-then", "hide-columns", "fold", "freeze", "columns", "column-sheet", "mend-all",
+    "rename-column", "rename-role", "add-column", "column-left", "column-right", "delete-columns",
 )  # fmt: skip
 """What the right button of the mouse offers."""
 TOOLS = ("add-column", "blueprints", "import", "export", "refresh", "autofit", "history", "palette")
@@ -419,6 +420,18 @@ class MainScreen(Screen[None]):
 
         sheet = self.session.sheet
         self.app.push_screen(AddColumn(sheet.table, sheet.selection.column), self._answered)
+
+    def action_autofill(self) -> None:
+        """Show what the clips give to the table, and fill it."""
+        from tui.screens.autofill import Autofill, AutofillDialog  # loads what reads clips
+
+        table = self.session.sheet.table
+
+        def decided(answer: Autofill | None) -> None:
+            if answer is not None:
+                self.try_to(lambda: self.edited(Edited(answer.fill(self.session.sheet))))
+
+        self.app.push_screen(AutofillDialog(table, schema_path(table).parent), decided)
 
     def action_column_sheet(self) -> None:
         """Change what contextdb.toml says of all columns, in a sheet; as one step."""

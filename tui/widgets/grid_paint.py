@@ -256,7 +256,8 @@ class Painter:
                 under = "selected"
             note, width = window.note(row, column), look.layout.widths[column] - 1
             mark = OPENS if note is not None and column == asset and kind == "text" else MARKS[kind]
-            mark = NOTED if mark == " " and (name, names[column]) in noted else mark
+            if mark == " ":
+                mark = NOTED if (name, names[column]) in noted else self.sheet.clip_mark(row, column)
             n_shared = self.sheet.shared_end if column == asset else None
             room = width - cell_len(note) - 1 if note else width
             if note and room >= min(cell_len(text), LEAST_BESIDE):

@@ -110,7 +110,9 @@ def load_bvh(path: str | PathLike[str], *, metres_per_unit: float = CENTIMETRE, 
     try:
         raw = place.read_bytes()
     except OSError as error:
-        fault = Fault(f"the file cannot be read: {error.strerror or error}.", place=Place(file), rule="file")
+        is_folder = place.is_dir()
+        found = "this is a folder." if is_folder else f"the file cannot be read: {error.strerror or error}."
+        fault = Fault(found, "a BVH file" if is_folder else "", place=Place(file), rule="file")
         raise FileError(fault, errno=error.errno) from error
     return parse_bvh(text_of(raw, file), place.stem if name is None else name, file=file, metres_per_unit=metres_per_unit, up=up)
 

@@ -2,7 +2,8 @@
 
 Clips of one rig, gait and style are told apart by direction, then by turn, then by speed. Each of these columns cuts all its values
 among the clips that are left, at the middle between two neighbours and a little beyond it: so for each context there is a clip, and
-between two clips there are both. A clip that passes through many values, such as a start, keeps its own.
+between two clips there are both. A clip that passes through many values, such as a start, keeps its own; where it turns for a
+while, and no clip turns to that side all the time, it is the one for such turns, and ends the cells of those that go straight.
 """
 
 from __future__ import annotations
@@ -35,6 +36,11 @@ class Scale:
     digits: int
     is_circular: bool = False
     is_signed: bool = True
+
+    @property
+    def is_turn(self) -> bool:
+        """Whether it has two sides, and ends."""
+        return self.is_signed and not self.is_circular
 
 
 SPEED = Scale(0.25, 0.05, 0.3, 2, is_signed=False)
@@ -115,20 +121,48 @@ def _cut(
 ) -> list[list[int]]:
     """Give some clips their cells in a column; the clips that the column does not tell apart, together."""
     known = {i: spread for i in members if (spread := spreads[i]) is not None}
-    steady = {i: spread for i, spread in known.items() if spread.width <= 2.0 * scale.bin_width} or known
+    steady = {i: spread for i, spread in known.items() if _is_steady(spread, scale)} or known
+    passing = [i for i in known if i not in steady]
     bins = _grouped(steady, lambda i: _bin(steady[i].middle, scale))
     spread_of = {at: _joined([steady[i] for i in each]) for at, each in bins.items()}
     if mirrored and scale.is_signed:
         for spread in list(spread_of.values()):
             spread_of.setdefault(_bin(-spread.middle, scale), Spread(-spread.high, -spread.middle, -spread.low))
+    ends = _ends([known[i] for i in passing], spread_of, scale, mirrored)
+    spread_of |= {_bin(end, scale): Spread(end, end, end) for end in ends if end is not None}
     intervals = _intervals(spread_of, scale)
     for at, each in bins.items():
         for i in each:
             found[i][column] = _text(intervals[at], scale)
-    passing = [i for i in known if i not in steady]
     for i in passing:
-        found[i][column] = _text(_own(known[i], scale), scale)
+        found[i][column] = _text(_passing(known[i], ends, scale), scale)
     return [*(each for each in bins.values()), *([passing] if passing else [])]
+
+
+def _ends(passing: Sequence[Spread], steady: Mapping[int, Spread], scale: Scale, mirrored: bool) -> Interval:
+    """How far to each side clips turn that do so only for a while; None where a steady clip turns to that side."""
+    if not passing or not scale.is_turn:
+        return None, None
+    low, high = min(each.low for each in passing), max(each.high for each in passing)
+    if mirrored:
+        low, high = min(low, -high), max(high, -low)
+    is_low, is_high = _bin(low, scale) < 0 <= min(steady), max(steady) <= 0 < _bin(high, scale)
+    return low if is_low else None, high if is_high else None
+
+
+def _passing(spread: Spread, ends: Interval, scale: Scale) -> Interval:
+    """What a clip passes through; it is open to a side to whose end it is nearer than to none."""
+    low, high = _own(spread, scale)
+    return (
+        None if ends[0] is not None and spread.low < ends[0] / 2.0 else low,
+        None if ends[1] is not None and spread.high > ends[1] / 2.0 else high,
+    )
+
+
+def _is_steady(spread: Spread, scale: Scale) -> bool:
+    """Whether a clip has one value, more or less; one that turns for less than half of its time has not."""
+    reach = max(spread.high - spread.middle, spread.middle - spread.low) if scale.is_turn else 0.0
+    return spread.width <= 2.0 * scale.bin_width and reach <= scale.bin_width
 
 
 def _bin(value: float, scale: Scale) -> int:

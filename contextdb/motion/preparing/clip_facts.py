@@ -38,6 +38,8 @@ ENDS_S = 0.2
 """How much of a clip's beginning and end its first and last state are taken from."""
 RUNNING_MPS = 2.2
 """Faster than this is a run, where no feet are found."""
+LEAST_RUNNING_MPS = 1.0
+"""Slower than this is no run, whether feet are down or not: jumps and hops."""
 FLIGHT_SHARE = 0.1
 """Of the time: a body that is in the air for longer runs."""
 LOW, HIGH = 0.1, 0.9
@@ -49,7 +51,8 @@ _GAIT_WORDS = {
 }
 _OTHER = """idle idling stand standing start starting stop stopping turn turning turns left right forward forwards fwd ahead
 straight back backward backwards bwd strafe strafing side sideways loop looping cycle circle slow slowly medium fast to from and the
-with l r f b dataset clip anim animation take motion mocap locomotion move moving inplace root rm in out bvh cw ccw deg degrees"""
+with l r f b dataset clip anim animation take motion mocap locomotion move moving around inplace root rm in out
+bvh cw ccw deg degrees"""
 _OTHER_WORDS = frozenset(_OTHER.split())
 """Words of a name that say what the columns say, or nothing of how the body is carried."""
 _NORMAL_WORDS = frozenset(("normal", "neutral", "default", "basic", "plain", "regular"))
@@ -156,7 +159,7 @@ def facts_of(clip: Clip, common: Iterable[str] = ()) -> ClipFacts:
     moments = Moments.of(path, step_s)
     speed, turn = _spread(moments.speeds), _spread(moments.turns)
     moves = moments.speeds >= STANDING_MPS
-    gait = _gait(clip.name, speed, falls) if bool(np.mean(moves) > HIGH / 2.0) or speed.high > 2.0 * STANDING_MPS else "Idle"
+    gait = gait_of(clip.name, speed, falls) if is_moving(clip.name, speed, float(np.mean(moves))) else "Idle"
     stands = min(STANDING_MPS, SLOW_SHARE * speed.middle)
     ends = [_end_state(path, falls, gait, stands, is_end=is_end) for is_end in (False, True)]
     stops = gait != "Idle" and ends[1] == "Idle" and ends[0] != "Idle"
@@ -218,14 +221,23 @@ def common_words(names: Sequence[str]) -> set[str]:
     return set.intersection(*(set(words_of(name)) for name in names)) if len(names) > 1 else set()
 
 
-def _gait(name: str, speed: Spread, falls: Footfalls | None) -> str:
-    """The gait of a clip that moves: as its name says, else by whether the body leaves the ground."""
-    said = next((_GAIT_WORDS[word] for word in words_of(name) if word in _GAIT_WORDS), None)
+def is_moving(name: str, speed: Spread, share: float) -> bool:
+    """Whether a clip moves that does so for a share of its moments; where the name says a gait, its fastest tenth is enough."""
+    return share > HIGH / 2.0 or speed.high > (STANDING_MPS if _gait_said(name) is not None else 2.0 * STANDING_MPS)
+
+
+def _gait_said(name: str) -> str | None:
+    return next((_GAIT_WORDS[word] for word in words_of(name) if word in _GAIT_WORDS), None)
+
+
+def gait_of(name: str, speed: Spread, falls: Footfalls | None) -> str:
+    """The gait of a clip that moves: as its name says, else by whether the body leaves the ground; who hops slowly does not run."""
+    said = _gait_said(name)
     if said is not None:
         return said
     if falls is None or not any(len(falls.down[foot]) for foot in falls.feet):
         return "Run" if speed.middle > RUNNING_MPS else "Walk"
-    return "Run" if _flight_share(falls) > FLIGHT_SHARE else "Walk"
+    return "Run" if _flight_share(falls) > FLIGHT_SHARE and speed.middle > LEAST_RUNNING_MPS else "Walk"
 
 
 def _flight_share(falls: Footfalls) -> float:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from contextdb.cells.arguments import require_callable, require_kind, require_many_of
@@ -39,7 +39,7 @@ class Described:
     cells : mapping of str to str
         Of the columns `gait`, `speed`, `direction`, `turn`, `style`, and the outputs `duration_s`, `start` and `end`.
     facts : ClipFacts
-        What was measured.
+        What was measured; of joint clips on the actor of the first role.
     """
 
     asset: str
@@ -96,6 +96,29 @@ def describe(clips: Sequence[Clip], *, mirrored: bool = False, progress: Tell | 
     return [Described(each.asset, found, each) for each, found in zip(facts, cells, strict=True)]
 
 
+def joint_clips(clips: Sequence[Clip]) -> dict[str, dict[str, int]]:
+    """The clips that were recorded together, named ASSET.ROLE and of one length: asset to role to place in `clips`."""
+    found = defaultdict[str, dict[str, int]](dict)
+    for i, clip in enumerate(clips):
+        asset, dot, role = clip.name.rpartition(".")
+        if dot and asset and role.isidentifier():
+            found[asset][role] = i
+    names = {clip.name for clip in clips}
+    sizes = {asset: {(clips[i].n_frames, clips[i].frame_time_s) for i in roles.values()} for asset, roles in found.items()}
+    return {
+        asset: dict(sorted(roles.items()))
+        for asset, roles in found.items()
+        if len(roles) > 1 and len(sizes[asset]) == 1 and asset not in names
+    }
+
+
+def joint_row(asset: str, clip: Clip) -> Described:
+    """The row of clips that were recorded together, of which `clip` is the first role's: its cells ask nothing of one body, since
+    the facts that it needs are those of several actors, such as `Host.speed`."""
+    facts = replace(facts_of(clip), asset=asset, style=NORMAL)
+    return Described(asset, {**dict.fromkeys((*CONDITIONS, *OUTPUTS), ""), "duration_s": f"{facts.duration_s:g}"}, facts)
+
+
 def _counts(clips: Sequence[Clip]) -> Counter[str]:
     return Counter(clip.name for clip in clips)
 
@@ -137,11 +160,12 @@ def condition_sections(rows: Sequence[Described]) -> Sections:
     }
 
 
-def table_section(rows: Sequence[Described], asset_column: str, file: str) -> dict[str, object]:
-    """What a new table of some rows is."""
+def table_section(rows: Sequence[Described], asset_column: str) -> dict[str, object]:
+    """What a new table of some rows is, beside its file."""
     outputs = {"duration_s": {"type": "number", "default": 0.0}, "start": {"type": "text"}, "end": {"type": "text"}}
-    fallback = min(rows, key=lambda row: (row.facts.style != NORMAL, row.facts.speed_mps.middle), default=None)
-    said: dict[str, object] = {"file": file, "asset": asset_column, "policy": "collect", "outputs": outputs}
+    alone = [row for row in rows if row.cells["gait"]]
+    fallback = min(alone, key=lambda row: (row.facts.style != NORMAL, row.facts.speed_mps.middle), default=None)
+    said: dict[str, object] = {"asset": asset_column, "policy": "collect", "outputs": outputs}
     return said | ({"fallback": fallback.asset} if fallback is not None else {})
 
 
@@ -151,10 +175,11 @@ class RigClips:
 
     clips: Sequence[Clip]
     patterns: Sequence[str]
+    roles: tuple[str, ...] = ()
 
 
 def by_rig(clips: Sequence[Clip], paths: Sequence[str]) -> list[RigClips]:
-    """The clips of each rig, unit and axis, those of which there are most first.
+    """The clips of each rig, unit and axis, those of which there are most first; joint clips by their roles behind the others.
 
     Parameters
     ----------
@@ -163,12 +188,13 @@ def by_rig(clips: Sequence[Clip], paths: Sequence[str]) -> list[RigClips]:
         Their files, below the folder of contextdb.toml, with "/" between names.
     """
     groups = defaultdict[object, list[int]](list)
+    roles_of = {i: tuple(roles) for roles in joint_clips(clips).values() for i in roles.values()}
     for i, clip in enumerate(clips):
-        groups[clip.skeleton.names, clip.metres_per_unit, clip.up].append(i)
+        groups[clip.skeleton.names, clip.metres_per_unit, clip.up, roles_of.get(i, ())].append(i)
     found = []
-    for members in sorted(groups.values(), key=lambda members: (-len(members), members[0])):
+    for members in sorted(groups.values(), key=lambda members: (members[0] in roles_of, -len(members), members[0])):
         own = {paths[i] for i in members}
-        found.append(RigClips([clips[i] for i in members], patterns_of(sorted(own), {*paths} - own)))
+        found.append(RigClips([clips[i] for i in members], patterns_of(sorted(own), {*paths} - own), roles_of.get(members[0], ())))
     return found
 
 
@@ -220,7 +246,10 @@ def motion_sections(rigs: Sequence[RigClips], table: str, markup: str | None = N
                 "up": rig.clips[0].up,
                 "mirror": bool(mirror),
                 **({"markup": markup} if markup is not None else {}),
+                **({"roles": list(rig.roles)} if rig.roles else {}),
             }
+        if rig.roles:
+            continue
         order = [{"database": name, "threshold": 0.0} for name in names[:-1]] + [{"database": names[-1]}]
         found["selectors", f"{table}{behind}"] = {"order": order}
         found["controllers", f"player{behind}"] = {"selector": f"{table}{behind}", "search_every_s": 0.1}

@@ -33,6 +33,8 @@ from contextdb.motion.markup.reserved import CONTACTS, ReservedTag
 from contextdb.motion.preparing.clip_facts import ENDS_S, SLOW_SHARE, STANDING_MPS, Moments, falls_of, require_finite, step_of
 from contextdb.motion.preparing.proposal import KINDS, N_SAMPLES, Kept, Kind, Proposal, Shape
 
+NEAR_MS = 1e-6
+"""Times that differ by less are the same."""
 ROOT_SMOOTH_S = 0.2
 """What is proposed for `root_smooth_s`: it evens out a step, and keeps a start and a bend."""
 SWAY_M, SWAY_DEG = 0.01, 3.0
@@ -137,11 +139,18 @@ class Look:
 
     def said(self, kind: Kind, tag: str | None, first: int | None, last: int | None, reason: str, measure: float) -> Proposal:
         """A proposal about frames from `first` to `last`."""
-        begin, end = (None if frame is None else round(frame / self.rate, 3) for frame in (first, last))
+        begin, end = span_of_frames(first, last, self.rate)
         value = None
         if tag == ReservedTag.NEXT_NATURAL_ONLY and begin is not None and end is not None:
             value = min(ENTRY_S, math.floor(100.0 * (end - begin)) / 100.0)  # no longer than the span
         return Proposal(self.clip.name, kind, tag, begin, end, value, reason, round(measure, 4))
+
+
+def span_of_frames(first: int | None, last: int | None, rate: float) -> tuple[float | None, float | None]:
+    """The seconds of a span that holds these frames and, below 1,000 frames a second, no other: rounded outwards to 0.001 s."""
+    begin = None if first is None else math.floor(1000.0 * first / rate + NEAR_MS) / 1000.0
+    end = None if last is None else math.ceil(1000.0 * last / rate - NEAR_MS) / 1000.0
+    return begin, end
 
 
 def prepare(

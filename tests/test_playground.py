@@ -19,10 +19,11 @@ import pytest
 from strategies import IS_FULL
 
 from contextdb import motion
+from contextdb.errors import FileError
 from examples.playground import world
 from examples.playground.__main__ import RATE, main, played, project_of_clips, run
 from examples.playground.game import Game
-from examples.playground.stick import REST, Stick, Sticks
+from examples.playground.stick import REST, Stick, Sticks, read_sticks
 
 ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT / "docs"))
@@ -159,6 +160,41 @@ def test_two_contest_the_ball_and_the_table_says_what_each_plays(game: Game):
     assert (apart.left_m, apart.ahead_m) == pytest.approx((0.0, 0.8), abs=0.1)
 
 
+def test_the_ball_comes_to_the_hand_without_a_leap_and_no_foot_that_stands_slides(game: Game):
+    assert game.ball is not None
+    x, z = game.ball.spot
+    put(game, x, z + 1.2)
+    before: dict[int, Any] = {}
+    ball, leaps, slides = game.ball.place, [], []
+    while game.ball.holder is None or game.ball.since_s < 2.0:
+        game.update(1.0 / RATE, REST)
+        leaps.append(float(np.linalg.norm(game.ball.place - ball)))
+        ball = game.ball.place
+        player, rig = game.player, game.player.stock.banks["moves"]
+        if player.playing == "catch_contested.Other":
+            down = {
+                rig.skeleton.names.index(foot.replace("Foot", "Toe")): on
+                for foot, on in zip(rig.feet, player.pose.contacts, strict=True)
+            }
+            here = {foot: player.pose.positions[foot, [0, 2]] for foot, on in down.items() if on}
+            slides += [float(np.linalg.norm(here[foot] - before[foot])) for foot in here if foot in before]
+            before = here
+    assert max(leaps) < 0.4
+    assert slides
+    assert max(slides) < 0.005
+
+
+@pytest.mark.parametrize(("run", "clip"), [(False, "walk_about_left"), (True, "jog_about_left")])
+def test_who_turns_back_plays_a_turn_about(game: Game, run: bool, clip: str):
+    put(game, -10.0, -15.0)
+    push(game, 2.0, Stick(0.0, 1.0, run=run))
+    seen = []
+    for _ in range(round(0.5 * RATE)):
+        game.update(1.0 / RATE, Stick(0.0, -1.0, run=run))
+        seen.append(game.player.playing)
+    assert seen.count(clip) > 20
+
+
 def test_who_runs_too_long_is_tired_and_plays_tired_clips(game: Game):
     put(game, -10.0, -15.0)
     game.player.stamina = 0.06
@@ -219,6 +255,12 @@ def test_a_stick_that_is_pushed_sideways_asks_for_its_pace():
     assert Stick(1.0, 1.0).velocity() == pytest.approx((0.99, 0.99), abs=0.01)
     assert Stick(0.1, 0.0).velocity() == (0.0, 0.0)
     assert Stick(0.0, 1.0, run=True).velocity(tired=True)[1] < Stick(0.0, 1.0, run=True).velocity()[1]
+
+
+def test_a_file_that_is_no_stick_is_refused(tmp_path: Path):
+    (tmp_path / "stick.csv").write_text("time_s,x\n0,far\n")
+    with pytest.raises(FileError, match=r"stick\.csv.*this is no stick"):
+        read_sticks(tmp_path / "stick.csv")
 
 
 def test_the_clips_of_a_folder_that_has_none_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]):

@@ -289,7 +289,10 @@ class Character:
         return RootMotion(*place_beside((*self._body.position, self._body.heading), self._apart))
 
     def sees(self, x_m: float, z_m: float, heading_rad: float | None = None) -> Target:
-        """A place in the world as seen from where the animation is: a target of one-offs, its distance and direction for facts."""
+        """A place in the world as seen from where the animation is: a target of one-offs, its distance and direction for facts.
+
+        Raises QueryError for what is no place.
+        """
         return Target.seen_from(self.root, x_m, z_m, heading_rad)
 
     @property
@@ -404,7 +407,7 @@ class Character:
     def features(self, dt_s: float = 0.0, body: Steered | None = None) -> Features | Floats:
         """The features of the pose that a query begins with: of the frame that plays next, or of rest where nothing plays.
 
-        With no argument the pose as it is now, such as for `MatchNode.enter`.
+        With no argument the pose as it is now, such as for `MatchNode.enter`. Never fails.
         """
         if self.pose is not None:
             return np.asarray(self.pose(self, dt_s))

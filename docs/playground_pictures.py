@@ -64,7 +64,7 @@ MOMENTS = {
     "playground-turn": Moment((1.5, -3.0, 0.0), [(1.6, pushed(0)), (0.5, pushed(80))], turn=-25.0),
     "playground-vault": Moment((-3.0, -2.0, 0.0), [(5.0, pushed(0, run=True))], 70.0, until=is_over_the_wall),
     "playground-ramp": Moment((4.5, 0.6, 0.0), [(3.2, pushed(0))], -50.0, 15.0, 4.6),
-    "playground-contest": Moment((-1.4, -1.5, 0.0), [(2.2, pushed(0)), (6.0, REST)], 40.0, 12.0, 6.2, until=is_caught),
+    "playground-contest": Moment((-1.4, -1.5, 0.0), [(2.2, pushed(0)), (6.0, REST)], -35.0, 31.0, 8.0, until=is_caught),
     "playground-tired": Moment((0.0, -9.0, 0.0), [(3.0, pushed(0, run=True))], 50.0, 10.0, 4.4, stamina=0.06),
     "playground-gap": Moment((0.0, 0.0, 0.0), [(1.2, pushed(0)), (1.2, pushed(180, strafe=True))], 25.0),
 }

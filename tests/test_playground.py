@@ -141,6 +141,15 @@ def test_who_only_stands_before_the_wall_stays_before_it(game: Game):
     assert game.player.character.root.ahead_m < world.WALL.z[0]
 
 
+def test_the_gate_has_seen_nothing_once_nobody_goes_to_the_wall(game: Game):
+    assert game.gate is not None
+    put(game, -3.0, 1.0)
+    push(game, 0.3, Stick(0.0, 1.0))
+    assert game.gate.seen is not None
+    push(game, 0.1, REST)
+    assert game.gate.seen is None
+
+
 def test_two_contest_the_ball_and_the_table_says_what_each_plays(game: Game):
     assert game.ball is not None
     x, z = game.ball.spot

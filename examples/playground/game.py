@@ -66,10 +66,10 @@ class Game(AbstractContextManager["Game"]):
 
     def _vault(self, actor: Actor) -> None:
         """Begin a vault when one fits: the table says which may play, the gate whether the best is good enough."""
-        if self.gate is None or actor.once is not None or actor.stick.gait == "Idle":
+        if self.gate is None:
             return
         ahead = world.wall_ahead(*actor.pose.root[:2], math.atan2(actor.stick.x, actor.stick.z))
-        if ahead is None:
+        if ahead is None or actor.once is not None or actor.stick.gait == "Idle":
             self.gate.close()
             return
         self.asking = actor.name

@@ -21,8 +21,7 @@ from examples.playground.actor import LONGEST
 from examples.playground.game import Game
 from examples.playground.stick import Sticks, read_sticks, stick_at
 
-RATE = 60.0
-TABLES = Path(__file__).parent / "tables"
+RATE, TABLES = 60.0, Path(__file__).parent / "tables"
 
 
 def main(words: list[str] | None = None) -> int:

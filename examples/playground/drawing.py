@@ -37,6 +37,7 @@ class Body:
     def __init__(self, root: NodePath, actor: Actor, own: LColor) -> None:
         self.actor, rig = actor, next(iter(actor.stock.banks.values()))
         names = [name.lower() for name in rig.skeleton.names]
+        self.hips = names.index("hips") if "hips" in names else 0
         self.feet = [rig.skeleton.names.index(foot) for foot in rig.feet]
         node, left = root.attachNewNode(actor.name), own * 0.8 + SHADOW * 0.2
         self.bones = [
@@ -104,7 +105,7 @@ class Scene:
         if ball is not None:
             self.ball.setPos(*here(ball.place))
             put(self.ring, *ball.spot, ball.holder is None)
-        x, y, z = here(player.pose.positions[0])
+        x, y, z = here(player.pose.positions[self.bodies[0].hips])
         turn, tilt = math.radians(self.turn), math.radians(self.tilt)
         back = self.away * math.cos(tilt)
         self.base.camera.setPos(x + back * math.sin(turn), y - back * math.cos(turn), z + self.away * math.sin(tilt))

@@ -14,12 +14,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
 from png_files import Picture, halved, write_png
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
 from contextdb.motion import write_game_clips
-from examples.playground.__main__ import RATE, TABLES
+from examples.playground.__main__ import RATE, TABLES, own_tables
 from examples.playground.actor import Actor
 from examples.playground.game import Game
 from examples.playground.stick import REST, Stick
@@ -63,7 +64,7 @@ MOMENTS = {
     "playground-turn": Moment((1.5, -3.0, 0.0), [(1.6, pushed(0)), (0.5, pushed(80))], turn=-25.0),
     "playground-vault": Moment((-3.0, -2.0, 0.0), [(5.0, pushed(0, run=True))], 70.0, until=is_over_the_wall),
     "playground-ramp": Moment((4.5, 0.6, 0.0), [(3.2, pushed(0))], -50.0, 15.0, 4.6),
-    "playground-contest": Moment((-1.4, -1.5, 0.0), [(2.2, pushed(0)), (6.0, REST)], 160.0, 12.0, 6.2, until=is_caught),
+    "playground-contest": Moment((-1.4, -1.5, 0.0), [(2.2, pushed(0)), (6.0, REST)], -35.0, 31.0, 8.0, until=is_caught),
     "playground-tired": Moment((0.0, -9.0, 0.0), [(3.0, pushed(0, run=True))], 50.0, 10.0, 4.4, stamina=0.06),
     "playground-gap": Moment((0.0, 0.0, 0.0), [(1.2, pushed(0)), (1.2, pushed(180, strafe=True))], 25.0),
 }
@@ -78,9 +79,7 @@ def put(actor: Actor, place: tuple[float, float, float]) -> None:
 
 def _game() -> Game:
     """The game, with its clips made where they are not there yet."""
-    if not (TABLES / "clips" / "walk_about_left.bvh").exists():
-        write_game_clips(TABLES / "clips")
-    return Game(TABLES)
+    return Game(own_tables())
 
 
 def moment(name: str) -> Picture:
@@ -94,8 +93,17 @@ def moment(name: str) -> Picture:
             for _ in range(round(seconds * RATE)):
                 game.update(1.0 / RATE, stick)
                 if wanted.until is not None and wanted.until(game):
-                    return halved(window.picture())
-        return halved(window.picture())
+                    return halved(picture(window))
+        return halved(picture(window))
+
+
+def picture(window: Window) -> Picture:
+    """What is drawn now: [height, width, 3]."""
+    window.show()
+    window.base.graphicsEngine.renderFrame()
+    texture = window.base.win.getScreenshot()
+    flat = np.frombuffer(bytes(texture.getRamImageAs("RGB")), np.uint8)
+    return flat.reshape(texture.getYSize(), texture.getXSize(), 3)[::-1]
 
 
 def film() -> list[Picture]:
@@ -110,7 +118,7 @@ def film() -> list[Picture]:
                 game.update(1.0 / RATE, stick)
                 window.scene.turn += 0.08
                 if frame % every == 0:
-                    found.append(halved(halved(window.picture())))
+                    found.append(halved(halved(picture(window))))
                 frame += 1
         return found
 

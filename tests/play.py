@@ -12,11 +12,10 @@ from pathlib import Path
 import oracles
 
 from contextdb import Project
-from contextdb.motion import write_game_clips
+from contextdb.motion import MotionProject, write_game_clips
 from examples.playground.__main__ import TABLES, played
-from examples.playground.actor import Stock
 from examples.playground.game import Game
-from examples.playground.stick import StickFile
+from examples.playground.stick import Sticks, read_sticks
 
 STICK = """\
 time_s,x,z,run,strafe,camera_deg
@@ -45,11 +44,11 @@ def clips() -> Path:
 
 
 @cache
-def stock() -> Stock:
+def stock() -> MotionProject:
     """The frames and poses of all clips, read once: those of every copy are the same."""
     folder = clips().with_name(f"{clips().name}-tables")
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    return Stock.of(Project.load(copied(folder)))
+    return MotionProject.of(Project.load(copied(folder)))
 
 
 def copied(folder: Path) -> Path:
@@ -64,14 +63,14 @@ def opened(folder: Path, link: str | None = None) -> Game:
     return Game(folder, link, settle_s=0.0, stock=stock())
 
 
-def stick(folder: Path, text: str = STICK) -> StickFile:
+def stick(folder: Path, text: str = STICK) -> Sticks:
     """A stick of a file."""
     path = folder / "stick.csv"
     path.write_text(text)
-    return StickFile.read(path)
+    return read_sticks(path)
 
 
-def checked(game: Game, seconds: float, stick: StickFile) -> Iterator[Game]:
+def checked(game: Game, seconds: float, stick: Sticks) -> Iterator[Game]:
     """Play, and look in each frame whether what every character plays may play; now and then every cell is read anew."""
     for frame, each in enumerate(played(game, seconds, stick)):
         table = game.watch.project["moves"]

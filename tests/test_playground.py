@@ -19,10 +19,11 @@ import pytest
 from strategies import IS_FULL
 
 from contextdb import motion
+from contextdb.errors import FileError
 from examples.playground import world
 from examples.playground.__main__ import RATE, main, played, project_of_clips, run
 from examples.playground.game import Game
-from examples.playground.stick import REST, Stick, StickFile
+from examples.playground.stick import REST, Stick, Sticks, read_sticks
 
 ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT / "docs"))
@@ -53,18 +54,17 @@ def push(game: Game, seconds: float, stick: Stick) -> None:
         game.update(1.0 / RATE, stick)
 
 
-def turned(stick: StickFile, seconds: float) -> StickFile:
+def turned(sticks: Sticks, seconds: float) -> Sticks:
     """The same again and again, there and back."""
     length_s = 9.0
-    back = [replace(each, x=-each.x, z=-each.z, camera=each.camera + math.pi) for each in stick.sticks]
-    times = math.ceil(seconds / length_s)
-    sticks = [each for i in range(times) for each in (back if i % 2 else stick.sticks)]
-    return StickFile([i * length_s + t for i in range(times) for t in stick.times_s], sticks)
+    back = [(from_s, replace(each, x=-each.x, z=-each.z, camera=each.camera + math.pi)) for from_s, each in sticks]
+    times = range(math.ceil(seconds / length_s))
+    return [(i * length_s + from_s, each) for i in times for from_s, each in (back if i % 2 else sticks)]
 
 
 def test_a_session_keeps_the_bars_of_motion_measure_and_no_row_is_wrong(game: Game, tmp_path: Path):
     stick = turned(play.stick(tmp_path), SECONDS)
-    run(play.checked(game, SECONDS, stick), tmp_path / "poses.npz", tmp_path / "session.parquet")
+    run(game, play.checked(game, SECONDS, stick), tmp_path / "poses.npz", tmp_path / "session.parquet")
     banks = {name: game.player.stock.banks[name] for name in ("moves", "tired")}
     session = motion.Trace.load(tmp_path / "session.parquet")
     measures = motion.measure(session, banks, databases=game.player.character.controller.selector.databases)
@@ -130,7 +130,7 @@ def test_who_runs_at_the_wall_vaults_it_when_the_gate_opens(game: Game):
         if world.WALL.holds(x, z):
             assert game.player.playing == "vault_run"
             heights.append(game.player.pose.positions[:, 1].min())
-    assert game.player.root.ahead_m > world.WALL.z[1]
+    assert game.player.character.root.ahead_m > world.WALL.z[1]
     assert heights
     assert min(heights) > world.WALL.near_m
 
@@ -138,7 +138,16 @@ def test_who_runs_at_the_wall_vaults_it_when_the_gate_opens(game: Game):
 def test_who_only_stands_before_the_wall_stays_before_it(game: Game):
     put(game, -4.9, 4.6)
     push(game, 2.0, Stick(0.0, 1.0))
-    assert game.player.root.ahead_m < world.WALL.z[0]
+    assert game.player.character.root.ahead_m < world.WALL.z[0]
+
+
+def test_the_gate_has_seen_nothing_once_nobody_goes_to_the_wall(game: Game):
+    assert game.gate is not None
+    put(game, -3.0, 1.0)
+    push(game, 0.3, Stick(0.0, 1.0))
+    assert game.gate.seen is not None
+    push(game, 0.1, REST)
+    assert game.gate.seen is None
 
 
 def test_two_contest_the_ball_and_the_table_says_what_each_plays(game: Game):
@@ -156,8 +165,43 @@ def test_two_contest_the_ball_and_the_table_says_what_each_plays(game: Game):
         "player": "catch_contested.Other",
         "rival": "catch_contested.Catcher",
     }
-    apart = motion.Target.seen_from(game.rival.root, *game.player.pose.root[:2])
+    apart = motion.Target.seen_from(game.rival.character.root, *game.player.pose.root[:2])
     assert (apart.left_m, apart.ahead_m) == pytest.approx((0.0, 0.8), abs=0.1)
+
+
+def test_the_ball_comes_to_the_hand_without_a_leap_and_no_foot_that_stands_slides(game: Game):
+    assert game.ball is not None
+    x, z = game.ball.spot
+    put(game, x, z + 1.2)
+    before: dict[int, Any] = {}
+    ball, leaps, slides = game.ball.place, [], []
+    while game.ball.holder is None or game.ball.since_s < 2.0:
+        game.update(1.0 / RATE, REST)
+        leaps.append(float(np.linalg.norm(game.ball.place - ball)))
+        ball = game.ball.place
+        player, rig = game.player, game.player.stock.banks["moves"]
+        if player.playing == "catch_contested.Other":
+            down = {
+                rig.skeleton.names.index(foot.replace("Foot", "Toe")): on
+                for foot, on in zip(rig.feet, player.pose.contacts, strict=True)
+            }
+            here = {foot: player.pose.positions[foot, [0, 2]] for foot, on in down.items() if on}
+            slides += [float(np.linalg.norm(here[foot] - before[foot])) for foot in here if foot in before]
+            before = here
+    assert max(leaps) < 0.4
+    assert slides
+    assert max(slides) < 0.005
+
+
+@pytest.mark.parametrize(("run", "clip"), [(False, "walk_about_left"), (True, "jog_about_left")])
+def test_who_turns_back_plays_a_turn_about(game: Game, run: bool, clip: str):
+    put(game, -10.0, -15.0)
+    push(game, 2.0, Stick(0.0, 1.0, run=run))
+    seen = []
+    for _ in range(round(0.5 * RATE)):
+        game.update(1.0 / RATE, Stick(0.0, -1.0, run=run))
+        seen.append(game.player.playing)
+    assert seen.count(clip) > 20
 
 
 def test_who_runs_too_long_is_tired_and_plays_tired_clips(game: Game):
@@ -177,7 +221,7 @@ def test_feet_stand_on_the_ramp_and_on_the_steps(game: Game):
         game.update(1.0 / RATE, Stick(0.0, 1.0))
         places = game.player.pose.positions[foot]
         above.append(min(y - world.ground(x, z)[0] for x, y, z in places))
-    assert game.player.root.ahead_m > world.STEPS[-1].z[1]
+    assert game.player.character.root.ahead_m > world.STEPS[-1].z[1]
     assert np.percentile(np.abs(above), 90) < 0.08
 
 
@@ -192,7 +236,7 @@ def test_the_screen_says_what_plays_why_and_which_rows_are_valid(game: Game):
     push(game, 1.5, Stick(0.0, 1.0))
     words = game.player.readout
     assert words.title.startswith("walk")
-    assert "walk at" in game.player.why
+    assert "walk at" in words.why
     assert ("  5  walk", True) in words.rows
     assert words.gap == ""
     assert "gait Walk" in words.facts
@@ -222,6 +266,12 @@ def test_a_stick_that_is_pushed_sideways_asks_for_its_pace():
     assert Stick(0.0, 1.0, run=True).velocity(tired=True)[1] < Stick(0.0, 1.0, run=True).velocity()[1]
 
 
+def test_a_file_that_is_no_stick_is_refused(tmp_path: Path):
+    (tmp_path / "stick.csv").write_text("time_s,x\n0,far\n")
+    with pytest.raises(FileError, match=r"stick\.csv.*this is no stick"):
+        read_sticks(tmp_path / "stick.csv")
+
+
 def test_the_clips_of_a_folder_that_has_none_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     assert main(["--clips", str(tmp_path), "--headless", "1"]) == 2
     assert "there is no BVH clip. Accepted: a folder with files *.bvh" in capsys.readouterr().err
@@ -229,8 +279,7 @@ def test_the_clips_of_a_folder_that_has_none_are_refused(tmp_path: Path, capsys:
 
 @pytest.mark.skipif(not IS_FULL, reason="EXAMPLES=full makes a project of other clips")
 def test_any_folder_of_clips_plays(tmp_path: Path, tables: Path):
-    project_of_clips(tables / "clips", tmp_path)
-    with Game(tmp_path, settle_s=0.0) as game:
+    with Game(project_of_clips(tables / "clips"), settle_s=0.0) as game:
         for _ in played(game, 4.0, play.stick(tmp_path)):
             assert game.player.playing
         assert game.ball is None
@@ -253,8 +302,8 @@ def test_the_pictures_of_the_page_show_what_is_drawn_now():
 
 
 def test_the_game_is_as_small_as_its_page_says():
-    lines = [line for file in (ROOT / "examples" / "playground").glob("*.py") for line in file.read_text("utf-8").splitlines()]
-    assert sum(bool(line.strip()) for line in lines) < 900
+    files = (ROOT / "examples" / "playground").glob("*.py")
+    assert sum(len(file.read_text("utf-8").splitlines()) for file in files) < 900
     assert "under 900 lines" in (ROOT / "docs" / "playground.md").read_text(encoding="utf-8")
 
 
@@ -289,7 +338,7 @@ def window(game: Game) -> Iterator[Any]:
 
 def test_the_picture_shows_the_player_and_what_is_said_without_a_screen(window: Any):
     push(window.game, 0.3, REST)
-    picture = window.picture().astype(int)
+    picture = importlib.import_module("playground_pictures").picture(window).astype(int)
     assert picture.shape == (360, 640, 3)
     red, blue = picture[..., 0], picture[..., 2]
     warm = np.argwhere(red - blue > 60)
@@ -302,6 +351,7 @@ def test_the_picture_shows_the_player_and_what_is_said_without_a_screen(window: 
 def test_a_gamepad_steers_looks_round_and_runs(window: Any):
     pushed = {"left_y": 1.0, "right_trigger": 0.9, "right_x": 0.5}
     pad = SimpleNamespace(
+        poll=lambda: None,
         findAxis=lambda axis: SimpleNamespace(value=pushed.get(axis.name, 0.0)),
         findButton=lambda name: SimpleNamespace(pressed=name == "lshoulder"),
     )
@@ -334,7 +384,7 @@ def test_keys_steer_and_the_f_keys_do_what_the_help_says(window: Any, tmp_path: 
     base.messenger.send("w")
     step(60)
     assert window.game.player.moved.facts["gait"] == "Walk"
-    assert window.game.player.root.ahead_m > 0.3
+    assert window.game.player.character.root.ahead_m > 0.3
     base.messenger.send("shift")
     base.messenger.send("f1")
     step(2)

@@ -17,7 +17,9 @@ from contextdb.errors import ClipError, MotionError, QueryError
 from contextdb.motion.characters.character import Character, CharacterState, Updated
 from contextdb.motion.characters.crowd import Crowd
 from contextdb.motion.characters.facts import FACTS, Moment
-from contextdb.motion.characters.paths import path_from
+from contextdb.motion.characters.motion_project import MotionProject
+from contextdb.motion.characters.one_off import OneOff
+from contextdb.motion.characters.paths import path_ahead, path_from
 from contextdb.motion.characters.readout import Readout
 from contextdb.motion.clips.clip import Clip, load_bvh, load_clips, parse_bvh, write_bvh
 from contextdb.motion.clips.doubts import ClipFinding, doubts_of
@@ -185,8 +187,10 @@ __all__ = [
     "MotionCoverage",
     "MotionDatabase",
     "MotionError",
+    "MotionProject",
     "Near",
     "Normalisation",
+    "OneOff",
     "Parting",
     "Permutations",
     "Playing",
@@ -268,6 +272,7 @@ __all__ = [
     "open_poses",
     "parse_bvh",
     "partners_of",
+    "path_ahead",
     "path_from",
     "pose_arrays",
     "pose_schema",

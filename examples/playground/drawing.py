@@ -4,8 +4,6 @@ Colours are flat and few: warm is the player, blue the rival, white the wish, ye
 of numbers; nothing is loaded from a file.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 
@@ -26,64 +24,47 @@ SKY, FLOOR, GRID, STONE, SHADOW, PLAYER, RIVAL, WISH, CLIP, HOLDS, BALL = (
     for code in ["20242e", "39404f", "4b5466", "76809a", "2a303c", "f2a65a", "6cb4ee", "ffffff", "ffd84d", "7ee08a", "f25f5c"]
 )
 SUN = LVector3(0.45, 0.35, -1.0)
-N_DOTS, DOT_EVERY_S = 10, 0.1
-N_ROUND, N_CAP = 14, 5
-HEAD = 0.6
-"""By so much of the neck the head is beyond its joint."""
-FLAT = world.Box((-20.0, 20.0), (-20.0, 20.0), 0.0, 0.0)
+N_DOTS, DOT_EVERY_S, N_ROUND, N_CAP = 10, 0.1, 14, 5
+EDGE, FLAT = 20, world.Box((-20.0, 20.0), (-20.0, 20.0), 0.0, 0.0)
 THICK = {"hip": 0.12, "spine": 0.12, "chest": 0.12, "head": 0.1, "upleg": 0.085, "leg": 0.062, "arm": 0.055, "": 0.045}
-"""Words in the names of joints, and the radius of a bone, in metres."""
+HEAD = 1.6
+"""Words in the names of joints and the radius of a bone in metres; how many times the neck's length away a head has its middle."""
 
 
 class Body:
     """A character: a capsule for each bone, its shadow, rings below feet that hold, dots along two paths."""
 
     def __init__(self, root: NodePath, actor: Actor, own: LColor) -> None:
-        self.actor = actor
-        rig = next(iter(actor.stock.banks.values()))
-        names = rig.skeleton.names
-        self.feet = [names.index(foot) for foot in rig.feet]
-        self.node = root.attachNewNode(actor.name)
-        self.bones = list(_bones(rig.skeleton))
-        self.head = next((i for i, name in enumerate(names) if "head" in name.lower()), -1)
-        darker = own * 0.8 + SHADOW * 0.2
-        self.capsules = [
-            solid(self.node, capsule(length, radius), darker if names[joint].lower().startswith("left") else own)
-            for _, joint, length, radius in self.bones
+        self.actor, rig = actor, next(iter(actor.stock.banks.values()))
+        names = [name.lower() for name in rig.skeleton.names]
+        self.hips = names.index("hips") if "hips" in names else 0
+        self.feet = [rig.skeleton.names.index(foot) for foot in rig.feet]
+        node, left = root.attachNewNode(actor.name), own * 0.8 + SHADOW * 0.2
+        self.bones = [
+            (parent, joint, solid(node, capsule(*shape), left if names[joint].startswith("left") else own))
+            for parent, joint, *shape in _bones(rig.skeleton)
         ]
-        self.shadow = _flat(root, root.attachNewNode("shadow"), SHADOW)
-        self.node.instanceTo(self.shadow)
-        self.contacts = [_flat(root, disc(0.16, 0.1), HOLDS) for _ in self.feet]
-        self.wish, self.clip = ([_flat(root, disc(0.055), own) for _ in range(N_DOTS)] for own in (WISH, CLIP))
+        self.shadow = mark(root, root.attachNewNode("shadow"), SHADOW)
+        node.instanceTo(self.shadow)
+        self.contacts = [mark(root, disc(0.16, 0.1), HOLDS) for _ in self.feet]
+        self.wish, self.clip = ([mark(root, disc(0.055), own) for _ in range(N_DOTS)] for own in (WISH, CLIP))
 
     def show(self) -> None:
         """The pose as it is now."""
-        pose, positions, path = self.actor.pose, self.actor.pose.positions, self.actor.moved.path
-        for (parent, joint, length, _), node in zip(self.bones, self.capsules, strict=True):
-            if length:
-                node.setPos(*here(positions[parent]))
-                node.lookAt(self.node, *here(positions[joint]))
-            else:
-                node.setPos(*here(positions[joint] + HEAD * (joint == self.head) * (positions[joint] - positions[parent])))
-        self.shadow.setMat(_onto(*pose.root[:2]))
-        self.shadow.show()
-        for joint, down, node in zip(self.feet, pose.contacts, self.contacts, strict=True):
-            put(node, positions[joint][0], positions[joint][2], bool(down))
-        for nodes, places, over_m in ((self.wish, path.positions[path.now :], 0.025), (self.clip, self._clip_s_path(), 0.03)):
-            for i, node in enumerate(nodes):
-                frame = min(round((i + 1) * DOT_EVERY_S * path.rate), len(places))
-                x, z = places[frame] if frame < len(places) else (0.0, 0.0)
-                put(node, x, z, frame < len(places), over_m)
-
-    def _clip_s_path(self) -> Floats:
-        """Where the clip would lead: its own movement from here on."""
-        playing, pose = self.actor.pose.playing, self.actor.pose
+        pose, playing = self.actor.pose, self.actor.pose.playing
         assert playing is not None
-        database = self.actor.stock.databases[playing.database]
-        assert database.root is not None
-        x, z, headings = database.root[playing.frame : min(playing.frame + 31, int(database.stops[playing.range]))].T
-        way = (z - z[0] + 1j * (x - x[0])) * np.exp(1j * (pose.root[2] - headings[0]))
-        return np.stack((pose.root[0] + way.imag, pose.root[1] + way.real), axis=1)
+        led = motion.path_ahead(self.actor.stock.databases[playing.database], playing, pose.root, N_DOTS * DOT_EVERY_S)
+        for parent, joint, node in self.bones:
+            node.setPos(*here(pose.positions[parent]))
+            node.lookAt(node.getParent(), *here(pose.positions[joint]))
+        self.shadow.setMat(_onto(*pose.root[:2]))
+        for joint, down, node in zip(self.feet, pose.contacts, self.contacts, strict=True):
+            put(node, pose.positions[joint][0], pose.positions[joint][2], bool(down))
+        for nodes, path, over_m in ((self.wish, self.actor.moved.path, 0.025), (self.clip, led, 0.03)):
+            for i, node in enumerate(nodes, 1):
+                frame = path.now + round(i * DOT_EVERY_S * path.rate)
+                place = path.positions[min(frame, len(path.positions) - 1)]
+                put(node, place[0], place[1], frame < len(path.positions), over_m)
 
 
 class Scene:
@@ -99,76 +80,66 @@ class Scene:
         for light, own in ((sun, (0.8, 0.78, 0.74, 1.0)), (sky, (0.42, 0.44, 0.5, 1.0))):
             light.setColor(own)
             root.setLight(root.attachNewNode(light))
-        _flat(root, grid(int(FLAT.x[1])), GRID).show()
+        lines = core.LineSegs()
+        for i in range(-EDGE, EDGE + 1):
+            for a, b in (((i, -EDGE), (i, EDGE)), ((-EDGE, i), (EDGE, i))):
+                lines.moveTo(*a, 0.004)
+                lines.drawTo(*b, 0.004)
+        mark(root, NodePath(lines.create()), GRID)
         for box in (FLAT, *world.FLOORS):
             solid(root, block(box), FLOOR if box is FLAT else STONE).setDepthOffset(-1)
         self.wall = solid(root, block(world.WALL), STONE)
         self.bodies = [Body(root, actor, own) for actor, own in zip(game.actors, (PLAYER, RIVAL), strict=False)]
-        self.ball = solid(root, capsule(0.0, 0.13), BALL)
-        self.ring = _flat(root, disc(0.5, 0.42), BALL)
+        if game.ball is not None:
+            self.ball, self.ring = solid(root, capsule(0.0, 0.0, 0.13), BALL), mark(root, disc(0.5, 0.42), BALL)
         self.turn, self.tilt, self.away = 0.0, 18.0, 5.5
 
     def show(self) -> None:
         """The game as it is now, from behind the player."""
         for body in self.bodies:
             body.show()
-        gate, player = self.game.gate, self.game.player
+        gate, player, ball = self.game.gate, self.game.player, self.game.ball
         may_vault = gate is not None and gate.seen is not None and bool(gate.seen.hit)
-        paint(self.wall, STONE * 0.6 + (HOLDS if player.playing.startswith("vault") else CLIP if may_vault else STONE) * 0.4)
-        self._show_ball()
-        x, y, z = here(player.pose.positions[0])
+        tint = HOLDS if player.playing.startswith("vault") else CLIP if may_vault else STONE
+        solid(self.base.render, self.wall, STONE * 0.6 + tint * 0.4)
+        if ball is not None:
+            self.ball.setPos(*here(ball.place))
+            put(self.ring, *ball.spot, ball.holder is None)
+        x, y, z = here(player.pose.positions[self.bodies[0].hips])
         turn, tilt = math.radians(self.turn), math.radians(self.tilt)
         back = self.away * math.cos(tilt)
         self.base.camera.setPos(x + back * math.sin(turn), y - back * math.cos(turn), z + self.away * math.sin(tilt))
         self.base.camera.lookAt(x, y, z + 0.15)
 
-    def _show_ball(self) -> None:
-        """Over its place, or on its way to a hand, or in it."""
-        ball = self.game.ball
-        if ball is None:
-            self.ball.hide()
-            return
-        place = np.array((ball.spot[0], ball.height_m, ball.spot[1]))
-        if ball.holder is not None:
-            hand = ball.holder.pose.positions[ball.holder.stock.banks["moves"].skeleton.names.index("RightHand")]
-            place += min(1.0, ball.since_s / max(ball.caught_s, 1e-6)) * (hand - place)
-        self.ball.setPos(*here(place))
-        put(self.ring, *ball.spot, ball.holder is None)
 
-
-def _bones(skeleton: motion.Skeleton) -> Iterator[tuple[int, int, float, float]]:
-    """From which joint to which each capsule goes, how long it is and how thick; a ball at the ends."""
-    for joint, parent in enumerate(skeleton.parents.tolist()):
-        name = skeleton.names[joint].lower()
-        if parent > 0 or (parent == 0 and "spine" in name) or "upleg" in name:
-            own = name if not parent or "arm" in name else skeleton.names[parent].lower()
-            yield parent, joint, float(np.linalg.norm(skeleton.offsets[joint])), next(r for word, r in THICK.items() if word in own)
-        if joint not in skeleton.parents:
-            yield parent, joint, 0.0, next(r for word, r in THICK.items() if word in name)
+def _bones(skeleton: motion.Skeleton) -> Iterator[tuple[int, int, float, float, float]]:
+    """From which joint towards which each capsule lies, from where to where in metres, and how thick it is; a ball for a head."""
+    names, parents = [name.lower() for name in skeleton.names], skeleton.parents.tolist()
+    thick = [next(radius for word, radius in THICK.items() if word in name) for name in names]
+    for joint, parent in enumerate(parents):
+        length = float(np.linalg.norm(skeleton.offsets[joint]))
+        if parent > 0 or (parent == 0 and "spine" in names[joint]) or "upleg" in names[joint]:
+            yield parent, joint, 0.0, length, thick[joint if not parent or "arm" in names[joint] else parent]
+        if "head" in names[joint] and joint not in parents:
+            yield parent, joint, HEAD * length, HEAD * length, thick[joint]
 
 
 def solid(root: NodePath, node: NodePath, own: LColor) -> NodePath:
     """A thing that the sun shines on."""
-    node.reparentTo(root)
-    paint(node, own)
-    return node
-
-
-def paint(node: NodePath, own: LColor) -> None:
-    """Give a thing a colour."""
     material = core.Material()
     material.setAmbient(own)
     material.setDiffuse(own)
     node.setMaterial(material)
+    node.reparentTo(root)
+    return node
 
 
-def _flat(root: NodePath, node: NodePath, own: LColor) -> NodePath:
+def mark(root: NodePath, node: NodePath, own: LColor) -> NodePath:
     """A mark on the ground, which no light changes."""
     node.reparentTo(root)
     node.setColor(own, 1)
     node.setLightOff(1)
     node.setMaterialOff(1)
-    node.hide()
     return node
 
 
@@ -219,13 +190,14 @@ def mesh(triangles: Floats, normals: Floats | None = None) -> NodePath:
     return NodePath(node)
 
 
-def capsule(length: float, radius: float) -> NodePath:
-    """A capsule along y, from 0 to its length; a ball where that is 0."""
+def capsule(from_m: float, to_m: float, radius: float) -> NodePath:
+    """A capsule along y; a ball where it ends at its beginning."""
     angles = 0.5 * math.pi * np.maximum(np.arange(N_CAP + 1) / N_CAP, 1e-3)
     wide, along = np.cos([*angles[::-1], *angles])[:, None], np.sin([*-angles[::-1], *angles])[:, None]
     turns = np.linspace(0.0, math.tau, N_ROUND + 1)
     normals = np.stack(np.broadcast_arrays(wide * np.cos(turns), along, wide * np.sin(turns)), axis=-1)
-    return mesh(quads(radius * normals + (normals[..., 1:2] > 0.0) * np.array((0.0, length, 0.0))), quads(normals))
+    middles = np.where(normals[..., 1:2] > 0.0, to_m, from_m) * (0.0, 1.0, 0.0)
+    return mesh(quads(radius * normals + middles), quads(normals))
 
 
 def block(box: world.Box) -> NodePath:
@@ -236,19 +208,8 @@ def block(box: world.Box) -> NodePath:
     return mesh(np.concatenate((quads(high[[[3, 2], [0, 1]]]), quads(sides))))
 
 
-def disc(radius: float, hole: float = 0.0) -> NodePath:
+def disc(radius: float, hole: float = 1e-4) -> NodePath:
     """A flat ring or disc on the ground."""
     turns = np.linspace(0.0, math.tau, 37)
     ring = np.stack((np.cos(turns), np.sin(turns), 0.0 * turns), axis=1)
-    triangles = quads(np.stack((max(hole, 1e-4) * ring, radius * ring)))
-    return mesh(triangles, np.tile((0.0, 0.0, 1.0), (triangles.size // 3, 1)))
-
-
-def grid(edge: int) -> NodePath:
-    """Lines on the ground, a metre apart."""
-    lines = core.LineSegs()
-    for i in range(-edge, edge + 1):
-        for a, b in (((i, -edge), (i, edge)), ((-edge, i), (edge, i))):
-            lines.moveTo(*a, 0.004)
-            lines.drawTo(*b, 0.004)
-    return NodePath(lines.create())
+    return mesh(quads(np.stack((hole * ring, radius * ring))))

@@ -1,17 +1,16 @@
 """What the player asks for, whoever holds the stick: keys and mouse, a gamepad, a file, or the rival's own head."""
 
-from __future__ import annotations
-
 import csv
 import math
-from bisect import bisect_right
 from dataclasses import dataclass
 from pathlib import Path
 
-WALK_MPS, RUN_MPS, TIRED_MPS = 1.4, 3.6, 2.6
-GAITS = ("Idle", "Walk", "Run")
-DEAD = 0.15
-"""A stick that is pushed less than this is at rest."""
+from contextdb.errors import Fault, FileError, Place
+
+PACES_MPS = {"Idle": 0.0, "Walk": 1.4, "Run": 3.6}
+COLUMNS = ("time_s", "x", "z", "run", "strafe", "camera_deg")
+TIRED_MPS, DEAD = 2.6, 0.15
+"""How fast a tired one runs; a stick that is pushed less than this is at rest."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,11 +26,11 @@ class Stick:
     @property
     def gait(self) -> str:
         """The fact of this name."""
-        return GAITS[0 if math.hypot(self.x, self.z) < DEAD else 2 if self.run else 1]
+        return "Idle" if math.hypot(self.x, self.z) < DEAD else "Run" if self.run else "Walk"
 
     def velocity(self, tired: bool = False) -> tuple[float, float]:
         """The velocity over the ground that it asks for, m/s."""
-        pace = {"Idle": 0.0, "Walk": WALK_MPS, "Run": TIRED_MPS if tired else RUN_MPS}[self.gait]
+        pace = TIRED_MPS if tired and self.gait == "Run" else PACES_MPS[self.gait]
         share = pace / max(1.0, math.hypot(self.x, self.z))
         return self.x * share, self.z * share
 
@@ -39,22 +38,22 @@ class Stick:
 REST = Stick()
 
 
-@dataclass(frozen=True)
-class StickFile:
-    """A stick that is moved by a file: each row holds until the next."""
+Sticks = list[tuple[float, Stick]]
+"""From which second on, ascending, and which."""
 
-    times_s: list[float]
-    sticks: list[Stick]
 
-    @classmethod
-    def read(cls, path: Path) -> StickFile:
-        """Read a CSV file with the columns time_s, x, z, run, strafe and camera_deg."""
+def read_sticks(path: Path) -> Sticks:
+    """Read a CSV file with the columns time_s, x, z, run, strafe and camera_deg. Raises FileError for another."""
+    try:
         with path.open(encoding="utf-8", newline="") as file:
-            rows = [{name: float(text or 0.0) for name, text in row.items()} for row in csv.DictReader(file)]
-        sticks = [Stick(row["x"], row["z"], row["run"] > 0.0, row["strafe"] > 0.0, math.radians(row["camera_deg"])) for row in rows]
-        return cls([row["time_s"] for row in rows], sticks)
+            rows = [[float(row[name] or 0.0) for name in COLUMNS] for row in csv.DictReader(file)]
+    except (OSError, KeyError, ValueError) as error:
+        raise FileError(
+            Fault(f"this is no stick: {error}.", f"a CSV file of numbers: {', '.join(COLUMNS)}", place=Place(str(path)))
+        ) from None
+    return [(time_s, Stick(x, z, run > 0.0, strafe > 0.0, math.radians(camera))) for time_s, x, z, run, strafe, camera in rows]
 
-    def at(self, time_s: float) -> Stick:
-        """The stick at a moment."""
-        row = bisect_right(self.times_s, time_s + 1e-9) - 1
-        return self.sticks[row] if row >= 0 else REST
+
+def stick_at(sticks: Sticks, time_s: float) -> Stick:
+    """The stick at a moment: that of the last row before it."""
+    return next((stick for from_s, stick in reversed(sticks) if from_s <= time_s + 1e-9), REST)

@@ -1,13 +1,10 @@
 """The ground, what stands on it, and where a body may go. Metres; x is to the left of who faces along z."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 
 from contextdb.motion import Steered
 
-Normal = tuple[float, float, float]
 RADIUS_M, HIGHEST_STEP_M, EDGE_M = 0.35, 0.35, 18.0
 """How near a body comes to a wall, onto what it steps, and how far the world goes."""
 
@@ -37,7 +34,7 @@ FLOORS = [RAMP, TOP, *STEPS]
 WALL = Box((-5.0, -1.0), (5.85, 6.15), 0.9, 0.9)
 
 
-def ground(x: float, z: float) -> tuple[float, Normal]:
+def ground(x: float, z: float) -> tuple[float, tuple[float, float, float]]:
     """The height and the normal below a place, as a pose stream asks for them."""
     floor = next((floor for floor in FLOORS if floor.holds(x, z)), None)
     if floor is None:

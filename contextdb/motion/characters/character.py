@@ -37,6 +37,7 @@ from contextdb.motion.clips.steering import Steered, steered_path
 from contextdb.motion.clips.trajectory import Trajectory, to_own_frame
 from contextdb.motion.features.extraction import Features, with_path
 from contextdb.motion.features.schema import FeatureSchema
+from contextdb.motion.nodes.warping import Target
 from contextdb.motion.output.bank import Place3, PoseBank
 from contextdb.motion.output.stages import Ground as HeightOf
 from contextdb.motion.output.stream import Pose, PoseState, PoseStream
@@ -47,7 +48,7 @@ from contextdb.motion.selection.controller_state import ControllerState
 from contextdb.motion.selection.decision import Decision, Playing
 from contextdb.motion.selection.root_motion import NO_MOTION, RootMotion
 from contextdb.motion.selection.variation import Rng
-from contextdb.motion.trace.session import Trace
+from contextdb.motion.trace.session import MOST, Trace
 from contextdb.records import quickly_made
 
 AT_REST = Steered()
@@ -245,12 +246,12 @@ class Character:
         copied.restore(self.state)
         return copied
 
-    def record(self, n_candidates: int = 12) -> Trace:
-        """Keep every decision from now on, with so many candidates of each search, in the trace that is given back.
+    def record(self, n_candidates: int = 12, *, most: int = MOST) -> Trace:
+        """Keep the decisions from now on, the last `most`, in the trace that is given back, with so many candidates of each search.
 
-        Raises MotionError where that is no whole number from 0 up.
+        Raises MotionError where one is no whole number: from 0 up, from 1 up.
         """
-        trace = Trace(n_candidates, self.controller.selector.databases)
+        trace = Trace(n_candidates, self.controller.selector.databases, most=most)
         self.controller.recorder = trace
         return trace
 
@@ -281,6 +282,18 @@ class Character:
     def body(self, body: Steered) -> None:
         require_kind(body, Steered, "body", "a Steered")
         self._body = body
+
+    @property
+    def root(self) -> RootMotion:
+        """Where the animation is: x to the left, z ahead and the heading of the last pose's root, which may lag behind the body."""
+        return RootMotion(*place_beside((*self._body.position, self._body.heading), self._apart))
+
+    def sees(self, x_m: float, z_m: float, heading_rad: float | None = None) -> Target:
+        """A place in the world as seen from where the animation is: a target of one-offs, its distance and direction for facts.
+
+        Raises QueryError for what is no place.
+        """
+        return Target.seen_from(self.root, x_m, z_m, heading_rad)
 
     @property
     def playing(self) -> Playing | None:
@@ -391,14 +404,17 @@ class Character:
         """The path from where the animation is: what lies behind it is where it was."""
         return _after_trail(path_from_place(step.place, path), step.trail)
 
-    def features(self, dt_s: float, body: Steered) -> Features | Floats:
-        """The features of the pose that a query begins with: of the frame that plays next, or of rest where nothing plays."""
+    def features(self, dt_s: float = 0.0, body: Steered | None = None) -> Features | Floats:
+        """The features of the pose that a query begins with: of the frame that plays next, or of rest where nothing plays.
+
+        With no argument the pose as it is now, such as for `MatchNode.enter`. Never fails.
+        """
         if self.pose is not None:
             return np.asarray(self.pose(self, dt_s))
         upcoming, databases = self.controller.upcoming(dt_s), self.controller.selector.databases
         if upcoming is not None:
             return databases[upcoming.database].raw(upcoming.frame)
-        return resting_pose(databases, self.schema, body)
+        return resting_pose(databases, self.schema, self._body if body is None else body)
 
     def valid(self, facts: Facts) -> OfValid | None:
         """What the tables allow with some facts."""

@@ -12,12 +12,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from contextdb.cells.arguments import require_kind, require_real
-from contextdb.errors import ContextError, Fault
+from contextdb.errors import ContextError, Fault, MotionError
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.trajectory import Trajectory
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.output.bank import Place3
-from contextdb.motion.selection.root_motion import RootMotion
+from contextdb.motion.search.database import MotionDatabase
+from contextdb.motion.selection.decision import Playing
+from contextdb.motion.selection.root_motion import RootMotion, between
 
 RETURN_HALFLIFE_S = 0.27
 """How fast a character is wished to come to the path of the body; as fast as a body follows a stick."""
@@ -26,7 +28,7 @@ MOST_TURN_RAD = math.radians(45.0)
 that asks for all of it makes the search jump to and fro."""
 SETTLED_HALFLIVES = 15.0
 """After so many half-lives a body goes straight on, and so does a path beyond its end."""
-LEAST_BACK_S = 2.0
+LEAST_BACK_S, MOST_AHEAD_S = 2.0, 3600.0
 A_PLACE = "x and z in metres and a heading in radians"
 
 
@@ -69,6 +71,42 @@ def path_from(root: Sequence[float], path: Trajectory, *, halflife_s: float = RE
     require_kind(path, Trajectory, "path", "a Trajectory, such as steered_path gives")
     require_real(halflife_s, "halflife_s", 0.001, 60.0)
     return path_from_place(place_of(root, "root"), path, halflife_s)
+
+
+def path_ahead(database: MotionDatabase, playing: Playing, root: Sequence[float], seconds: float = 0.5) -> Trajectory:
+    """Where the clip that plays leads by itself from here on, as a path over the ground from its root.
+
+    Parameters
+    ----------
+    database : MotionDatabase
+        With root motion and a schema: built from clips.
+    playing : Playing
+        A frame of it, such as `Pose.playing`.
+    root : (x, z, heading)
+        Where the character is, such as `Pose.root`.
+    seconds : float
+        How far ahead; a clip that ends before gives a shorter path.
+
+    Raises
+    ------
+    ContextError
+        An argument of another type.
+    MotionError
+        A database without root motion, or that has no such frame.
+    """
+    require_kind(database, MotionDatabase, "database", "a MotionDatabase")
+    require_kind(playing, Playing, "playing", "a Playing, what Pose.playing gives")
+    here = RootMotion(*place_of(root, "root"))
+    if database.root is None or database.schema is None or not 0 <= playing.frame < database.n_frames:
+        raise MotionError(Fault(f"the database knows no way from frame {playing.frame}.", "a frame of a database built from clips"))
+    rate = database.schema.rate
+    n_frames = 1 + int(require_real(seconds, "seconds", 0.0, MOST_AHEAD_S) * rate + 1e-6)
+    stop = int(database.stops[np.searchsorted(database.stops, playing.frame, side="right")])
+    path = database.root[playing.frame : min(stop, playing.frame + n_frames)].astype(np.float64)
+    first = RootMotion(*path[0].tolist())
+    places = [here.then(between(first, RootMotion(*place))) for place in path.tolist()]
+    headings = np.unwrap([place.turn_rad for place in places])
+    return Trajectory(rate, np.array([(place.left_m, place.ahead_m) for place in places]), headings)
 
 
 def path_from_place(place: Place3, path: Trajectory, halflife_s: float = RETURN_HALFLIFE_S) -> Trajectory:

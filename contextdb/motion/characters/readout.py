@@ -10,7 +10,7 @@ from typing import Any, Protocol, runtime_checkable
 
 from contextdb.cells.arguments import require_kind
 from contextdb.motion.characters.character import Updated
-from contextdb.motion.selection.decision import Action, Playing
+from contextdb.motion.selection.decision import Action, Decision, Playing
 
 
 @runtime_checkable
@@ -51,20 +51,23 @@ class Readout:
         self._shown: Playing | None = None
         self._gap: tuple[object, object, str] = (None, None, "")
 
-    def update(self, updated: Updated, table: Explains, shown: Playing | None = None) -> None:
+    def update(self, updated: Updated, table: Explains, shown: Decision | Playing | None = None) -> None:
         """Take note of an update, and of the table that said what was valid; facts that it lacks are taken as any.
 
-        `shown` is what is seen, where that is not what was decided: a one-off.
+        `shown` is what is seen, where that is not what was decided: the decision of a one-off, or what plays of it.
         Raises ContextError for arguments of another kind, and for facts that the table refuses.
         """
         require_kind(updated, Updated, "updated", "an Updated, what Character.update gives")
         require_kind(table, Explains, "table", "a compiled table")
-        require_kind(shown, (Playing, type(None)), "shown", "a Playing, or None")
+        require_kind(shown, (Decision, Playing, type(None)), "shown", "a Decision, a Playing, or None")
         decision = updated.decision
-        self._updated, self._table, self._shown = updated, table, decision.playing if shown is None else shown
+        seen = decision if shown is None else shown
+        self._updated, self._table, self._shown = updated, table, seen.playing if isinstance(seen, Decision) else seen
         if not self._chosen or decision.action in (Action.START, Action.JUMP):
             self._chosen = decision.why
         self.why = f"No longer valid, but held by {decision.held}." if decision.held else self._chosen
+        if isinstance(shown, Decision):
+            self.why = shown.why
         self.valid = table.query(updated.facts, unknown="any")
 
     @property

@@ -28,6 +28,12 @@ LEGS_UP: list[Bump] = [
     for side in ("Left", "Right")
     for joint, bend in (("UpLeg", -75.0), ("Leg", 95.0), ("Arm", -35.0))
 ]
+STEPS: list[Bump] = [
+    (f"{side}{joint}", "Xrotation", from_s, from_s + 0.35, bend)
+    for side, from_s in (("Left", 0.55), ("Right", 0.85))
+    for joint, bend in (("UpLeg", -35.0), ("Leg", 60.0), ("Foot", -25.0))
+]
+"""Two steps on the spot, while the clip is brought to the other one: a foot that stands would slide."""
 
 
 def _hands_up(from_s: float, to_s: float) -> list[Bump]:
@@ -48,7 +54,7 @@ ONCE: dict[str, Bent] = {
 CONTESTS: dict[str, dict[str, Bent]] = {
     "catch_contested": {
         "Catcher": ("stop_walk", 3.2, 4.9, [("Hips", "Yposition", 0.9, 1.5, 45.0), *_hands_up(0.7, 1.7)]),
-        "Other": ("stop_walk", 3.2, 4.9, [("Chest", "Xrotation", 0.8, 1.6, 25.0), *_hands_up(0.7, 1.7)[:1]]),
+        "Other": ("stop_walk", 3.2, 4.9, [("Chest", "Xrotation", 0.8, 1.6, 25.0), *_hands_up(0.7, 1.7)[:1], *STEPS]),
     }
 }
 """The clips of each role. Both come to a stand, `APART_M` from each other, face to face."""

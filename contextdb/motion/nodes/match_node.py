@@ -141,7 +141,10 @@ class MatchPlay:
         playing = playing_at(require_text(database, "database"), head, head.frame_at(time_s), time_s)
         motion = between(self.at(self.since_s), self.at(self.time_s))
         action = Action.JUMP if self.since_s == 0.0 else Action.CONTINUE
-        why = f"plays {playing.asset} on to its target"
+        way = self.costs.distance + self.costs.rotation
+        why = (
+            f"plays {playing.asset} on to its target; its cost was {self.hit.cost:.4g}{f', {way:.4g} of it the way' if way else ''}"
+        )
         return Decision(0, self.time_s, action, why, False, playing, None, root_motion=motion, root_weight=0.0)
 
     def at(self, time_s: float) -> RootMotion:

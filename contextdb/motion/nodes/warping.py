@@ -62,6 +62,16 @@ class Target:
     ahead_m: float
     turn_rad: float | None = None
 
+    @property
+    def distance_m(self) -> float:
+        """How far away it is."""
+        return math.hypot(self.left_m, self.ahead_m)
+
+    @property
+    def direction_deg(self) -> float:
+        """In which direction it is seen: degrees, 0 ahead, positive to the left."""
+        return math.degrees(math.atan2(self.left_m, self.ahead_m))
+
     def __post_init__(self) -> None:
         for name in ("left_m", "ahead_m"):
             metres = _number(getattr(self, name), f"the target's {name}", "metres")

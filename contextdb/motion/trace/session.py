@@ -20,6 +20,7 @@ import hashlib
 import io
 import json
 import marshal
+import sys
 import zlib
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
@@ -97,7 +98,7 @@ class Trace(Sequence[Decision]):
         self, n_candidates: int = N_CANDIDATES, databases: Mapping[str, MotionDatabase] | None = None, *, most: int = MOST
     ) -> None:
         for what, number, least in (("n_candidates", n_candidates, 0), ("most", most, 1)):
-            if isinstance(number, bool) or not isinstance(number, int) or number < least:
+            if isinstance(number, bool) or not isinstance(number, int) or not least <= number <= sys.maxsize:
                 raise MotionError(Fault(f"{what} is {number!r}.", f"a whole number, {least} or more"))
         for name, each in require_mapping(
             {} if databases is None else databases, "databases", "a mapping of names to databases"

@@ -13,6 +13,7 @@ from played import RATE, bank, decisions
 
 from contextdb.motion import PoseSettings, PoseStream
 from contextdb.motion.output import kernels
+from contextdb.motion.output.feet import hinges_of
 
 STEP = 1.0 / RATE
 RIG = bank().skeleton
@@ -173,6 +174,40 @@ def test_a_place_out_of_reach_stretches_the_leg_toward_it_and_the_knee_never_sla
     assert max(angles) < 173.0
     assert np.diff(angles).min() > -1e-9
     assert np.linalg.norm(c - a) > 0.997 * (0.46 + 0.45)
+
+
+@given(st.floats(-math.pi, math.pi))
+def test_a_leg_that_is_nearly_stretched_bends_its_knee_ahead_wherever_it_is_bent_to(side):
+    turns = np.zeros((RIG.n_joints, 3))
+    turns[LEG[1]] = [0.02 * math.cos(side), 0.0, 0.02 * math.sin(side)]
+    rotations = turned(turns)
+    hip = placed(rotations)[0][LEG[0]]
+    before, after, _ = bent(rotations, hip - np.array([0.0, 0.88, 0.0]))
+    assert (after[LEG[1]] - hip)[2] > 0.08
+    near = bent(rotations, before[LEG[2]] + np.array([0.0, 1e-6, 0.0]))[1]
+    np.testing.assert_allclose(near, before, atol=1e-3)
+
+
+def test_hips_go_down_for_a_leg_without_a_step_in_their_speed():
+    rotations = turned(np.zeros((RIG.n_joints, 3)))
+    rotations[LEG[1]] = [math.cos(0.3), math.sin(0.3), 0.0, 0.0]
+    positions = placed(rotations)[0]
+    hip, ankle = positions[LEG[0]], positions[LEG[2]]
+    ways = np.arange(0.0, 0.2, 0.001)
+    places = ankle + ways[:, None] * (ankle - hip) / np.linalg.norm(ankle - hip)
+    down = np.array([kernels.too_high(positions, LEG, LEG[2], place, 0.0, 0.0, STRAIGHT, 0.0) for place in places])
+    assert down[0] == 0.0
+    speeds = np.diff(down) / 0.001
+    assert speeds[0] < 0.01
+    assert speeds[-1] > 0.95
+    assert np.diff(speeds).min() >= 0.0
+    assert np.diff(speeds).max() < 0.05
+    reach = math.sqrt(0.46**2 + 0.45**2 - 2.0 * 0.46 * 0.45 * math.cos(STRAIGHT))
+    assert np.linalg.norm(places - hip + down[:, None] * [0.0, 1.0, 0.0], axis=1).max() < reach
+
+
+def test_a_knee_bends_about_the_axis_to_the_left_of_its_clips():
+    np.testing.assert_allclose(hinges_of(bank()), [[1.0, 0.0, 0.0]] * 2, atol=0.05)
 
 
 def test_a_foot_that_had_to_be_let_go_is_locked_again_while_it_is_down():

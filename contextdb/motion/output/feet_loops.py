@@ -127,7 +127,7 @@ def move_foot(own, toe, height, is_down, y, radius, dt, to):
 
 @compiled
 def stand_all(
-    parents, offsets, places, clip_rotations, clip_positions, joints, tops, is_locking, y, radius, dt,
+    parents, offsets, places, clip_rotations, clip_positions, joints, hinges, tops, is_locking, y, radius, dt,
     contacts, free, footings, hips, feet, positions, world, to_feet, lower, rotations, moved,
 ):  # fmt: skip
     """Move all feet on, lower the hips by what their legs need, and bend the legs.
@@ -154,8 +154,10 @@ def stand_all(
                 to[OFFSET + i] = 0.0
             _free(to, False, over)
         shown = (to[SHOWN], to[SHOWN + 1], to[SHOWN + 2])
-        down = kernels.too_high(positions, joints[foot], joints[foot, 3], shown, footings[foot, 1], footings[foot, 2], STRAIGHT)
-        most = max(most, min(down + hips, MOST_LOWER))
+        down = kernels.too_high(
+            positions, joints[foot], joints[foot, 3], shown, footings[foot, 1], footings[foot, 2], STRAIGHT, hips
+        )
+        most = max(most, min(down, MOST_LOWER))
     apart, speed = _come(lower[0] - most, lower[1], HIPS_DAMPING, dt)
     lower[0], lower[1] = most + apart, speed
     if lower[0] < most:
@@ -174,5 +176,6 @@ def stand_all(
         is_there = shown[0] == positions[toe, 0] and shown[1] == positions[toe, 1] and shown[2] == positions[toe, 2]
         if not is_there or footings[foot, 0] != 0.0 or footings[foot, 1] != 0.0 or footings[foot, 2] != 0.0:
             kernels.stand(
-                parents, positions, world, joints[foot], toe, shown, footings[foot, 1], footings[foot, 2], STRAIGHT, rotations
-            )
+                parents, positions, world, joints[foot], toe, hinges[foot], shown, footings[foot, 1], footings[foot, 2], STRAIGHT,
+                rotations,
+            )  # fmt: skip

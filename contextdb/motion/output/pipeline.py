@@ -15,7 +15,7 @@ from contextdb.console import announce
 from contextdb.errors import Fault, MotionError, in_quotes, nearest, some
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.output.bank import Flags, PoseBank, tops_of
-from contextdb.motion.output.feet import OnGround, legs_of
+from contextdb.motion.output.feet import OnGround, hinges_of, legs_of
 from contextdb.motion.output.ground import ManyGround, Triple, below, below_many
 from contextdb.motion.output.pose import CrowdPoses
 from contextdb.motion.output.settings import PoseSettings
@@ -289,7 +289,8 @@ def _bones(bank: PoseBank) -> Bones:
     rig, spine, tops = bank.skeleton, spine_of(bank), np.array(tops_of(bank.skeleton), np.int64)
     joints, left = (np.zeros(0, np.int64), np.zeros(0)) if spine is None else (spine.joints, spine.left)
     parents, offsets = np.array(rig.parents, np.int64), np.array(rig.offsets, np.float64)
-    return Bones(parents, offsets, bank.places, legs_of(bank), tops, np.searchsorted(bank.moving, tops), joints, left)
+    legs, hinges = legs_of(bank), hinges_of(bank)
+    return Bones(parents, offsets, bank.places, legs, hinges, tops, np.searchsorted(bank.moving, tops), joints, left)
 
 
 def _checked(banks: object) -> dict[str, PoseBank]:

@@ -201,9 +201,9 @@ def stand_rows(to, bones, at, before, given, contacts, dt, rows, roots, rotation
             dt_s = dt if before[i, BEGUN] != 0.0 else 0.0
             feet_loops.stand_all(
                 bones.parents, bones.offsets, bones.places, _part(row, at, ROTATIONS, 4), _part(row, at, POSITIONS, 3),
-                bones.legs, bones.top_places, to.is_locking, to.foot_damping, to.foot_radius_m, dt_s, contacts[i], free[i],
-                _part(row, at, FOOTINGS, FOOTING), row[HIPS], _part(before[i], at, FEET, FOOT), positions[i], world[i],
-                _part(row, at, FEET, FOOT), row[LOWER : LOWER + 2], rotations[i], moved[i],
+                bones.legs, bones.hinges, bones.top_places, to.is_locking, to.foot_damping, to.foot_radius_m, dt_s,
+                contacts[i], free[i], _part(row, at, FOOTINGS, FOOTING), row[HIPS], _part(before[i], at, FEET, FOOT),
+                positions[i], world[i], _part(row, at, FEET, FOOT), row[LOWER : LOWER + 2], rotations[i], moved[i],
             )  # fmt: skip
         kernels.place_whole(
             bones.parents, bones.offsets, bones.places, rotations[i], moved[i], roots[i, 0], roots[i, 1], roots[i, 2],

@@ -90,14 +90,15 @@ class Bones(NamedTuple):
     """A rig as loops read it.
 
     Parents [J], offsets [J, 3], and which row of positions [M, 3] is each joint's [J]; of each foot hip, knee, ankle and what
-    stands [F, 4]; the joints that hang on the root, and where they are in positions; the joints from the hips to the chest, none of
-    a rig that is not aligned, and after each the share of the turn that is left.
+    stands [F, 4], and the axis that its knee bends about [F, 3]; the joints that hang on the root, and where they are in positions;
+    the joints from the hips to the chest, none of a rig that is not aligned, and after each the share of the turn that is left.
     """
 
     parents: Ints
     offsets: Floats
     places: Ints
     legs: Ints
+    hinges: Floats
     tops: Ints
     top_places: Ints
     spine: Ints

@@ -12,8 +12,10 @@ from hypothesis import strategies as st
 from played import RATE, bank, decisions
 
 from contextdb.motion import PoseSettings, PoseStream
-from contextdb.motion.output import kernels
+from contextdb.motion.output import feet_loops, kernels
 from contextdb.motion.output.feet import hinges_of
+from contextdb.motion.output.foot_state import POINT, SEEN, SHOWN, WIDTH
+from contextdb.motion.output.stages import damping
 
 STEP = 1.0 / RATE
 RIG = bank().skeleton
@@ -218,3 +220,21 @@ def test_a_foot_that_had_to_be_let_go_is_locked_again_while_it_is_down():
     over, _ = slides(poses[30:])
     assert slides(poses[:20])[0].max() > 0.02
     assert over.max() < 1e-6
+
+
+@given(st.floats(0.0, 6.0), st.sampled_from([1.0 / 60.0, STEP]))
+def test_a_fast_foot_is_not_stopped_at_once_when_it_is_locked(speed, dt):
+    most, y = 60.0, damping(0.1)
+    own, first, second = (np.zeros(WIDTH) for _ in range(3))
+    own[SEEN] = 1.0
+    toe = np.array([0.6 * speed * dt, 0.0, 0.8 * speed * dt])
+    feet_loops.move_foot(own, toe, 0.0, True, y, 0.45, most, dt, first)
+    feet_loops.move_foot(first, toe, 0.0, True, y, 0.45, most, dt, second)
+    np.testing.assert_allclose(first[SHOWN : SHOWN + 3], toe, atol=1e-12)
+    moved = float(np.linalg.norm(second[SHOWN : SHOWN + 3] - toe)) / dt
+    assert (speed - moved) * dt <= most * STEP * dt + 1e-9
+    if speed <= most * STEP:
+        assert moved == 0.0
+    rest = second.copy()
+    feet_loops.move_foot(second, toe, 0.0, True, y, 0.45, most, 5.0, rest)
+    np.testing.assert_allclose(rest[SHOWN : SHOWN + 3 : 2], rest[POINT : POINT + 2], atol=1e-9)

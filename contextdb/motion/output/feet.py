@@ -12,10 +12,10 @@ the two decays as a spring. It goes up with the clip's own velocity; only where 
 by and by. One that was let go while it was down is locked again when it has nearly come to its clip's place.
 
 The hips go down so that legs reach, stretched no more than in the clip or than a knee of 170°: the nearer a leg is to that, the
-more of the way is theirs, so that no knee stops at once. The place of a foot is that of the toe where it has one, else of the ankle.
-The hip and knee turn so that the foot gets there, and the foot keeps its rotation but for the slope. What a knee bends more than in
-the clip it bends about the axis that it has on the mean of the clips, as that of a knee that is nearly straight may point anywhere.
-A leg cannot become longer: a place out of its reach is not reached.
+more of the way is theirs, so that no knee stops at once. The place of a foot is that of the toe where it has one, else of the
+ankle. The hip and knee turn so that the foot gets there, and the foot keeps its rotation but for the slope. What a knee bends more
+than in the clip it bends about the axis that it has on the mean of the clips, as that of a knee that is nearly straight may point
+anywhere. A leg cannot become longer: a place out of its reach is not reached.
 
 Contacts are those of the clip, as those of the shown pose would hide the worst slides.
 

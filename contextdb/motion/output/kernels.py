@@ -325,6 +325,33 @@ def place_whole(parents, offsets, places, rotations, positions, x, z, heading, t
     place(parents, to_translations, rotations, x, z, heading, to_positions, to_world)
 
 
+@compiled
+def fastest(parents, offsets, places, rotations, positions, root, step, dt, to):
+    """Write how much the joint that accelerates most does so in each frame of a range, over steps of some frames: [N - 2 step]."""
+    n, j = root.shape[0], parents.shape[0]
+    turns, world, moved = np.empty((j, 4)), np.empty((j, 4)), np.empty((j, 3))
+    shown = np.empty((n, j, 3))
+    for frame in range(n):
+        turns[:] = rotations[frame]
+        x, z, heading = root[frame, 0], root[frame, 1], root[frame, 2]
+        place_whole(parents, offsets, places, turns, positions[frame], x, z, heading, moved, shown[frame], world)
+    for frame in range(n - 2 * step):
+        to[frame] = sharpest(shown[frame], shown[frame + step], shown[frame + 2 * step], step * dt)
+
+
+@compiled
+def sharpest(before, now, after, dt):
+    """The acceleration of the joint that accelerates most, of three moments."""
+    most = 0.0
+    for j in range(now.shape[0]):
+        size = 0.0
+        for i in range(3):
+            change = after[j, i] - 2.0 * now[j, i] + before[j, i]
+            size += change * change
+        most = max(most, size)
+    return math.sqrt(most) / (dt * dt)
+
+
 # ---- legs
 
 

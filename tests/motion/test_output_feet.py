@@ -12,7 +12,10 @@ from hypothesis import strategies as st
 from played import RATE, bank, decisions
 
 from contextdb.motion import PoseSettings, PoseStream
-from contextdb.motion.output import kernels
+from contextdb.motion.output import feet_loops, kernels
+from contextdb.motion.output.feet import hinges_of
+from contextdb.motion.output.foot_state import POINT, SEEN, SHOWN, WIDTH
+from contextdb.motion.output.stages import damping
 
 STEP = 1.0 / RATE
 RIG = bank().skeleton
@@ -175,6 +178,40 @@ def test_a_place_out_of_reach_stretches_the_leg_toward_it_and_the_knee_never_sla
     assert np.linalg.norm(c - a) > 0.997 * (0.46 + 0.45)
 
 
+@given(st.floats(-math.pi, math.pi))
+def test_a_leg_that_is_nearly_stretched_bends_its_knee_ahead_wherever_it_is_bent_to(side):
+    turns = np.zeros((RIG.n_joints, 3))
+    turns[LEG[1]] = [0.02 * math.cos(side), 0.0, 0.02 * math.sin(side)]
+    rotations = turned(turns)
+    hip = placed(rotations)[0][LEG[0]]
+    before, after, _ = bent(rotations, hip - np.array([0.0, 0.88, 0.0]))
+    assert (after[LEG[1]] - hip)[2] > 0.08
+    near = bent(rotations, before[LEG[2]] + np.array([0.0, 1e-6, 0.0]))[1]
+    np.testing.assert_allclose(near, before, atol=1e-3)
+
+
+def test_hips_go_down_for_a_leg_without_a_step_in_their_speed():
+    rotations = turned(np.zeros((RIG.n_joints, 3)))
+    rotations[LEG[1]] = [math.cos(0.3), math.sin(0.3), 0.0, 0.0]
+    positions = placed(rotations)[0]
+    hip, ankle = positions[LEG[0]], positions[LEG[2]]
+    ways = np.arange(0.0, 0.2, 0.001)
+    places = ankle + ways[:, None] * (ankle - hip) / np.linalg.norm(ankle - hip)
+    down = np.array([kernels.too_high(positions, LEG, LEG[2], place, 0.0, 0.0, STRAIGHT, 0.0) for place in places])
+    assert down[0] == 0.0
+    speeds = np.diff(down) / 0.001
+    assert speeds[0] < 0.01
+    assert speeds[-1] > 0.95
+    assert np.diff(speeds).min() >= 0.0
+    assert np.diff(speeds).max() < 0.05
+    reach = math.sqrt(0.46**2 + 0.45**2 - 2.0 * 0.46 * 0.45 * math.cos(STRAIGHT))
+    assert np.linalg.norm(places - hip + down[:, None] * [0.0, 1.0, 0.0], axis=1).max() < reach
+
+
+def test_a_knee_bends_about_the_axis_to_the_left_of_its_clips():
+    np.testing.assert_allclose(hinges_of(bank()), [[1.0, 0.0, 0.0]] * 2, atol=0.05)
+
+
 def test_a_foot_that_had_to_be_let_go_is_locked_again_while_it_is_down():
     def body(t):
         return (0.0, 3.0 * min(t, 0.3), 0.0)
@@ -183,3 +220,21 @@ def test_a_foot_that_had_to_be_let_go_is_locked_again_while_it_is_down():
     over, _ = slides(poses[30:])
     assert slides(poses[:20])[0].max() > 0.02
     assert over.max() < 1e-6
+
+
+@given(st.floats(0.0, 6.0), st.sampled_from([1.0 / 60.0, STEP]))
+def test_a_fast_foot_is_not_stopped_at_once_when_it_is_locked(speed, dt):
+    most, y = 60.0, damping(0.1)
+    own, first, second = (np.zeros(WIDTH) for _ in range(3))
+    own[SEEN] = 1.0
+    toe = np.array([0.6 * speed * dt, 0.0, 0.8 * speed * dt])
+    feet_loops.move_foot(own, toe, 0.0, True, y, 0.45, most, dt, first)
+    feet_loops.move_foot(first, toe, 0.0, True, y, 0.45, most, dt, second)
+    np.testing.assert_allclose(first[SHOWN : SHOWN + 3], toe, atol=1e-12)
+    moved = float(np.linalg.norm(second[SHOWN : SHOWN + 3] - toe)) / dt
+    assert (speed - moved) * dt <= most * STEP * dt + 1e-9
+    if speed <= most * STEP:
+        assert moved == 0.0
+    rest = second.copy()
+    feet_loops.move_foot(second, toe, 0.0, True, y, 0.45, most, 5.0, rest)
+    np.testing.assert_allclose(rest[SHOWN : SHOWN + 3 : 2], rest[POINT : POINT + 2], atol=1e-9)

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from played import NAMES, RATE, SCHEMA, bank, clips, database, decisions, playing_at, range_of
 
@@ -185,11 +185,35 @@ def test_after_one_halflife_three_fifths_of_a_resting_offset_are_left():
     np.testing.assert_allclose(decayed(x, v, 0.1, 0.1)[0], 0.5 * (1.0 + 2.0 * math.log(2.0)) * 0.5 * x)
 
 
+def runs_out(decision):
+    """Whether a clip comes to its end in an update."""
+    before = decision.before
+    return before is not None and before.time_s >= bank().last_s(bank().range_of(before.asset, before.mirrored))
+
+
+@pytest.mark.parametrize("part", [0.0, 0.05, 0.6, 1.0])
+def test_a_clip_that_runs_out_within_an_update_does_not_stop_for_the_rest_of_it(part):
+    end_s = bank().last_s(bank().range_of("start_walk"))
+    poses = streamed([("start_walk", end_s - (9.0 + part) * STEP, 10), ("walk", 0.3, 5)], SPRING)
+    joints = np.linalg.norm(np.diff([pose.positions for pose in poses], n=2, axis=0), axis=-1).max(axis=1) / STEP**2
+    speeds = np.diff([pose.root[1] for pose in poses]) / STEP
+    assert joints[8:].max() < 1.3 * bank().most_accel
+    np.testing.assert_allclose(speeds[9], speeds[8], rtol=0.1)
+
+
+def test_a_clip_that_stands_at_its_end_is_left_standing():
+    end_s = bank().last_s(bank().range_of("start_walk"))
+    poses = streamed([("start_walk", end_s - 3.0 * STEP, 12), ("idle", 0.3, 5)], SPRING)
+    np.testing.assert_allclose(poses[12].root, poses[11].root, atol=1e-9)
+    np.testing.assert_allclose(poses[12].rotations, poses[11].rotations, atol=1e-9)
+
+
 @given(segments=plays, parts=st.integers(2, 4))
 def test_a_step_of_time_may_be_taken_in_parts(segments, parts):
     whole = streamed(segments, SPRING)
     stream, shown = PoseStream(bank(), SPRING), []
     ticks = list(decisions(segments, STEP))
+    assume(not any(runs_out(decision) for decision in ticks))
     for decision in ticks:
         if decision.tick == 0:
             shown.append(stream.update(decision, 0.0))

@@ -11,9 +11,11 @@ It is let go when it goes up in the clip, or when it would be farther from the c
 the two decays as a spring. It goes up with the clip's own velocity; only where it had to be let go does its velocity change
 by and by. One that was let go while it was down is locked again when it has nearly come to its clip's place.
 
-The hips go down by the least that lets legs reach, stretched no more than in the clip or than a knee of 170°. The place of a foot
-is that of the toe where it has one, else of the ankle. The hip and knee turn so that the foot gets there, and the foot keeps its
-rotation but for the slope. A leg cannot become longer: a place out of its reach is not reached.
+The hips go down so that legs reach, stretched no more than in the clip or than a knee of 170°: the nearer a leg is to that, the
+more of the way is theirs, so that no knee stops at once. The place of a foot is that of the toe where it has one, else of the
+ankle. The hip and knee turn so that the foot gets there, and the foot keeps its rotation but for the slope. What a knee bends more
+than in the clip it bends about the axis that it has on the mean of the clips, as that of a knee that is nearly straight may point
+anywhere. A leg cannot become longer: a place out of its reach is not reached.
 
 Contacts are those of the clip, as those of the shown pose would hide the worst slides.
 
@@ -34,7 +36,7 @@ from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.output.bank import Flags, Place3, PoseBank
 from contextdb.motion.output.foot_state import FAR_M, FREE, HIPS_DAMPING, LOCKED, POINT, SEEN
 from contextdb.motion.output.ground import Footing, Triple, standing, swinging
-from contextdb.motion.output.legs import eased, leg_of
+from contextdb.motion.output.legs import LEFT, eased, hinge_of, leg_of
 from contextdb.motion.output.stages import FEET, FOOT, FOOTING, FOOTINGS, HIPS, STRIDE, TURN, Columns, decayed
 
 GONE = (1.0, 0.0, 0.0)
@@ -69,6 +71,15 @@ def legs_of(bank: PoseBank) -> Ints:
     legs = [leg_of(bank.skeleton, foot) for foot in bank.feet]
     joints = [[NO_LEG] * 4 if leg is None else [*leg.joints.tolist(), leg.toe] for leg in legs]
     return np.array(joints, np.int64).reshape(-1, 4)
+
+
+def hinges_of(bank: PoseBank) -> Floats:
+    """The axis that the knee of each foot's leg bends about in the clips: [F, 3]."""
+    legs = [leg_of(bank.skeleton, foot) for foot in bank.feet]
+    axes = [
+        LEFT if leg is None else hinge_of(bank.skeleton, leg, bank.rotations[:, leg.joints[1]].astype(np.float64)) for leg in legs
+    ]
+    return np.array(axes, np.float64).reshape(-1, 3)
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from contextdb.motion.output import kernels
+from contextdb.motion.output.bank import STEP_S
 from contextdb.motion.output.foot_state import (
     BACK_SHARE,
     DOWN,
@@ -82,7 +83,7 @@ def _free(to, is_down, toe):
 
 
 @compiled
-def move_foot(own, toe, height, is_down, y, radius, dt, to):
+def move_foot(own, toe, height, is_down, y, radius, most_accel, dt, to):
     """Write the foot after this tick, whose toe is at a place without a lock and has a height in the clip."""
     moved = (toe[0] - own[FREE], toe[1] - own[FREE + 1], toe[2] - own[FREE + 2])
     for i in range(6):
@@ -119,15 +120,32 @@ def move_foot(own, toe, height, is_down, y, radius, dt, to):
         x, z = toe[0] + to[OFFSET], toe[2] + to[OFFSET + 2]
         to[OFFSET + 1] = toe[1] + to[OFFSET + 1] - height
         to[OFFSET], to[OFFSET + 2] = 0.0, 0.0
-        to[SPEED], to[SPEED + 1], to[SPEED + 2] = 0.0, 0.0, 0.0
+        to[SPEED + 1] = 0.0
+        x, z = _stopped(own, x, z, y, most_accel, dt, to)
         _locked(to, x, z, height, toe)
         return
     _free(to, is_down, toe)
 
 
 @compiled
+def _stopped(own, x, z, y, most_accel, dt, to):
+    """Where a foot that is locked at a place comes to rest, its offset to that and its speed written: there and at once, but for
+    what it is too fast to lose in a step as joints lose it in the clips."""
+    left, ahead = x - own[SHOWN], z - own[SHOWN + 2]
+    way = math.hypot(left, ahead)
+    over = way / dt - STEP_S * most_accel if dt > 0.0 else 0.0
+    if over <= 0.0:
+        to[SPEED], to[SPEED + 2] = 0.0, 0.0
+        return x, z
+    over *= y * STEP_S / (1.0 - math.exp(-y * STEP_S)) / way
+    to[SPEED], to[SPEED + 2] = over * left, over * ahead
+    to[OFFSET], to[OFFSET + 2] = -over * left / y, -over * ahead / y
+    return x + over * left / y, z + over * ahead / y
+
+
+@compiled
 def stand_all(
-    parents, offsets, places, clip_rotations, clip_positions, joints, tops, is_locking, y, radius, dt,
+    parents, offsets, places, clip_rotations, clip_positions, joints, hinges, tops, is_locking, y, radius, most_accel, dt,
     contacts, free, footings, hips, feet, positions, world, to_feet, lower, rotations, moved,
 ):  # fmt: skip
     """Move all feet on, lower the hips by what their legs need, and bend the legs.
@@ -148,14 +166,16 @@ def stand_all(
             continue
         over = (free[foot, 0], free[foot, 1] + footings[foot, 0], free[foot, 2])
         if is_locking:
-            move_foot(feet[foot], over, heights[foot] + footings[foot, 0], contacts[foot], y, radius, dt, to)
+            move_foot(feet[foot], over, heights[foot] + footings[foot, 0], contacts[foot], y, radius, most_accel, dt, to)
         else:
             for i in range(6):
                 to[OFFSET + i] = 0.0
             _free(to, False, over)
         shown = (to[SHOWN], to[SHOWN + 1], to[SHOWN + 2])
-        down = kernels.too_high(positions, joints[foot], joints[foot, 3], shown, footings[foot, 1], footings[foot, 2], STRAIGHT)
-        most = max(most, min(down + hips, MOST_LOWER))
+        down = kernels.too_high(
+            positions, joints[foot], joints[foot, 3], shown, footings[foot, 1], footings[foot, 2], STRAIGHT, hips
+        )
+        most = max(most, min(down, MOST_LOWER))
     apart, speed = _come(lower[0] - most, lower[1], HIPS_DAMPING, dt)
     lower[0], lower[1] = most + apart, speed
     if lower[0] < most:
@@ -174,5 +194,6 @@ def stand_all(
         is_there = shown[0] == positions[toe, 0] and shown[1] == positions[toe, 1] and shown[2] == positions[toe, 2]
         if not is_there or footings[foot, 0] != 0.0 or footings[foot, 1] != 0.0 or footings[foot, 2] != 0.0:
             kernels.stand(
-                parents, positions, world, joints[foot], toe, shown, footings[foot, 1], footings[foot, 2], STRAIGHT, rotations
-            )
+                parents, positions, world, joints[foot], toe, hinges[foot], shown, footings[foot, 1], footings[foot, 2], STRAIGHT,
+                rotations,
+            )  # fmt: skip

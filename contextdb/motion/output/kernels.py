@@ -325,6 +325,33 @@ def place_whole(parents, offsets, places, rotations, positions, x, z, heading, t
     place(parents, to_translations, rotations, x, z, heading, to_positions, to_world)
 
 
+@compiled
+def fastest(parents, offsets, places, rotations, positions, root, step, dt, to):
+    """Write how much the joint that accelerates most does so in each frame of a range, over steps of some frames: [N - 2 step]."""
+    n, j = root.shape[0], parents.shape[0]
+    turns, world, moved = np.empty((j, 4)), np.empty((j, 4)), np.empty((j, 3))
+    shown = np.empty((n, j, 3))
+    for frame in range(n):
+        turns[:] = rotations[frame]
+        x, z, heading = root[frame, 0], root[frame, 1], root[frame, 2]
+        place_whole(parents, offsets, places, turns, positions[frame], x, z, heading, moved, shown[frame], world)
+    for frame in range(n - 2 * step):
+        to[frame] = sharpest(shown[frame], shown[frame + step], shown[frame + 2 * step], step * dt)
+
+
+@compiled
+def sharpest(before, now, after, dt):
+    """The acceleration of the joint that accelerates most, of three moments."""
+    most = 0.0
+    for j in range(now.shape[0]):
+        size = 0.0
+        for i in range(3):
+            change = after[j, i] - 2.0 * now[j, i] + before[j, i]
+            size += change * change
+        most = max(most, size)
+    return math.sqrt(most) / (dt * dt)
+
+
 # ---- legs
 
 
@@ -381,8 +408,8 @@ def bend_leg(parents, positions, world, leg, target, ahead, straight, rotations)
     """Bend a leg, its joints `leg` (hip, knee, ankle), so that its ankle comes to a target; the foot keeps its rotation.
 
     `positions` and `world` place the joints; the leg's `rotations` against their parents are written. A knee that would be
-    straighter than `straight` (radians), and than it is, goes only a quarter of what is over: it never slams. `ahead` is where a
-    stretched leg's knee bends to.
+    straighter than `straight` (radians), and than it is, goes only a quarter of what is over: it never slams. What a knee bends
+    more than it does already it bends to where `ahead` is: the way a nearly stretched leg is bent to says nothing.
     """
     hip, knee, ankle = leg[0], leg[1], leg[2]
     a = (positions[hip, 0], positions[hip, 1], positions[hip, 2])
@@ -400,14 +427,22 @@ def bend_leg(parents, positions, world, leg, target, ahead, straight, rotations)
     limit = max(straight, now)
     if wanted > limit:
         wanted = limit + 0.25 * (wanted - limit)
-    straighten = (1.0, 0.0, 0.0, 0.0)
-    if _length(axis) < 1e-6 * upper * lower:  # stretched: bent to no side of its own
-        straighten, now = _arc(shin, thigh), math.pi
-        axis = _cross(thigh, _cross(_cross((a[0] - c[0], a[1] - c[1], a[2] - c[2]), (ahead[0], ahead[1], ahead[2])), thigh))
+    back, size = (1.0, 0.0, 0.0, 0.0), _length(axis)
+    if size > 1e-6 * upper * lower:
+        axis = (axis[0] / size, axis[1] / size, axis[2] / size)
+        back = _about(axis, now - math.pi)
+    else:  # stretched: bent to no side of its own
+        back, now, axis = _arc(shin, thigh), math.pi, (0.0, 0.0, 0.0)
+    if wanted < now:
+        hinge = _cross(thigh, _cross(_cross((a[0] - c[0], a[1] - c[1], a[2] - c[2]), (ahead[0], ahead[1], ahead[2])), thigh))
+        size, more = _length(hinge), now - wanted
+        share = more / size if size > 1e-12 else 0.0
+        bent = math.pi - now
+        axis = (bent * axis[0] + share * hinge[0], bent * axis[1] + share * hinge[1], bent * axis[2] + share * hinge[2])
     size = _length(axis)
     if size < 1e-12:
         return
-    bend = _product(_about((axis[0] / size, axis[1] / size, axis[2] / size), now - wanted), straighten)
+    bend = _product(_about((axis[0] / size, axis[1] / size, axis[2] / size), math.pi - wanted), back)
     moved = _turned(bend, shin)
     swing = _arc((thigh[0] + moved[0], thigh[1] + moved[1], thigh[2] + moved[2]), way)
     old_hip, old_knee, foot = world[hip], world[knee], world[ankle]
@@ -422,34 +457,42 @@ def bend_leg(parents, positions, world, leg, target, ahead, straight, rotations)
 
 
 @compiled
-def too_high(positions, leg, toe, place, along_x, along_z, straight):
-    """By how much a hip is too high for its leg to bring its toe to a place: below 0 where it reaches farther.
+def too_high(positions, leg, toe, place, along_x, along_z, straight, raised):
+    """By how much hips that are raised are too high for a leg to bring its toe to a place; 0 where they are not.
 
-    A leg reaches as far as it does now, or as with a knee that is `straight`.
+    A leg reaches as far as it does now; and farther the harder, up to where its knee is `straight`: it does not come there at once.
     """
     a, b, c, t = positions[leg[0]], positions[leg[1]], positions[leg[2]], positions[toe]
     tilt = _arc((0.0, 1.0, 0.0), (-along_x, 1.0, -along_z))
     way = _turned(tilt, (t[0] - c[0], t[1] - c[1], t[2] - c[2]))
     upper, lower = _length((b[0] - a[0], b[1] - a[1], b[2] - a[2])), _length((c[0] - b[0], c[1] - b[1], c[2] - b[2]))
     now = _length((c[0] - a[0], c[1] - a[1], c[2] - a[2]))
-    reach = max(now, math.sqrt(upper * upper + lower * lower - 2.0 * upper * lower * math.cos(straight)))
-    x, y, z = place[0] - way[0] - a[0], a[1] - place[1] + way[1], place[2] - way[2] - a[2]
+    room = math.sqrt(upper * upper + lower * lower - 2.0 * upper * lower * math.cos(straight)) - now
+    x, y, z = place[0] - way[0] - a[0], a[1] + raised - place[1] + way[1], place[2] - way[2] - a[2]
+    over = math.sqrt(x * x + y * y + z * z) - now
+    if over <= 0.0:
+        return 0.0
+    reach = now + over / math.sqrt(1.0 + (over / room) ** 2) if room > 0.0 else now
     return y - math.sqrt(max(reach * reach - x * x - z * z, 0.0))
 
 
 @compiled
-def stand(parents, positions, world, leg, toe, place, along_x, along_z, straight, rotations):
-    """Bend a leg so that its toe comes to a place, its foot turned by the slope of the ground, which rises along x and z."""
+def stand(parents, positions, world, leg, toe, hinge, place, along_x, along_z, straight, rotations):
+    """Bend a leg so that its toe comes to a place, its foot turned by the slope of the ground, which rises along x and z.
+
+    `hinge` is the axis that its knee bends about, against its hip.
+    """
     ankle = leg[2]
     tilt = _arc((0.0, 1.0, 0.0), (-along_x, 1.0, -along_z))
     foot = world[ankle]
     turned = _product(tilt, (foot[0], foot[1], foot[2], foot[3]))
     for i in range(4):
         world[ankle, i] = turned[i]
-    a, t = positions[ankle], positions[toe]
-    way = _turned(tilt, (t[0] - a[0], t[1] - a[1], t[2] - a[2]))
-    shin = world[leg[1]]
-    ahead = (shin[1], shin[2], shin[3]) if toe == ankle else way
+    a, c, t = positions[leg[0]], positions[ankle], positions[toe]
+    way = _turned(tilt, (t[0] - c[0], t[1] - c[1], t[2] - c[2]))
+    thigh = world[leg[0]]
+    axis = _turned((thigh[0], thigh[1], thigh[2], thigh[3]), (hinge[0], hinge[1], hinge[2]))
+    ahead = _cross(axis, (a[0] - c[0], a[1] - c[1], a[2] - c[2]))
     target = (place[0] - way[0], place[1] - way[1], place[2] - way[2])
     bend_leg(parents, positions, world, leg, target, ahead, straight, rotations)
 

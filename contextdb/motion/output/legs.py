@@ -12,12 +12,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from contextdb.motion.clips import quaternions
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints, Skeleton
 from contextdb.motion.clips.trajectory import to_own_frame
 from contextdb.motion.output.travel import laps_about
 
 Flags = NDArray[np.bool_]
+
+LEAST_BEND, LEFT = 1e-3, np.array([1.0, 0.0, 0.0])
+"""A knee whose sine is less on the mean does not bend."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -37,6 +41,17 @@ def leg_of(rig: Skeleton, foot: str) -> Leg | None:
     below = [joint for joint in range(rig.n_joints) if rig.parents[joint] == ankle]
     toes = [joint for joint in below if "toe" in rig.names[joint].casefold() or "ball" in rig.names[joint].casefold()]
     return Leg(np.array([above[1], above[0], ankle], np.int64), (toes or [ankle])[0])
+
+
+def hinge_of(rig: Skeleton, leg: Leg, knees: Floats) -> Floats:
+    """The axis that a knee bends about, against its hip [3]: the mean of poses, of whose knees the rotations are [N, 4].
+
+    Of a knee that never bends the axis to the left.
+    """
+    thigh, shin = rig.offsets[leg.joints[1]], rig.offsets[leg.joints[2]]
+    axis = np.cross(thigh, quaternions.rotate(knees, np.broadcast_to(shin, (len(knees), 3)))).mean(axis=0)
+    size = float(np.linalg.norm(axis))
+    return np.asarray(axis / size) if size > LEAST_BEND * np.linalg.norm(thigh) * np.linalg.norm(shin) else LEFT
 
 
 def steps_of(root: NDArray[np.floating], toes: Floats, contacts: Flags, spans: Sequence[tuple[int, int, bool]]) -> Floats:

@@ -15,7 +15,7 @@ from contextdb.console import announce
 from contextdb.errors import Fault, MotionError, in_quotes, nearest, some
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.output.bank import Flags, PoseBank, tops_of
-from contextdb.motion.output.feet import OnGround, legs_of
+from contextdb.motion.output.feet import OnGround, hinges_of, legs_of
 from contextdb.motion.output.ground import ManyGround, Triple, below, below_many
 from contextdb.motion.output.pose import CrowdPoses
 from contextdb.motion.output.settings import PoseSettings
@@ -50,6 +50,8 @@ from contextdb.motion.output.stages import (
 )
 from contextdb.motion.selection.decision import Action, Decision, Playing
 
+ADDED_SHARE = 0.75
+"""What is added to the clips may accelerate joints by this share of what the clips do; the rest is left for the clips."""
 NEAR_S = 0.1
 """What is shown goes on where it is not farther from where it should be than this."""
 ROOTS = {"animation": ANIMATION, "code": CODE, "mixed": MIXED, "path": PATH}
@@ -86,7 +88,7 @@ class Pipeline:
         self.all: list[PoseBank] = [self.only] if self.only is not None else list(self.banks.values())
         self.rig = self.all[0]
         self._numbers = {name: i for i, name in enumerate(self.banks)}
-        self._to, self._bones = _shaping(settings), _bones(self.rig)
+        self._to, self._bones = _shaping(settings), _bones(self.all)
         self._columns = Columns(self.rig.n_joints, len(self.rig.moving), len(self.rig.feet), self._to.blend)
 
     def is_like(self, other: Pipeline) -> bool:
@@ -154,9 +156,10 @@ class Pipeline:
         seams: list[Seam] = []
         all_playing, jumps, forced = [], [], []
         gives = _gives(grounds, len(rows))
-        for decision, shown, rate, ground in zip(decisions, rows.playing, rows.numbers[:, CLIP_RATE].tolist(), gives, strict=True):
+        rates = rows.numbers[:, [CLIP_RATE, PLAY_RATE]].tolist()
+        for decision, shown, (rate, shown_rate), ground in zip(decisions, rows.playing, rates, gives, strict=True):
             playing, action, before, is_ahead = decision.playing, decision.action, decision.before, False
-            number, at, time_s, seam = -1, 0, 0.0, -1
+            number, at, time_s, seam, lost_s = -1, 0, 0.0, -1, 0.0
             if playing is not None:
                 (number, at), time_s = self.find(playing), playing.time_s
             if shown is not None and playing is not None:
@@ -168,21 +171,33 @@ class Pipeline:
                     seam, end_s = len(seams) // 2, self.all[number].last_s(at)
                     seams += [(number, at, end_s, rate), (number, at, 0.0, decision.play_rate)]
                 elif action is Action.JUMP or action is Action.START:
-                    was, seam = before or shown, len(seams) // 2
-                    seams += [(*self.find(was), was.time_s, rate), (number, at, time_s, decision.play_rate)]
+                    left = self._left(before or shown, shown.time_s + dt * rate, rate, shown_rate == 0.0)
+                    seam = len(seams) // 2
+                    lost_s = 0.0 if before is None or is_ahead or rate == 0.0 else (left[2] - before.time_s) / rate
+                    seams += [
+                        left,
+                        (number, at, time_s, decision.play_rate),
+                    ]
             code = CONTINUES if action is Action.CONTINUE else HOLDS if action is Action.HOLD else ELSE
             motion = decision.root_motion
             given.append(
                 (
                     number, at, time_s, shown is not None, code, decision.play_rate,
                     motion.left_m, motion.ahead_m, motion.turn_rad, decision.root_weight, is_ahead, seam,
-                    0.0, 0.0, 0.0, 0.0, ground, *WRITTEN,
+                    0.0, 0.0, 0.0, 0.0, ground, *WRITTEN, lost_s,
                 )
             )  # fmt: skip
             all_playing.append(playing)
             jumps.append(action is Action.JUMP)
             forced.append(action is Action.JUMP and decision.continuing_cost is None)
         return np.array(given, np.float64), seams, all_playing, jumps, forced
+
+    def _left(self, was: Playing, until_s: float, rate: float, is_still: bool) -> Seam:
+        """The moment that is left at a seam: behind its end where a clip has run out within the update, and did not stand there."""
+        number, at = self.find(was)
+        if was.time_s < self.all[number].last_s(at):
+            return number, at, was.time_s, rate
+        return number, at, was.time_s if is_still else max(was.time_s, until_s), 0.0 if is_still else rate
 
     def _used(self, numbers: Floats) -> Iterator[int]:
         """The numbers of the banks among some."""
@@ -285,11 +300,14 @@ def _shaping(settings: PoseSettings) -> Shaping:
     )
 
 
-def _bones(bank: PoseBank) -> Bones:
+def _bones(banks: Sequence[PoseBank]) -> Bones:
+    bank = banks[0]
     rig, spine, tops = bank.skeleton, spine_of(bank), np.array(tops_of(bank.skeleton), np.int64)
     joints, left = (np.zeros(0, np.int64), np.zeros(0)) if spine is None else (spine.joints, spine.left)
     parents, offsets = np.array(rig.parents, np.int64), np.array(rig.offsets, np.float64)
-    return Bones(parents, offsets, bank.places, legs_of(bank), tops, np.searchsorted(bank.moving, tops), joints, left)
+    legs, hinges = legs_of(bank), hinges_of(bank)
+    tops_at, most = np.searchsorted(bank.moving, tops), ADDED_SHARE * max(each.most_accel for each in banks)
+    return Bones(parents, offsets, bank.places, legs, hinges, tops, tops_at, joints, left, most)
 
 
 def _checked(banks: object) -> dict[str, PoseBank]:

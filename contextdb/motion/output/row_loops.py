@@ -35,6 +35,7 @@ from contextdb.motion.output.stages import (
     IS_FLAT,
     IS_ON,
     LEFT,
+    LOST,
     LOWER,
     MOTION,
     PLAY_RATE,
@@ -90,7 +91,8 @@ def sample_rows(bank, frames, at, given, rows, contacts):
 def sample_seams(bank, frames, seams, velocities, rotations, spins, positions, speeds):
     """Write each moment at a seam that is in a bank of this number; seams [S, 4] are bank, range, second, and how fast it plays.
 
-    Rotations [S, J, 4], spins [S, J, 3], positions and speeds [S, M, 3], and the velocities of the root [S, 3].
+    One behind the end of its clip goes on as the clip did there, unless it stands: what runs out within an update does not stop
+    for the rest of it. Rotations [S, J, 4], spins [S, J, 3], positions and speeds [S, M, 3], and the velocities of the root [S, 3].
     """
     for i in range(seams.shape[0]):
         if seams[i, IN_BANK] != bank:
@@ -104,6 +106,10 @@ def sample_seams(bank, frames, seams, velocities, rotations, spins, positions, s
         velocity = kernels.root_velocity(frames.root, low, high, share, frames.rate)
         for k in range(3):
             velocities[i, k] = rate * velocity[k]
+        past = 0.0 if frames.looping[number] or rate == 0.0 else seams[i, AT] - frames.n_steps[number] / frames.rate
+        if past > 0.0:
+            kernels.turn_by(past * spins[i], rotations[i], rotations[i])
+            positions[i] += past * speeds[i]
         for j in range(spins.shape[1]):
             for k in range(3):
                 spins[i, j, k] *= rate
@@ -173,6 +179,9 @@ def move_rows(to, bones, at, before, given, left, velocities, dt, rows, roots, r
         a, b = (2 * k, 2 * k + 1) if k >= 0 else (0, 0)
         seam_left = (velocities[a, 0], velocities[a, 1], velocities[a, 2])
         seam_entered = (velocities[b, 0], velocities[b, 1], velocities[b, 2])
+        if k >= 0 and own[LOST] > 0.0:
+            gone = own[LOST]
+            motion = (motion[0] + gone * seam_left[0], motion[1] + gone * seam_left[1], motion[2] + gone * seam_left[2])
         x, z, heading = place_root(to, own, motion, dt_s, k >= 0, seam_left, seam_entered, was, row)
         roots[i, 0], roots[i, 1], roots[i, 2] = x, z, heading
         align(to, bones, own, heading, dt_s, was, row, rotations[i], moved[i])
@@ -201,9 +210,9 @@ def stand_rows(to, bones, at, before, given, contacts, dt, rows, roots, rotation
             dt_s = dt if before[i, BEGUN] != 0.0 else 0.0
             feet_loops.stand_all(
                 bones.parents, bones.offsets, bones.places, _part(row, at, ROTATIONS, 4), _part(row, at, POSITIONS, 3),
-                bones.legs, bones.top_places, to.is_locking, to.foot_damping, to.foot_radius_m, dt_s, contacts[i], free[i],
-                _part(row, at, FOOTINGS, FOOTING), row[HIPS], _part(before[i], at, FEET, FOOT), positions[i], world[i],
-                _part(row, at, FEET, FOOT), row[LOWER : LOWER + 2], rotations[i], moved[i],
+                bones.legs, bones.hinges, bones.top_places, to.is_locking, to.foot_damping, to.foot_radius_m, bones.most_accel,
+                dt_s, contacts[i], free[i], _part(row, at, FOOTINGS, FOOTING), row[HIPS], _part(before[i], at, FEET, FOOT),
+                positions[i], world[i], _part(row, at, FEET, FOOT), row[LOWER : LOWER + 2], rotations[i], moved[i],
             )  # fmt: skip
         kernels.place_whole(
             bones.parents, bones.offsets, bones.places, rotations[i], moved[i], roots[i, 0], roots[i, 1], roots[i, 2],

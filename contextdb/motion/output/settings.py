@@ -11,7 +11,7 @@
     blend = "spring"           # how a jump is hidden: "spring", "dead", or "none"
     halflife_s = 0.1           # of the spring, for joints and root
     fade_s = 0.5               # dead: how long what was left fades
-    fade_halflife_s = 0.25     # dead: how fast it slows down
+    fade_halflife_s = 0.1      # dead: how fast it slows down
     path_alignment = true      # hips and legs turn to the way that the game goes, and the chest stays
     alignment_limit_deg = 70.0 # by so much at most
     alignment_halflife_s = 0.15
@@ -22,7 +22,7 @@
     foot_radius_m = 0.45       # a foot is let go where the clip has it so far away
 
 Reading touches no file.
-Source of the defaults: orangeduck/Motion-Matching, `controller.cpp`, and its dead blending demo.
+Source of the defaults: orangeduck/Motion-Matching, `controller.cpp`, and its dead blending demo, whose poses go on for longer.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ NUMBERS = {
     "rotation_clamp_deg": ("degrees from 0 to 180, such as 90", 0.0, 180.0),
     "halflife_s": ("seconds from 0.001 to 60, such as 0.1", LEAST_HALFLIFE_S, 60.0),
     "fade_s": ("seconds from 0.001 to 60, such as 0.5", LEAST_HALFLIFE_S, 60.0),
-    "fade_halflife_s": ("seconds from 0.001 to 60, such as 0.25", LEAST_HALFLIFE_S, 60.0),
+    "fade_halflife_s": ("seconds from 0.001 to 60, such as 0.1", LEAST_HALFLIFE_S, 60.0),
     "alignment_limit_deg": ("degrees from 0 to 90, such as 70", 0.0, 90.0),
     "alignment_halflife_s": ("seconds from 0.001 to 60, such as 0.15", LEAST_HALFLIFE_S, 60.0),
     "min_stride": ("a share from 0.1 to 1, such as 0.8; 1 shortens no step", 0.1, 1.0),
@@ -110,7 +110,7 @@ class PoseSettings:
     blend: Blend = "spring"
     halflife_s: float = 0.1
     fade_s: float = 0.5
-    fade_halflife_s: float = 0.25
+    fade_halflife_s: float = 0.1
     path_alignment: bool = True
     alignment_limit_deg: float = 70.0
     alignment_halflife_s: float = 0.15

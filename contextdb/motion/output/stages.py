@@ -53,7 +53,9 @@ GIVES_BODY, GIVEN_BODY, GIVES_GROUND = 12, 13, 16
 TRAVEL, FRAME, IS_FLAT, BENDS = 17, 20, 21, 22
 """Written by loops: how fast what plays goes to the left and ahead of its mean facing, and by how much the root is turned from
 that; the nearest frame; whether no ground is felt; whether legs may have to bend."""
-GIVEN = 23
+LOST = 23
+"""The seconds of the update that were left when what played had run out: the clip's movement is without them."""
+GIVEN = 24
 CONTINUES, HOLDS, ELSE = 0.0, 1.0, 2.0
 
 ANIMATION, CODE, MIXED, PATH = 0, 1, 2, 3
@@ -90,18 +92,21 @@ class Bones(NamedTuple):
     """A rig as loops read it.
 
     Parents [J], offsets [J, 3], and which row of positions [M, 3] is each joint's [J]; of each foot hip, knee, ankle and what
-    stands [F, 4]; the joints that hang on the root, and where they are in positions; the joints from the hips to the chest, none of
-    a rig that is not aligned, and after each the share of the turn that is left.
+    stands [F, 4], and the axis that its knee bends about [F, 3]; the joints that hang on the root, and where they are in positions;
+    the joints from the hips to the chest, none of a rig that is not aligned, and after each the share of the turn that is left;
+    and the acceleration of joints that may be added to the clips'.
     """
 
     parents: Ints
     offsets: Floats
     places: Ints
     legs: Ints
+    hinges: Floats
     tops: Ints
     top_places: Ints
     spine: Ints
     left: Floats
+    most_accel: float
 
 
 @dataclass(frozen=True)

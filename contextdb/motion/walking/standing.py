@@ -7,6 +7,7 @@ those of `contextdb.motion.output`.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,9 +19,10 @@ from contextdb.motion.output.bank import Place3, loops, tops_of
 from contextdb.motion.output.feet import LEVEL_HIPS, Height
 from contextdb.motion.output.foot_state import HIPS_DAMPING, MOST_LOWER, STRAIGHT
 from contextdb.motion.output.ground import FLAT, Footing, below, standing, swinging
-from contextdb.motion.output.legs import Leg, eased, leg_of
+from contextdb.motion.output.legs import LEFT, Leg, eased, hinge_of, leg_of
 from contextdb.motion.output.stages import Ground
 from contextdb.motion.walking.blending import Mix
+from contextdb.motion.walking.cycle import Cycle
 from contextdb.motion.walking.footsteps import Steps, ramp
 
 
@@ -47,16 +49,21 @@ class Shown:
 
 @dataclass(frozen=True, eq=False)
 class Legs:
-    """The legs of a rig; those without hip and knee are left as the cycles have them."""
+    """The legs of a rig, and the axes [3] of their knees; those without hip and knee are left as the cycles have them."""
 
     rig: Skeleton
     legs: tuple[Leg | None, Leg | None]
+    hinges: list[Floats]
     tops: list[int]
 
     @classmethod
-    def of(cls, rig: Skeleton, feet: tuple[str, str]) -> Legs:
-        """The legs of two feet."""
-        return cls(rig, (leg_of(rig, feet[0]), leg_of(rig, feet[1])), tops_of(rig))
+    def of(cls, cycles: Sequence[Cycle]) -> Legs:
+        """The legs of the rig of some cycles."""
+        rig, feet = cycles[0].skeleton, cycles[0].feet
+        legs = leg_of(rig, feet[0]), leg_of(rig, feet[1])
+        rotations = np.concatenate([cycle.rotations for cycle in cycles])
+        hinges = [LEFT if leg is None else hinge_of(rig, leg, rotations[:, leg.joints[1]]) for leg in legs]
+        return cls(rig, legs, hinges, tops_of(rig))
 
     def grounded(
         self,
@@ -91,21 +98,20 @@ class Legs:
         rotations, translations = (each.copy() for each in mix.at(phase))
         positions, world = self._placed(rotations, translations, place)
         toes = self._stood(state, mix, phase, steps, place, positions, world)
-        most = -math.inf
+        most, hips = 0.0, state.hips.now
         for leg, toe, footing in zip(self.legs, toes, state.footings, strict=True):
             if leg is not None:
                 _, x, z = footing.now
-                down = loops().too_high(positions, leg.joints, leg.toe, toe, x, z, STRAIGHT)
-                most = max(most, min(down + state.hips.now, MOST_LOWER))
-        lower = state.lower.gone_down(max(most, 0.0), dt_s)
-        height = state.hips.now - lower.now
+                most = max(most, loops().too_high(positions, leg.joints, leg.toe, toe, x, z, STRAIGHT, hips))
+        lower = state.lower.gone_down(min(most, MOST_LOWER), dt_s)
+        height = hips - lower.now
         positions[:, 1] += height
         for top in self.tops:
             translations[top, 1] += height
-        for leg, toe, footing in zip(self.legs, toes, state.footings, strict=True):
+        for leg, hinge, toe, footing in zip(self.legs, self.hinges, toes, state.footings, strict=True):
             if leg is not None:
                 _, x, z = footing.now
-                loops().stand(self.rig.parents, positions, world, leg.joints, leg.toe, toe, x, z, STRAIGHT, rotations)
+                loops().stand(self.rig.parents, positions, world, leg.joints, leg.toe, hinge, toe, x, z, STRAIGHT, rotations)
         positions, _ = self._placed(rotations, translations, place)
         return Shown(rotations, translations, positions), GroundState(state.footings, state.hips, lower)
 

@@ -120,7 +120,7 @@ class Walker:
                 )
         self._cycles = tuple(cycle for gait in self.gaits for cycle in gait.cycles)
         same_rig(self._cycles)
-        self._legs = Legs.of(self._cycles[0].skeleton, self._cycles[0].feet)
+        self._legs = Legs.of(self._cycles)
         self._state = WalkState(require_real(phase, "phase", 0.0, 1.0) % 1.0)
 
     @property

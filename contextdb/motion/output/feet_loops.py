@@ -30,7 +30,7 @@ from contextdb.motion.output.foot_state import (
     SPEED,
     STRAIGHT,
 )
-from contextdb.motion.output.kernels import compiled
+from contextdb.motion.output.kernels import compiled, flat_length
 
 
 @compiled
@@ -47,7 +47,7 @@ def free_places(
     """Place all joints in the world; and each foot's toe, moved along the way for steps that are by `more` longer."""
     translations = np.empty_like(to_positions)
     kernels.place_whole(parents, offsets, places, rotations, positions, x, z, heading, translations, to_positions, to_world)
-    size = math.hypot(vx, vz)
+    size = flat_length(vx, vz)
     for foot in range(joints.shape[0]):
         hip, ankle, toe = joints[foot, 0], joints[foot, 2], joints[foot, 3]
         if toe < 0:
@@ -104,7 +104,7 @@ def move_foot(own, toe, height, is_down, y, radius, dt, to):
         to[OFFSET + i], to[SPEED + i] = _come(own[OFFSET + i], own[SPEED + i], y, dt)
     if was_locked:
         x, z = own[POINT], own[POINT + 1]
-        if math.hypot(x - toe[0], z - toe[2]) <= radius:
+        if flat_length(x - toe[0], z - toe[2]) <= radius:
             _locked(to, x, z, height, toe)
             return
         point = (x, height, z)
@@ -113,8 +113,8 @@ def move_foot(own, toe, height, is_down, y, radius, dt, to):
             to[SPEED + i] -= moved[i] / dt if dt > 0.0 else 0.0
         _free(to, True, toe)
         return
-    is_near = math.hypot(to[OFFSET], to[OFFSET + 2]) < BACK_SHARE * radius
-    is_back = is_near and math.hypot(moved[0], moved[2]) <= SLOW_MPS * dt
+    is_near = flat_length(to[OFFSET], to[OFFSET + 2]) < BACK_SHARE * radius
+    is_back = is_near and flat_length(moved[0], moved[2]) <= SLOW_MPS * dt
     if is_down and (own[DOWN] == 0.0 or is_back):
         x, z = toe[0] + to[OFFSET], toe[2] + to[OFFSET + 2]
         to[OFFSET + 1] = toe[1] + to[OFFSET + 1] - height

@@ -7,6 +7,8 @@ rotations [N, J, 4], positions of the joints that have some of their own [N, M, 
 
 from __future__ import annotations
 
+import numpy as np
+
 from contextdb.motion.output import feet_loops, kernels
 from contextdb.motion.output.alignment import align
 from contextdb.motion.output.dead_blending import dead_blend
@@ -77,9 +79,9 @@ def sample_rows(bank, frames, at, given, rows, contacts):
         kernels.sample(frames.rotations, frames.positions, low, high, share, rotations, positions)
         for k in range(3):
             a, b = frames.ways[low, k], frames.ways[high, k]
-            row[CLIP_ROOT + k] = a + share * (b - a)
+            row[CLIP_ROOT + k] = a + share * np.float64(b - a)
             a, b = frames.ways[low, 3 + k], frames.ways[high, 3 + k]
-            given[i, TRAVEL + k] = a + share * (b - a)
+            given[i, TRAVEL + k] = a + share * np.float64(b - a)
         near = high if share >= 0.5 else low
         given[i, FRAME] = near
         for k in range(contacts.shape[1]):

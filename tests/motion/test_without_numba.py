@@ -21,11 +21,11 @@ bank, told = motion.PoseBank.build(clips, schema), hashlib.sha256()
 for settings in (motion.PoseSettings(), motion.PoseSettings(root="path", blend="dead")):
     stream = motion.PoseStream(bank, settings)
     first = motion.Character(motion.Controller(selector), schema, None, stream)
-    crowd = motion.Crowd([first.copy() for _ in range(3)])
+    crowd = motion.Crowd([first.copy() for _ in range(9)])
     n_jumps = 0
     for tick in range(24):
         way = 2.1 * (tick // 8)
-        moved = crowd.update(1.0 / 30.0, [(speed * math.sin(way), speed * math.cos(way)) for speed in (0.0, 1.2, 3.0)])
+        moved = crowd.update(1.0 / 30.0, [(0.5 * i * math.sin(way), 0.5 * i * math.cos(way)) for i in range(9)])
         for one in moved:
             n_jumps += one.decision.action is motion.Action.JUMP
             for numbers in (one.pose.rotations, one.pose.positions, one.pose.root):
@@ -35,7 +35,7 @@ print(told.hexdigest())
 """
 
 
-def test_poses_are_the_same_to_the_last_bit_without_numba():
+def test_poses_are_the_same_to_the_last_bit_without_numba() -> None:
     pytest.importorskip("numba")
     answers = [subprocess.run([sys.executable, "-c", SCRIPT, how], capture_output=True, text=True) for how in ("with", "without")]
     assert [each.stderr for each in answers] == ["", ""]

@@ -41,22 +41,18 @@ def _come(value, speed, y, dt):
 
 
 @compiled
-def free_places(
-    parents, offsets, places, rotations, positions, x, z, heading, joints, more, vx, vz, to_positions, to_world, to_free
-):
-    """Place all joints in the world; and each foot's toe, moved along the way for steps that are by `more` longer."""
-    translations = np.empty_like(to_positions)
-    kernels.place_whole(parents, offsets, places, rotations, positions, x, z, heading, translations, to_positions, to_world)
+def free_places(positions, joints, more, vx, vz, to_free):
+    """Write each foot's toe, with the joints placed in the world, moved along the way for steps that are by `more` longer."""
     size = flat_length(vx, vz)
     for foot in range(joints.shape[0]):
         hip, ankle, toe = joints[foot, 0], joints[foot, 2], joints[foot, 3]
         if toe < 0:
             continue
         for i in range(3):
-            to_free[foot, i] = to_positions[toe, i]
+            to_free[foot, i] = positions[toe, i]
         if more != 0.0 and size >= LEAST_MPS:
             ways = (vx / size, vz / size)
-            apart = (to_positions[ankle, 0] - to_positions[hip, 0], to_positions[ankle, 2] - to_positions[hip, 2])
+            apart = (positions[ankle, 0] - positions[hip, 0], positions[ankle, 2] - positions[hip, 2])
             along = more * (ways[0] * apart[0] + ways[1] * apart[1])
             to_free[foot, 0] += along * ways[0]
             to_free[foot, 2] += along * ways[1]

@@ -22,6 +22,10 @@ except ImportError:  # pragma: no cover - the same loops, slower
     numba = None  # type: ignore[assignment]
 
 
+FEW_ROWS = 8
+"""So few characters are not worth a call of numpy."""
+
+
 def compiled(loop: Any) -> Any:
     """The loop compiled by numba; as it is without numba, or where numba has no place to keep what it compiles."""
     if numba is None:  # pragma: no cover - the same loops, slower
@@ -344,6 +348,46 @@ def place_whole(parents, offsets, places, rotations, positions, x, z, heading, t
         for i in range(3):
             to_translations[j, i] = offsets[j, i] if places[j] < 0 else positions[places[j], i]
     place(parents, to_translations, rotations, x, z, heading, to_positions, to_world)
+
+
+@compiled
+def _place_rows(parents, offsets, places, chosen, rotations, positions, roots, to_translations, to_positions, to_world):
+    """As `place_whole`, of the characters that are chosen, bool [N], each with a root (x, z, heading): [N, 3]."""
+    for i in range(chosen.shape[0]):
+        if chosen[i]:
+            place_whole(
+                parents, offsets, places, rotations[i], positions[i], roots[i, 0], roots[i, 1], roots[i, 2],
+                to_translations[i], to_positions[i], to_world[i],
+            )  # fmt: skip
+
+
+def _place_many(
+    parents: Any, offsets: Any, places: Any, chosen: Any, rotations: Any, positions: Any, roots: Any,
+    to_translations: Any, to_positions: Any, to_world: Any,
+) -> None:  # fmt: skip
+    """The same by numpy, of all characters at once: the formulas do for arrays as well."""
+    at = np.flatnonzero(chosen)
+    if len(at) < FEW_ROWS:
+        _place_rows(parents, offsets, places, chosen, rotations, positions, roots, to_translations, to_positions, to_world)
+        return
+    moving = np.flatnonzero(places >= 0)
+    translations = np.repeat(offsets[None], len(at), axis=0)
+    translations[:, moving] = positions[at][:, places[moving]]
+    x, z, headings = roots[at, 0], roots[at, 1], roots[at, 2].tolist()
+    cos, sin = np.array([math.cos(0.5 * h) for h in headings]), np.array([math.sin(0.5 * h) for h in headings])
+    placed, world = np.empty_like(translations), np.empty((len(at), len(parents), 4))
+    turns = rotations[at]
+    for j, p in enumerate(parents.tolist()):
+        above = (cos, 0.0, sin, 0.0) if p < 0 else tuple(world[:, p].T)
+        start = (x, 0.0, z) if p < 0 else tuple(placed[:, p].T)
+        moved = _turned(above, tuple(translations[:, j].T))
+        for i in range(3):
+            placed[:, j, i] = start[i] + moved[i]
+        world[:, j] = np.stack(_product(above, tuple(turns[:, j].T)), axis=1)
+    to_translations[at], to_positions[at], to_world[at] = translations, placed, world
+
+
+place_rows: Any = _place_rows if hasattr(_place_rows, "stats") else _place_many
 
 
 # ---- legs

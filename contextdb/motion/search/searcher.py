@@ -1,4 +1,4 @@
-"""Ask the compiled search, or scan every frame where numba is missing. Both give the same frames at the same costs.
+"""Ask the compiled search, or the one of numpy where numba is missing. Both give the same frames at the same costs.
 
 N frames, F features, R ranges.
 """
@@ -27,7 +27,7 @@ from contextdb.motion.search.layout import Layout
 from contextdb.motion.search.many_filters import ManyFilters
 
 MOST_KINDS = 65536
-"""With more kinds of frames than this, every frame is scanned."""
+"""With more kinds of frames than this, numpy searches."""
 BLOCK_QUERIES = 512
 """So many queries at most go through the frames together."""
 THREAD_QUERIES = 32

@@ -92,8 +92,6 @@ def test_the_search_without_numba_has_the_same_costs_to_the_last_bit(schema, see
     vars(plain._searcher)["_compiled"] = None
     assert compiled.search(query) == plain.search(query)
     assert compiled.search_many([query, -query]) == plain.search_many([query, -query])
-    plain._searcher.many = 1  # by the bounds of boxes too
-    assert compiled.search(query) == plain.search(query)
 
 
 @given(schemas(), st.integers(0, 2**32))

@@ -163,14 +163,13 @@ def allowed_frames(database, given):
 
 
 def by(engine, database):
-    """The database as it is, or as it searches where numba cannot be installed: all frames, or those that boxes leave."""
+    """The database as it is, or as it searches where numba cannot be installed."""
     if engine != "numba":
         vars(database._searcher)["_compiled"] = None
-        database._searcher.many = 1 if engine == "numpy, by boxes" else database.n_frames
     return database
 
 
-engines = pytest.mark.parametrize("engine", ["numba", "numpy", "numpy, by boxes"])
+engines = pytest.mark.parametrize("engine", ["numba", "numpy"])
 
 
 @engines
@@ -252,19 +251,21 @@ def test_a_new_mask_rebuilds_nothing():
     assert database._searcher is searcher
 
 
-def test_a_weight_turned_to_zero_hides_no_frame_at_the_ends_of_float32():
+@engines
+def test_a_weight_turned_to_zero_hides_no_frame_at_the_ends_of_float32(engine):
     features = np.array([[3e38, 1.0], [-3e38, 0.0]], np.float32)
     plain = MotionDatabase.from_features(features, [0], [2], ["a"])
     database = replace(plain, slices=(slice(0, 1), slice(1, 2)), channel_names=("far", "near"), weights=np.array([0.0, 1.0]))
-    assert database.search([3e38, 0.0]) == Hit("a", 0, 1, 0.0)
+    assert by(engine, database).search([3e38, 0.0]) == Hit("a", 0, 1, 0.0)
 
 
-def test_a_frame_just_cheaper_than_another_is_found_where_float32_cannot_tell_them_apart():
+@engines
+def test_a_frame_just_cheaper_than_another_is_found_where_float32_cannot_tell_them_apart(engine):
     features = np.zeros((64, 2), np.float32)
     features[:, 0] = 1000.0
     features[40, 1] = 1e-4
     database = MotionDatabase.from_features(features, [0, 32], [32, 64], ["a", "b"])
-    assert database.search([0.0, 1e-4]).frame == 40
+    assert by(engine, database).search([0.0, 1e-4]).frame == 40
 
 
 def test_penalties_of_an_asset_count_for_all_its_ranges():

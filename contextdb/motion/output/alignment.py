@@ -20,7 +20,7 @@ from __future__ import annotations
 import math
 
 from contextdb.motion.output import kernels
-from contextdb.motion.output.kernels import compiled, remainder
+from contextdb.motion.output.kernels import compiled, flat_length, remainder
 from contextdb.motion.output.root import rotation_share
 from contextdb.motion.output.stages import (
     HAS_VELOCITY,
@@ -62,7 +62,7 @@ def _wanted(to, given, heading, row):
     sway = given[TRAVEL + 2] * rotation_share(to, given[WEIGHT])
     x = row[VELOCITY] if row[HAS_VELOCITY] != 0.0 else 0.0
     z = row[VELOCITY + 1] if row[HAS_VELOCITY] != 0.0 else 0.0
-    own, wanted = math.hypot(left, ahead), math.hypot(x, z)
+    own, wanted = flat_length(left, ahead), flat_length(x, z)
     if own < LEAST_MPS or wanted < LEAST_MPS:
         return 0.0, 1.0
     turn = remainder(math.atan2(x, z) - (heading - sway) - math.atan2(left, ahead))

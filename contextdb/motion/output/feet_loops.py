@@ -31,7 +31,7 @@ from contextdb.motion.output.foot_state import (
     SPEED,
     STRAIGHT,
 )
-from contextdb.motion.output.kernels import compiled
+from contextdb.motion.output.kernels import compiled, flat_length
 
 
 @compiled
@@ -42,22 +42,18 @@ def _come(value, speed, y, dt):
 
 
 @compiled
-def free_places(
-    parents, offsets, places, rotations, positions, x, z, heading, joints, more, vx, vz, to_positions, to_world, to_free
-):
-    """Place all joints in the world; and each foot's toe, moved along the way for steps that are by `more` longer."""
-    translations = np.empty_like(to_positions)
-    kernels.place_whole(parents, offsets, places, rotations, positions, x, z, heading, translations, to_positions, to_world)
-    size = math.hypot(vx, vz)
+def free_places(positions, joints, more, vx, vz, to_free):
+    """Write each foot's toe, with the joints placed in the world, moved along the way for steps that are by `more` longer."""
+    size = flat_length(vx, vz)
     for foot in range(joints.shape[0]):
         hip, ankle, toe = joints[foot, 0], joints[foot, 2], joints[foot, 3]
         if toe < 0:
             continue
         for i in range(3):
-            to_free[foot, i] = to_positions[toe, i]
+            to_free[foot, i] = positions[toe, i]
         if more != 0.0 and size >= LEAST_MPS:
             ways = (vx / size, vz / size)
-            apart = (to_positions[ankle, 0] - to_positions[hip, 0], to_positions[ankle, 2] - to_positions[hip, 2])
+            apart = (positions[ankle, 0] - positions[hip, 0], positions[ankle, 2] - positions[hip, 2])
             along = more * (ways[0] * apart[0] + ways[1] * apart[1])
             to_free[foot, 0] += along * ways[0]
             to_free[foot, 2] += along * ways[1]
@@ -105,7 +101,7 @@ def move_foot(own, toe, height, is_down, y, radius, most_accel, dt, to):
         to[OFFSET + i], to[SPEED + i] = _come(own[OFFSET + i], own[SPEED + i], y, dt)
     if was_locked:
         x, z = own[POINT], own[POINT + 1]
-        if math.hypot(x - toe[0], z - toe[2]) <= radius:
+        if flat_length(x - toe[0], z - toe[2]) <= radius:
             _locked(to, x, z, height, toe)
             return
         point = (x, height, z)
@@ -114,8 +110,8 @@ def move_foot(own, toe, height, is_down, y, radius, most_accel, dt, to):
             to[SPEED + i] -= moved[i] / dt if dt > 0.0 else 0.0
         _free(to, True, toe)
         return
-    is_near = math.hypot(to[OFFSET], to[OFFSET + 2]) < BACK_SHARE * radius
-    is_back = is_near and math.hypot(moved[0], moved[2]) <= SLOW_MPS * dt
+    is_near = flat_length(to[OFFSET], to[OFFSET + 2]) < BACK_SHARE * radius
+    is_back = is_near and flat_length(moved[0], moved[2]) <= SLOW_MPS * dt
     if is_down and (own[DOWN] == 0.0 or is_back):
         x, z = toe[0] + to[OFFSET], toe[2] + to[OFFSET + 2]
         to[OFFSET + 1] = toe[1] + to[OFFSET + 1] - height

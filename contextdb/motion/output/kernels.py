@@ -22,6 +22,10 @@ except ImportError:  # pragma: no cover - the same loops, slower
     numba = None  # type: ignore[assignment]
 
 
+FEW_ROWS = 8
+"""So few characters are not worth a call of numpy."""
+
+
 def compiled(loop: Any) -> Any:
     """The loop compiled by numba; as it is without numba, or where numba has no place to keep what it compiles."""
     if numba is None:  # pragma: no cover - the same loops, slower
@@ -30,6 +34,30 @@ def compiled(loop: Any) -> Any:
         return numba.njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")(loop)
     except RuntimeError:  # pragma: no cover - a folder that nobody may write to
         return loop
+
+
+# ---- rows of numbers
+
+
+@compiled
+def three(rows, j):
+    """Row j of three numbers, in float64."""
+    return (np.float64(rows[j, 0]), np.float64(rows[j, 1]), np.float64(rows[j, 2]))
+
+
+@compiled
+def four(rows, j):
+    """Row j of four numbers, in float64."""
+    return (np.float64(rows[j, 0]), np.float64(rows[j, 1]), np.float64(rows[j, 2]), np.float64(rows[j, 3]))
+
+
+if not hasattr(four, "stats"):  # Python works on its own numbers several times faster
+
+    def three(rows: Any, j: int) -> Any:
+        """Row j of three numbers."""
+        return rows[j].tolist()
+
+    four = three
 
 
 # ---- angles and moments
@@ -44,11 +72,17 @@ def remainder(angle):
 
 
 @compiled
+def flat_length(x, z):
+    """How long a way over the ground is: as a square root, for `math.hypot` rounds otherwise when it is compiled."""
+    return math.sqrt(x * x + z * z)
+
+
+@compiled
 def between(start, n_steps, is_looping, frame):
     """The two frames about a moment of a range, counted over all, and the share of the second; a loop goes on."""
     if is_looping and n_steps > 0 and not 0.0 <= frame <= n_steps:
         frame %= n_steps
-    frame = min(max(frame, 0.0), float(n_steps))
+    frame = min(max(float(frame), 0.0), float(n_steps))
     low = min(int(frame), max(n_steps - 1, 0))
     return start + low, start + min(low + 1, n_steps), frame - low
 
@@ -151,35 +185,33 @@ def _speed_of(turn, spin):
 @compiled
 def sample(rotations, positions, low, high, share, to_rotations, to_positions):
     """The pose between two frames: rotations on the shorter way, positions on the straight line."""
-    for j in range(rotations.shape[1]):
-        dot = 0.0
-        for i in range(4):
-            dot += rotations[low, j, i] * rotations[high, j, i]
-        other = -share if dot < 0.0 else share
-        size = 0.0
-        for i in range(4):
-            to_rotations[j, i] = (1.0 - share) * rotations[low, j, i] + other * rotations[high, j, i]
-            size += to_rotations[j, i] * to_rotations[j, i]
-        size = math.sqrt(size)
-        for i in range(4):
-            to_rotations[j, i] /= size
-    for j in range(positions.shape[1]):
+    first, second, from_positions, next_positions = rotations[low], rotations[high], positions[low], positions[high]
+    one = 1.0 - share
+    for j in range(first.shape[0]):
+        a, b = four(first, j), four(second, j)
+        dot = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
+        two = -share if dot < 0.0 else share
+        w, x, y, z = one * a[0] + two * b[0], one * a[1] + two * b[1], one * a[2] + two * b[2], one * a[3] + two * b[3]
+        size = math.sqrt(w * w + x * x + y * y + z * z)
+        to_rotations[j, 0], to_rotations[j, 1], to_rotations[j, 2], to_rotations[j, 3] = w / size, x / size, y / size, z / size
+    for j in range(from_positions.shape[0]):
+        p, q = three(from_positions, j), three(next_positions, j)
         for i in range(3):
-            to_positions[j, i] = (1.0 - share) * positions[low, j, i] + share * positions[high, j, i]
+            to_positions[j, i] = one * p[i] + share * q[i]
 
 
 @compiled
 def slopes(rotations, positions, low, high, rate, to_spins, to_velocities):
     """How fast the joints turn (in their parents' frames) and move from one frame to the next."""
-    for j in range(rotations.shape[1]):
-        a = (rotations[low, j, 0], rotations[low, j, 1], rotations[low, j, 2], rotations[low, j, 3])
-        b = (rotations[high, j, 0], rotations[high, j, 1], rotations[high, j, 2], rotations[high, j, 3])
-        turn = _turn(_product(b, _inverse(a)))
+    first, second, from_positions, next_positions = rotations[low], rotations[high], positions[low], positions[high]
+    for j in range(first.shape[0]):
+        turn = _turn(_product(four(second, j), _inverse(four(first, j))))
         for i in range(3):
             to_spins[j, i] = rate * turn[i]
-    for j in range(positions.shape[1]):
+    for j in range(from_positions.shape[0]):
+        p, q = three(from_positions, j), three(next_positions, j)
         for i in range(3):
-            to_velocities[j, i] = rate * (positions[high, j, i] - positions[low, j, i])
+            to_velocities[j, i] = rate * (q[i] - p[i])
 
 
 # ---- the spring: offsets to what plays, which decay
@@ -190,25 +222,25 @@ def decay(offsets, speeds, damping, dt, to_offsets, to_speeds):
     """Offsets [n, 3] and their speeds after some time: x = e^{-yt} (x0 + (v0 + x0 y) t)."""
     fade = math.exp(-damping * dt)
     for j in range(offsets.shape[0]):
+        offset, speed = three(offsets, j), three(speeds, j)
         for i in range(3):
-            pushed = speeds[j, i] + offsets[j, i] * damping
-            to_offsets[j, i] = fade * (offsets[j, i] + pushed * dt)
-            to_speeds[j, i] = fade * (speeds[j, i] - pushed * damping * dt)
+            pushed = speed[i] + offset[i] * damping
+            to_offsets[j, i] = fade * (offset[i] + pushed * dt)
+            to_speeds[j, i] = fade * (speed[i] - pushed * damping * dt)
 
 
 @compiled
 def leave(offsets, speeds, from_rotations, from_spins, to_rotations, to_spins, new_offsets, new_speeds):
     """The turns that keep the shown pose and its velocity, where another animation begins to play under them."""
     for j in range(offsets.shape[0]):
-        turn, speed = (offsets[j, 0], offsets[j, 1], offsets[j, 2]), (speeds[j, 0], speeds[j, 1], speeds[j, 2])
-        old, new = from_rotations[j], to_rotations[j]
+        turn, speed = three(offsets, j), three(speeds, j)
         offset = _rotation(turn)
-        shown = _product(offset, (old[0], old[1], old[2], old[3]))
+        shown = _product(offset, four(from_rotations, j))
         own = _spin_of(turn, speed)
-        carried = _turned(offset, (from_spins[j, 0], from_spins[j, 1], from_spins[j, 2]))
-        rest = _product(shown, (new[0], -new[1], -new[2], -new[3]))
+        carried = _turned(offset, three(from_spins, j))
+        rest = _product(shown, _inverse(four(to_rotations, j)))
         left = _turn(rest)
-        under = _turned(rest, (to_spins[j, 0], to_spins[j, 1], to_spins[j, 2]))
+        under = _turned(rest, three(to_spins, j))
         spin = (own[0] + carried[0] - under[0], own[1] + carried[1] - under[1], own[2] + carried[2] - under[2])
         pace = _speed_of(left, spin)
         for i in range(3):
@@ -220,8 +252,7 @@ def leave(offsets, speeds, from_rotations, from_spins, to_rotations, to_spins, n
 def turn_by(offsets, rotations, to_rotations):
     """Rotations, each turned by its offset."""
     for j in range(offsets.shape[0]):
-        q = rotations[j]
-        turned = _product(_rotation((offsets[j, 0], offsets[j, 1], offsets[j, 2])), (q[0], q[1], q[2], q[3]))
+        turned = _product(_rotation(three(offsets, j)), four(rotations, j))
         for i in range(4):
             to_rotations[j, i] = turned[i]
 
@@ -236,16 +267,15 @@ def fade_turns(left, spins, reach, share, slope, braking, playing, playing_spins
     `share` of what plays, which grows by `slope` a second; the spins are `braking` of what they were.
     """
     for j in range(left.shape[0]):
-        a, b = left[j], playing[j]
-        gone = _product(_rotation((reach * spins[j, 0], reach * spins[j, 1], reach * spins[j, 2])), (a[0], a[1], a[2], a[3]))
-        between = _product((b[0], b[1], b[2], b[3]), _inverse(gone))
+        spun, p = three(spins, j), three(playing_spins, j)
+        gone = _product(_rotation((reach * spun[0], reach * spun[1], reach * spun[2])), four(left, j))
+        between = _product(four(playing, j), _inverse(gone))
         way = _turn(between)
         part = (share * way[0], share * way[1], share * way[2])
         over = _rotation(part)
         mixed = _product(over, gone)
-        own = (braking * spins[j, 0], braking * spins[j, 1], braking * spins[j, 2])
+        own = (braking * spun[0], braking * spun[1], braking * spun[2])
         carried = _turned(between, own)
-        p = playing_spins[j]
         pace = _speed_of(way, (p[0] - carried[0], p[1] - carried[1], p[2] - carried[2]))
         grown = (slope * way[0] + share * pace[0], slope * way[1] + share * pace[1], slope * way[2] + share * pace[2])
         spin = _spin_of(part, grown)
@@ -269,22 +299,19 @@ def align(parents, tops, places, spine, left, turn, rotations, positions):
     first = parents[spine[0]]
     above = (1.0, 0.0, 0.0, 0.0)
     while first >= 0:
-        q = rotations[first]
-        above = _product((q[0], q[1], q[2], q[3]), above)
+        above = _product(four(rotations, first), above)
         first = parents[first]
     whole = (math.cos(0.5 * turn), 0.0, math.sin(0.5 * turn), 0.0)
     for k in range(tops.shape[0]):
-        q, p = rotations[tops[k]], positions[places[k]]
-        turned = _product(whole, (q[0], q[1], q[2], q[3]))
-        moved = _turned(whole, (p[0], p[1], p[2]))
+        turned = _product(whole, four(rotations, tops[k]))
+        moved = _turned(whole, three(positions, places[k]))
         for i in range(4):
             rotations[tops[k], i] = turned[i]
         for i in range(3):
             positions[places[k], i] = moved[i]
     under = _product(whole, above)
     for k in range(spine.shape[0]):
-        q = rotations[spine[k]]
-        above = _product(above, (q[0], q[1], q[2], q[3]))
+        above = _product(above, four(rotations, spine[k]))
         angle = 0.5 * turn * left[k]
         turned = _product((math.cos(angle), 0.0, math.sin(angle), 0.0), above)
         own = _product(_inverse(under), turned)
@@ -301,15 +328,13 @@ def place(parents, translations, rotations, x, z, heading, to_positions, to_worl
     """Forward kinematics of one pose whose first joint is placed against (x, 0, z), facing `heading`."""
     for j in range(parents.shape[0]):
         p = parents[j]
-        t, q = translations[j], rotations[j]
         if p < 0:
             above = (math.cos(0.5 * heading), 0.0, math.sin(0.5 * heading), 0.0)
             start = (x, 0.0, z)
         else:
-            above = (to_world[p, 0], to_world[p, 1], to_world[p, 2], to_world[p, 3])
-            start = (to_positions[p, 0], to_positions[p, 1], to_positions[p, 2])
-        moved = _turned(above, (t[0], t[1], t[2]))
-        turned = _product(above, (q[0], q[1], q[2], q[3]))
+            above, start = four(to_world, p), three(to_positions, p)
+        moved = _turned(above, three(translations, j))
+        turned = _product(above, four(rotations, j))
         for i in range(3):
             to_positions[j, i] = start[i] + moved[i]
         for i in range(4):
@@ -352,6 +377,46 @@ def sharpest(before, now, after, dt):
     return math.sqrt(most) / (dt * dt)
 
 
+@compiled
+def _place_rows(parents, offsets, places, chosen, rotations, positions, roots, to_translations, to_positions, to_world):
+    """As `place_whole`, of the characters that are chosen, bool [N], each with a root (x, z, heading): [N, 3]."""
+    for i in range(chosen.shape[0]):
+        if chosen[i]:
+            place_whole(
+                parents, offsets, places, rotations[i], positions[i], roots[i, 0], roots[i, 1], roots[i, 2],
+                to_translations[i], to_positions[i], to_world[i],
+            )  # fmt: skip
+
+
+def _place_many(
+    parents: Any, offsets: Any, places: Any, chosen: Any, rotations: Any, positions: Any, roots: Any,
+    to_translations: Any, to_positions: Any, to_world: Any,
+) -> None:  # fmt: skip
+    """The same by numpy, of all characters at once: the formulas do for arrays as well."""
+    at = np.flatnonzero(chosen)
+    if len(at) < FEW_ROWS:
+        _place_rows(parents, offsets, places, chosen, rotations, positions, roots, to_translations, to_positions, to_world)
+        return
+    moving = np.flatnonzero(places >= 0)
+    translations = np.repeat(offsets[None], len(at), axis=0)
+    translations[:, moving] = positions[at][:, places[moving]]
+    x, z, headings = roots[at, 0], roots[at, 1], roots[at, 2].tolist()
+    cos, sin = np.array([math.cos(0.5 * h) for h in headings]), np.array([math.sin(0.5 * h) for h in headings])
+    placed, world = np.empty_like(translations), np.empty((len(at), len(parents), 4))
+    turns = rotations[at]
+    for j, p in enumerate(parents.tolist()):
+        above = (cos, 0.0, sin, 0.0) if p < 0 else tuple(world[:, p].T)
+        start = (x, 0.0, z) if p < 0 else tuple(placed[:, p].T)
+        moved = _turned(above, tuple(translations[:, j].T))
+        for i in range(3):
+            placed[:, j, i] = start[i] + moved[i]
+        world[:, j] = np.stack(_product(above, tuple(turns[:, j].T)), axis=1)
+    to_translations[at], to_positions[at], to_world[at] = translations, placed, world
+
+
+place_rows: Any = _place_rows if hasattr(_place_rows, "stats") else _place_many
+
+
 # ---- legs
 
 
@@ -365,17 +430,11 @@ def heights(parents, offsets, places, rotations, positions, joints, to_heights):
         j = joints[k]
         x = (0.0, 0.0, 0.0)
         while j >= 0:
-            if places[j] >= 0:
-                p = positions[places[j]]
-                t = (p[0], p[1], p[2])
-            else:
-                p = offsets[j]
-                t = (p[0], p[1], p[2])
+            t = three(positions, places[j]) if places[j] >= 0 else three(offsets, j)
             x = (x[0] + t[0], x[1] + t[1], x[2] + t[2])
             j = parents[j]
             if j >= 0:
-                q = rotations[j]
-                x = _turned((q[0], q[1], q[2], q[3]), x)
+                x = _turned(four(rotations, j), x)
         to_heights[k] = x[1]
 
 
@@ -412,9 +471,7 @@ def bend_leg(parents, positions, world, leg, target, ahead, straight, rotations)
     more than it does already it bends to where `ahead` is: the way a nearly stretched leg is bent to says nothing.
     """
     hip, knee, ankle = leg[0], leg[1], leg[2]
-    a = (positions[hip, 0], positions[hip, 1], positions[hip, 2])
-    b = (positions[knee, 0], positions[knee, 1], positions[knee, 2])
-    c = (positions[ankle, 0], positions[ankle, 1], positions[ankle, 2])
+    a, b, c = three(positions, hip), three(positions, knee), three(positions, ankle)
     thigh, shin = (b[0] - a[0], b[1] - a[1], b[2] - a[2]), (c[0] - b[0], c[1] - b[1], c[2] - b[2])
     way = (target[0] - a[0], target[1] - a[1], target[2] - a[2])
     upper, lower = _length(thigh), _length(shin)
@@ -445,13 +502,11 @@ def bend_leg(parents, positions, world, leg, target, ahead, straight, rotations)
     bend = _product(_about((axis[0] / size, axis[1] / size, axis[2] / size), math.pi - wanted), back)
     moved = _turned(bend, shin)
     swing = _arc((thigh[0] + moved[0], thigh[1] + moved[1], thigh[2] + moved[2]), way)
-    old_hip, old_knee, foot = world[hip], world[knee], world[ankle]
-    new_hip = _product(swing, (old_hip[0], old_hip[1], old_hip[2], old_hip[3]))
-    new_knee = _product(swing, _product(bend, (old_knee[0], old_knee[1], old_knee[2], old_knee[3])))
-    above = world[parents[hip]]
-    first = _product((above[0], -above[1], -above[2], -above[3]), new_hip)
+    new_hip = _product(swing, four(world, hip))
+    new_knee = _product(swing, _product(bend, four(world, knee)))
+    first = _product(_inverse(four(world, parents[hip])), new_hip)
     second = _product(_inverse(new_hip), new_knee)
-    third = _product(_inverse(new_knee), (foot[0], foot[1], foot[2], foot[3]))
+    third = _product(_inverse(new_knee), four(world, ankle))
     for i in range(4):
         rotations[hip, i], rotations[knee, i], rotations[ankle, i] = first[i], second[i], third[i]
 
@@ -462,7 +517,7 @@ def too_high(positions, leg, toe, place, along_x, along_z, straight, raised):
 
     A leg reaches as far as it does now; and farther the harder, up to where its knee is `straight`: it does not come there at once.
     """
-    a, b, c, t = positions[leg[0]], positions[leg[1]], positions[leg[2]], positions[toe]
+    a, b, c, t = three(positions, leg[0]), three(positions, leg[1]), three(positions, leg[2]), three(positions, toe)
     tilt = _arc((0.0, 1.0, 0.0), (-along_x, 1.0, -along_z))
     way = _turned(tilt, (t[0] - c[0], t[1] - c[1], t[2] - c[2]))
     upper, lower = _length((b[0] - a[0], b[1] - a[1], b[2] - a[2])), _length((c[0] - b[0], c[1] - b[1], c[2] - b[2]))
@@ -484,14 +539,12 @@ def stand(parents, positions, world, leg, toe, hinge, place, along_x, along_z, s
     """
     ankle = leg[2]
     tilt = _arc((0.0, 1.0, 0.0), (-along_x, 1.0, -along_z))
-    foot = world[ankle]
-    turned = _product(tilt, (foot[0], foot[1], foot[2], foot[3]))
+    turned = _product(tilt, four(world, ankle))
     for i in range(4):
         world[ankle, i] = turned[i]
-    a, c, t = positions[leg[0]], positions[ankle], positions[toe]
+    a, c, t = three(positions, leg[0]), three(positions, ankle), three(positions, toe)
     way = _turned(tilt, (t[0] - c[0], t[1] - c[1], t[2] - c[2]))
-    thigh = world[leg[0]]
-    axis = _turned((thigh[0], thigh[1], thigh[2], thigh[3]), (hinge[0], hinge[1], hinge[2]))
+    axis = _turned(four(world, leg[0]), (hinge[0], hinge[1], hinge[2]))
     ahead = _cross(axis, (a[0] - c[0], a[1] - c[1], a[2] - c[2]))
     target = (place[0] - way[0], place[1] - way[1], place[2] - way[2])
     bend_leg(parents, positions, world, leg, target, ahead, straight, rotations)

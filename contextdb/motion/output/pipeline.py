@@ -129,7 +129,9 @@ class Pipeline:
         translations, positions = np.empty((n, n_joints, 3)), np.empty((n, n_joints, 3))
         world, free = np.empty((n, n_joints, 4)), np.empty((n, n_feet, 3))
         before = rows.numbers
-        loops.move_rows(to, bones, at, before, given, left, velocities, dt, after, roots, rotations, moved, positions, world, free)
+        loops.move_rows(
+            to, bones, at, before, given, left, velocities, dt, after, roots, rotations, moved, translations, positions, world, free
+        )
         if grounds is not None or not given[:, IS_FLAT].all():
             self._stand(given, before, dt, grounds, contacts, roots, free, after)
         loops.stand_rows(

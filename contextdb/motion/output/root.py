@@ -25,7 +25,7 @@ from __future__ import annotations
 import math
 
 from contextdb.motion.clips.steering import STANDING_MPS
-from contextdb.motion.output.kernels import compiled, remainder
+from contextdb.motion.output.kernels import compiled, flat_length, remainder
 from contextdb.motion.output.stages import (
     ANIMATION,
     BASE,
@@ -133,12 +133,12 @@ def _moved(to, given, motion, dt, moved, turned, before, row):
     last = (before[BODY], before[BODY + 1], before[BODY + 2]) if before[HAS_BODY] != 0.0 else body
     x, z, heading = after
     if is_on:
-        far = math.hypot(x - base[0], z - base[1])
+        far = flat_length(x - base[0], z - base[1])
         x, z = base[0] + far * way[0], base[1] + far * way[1]
     x += (1.0 - moved) * (body[0] - last[0])
     z += (1.0 - moved) * (body[1] - last[1])
     heading += (1.0 - turned) * remainder(body[2] - last[2])
-    own_m = math.hypot(x - base[0], z - base[1])
+    own_m = flat_length(x - base[0], z - base[1])
     own_turn = abs(heading - base[2]) + TURN_PER_M * own_m
     return _pulled(to, (x, z, heading), _beside(x, z, body, is_on, way), own_m, own_turn, dt)
 
@@ -147,7 +147,7 @@ def _moved(to, given, motion, dt, moved, turned, before, row):
 def _pulled(to, base, body, way, turned, dt):
     """The base nearer to the game's body, by what it moved and turned itself at most."""
     x, z, heading = body[0] - base[0], body[1] - base[1], remainder(body[2] - base[2])
-    apart = math.hypot(x, z)
+    apart = flat_length(x, z)
     share = min(_made_up(to.position_pull_s, dt), MOST_PULL * way / apart) if apart > 0.0 else 0.0
     turn = math.copysign(min(_made_up(to.rotation_pull_s, dt) * abs(heading), MOST_PULL * turned), heading)
     return (base[0] + share * x, base[1] + share * z, base[2] + turn)
@@ -160,7 +160,7 @@ def _clamped(to, base, offset, row):
     is_on, way = _way(to, row)
     body = _beside(x, z, (row[BODY], row[BODY + 1], row[BODY + 2]), is_on, way)
     left, ahead, turn = x - body[0], z - body[1], remainder(heading - body[2])
-    apart, most = math.hypot(left, ahead), to.position_clamp_m
+    apart, most = flat_length(left, ahead), to.position_clamp_m
     share = most / apart - 1.0 if apart > most else 0.0
     over = turn - min(max(turn, -to.rotation_clamp), to.rotation_clamp)
     return (base[0] + share * left, base[1] + share * ahead, base[2] - over)
@@ -204,7 +204,7 @@ def _way(to, row):
     if to.root != PATH or row[HAS_VELOCITY] == 0.0:
         return False, (0.0, 0.0)
     x, z = row[VELOCITY], row[VELOCITY + 1]
-    size = math.hypot(x, z)
+    size = flat_length(x, z)
     if size > STANDING_MPS:
         return True, (x / size, z / size)
     return False, (0.0, 0.0)

@@ -7,6 +7,8 @@ rotations [N, J, 4], positions of the joints that have some of their own [N, M, 
 
 from __future__ import annotations
 
+import numpy as np
+
 from contextdb.motion.output import feet_loops, kernels
 from contextdb.motion.output.alignment import align
 from contextdb.motion.output.dead_blending import dead_blend
@@ -78,9 +80,9 @@ def sample_rows(bank, frames, at, given, rows, contacts):
         kernels.sample(frames.rotations, frames.positions, low, high, share, rotations, positions)
         for k in range(3):
             a, b = frames.ways[low, k], frames.ways[high, k]
-            row[CLIP_ROOT + k] = a + share * (b - a)
+            row[CLIP_ROOT + k] = a + share * np.float64(b - a)
             a, b = frames.ways[low, 3 + k], frames.ways[high, 3 + k]
-            given[i, TRAVEL + k] = a + share * (b - a)
+            given[i, TRAVEL + k] = a + share * np.float64(b - a)
         near = high if share >= 0.5 else low
         given[i, FRAME] = near
         for k in range(contacts.shape[1]):
@@ -158,7 +160,9 @@ def _blend(to, at, i, k, dt, left, before, row, rotations, positions):
 
 
 @compiled
-def move_rows(to, bones, at, before, given, left, velocities, dt, rows, roots, rotations, moved, positions, world, free):
+def move_rows(
+    to, bones, at, before, given, left, velocities, dt, rows, roots, rotations, moved, translations, positions, world, free
+):  # fmt: skip
     """Put each character through all stages up to its feet, whose places without a lock are written.
 
     A character that appears has not moved, and has no seam.
@@ -192,13 +196,16 @@ def move_rows(to, bones, at, before, given, left, velocities, dt, rows, roots, r
             is_flat = is_flat and was[j] == 0.0
         is_level = is_flat and row[STRIDE] == 1.0 and was[LOWER] == 0.0 and was[LOWER + 1] == 0.0
         own[IS_FLAT], own[BENDS] = 1.0 if is_flat else 0.0, 0.0 if is_level and not to.is_locking else 1.0
-        if own[BENDS] != 0.0:
+    bends = given[:, BENDS] != 0.0
+    kernels.place_rows(
+        bones.parents, bones.offsets, bones.places, bends, rotations, moved, roots, translations, positions, world
+    )  # fmt: skip
+    for i in range(given.shape[0]):
+        row = rows[i]
+        if bends[i]:
             vx = row[VELOCITY] if row[HAS_VELOCITY] != 0.0 else 0.0
             vz = row[VELOCITY + 1] if row[HAS_VELOCITY] != 0.0 else 0.0
-            feet_loops.free_places(
-                bones.parents, bones.offsets, bones.places, rotations[i], moved[i], x, z, heading, bones.legs,
-                row[STRIDE] - 1.0, vx, vz, positions[i], world[i], free[i],
-            )  # fmt: skip
+            feet_loops.free_places(positions[i], bones.legs, row[STRIDE] - 1.0, vx, vz, free[i])
 
 
 @compiled
@@ -214,7 +221,7 @@ def stand_rows(to, bones, at, before, given, contacts, dt, rows, roots, rotation
                 dt_s, contacts[i], free[i], _part(row, at, FOOTINGS, FOOTING), row[HIPS], _part(before[i], at, FEET, FOOT),
                 positions[i], world[i], _part(row, at, FEET, FOOT), row[LOWER : LOWER + 2], rotations[i], moved[i],
             )  # fmt: skip
-        kernels.place_whole(
-            bones.parents, bones.offsets, bones.places, rotations[i], moved[i], roots[i, 0], roots[i, 1], roots[i, 2],
-            translations[i], positions[i], world[i],
-        )  # fmt: skip
+    everyone = np.ones(given.shape[0], np.bool_)
+    kernels.place_rows(
+        bones.parents, bones.offsets, bones.places, everyone, rotations, moved, roots, translations, positions, world
+    )  # fmt: skip

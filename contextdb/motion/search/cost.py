@@ -17,26 +17,35 @@ from contextdb.motion.search.layout import Layout
 FRAMES_AT_ONCE = 8192
 """Frames are gathered in blocks of this many, so that memory stays small and a block stays in the processor's cache."""
 
+FEW = 64
+"""Of so few frames the sums are made in one go, with what comes before the last thrown away."""
+
 
 def channel_costs(layout: Layout, frames: Ints, query: Floats, slices: Sequence[slice], weights: Floats) -> Floats:
-    """Each channel's weight times its squared differences: [C, len(frames)]; `query` is normalised."""
+    """Each channel's weight times its squared differences: [C, len(frames)]; `query` is normalised, [F] or one for each frame."""
     block = layout.take(frames).T.astype(np.float64, order="C")
-    block -= query[:, None]
+    block -= np.atleast_2d(query).T
     block *= block
-    return np.stack([weight * _sum(block[columns]) for columns, weight in zip(slices, weights, strict=True)])
+    found = np.empty((len(weights), len(frames)))
+    for row, columns, weight in zip(found, slices, weights.tolist(), strict=True):
+        np.multiply(_sum(block[columns]), weight, out=row)
+    return found
 
 
 def costs(layout: Layout, frames: Ints, query: Floats, slices: Sequence[slice], weights: Floats) -> Floats:
-    """The cost of each frame without its bias: [len(frames)]."""
+    """The cost of each frame without its bias: [len(frames)]; `query` as in `channel_costs`."""
     total = np.empty(len(frames))
     for start in range(0, len(frames), FRAMES_AT_ONCE):
         block = slice(start, start + FRAMES_AT_ONCE)
-        total[block] = _sum(channel_costs(layout, frames[block], query, slices, weights))
+        own = query[block] if query.ndim == 2 else query
+        total[block] = _sum(channel_costs(layout, frames[block], own, slices, weights))
     return total
 
 
 def _sum(rows: Floats) -> Floats:
     """The sum of rows [n, F], added one by one: numpy's own sum may choose another order for another F."""
+    if len(rows) and rows.shape[1] <= FEW:
+        return rows[0] if len(rows) == 1 else np.asarray(np.add.accumulate(rows, 0)[-1])
     total = np.zeros(rows.shape[1])
     for row in rows:
         total += row

@@ -127,6 +127,10 @@ class Layout:
         box = int(self.box_starts.searchsorted(frame, side="right")) - 1
         return int(self.box_ranges[box]) if box >= 0 and frame < self.box_starts[box] + self.box_sizes[box] else -1
 
+    def ranges_of(self, frames: Ints) -> NDArray[np.int32]:
+        """The range of each of some frames, each in one: int32 [len(frames)]."""
+        return self.box_ranges[self.box_starts.searchsorted(frames, side="right") - 1]
+
     def are_in_ranges(self, frames: Ints) -> NDArray[np.bool_]:
         """Which frames are in a range, and not between two: bool [len(frames)]."""
         boxes = self.box_starts.searchsorted(frames, side="right") - 1
@@ -147,13 +151,6 @@ class Layout:
         ranges = np.full(self.n_frames, -1, np.int64)
         ranges[self.frames] = np.repeat(self.box_ranges, self.box_sizes)
         return ranges
-
-    @cached_property
-    def frame_boxes(self) -> Ints:
-        """The box of each frame, -1 between ranges: int64 [N]."""
-        boxes = np.full(self.n_frames, -1, np.int64)
-        boxes[self.frames] = np.repeat(np.arange(len(self.box_sizes)), self.box_sizes)
-        return boxes
 
     @property
     def frames(self) -> Ints:

@@ -49,6 +49,12 @@ class ManyFilters(NamedTuple):
             tuple(each.skips for each in filters) if any(each.skips for each in filters) else (),
         )
 
+    @classmethod
+    def alone(cls, chosen: Filter) -> ManyFilters:
+        """One filter."""
+        skips = (chosen.skips,) if chosen.skips else ()
+        return cls(chosen, chosen.ranges[None], chosen.range_biases[None], np.array([chosen.current]), skips)
+
     @property
     def least_of_ranges(self) -> Floats:
         """The least of each row of `range_biases`."""
@@ -62,18 +68,17 @@ class ManyFilters(NamedTuple):
         spans = [(skip.start, skip.stop) for skips in self.skips for skip in skips]
         return np.array(spans, np.int64), np.cumsum([0, *map(len, self.skips)])
 
-    def each(self) -> Iterable[Filter]:
-        """The filters one by one."""
-        for i, current in enumerate(self.currents.tolist()):
-            biases = self.range_biases[i if len(self.range_biases) > 1 else 0]
-            yield self.shared._replace(
-                ranges=self.ranges[i if len(self.ranges) > 1 else 0],
-                is_whole=False,
-                range_biases=biases,
-                least_of_ranges=float(biases.min(initial=np.inf)),
-                current=current,
-                skips=self.skips[i] if self.skips else (),
-            )
+    def one(self, i: int) -> Filter:
+        """The filter of one search."""
+        biases = self.range_biases[i if len(self.range_biases) > 1 else 0]
+        return self.shared._replace(
+            ranges=self.ranges[i if len(self.ranges) > 1 else 0],
+            is_whole=False,
+            range_biases=biases,
+            least_of_ranges=float(biases.min(initial=np.inf)),
+            current=int(self.currents[i]),
+            skips=self.skips[i] if self.skips else (),
+        )
 
 
 def together(filters: Sequence[Filter]) -> Iterable[list[int]]:

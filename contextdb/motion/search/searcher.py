@@ -1,4 +1,4 @@
-"""Ask the compiled search, or scan every frame where numba is missing. Both give the same frames at the same costs.
+"""Ask the compiled search, or the one of numpy where numba is missing. Both give the same frames at the same costs.
 
 N frames, F features, R ranges.
 """
@@ -27,7 +27,7 @@ from contextdb.motion.search.layout import Layout
 from contextdb.motion.search.many_filters import ManyFilters
 
 MOST_KINDS = 65536
-"""With more kinds of frames than this, every frame is scanned."""
+"""With more kinds of frames than this, numpy searches."""
 BLOCK_QUERIES = 512
 """So many queries at most go through the frames together."""
 THREAD_QUERIES = 32
@@ -49,7 +49,6 @@ class Searcher:
         self.layout, self.kinds, self.normalisation = layout, kinds, normalisation
         self.slices, self.weights, self.feature_names = slices, weights, feature_names
         self._shape = (layout.n_features,)
-        self.many = scan.MANY
 
     def least(self, query: ArrayLike, chosen: Filter, within: float, n: int) -> tuple[int, Floats, Ints]:
         """The lowest totals not above `within` and their frames: one of all frames (n = 1), or one for each range (n = R).
@@ -59,8 +58,13 @@ class Searcher:
         totals, frames = np.empty(n), np.empty(n, np.int64)
         if self._compiled is None:
             wanted = self.normalised(query)
-            scan.least(self.layout, wanted, self.slices, self.weights, chosen, self.kinds, within, totals, frames, self.many)
-            return self.layout.range_of(int(frames[0])), totals, frames
+            totals[:], frames[:] = within, -1
+            if n == 1:
+                of, found, own = self._scan.least_of_many(wanted[None], ManyFilters.alone(chosen))
+                return int(of[0]), own, found
+            at, found, own = self._scan.least(wanted, chosen, within)
+            totals[at], frames[at] = own, found
+            return 0, totals, frames
         kernels, pack = self._compiled
         is_plain = type(query) is np.ndarray and query.dtype == np.float64 and query.flags.c_contiguous
         raw = query if is_plain else np.ascontiguousarray(arguments.numbers_of(query, "the query"))
@@ -79,10 +83,8 @@ class Searcher:
         n = len(queries)
         totals, frames, ranges = np.empty(n), np.empty(n, np.int64), np.empty(n, np.int64)
         if self._compiled_for_many is None or queries.shape[1:] != self._shape:
-            found = [self.least(query, chosen, np.inf, 1) for query, chosen in zip(queries, filters.each(), strict=True)]
-            for i, (at, total, frame) in enumerate(found):
-                ranges[i], totals[i], frames[i] = at, total[0], frame[0]
-            return ranges, frames, totals
+            wanted = np.array([self.normalised(query) for query in queries]).reshape(n, *self._shape)
+            return self._scan.least_of_many(wanted, filters)
         kernels, arrays = self._compiled_for_many
         shared = filters.shared
         of_kinds = (shared.kinds.allowed, shared.kinds.biases, shared.kinds.playable)
@@ -100,6 +102,11 @@ class Searcher:
         wanted = self.normalisation.apply(raw)
         arguments.refuse_infinite(wanted, raw, self.feature_names)
         return wanted
+
+    @cached_property
+    def _scan(self) -> scan.Scan:
+        """The search by numpy."""
+        return scan.Scan(self.layout, self.kinds, self.slices, self.weights)
 
     @cached_property
     def _compiled(self) -> tuple[ModuleType, Any] | None:

@@ -17,8 +17,9 @@ Answer = TypeVar("Answer")
 
 
 def take_height(screen: Screen[Any]) -> None:
-    """Give a screen the class of its height before its parts are made; Textual does it later, and then works all styles out anew."""
-    reached = [name for least, name in sorted(screen.app.VERTICAL_BREAKPOINTS or ()) if screen.app.size.height >= least]
+    """Give a screen the class of its height before its parts are made: later on, Textual would style each part anew."""
+    height = screen.app.size.height
+    reached = [name for least, name in sorted(screen.app.VERTICAL_BREAKPOINTS or ()) if height >= least]
     screen.add_class(*reached[-1:], update=False)
 
 

@@ -3,23 +3,21 @@
     session [COLUMNS ROWS]      open it, in a terminal of 80 x 24 or that size
     press, type, click, screen, file    as there; a file is one of the project
 
-`python tests/tui/debug_replay.py --update` writes what is shown now into the files.
+`python tests/tui/update_replays.py` writes what is shown now into these files too.
 """
 
 from __future__ import annotations
 
 import sys
-from dataclasses import replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parent), str(HERE.parent.parent)]
 
-from replay import SCROLL_BAR, Replay, ReplayError, Step, _text, read_steps, written  # noqa: E402
+from replay import SCROLL_BAR, Replay, ReplayError, Step, _text  # noqa: E402
 from running import run  # noqa: E402
-from terminal import alone, drive, screen_text  # noqa: E402
+from terminal import drive, screen_text  # noqa: E402
 from test_motion_commands import MARKS, STICK, TABLE, TOML  # noqa: E402
 
 from contextdb.commands.motion_replay_command import databases_of  # noqa: E402
@@ -70,20 +68,3 @@ class DebugReplay(Replay):
 
     def _path(self, name: str) -> Path:
         return self.folder / "game" / name
-
-
-def replayed(path: Path) -> tuple[str, str]:
-    """The text of a replay file, and what it would be if all that it shows is as it is now."""
-    text = path.read_text("utf-8")
-    steps, ending = read_steps(text)
-    with TemporaryDirectory() as folder, alone(Path(folder)):
-        return text, written([replace(step) for step in DebugReplay(Path(folder)).shown(steps)], ending)
-
-
-if __name__ == "__main__":
-    for each in FILES:
-        before, after = replayed(each)
-        if before != after:
-            print(f"{each.name}: {'written' if '--update' in sys.argv else 'differs'}")
-            if "--update" in sys.argv:
-                each.write_text(after, "utf-8")

@@ -19,7 +19,7 @@ begin with `|` are what a command shows, and a test compares them:
     file [FILE]                 what differs in the file from what it was at first: `-` gone, `+` new
     ended                       the editor's exit code, once it has been left
 
-`python tests/tui/replay.py --update` writes what is shown now into the files.
+`python tests/tui/update_replays.py` writes what is shown now into the files.
 """
 
 from __future__ import annotations
@@ -237,30 +237,9 @@ def _difference(before: str, after: str) -> Iterator[str]:
             yield line[0] + line[2:]
 
 
-def replayed(path: Path) -> tuple[str, str]:
+def replayed(path: Path, kind: type[Replay] = Replay) -> tuple[str, str]:
     """The text of a replay file, and what it would be if all that it shows is as it is now."""
     text = path.read_text("utf-8")
     steps, ending = read_steps(text)
     with TemporaryDirectory() as folder, alone(Path(folder)):
-        return text, written(Replay(Path(folder)).shown(steps), ending)
-
-
-def main(arguments: list[str]) -> int:
-    """Write what is shown now into the files, or say which differ; with names only those files."""
-    names = [a for a in arguments if a != "--update"]
-    n_different = 0
-    for path in FILES:
-        if names and path.stem not in names:
-            continue
-        before, after = replayed(path)
-        if before == after:
-            continue
-        n_different += 1
-        print(f"{path.name}: {'written' if '--update' in arguments else 'differs'}")
-        if "--update" in arguments:
-            path.write_text(after, "utf-8")
-    return 0 if "--update" in arguments else min(n_different, 1)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main(sys.argv[1:]))
+        return text, written(kind(Path(folder)).shown(steps), ending)

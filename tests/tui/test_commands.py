@@ -103,20 +103,20 @@ def test_tabs_and_tools_are_commands():
 # ---- in the editor
 
 
-def in_cells(app: EditorApp) -> None:
+async def in_cells(app: EditorApp) -> None:
     app.main.session.sheet.go(0, 1)
 
 
-def in_the_test_row(app: EditorApp) -> None:
+async def in_the_test_row(app: EditorApp) -> None:
     app.main.session.sheet.go(0, 1)
     app.main.assets.grid.is_in_test_row = True
 
 
-def with_a_bar_open(app: EditorApp) -> None:
-    app.main.assets.action_find()
+async def with_a_bar_open(app: EditorApp) -> None:
+    await app.main.assets.action_find()
 
 
-def with_all_rows_hidden(app: EditorApp) -> None:
+async def with_all_rows_hidden(app: EditorApp) -> None:
     app.main.session.sheet.set_filter(Filter(text="nowhere"))
     app.main.show()
 
@@ -160,7 +160,7 @@ def test_every_command_runs_wherever_one_is(tmp_path, name, state):
     async def script(app: EditorApp, pilot) -> list[str]:
         ran = []
         for command in commands:
-            state(app)
+            await state(app)
             await app.main.run_command(command.id)
             await settled(pilot)
             assert app._exception is None, f"{command.id}: {app._exception}"

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import ClassVar
 
-from rich.table import Table
-from rich.text import Text
-from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
-from textual.containers import VerticalScroll
-from textual.widgets import Static
 
 from tui.debug.keys import KEYS, names_of
-from tui.screens.dialog import Dialog
+from tui.screens.help_page import HelpPage, Lines
 
 QUESTIONS = (
     ("Why this clip?", "Go to a jump with [ and ]: the second line says why. The weights show what each channel adds."),
@@ -40,38 +36,15 @@ SIGNS = (
 )
 
 
-class DebugHelp(Dialog[None]):
+class DebugHelp(HelpPage):
     """What the screen shows, and its keys."""
 
-    DEFAULT_CSS = """
-    DebugHelp VerticalScroll { height: 1fr; scrollbar-size-vertical: 1; }
-    DebugHelp Static { height: auto; }
-    """
-    BINDINGS: ClassVar[list[BindingType]] = [Binding("f1,q,question_mark", "cancel", "Close", show=False)]
-    title_text = "Help"
-    keys_text = "↑↓ scroll · Esc close"
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("question_mark", "cancel", "Close", show=False)]
+    widest = 36
 
-    def __init__(self) -> None:
-        super().__init__(classes="-wide")
-
-    def compose_body(self) -> ComposeResult:
-        with VerticalScroll():
-            yield Static(_section("Four questions", QUESTIONS))
-            yield Static(_section("What the signs mean", SIGNS))
-            for group in dict.fromkeys(key.group for key in KEYS):
-                lines = [(names_of(key.keys), key.about) for key in KEYS if key.group == group]
-                yield Static(_section(group, tuple(lines)))
-
-    def on_mount(self) -> None:
-        self.query_one(VerticalScroll).focus()
-
-
-def _section(title: str, lines: tuple[tuple[str, str], ...]) -> Table:
-    table = Table(
-        title=Text(title, style="bold"), title_justify="left", box=None, show_header=False, pad_edge=False, padding=(0, 2, 0, 0)
-    )
-    table.add_column(min_width=16, max_width=36)
-    table.add_column()
-    for left, right in lines:
-        table.add_row(Text(left, style="bold"), Text(right))
-    return table
+    def sections(self) -> Iterator[tuple[str, Lines]]:
+        """The questions, the signs, and the keys by their groups."""
+        yield "Four questions", QUESTIONS
+        yield "What the signs mean", SIGNS
+        for group in dict.fromkeys(key.group for key in KEYS):
+            yield group, [(names_of(key.keys), key.about) for key in KEYS if key.group == group]

@@ -377,15 +377,15 @@ class AssetsPane(Pane):
 
     # ---- find
 
-    def action_find(self) -> None:
-        """Open the bar, with the text of the cell where it was opened from nothing."""
+    async def action_find(self) -> None:
+        """Open the bar."""
         self.query_one(FilterBar).remove_class("-open")
-        self.query_one(FindBar).open()
+        await self.query_one(FindBar).open()
 
-    def action_find_next(self, is_backwards: bool) -> None:
+    async def action_find_next(self, is_backwards: bool) -> None:
         """Go to the next hit."""
         if not self._search.text:
-            self.action_find()
+            await self.action_find()
         else:
             self._seek(FindBar.Sought(self._search, is_backwards))
 
@@ -422,10 +422,10 @@ class AssetsPane(Pane):
 
     # ---- filter and sort
 
-    def action_filter(self) -> None:
+    async def action_filter(self) -> None:
         """Open the bar."""
         self.query_one(FindBar).remove_class("-open")
-        self.query_one(FilterBar).open()
+        await self.query_one(FilterBar).open()
 
     def action_note(self) -> None:
         """Ask for a note on the cell of the cursor."""

@@ -35,6 +35,7 @@ from tui.model.options import OPTIONS, POLICY_WORDS, columns_for, with_expressio
 from tui.model.sheet import Sheet
 from tui.panes.pane import Pane
 from tui.widgets.field import Field
+from tui.widgets.pick import Pick
 from tui.widgets.ticks import TickList
 
 WIDE = 120
@@ -92,9 +93,7 @@ class OptionsPane(Pane):
         with Vertical(id="options-condition", classes="options--part"):
             yield Static(id="condition-title", classes="options--title")
             kinds = [(f"{name:<8}{kind.words}", name) for name, kind in KINDS.items()]
-            yield Field(
-                "Type", Select(kinds, compact=True, allow_blank=False, id="condition-type"), "What a fact of it is.", "type"
-            )
+            yield Field("Type", Pick(kinds, compact=True, allow_blank=False, id="condition-type"), "What a fact of it is.", "type")
             yield Field(
                 "Least",
                 Input(compact=True, placeholder="no bound", id="condition-min"),
@@ -126,14 +125,14 @@ class OptionsPane(Pane):
     def _control(self, key: str) -> Widget:
         if key == "policy":
             words = [(f"{policy:<10}{POLICY_WORDS[policy]}", policy) for policy in POLICIES]
-            return Select(words, compact=True, allow_blank=False, id="option-policy")
+            return Pick(words, compact=True, allow_blank=False, id="option-policy")
         if key == "outputs":
             return TickList(compact=True, id="option-outputs")
         if key == "fallback":
             return Input(compact=True, placeholder="none", id="option-fallback")
         if key == "assume":
             return Vertical(Input(compact=True), id="options-assume")
-        return Select[str]([], compact=True, prompt="none", id=f"option-{key}")
+        return Pick[str]([], compact=True, prompt="none", id=f"option-{key}")
 
     # ---- show
 

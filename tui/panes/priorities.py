@@ -31,6 +31,7 @@ from tui.model.priorities import (
 )
 from tui.model.sheet import Sheet
 from tui.panes.pane import Pane
+from tui.widgets.pick import Pick
 
 NO_DATABASES = (
     "A database is a set of clips to search. A selector puts databases in order: the best frame of one wins outright when its cost "
@@ -94,7 +95,7 @@ class PrioritiesPane(Pane):
                 with Horizontal():
                     yield Static(id="priorities-asked")
                     yield Input(id="priorities-threshold", compact=True)
-                    yield Select[str]([], id="priorities-database", compact=True, prompt="pick a database")
+                    yield Pick[str]([], id="priorities-database", compact=True, prompt="pick a database")
                 yield Static(id="priorities-wrong")
             with Horizontal(id="priorities-tools"):
                 for key, label in TOOLS.items():

@@ -25,6 +25,7 @@ from tui.model.column_choices import JOB_WORDS, Choice, Insertion, NewColumnForm
 from tui.model.condition_form import ConditionForm
 from tui.screens.dialog import Dialog
 from tui.widgets.field import Field
+from tui.widgets.pick import Pick
 
 _TYPED = {"min": "Least", "max": "Most", "unit": "Unit", "values": "Values", "description": "Description"}
 
@@ -50,7 +51,7 @@ class AddColumn(Dialog[Insertion]):
         & #column-form { height: auto; }
         & #column-buttons { height: 1; margin: 1 0 0 0; }
         & Field .field--label { width: 13; }
-        & Field .field--wrong { padding: 0 0 0 13; }
+        & Field .field--says { padding: 0 0 0 13; }
     }
     """
 
@@ -75,16 +76,16 @@ class AddColumn(Dialog[Insertion]):
         with Vertical(id="column-form"):
             width = max(map(len, JOB_WORDS)) + 2
             jobs = [(f"{job:<{width}}{words}", job) for job, words in JOB_WORDS.items()]
-            yield Field("What it is", Select(jobs, compact=True, allow_blank=False, id="column-job"), key="job")
+            yield Field("What it is", Pick(jobs, compact=True, allow_blank=False, id="column-job"), key="job")
             kinds = [(f"{name:<8}{kind.words}", name) for name, kind in KINDS.items()]
-            yield Field("Type", Select(kinds, compact=True, allow_blank=False, id="column-type"), key="type")
+            yield Field("Type", Pick(kinds, compact=True, allow_blank=False, id="column-type"), key="type")
             for key, label in _TYPED.items():
                 placeholder = (
                     "names with spaces between them" if key == "values" else "no bound" if key in ("min", "max") else "none"
                 )
                 yield Field(label, Input(compact=True, id=f"column-{key}", placeholder=placeholder), key=key)
         where = [(Content(words), at) for words, at in self.places.items()]
-        yield Field("Where", Select(where, compact=True, allow_blank=False, id="column-where"), key="where")
+        yield Field("Where", Pick(where, compact=True, allow_blank=False, id="column-where"), key="where")
         with Horizontal(id="column-buttons"):
             yield Button("Insert", compact=True, variant="primary", id="column-insert")
             yield Button("Cancel", compact=True, id="column-cancel")

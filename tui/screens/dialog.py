@@ -5,15 +5,22 @@ A dialog is given what it shows, and gives back what was decided, or None. It ch
 
 from __future__ import annotations
 
-from typing import ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Vertical
-from textual.screen import ModalScreen
+from textual.screen import ModalScreen, Screen
 from textual.widgets import Static
 
 Answer = TypeVar("Answer")
+
+
+def take_height(screen: Screen[Any]) -> None:
+    """Give a screen the class of its height before its parts are made: later on, Textual would style each part anew."""
+    height = screen.app.size.height
+    reached = [name for least, name in sorted(screen.app.VERTICAL_BREAKPOINTS or ()) if height >= least]
+    screen.add_class(*reached[-1:], update=False)
 
 
 class Dialog(ModalScreen[Answer | None], Generic[Answer]):
@@ -42,6 +49,7 @@ class Dialog(ModalScreen[Answer | None], Generic[Answer]):
     """Which keys do what, in the lower border."""
 
     def compose(self) -> ComposeResult:
+        take_height(self)
         with Vertical(id="dialog") as box, Vertical(id="dialog-body"):
             yield from self.compose_body()
         box.border_title = self.title_text

@@ -25,6 +25,7 @@ from tui.screens.context_forms import SureDialog
 from tui.screens.dialog import Dialog
 from tui.widgets.field import Field
 from tui.widgets.line_list import LineList, ListColumn
+from tui.widgets.pick import Pick
 
 BY_SUFFIX = "as the file is named"
 
@@ -71,7 +72,7 @@ class ExportDialog(Dialog[Export]):
         entry = Input(f"{self.table.name}.xlsx", id="export-path", compact=True)
         yield Field("File", entry, f"Ends in {', '.join(suffixes_written())}.", key="path")
         formats = [(BY_SUFFIX, ""), *((one.about.split(";")[0], one.name) for one in FORMATS.values() if one.is_written)]
-        yield Field("Format", Select(formats, value="", allow_blank=False, compact=True, id="export-format"), key="format")
+        yield Field("Format", Pick(formats, value="", allow_blank=False, compact=True, id="export-format"), key="format")
         yield LineList(
             [ListColumn(f"In {self.folder.name or self.folder}", 20, 1)], empty="No file of this name yet.", id="export-names"
         )

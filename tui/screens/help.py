@@ -2,18 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import ClassVar
-
-from rich.table import Table
-from rich.text import Text
-from textual.app import ComposeResult
-from textual.binding import Binding, BindingType
-from textual.containers import VerticalScroll
-from textual.widgets import Static
+from collections.abc import Iterator, Mapping
 
 from tui.commands import COMMANDS, Command, key_names
-from tui.screens.dialog import Dialog
+from tui.screens.help_page import HelpPage, Lines
 
 CELLS = (
     ("Any, or nothing", "every value"),
@@ -40,44 +32,20 @@ MARKS = (
 )
 
 
-class HelpDialog(Dialog[None]):
+class HelpDialog(HelpPage):
     """How cells are written, what the marks mean, and every command with its keys."""
-
-    DEFAULT_CSS = """
-    HelpDialog VerticalScroll { height: 1fr; scrollbar-size-vertical: 1; }
-    HelpDialog Static { height: auto; }
-    """
-    BINDINGS: ClassVar[list[BindingType]] = [Binding("f1,q", "cancel", "Close", show=False)]
-    title_text = "Help"
-    keys_text = "↑↓ scroll · Esc close"
 
     def __init__(self, keys: Mapping[str, str]) -> None:
         """`keys` are those of a keymap file: command to keys."""
-        super().__init__(classes="-wide")
+        super().__init__()
         self._keys = keys
 
-    def compose_body(self) -> ComposeResult:
-        with VerticalScroll():
-            yield Static(_section("How a cell is written", CELLS))
-            yield Static(_section("What the marks mean", MARKS))
-            for group in dict.fromkeys(command.group for command in COMMANDS):
-                commands = [c for c in COMMANDS if c.group == group]
-                yield Static(_section(group, [(self._keys_of(c), c.about) for c in commands]))
-
-    def on_mount(self) -> None:
-        self.query_one(VerticalScroll).focus()
+    def sections(self) -> Iterator[tuple[str, Lines]]:
+        """Cells, marks, and the commands by their groups."""
+        yield "How a cell is written", CELLS
+        yield "What the marks mean", MARKS
+        for group in dict.fromkeys(command.group for command in COMMANDS):
+            yield group, [(self._keys_of(command), command.about) for command in COMMANDS if command.group == group]
 
     def _keys_of(self, command: Command) -> str:
         return "  ".join(key_names(self._keys.get(command.id, command.keys)))
-
-
-def _section(title: str, lines: tuple[tuple[str, str], ...] | list[tuple[str, str]]) -> Table:
-    table = Table(
-        title=Text(title, style="bold"), title_justify="left", box=None, show_header=False, pad_edge=False, padding=(0, 2, 0, 0)
-    )
-    table.add_column(no_wrap=True, min_width=22)
-    table.add_column()
-    for left, right in lines:
-        table.add_row(Text(left, style="bold"), Text(right))
-    table.caption = ""
-    return table

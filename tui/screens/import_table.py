@@ -28,6 +28,7 @@ from tui.model.paths import common_start, completions, resolved
 from tui.screens.dialog import Dialog
 from tui.widgets.field import Field
 from tui.widgets.line_list import LineList, ListCell, ListColumn
+from tui.widgets.pick import Pick
 
 BY_ITSELF = "by its content"
 THE_ONLY = "the filled sheet"
@@ -116,13 +117,13 @@ class ImportDialog(Dialog[Import]):
         if self.text is None:
             yield Field("File", Input(id="import-path", compact=True), key="path")
         formats = [(BY_ITSELF, ""), *((one.about.split(";")[0], one.name) for one in FORMATS.values() if one.is_read)]
-        kind = Select(formats, value="" if self.text is None else "tsv", allow_blank=False, compact=True, id="import-format")
-        sheet = Select([(THE_ONLY, "")], value="", allow_blank=False, compact=True, id="import-sheet")
+        kind = Pick(formats, value="" if self.text is None else "tsv", allow_blank=False, compact=True, id="import-format")
+        sheet = Pick([(THE_ONLY, "")], value="", allow_blank=False, compact=True, id="import-sheet")
         yield Field("Format, sheet", Horizontal(kind, sheet), key="how")
         modes = [(about, mode) for mode, about in MODES.items()]
-        yield Field("Rows", Select(modes, value="merge", allow_blank=False, compact=True, id="import-mode"), key="mode")
+        yield Field("Rows", Pick(modes, value="merge", allow_blank=False, compact=True, id="import-mode"), key="mode")
         texts = [(THE_USUAL, ""), *((about, name) for name, about in NAMES.items())]
-        yield Field("Names", Select(texts, value="", allow_blank=False, compact=True, id="import-texts"), key="texts")
+        yield Field("Names", Pick(texts, value="", allow_blank=False, compact=True, id="import-texts"), key="texts")
         yield LineList(
             [ListColumn(f"In {self.folder.name or self.folder}", 20, 1)],
             empty="No such file.",

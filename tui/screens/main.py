@@ -36,6 +36,7 @@ from tui.panes.problems import ProblemsPane
 from tui.panes.why import WIDE
 from tui.screens.ask import AskDialog, ChooseDialog
 from tui.screens.asking import TestRow
+from tui.screens.dialog import take_height
 from tui.screens.disk_care import LOOK_EVERY_S, DiskCare
 from tui.screens.export_table import Export
 from tui.screens.following import Followed, Following
@@ -127,6 +128,7 @@ class MainScreen(Screen[None]):
         return self.query_one(AssetsPane)
 
     def compose(self) -> ComposeResult:
+        take_height(self)
         yield Bar(id="tabs")
         yield Bar([Item(name, BY_ID[name].label) for name in TOOLS], id="tools")
         with ContentSwitcher(initial="assets", id="panes"):

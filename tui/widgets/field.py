@@ -17,10 +17,9 @@ class Field(Vertical):
         height: auto;
         & > Horizontal { height: auto; }
         & .field--label { width: 17; padding: 0 1 0 0; color: $text; }
-        & .field--meaning { color: $text-muted; padding: 0 1 0 17; height: auto; }
-        & .field--wrong { color: $text-error; padding: 0 1 0 17; height: auto; display: none; }
-        &.-wrong .field--wrong { display: block; }
-        &.-wrong .field--meaning { display: none; }
+        & .field--says { color: $text-muted; padding: 0 1 0 17; height: auto; display: none; }
+        &.-says .field--says { display: block; }
+        &.-wrong .field--says { color: $text-error; display: block; }
         &:focus-within { height: auto; }  /* Textual follows the focus only where this stands last in a selector */
         &:focus-within .field--label { text-style: bold underline; color: $text; }
         & .field--control { width: 1fr; }
@@ -43,21 +42,21 @@ class Field(Vertical):
         self.key = key
         self.wrong = ""
         control.add_class("field--control")
+        self.set_class(bool(meaning), "-says")
 
     def compose(self) -> ComposeResult:
         """The label and the control, and below them what it means or what is wrong."""
         with Horizontal():
             yield Static(Content(self.label), classes="field--label")
             yield self.control
-        if self.meaning:
-            yield Static(Content(self.meaning), classes="field--meaning")
-        yield Static("", classes="field--wrong")
+        yield Static(Content(self.meaning), classes="field--says")
 
     def say(self, wrong: str = "", meaning: str | None = None) -> None:
         """Show what is wrong with what was typed, or, when nothing is, what the field means."""
-        self.wrong = wrong
+        meaning = self.meaning if meaning is None else meaning
+        if (wrong, meaning) == (self.wrong, self.meaning):
+            return
+        self.wrong, self.meaning = wrong, meaning
         self.set_class(bool(wrong), "-wrong")
-        self.query_one(".field--wrong", Static).update(Content(f"✗ {wrong}") if wrong else "")
-        if meaning is not None and meaning != self.meaning:
-            self.meaning = meaning
-            self.query_one(".field--meaning", Static).update(Content(meaning))
+        self.set_class(bool(meaning), "-says")
+        self.query_one(".field--says", Static).update(Content(f"✗ {wrong}" if wrong else meaning))

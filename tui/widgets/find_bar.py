@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
+from textual.compose import compose
 from textual.containers import Horizontal
 from textual.message import Message
 from textual.widgets import Button, Checkbox, Input, Static
@@ -35,17 +36,16 @@ class SheetBar(Horizontal):
     class Closed(Message):
         """The bar was closed: the grid takes the keys again."""
 
-    @property
-    def is_open(self) -> bool:
-        """Whether it is seen."""
-        return self.has_class("-open")
+    def parts(self) -> ComposeResult:
+        """What is in it. It is made when the bar is opened first: a table that is only looked at needs none of it."""
+        raise NotImplementedError
 
-    def open(self, text: str = "") -> None:
-        """Show it, ready to type in; `text` is there chosen."""
+    async def open(self) -> None:
+        """Show it, ready to type in."""
+        if not self.children:
+            await self.mount_all(compose(self, self.parts()))
         self.add_class("-open")
         entry = self.query(Input).first()
-        if text:
-            entry.value = text
         entry.focus()
         entry.action_select_all()
 
@@ -83,7 +83,7 @@ class FindBar(SheetBar):
         is_all: bool
         in_selection: bool
 
-    def compose(self) -> ComposeResult:
+    def parts(self) -> ComposeResult:
         with Horizontal():
             yield Static("Find")
             yield Input(compact=True, id="find-text", placeholder="text")
@@ -106,7 +106,8 @@ class FindBar(SheetBar):
 
     def say(self, text: str) -> None:
         """Say how many cells are found."""
-        self.query_one("#find-count", Static).update(text)
+        for count in self.query("#find-count").results(Static):
+            count.update(text)
 
     def action_next(self, is_backwards: bool) -> None:
         """Go to the next hit."""
@@ -163,7 +164,7 @@ class FilterBar(SheetBar):
         is_valid: bool
         has_findings: bool
 
-    def compose(self) -> ComposeResult:
+    def parts(self) -> ComposeResult:
         with Horizontal():
             yield Static("Filter")
             yield Input(compact=True, id="filter-text", placeholder="rows with this text; in a column also <3, not Walk")
@@ -174,15 +175,17 @@ class FilterBar(SheetBar):
 
     def clear(self) -> None:
         """Show every row."""
-        self.query_one(Input).value = ""
+        for entry in self.query(Input):
+            entry.value = ""
         for box in self.query(Checkbox):
             box.value = False
-        self._tell()
+        self.post_message(self.Wanted("", False, False, False))
 
     def clear_text(self) -> None:
         """Take the text away, without a word: what it asked for stays, or has been taken off."""
         with self.prevent(Input.Changed):
-            self.query_one(Input).value = ""
+            for entry in self.query(Input):
+                entry.value = ""
 
     def _tell(self) -> None:
         text = self.query_one(Input).value

@@ -1,0 +1,23 @@
+"""Write what the editor and the debugger show now into their replay files; with names only into those."""
+
+from __future__ import annotations
+
+import sys
+
+import debug_replay
+from replay import FILES, Replay, replayed
+
+
+def main(names: list[str]) -> None:
+    """Write, and say what was written."""
+    kinds: dict[type[Replay], list] = {Replay: FILES, debug_replay.DebugReplay: debug_replay.FILES}
+    for kind, files in kinds.items():
+        for path in files:
+            before, now = replayed(path, kind) if not names or path.stem in names else ("", "")
+            if before != now:
+                path.write_text(now, "utf-8")
+                print(f"{path.name}: written")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -67,9 +67,11 @@ class Layout:
 
     @property
     def extent(self) -> int:
-        """How far one may scroll, with the window: so far that the last column is whole and the first one seen begins in full."""
+        """How far one may scroll, with the window: so far that the last column is whole and the first one seen begins in full.
+
+        A table that is seen whole is no wider than itself, for the window becomes narrower with a scroll bar beside it."""
         last = self.scroll_to(len(self.widths) - 1, 0)
-        return max(self.total, self.width + last)
+        return max(self.total, self.width + last) if last else self.total
 
     def visible(self, scroll: int) -> range:
         """The columns not frozen that are in the window, at least in part, when it is scrolled to the right by so many cells."""

@@ -66,6 +66,8 @@ COLUMN_MENU = (
     "rename-role", "add-column", "column-left", "column-right", "delete-columns",
 )  # fmt: skip
 """What the right button of the mouse offers."""
+WITH_TOOLS = 30
+"""On a screen of fewer lines the tools give way to the rows; the palette, where all of them are too, stands behind the tabs."""
 TOOLS = ("add-column", "blueprints", "import", "export", "refresh", "autofit", "history", "palette")
 
 
@@ -139,6 +141,9 @@ class MainScreen(Screen[None]):
         self.set_interval(LOOK_EVERY_S, self.care.look)
         self._opened()
 
+    def on_resize(self) -> None:
+        self._show_bars()
+
     def on_unmount(self) -> None:
         self.coverage.cancel()
         self.following.close()
@@ -159,6 +164,9 @@ class MainScreen(Screen[None]):
         mark = " *" if self.session.sheet.is_modified else ""
         items = [Item("open", f"{self.table_name}{mark}", is_strong=True)]
         items += [Item(tab, BY_ID[tab].label, is_on=tab == self.tab) for tab in self.tabs]
+        has_tools = self.size.height >= WITH_TOOLS
+        self.query_one("#tools", Bar).display = has_tools
+        items += [] if has_tools else [Item("palette", BY_ID["palette"].label)]
         table = self.session.sheet.table
         about = f"{plural(table.n_rows, 'row')} · {plural(len(table.columns), 'column')}"
         self.query_one("#tabs", Bar).show(items, about)

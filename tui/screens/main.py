@@ -235,6 +235,8 @@ class MainScreen(Screen[None]):
         self._switch_to(name)
 
     def _switch_to(self, name: str) -> None:
+        if name != self.tab:
+            self.say("")  # it was of the tab that is left
         self.query_one("#panes", ContentSwitcher).current = name
         self._show_bars()
         if name != "assets":

@@ -31,6 +31,8 @@ N_NAME_LINES = 3
 _JOINT = re.compile(r"(?<=[_.\-/ ])|(?<=[a-z0-9])(?=[A-Z])")
 """Where a name may go on in the next line: behind a sign that joins words, and before a capital."""
 
+JOINER = "\u200d"
+"""Makes one sign of two; `tui.drawn` shows the first of them."""
 _SHOWN = {ord(c): s for c, s in zip("\n\r\t", "⏎⏎⇥", strict=True)}
 
 
@@ -178,7 +180,7 @@ def cut_middle(text: str, width: int, n_shared: int = 0) -> str:
 def cut(text: str, width: int) -> str:
     """The text in exactly so many cells; a longer one ends in "…". Line ends and tabs are shown by signs, other controls by "�"."""
     if not text.isprintable():
-        text = "".join(c if c.isprintable() else "�" for c in text.translate(_SHOWN))
+        text = "".join(c if c.isprintable() or c == JOINER else "�" for c in text.translate(_SHOWN))
     if cell_len(text) <= width:
         return set_cell_size(text, width)
     return set_cell_size(text, width - 1) + "…" if width > 1 else "…"[:width]

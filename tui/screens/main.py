@@ -11,7 +11,9 @@ from rich.text import Text
 from textual import on
 from textual.app import ComposeResult
 from textual.binding import BindingType
+from textual.reactive import Reactive
 from textual.screen import Screen
+from textual.widget import Widget
 from textual.widgets import ContentSwitcher, Static
 
 from contextdb.disk import write_atomic
@@ -88,6 +90,8 @@ class MainScreen(Screen[None]):
     """
 
     app: Editor
+    focused: Reactive[Widget | None] = Reactive(None, repaint=False)
+    """What has the keys. Of the screen itself nothing looks otherwise then: Textual would paint all of it again."""
 
     def __init__(self, workspace: Workspace, name: str) -> None:
         super().__init__()
@@ -179,11 +183,13 @@ class MainScreen(Screen[None]):
         status = self.query_one(StatusLine)
         is_short = is_quiet and status.has_room(text)
         status.show(text if is_short else "")
-        if (text, level) != self._said:
-            self._said = (text, level)
-            said = self.query_one("#said", Static)
+        if (text, level) == self._said:
+            return
+        self._said, said = (text, level), self.query_one("#said", Static)
+        if not is_short:
+            said.update(Text(text if is_quiet else f"! {text}"))
+        if not is_short or said.display:
             said.set_classes("" if is_short else f"-{level}")
-            said.update(Text("" if is_short else text if is_quiet else f"! {text}"))
 
     @on(Told)
     def _told(self, event: Told) -> None:

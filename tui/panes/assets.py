@@ -148,8 +148,11 @@ class AssetsPane(Pane):
 
     @on(Grid.Moved)
     def _show_cell(self) -> None:
+        self.why_pane.follow(self.sheet)
+        self._show_place()
+
+    def _show_place(self) -> None:
         sheet = self.sheet
-        self.why_pane.follow(sheet)
         row, column = sheet.cursor
         column = self.grid.field
         header, condition = sheet.header(column), sheet.fact_of(column)
@@ -341,7 +344,8 @@ class AssetsPane(Pane):
             self.grid.changed()
         else:
             self.grid.asked_again()
-        self._show_cell()
+        self.why_pane.follow_soon(sheet)
+        self._show_place()
 
     def show_live(self, said: Said | None, items: Sequence[Item] = ()) -> None:
         """Say how it stands with the game; None: none is followed."""

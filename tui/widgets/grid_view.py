@@ -17,6 +17,7 @@ from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
 from contextdb.schema.shapes import CHANCE
+from tui.contrast import readable
 from tui.model.alignment import MOST_ALIGNED, indented
 from tui.model.layout import COMPACT, MOST_TEXTS, WIDEST, Layout, fitted_width, layout, name_lines, name_width
 from tui.model.sheet import Sheet
@@ -341,7 +342,8 @@ class GridView(ScrollView, inherit_bindings=False):
             over = self.get_component_rich_style(f"grid--{meant}")
             plain = Style(bgcolor=under.bgcolor, bold=under.bold, underline=under.underline)
             said = Style(color=over.color, bold=over.bold or None, underline=over.underline or None, strike=over.strike or None)
-            self._styles[ground, meant] = plain + said
+            whole = plain + said
+            self._styles[ground, meant] = whole if meant == "line" else readable(whole)
         return self._styles[ground, meant]
 
     def _fit(self) -> None:

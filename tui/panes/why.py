@@ -72,7 +72,8 @@ class WhyPane(VerticalScroll, can_focus=False):
             why, outputs = why_row(sheet.query, sheet.table, row), sheet.table.settings.outputs
             gives = [f"{name} = {sheet.table.text(row, name) or '–'}" for name in outputs] if why.is_picked else []
             said = _said(why, gives)
-        self.query_one(Static).update(said)
+        static = self.query_one(Static)
+        static.update(said, layout=said.get_height({}, max(static.size.width, 1)) != static.size.height)
 
 
 def _said(why: RowWhy, gives: Sequence[str]) -> Content:

@@ -47,6 +47,35 @@ def read(name: str) -> str:
     return Path(name).read_bytes().decode()
 
 
+# ---- notes
+
+NOTED = "Asset,Column,Note,Colour\nwalk,speed,slow?,\n"
+
+
+@pytest.mark.parametrize(
+    ("ours", "theirs", "merged"),
+    [
+        ("new,gait,a,\n", "new,speed,b,\n", "new,gait,a,\nnew,speed,b,\nwalk,speed,slow?,\n"),
+        ("new,,,red\n", "new,,n,\n", "new,,n,red\nwalk,speed,slow?,\n"),
+    ],
+    ids=["two cells of a new asset", "a note and a colour of its row"],
+)
+def test_notes_that_two_people_add_to_one_new_asset_are_both_kept(ours, theirs, merged):
+    files = put(base=NOTED, ours=NOTED + ours, theirs=NOTED + theirs)
+    assert run("merge", *files, "--path", "t.notes.csv").code == 0
+    assert read("ours.csv") == NOTED.splitlines(keepends=True)[0] + merged
+
+
+def test_one_note_that_both_changed_stands_between_marks_or_is_taken_from_a_side():
+    files = put(base=NOTED, ours=NOTED.replace("slow?", "fast?"), theirs=NOTED.replace("slow?", ""))
+    result = run("merge", *files, "--path", "t.notes.csv", "-o", "out.csv")
+    assert result.code == 1
+    assert 'the note of "walk speed" changed on both sides' in result.err
+    assert "<<<<<<< ours\nwalk,speed,fast?,\n" in read("out.csv")
+    assert run("merge", *files, "--path", "t.notes.csv", "--take", "theirs").code == 0
+    assert read("ours.csv") == "Asset,Column,Note,Colour\n"
+
+
 # ---- clean
 
 
@@ -212,7 +241,7 @@ def test_a_meaning_that_cannot_be_looked_at_is_told_of_the_named_file_not_of_git
 
 
 def test_notes_are_no_table_so_that_nothing_is_told_of_their_meaning(here):
-    base = 'Asset,Column,Note,Colour\nwalk,speed,"first, note",\nrun,gait,second,\n'
+    base = 'Asset,Column,Note,Colour\nrun,gait,second,\nwalk,speed,"first, note",\n'
     sides = {"ours": base.replace("first", "ours"), "theirs": base.replace("second", "theirs")}
     result = run("merge", *put(base=base, **sides), "--path", "moves.notes.csv")
     assert (result.code, result.err) == (0, "")

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from tui.panes.motion import DebugWanted
 
 LOW = 14
-"""On a screen of fewer lines the tools and the details give way to the rows."""
+"""On a screen of fewer lines the details give way to the rows."""
 
 
 class EditorApp(Editor):
@@ -65,7 +65,7 @@ class EditorApp(Editor):
     SheetBar Button.-textual-compact { background: $surface; }
     Dialog OptionList, Dialog OptionList:focus { background: $surface; }
     .-low {
-        & #tools, & StatusLine, & #coverage-bar { display: none; }
+        & StatusLine, & #coverage-bar { display: none; }
         & #coverage-detail, & #problems-detail { max-height: 0; border-top: none; }
         & #coverage-state, & #priorities-context { max-height: 1; }
         & #coverage-sections, & #problems-levels { margin: 0; }

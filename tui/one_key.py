@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
+from collections.abc import Sequence
 
 from textual import events
 from textual.app import App
 from textual.dom import DOMNode
+from textual.filter import LineFilter
 from textual.widget import Widget
 
+from tui.drawn import SameWidths
+
+SAME_WIDTHS = SameWidths()
 WAIT_FOR_PART_S = 2.0
 """So long a key waits for a part of the screen that is still at work on the key before."""
 
@@ -22,6 +27,10 @@ class OneKeyAtATime(App[None]):
         self._ahead: deque[events.Event] = deque()
         """What was typed before the key before it has done all it does."""
         self._settling: asyncio.Task[None] | None = None
+
+    def get_line_filters(self) -> Sequence[LineFilter]:
+        """Also one that keeps columns from drifting."""
+        return [*super().get_line_filters(), SAME_WIDTHS]
 
     async def on_event(self, event: events.Event) -> None:
         """Take one key at a time. A key can open an editor or a dialog, and what is typed after it is meant for that."""

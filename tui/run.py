@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -42,6 +43,7 @@ def edit(path: str | None, theme: str | None = None) -> None:
     _require_readable(workspace)
     _forget_exported_size()
     read_whole_keys()
+    pass_over_what_stays()
     EditorApp(workspace, settings, theme or _theme_for(settings)).run()
 
 
@@ -120,6 +122,13 @@ def _debugged(shown: Recording | Live, settings: EditorSettings) -> None:
         recording = shown if isinstance(shown, Recording) else shown.recording
         if recording is not None:
             recording.edited()
+
+
+def pass_over_what_stays() -> None:
+    """Let the collector of garbage pass over the table and the modules, which stay: else it walks through all of them at every
+    other key, for a tenth of a second in a large table."""
+    gc.freeze()
+    gc.set_threshold(20_000, 20, 50)
 
 
 def _forget_exported_size() -> None:

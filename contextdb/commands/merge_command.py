@@ -1,8 +1,8 @@
 """Merge two versions of a table, cell by cell, with rows and columns that were added, removed and moved. A git merge driver.
 
-A contextdb.toml is merged key by key. The result is written to OURS, or to FILE. Conflicts are written between git's marks, row by
-row, for a person or the editor to decide; a Parquet file then stays as it was. If one of the three files is not a table, its lines
-are merged as git does.
+A contextdb.toml is merged key by key, notes (NAME.notes.csv) place by place. The result is written to OURS, or to FILE. Conflicts
+are written between git's marks, row by row, for a person or the editor to decide; a Parquet file then stays as it was. If one of
+the three files is not a table, its lines are merged as git does.
 
 Exits with 0 if everything merged, with 1 if something is left to decide or lines were merged, with 2 if a file is missing or
 cannot be written.
@@ -28,10 +28,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from contextdb.console import ExitCode, printable
-from contextdb.disk import names_a_table, read_bytes, write_atomic
+from contextdb.disk import NOTES_SUFFIX, names_a_table, read_bytes, write_atomic
 from contextdb.edits.diffing import diff
 from contextdb.edits.diffing.lines import merged_lines
 from contextdb.edits.diffing.markers import with_markers
+from contextdb.edits.diffing.notes_merging import merge_notes
 from contextdb.edits.diffing.toml_merging import merge_toml
 from contextdb.errors import ContextDBError, Fault, Place, SchemaError, TableError, in_quotes, plural, shown
 from contextdb.files.parquet import ParquetSource
@@ -69,6 +70,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     path = Path(arguments.path or arguments.ours)
     raws = [read_bytes(file) for file in (arguments.base, arguments.ours, arguments.theirs)]
     merged = _merged_toml if path.suffix.lower() == ".toml" else _merged_tables
+    merged = _merged_notes if path.name.lower().endswith(NOTES_SUFFIX) else merged
     try:
         raw, tell = merged(path, raws, arguments)
     except Exception as error:  # whatever it is: git would go on with ours alone
@@ -139,6 +141,11 @@ def _merged_toml(path: Path, raws: Raws, arguments: argparse.Namespace) -> Merge
         return ExitCode.FOUND if found.conflicts else ExitCode.OK
 
     return found.with_markers.encode(), tell
+
+
+def _merged_notes(path: Path, raws: Raws, arguments: argparse.Namespace) -> Merged:
+    """Merge three versions of the notes by a table."""
+    return merge_notes(raws, _names(path, arguments), arguments.take), lambda: ExitCode.OK
 
 
 def _merge_lines(path: Path, raws: Raws, arguments: argparse.Namespace, error: Exception) -> ExitCode:

@@ -17,7 +17,7 @@ from contextdb.disk.together import NewFile
 from contextdb.errors import Fault, FileError, Place, SchemaError, shown, some
 from contextdb.files.file_names import alike
 from contextdb.files.toml_text import Path as KeyPath
-from contextdb.files.toml_text import as_toml, dotted
+from contextdb.files.toml_text import as_toml, dotted, plain_numbers
 from contextdb.schema import toml_edit
 from contextdb.schema.sections import schema_to_dict, settings_to_dict
 from contextdb.schema.settings import EMPTY, Schema, TableSettings, read_schema
@@ -246,7 +246,7 @@ def _finest(wanted: Changes) -> Iterator[tuple[KeyPath, object]]:
             inner = {(*key, name): (was.get(name), now.get(name)) for name in {**was, **now}}
             yield from _finest({path: said for path, said in inner.items() if repr(said[0]) != repr(said[1])})  # false is not 0
         else:
-            yield key, now
+            yield key, plain_numbers(now)
 
 
 def _new_conditions(text: str, parts: Mapping[KeyPath, Mapping[str, object]], table: Table) -> dict[KeyPath, dict[str, object]]:

@@ -24,6 +24,15 @@ def as_toml(value: object) -> str:
     return value.isoformat() if isinstance(value, (datetime.date, datetime.time)) else str(value)
 
 
+def plain_numbers(value: object) -> object:
+    """A value with its whole numbers as people write them: 0, not 0.0."""
+    if isinstance(value, Mapping):
+        return {key: plain_numbers(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain_numbers(item) for item in value]
+    return int(value) if isinstance(value, float) and value.is_integer() and abs(value) < 2.0**53 else value
+
+
 def dotted(path: Path) -> str:
     """A path as a header writes it: conditions."Defender.Tags"."""
     return ".".join(key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else as_toml(key) for key in path)

@@ -12,6 +12,7 @@ import contextdb as cdb
 from contextdb.tables.project import load_table
 from contextdb.tables.table import Table
 from tui.model.column_sheet import ColumnSheet, Wrong
+from tui.screens.sheet_dialog import SmallGrid
 
 TOML = """[conditions.speed]  # as the game says
 type = "number"
@@ -204,3 +205,28 @@ def test_enter_after_a_run_of_tabs_goes_to_the_name_of_the_next_column(folder):
         return [column.to_list()[-3:-1] for column in table.columns[:3]]
 
     assert with_editor(folder / "t.csv", script, (120, 36)) == [["hp", "mp"], ["", ""], ["int", ""]]
+
+
+def test_two_lines_stand_over_the_rows_for_no_fact_leaves_any_here(folder):
+    async def script(app, pilot):
+        await press(pilot, "alt+j", "e")
+        return app.screen.query_one(SmallGrid).look.header_lines
+
+    assert with_editor(folder / "t.csv", script, (160, 48)) == ("name", "both")
+
+
+def test_numbers_are_written_as_people_write_them(table, folder):
+    from contextdb.edits.schema_file import write_schema
+
+    cells = [
+        (1, "Least", "0"),
+        (1, "Most", "7"),
+        (1, "Weight", "2"),
+        (2, "Weight", "0.5"),
+        (4, "Type", "number"),
+        (4, "Least", "1"),
+    ]
+    write_schema(table, changed(table, *cells))
+    toml = (folder / "contextdb.toml").read_text()
+    assert {"min = 0.0", "max = 7", "weight = 2", "weight = 0.5"} <= set(toml.splitlines())  # min was so, and is not touched
+    assert 'Slots = { type = "number", min = 1 }' in toml

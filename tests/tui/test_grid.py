@@ -55,7 +55,7 @@ def sheet_of(columns: dict[str, list[str]] = ROWS, enabled: str | None = "Enable
     return Sheet(Table.build("t", texts, declared, TableSettings("t", enabled=enabled if enabled in columns else None)))
 
 
-def look_of(sheet: Sheet, width: int = 80, height: int = 10, **more: object) -> Look:
+def look_of(sheet: Sheet, width: int = 80, height: int = 26, **more: object) -> Look:
     made = layout([10] * sheet.shape[1], 1, sheet.table.n_rows, width)
     seen = {"left": 0, "top": 0, "is_in_test_row": False, "has_focus": True} | more
     return Look(made, height, **seen)
@@ -116,6 +116,22 @@ def test_three_lines_of_headers_say_name_type_unit_and_how_many_rows_the_fact_le
         "     asset    │ m/s      │ bool     │ enum     │ enabled  │",
         "              │          │ leaves 2 │          │          │",
     ]
+
+
+def test_in_a_low_window_one_line_of_headers_says_the_type_or_what_the_fact_leaves():
+    sheet = sheet_of()
+    sheet.set_fact("hit", "True")
+    assert lines(sheet, height=20)[:2] == [
+        "#    Asset   ↕│ speed   ↕│ hit     ↕│ gait    ↕│ Enabled ↕│",
+        "     asset    │ m/s      │ leaves 2 │ enum     │ enabled  │",
+    ]
+
+
+def test_a_narrow_column_says_its_type_where_its_unit_has_no_room():
+    declared = Schema(conditions=conditions_from_dict({"speed": {"type": "number", "unit": "metres per second"}}))
+    texts = [TextColumn.of("Asset", ["walk"]), TextColumn.of("speed", ["0..2"])]
+    sheet = Sheet(Table.build("t", texts, declared, TableSettings("t")))
+    assert lines(sheet)[1] == "     asset    │ number   │"
 
 
 def test_each_mark_says_without_colour_what_a_row_or_a_cell_is():
@@ -186,7 +202,7 @@ def test_a_selection_is_not_painted_while_the_cursor_is_in_the_test_row():
     sheet.go(1, 2, extend=True)
     painter, look = painter_of(sheet), look_of(sheet, is_in_test_row=True)
     assert {ground for _, ground, _ in parts(painter.line(3, look))} == {"gutter", "frozen", "row"}
-    assert ("cursor" in {s.style.meta["ground"] for s in painter.line(9, look) if s.style}) is True
+    assert ("cursor" in {s.style.meta["ground"] for s in painter.line(look.foot, look) if s.style}) is True
 
 
 def test_a_disabled_row_is_struck_but_what_cannot_be_read_in_it_stays_marked():

@@ -221,3 +221,13 @@ def test_a_message_that_is_longer_than_the_line_is_seen_whole(path):
         return "Ctrl+Z takes it back." in long, "Ctrl+Z" in screen_text(app), "Done." in screen_text(app)
 
     assert with_editor(path, script) == (True, False, True)
+
+
+def test_what_was_said_in_one_tab_is_gone_in_the_next(path):
+    async def script(app, pilot):
+        await press(pilot, "ctrl+c")
+        before = said(app)
+        await press(pilot, "alt+5")
+        return before, said(app)
+
+    assert with_editor(path, script) == ("Copied 1 × 1.", "")

@@ -40,10 +40,18 @@ def test_notes_and_colours_are_lines_that_merge_and_no_table(path):
     assert sorted(name for name, _ in table_files(path.parent, load_table(path).schema)) == ["other", "t"]
 
 
-@pytest.mark.parametrize("text", ["", "a,b\n1,2\n", 'Asset,Column,Note,Colour\n"x\n', "Asset,Column,Note,Colour\nb,,,mauve\n"])
+@pytest.mark.parametrize("text", ["", "a,b\n1,2\n", 'Asset,Column,Note,Colour\n"x\n'])
 def test_a_file_of_notes_that_is_none_says_nothing(path, text):
     notes_path(path).write_text(text)
     assert Notes.beside(path) == Notes()
+
+
+def test_a_colour_that_there_is_not_colours_nothing_and_stays_in_the_file(path):
+    notes_path(path).write_text("Asset,Column,Note,Colour\nb,,,mauve\nb,speed,ask Ana,red\n")
+    assert not Notes.beside(path).colours
+    Notes.kept(path).with_note("c", "speed", "x").with_colour(["c"], "red").write(path)
+    told = "Asset,Column,Note,Colour\nb,,,mauve\nb,speed,ask Ana,red\nc,,,red\nc,speed,x,\n"
+    assert notes_path(path).read_text() == told
 
 
 @pytest.mark.parametrize(
@@ -86,8 +94,8 @@ def test_the_editor_writes_a_note_shows_it_and_takes_it_away(path):
     assert "▪2" in seen
     assert told == "Note kept."
     assert "marked amber" in screen
-    assert marks == Notes({("b", "speed"): "hello"}, {"b": "amber"})
-    assert after == Notes({}, {"b": "amber"})
+    assert marks == Notes({("b", "speed"): "hello"}, {("b", ""): "amber"})
+    assert after == Notes({}, {("b", ""): "amber"})
     assert not is_modified
 
 

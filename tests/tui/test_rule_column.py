@@ -32,7 +32,7 @@ def test_a_rule_that_cannot_be_read_is_marked_and_told(path):
     screen = with_editor(path, script, (120, 24))
     assert "!spead > 3" in screen
     assert 'there is no condition "spead"' in screen
-    assert "rule" in screen.splitlines()[4]
+    assert "rule" in screen.splitlines()[3]
 
 
 def test_a_row_that_its_rule_excludes_is_not_lit_and_the_rule_is_marked(path):

@@ -60,6 +60,24 @@ def test_a_screen_that_is_made_smaller_and_larger_stays_what_it_is(path, scene):
     assert now == was
 
 
+def test_in_a_terminal_of_80_columns_and_24_lines_five_columns_are_whole_and_fourteen_rows_are_seen(path):
+    async def script(app, pilot):
+        return screen_text(app).splitlines()
+
+    lines = with_editor(path, script)
+    rows = [line for line in lines if line[:2].strip().isdigit()]
+    assert len(rows) >= 14
+    assert all(line.count("│") >= 5 for line in rows)
+    assert "Commands" in lines[0]
+
+
+def test_in_a_terminal_of_160_columns_all_nine_columns_are_whole(path):
+    async def script(app, pilot):
+        return screen_text(app).splitlines()
+
+    assert next(line for line in with_editor(path, script, (160, 48)) if line.startswith(" 1 ")).count("│") == 9
+
+
 def test_in_a_terminal_of_20_columns_and_8_lines_there_are_names_rows_the_test_row_and_keys(path):
     async def script(app, pilot):
         return screen_text(app).splitlines()

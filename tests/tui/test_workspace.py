@@ -9,6 +9,7 @@ import pytest
 
 from contextdb.errors import ContextDBError, SchemaError
 from tui.model.beginning import Beginning
+from tui.model.columns_shown import ColumnsShown
 from tui.model.workspace import Workspace
 
 RAW = "Asset,hit\nwalk,True\n"
@@ -157,3 +158,12 @@ def test_a_contextdb_toml_that_breaks_while_tables_are_open_is_told_and_loses_no
     assert sorted(space.files) == ["a", "b"]
     assert space.unsaved == ["a"]
     space.close()
+
+
+def test_a_table_that_is_held_elsewhere_keeps_its_columns_when_it_is_taken_over(folder):
+    holder, space = Workspace(folder), Workspace(folder)
+    holder.session("a")
+    hidden = ColumnsShown(frozenset(["hit"]))
+    space.session("a").sheet.show_columns(hidden)
+    assert space.session("a").is_read_only
+    assert space.reopen("a", takes_over=True).sheet.columns_shown == hidden

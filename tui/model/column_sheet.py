@@ -35,7 +35,7 @@ WORDS = (CONDITION, OUTPUT, ASSET, RULE, *get_args(PlainJob), DECLARED)
 """What a row can be; "declared": contextdb.toml tells of the condition, and the table has no column of it."""
 HINTS = {
     NAME: "name", IS: "job", TYPE: "type", "Unit": "m/s", "Least": "bound", "Most": "bound", "Values": "names",
-    "Default": "output", "Weight": "number", "Mirror": "pairs", "Expression": "how a fact is computed", "Description": "text",
+    "Default": "output", "Weight": "number", "Mirror": "pairs", "Expression": "computed as", "Description": "text",
 }  # fmt: skip
 """The columns of the sheet, and what is below their names."""
 _FORM = {

@@ -31,6 +31,8 @@ N_NAME_LINES = 3
 _JOINT = re.compile(r"(?<=[_.\-/ ])|(?<=[a-z0-9])(?=[A-Z])")
 """Where a name may go on in the next line: behind a sign that joins words, and before a capital."""
 
+JOINER = "\u200d"
+"""Makes one sign of two; `tui.drawn` shows the first of them."""
 _SHOWN = {ord(c): s for c, s in zip("\n\r\t", "⏎⏎⇥", strict=True)}
 
 
@@ -67,9 +69,11 @@ class Layout:
 
     @property
     def extent(self) -> int:
-        """How far one may scroll, with the window: so far that the last column is whole and the first one seen begins in full."""
+        """How far one may scroll, with the window: so far that the last column is whole and the first one seen begins in full.
+
+        A table that is seen whole is no wider than itself, for the window becomes narrower with a scroll bar beside it."""
         last = self.scroll_to(len(self.widths) - 1, 0)
-        return max(self.total, self.width + last)
+        return max(self.total, self.width + last) if last else self.total
 
     def visible(self, scroll: int) -> range:
         """The columns not frozen that are in the window, at least in part, when it is scrolled to the right by so many cells."""
@@ -176,7 +180,7 @@ def cut_middle(text: str, width: int, n_shared: int = 0) -> str:
 def cut(text: str, width: int) -> str:
     """The text in exactly so many cells; a longer one ends in "…". Line ends and tabs are shown by signs, other controls by "�"."""
     if not text.isprintable():
-        text = "".join(c if c.isprintable() else "�" for c in text.translate(_SHOWN))
+        text = "".join(c if c.isprintable() or c == JOINER else "�" for c in text.translate(_SHOWN))
     if cell_len(text) <= width:
         return set_cell_size(text, width)
     return set_cell_size(text, width - 1) + "…" if width > 1 else "…"[:width]

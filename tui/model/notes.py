@@ -10,28 +10,32 @@ its asset, so the same is said of all rows of one asset.
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 from contextdb.disk import NOTES_SUFFIX, write_atomic
+from contextdb.edits.diffing.notes_merging import FIELDS, Spot, written
 from contextdb.errors import ContextDBError, Fault, FileError, Place
 from contextdb.files.texts import read_texts
 
 COLOURS = ("red", "amber", "green", "blue", "violet")
-FIELDS = ("Asset", "Column", "Note", "Colour")
 
 
 @dataclass(frozen=True)
 class Notes:
     """What people wrote at the edge of a table."""
 
-    texts: Mapping[tuple[str, str], str] = field(default_factory=dict)
+    texts: Mapping[Spot, str] = field(default_factory=dict)
     """Asset and column to note."""
-    colours: Mapping[str, str] = field(default_factory=dict)
-    """Asset to colour."""
+    words: Mapping[Spot, str] = field(default_factory=dict)
+    """Asset and column to what is said of its colour: also of one that there is not, and of a cell, which has none here."""
+
+    @cached_property
+    def colours(self) -> Mapping[str, str]:
+        """Asset to colour."""
+        return {asset: word for (asset, column), word in self.words.items() if not column and word in COLOURS}
 
     @classmethod
     def beside(cls, table: Path) -> Notes:
@@ -56,7 +60,7 @@ class Notes:
             raise FileError(Fault("this is no file of notes.", f"the columns {', '.join(FIELDS)}", place=Place(str(path))))
         lines = list(zip(*(columns[name] for name in FIELDS), strict=True))
         texts = {(asset, column): note for asset, column, note, _ in lines if note.strip()}
-        return cls(texts, {asset: colour for asset, column, _, colour in lines if not column and colour in COLOURS})
+        return cls(texts, {(asset, column): colour for asset, column, _, colour in lines if colour.strip()})
 
     def with_note(self, asset: str, column: str, text: str) -> Notes:
         """With another note on a cell; an empty one takes it away."""
@@ -65,19 +69,14 @@ class Notes:
 
     def with_colour(self, assets: list[str], colour: str) -> Notes:
         """With another colour of some rows; an empty one takes it away."""
-        others = {asset: one for asset, one in self.colours.items() if asset not in assets}
-        return replace(self, colours=others | (dict.fromkeys(assets, colour) if colour else {}))
+        rows = [(asset, "") for asset in assets]
+        others = {spot: word for spot, word in self.words.items() if spot not in rows}
+        return replace(self, words=others | (dict.fromkeys(rows, colour) if colour else {}))
 
     def write(self, table: Path) -> None:
         """Write the file; raises FileError where the disk refuses."""
-        lines = {(asset, column): [note, ""] for (asset, column), note in self.texts.items()}
-        for asset, colour in self.colours.items():
-            lines.setdefault((asset, ""), ["", ""])[1] = colour
-        out = io.StringIO()
-        writer = csv.writer(out, lineterminator="\n")
-        writer.writerow(FIELDS)
-        writer.writerows([*place, *said] for place, said in sorted(lines.items()))
-        write_atomic(notes_path(table), out.getvalue().encode())
+        spots = {**self.texts, **self.words}
+        write_atomic(notes_path(table), written({spot: (self.texts.get(spot, ""), self.words.get(spot, "")) for spot in spots}))
 
 
 def notes_path(table: Path) -> Path:

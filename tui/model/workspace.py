@@ -95,10 +95,13 @@ class Workspace:
 
     def reopen(self, name: str, takes_over: bool = False) -> Session:
         """Let go of a table and open it again; errors as of `Session`."""
-        if (session := self.sessions.pop(name, None)) is not None:
-            session.close()
-        self.sessions[name] = Session(self.files[name], takes_over)
-        return self.sessions[name]
+        before = self.sessions.pop(name, None)
+        if before is not None:
+            before.close()
+        self.sessions[name] = session = Session(self.files[name], takes_over)
+        if before is not None:  # of one that is read-only nothing was kept
+            session.sheet.show_columns(before.sheet.columns_shown)
+        return session
 
     def save_as(self, name: str, other: str, suffix: str = ".csv") -> None:
         """Write a table, its unsaved edits with it, as another table of the folder; the old file stays as it was last saved.

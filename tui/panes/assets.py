@@ -10,6 +10,7 @@ import numpy as np
 from textual import on
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
+from textual.containers import Container
 from textual.geometry import Size
 
 from contextdb.cells.facts import read_fact_text
@@ -53,7 +54,12 @@ class _Place:
 class AssetsPane(Pane):
     """A table as a spreadsheet, with the test row at its foot."""
 
-    DEFAULT_CSS = "AssetsPane { layout: vertical; & Grid { height: 1fr; } & #chips { display: none; } & #live { display: none; } }"
+    DEFAULT_CSS = """
+    AssetsPane {
+        layout: vertical;
+        & Grid { height: 1fr; } & #chips { display: none; } & #live { display: none; } & #over { height: 0; }
+    }
+    """
     BINDINGS: ClassVar[list[BindingType]] = [Binding("f6", "back", "Back to the table", show=False)]
 
     def __init__(self, sheet: Sheet, clipboard: Clipboard) -> None:
@@ -74,6 +80,7 @@ class AssetsPane(Pane):
         yield Grid(self.sheet)
         yield FilterBar()
         yield FindBar()
+        yield Container(id="over")  # of the editor: what it comes into is painted again, so that must not be the grid's
 
     def on_mount(self) -> None:
         self._show_cell()
@@ -141,8 +148,11 @@ class AssetsPane(Pane):
 
     @on(Grid.Moved)
     def _show_cell(self) -> None:
+        self.why_pane.follow(self.sheet)
+        self._show_place()
+
+    def _show_place(self) -> None:
         sheet = self.sheet
-        self.why_pane.follow(sheet)
         row, column = sheet.cursor
         column = self.grid.field
         header, condition = sheet.header(column), sheet.fact_of(column)
@@ -182,7 +192,7 @@ class AssetsPane(Pane):
             is_typing=event.is_typing,
             open_list=event.opens_list,
         )
-        self.mount(editor)
+        self.query_one("#over").mount(editor)
         self._place_editor()
         editor.focus()
 
@@ -334,7 +344,8 @@ class AssetsPane(Pane):
             self.grid.changed()
         else:
             self.grid.asked_again()
-        self._show_cell()
+        self.why_pane.follow_soon(sheet)
+        self._show_place()
 
     def show_live(self, said: Said | None, items: Sequence[Item] = ()) -> None:
         """Say how it stands with the game; None: none is followed."""

@@ -15,6 +15,8 @@ from tui.screens.nearest import STATES, row_state
 
 WIDE = 140
 """The pane stands beside the table on screens of so many columns; on others F12 opens a dialog."""
+OFTEN_S = 0.2
+"""While a game runs the pane is written again so often; nobody reads faster, and it costs more than all the rest."""
 NO_FACTS = "The test row is empty: F6 goes there, F9 loads a context."
 
 
@@ -30,6 +32,11 @@ class WhyPane(VerticalScroll, can_focus=False):
     }
     """
 
+    def __init__(self) -> None:
+        super().__init__()
+        self._waiting: ShownTable | None = None
+        """What is shown when its time comes."""
+
     def compose(self) -> ComposeResult:
         yield Static()
 
@@ -43,6 +50,17 @@ class WhyPane(VerticalScroll, can_focus=False):
         self.toggle_class("-open")
         self.follow(sheet)
 
+    def follow_soon(self, sheet: ShownTable) -> None:
+        """Show the row of the cursor, a few times a second."""
+        if self.is_open and self._waiting is None:
+            self.set_timer(OFTEN_S, self._follow_now)
+        self._waiting = sheet if self.is_open else None
+
+    def _follow_now(self) -> None:
+        waiting, self._waiting = self._waiting, None
+        if waiting is not None:
+            self.follow(waiting)
+
     def follow(self, sheet: ShownTable) -> None:
         """Show the row of the cursor."""
         if not self.is_open:
@@ -54,7 +72,8 @@ class WhyPane(VerticalScroll, can_focus=False):
             why, outputs = why_row(sheet.query, sheet.table, row), sheet.table.settings.outputs
             gives = [f"{name} = {sheet.table.text(row, name) or '–'}" for name in outputs] if why.is_picked else []
             said = _said(why, gives)
-        self.query_one(Static).update(said)
+        static = self.query_one(Static)
+        static.update(said, layout=said.get_height({}, max(static.size.width, 1)) != static.size.height)
 
 
 def _said(why: RowWhy, gives: Sequence[str]) -> Content:

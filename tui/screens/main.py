@@ -11,7 +11,9 @@ from rich.text import Text
 from textual import on
 from textual.app import ComposeResult
 from textual.binding import BindingType
+from textual.reactive import Reactive
 from textual.screen import Screen
+from textual.widget import Widget
 from textual.widgets import ContentSwitcher, Static
 
 from contextdb.disk import write_atomic
@@ -68,6 +70,8 @@ COLUMN_MENU = (
     "rename-column", "rename-role", "add-column", "column-left", "column-right", "delete-columns",
 )  # fmt: skip
 """What the right button of the mouse offers."""
+WITH_TOOLS = 30
+"""On a screen of fewer lines the tools give way to the rows; the palette, where all of them are too, stands behind the tabs."""
 TOOLS = ("add-column", "blueprints", "import", "export", "refresh", "autofit", "history", "palette")
 
 
@@ -88,6 +92,8 @@ class MainScreen(Screen[None]):
     """
 
     app: Editor
+    focused: Reactive[Widget | None] = Reactive(None, repaint=False)
+    """What has the keys. Of the screen itself nothing looks otherwise then: Textual would paint all of it again."""
 
     def __init__(self, workspace: Workspace, name: str) -> None:
         super().__init__()
@@ -142,6 +148,9 @@ class MainScreen(Screen[None]):
         self.set_interval(LOOK_EVERY_S, self.care.look)
         self._opened()
 
+    def on_resize(self) -> None:
+        self._show_bars()
+
     def on_unmount(self) -> None:
         self.coverage.cancel()
         self.following.close()
@@ -162,6 +171,9 @@ class MainScreen(Screen[None]):
         mark = " *" if self.session.sheet.is_modified else ""
         items = [Item("open", f"{self.table_name}{mark}", is_strong=True)]
         items += [Item(tab, BY_ID[tab].label, is_on=tab == self.tab) for tab in self.tabs]
+        has_tools = self.size.height >= WITH_TOOLS
+        self.query_one("#tools", Bar).display = has_tools
+        items += [] if has_tools else [Item("palette", BY_ID["palette"].label)]
         table = self.session.sheet.table
         about = f"{plural(table.n_rows, 'row')} · {plural(len(table.columns), 'column')}"
         self.query_one("#tabs", Bar).show(items, about)
@@ -174,11 +186,13 @@ class MainScreen(Screen[None]):
         status = self.query_one(StatusLine)
         is_short = is_quiet and status.has_room(text)
         status.show(text if is_short else "")
-        if (text, level) != self._said:
-            self._said = (text, level)
-            said = self.query_one("#said", Static)
+        if (text, level) == self._said:
+            return
+        self._said, said = (text, level), self.query_one("#said", Static)
+        if not is_short:
+            said.update(Text(text if is_quiet else f"! {text}"))
+        if not is_short or said.display:
             said.set_classes("" if is_short else f"-{level}")
-            said.update(Text("" if is_short else text if is_quiet else f"! {text}"))
 
     @on(Told)
     def _told(self, event: Told) -> None:
@@ -230,6 +244,8 @@ class MainScreen(Screen[None]):
         self._switch_to(name)
 
     def _switch_to(self, name: str) -> None:
+        if name != self.tab:
+            self.say("")  # it was of the tab that is left
         self.query_one("#panes", ContentSwitcher).current = name
         self._show_bars()
         if name != "assets":

@@ -14,6 +14,7 @@ from textual.message import Message
 from textual.strip import Strip
 from textual.widget import Widget
 
+from tui.contrast import readable
 from tui.model.layout import cut
 
 
@@ -89,7 +90,7 @@ class Bar(Widget):
         return self._of("bar--hover" if item.command and item.command == self._hovered else "bar--item")
 
     def _of(self, name: str) -> Style:
-        return self.get_component_rich_style(name)
+        return readable(self.get_component_rich_style(name))
 
     def _item_at(self, x: int) -> Item | None:
         end = 0
@@ -141,7 +142,7 @@ class StatusLine(Widget):
 
     def render_line(self, y: int) -> Strip:
         left, right = self._texts
-        width, style = self.size.width, self.rich_style
+        width, style = self.size.width, readable(self.rich_style)
         if not right:
             return Strip([Segment(cut(f" {left}", width), style)])
         room = max(width - cell_len(right) - 2, 0)
@@ -176,7 +177,7 @@ class CellLine(Widget):
 
     def render_line(self, y: int) -> Strip:
         place, text, fault, about = self._parts
-        plain = self.get_component_rich_style("cell-line--about")
+        plain = self._of("about")
         segments = [
             Segment(f" {cut(place, min(cell_len(place), self.size.width // 2))}  ", self._of("place")),
             Segment(cut(text, min(cell_len(text), self.size.width)) if text else "", self._of("text")),
@@ -191,4 +192,4 @@ class CellLine(Widget):
         return strip.adjust_cell_length(self.size.width, plain)
 
     def _of(self, part: str) -> Style:
-        return self.get_component_rich_style(f"cell-line--{part}")
+        return readable(self.get_component_rich_style(f"cell-line--{part}"))

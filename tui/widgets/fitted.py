@@ -5,13 +5,14 @@ from __future__ import annotations
 from rich.cells import cell_len, set_cell_size
 
 from contextdb.console import printable
+from tui.model.layout import JOINER
 
 
 def fitted(text: str, width: int, to_right: bool = False) -> str:
     """The text in just so many terminal cells; wide characters take two."""
     if width <= 0:
         return ""
-    clean = printable(text[: 4 * width + 8])
+    clean = JOINER.join(map(printable, text[: 4 * width + 8].split(JOINER)))
     n = cell_len(clean)
     if n > width:
         return set_cell_size(clean, width - 1) + "…"

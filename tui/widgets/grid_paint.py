@@ -1,4 +1,4 @@
-"""Paint the lines of a grid: three lines of headers (one in a low window), the rows on the screen, and the test row at the foot.
+"""Paint the lines of a grid: lines of headers (fewer in a low window), the rows on the screen, and the test row at the foot.
 
 Only what is seen is read and painted, so that a line costs the same in a table of ten rows and of a hundred thousand.
 """
@@ -22,9 +22,9 @@ from tui.model.window import MARKS, PICKED, PLAYS, Window
 
 LOWEST = 8
 """In a window of fewer lines only the names of the columns stand over the rows."""
-LOW, ROOMY = 12, 20
-"""In a window of fewer lines than the first names are not wrapped. In one of fewer than the second, wrapped names leave one line
-for the type, or for what the fact of the test row leaves."""
+LOW, ROOMY = 12, 24
+"""In a window of fewer lines than the first names are not wrapped. In one of fewer than the second one line says the type, or what
+the fact of the test row leaves; in others both have a line."""
 AT_LEFT, AT_RIGHT = "«", "»"
 """Stand at an edge of the window behind which cells of the row fail."""
 HIDES = "║"
@@ -46,11 +46,12 @@ StyleOf = Callable[[str, str], Style]
 
 
 @lru_cache(maxsize=256)
-def header_lines(height: int, n_names: int, is_wrapped: bool = False) -> tuple[str, ...]:
-    """What the lines over the rows say in a window so high, where the longest name takes `n_names` lines."""
+def header_lines(height: int, n_names: int, has_facts: bool = True) -> tuple[str, ...]:
+    """What the lines over the rows say in a window so high, where the longest name takes `n_names` lines; without a test row no
+    fact leaves rows."""
     if height < LOWEST:
         return ("name",)
-    says = ("both",) if is_wrapped and (height < LOW or (n_names > 1 and height < ROOMY)) else ("kind", "leaves")
+    says = ("both",) if height < ROOMY or not has_facts else ("kind", "leaves")
     return (*["name"] * (n_names if height >= LOW else 1), *says)
 
 
@@ -90,7 +91,7 @@ class Look:
     @property
     def header_lines(self) -> tuple[str, ...]:
         """What each of the lines over the rows says."""
-        return header_lines(self.height, self.n_names, self.is_wrapped)
+        return header_lines(self.height, self.n_names, self.has_test_row)
 
     @property
     def sort_line(self) -> int:
@@ -209,8 +210,8 @@ class Painter:
 
     def _kind(self, column: int, width: int, ground: str) -> Iterator[Segment]:
         header = self._header(column)
-        kind = f"{header.kind} · {header.unit}" if header.unit else header.kind
-        kind = kind if cell_len(kind) < width else header.unit or header.kind
+        forms = (f"{header.kind} · {header.unit}", header.unit) if header.unit else ()
+        kind = next((form for form in forms if cell_len(form) < width), header.kind)
         yield Segment(" " + cut(kind, width - 1), self.style(ground, "muted"))
 
     def _leaves(self, column: int, width: int, ground: str) -> Iterator[Segment]:

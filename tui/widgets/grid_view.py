@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from typing import ClassVar
+from typing import ClassVar, Self
 
 from rich.cells import cell_len
 from rich.style import Style
@@ -17,6 +17,7 @@ from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
 from contextdb.schema.shapes import CHANCE
+from tui.contrast import readable
 from tui.model.alignment import MOST_ALIGNED, indented
 from tui.model.layout import COMPACT, MOST_TEXTS, WIDEST, Layout, fitted_width, layout, name_lines, name_width
 from tui.model.sheet import Sheet
@@ -100,6 +101,10 @@ class GridView(ScrollView, inherit_bindings=False):
         self._fields: tuple[str, ...] = ()
         """The fields of the test row behind the columns, that the layout is of."""
         self._extra: int | None = None
+        self._painted: dict[int, Strip] = {}
+        """The lines that were painted last, where the grid was then."""
+        self._painted_at: tuple[object, ...] = ()
+        self._had_focus = False
 
     def open(self, sheet: Sheet) -> None:
         """Show another table."""
@@ -135,7 +140,21 @@ class GridView(ScrollView, inherit_bindings=False):
         self._layout = None
         self._fit()
         self.show_cursor(is_after_edit=True)
-        self.refresh()
+        self._repaint()
+
+    def _repaint(self) -> None:
+        """Paint the lines that look otherwise than they did."""
+        look = self.look
+        if not self.is_mounted or self._place(look) != self._painted_at:
+            self.refresh()
+            return
+        others = [y for y in range(look.height) if self._painted.get(y) != self._painter.line(y, look)]
+        if others:
+            self.refresh(*(Region(0, y, look.layout.width, 1) for y in others))
+
+    @staticmethod
+    def _place(look: Look) -> tuple[object, ...]:
+        return look.layout.width, look.height, look.left, look.top
 
     def asked_again(self) -> None:
         """Show the answers to other facts. Only lines that look otherwise are painted; cells that have just begun to fail flash."""
@@ -253,7 +272,11 @@ class GridView(ScrollView, inherit_bindings=False):
         return len(self.sheet.view) if self.is_in_new_row else self.sheet.cursor[0]
 
     def render_line(self, y: int) -> Strip:
-        return self._painter.line(y, self.look)
+        look = self.look
+        if (place := self._place(look)) != self._painted_at:
+            self._painted, self._painted_at = {}, place
+        self._painted[y] = strip = self._painter.line(y, look)
+        return strip
 
     def notify_style_update(self) -> None:
         self._styles.clear()
@@ -319,7 +342,8 @@ class GridView(ScrollView, inherit_bindings=False):
             over = self.get_component_rich_style(f"grid--{meant}")
             plain = Style(bgcolor=under.bgcolor, bold=under.bold, underline=under.underline)
             said = Style(color=over.color, bold=over.bold or None, underline=over.underline or None, strike=over.strike or None)
-            self._styles[ground, meant] = plain + said
+            whole = plain + said
+            self._styles[ground, meant] = whole if meant == "line" else readable(whole)
         return self._styles[ground, meant]
 
     def _fit(self) -> None:
@@ -333,11 +357,24 @@ class GridView(ScrollView, inherit_bindings=False):
         self._fit()
         self.show_cursor(is_after_edit=True)
 
-    def on_focus(self) -> None:
-        self.refresh()
+    def focus(self, scroll_visible: bool = True) -> Self:
+        """Take the keys; nothing is painted before they come."""
+        self.app.call_later(self._take_keys, scroll_visible)
+        return self
 
-    def on_blur(self) -> None:
-        self.refresh()
+    def _take_keys(self, scroll_visible: bool) -> None:
+        if self.is_attached:
+            self.screen.set_focus(self, scroll_visible=scroll_visible)
+
+    def refresh(self, *regions: Region, repaint: bool = True, layout: bool = False, recompose: bool = False) -> Self:
+        """Paint again. Textual asks for all when the keys come or go, and then the line of the cursor alone looks otherwise."""
+        is_all = not regions and repaint and not (layout or recompose)
+        if is_all and self.is_mounted and self.has_focus != self._had_focus:
+            self._had_focus = self.has_focus
+            look = self.look
+            y = look.foot if self.is_in_test_row else look.n_headers + self._cursor_row - look.top
+            regions = (Region(0, y, look.layout.width, 1),)
+        return super().refresh(*regions, repaint=repaint, layout=layout, recompose=recompose)
 
     def show_cursor(self, is_after_edit: bool = False) -> None:
         """Scroll so that the cursor, or the corner that Shift moves, is seen; behind another tab once it is seen again. After an

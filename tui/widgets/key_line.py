@@ -14,6 +14,7 @@ from textual.strip import Strip
 from textual.widget import Widget
 
 from tui.commands import key_name
+from tui.contrast import readable
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +76,7 @@ class KeyLine(Widget):
             x += key.width
 
     def render_line(self, y: int) -> Strip:
-        key_style, label_style = (self.get_component_rich_style(f"key-line--{part}") for part in ("key", "label"))
+        key_style, label_style = (readable(self.get_component_rich_style(f"key-line--{part}")) for part in ("key", "label"))
         segments = [Segment(" ", label_style)]
         for _, key in self._fitting():
             segments += [Segment(key.name, key_style), Segment(f" {key.label}  ", label_style)]

@@ -77,7 +77,7 @@ class Editor:
 
 
 SCREENS = (
-    Screen(xterm("f1"), "How a cell is written", "HelpDialog"),
+    Screen(xterm("f1"), "How a cell is written", "HelpPage"),
     Screen(alt("j"), "E edit all", "ColumnsDialog LineList"),
     Screen(alt("j") + "e", "Tab right", "ColumnSheetDialog", leaves=alt("x")),
     Screen(alt("d"), "N not", "ValuesDialog LineList"),

@@ -62,7 +62,7 @@ SECTIONS = {
     "The table is open elsewhere": ("HeldDialog",),
     "The file was changed on disk": ("ConflictsDialog",),
     "Panes of the debugger": ("Bars", "Channels", "Stage"),
-    "Help of the debugger": ("DebugHelp",),
+    "Help of the debugger": ("HelpPage", "DebugHelp"),
     "The debugger before a session is read": ("WaitingScreen",),
 }
 """The widgets of each section; those of the commands and of the debugger's list have theirs."""

@@ -78,8 +78,8 @@ class AutofillDialog(Dialog[Autofill]):
     """Fill the table from its clips."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("a", "take(True)", "All", show=False),
-        Binding("e", "take(False)", "Empty", show=False),
+        Binding("a", "take(True)", "Fill all cells", show=False),
+        Binding("e", "take(False)", "Fill empty cells", show=False),
     ]
     DEFAULT_CSS = """
     AutofillDialog {

@@ -128,7 +128,7 @@ def _stopped(own, x, z, y, most_accel, dt, to):
     """Where a foot that is locked at a place comes to rest, its offset to that and its speed written: there and at once, but for
     what it is too fast to lose in a step as joints lose it in the clips."""
     left, ahead = x - own[SHOWN], z - own[SHOWN + 2]
-    way = math.hypot(left, ahead)
+    way = flat_length(left, ahead)
     over = way / dt - STEP_S * most_accel if dt > 0.0 else 0.0
     if over <= 0.0:
         to[SPEED], to[SPEED + 2] = 0.0, 0.0

@@ -358,7 +358,7 @@ def fastest(parents, offsets, places, rotations, positions, root, step, dt, to):
     shown = np.empty((n, j, 3))
     for frame in range(n):
         turns[:] = rotations[frame]
-        x, z, heading = root[frame, 0], root[frame, 1], root[frame, 2]
+        x, z, heading = three(root, frame)
         place_whole(parents, offsets, places, turns, positions[frame], x, z, heading, moved, shown[frame], world)
     for frame in range(n - 2 * step):
         to[frame] = sharpest(shown[frame], shown[frame + step], shown[frame + 2 * step], step * dt)
@@ -527,7 +527,7 @@ def too_high(positions, leg, toe, place, along_x, along_z, straight, raised):
     over = math.sqrt(x * x + y * y + z * z) - now
     if over <= 0.0:
         return 0.0
-    reach = now + over / math.sqrt(1.0 + (over / room) ** 2) if room > 0.0 else now
+    reach = now + over * room / math.sqrt(room * room + over * over) if room > 0.0 else now
     return y - math.sqrt(max(reach * reach - x * x - z * z, 0.0))
 
 

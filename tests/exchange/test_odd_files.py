@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 import python_calamine as calamine
+from test_dmn_rules import decision
 from test_workbooks import book, raw_of, read_book, refused, texts, told
 
 from contextdb.columns import TextColumn
@@ -14,6 +15,7 @@ from contextdb.errors import ContextDBError, TableError, in_quotes
 from contextdb.exchange import xlsx_scan
 from contextdb.exchange.formats import FORMATS, ReadOptions, read, write
 from contextdb.exchange.proposals import propose_type
+from contextdb.schema.sections import settings_to_dict
 from contextdb.tables.table import Table
 
 OLD = Path(__file__).parent / "old.xls"
@@ -121,3 +123,46 @@ def test_a_day_that_no_calendar_has_stays_as_it_is_written_and_bounds_nothing():
     reading = read(told_of.encode(), "x.dmn")
     assert texts(reading)["day"] == ["2024-02-30..2024-03-01"]
     assert f"the allowed values {in_quotes(day)} are not kept" in told(reading)
+
+
+def test_a_long_fallback_of_a_workbook_comes_back():
+    names = [f"output number {i}" for i in range(12)]
+    fallback = {"asset": "nothing", "outputs": dict.fromkeys(names, "7")}
+    columns = {"Asset": ["a"], **{name: ["1"] for name in names}}
+    table = Table.from_columns(columns, settings={"outputs": names, "fallback": fallback}, name="t")
+    again = read(write(table, FORMATS["xlsx"])[0], "t.xlsx").schema
+    assert again is not None
+    assert settings_to_dict(again.tables["t"]) == settings_to_dict(table.settings) | {"asset": "Asset"}
+
+
+def test_dmn_says_what_it_leaves_out_of_priorities_rules_and_assumptions():
+    conditions = {name: {"type": "number", "min": 0, "max": 9} for name in ("speed", "limit")}
+    columns = {"Asset": ["a", "b"], "speed": ["1", "2"], "Prio": ["1", "2"], "When": ["limit > 3", ""]}
+    settings = {"policy": "priority", "priority": "Prio", "when": "When", "assume": ["speed < 8"]}
+    said = "\n".join(map(str, write(Table.from_columns(columns, conditions, settings), FORMATS["dmn"])[1]))
+    for what in ("the priorities are an output", "its rules become an output", "assume is not kept"):
+        assert what in said
+
+
+def test_dmn_refuses_a_character_that_xml_cannot_hold_and_two_columns_of_one_name():
+    with pytest.raises(TableError, match="a character that XML cannot hold"):
+        write(Table.from_columns({"Asset": ["a\x0b"]}), FORMATS["dmn"])
+    with pytest.raises(TableError, match='the column name "asset" appears twice'):
+        decision({"asset": "number"}, ["1"])
+
+
+def test_a_quoted_formula_stays_different_from_a_text_that_has_the_quote_already():
+    table = Table.from_columns({"Asset": ["a", "b"], "note": ["=1", "'=1"]}, settings={"outputs": ["note"]})
+    assert write(table, FORMATS["csv"], "quote")[0] == b"Asset,note\na,''=1\nb,'=1\n"
+
+
+def test_a_sheet_of_scattered_cells_is_refused_and_a_blank_cell_parts_no_row():
+    scattered = [["x" if r % 2 and c % 2 else None for c in range(80)] for r in range(80)]
+    assert "more than 1,000 blocks of cells" in refused(book(t=scattered))
+    parted = [["A", "b", "c"], ["a", 1, 2], [None] * 3, ["b", None, 3]]
+    assert texts(read_book(book(t=parted))) == {"A": ["a", "b"], "b": ["1", ""], "c": ["2", "3"]}
+
+
+def test_of_many_structs_the_first_are_told_and_how_many_more():
+    rows = "".join(f'r{i},"(X=1.0,Y={i}.0)"\n' for i in range(30))
+    assert "10 more structs" in told(read(f"---,at\n{rows}".encode(), "x.csv"))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from hypothesis import strategies as st
 
 from contextdb.edits import edits
+from contextdb.edits.schema_file import schema_change
 from contextdb.tables.changes import Edit
 from contextdb.tables.table import Table
 
@@ -84,3 +85,14 @@ def edits_of(draw: st.DrawFn, table: Table) -> Edit:
     if kind == "rename" and free:
         return edits.rename_column(table, draw(st.sampled_from(names)), draw(st.sampled_from(free)))
     return edits.set_cells(table, [])
+
+
+def write_schema(before: Table | None, after: Table) -> bool:
+    """Write what `after` says differently from `before`; gives whether there was something to write.
+
+    The parameters and errors are those of `schema_change`.
+    """
+    change = schema_change(before, after)
+    if change is not None:
+        change.write()
+    return change is not None

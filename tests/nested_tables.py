@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
 import oracles
 import strategies
 from hypothesis import strategies as st
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 from contextdb.cells.conditions import Condition
 from contextdb.cells.kinds import KINDS
 from contextdb.schema.settings import EMPTY, TableSettings
+from contextdb.tables.nesting.flat import FlatTable
 from contextdb.tables.table import Table
 
 NAMES = ("outer", "dive", "low")
@@ -130,3 +132,11 @@ def _offered(flat: list[tuple[int, Way]], depth: int) -> list[int]:
 def _plain(table: Table, job: str, row: int, default: str) -> str:
     name = getattr(table.settings, job)
     return (table.text(row, name).strip() if name else "") or default
+
+
+def flat_rows(table: Table, flat: Table | FlatTable) -> list[np.ndarray[tuple[int], np.dtype[np.int64]]]:
+    """For each row of a table its rows in the flat table."""
+    if not isinstance(flat, FlatTable):
+        return list(np.arange(table.n_rows).reshape(-1, 1))
+    own = flat.expansion.rows[0]
+    return np.split(np.arange(len(own)), np.searchsorted(own, np.arange(1, table.n_rows))) if table.n_rows else []

@@ -48,7 +48,11 @@ def test_a_day_is_given_as_a_date_or_as_its_text(given: object):
 
 
 @pytest.mark.parametrize(
-    "given", [20484, True, "20484", datetime.datetime(2026, 1, 31), np.datetime64("2026-01-31T12"), "2026-02-30"]
+    "given",
+    [
+        *(20484, True, "20484", datetime.datetime(2026, 1, 31), np.datetime64("2026-01-31T12"), "2026-02-30"),
+        *(1e9, 1.5, np.datetime64("20000-01-01")),
+    ],
 )
 def test_what_is_no_day_is_refused(given: object):
     with pytest.raises(ContextDBError) as caught:
@@ -63,6 +67,10 @@ def test_what_means_nothing_is_a_missing_date():
 def test_the_first_and_the_last_day_of_the_calendar_are_facts():
     assert [read_fact_text(str(day), DAY) for day in (date.min, date.max)] == list(LIMITS)
     assert [date_of(day) for day in LIMITS] == [date.min, date.max]
+
+
+def test_an_interval_without_an_end_may_say_inf():
+    assert parse_cell("-inf..2026-01-31", DATE) == parse_cell("<=2026-01-31", DATE)
 
 
 # ---- asked

@@ -69,8 +69,9 @@ def test_an_undeclared_table_has_its_name_in_one_form_and_is_found_by_either(tmp
 @pytest.mark.parametrize("declared", FORMS)
 @pytest.mark.parametrize("disk", FORMS)
 def test_an_edit_of_the_settings_stays_in_the_section_of_the_file(tmp_path, disk, declared):
+    from edit_strategies import write_schema
+
     from contextdb.edits.edits import set_settings
-    from contextdb.edits.schema_file import write_schema
 
     table = load(put(tmp_path, FORMS[disk], FORMS[declared]))
     write_schema(table, set_settings(table, policy="first").apply(table))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import signal
+import socket
 import stat
 import subprocess
 import sys
@@ -393,3 +394,11 @@ def test_what_a_killed_save_left_is_no_table(table: Path):
     write_texts(table, columns, source, np.array([0]))
     assert table.read_bytes() == b"a,b\r\nx,1\r\n"
     assert list(table.parent.glob("*.csv")) == [table]
+
+
+@pytest.mark.skipif(not hasattr(socket, "AF_UNIX"), reason="sockets in folders")
+def test_what_is_neither_file_nor_stream_is_not_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)  # the path of a socket is short
+    with socket.socket(socket.AF_UNIX) as game:
+        game.bind("game")
+        assert "this is not a regular file" in refused(lambda: write_atomic(Path("game"), b"x"))

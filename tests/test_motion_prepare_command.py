@@ -208,7 +208,7 @@ def test_marks_of_a_clip_as_it_was_are_replaced_and_all_others_stay(game: Path):
     assert "start_walk,NextNaturalOnly,1.583,2.217,0.2" in after
     assert "start_walk changed since it was prepared" in told.err
     assert not {line for line in before if line.startswith("start_walk,Contact")} & set(after)
-    assert "nothing to propose" in prepare("game/clips", "--write").err
+    assert "nothing to write: only you can cut" in prepare("game/clips", "--write").err
 
 
 def test_a_mark_that_was_edited_stays_when_its_clip_changes(game: Path):

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from nested_files import AIR, write
+from nested_tables import flat_rows
 from running import run
 
 import contextdb as cdb
@@ -14,7 +15,7 @@ from contextdb.checks.rows import check_rows
 from contextdb.checks.run import check
 from contextdb.schema.settings import TableSettings
 from contextdb.tables.nesting.links import inner_rows
-from contextdb.tables.table import flat_rows, leaf_assets
+from contextdb.tables.table import leaf_assets
 
 
 def rules(findings: list[cdb.Finding]) -> dict[str, list[int | None]]:

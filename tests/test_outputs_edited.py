@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from edit_strategies import write_schema
 from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 from strategies import examples
@@ -13,7 +14,6 @@ from test_outputs import declarations, default_of
 
 from contextdb.edits import edits
 from contextdb.edits.diffing.toml_merging import merge_toml
-from contextdb.edits.schema_file import write_schema
 from contextdb.errors import SchemaError
 from contextdb.files.toml_text import as_toml, dotted
 from contextdb.schema.sections import settings_to_dict, settings_with

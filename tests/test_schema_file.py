@@ -9,12 +9,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from edit_strategies import write_schema
 from hypothesis import given
 from hypothesis import strategies as st
 from strategies import examples
 
 from contextdb.edits import edits
-from contextdb.edits.schema_file import schema_change, write_schema
+from contextdb.edits.schema_file import schema_change
 from contextdb.errors import FileError, SchemaError
 from contextdb.schema import toml_edit
 from contextdb.schema.sections import schema_to_dict

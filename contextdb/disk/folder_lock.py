@@ -26,8 +26,6 @@ try:
 except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
-IGNORED = ".contextdb-*"
-"""The names of temporary files and folders, as a line of .gitignore."""
 UNFINISHED = ".contextdb-unfinished.json"
 """Where it is, several files are being replaced in one step (`contextdb.disk.together`): their temporary files are still
 wanted."""

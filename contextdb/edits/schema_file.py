@@ -65,17 +65,6 @@ class SchemaChange:
             raise FileError(self.fault)
 
 
-def write_schema(before: Table | None, after: Table) -> bool:
-    """Write what `after` says differently from `before`; gives whether there was something to write.
-
-    The parameters and errors are those of `schema_change`.
-    """
-    change = schema_change(before, after)
-    if change is not None:
-        change.write()
-    return change is not None
-
-
 def schema_change(before: Table | None, after: Table) -> SchemaChange | None:
     """What is to be written so that contextdb.toml says what a table says; None when it says so already.
 

@@ -188,8 +188,6 @@ def _number_test(part: str, kind: Kind) -> str | None:
 
 def _values_test(accepts: ValueSet) -> str | None:
     words = [str(v).lower() if isinstance(v, bool) else literal(v) for v in sorted(accepts.values, key=str)]
-    if not words:
-        return "-"  # all but none
     return f"not({','.join(words)})" if accepts.is_complement else ",".join(words)
 
 

@@ -56,7 +56,7 @@ def holding(node: Membership, item: tuple[Part, Type], choices: Sequence[Choice]
 
 def spelt(node: Text, kind: Kind) -> tuple[Part, Type]:
     """A text as the number of a type that spells its numbers as texts."""
-    cell = _cell(node, Domain(kind.name))
+    cell = _cell(node, Domain(kind.name), kind.result)
     spans = cell.accepts.spans if isinstance(cell.accepts, NumberSet) else ()
     if len(spans) != 1 or spans[0][0] != spans[0][1]:
         raise Refusal(node.start, node.stop, f"{in_quotes(node.value)} is not {kind.value}", kind.result)
@@ -118,12 +118,12 @@ def _domain(item: Part, found: Type, conditions: Mapping[str, Condition]) -> Dom
     return TEXT if found.is_text else Domain(found.kind.name)
 
 
-def _cell(node: Text, domain: Domain) -> Cell:
+def _cell(node: Text, domain: Domain, accepted: str = "") -> Cell:
     try:
         cell = parse_cell(node.value, domain)
     except CellError as error:
         fault = error.faults[0]
-        raise Refusal(node.start, node.stop, fault.found.rstrip("."), fault.accepted, fault.mend or None) from None
+        raise Refusal(node.start, node.stop, fault.found.rstrip("."), accepted or fault.accepted, fault.mend or None) from None
     if cell.is_soft or cell.is_empty:
         why = "a cell here has no penalty" if cell.is_soft else "no value is in this cell"
         raise Refusal(node.start, node.stop, why, domain.type.cells)

@@ -238,8 +238,6 @@ class _Parser:
             return self._slipped(token, slip)
         if token.kind == "end":
             return Refusal(token.start, token.stop, why or "the expression ends too early", accepted, meant)
-        if token.text == "=":
-            return Refusal(token.start, token.stop, "nothing is set here", meant="==")
         return Refusal(token.start, token.stop, why or self._side_by_side(before, token), accepted, meant)
 
     def _slipped(self, token: Token, slip: str) -> Refusal:

@@ -70,11 +70,6 @@ class Source:
         """Whether the last record has a line end."""
         return not len(self.stops) or int(self.stops[-1]) < len(self.raw)
 
-    @property
-    def has_bom(self) -> bool:
-        """Whether the file begins with a byte order mark."""
-        return self.raw.startswith(UTF8_BOM)
-
 
 NO_SOURCE = Source(b"", np.zeros(1, np.int64), np.zeros(0, np.int64), ())
 """What a table that was never read comes from."""

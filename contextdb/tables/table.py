@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
-import numpy as np
 import polars as pl
 
 from contextdb.cells.arguments import require_kind, require_mapping, require_path, require_text
@@ -154,11 +153,3 @@ def leaf_assets(table: Table) -> list[str]:
     """The assets that the rows of a table and those inside it name, without paths."""
     flat = table.flat()
     return list(flat.leaves) if isinstance(flat, FlatTable) else flat.assets
-
-
-def flat_rows(table: Table, flat: Table | FlatTable) -> list[np.ndarray[tuple[int], np.dtype[np.int64]]]:
-    """For each row of a table its rows in the flat table."""
-    if not isinstance(flat, FlatTable):
-        return list(np.arange(table.n_rows).reshape(-1, 1))
-    own = flat.expansion.rows[0]
-    return np.split(np.arange(len(own)), np.searchsorted(own, np.arange(1, table.n_rows))) if table.n_rows else []

@@ -144,6 +144,7 @@ def test_what_is_no_pose_of_the_rig_is_refused():
     [pose, *_] = live(clip)
     schema, history = schema_of(Channel("position", bone="LeftFoot")), PoseHistory(clip.skeleton)
     wrong = [LivePose(pose.positions[:3], pose.rotations), LivePose(pose.positions * np.nan, pose.rotations), None, "pose"]
+    wrong += [LivePose(np.full(pose.positions.shape, "far"), pose.rotations)]
     for other in [*wrong, LivePose(pose.positions, pose.rotations, (0.0, 0.0, "north"))]:
         with pytest.raises(QueryError, match="the pose"):
             query_from_pose(schema, other, history)

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from nested_tables import flat_rows
 
 import contextdb as cdb
 from contextdb.checks.cases import check_cases
 from contextdb.schema.settings import TableSettings
 from contextdb.tables.compiling import compile_table
 from contextdb.tables.nesting.links import Neighbours
-from contextdb.tables.table import Table, flat_rows
+from contextdb.tables.table import Table
 from tui.model.context_list import ContextList
 from tui.model.coverage_run import measured
 from tui.model.query_row import QueryRow

@@ -94,7 +94,7 @@ def test_a_derived_fact_a_rule_and_a_typed_output_are_made(table, folder):
     assert [c.name for c in after.columns] == ["Asset", "speed", "gait", "target", "Slots", "rule", "Damage", "order"]
     assert (after.settings.when, after.settings.priority, after.settings.outputs) == ("rule", "order", ("Slots", "Damage"))
     assert after.schema.conditions["closing"].expr == "speed - target"
-    from contextdb.edits.schema_file import write_schema
+    from edit_strategies import write_schema
 
     write_schema(table, after)
     said_now = tomllib.loads((folder / "contextdb.toml").read_text())

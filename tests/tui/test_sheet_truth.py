@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from nested_tables import flat_rows
 from running import run
 from terminal import press, said, screen_text, with_editor
 
 import contextdb as cdb
 from contextdb.checks.cases import exactly, read_expected
-from contextdb.tables.table import flat_rows
 from tui.model.context_list import ContextList
 from tui.model.sheet import Sheet
 from tui.model.why import why_row

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 import math
 from decimal import Decimal
 from fractions import Fraction
@@ -336,6 +337,16 @@ def test_facts_are_described_as_people_write_them():
     assert describe(0.1, NUMBER) == "0.1"
     assert describe(5.0, NUMBER) == "5"
     assert describe("CB", TEXT) == "CB"
+
+
+class Position(str, enum.Enum):  # noqa: UP042 - the kind whose str() is not its value
+    CORNER = "CB"
+    AIRBORNE = "InAir"
+
+
+def test_a_member_of_an_enum_of_texts_is_its_value():
+    assert repr(read(Position.CORNER, DEPTH)) == repr(read(Position.CORNER, TEXT)) == "'CB'"
+    assert repr(read({Position.AIRBORNE}, STATE)) == "frozenset({'InAir'})"
 
 
 # ---- words for what is missing

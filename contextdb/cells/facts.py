@@ -260,7 +260,7 @@ def _read_one_value(value: object, condition: Condition) -> str:
         raise _fault(value, condition)
     if not condition.domain.type.is_open and value not in condition.domain.known:
         raise _unknown(value, condition)
-    return str(value)
+    return str.__str__(value)  # what an enum member of type str says of itself is not its value
 
 
 def _unknown(value: str, condition: Condition) -> ContextError:
@@ -280,7 +280,7 @@ def _read_tags(value: object, condition: Condition) -> Fact:
         except CellError as error:
             raise ContextError(*(f.at(Place(column=condition.name)) for f in error.faults)) from None
     elif isinstance(value, (set, frozenset, list, tuple)):
-        tags = frozenset(str(t) if isinstance(t, str) else _not_a_tag(t, condition) for t in value)
+        tags = frozenset(str.__str__(t) if isinstance(t, str) else _not_a_tag(t, condition) for t in value)
     else:
         raise _fault(value, condition)
     for tag in sorted(tags):

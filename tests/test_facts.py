@@ -377,3 +377,9 @@ def test_a_given_fact_that_is_nearly_a_missing_one_is_taken_for_a_slip():
         'Accepted: the names of the table\'s conditions. Did you mean "speed"?'
     )
     assert misspelt(["speed"], ["colour", "heading"]) is None
+
+
+def test_a_name_with_an_accent_of_its_own_is_a_slip():
+    assert 'Did you mean "Höhe"?' in str(misspelt(["Höhe"], ["Ho\u0308he"]))
+    domain = Domain("enum", ("Höhe", "Breite"))
+    assert 'Did you mean "Höhe"?' in refused("Ho\u0308he", domain)

@@ -23,7 +23,7 @@ from contextdb.cells.grammar import parse_cell, parse_tags
 from contextdb.cells.intervals import EVERYTHING
 from contextdb.cells.sets import SET_OF, Cell, NumberSet, ValueSet, covers
 from contextdb.cells.words import truth_of
-from contextdb.errors import CellError, ContextError, Fault, NoSuchFact, Place, in_quotes, nearest, plural, shown, some
+from contextdb.errors import CellError, ContextError, Fault, NoSuchFact, Place, folded, in_quotes, nearest, plural, shown, some
 
 Unknown = Literal["error", "any", "never"]
 Fact = bool | float | str | frozenset[str] | Cell | None
@@ -164,7 +164,7 @@ def alike(name: str, known: Iterable[str]) -> tuple[str, ...]:
 
 
 def _is_slip(name: str, near: str) -> bool:
-    return difflib.SequenceMatcher(None, name.casefold(), near.casefold()).ratio() >= 0.85
+    return difflib.SequenceMatcher(None, folded(name), folded(near)).ratio() >= 0.85
 
 
 def _fault(value: object, condition: Condition, mend: str = "", accepted: str = "") -> ContextError:

@@ -119,6 +119,16 @@ def test_an_update_is_what_its_parts_do_by_hand():
         np.testing.assert_allclose(updated.pose.positions, expected.positions, rtol=0.0, atol=1e-9)
 
 
+def test_a_stick_may_be_an_array():
+    one, other = character(), character()
+    for tick in range(40):
+        moved, same = (
+            one.update(DT, stick_at(tick), gait(stick_at(tick))),
+            other.update(DT, np.array(stick_at(tick)), gait(stick_at(tick))),
+        )
+    assert (moved.body, moved.decision.playing) == (same.body, same.decision.playing)
+
+
 def test_a_search_hears_where_the_animation_really_is():
     one = character()
     driven(one, 50)

@@ -356,7 +356,7 @@ class Character:
     def step(self, dt: float, stick: Ground, facts: Facts | None, facing: float | None, body: Steered | None) -> Step:
         """The body and the facts of an update."""
         dt = require_real(dt, "dt", 0.0)
-        require_point(stick, "stick", "two numbers, x and z in metres a second")
+        stick = require_point(stick, "stick", "two numbers, x and z in metres a second")
         given = {} if facts is None else require_mapping(facts, "facts", "a mapping of names to facts")
         require_kind(body, (Steered, type(None)), "body", "a Steered")
         if facing is not None:

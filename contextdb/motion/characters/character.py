@@ -191,7 +191,7 @@ class Character:
         if ground is not None:
             require_callable(ground, "ground")
         self.controller, self.schema, self.stream, self.pose = controller, schema, stream, pose
-        self.own_facts, self.unknown, self.ground = own_facts, unknown, ground
+        self.own_facts, self.unknown, self.ground = dict(own_facts), unknown, ground
         self.tables = tables
         self._own: tuple[object, object, Mapping[str, FactOf]] = (None, None, {})
         self._body, self._apart = body, NO_MOTION
@@ -244,6 +244,11 @@ class Character:
         copied = Character(self.controller.copy(), self.schema, self.tables, stream, self._body, **options)  # type: ignore[arg-type]
         copied.restore(self.state)
         return copied
+
+    __copy__ = copy
+
+    def __repr__(self) -> str:
+        return f"<Character: plays {'nothing' if self.playing is None else in_quotes(self.playing.asset)}>"
 
     def record(self, n_candidates: int = 12) -> Trace:
         """Keep every decision from now on, with so many candidates of each search, in the trace that is given back.

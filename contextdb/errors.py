@@ -24,6 +24,7 @@ correction, in that order. One error reports all faults of a file together. In b
 from __future__ import annotations
 
 import difflib
+import unicodedata
 import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -190,11 +191,16 @@ def in_quotes(text: str, most: int = SHOWN_CHARACTERS) -> str:
 
 def nearest(word: str, known: Iterable[str]) -> str | None:
     """The known name most like `word`, in spelling and apart from its case, or None when none is near."""
-    folded: dict[str, str] = {}
+    known_as: dict[str, str] = {}
     for name in known:
-        folded.setdefault(name.casefold(), name)
-    found = difflib.get_close_matches(word.casefold()[:200], folded, n=1, cutoff=0.6)
-    return folded[found[0]] if found else None
+        known_as.setdefault(folded(name), name)
+    found = difflib.get_close_matches(folded(word)[:200], known_as, n=1, cutoff=0.6)
+    return known_as[found[0]] if found else None
+
+
+def folded(name: str) -> str:
+    """A name apart from its case, and from whether an accented letter is one character or two."""
+    return unicodedata.normalize("NFC", name).casefold()
 
 
 def some(names: Iterable[str], most: int = 6) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import operator
+import random
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -69,7 +70,7 @@ WRONG: list[object] = [
     {"speed": [Odd()]}, {"speed": "abc"}, {"speed": [[1]], "gait": [1, 2]}, {"speed": np.zeros((2, 2))}, (1, 2, 3), {1},
     np.zeros((2, 2)), np.arange(3), Odd(), Odd, len, Path("nowhere"), COMPILED.query(FACTS), ANSWERS,
 ]  # fmt: skip
-FUNCTIONS = ("prefer)", "on_change)", "on_error)")
+FUNCTIONS = ("prefer)", "on_change)", "on_error)", "progress)", "should_stop)")
 """Arguments that are functions: what goes wrong in one that the caller gave is not ours to tell."""
 Call = Callable[[object], object]
 CALLS: dict[str, Call] = {
@@ -199,6 +200,8 @@ CALLS: dict[str, Call] = {
     "coverage(work)": lambda x: cdb.coverage(TABLE, work=x, samples=9),  # type: ignore[arg-type]
     "coverage(samples)": lambda x: cdb.coverage(TABLE, samples=x, work=9),  # type: ignore[arg-type]
     "coverage(max_gaps)": lambda x: cdb.coverage(TABLE, max_gaps=x, work=9, samples=9),  # type: ignore[arg-type]
+    "coverage(progress)": lambda x: cdb.coverage(TABLE, progress=x, work=9, samples=9),  # type: ignore[arg-type]
+    "coverage(should_stop)": lambda x: cdb.coverage(TABLE, should_stop=x, work=9, samples=9),  # type: ignore[arg-type]
     "coverage(weights)": lambda x: cdb.coverage(TABLE, weights=x, work=9, samples=9),  # type: ignore[arg-type]
     "coverage(impossible)": lambda x: cdb.coverage(TABLE, impossible=x, work=9, samples=9),  # type: ignore[arg-type]
     "observe(table)": lambda x: telemetry.observe(x, RECORDED),  # type: ignore[arg-type]
@@ -256,6 +259,8 @@ def test_every_public_method_is_asked_with_wrong_arguments():
 def test_a_seed_or_generator_that_is_none_is_refused_by_name():
     with pytest.raises(cdb.ContextError, match=r"rng is of type str\. Accepted: a random.Random, a numpy.random.Generator"):
         COMPILED.pick(FACTS, rng="x")  # type: ignore[arg-type]
+    with pytest.raises(cdb.ContextError, match="rng is of type type"):
+        COMPILED.pick(FACTS, rng=random.Random)  # type: ignore[arg-type]
 
 
 def test_an_asset_that_is_misspelt_is_refused_with_the_nearest():

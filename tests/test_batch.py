@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import enum
 import math
 import sys
 from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import date
+from decimal import Decimal
 from fractions import Fraction
 from unittest import mock
 
@@ -380,6 +382,46 @@ def test_tags_may_be_lists_sets_or_texts():
     table = Table.from_columns({"Asset": ["a", "b"], "x": ["+InAir", "-Move"]}, {"x": {"type": "tags"}}).compile()
     for column in ([["InAir"], []], [{"InAir"}, set()], ["InAir", ""], pl.Series([["InAir"], []], dtype=pl.List(pl.String))):
         assert [rows.tolist() for rows in table.query_many({"x": column}).lists()] == [[0, 1], [1]]
+
+
+class Gait(enum.Enum):
+    AIR = "Air"
+
+
+@pytest.mark.parametrize(
+    ("kind", "column"),
+    [
+        ("date", [0, 1]),
+        ("date", [True, False]),
+        ("date", np.array([1, 2], dtype=object)),
+        ("date", ["2026-2-1", "2026-02-02"]),
+        ("number", [1.0, np.complex128(1 + 2j)]),
+        ("number", np.array(["2026-02-01", "2026-02-02"], dtype="M8[ns]")),
+        ("number", np.array([1, 2], dtype="m8[ns]")),
+        ("text", [Gait.AIR, Gait.AIR]),
+        ("text", [Decimal("1e400"), "a"]),
+        ("bool", [Decimal("1e400"), True]),
+    ],
+    ids=lambda value: "" if isinstance(value, str) else str(value)[:30],
+)
+def test_a_column_holds_no_fact_that_a_query_refuses(kind, column):
+    table = Table.from_columns({"Asset": ["a", "b"], "x": ["Any", "Any"]}, {"x": {"type": kind}}).compile()
+    with pytest.raises(ContextError, match=r'row \d, column "x": .* is not a fact of type|cannot read "2026-2-1"'):
+        table.query_many({"x": column})
+
+
+def test_days_may_be_nanoseconds_of_numpy():
+    table = Table.from_columns({"Asset": ["a", "b"], "x": ["2026-02-01", "2026-02-02.."]}, {"x": {"type": "date"}}).compile()
+    days = np.array(["2026-02-01", "2026-02-05"], dtype="M8[ns]")
+    assert [rows.tolist() for rows in table.query_many({"x": days}).lists()] == [[0], [1]]
+
+
+def test_a_fact_that_numpy_masks_is_missing():
+    table = Table.from_columns({"Asset": ["a", "b"], "x": ["0..2", "2.."]}, {"x": {"type": "number"}}).compile()
+    masked = np.ma.array([1.0, 5.0, 3.0], mask=[False, True, False])
+    assert [rows.tolist() for rows in table.query_many({"x": masked}, unknown="never").lists()] == [[0], [], [1]]
+    with pytest.raises(ContextError, match='row 2, column "x": the fact is missing in 1 context'):
+        table.query_many({"x": masked})
 
 
 @pytest.mark.parametrize("n_bounds", [0, 1, batch.FEW_BOUNDS, batch.FEW_BOUNDS + 1])

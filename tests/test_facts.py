@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 import math
 from decimal import Decimal
 from fractions import Fraction
@@ -338,6 +339,16 @@ def test_facts_are_described_as_people_write_them():
     assert describe("CB", TEXT) == "CB"
 
 
+class Position(str, enum.Enum):  # noqa: UP042 - the kind whose str() is not its value
+    CORNER = "CB"
+    AIRBORNE = "InAir"
+
+
+def test_a_member_of_an_enum_of_texts_is_its_value():
+    assert repr(read(Position.CORNER, DEPTH)) == repr(read(Position.CORNER, TEXT)) == "'CB'"
+    assert repr(read({Position.AIRBORNE}, STATE)) == "frozenset({'InAir'})"
+
+
 # ---- words for what is missing
 
 
@@ -366,3 +377,9 @@ def test_a_given_fact_that_is_nearly_a_missing_one_is_taken_for_a_slip():
         'Accepted: the names of the table\'s conditions. Did you mean "speed"?'
     )
     assert misspelt(["speed"], ["colour", "heading"]) is None
+
+
+def test_a_name_with_an_accent_of_its_own_is_a_slip():
+    assert 'Did you mean "Höhe"?' in str(misspelt(["Höhe"], ["Ho\u0308he"]))
+    domain = Domain("enum", ("Höhe", "Breite"))
+    assert 'Did you mean "Höhe"?' in refused("Ho\u0308he", domain)

@@ -478,8 +478,8 @@ def test_the_time_is_asked_for_where_rows_rest_for_seconds():
         picker.pick(table.query({"x": True}))
     with pytest.raises(ContextError, match="time_s is not given"):
         picker.pick_many(table.query_many({"x": [True]}))
-    for time in (float("nan"), float("inf"), "now", 1j):
-        with pytest.raises(ContextError, match=r"time_s is .* Accepted: a number of seconds"):
+    for time in (float("nan"), float("inf"), "now", 1j, 10**5000):
+        with pytest.raises(ContextError, match=r"time_s is .* Accepted: a number from -1e\+15"):
             picker.pick(table.query({"x": True}), time_s=time)
     none = table_of(x=["Any"], cooldown_s=[""])
     assert none.picker().pick(none.query({"x": True}))

@@ -67,12 +67,13 @@ def require_real(value: object, what: str, least: float = -MOST, most: float = M
     raise _wrong(value, what, f"a number from {least:g} to {most:g}")
 
 
-def require_point(value: object, what: str, accepted: str) -> None:
-    """Raise ContextError for what is no pair of finite numbers."""
-    if not isinstance(value, (tuple, list)) or len(value) != 2:
+def require_point(value: object, what: str, accepted: str) -> tuple[float, float]:
+    """A pair of finite numbers, which may be an array."""
+    is_row = isinstance(value, (tuple, list)) or (isinstance(value, np.ndarray) and value.ndim == 1)
+    if not is_row or len(value) != 2:  # type: ignore[arg-type]
         raise _wrong(value, what, accepted)
-    for each in value:
-        require_real(each, f"one of {what}")
+    first, second = (require_real(each, f"one of {what}") for each in value)  # type: ignore[attr-defined]
+    return first, second
 
 
 def require_pair(value: object, what: str, accepted: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 from typing import Any
 
 import numpy as np
@@ -10,11 +11,26 @@ from numpy.typing import NDArray
 
 from contextdb.cells.kinds import Kind
 
+_PLAIN: dict[pl.DataType, tuple[type, ...]] = {
+    pl.Boolean(): (bool, np.bool_),
+    pl.String(): (str,),
+    pl.Float64(): (int, float, np.integer, np.floating, np.ndarray),
+    pl.Date(): (datetime.date,),
+}
+"""The types of which every value is a fact; of others polars takes some that a query refuses, such as an int for a date."""
 
-def as_series(given: Any, listed: pl.DataType) -> pl.Series | None:
+
+def listed(given: Any) -> list[Any]:
+    """A column as a list of single facts; dates and times of numpy as they are, because many of them are ints to Python."""
+    if isinstance(given, pl.Series):
+        return given.to_list()
+    return given.tolist() if isinstance(given, np.ndarray) and given.dtype.kind not in "mM" else list(given)
+
+
+def as_series(given: Any, dtype: pl.DataType) -> pl.Series | None:
     """A column as a polars series, or None when it has no single plain type.
 
-    What is listed must be of the type `listed`: left to itself polars takes a list after its first items for float32 or for truth.
+    A list must be of the type `dtype`: left to itself polars takes a list after its first items for float32 or for truth.
     """
     if isinstance(given, pl.Series):
         return given
@@ -22,10 +38,16 @@ def as_series(given: Any, listed: pl.DataType) -> pl.Series | None:
     try:
         if is_typed:
             return pl.Series(given, nan_to_null=False)
-        items = given.tolist() if isinstance(given, np.ndarray) else list(given)
-        return pl.Series(items, dtype=listed, strict=True, nan_to_null=False) if items else None
+        items = listed(given)
+        if not items or not all(_is_plain(kind, _PLAIN[dtype]) for kind in set(map(type, items))):
+            return None
+        return pl.Series(items, dtype=dtype, strict=True, nan_to_null=False)
     except (TypeError, ValueError, OverflowError, pl.exceptions.PolarsError, pl.exceptions.PanicException):
         return None
+
+
+def _is_plain(kind: type, plain: tuple[type, ...]) -> bool:
+    return kind is type(None) or (issubclass(kind, plain) and not issubclass(kind, (datetime.datetime, np.timedelta64)))
 
 
 def plain_numbers(given: Any, kind: Kind) -> NDArray[np.float64] | None:

@@ -23,7 +23,7 @@ from contextdb.cells.grammar import parse_cell, parse_tags
 from contextdb.cells.intervals import EVERYTHING
 from contextdb.cells.sets import SET_OF, Cell, NumberSet, ValueSet, covers
 from contextdb.cells.words import truth_of
-from contextdb.errors import CellError, ContextError, Fault, NoSuchFact, Place, in_quotes, nearest, plural, shown, some
+from contextdb.errors import CellError, ContextError, Fault, NoSuchFact, Place, folded, in_quotes, nearest, plural, shown, some
 
 Unknown = Literal["error", "any", "never"]
 Fact = bool | float | str | frozenset[str] | Cell | None
@@ -164,7 +164,7 @@ def alike(name: str, known: Iterable[str]) -> tuple[str, ...]:
 
 
 def _is_slip(name: str, near: str) -> bool:
-    return difflib.SequenceMatcher(None, name.casefold(), near.casefold()).ratio() >= 0.85
+    return difflib.SequenceMatcher(None, folded(name), folded(near)).ratio() >= 0.85
 
 
 def _fault(value: object, condition: Condition, mend: str = "", accepted: str = "") -> ContextError:
@@ -260,7 +260,7 @@ def _read_one_value(value: object, condition: Condition) -> str:
         raise _fault(value, condition)
     if not condition.domain.type.is_open and value not in condition.domain.known:
         raise _unknown(value, condition)
-    return str(value)
+    return str.__str__(value)  # what an enum member of type str says of itself is not its value
 
 
 def _unknown(value: str, condition: Condition) -> ContextError:
@@ -280,7 +280,7 @@ def _read_tags(value: object, condition: Condition) -> Fact:
         except CellError as error:
             raise ContextError(*(f.at(Place(column=condition.name)) for f in error.faults)) from None
     elif isinstance(value, (set, frozenset, list, tuple)):
-        tags = frozenset(str(t) if isinstance(t, str) else _not_a_tag(t, condition) for t in value)
+        tags = frozenset(str.__str__(t) if isinstance(t, str) else _not_a_tag(t, condition) for t in value)
     else:
         raise _fault(value, condition)
     for tag in sorted(tags):

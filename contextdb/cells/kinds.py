@@ -65,7 +65,7 @@ def _from_number(value: object) -> float | None:
         return value + 0.0 if value == value else None
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
-    if not isinstance(value, (Real, Decimal, np.integer, np.floating, np.bool_)):
+    if not isinstance(value, (Real, Decimal, np.integer, np.floating, np.bool_)) or isinstance(value, np.timedelta64):
         raise TypeError
     try:
         number = float(value) + 0.0

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from contextdb import bitmask
 from contextdb.bitmask import Rows, Words, read_only
 from contextdb.cells.angles import wrap_angles
-from contextdb.cells.fact_columns import plain_numbers
+from contextdb.cells.fact_columns import listed, plain_numbers
 from contextdb.cells.facts import Unknown, check_mode, missing_error, misspelt, read_fact
 from contextdb.cells.mirroring import in_mirror
 from contextdb.cells.sets import Cell
@@ -33,7 +33,6 @@ from contextdb.compiled.batch_columns import (
     facts_of,
     holds_sets,
     kept_columns,
-    listed,
     mirrored_columns,
     plain_values,
 )

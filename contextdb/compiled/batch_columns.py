@@ -11,7 +11,7 @@ import polars as pl
 from numpy.typing import NDArray
 
 from contextdb.cells.conditions import Condition
-from contextdb.cells.fact_columns import as_series, plain_numbers
+from contextdb.cells.fact_columns import as_series, listed, plain_numbers
 from contextdb.cells.facts import read_fact
 from contextdb.cells.mirroring import kept_fact, mirrored_fact, partner_of
 from contextdb.cells.sets import Cell
@@ -35,9 +35,14 @@ def facts_of(contexts: object) -> dict[str, Any]:
         if not is_flat:
             place = Place(column=str(name))
             raise ContextError(
-                Fault(f"{type(column).__name__} is not a column of facts.", "a list, a flat array or a series", place=place)
+                Fault(f"{type(column).__name__} is not a column of facts.", "a list, a flat array or a polars series", place=place)
             )
-    return dict(contexts)
+    return {name: _unmasked(column) for name, column in contexts.items()}
+
+
+def _unmasked(column: Any) -> Any:
+    """A column in which a fact that numpy masks is missing."""
+    return column.tolist() if isinstance(column, np.ma.MaskedArray) else column
 
 
 def common_length(columns: Mapping[str, Any]) -> int:
@@ -46,11 +51,6 @@ def common_length(columns: Mapping[str, Any]) -> int:
     if len(set(lengths.values())) > 1:
         raise ContextError(Fault(f"the columns are not equally long: {lengths}.", "one fact for each context in every column"))
     return next(iter(lengths.values()), 0)
-
-
-def listed(given: Any) -> list[Any]:
-    """A column as a list of Python's own values."""
-    return given.to_list() if isinstance(given, pl.Series) else given.tolist() if isinstance(given, np.ndarray) else list(given)
 
 
 def holds_sets(given: Any, condition: Condition) -> bool:

@@ -55,7 +55,7 @@ class Memory:
             return given
         if isinstance(given, (int, np.integer)):
             return random.Random(int(given))
-        if not callable(getattr(given, "random", None)):
+        if isinstance(given, type) or not callable(getattr(given, "random", None)):
             found = f"rng is of type {type(given).__name__}."
             raise ContextError(Fault(found, "a random.Random, a numpy.random.Generator, or a number to seed one with"))
         return given

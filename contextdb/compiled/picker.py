@@ -13,7 +13,6 @@ from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import accumulate
-from math import isfinite
 from typing import Any, Self
 
 import numpy as np
@@ -21,7 +20,7 @@ from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.bitmask import Rows, read_only
-from contextdb.cells.arguments import require_kind, require_whole
+from contextdb.cells.arguments import require_kind, require_real, require_whole
 from contextdb.compiled.batch_costs import CostsOfPairs, costs_of_pairs
 from contextdb.compiled.casting.stage import CastMatches
 from contextdb.compiled.chance import uniform, uniforms
@@ -39,6 +38,8 @@ from contextdb.schema.shapes import CHANCE
 MOST_PAIRS = 1 << 20
 """So many rows of many answers are looked at together."""
 MOST_MEMORY = 1000
+MOST_S = 1e15
+"""The latest time of a game, in seconds; the time of the day since 1970 is among them."""
 
 
 @dataclass(frozen=True)
@@ -390,9 +391,7 @@ def _time(known: _Known, time_s: float | None) -> float:
             found = f"rows of the table {in_quotes(name)} rest for seconds after they were picked, and time_s is not given."
             raise ContextError(Fault(found, "the time of the game in seconds, such as pick(matches, time_s=12.5)"))
         return 0.0
-    if not isinstance(time_s, (int, float, np.integer, np.floating)) or not isfinite(time_s):
-        raise ContextError(Fault(f"time_s is {in_quotes(str(time_s))}.", "a number of seconds"))
-    return float(time_s)
+    return require_real(time_s, "time_s", -MOST_S, MOST_S)
 
 
 def _character(who: object) -> int:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contextdb.cells.arguments import require_callable
 from contextdb.compiled.table import CompiledTable
 from contextdb.console import PREPARING
 from contextdb.covering.assumed import Opened, opened
@@ -102,6 +103,8 @@ def coverage(
     in it, and gaps without a sample that can happen are left out.
     """
     require_counts(work=work, samples=SAMPLES if samples is None else samples, max_gaps=max_gaps, seed=seed)
+    require_callable(progress, "progress")
+    require_callable(should_stop, "should_stop")
     watcher = Progress(progress, should_stop)
     found = opened(table, impossible, weights, assume, watcher.within("Reading the cells", 0.0, COUNT_AT))
     report = _report(found, seed, work, samples, max_gaps, watcher)

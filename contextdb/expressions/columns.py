@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from contextdb.cells.angles import wrap_angles
 from contextdb.cells.conditions import Condition
-from contextdb.cells.fact_columns import as_series, plain_numbers
+from contextdb.cells.fact_columns import as_series, listed, plain_numbers
 from contextdb.cells.facts import read_fact
 from contextdb.cells.kinds import Kind
 from contextdb.cells.sets import Cell
@@ -92,24 +92,23 @@ def _texts(given: Any, condition: Condition) -> Coded:
     if series is None or series.dtype != pl.String:
         return _coded(*_read_each(given, condition))
     distinct = series.drop_nulls().unique(maintain_order=True)
-    listed = distinct.to_list()
-    for value in listed:
+    texts = distinct.to_list()
+    for value in texts:
         try:
             read_fact(value, condition)
         except ContextError as error:
             row = series.index_of(value)
             raise _placed(error, row or 0, condition) from None
     codes = series.cast(pl.Enum(distinct)).to_physical().cast(pl.Int32).fill_null(-1)
-    return Coded(codes.to_numpy(), tuple(listed))
+    return Coded(codes.to_numpy(), tuple(texts))
 
 
 def _read_each(given: Any, condition: Condition) -> tuple[list[int], list[Any]]:
     """The distinct facts in canonical form, and which one each context has, -1 where missing."""
-    listed = given.to_list() if isinstance(given, pl.Series) else given.tolist() if isinstance(given, np.ndarray) else list(given)
     known: dict[object, int] = {}
     codes: list[int] = []
     values: list[Any] = []
-    for row, value in enumerate(listed):
+    for row, value in enumerate(listed(given)):
         key = (type(value), tuple(value) if isinstance(value, (list, set)) else value)
         try:
             if key not in known:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import math
+import pickle
+import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -117,6 +120,16 @@ def test_an_update_is_what_its_parts_do_by_hand():
         assert updated.decision.playing == decision.playing
         expected = stream.update(decision, DT, body)
         np.testing.assert_allclose(updated.pose.positions, expected.positions, rtol=0.0, atol=1e-9)
+
+
+def test_a_stick_may_be_an_array():
+    one, other = character(), character()
+    for tick in range(40):
+        moved, same = (
+            one.update(DT, stick_at(tick), gait(stick_at(tick))),
+            other.update(DT, np.array(stick_at(tick)), gait(stick_at(tick))),
+        )
+    assert (moved.body, moved.decision.playing) == (same.body, same.decision.playing)
 
 
 def test_a_search_hears_where_the_animation_really_is():
@@ -271,6 +284,32 @@ def test_a_copy_stands_where_the_character_stands_and_goes_its_own_way():
     assert_same_poses(went, driven(copied, 40, 35))
     driven(copied, 5)
     assert copied.body != one.body
+
+
+@pytest.mark.parametrize(
+    "copied",
+    [copy.copy, lambda one: copy.copy(motion.Crowd([one]))[0], lambda one: pickle.loads(pickle.dumps(one))],
+    ids=["copy", "copy of a crowd", "pickle"],
+)
+def test_copies_of_python_s_own_go_their_own_way(copied):
+    one, same = character(), character()
+    driven(one, 35), driven(same, 35)
+    other = copied(one)
+    assert_same_poses(driven(other, 40, 35), driven(same.copy(), 40, 35))
+    assert_same_poses(driven(one, 40, 35), driven(same, 40, 35))
+
+
+def test_what_a_character_is_made_of_shows_itself_in_one_line():
+    one = character()
+    assert [repr(part) for part in (one, one.controller, one.controller.selector, one.record())] == [
+        "<Character: plays nothing>",
+        "<Controller: plays nothing>",
+        '<Selector: "all">',
+        "<Trace: 0 decisions>",
+    ]
+    driven(one, 1)
+    assert (repr(one), repr(one.stream)) == ('<Character: plays "idle">', '<PoseStream: root "mixed", 19 joints>')
+    assert re.fullmatch(r"<PoseBank: \d+ ranges, [\d,]+ frames, 19 joints>", repr(one.stream.rig))
 
 
 def test_what_is_refused_leaves_the_character_where_it_stood():

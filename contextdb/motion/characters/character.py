@@ -192,7 +192,7 @@ class Character:
         if ground is not None:
             require_callable(ground, "ground")
         self.controller, self.schema, self.stream, self.pose = controller, schema, stream, pose
-        self.own_facts, self.unknown, self.ground = own_facts, unknown, ground
+        self.own_facts, self.unknown, self.ground = dict(own_facts), unknown, ground
         self.tables = tables
         self._own: tuple[object, object, Mapping[str, FactOf]] = (None, None, {})
         self._body, self._apart = body, NO_MOTION
@@ -245,6 +245,11 @@ class Character:
         copied = Character(self.controller.copy(), self.schema, self.tables, stream, self._body, **options)  # type: ignore[arg-type]
         copied.restore(self.state)
         return copied
+
+    __copy__ = copy
+
+    def __repr__(self) -> str:
+        return f"<Character: plays {'nothing' if self.playing is None else in_quotes(self.playing.asset)}>"
 
     def record(self, n_candidates: int = 12, *, most: int = MOST) -> Trace:
         """Keep the decisions from now on, the last `most`, in the trace that is given back, with so many candidates of each search.
@@ -369,7 +374,7 @@ class Character:
     def step(self, dt: float, stick: Ground, facts: Facts | None, facing: float | None, body: Steered | None) -> Step:
         """The body and the facts of an update."""
         dt = require_real(dt, "dt", 0.0)
-        require_point(stick, "stick", "two numbers, x and z in metres a second")
+        stick = require_point(stick, "stick", "two numbers, x and z in metres a second")
         given = {} if facts is None else require_mapping(facts, "facts", "a mapping of names to facts")
         require_kind(body, (Steered, type(None)), "body", "a Steered")
         if facing is not None:

@@ -84,6 +84,9 @@ class Crowd(Sequence[Character]):
     def __iter__(self) -> Iterator[Character]:
         return iter(self._characters)
 
+    def __copy__(self) -> Crowd:
+        return Crowd(character.copy() for character in self)
+
     def __repr__(self) -> str:
         return f"<Crowd: {plural(len(self), 'character')}>"
 

@@ -74,7 +74,7 @@ class Steered:
         Raises ContextError where `wanted` is no pair of numbers, or another argument no number.
         """
         require_real(dt_s, "dt_s", 0.0)
-        require_point(wanted, "wanted", "two numbers, x and z in metres a second")
+        wanted = require_point(wanted, "wanted", "two numbers, x and z in metres a second")
         if facing is not None:
             require_real(facing, "facing")
         return self._moved(dt_s, wanted, facing)
@@ -181,7 +181,7 @@ def steered_path(
     accepted = "a list of Steered, the body at its last moments"
     if not require_many_of(past, Steered, "past", accepted):
         raise MotionError(Fault("there is no body to steer.", "its last moments, at least the present one"))
-    require_point(wanted, "wanted", "two numbers, x and z in metres a second")
+    wanted = require_point(wanted, "wanted", "two numbers, x and z in metres a second")
     if facing is not None:
         require_real(facing, "facing")
     rate, reach_s = require_real(rate, "rate", LEAST_RATE, MOST_RATE), require_real(reach_s, "reach_s", 0.0, MOST_REACH_S)

@@ -201,6 +201,10 @@ class PoseBank:
             raise MotionError(*faults)
         return _joined(parts, schema.rate)
 
+    def __repr__(self) -> str:
+        sizes = plural(len(self.assets), "range"), plural(self.n_frames, "frame"), plural(self.n_joints, "joint")
+        return f"<PoseBank: {', '.join(sizes)}>"
+
     @property
     def n_frames(self) -> int:
         """How many frames all ranges have."""

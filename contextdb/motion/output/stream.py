@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contextdb.cells.arguments import require_kind, require_real
-from contextdb.errors import ContextError, Fault, MotionError
+from contextdb.errors import ContextError, Fault, MotionError, plural
 from contextdb.motion.clips.ground_place import A_BODY, OfBody, place_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.steering import Steered
@@ -79,6 +79,9 @@ class PoseStream:
         self.pipeline = Pipeline(bank, settings)
         self._rows, self._at = self.pipeline.begun(), 0
         self._state: PoseState | None = None
+
+    def __repr__(self) -> str:
+        return f'<PoseStream: root "{self.settings.root}", {plural(self.rig.n_joints, "joint")}>'
 
     @property
     def settings(self) -> PoseSettings:

@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 from numpy.typing import ArrayLike
 
 from contextdb.cells.arguments import require_kind
-from contextdb.errors import Fault, MotionError, QueryError
+from contextdb.errors import Fault, MotionError, QueryError, in_quotes
 from contextdb.motion import arguments
 from contextdb.motion.clips.ground_place import GroundPlace, OfBody, place_of
 from contextdb.motion.clips.quaternions import Floats
@@ -146,6 +146,11 @@ class Controller:
         copied = Controller(self.selector, self.settings, rng=deepcopy(self._rng), clock=self._clock)
         copied._state = self._state
         return copied
+
+    __copy__ = copy
+
+    def __repr__(self) -> str:
+        return f"<Controller: plays {'nothing' if self.playing is None else in_quotes(self.playing.asset)}>"
 
     @property
     def state(self) -> ControllerState:

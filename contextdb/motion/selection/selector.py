@@ -83,6 +83,9 @@ class Selector:
         self.tags: tuple[str, ...] = tuple(dict.fromkeys((*known, *tags)))
         self._databases = {name: with_tags(database, self.tags) for name, database in loaded.items()}
 
+    def __repr__(self) -> str:
+        return f"<Selector: {some(self.names)}>"
+
     @property
     def databases(self) -> Mapping[str, MotionDatabase]:
         """The loaded databases in order, as they are searched: each knows the tags of all."""

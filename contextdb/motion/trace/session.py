@@ -128,6 +128,9 @@ class Trace(Sequence[Decision]):
         """The controller that recorded it; "" where the session does not say."""
         return next((str(about["controller"]) for about in self.about.values() if "controller" in about), "")
 
+    def __repr__(self) -> str:
+        return f"<Trace: {plural(len(self), 'decision')}>"
+
     def __len__(self) -> int:
         return self._n_loaded + len(self._rows)
 

@@ -36,8 +36,8 @@ from tui.widgets.editing.popup import MOST_ROWS, Mend, Popup, Told
 
 
 class CellEditor(Widget):
-    """Mounted once on the screen over the grid: `place` says where, `open` for which cell. It posts one of its messages, and then is
-    to be closed: another one for each cell would cost more than all that a typed cell paints."""
+    """Mounted once on the screen over the grid: `place` says where, `open` for which cell. It posts one of its messages and is
+    then closed: another one for each cell would cost more than all that a typed cell paints."""
 
     BINDINGS: ClassVar[list[BindingType]] = KEYS
 

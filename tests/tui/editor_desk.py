@@ -44,8 +44,9 @@ class Desk(App[None]):
         yield Button("elsewhere")
 
     async def on_mount(self) -> None:
-        self.editor = CellEditor(*self._of, **self._more)
+        self.editor = CellEditor()
         self.editor.place(self.at, self.size)
+        self.editor.open(*self._of, **self._more)
         await self.screen.mount(self.editor)
 
     def look(self) -> None:

@@ -98,7 +98,7 @@ class AssetsPane(Pane):
     @property
     def editor(self) -> CellEditor | None:
         """The editor that is open over a cell."""
-        return next(iter(self.screen.query(CellEditor)), None)
+        return next((one for one in self.query(CellEditor) if one.is_open), None)
 
     def show(self) -> None:
         """Show the sheet as it is now."""
@@ -182,7 +182,10 @@ class AssetsPane(Pane):
         column = self.grid.field
         self._edited = _Place(row, column, self.grid.is_in_test_row, self.grid.is_in_new_row)
         columns = self.sheet.table.columns
-        editor = CellEditor(
+        over = self.query_one("#over")
+        editor = next(iter(over.query(CellEditor)), None) or CellEditor()
+        editor.place(self.grid.cell_region(), Size(self.screen.size.width, self.region.bottom))
+        editor.open(
             self.sheet.fact_of(column),
             self.sheet.header(column).kind,
             event.text,
@@ -192,9 +195,8 @@ class AssetsPane(Pane):
             is_typing=event.is_typing,
             open_list=event.opens_list,
         )
-        self.query_one("#over").mount(editor)
-        self._place_editor()
-        editor.focus()
+        if editor.parent is None:
+            over.mount(editor)
 
     def _known(self, texts: TextColumn) -> list[str]:
         """What a cell may be completed to: an asset first to the clips that no row names yet, an output to what it may say."""
@@ -296,7 +298,7 @@ class AssetsPane(Pane):
 
     def _close_editor(self) -> None:
         if self.editor is not None:
-            self.editor.remove()
+            self.editor.close()
         self.grid.focus()
 
     def on_resize(self) -> None:

@@ -62,7 +62,7 @@ class SheetDialog(Dialog[Answer]):
     @property
     def editor(self) -> CellEditor | None:
         """The editor that is open over a cell."""
-        return next(iter(self.query(CellEditor)), None)
+        return next((one for one in self.query(CellEditor) if one.is_open), None)
 
     def is_fact(self, column: int) -> bool:
         """Whether a column holds facts, not cells."""
@@ -87,7 +87,9 @@ class SheetDialog(Dialog[Answer]):
         if self.editor is not None:
             return
         sheet, (_, column) = self.sheet, self.sheet.cursor
-        editor = CellEditor(
+        editor = next(iter(self.query(CellEditor)), None) or CellEditor()
+        editor.place(self.grid.cell_region(), Size(self.size.width, self.size.height))
+        editor.open(
             sheet.of_column(column),
             sheet.header(column).kind,
             event.text,
@@ -97,9 +99,8 @@ class SheetDialog(Dialog[Answer]):
             is_typing=event.is_typing,
             open_list=event.opens_list,
         )
-        self.query_one("#dialog-body").mount(editor)
-        self._place_editor()
-        editor.focus()
+        if editor.parent is None:
+            self.query_one("#dialog-body").mount(editor)
 
     def on_resize(self) -> None:
         self.call_after_refresh(self._place_editor)
@@ -137,7 +138,7 @@ class SheetDialog(Dialog[Answer]):
 
     def _close_editor(self) -> None:
         if self.editor is not None:
-            self.editor.remove()
+            self.editor.close()
         self.grid.focus()
 
     @on(Grid.CopyWanted)

@@ -36,7 +36,8 @@ from tui.widgets.editing.popup import MOST_ROWS, Mend, Popup, Told
 
 
 class CellEditor(Widget):
-    """Mounted on the screen over the grid; `place` says where. It posts one of its two messages and is then to be removed."""
+    """Mounted once on the screen over the grid: `place` says where, `open` for which cell. It posts one of its messages and is
+    then closed: another one for each cell would cost more than all that a typed cell paints."""
 
     BINDINGS: ClassVar[list[BindingType]] = KEYS
 
@@ -73,7 +74,16 @@ class CellEditor(Widget):
     class Cancelled(Message):
         """The cell stays as it was."""
 
-    def __init__(
+    def __init__(self) -> None:
+        super().__init__()
+        self.is_open = False
+        self.entry = Entry(self._typed)
+        self._choices = ChoiceList()
+        self._popup = Popup(self._choices)
+        self._cell, self._screen = Region(0, 0, 20, 1), Size(80, 24)
+        self._is_ready = False
+
+    def open(
         self,
         condition: Condition | None,
         kind: str,
@@ -85,7 +95,7 @@ class CellEditor(Widget):
         is_typing: bool = False,
         open_list: bool = False,
     ) -> None:
-        super().__init__()
+        """Edit a cell, and take the keys; nothing is left of the cell before."""
         self.condition = condition
         self.kind = kind
         self.is_fact = is_fact
@@ -93,21 +103,25 @@ class CellEditor(Widget):
         """Enter mode: arrows take the text. Else they move in it."""
         self.is_list_open = False
         """The keys go to the list."""
-        self.entry = Entry(text, self._typed)
         self._check = check
         self._began_with = None if is_typing else text
         self._chooser = Chooser(condition, kind, known, is_fact)
-        self._choices = ChoiceList("(not given)" if is_fact else "Any")
-        self._popup = Popup(self._choices)
+        self._choices.begin("(not given)" if is_fact else "Any")
+        self.entry.begin(text)
         self._offer = Offer()
         self._meaning = Meaning()
         self._refused: Fault | None = None
         self._mend = ""
         self._seen = "", -1
-        self._has_ticked = self._has_moved = self._is_done = self._is_ready = self._is_tab = False
-        self._cell, self._screen = Region(0, 0, 20, 1), Size(80, 24)
+        self._has_ticked = self._has_moved = self._is_done = self._is_tab = False
         if open_list and self._chooser.has_list:
             self._open()
+        self.is_open = self.display = True
+        self._begin()
+
+    def close(self) -> None:
+        """Be seen no more. Who closes it gives the keys on."""
+        self._is_done, self.is_open, self.display = True, False, False
 
     def compose(self) -> ComposeResult:
         yield self.entry
@@ -115,8 +129,13 @@ class CellEditor(Widget):
 
     def on_mount(self) -> None:
         self._is_ready = True
-        self.entry.focus()
-        self._update()
+        self._begin()
+
+    def _begin(self) -> None:
+        """Show the cell once there is a line to show it in."""
+        if self._is_ready and self.is_open:
+            self.screen.set_focus(self.entry)  # at once: a word that it lost the keys, to the cell before, then means nothing
+            self._update()
 
     def focus(self, scroll_visible: bool = True) -> Self:
         """Give the keys to the entry line."""
@@ -143,13 +162,14 @@ class CellEditor(Widget):
     def place(self, cell: Region, screen: Size) -> None:
         """Stand so that the entry line lies on the cell, wider where the text is, and the popup below or above it."""
         self._cell, self._screen = cell, screen
+        if not (self._is_ready and self.is_open):
+            return
         width = min(max(cell.width, cell_len(self.entry.value) + 1), screen.width)
         x, y = max(0, min(cell.x, screen.width - width)), max(0, min(cell.y, screen.height - 1))
         self.styles.width = width
         self.absolute_offset = Region(x, y, width, 1).offset
-        if self._is_ready:
-            self._popup.stand(Region(x, y, width, 1), screen)
-            self.refresh(layout=True)
+        self._popup.stand(Region(x, y, width, 1), screen)
+        self.refresh(layout=True)
 
     def refuse(self, fault: Fault) -> None:
         """Show why a text was not taken, and go on editing."""
@@ -223,14 +243,15 @@ class CellEditor(Widget):
     @on(Input.Changed)
     def _changed(self, event: Input.Changed) -> None:
         event.stop()
-        self._refused, self._mend = None, ""
-        self._update()
+        if self.is_open:
+            self._refused, self._mend = None, ""
+            self._update()
 
     @on(Entry.CaretMoved)
     def _caret_moved(self, event: Entry.CaretMoved) -> None:
         """Another word possible."""
         event.stop()
-        if self._chooser.has_ticks and self._seen != (self.text, self.entry.cursor_position):
+        if self.is_open and self._chooser.has_ticks and self._seen != (self.text, self.entry.cursor_position):
             self._update()
 
     def _typed(self, typed: str) -> bool:
@@ -349,7 +370,7 @@ class CellEditor(Widget):
 
     def on_descendant_blur(self, event: events.DescendantBlur) -> None:
         """A click elsewhere takes a good text; a bad one stays, unless it is the one that was there."""
-        if self._is_done or not self.app.app_focus or not self.is_attached:
+        if self._is_done or not self.app.app_focus or not self.is_attached or self.screen.focused is self.entry:
             return
         if self.text == self._began_with:
             self.action_cancel()

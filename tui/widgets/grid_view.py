@@ -105,6 +105,8 @@ class GridView(ScrollView, inherit_bindings=False):
         """The lines that were painted last, where the grid was then."""
         self._painted_at: tuple[object, ...] = ()
         self._had_focus = False
+        self._scrolled_in: tuple[object, ...] = ()
+        """The sizes that the scroll bars are of."""
 
     def open(self, sheet: Sheet) -> None:
         """Show another table."""
@@ -365,6 +367,16 @@ class GridView(ScrollView, inherit_bindings=False):
     def _take_keys(self, scroll_visible: bool) -> None:
         if self.is_attached:
             self.screen.set_focus(self, scroll_visible=scroll_visible)
+
+    def _scroll_update(self, virtual_size: Size) -> None:
+        """Textual paints both scroll bars, and every line with them, after each layout of the screen: only other sizes need it."""
+        sizes = virtual_size, self.size, self.container_size, self.scrollbars_enabled
+        if sizes != self._scrolled_in:
+            super()._scroll_update(virtual_size)
+            self._scrolled_in = virtual_size, self.size, self.container_size, self.scrollbars_enabled
+
+    def watch_has_focus(self, _has_focus: bool) -> None:
+        """No style here depends on the keys. Textual would work out all of them again, and paint the scroll bars: every line."""
 
     def refresh(self, *regions: Region, repaint: bool = True, layout: bool = False, recompose: bool = False) -> Self:
         """Paint again. Textual asks for all when the keys come or go, and then the line of the cursor alone looks otherwise."""

@@ -42,15 +42,19 @@ class ChoiceList(Widget, can_focus=False):
 
         at: int
 
-    def __init__(self, none_label: str) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self.none_label = none_label
+        self.none_label = ""
         """What row None is called."""
         self.rows: Sequence[Row] = ()
         self.highlight: int | None = None
         self._tick: Callable[[Row], Tick] | None = None
         self._has_boxes = False
         self._top = 0
+
+    def begin(self, none_label: str) -> None:
+        """Forget the rows of the cell before."""
+        self.none_label, self.rows, self.highlight, self._top = none_label, (), None, 0
 
     def show(self, rows: Sequence[Row], tick: Callable[[Row], Tick] | None, has_boxes: bool, highlight: int | None) -> None:
         """Show other rows. `tick` says what is chosen, None: nothing is; with boxes, each row has one."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from typing import ClassVar
+from typing import ClassVar, Self
 
 from rich.cells import cell_len
 from textual import events
@@ -38,9 +38,9 @@ class Entry(Input):
     class CaretMoved(Message):
         """The caret is elsewhere, or the text has changed."""
 
-    def __init__(self, text: str, typed: Callable[[str], bool]) -> None:
-        self._signs = {code: sign for code, sign in _SIGNS.items() if chr(code) in text and sign not in text}
-        super().__init__(text.translate(self._signs), compact=True, select_on_focus=False)
+    def __init__(self, typed: Callable[[str], bool]) -> None:
+        self._signs: dict[int, str] = {}
+        super().__init__(compact=True, select_on_focus=False)
         self.cursor_blink = False
         self._typed = typed
         self.keys_of_list: frozenset[str] = frozenset()
@@ -50,6 +50,16 @@ class Entry(Input):
     def text(self) -> str:
         """What the cell would hold."""
         return self.value.translate({ord(sign): chr(code) for code, sign in self._signs.items()})
+
+    def begin(self, text: str) -> None:
+        """Hold the text of a cell, without word of it."""
+        self._signs = {code: sign for code, sign in _SIGNS.items() if chr(code) in text and sign not in text}
+        with self.prevent(Input.Changed, self.CaretMoved):
+            self.write(text)
+
+    def blur(self) -> Self:
+        """Keep what there is: Textual calls this when the line is hidden, and would take the keys from whom they were given to."""
+        return self
 
     def write(self, text: str, caret: int | None = None) -> None:
         """Put another text there."""

@@ -1,8 +1,8 @@
 """A decision table of a DMN file as columns: inputs are conditions, outputs and annotations are data, the first output the asset.
 
 A rule is a row. The hit policy becomes the table's policy. What a cell cannot say becomes the row's own rule where an expression
-can; else it is kept as `= TEXT`, which no type reads, and is told with its rule and column. A document type, and with it bombs and
-external entities, is refused before anything is parsed.
+can; else it is kept as `= TEXT`, which no type reads, and is reported with its rule and column. A document type, and with it bombs
+and external entities, is refused before anything is parsed.
 
 Source: OMG, Decision Model and Notation 1.3 to 1.5; `bpmn-io/dmn-js` for what editors write.
 """

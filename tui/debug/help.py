@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from rich.table import Table
-from rich.text import Text
+from rich.table import Column
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import VerticalScroll
@@ -13,6 +12,7 @@ from textual.widgets import Static
 
 from tui.debug.keys import KEYS, names_of
 from tui.screens.dialog import Dialog
+from tui.screens.help import section
 
 QUESTIONS = (
     ("Why this clip?", "Go to a jump with [ and ]: the second line says why. The weights show what each channel adds."),
@@ -56,22 +56,11 @@ class DebugHelp(Dialog[None]):
 
     def compose_body(self) -> ComposeResult:
         with VerticalScroll():
-            yield Static(_section("Four questions", QUESTIONS))
-            yield Static(_section("What the signs mean", SIGNS))
+            yield Static(section("Four questions", QUESTIONS, Column(min_width=16, max_width=36)))
+            yield Static(section("What the signs mean", SIGNS, Column(min_width=16, max_width=36)))
             for group in dict.fromkeys(key.group for key in KEYS):
                 lines = [(names_of(key.keys), key.about) for key in KEYS if key.group == group]
-                yield Static(_section(group, tuple(lines)))
+                yield Static(section(group, lines, Column(min_width=16, max_width=36)))
 
     def on_mount(self) -> None:
         self.query_one(VerticalScroll).focus()
-
-
-def _section(title: str, lines: tuple[tuple[str, str], ...]) -> Table:
-    table = Table(
-        title=Text(title, style="bold"), title_justify="left", box=None, show_header=False, pad_edge=False, padding=(0, 2, 0, 0)
-    )
-    table.add_column(min_width=16, max_width=36)
-    table.add_column()
-    for left, right in lines:
-        table.add_row(Text(left, style="bold"), Text(right))
-    return table

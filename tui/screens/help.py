@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
-from rich.table import Table
+from rich.table import Column, Table
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
@@ -58,11 +58,11 @@ class HelpDialog(Dialog[None]):
 
     def compose_body(self) -> ComposeResult:
         with VerticalScroll():
-            yield Static(_section("How a cell is written", CELLS))
-            yield Static(_section("What the marks mean", MARKS))
+            yield Static(section("How a cell is written", CELLS))
+            yield Static(section("What the marks mean", MARKS))
             for group in dict.fromkeys(command.group for command in COMMANDS):
                 commands = [c for c in COMMANDS if c.group == group]
-                yield Static(_section(group, [(self._keys_of(c), c.about) for c in commands]))
+                yield Static(section(group, [(self._keys_of(c), c.about) for c in commands]))
 
     def on_mount(self) -> None:
         self.query_one(VerticalScroll).focus()
@@ -71,13 +71,11 @@ class HelpDialog(Dialog[None]):
         return "  ".join(key_names(self._keys.get(command.id, command.keys)))
 
 
-def _section(title: str, lines: tuple[tuple[str, str], ...] | list[tuple[str, str]]) -> Table:
-    table = Table(
-        title=Text(title, style="bold"), title_justify="left", box=None, show_header=False, pad_edge=False, padding=(0, 2, 0, 0)
-    )
-    table.add_column(no_wrap=True, min_width=22)
-    table.add_column()
+def section(title: str, lines: Sequence[tuple[str, str]], first: Column | None = None) -> Table:
+    """Lines of two columns under a title; `first` says how wide the first column may be."""
+    columns = first or Column(no_wrap=True, min_width=22), Column()
+    heading = Text(title, style="bold")
+    table = Table(*columns, title=heading, title_justify="left", box=None, show_header=False, pad_edge=False, padding=(0, 2, 0, 0))
     for left, right in lines:
         table.add_row(Text(left, style="bold"), Text(right))
-    table.caption = ""
     return table

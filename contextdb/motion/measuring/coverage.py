@@ -258,7 +258,7 @@ class MotionCoverage:
                 other = MAPS[name].opposite[column]
                 is_both = self.is_mirrored and other != column
                 if is_both and (shares[row, other], -other) > (shares[row, column], -column):
-                    continue  # that of the other side is told of
+                    continue  # that of the other side is listed
                 fills = float(shares[row, column] + (shares[row, other] if is_both else 0.0)) / wanted
                 elsewhere = self._elsewhere(name, row, column)
                 found.append(ToCapture(name, row, column, fills, float(shares[row, column]), elsewhere, is_both))
@@ -303,7 +303,7 @@ def coverage(
     pattern : str
         How clips of transitions are named, with `{from}` and `{to}`.
     near_cost : float
-        Clips that lie within this cost of another are told; see `near_clips`.
+        Clips that lie within this cost of another are listed; see `near_clips`.
     progress : function of (done, total, clip name), optional
 
     Raises

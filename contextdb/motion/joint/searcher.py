@@ -20,7 +20,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from contextdb.cells.arguments import require_kind, require_many_of, require_mapping, require_whole
-from contextdb.console import announce
 from contextdb.errors import ContextError, Fault, MotionError, QueryError, in_quotes, nearest, some
 from contextdb.motion.clips.ground_place import A_BODY, GroundPlace, OfBody, place_of
 from contextdb.motion.clips.quaternions import Floats
@@ -38,6 +37,7 @@ from contextdb.motion.reading import as_number
 from contextdb.motion.search import cost
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.hit import NOTHING, Hit
+from contextdb.motion.search.searcher import compile_once
 from contextdb.motion.selection.choice import Choice
 from contextdb.motion.selection.selector import Entry, Selector, choice_of
 
@@ -363,9 +363,7 @@ def load_kernels() -> ModuleType | None:
         from contextdb.motion.joint import kernels
     except (ImportError, RuntimeError):
         return None
-    announce(kernels.search)
-    kernels.search.compile(kernels.SIGNATURE)
-    kernels.search.disable_compile()
+    compile_once(kernels.search, kernels.SIGNATURE)
     return kernels
 
 

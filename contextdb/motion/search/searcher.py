@@ -132,9 +132,7 @@ def load_kernels() -> ModuleType | None:
         from contextdb.motion.search import kernels
     except (ImportError, RuntimeError):
         return None
-    announce(kernels.search)
-    kernels.search.compile(kernels.SIGNATURE)
-    kernels.search.disable_compile()
+    compile_once(kernels.search, kernels.SIGNATURE)
     return kernels
 
 
@@ -145,10 +143,15 @@ def load_many_kernels() -> ModuleType | None:
         return None
     from contextdb.motion.search import many_kernels
 
-    announce(many_kernels.search_block)
-    many_kernels.search_block.compile(many_kernels.SIGNATURE)
-    many_kernels.search_block.disable_compile()
+    compile_once(many_kernels.search_block, many_kernels.SIGNATURE)
     return many_kernels
+
+
+def compile_once(loop: Any, signature: Any) -> None:
+    """Compile a numba function for its one signature, with a word where that is the first time on this machine."""
+    announce(loop)
+    loop.compile(signature)
+    loop.disable_compile()
 
 
 def in_blocks(n: int, work: Callable[[int, int], object]) -> None:

@@ -12,13 +12,12 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.geometry import Size
 
-from contextdb.cells.facts import read_fact_text
 from contextdb.cells.words import MARK
 from contextdb.columns import TextColumn
-from contextdb.errors import ContextDBError, ContextError, Fault, plural
+from contextdb.errors import ContextDBError, Fault, plural
 from tui.clipboard import Clipboard
 from tui.messages import Edited, RenameWanted, Told
-from tui.model.asked import Offered
+from tui.model.asked import Offered, fact_fault
 from tui.model.column_values import selection_said
 from tui.model.find import PatternError, Search
 from tui.model.notes import COLOURS, Notes
@@ -191,14 +190,7 @@ class AssetsPane(SheetView):
         return [*Priorities(self.sheet).clips_without_row(), *known]
 
     def _check_fact(self, text: str) -> Fault | None:
-        found = self.sheet.fact_of(self._edited.column)
-        if found is None or not text.strip():
-            return None
-        try:
-            read_fact_text(text, found)
-        except ContextError as error:
-            return error.faults[0]
-        return None
+        return fact_fault(text, self.sheet.fact_of(self._edited.column))
 
     @on(CellEditor.Committed)
     def _commit(self, event: CellEditor.Committed) -> None:

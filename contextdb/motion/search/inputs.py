@@ -54,6 +54,7 @@ def parts_of(
 
 
 def as_features(features: ArrayLike) -> Features:
+    """Features as they are given: float32, frames x features."""
     array = arguments.array_of(features, "the features", MotionError)
     if array.ndim != 2:
         raise MotionError(Fault(f"the features have shape {array.shape}.", "frames x features"))

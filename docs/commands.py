@@ -18,7 +18,7 @@ from contextdb.cli import COMMANDS, Group
 PAGE = Path(__file__).parent / "commands.md"
 HEAD = """# Commands
 
-For whoever looks up an option: every command with its help, as `contextdb COMMAND --help` prints it in a terminal of 100 columns.
+Every command with its help, as `contextdb COMMAND --help` prints it in a terminal of 100 columns.
 [Recipes](recipes.md) show the commands at work, [messages](messages.md) say what they may report, and [ci](ci.md#exit-codes) what
 their exit codes mean. `make docs` writes this page.
 """

@@ -16,6 +16,7 @@ class Slip:
 
 
 def make(slip: Slip, folder: Path) -> None:
+    """Change the file; ValueError where what is to be changed is not in it just once."""
     path = folder / slip.file
     text = path.read_bytes().decode()
     if text.count(slip.old) != 1:

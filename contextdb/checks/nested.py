@@ -1,6 +1,6 @@
 """What a check finds wrong with rows that refer to another table, and what it says of a flat table's rows.
 
-A finding of a table is about that table's own rows: what concerns rows of an inner table alone is told of that table, once.
+A finding of a table is about that table's own rows: what concerns rows of an inner table alone is reported there, once.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def check_nesting(table: Table) -> Iterator[Finding]:
 
 
 def _unusable(table: Table) -> Iterator[Finding]:
-    """A finding for each inner table that has faults, which are told of that table."""
+    """A finding for each inner table that has faults, which are reported there."""
     for name, rows in inner_rows(table).items():
         try:
             assert table.around is not None

@@ -57,7 +57,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Check one table or a folder of them."""
-    found = check_path(arguments.path)
+    return printed(check_path(arguments.path), arguments)
+
+
+def printed(found: CheckReport, arguments: argparse.Namespace) -> ExitCode:
+    """Print a report in the format that is asked for; the code says whether anything in it fails."""
     failing = LEVELS[: LEVELS.index(arguments.fail_on) + 1] if arguments.fail_on != "none" else ()
     text = report.render(
         arguments.format,

@@ -24,7 +24,7 @@ from pathlib import Path
 from contextdb.commands import add_format_arguments, coverage_telemetry
 from contextdb.commands.progress import Bar, bar, has_many_cells
 from contextdb.console import ExitCode, output, printable, terminal_width, wants_colour
-from contextdb.covering.baseline import Earlier
+from contextdb.covering.baseline import ACCEPTED, Earlier, read_baseline
 from contextdb.covering.engine import MOST_GAPS, SAMPLES, WORK
 from contextdb.covering.pairs import PairTable
 from contextdb.covering.progress import Tell
@@ -65,7 +65,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     """Measure one table or a folder of them."""
     _require_sense(arguments)
     tables = [table.flat() for table in tables_at(arguments.path)]
-    baseline = _read_baseline(arguments.baseline) if arguments.baseline else None
+    baseline = read_baseline(baseline_text(arguments.baseline, ACCEPTED), arguments.baseline) if arguments.baseline else None
     if arguments.gap is not None or arguments.explain is not None:
         text, code = _details(arguments, _only(tables)), ExitCode.OK
     else:
@@ -260,14 +260,12 @@ def _only(tables: Sequence[EitherTable]) -> EitherTable:
     return tables[0]
 
 
-def _read_baseline(file: str) -> dict[str, Earlier]:
-    from contextdb.covering.baseline import ACCEPTED, read_baseline
-
+def baseline_text(file: str, accepted: str = "") -> str:
+    """What the file of a baseline says; `accepted` is what it may be."""
     try:
-        text = read_bytes(Path(file)).decode("utf-8-sig")
+        return read_bytes(Path(file)).decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise ContextError(Fault("the baseline is not text.", ACCEPTED, place=Place(file))) from None
-    return read_baseline(text, file)
+        raise ContextError(Fault("the baseline is not text.", accepted, place=Place(file))) from None
 
 
 def percent(text: str) -> float:

@@ -1,4 +1,4 @@
-"""What git is told of tables: lines of .gitattributes, and sections of git's configuration. Shared by the `git` commands."""
+"""The settings of git for tables: lines of .gitattributes, and sections of git's configuration. Shared by the `git` commands."""
 
 from __future__ import annotations
 

@@ -9,8 +9,8 @@ written as for the command `query`. Ctrl+C ends it.
   contextdb live game --tables tables/ --explain
   contextdb live game --record session.jsonl
 
-With --tables the questions are also asked of the tables of a folder: it is told where their answers differ from the game's, and
-with --explain which rows were nearest, and which of their cells fail. With --record FILE every question is kept, not only the
+With --tables the questions are also asked of the tables of a folder: the command says where their answers differ from the game's,
+and with --explain which rows were nearest, and which of their cells fail. With --record FILE every question is kept, not only the
 newest; the commands `evaluate` and `coverage --telemetry` read FILE, while it grows too.
 """
 
@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--who", action="append", metavar="WHO", help="only what this character asks; may be repeated")
     parser.add_argument("--table", action="append", metavar="TABLE", help="only what this table is asked; may be repeated")
     parser.add_argument("--record", metavar="FILE", help="also write every line to a new file: .jsonl")
-    parser.add_argument("--tables", metavar="FOLDER", help="a folder of tables to ask too; differing answers are told")
+    parser.add_argument("--tables", metavar="FOLDER", help="a folder of tables to ask too; shows where their answers differ")
     parser.add_argument("--explain", action="store_true", help="with --tables: show the nearest rows, and which cells fail")
     parser.add_argument("--most", type=_count, metavar="N", help="end after so many lines")
 

@@ -15,6 +15,7 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
+from contextdb.commands.motion_clips import unit_of
 from contextdb.console import ExitCode, aligned, output, printable
 from contextdb.errors import plural
 from contextdb.motion.clips.clip import CENTIMETRE, UPS, Clip, load_clips
@@ -29,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The arguments of the command."""
     parser.add_argument("files", metavar="FILE", nargs="+", help="BVH files, or folders of them")
     parser.add_argument(
-        "--metres-per-unit", metavar="M", type=_unit, default=CENTIMETRE, help="the unit of the files in metres (default: 0.01)"
+        "--metres-per-unit", metavar="M", type=unit_of, default=CENTIMETRE, help="the unit of the files in metres (default: 0.01)"
     )
     parser.add_argument("--up", choices=UPS, default="y", help="the axis that points up (default: y)")
     parser.add_argument("--json", action="store_true", help="print a JSON document instead of trees")
@@ -88,13 +89,3 @@ def _document(files: list[str], clip: Clip) -> dict[str, object]:
     found = {"hips": rig.hips, "spine": rig.spine, "head": rig.head, "feet": rig.feet, "heels": rig.heels, "toes": rig.toes}
     sides = {"facing": rig.facing, "mirror": [list(pair) for pair in rig.mirror]}
     return {"files": files, "rate": clip.rate, "height_m": round(rig.height_m, 6), **found, **sides, "bones": bones}
-
-
-def _unit(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 1e-9 <= value <= 1e9:
-        raise argparse.ArgumentTypeError(f'"{text}" is not a unit. Accepted: metres, such as 0.01 for centimetres.')
-    return value

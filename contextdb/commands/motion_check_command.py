@@ -13,17 +13,16 @@ warning, such as a body of 170 m.
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from contextdb import report
 from contextdb.commands import add_format_arguments
+from contextdb.commands.check_command import printed
 from contextdb.commands.progress import building_bar
-from contextdb.console import ExitCode, output, terminal_width, wants_colour
+from contextdb.console import ExitCode
 from contextdb.errors import ContextDBError, Fault, Place, plural
-from contextdb.findings import LEVELS, Finding
+from contextdb.findings import Finding
 from contextdb.motion.storage.building import CACHE_FOLDER
 from contextdb.motion.storage.checking import check_clips, check_motion
 from contextdb.motion.storage.config import MotionConfig
@@ -51,7 +50,7 @@ class MotionReport(CheckReport):
         return f"{databases} and {clips} checked: {said}"
 
     def condensed(self) -> MotionReport:
-        """The report for people: what many clips have in common is told of the first, with how many others have it."""
+        """The report for people: what many clips have in common is reported for the first, with how many others have it."""
         alike: dict[tuple[str, ...], list[Finding]] = {}
         for i, finding in enumerate(self.findings):
             mend = finding.message.partition(" Expected: ")[2]
@@ -82,19 +81,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Check the motion of a folder."""
     found = check_path(arguments.path, cache=not arguments.no_cache)
-    failing = LEVELS[: LEVELS.index(arguments.fail_on) + 1] if arguments.fail_on != "none" else ()
     is_for_people = arguments.format in ("text", "markdown") and not arguments.all
-    text = report.render(
-        arguments.format,
-        found.condensed() if is_for_people else found,
-        colour=wants_colour(sys.stdout),
-        width=terminal_width(),
-        shows_all=arguments.all,
-        failing=failing,
-    )
-    with output():
-        print(text, end="")
-    return ExitCode.FOUND if any(f.level in failing for f in found.findings) else ExitCode.OK
+    return printed(found.condensed() if is_for_people else found, arguments)
 
 
 def check_path(path: str, *, cache: bool = True) -> MotionReport:

@@ -17,23 +17,32 @@ import argparse
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from contextdb.commands import add_format_arguments
-from contextdb.commands.coverage_command import percent
+from contextdb.commands.coverage_command import baseline_text, percent
 from contextdb.commands.motion_build_command import MotionProject
 from contextdb.commands.progress import building_bar
 from contextdb.console import ExitCode, output, terminal_width, wants_colour
-from contextdb.disk import read_bytes, write_atomic
-from contextdb.errors import ContextError, Fault, Place, in_quotes, nearest, some
+from contextdb.covering.motion import motion_coverage
+from contextdb.disk import write_atomic
+from contextdb.errors import ContextError, Fault, in_quotes, nearest, some
 from contextdb.motion.measuring.near_clips import NEAR_COST
 from contextdb.motion.measuring.transition_names import PATTERN
 from contextdb.motion.storage.building import open_or_build
 from contextdb.report import formats, render
+from contextdb.report.motion_coverage_results import (
+    BASELINE,
+    Earlier,
+    MotionCoverageResults,
+    MotionMeasured,
+    fail_under,
+    lost_since,
+    no_loss,
+    read_baseline,
+    table_gone,
+)
+from contextdb.report.motion_coverage_text import render_context
 from contextdb.tables.project import Project
-
-if TYPE_CHECKING:
-    from contextdb.report.motion_coverage_results import Earlier, MotionCoverageResults
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -58,7 +67,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     """Measure a project."""
     if arguments.context is not None and (arguments.format != "text" or arguments.baseline or arguments.fail_under is not None):
         raise ContextError(Fault("--context is text about some contexts; other formats and bars do not go with it."))
-    earlier = _read_baseline(arguments.baseline) if arguments.baseline else None
+    earlier = read_baseline(baseline_text(arguments.baseline, BASELINE), arguments.baseline) if arguments.baseline else None
     results = _results(arguments, earlier)
     colour, width = wants_colour(sys.stdout) and not arguments.output, terminal_width()
     if arguments.context is not None:
@@ -74,16 +83,6 @@ def run(arguments: argparse.Namespace) -> ExitCode:
 
 
 def _results(arguments: argparse.Namespace, earlier: Mapping[str, Earlier] | None) -> MotionCoverageResults:
-    from contextdb.covering.motion import motion_coverage
-    from contextdb.report.motion_coverage_results import (
-        MotionCoverageResults,
-        MotionMeasured,
-        fail_under,
-        lost_since,
-        no_loss,
-        table_gone,
-    )
-
     project = MotionProject.load(arguments.path)
     with building_bar() as progress:
         databases = open_or_build(project.config, project.folder, project.assets, progress)
@@ -112,24 +111,12 @@ def _results(arguments: argparse.Namespace, earlier: Mapping[str, Earlier] | Non
 
 
 def _context(results: MotionCoverageResults, wanted: str, colour: bool, width: int) -> str:
-    from contextdb.report.motion_coverage_text import render_context
-
     known = {each.contexts.id: (measured, each) for measured in results.tables for each in measured.motion.coverage.contexts}
     if wanted not in known:
         near = nearest(wanted, known)
         accepted = f"an id of the report, such as {some(list(known))}" if known else "none: no context has a valid clip"
         raise ContextError(Fault(f"there are no contexts {in_quotes(wanted)}.", accepted, in_quotes(near) if near else ""))
     return render_context(*known[wanted], colour=colour, width=width)
-
-
-def _read_baseline(file: str) -> dict[str, Earlier]:
-    from contextdb.report.motion_coverage_results import BASELINE, read_baseline
-
-    try:
-        text = read_bytes(Path(file)).decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise ContextError(Fault("the baseline is not text.", BASELINE, place=Place(file))) from None
-    return read_baseline(text, file)
 
 
 def _axes(given: list[str]) -> dict[str, str]:

@@ -2,7 +2,7 @@
 
 Cells are ranges from the clips' own movement; neighbours overlap a little, so that for each context some clip is valid. With --out
 the table is written with the contextdb.toml that it needs: conditions, outputs, features, databases, a selector and a controller.
-With --into columns, empty cells and rows that are missing are filled; a cell that does not accept what its clip shows is told.
+With --into columns, empty cells and rows that are missing are filled; a cell that does not accept what its clip shows is reported.
 
 Exits with 1 if a cell says other than its clip, or a clip could not be read.
 

@@ -20,22 +20,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from contextdb import report
 from contextdb.commands import add_format_arguments
+from contextdb.commands.coverage_command import baseline_text
 from contextdb.commands.motion_build_command import MotionProject, warn
 from contextdb.commands.motion_replay_command import project_of
 from contextdb.console import ExitCode, output, terminal_width, wants_colour
-from contextdb.disk import read_bytes
 from contextdb.errors import ContextDBError, ContextError, Fault, Place, in_quotes, plural
 from contextdb.motion import Measures, MotionDatabase, PoseBank, PoseSettings, measure, open_or_build, open_or_build_poses
 from contextdb.motion.storage.written_poses import NPZ
 from contextdb.motion.trace.filter_rows import fingerprint
 from contextdb.motion.trace.session import Trace
-
-if TYPE_CHECKING:
-    from contextdb.report.measure_results import Gate, MeasureResults, SessionMeasures
+from contextdb.report.measure_results import Bar, Gate, MeasureResults, SessionMeasures, compared, held_to, read_baseline
 
 BARS = {
     "skate": ("skate_cm_s", "CM_S", "the most that planted feet may slide, cm/s"),
@@ -76,15 +73,9 @@ def run(arguments: argparse.Namespace) -> ExitCode:
 
 
 def _results(arguments: argparse.Namespace, poses: Sequence[str]) -> MeasureResults:
-    from contextdb.report.measure_results import MeasureResults, read_baseline
-
     earlier: Mapping[str, Mapping[str, object]] = {}
     if arguments.baseline:
-        try:
-            text = read_bytes(Path(arguments.baseline)).decode("utf-8-sig")
-        except UnicodeDecodeError:
-            raise ContextError(Fault("the baseline is not text.", place=Place(arguments.baseline))) from None
-        earlier = read_baseline(text, arguments.baseline)
+        earlier = read_baseline(baseline_text(arguments.baseline), arguments.baseline)
     clips: dict[str, Clips] = {}
     every = [
         _measured(arguments, file, poses[i] if poses else None, clips, _before(earlier, file, arguments))
@@ -123,8 +114,6 @@ class Clips:
 def _measured(
     arguments: argparse.Namespace, file: str, poses: str | None, known: dict[str, Clips], before: Mapping[str, object]
 ) -> SessionMeasures:
-    from contextdb.report.measure_results import SessionMeasures, compared
-
     trace = None if Path(file).suffix == NPZ else Trace.load(file)
     if trace is None and poses:
         raise ContextError(Fault("--poses goes with a session, and these are poses.", "a .parquet session", place=Place(file)))
@@ -155,8 +144,6 @@ def add_bars(parser: argparse.ArgumentParser) -> None:
 
 def gates_of(arguments: argparse.Namespace, measures: Measures, file: str) -> list[Gate]:
     """The gate of each bar that the options set. Raises ContextError for one that cannot be judged."""
-    from contextdb.report.measure_results import Bar, held_to
-
     asked = {name: getattr(arguments, f"max_{name.replace('-', '_')}") for name in BARS}
     bars = [Bar(f"max-{name}", BARS[name][0], most) for name, most in asked.items() if most is not None]
     return [held_to(bar, measures, file) for bar in bars]

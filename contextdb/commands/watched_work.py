@@ -28,7 +28,7 @@ sleep, clock = time.sleep, time.monotonic
 def watched(path: str, work: Callable[[], ExitCode]) -> ExitCode:
     """Do some work on a folder now, and again when files in it have changed and rested; ends with Ctrl+C.
 
-    What is wrong is told, and mended by the next change.
+    Says what is wrong; the next change may mend it.
 
     Raises
     ------

@@ -258,7 +258,7 @@ class RulePart:
     step: Step | None = None
 
     def failure(self, fact: str) -> Failure:
-        """That it does not hold, with what is told of its facts."""
+        """That it does not hold, with what is known of its facts."""
         return Failure(self.column, self.text, fact, "Any", self.step)
 
 

@@ -81,7 +81,7 @@ def coverage(
     assume : bool
         False ignores what contextdb.toml says about contexts: the `assume` of the table, and how derived facts are computed.
     progress : callable of (str, float), optional
-        Is told what is being worked out and which share of the whole is done; the report is the same without it.
+        Called with what is being worked out and which share of the whole is done; the report is the same without it.
     should_stop : callable that gives bool, optional
         Asked often, from the thread of the call; True ends the call with Cancelled.
 

@@ -153,7 +153,7 @@ def motion_coverage(
     pattern : str
         How clips of transitions are named.
     near_cost : float
-        Clips that lie within this cost of another are told.
+        Clips that lie within this cost of another are listed.
     seed : int
         Of contexts that have to be drawn.
     progress : function of (done, total, clip name), optional

@@ -1,7 +1,7 @@
 """What described clips become as a table: a new one, or columns and rows filled into one that is there, with its contextdb.toml.
 
-What stands in a cell already stays; where it does not accept what the clip shows, that is told, and replaced only where asked. The
-command `motion describe` and Autofill in the editor are made of the same functions: `rows_for`, and `Filling` with its edit.
+What stands in a cell already stays; where it does not accept what the clip shows, that is reported, and replaced only where asked.
+The command `motion describe` and Autofill in the editor are made of the same functions: `rows_for`, and `Filling` with its edit.
 """
 
 from __future__ import annotations

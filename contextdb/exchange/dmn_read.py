@@ -1,8 +1,8 @@
 """A decision table of a DMN file as columns: inputs are conditions, outputs and annotations are data, the first output the asset.
 
 A rule is a row. The hit policy becomes the table's policy. What a cell cannot say becomes the row's own rule where an expression
-can; else it is kept as `= TEXT`, which no type reads, and is told with its rule and column. A document type, and with it bombs and
-external entities, is refused before anything is parsed.
+can; else it is kept as `= TEXT`, which no type reads, and is reported with its rule and column. A document type, and with it bombs
+and external entities, is refused before anything is parsed.
 
 Source: OMG, Decision Model and Notation 1.3 to 1.5; `bpmn-io/dmn-js` for what editors write.
 """
@@ -114,25 +114,21 @@ def read_dmn(raw: bytes, file: str, decision: str | None = None) -> Reading:
     plain = tuple(column.name for column in data[1:])
     typed, lost_outputs = _typed(outputs[1:])
     fallback, given, lost_defaults = _fallback(outputs, typed)
-    priority = _priority_name(columns, policy)
-    rule_name = when[0].name if when else None
     settings = TableSettings(
-        name, asset=data[0].name, outputs=plain, policy=policy, priority=priority, fallback=fallback, when=rule_name
+        name,
+        asset=data[0].name,
+        outputs=plain,
+        policy=policy,
+        priority=_priority_name(columns, policy),
+        fallback=fallback,
+        when=when[0].name if when else None,
+        typed=typed,
+        fallback_outputs=given,
     )
-    settings = replace(settings, typed=typed, fallback_outputs=given)
     schema = Schema(conditions={**declared, **rules_of_rows.facts}, tables={name: settings})
-    lost = [*lost, *lost_values, *_notes_on_entries(rules)]
-    told = (
-        *_version(root),
-        *policy_remarks,
-        *_expressions(element),
-        *_results(root, inputs),
-        *lost_types,
-        *lost_outputs,
-        *lost_defaults,
-        *rules_of_rows.remarks(),
-    )
-    remarks = (*told, *capped(lost, "such entries"))
+    told = [*_version(root), *policy_remarks, *_expressions(element), *_results(root, inputs)]
+    told += [*lost_types, *lost_outputs, *lost_defaults, *rules_of_rows.remarks()]
+    remarks = (*told, *capped([*lost, *lost_values, *_notes_on_entries(rules)], "such entries"))
     return Reading(tuple(columns), "dmn", remarks, schema, outputs=plain)
 
 

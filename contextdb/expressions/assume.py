@@ -1,7 +1,7 @@
 """Assumptions: expressions that hold in every context that can happen.
 
-What they rule out is told as boxes of cells where each comparison is about one condition and constants; an assumption that computes
-with facts, or compares them with each other, can only be asked context by context.
+What they rule out is given as boxes of cells where each comparison is about one condition and constants; an assumption that
+computes with facts, or compares them with each other, can only be asked context by context.
 """
 
 from __future__ import annotations

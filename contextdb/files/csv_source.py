@@ -134,7 +134,7 @@ def read_rows(
 
 
 def name_faults(names: Sequence[str]) -> Iterator[Fault]:
-    """What is wrong with the names of the columns: one is empty, or appears twice. The first few are told, and how many more."""
+    """What is wrong with the names of the columns: one is empty, or appears twice. Names the first few."""
     faults = list(_name_faults(names))
     yield from faults[:MOST_NAME_FAULTS]
     if len(faults) > MOST_NAME_FAULTS:

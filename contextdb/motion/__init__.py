@@ -80,8 +80,9 @@ from contextdb.motion.preparing.describing import Described, describe
 from contextdb.motion.preparing.proposal import Proposal
 from contextdb.motion.preparing.proposals import prepare
 from contextdb.motion.search.candidates import Candidate, Candidates
-from contextdb.motion.search.database import Hit, MotionDatabase, build_databases
+from contextdb.motion.search.database import MotionDatabase, build_databases
 from contextdb.motion.search.filters import Biases
+from contextdb.motion.search.hit import Hit
 from contextdb.motion.selection.choice import Choice, Reason, Search, Status
 from contextdb.motion.selection.controller import Controller
 from contextdb.motion.selection.controller_group import ControllerGroup

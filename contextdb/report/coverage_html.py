@@ -23,12 +23,12 @@ from contextdb.report.coverage_words import (
     nearest_sentence,
     overlap_sentence,
 )
+from contextdb.report.html_parts import POLICY, escaped, paragraph, table_of
 from contextdb.report.results import as_path
 from contextdb.tables.variety import VARIETY
 
 MOST_ROWS = 5_000
 """Rows that are listed, those with findings before others."""
-POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
 
 
 def render(results: CoverageResults) -> str:
@@ -57,12 +57,12 @@ def _summary(tables: Sequence[Measured]) -> str:
     columns = [("table", False), ("covered", True), ("gaps", True), ("rows", True), ("bars", False), ("", False)]
     is_held = any(m.gates for m in tables)
     lines = [_summary_line(measured, number, is_held) for number, measured in enumerate(tables)]
-    return _table("Tables", columns if is_held else [*columns[:4], columns[5]], lines)
+    return table_of("Tables", columns if is_held else [*columns[:4], columns[5]], lines)
 
 
 def _summary_line(measured: Measured, number: int, is_held: bool) -> list[str]:
     report = measured.report
-    name = f'<td class="k"><a href="#t{number}">{_text(report.table)}</a></td>'
+    name = f'<td class="k"><a href="#t{number}">{escaped(report.table)}</a></td>'
     gaps = _cell(f"{len(report.gaps):,}{'' if report.gaps_complete else '+'}", len(report.gaps))
     line = [name, _cell(format_percent(report.lower), report.lower), gaps, _cell(f"{report.n_rows:,}", report.n_rows)]
     return [*line, *([_word(_kept(measured))] if is_held else []), f'<td class="share">{_bar(report)}</td>']
@@ -81,12 +81,12 @@ def _bar(report: CoverageReport) -> str:
 
 def _section(measured: Measured, number: int) -> str:
     report = measured.report
-    parts = [f'<h2 id="t{number}">{_text(report.table)}</h2>\n', _paragraph(_size(measured), "muted"), *_head(measured)]
+    parts = [f'<h2 id="t{number}">{escaped(report.table)}</h2>\n', paragraph(_size(measured), "muted"), *_head(measured)]
     parts += [*_change(measured), *_telemetry(measured), *_gaps(measured)]
     if measured.pairs is not None:
         parts.append(heat_map(measured.pairs, number))
     elif measured.left_out:
-        parts.append(_paragraph(measured.left_out, "muted"))
+        parts.append(paragraph(measured.left_out, "muted"))
     parts += [*_overlap(measured), *_findings(measured), *_rows(measured)]
     return f"<article>\n{''.join(parts)}</article>\n"
 
@@ -97,9 +97,9 @@ def _size(measured: Measured) -> str:
 
 def _head(measured: Measured) -> Iterator[str]:
     report = measured.report
-    yield _paragraph(report.headline, "headline")
+    yield paragraph(report.headline, "headline")
     yield f"{_bar(report)}\n"
-    yield from (_paragraph(sentence, "muted") for sentence in assumed_sentences(report))
+    yield from (paragraph(sentence, "muted") for sentence in assumed_sentences(report))
     if measured.gates:
         yield _gates(measured.gates)
 
@@ -107,7 +107,7 @@ def _head(measured: Measured) -> Iterator[str]:
 def _gates(gates: Iterable[Gate]) -> str:
     items = (
         f'<li><span class="{"passed" if g.passed else "failed"}">{"Passed" if g.passed else "Failed"}</span> '
-        f"{escape(g.name)}: {_text(g.message)}</li>"
+        f"{escape(g.name)}: {escaped(g.message)}</li>"
         for g in gates
     )
     return f'<ul class="gates">{"".join(items)}</ul>\n'
@@ -118,14 +118,14 @@ def _change(measured: Measured) -> Iterator[str]:
     if change is None:
         return
     yield "<h3>Since the baseline</h3>\n"
-    yield _paragraph(f"{change_sentence(measured, change)}.")
+    yield paragraph(f"{change_sentence(measured, change)}.")
     rows = [("new gap", gap.text, gap.share) for gap in change.opened] + [
         ("closed gap", gap.text, gap.share) for gap in change.closed
     ]
     lines = [[_cell(kind), _cell(text), _cell(format_percent(share), share)] for kind, text, share in rows]
     lines += [[_cell("newly dead"), _cell(measured.named(f.row or 0)), _cell("", 0.0)] for f in change.dead]
     if lines:
-        yield _table("What changed", [("", False), ("contexts, or row", False), ("share", True)], lines)
+        yield table_of("What changed", [("", False), ("contexts, or row", False), ("share", True)], lines)
 
 
 def _telemetry(measured: Measured) -> Iterator[str]:
@@ -133,17 +133,17 @@ def _telemetry(measured: Measured) -> Iterator[str]:
     if seen is None:
         return
     yield "<h3>Recorded moments</h3>\n"
-    yield _paragraph(seen.headline)
+    yield paragraph(seen.headline)
     lines = [[_cell(format_percent(gap.share), gap.share), _cell(gap.text)] for gap in measured.seen_elsewhere]
     if lines:
-        yield _table("Moments without a valid row", [("share of the moments", True), ("contexts", False)], lines)
-    yield from (_paragraph(f"{sentence}.", "muted") for sentence in facts_sentences(seen))
+        yield table_of("Moments without a valid row", [("share of the moments", True), ("contexts", False)], lines)
+    yield from (paragraph(f"{sentence}.", "muted") for sentence in facts_sentences(seen))
 
 
 def _gaps(measured: Measured) -> Iterator[str]:
     report = measured.report
     yield "<h3>Gaps</h3>\n"
-    yield _paragraph(f"{gaps_sentence(report)}.")
+    yield paragraph(f"{gaps_sentence(report)}.")
     if not report.gaps:
         return
     columns = [("", True), ("share", True), ("in no gap above", True), ("contexts without a valid row", False), ("nearest", False)]
@@ -159,13 +159,13 @@ def _gaps(measured: Measured) -> Iterator[str]:
         ]
         for i, gap in enumerate(report.gaps, 1)
     ]
-    yield _table("Gaps", columns, lines)
+    yield table_of("Gaps", columns, lines)
 
 
 def _overlap(measured: Measured) -> Iterator[str]:
     report = measured.report
     yield "<h3>Rows valid at once</h3>\n"
-    yield _paragraph(f"{overlap_sentence(report)}.")
+    yield paragraph(f"{overlap_sentence(report)}.")
     most = max(report.overlap.histogram, default=0.0)
     bars = "".join(
         f'<tr><td class="n">{n}</td><td class="n">{escape(format_percent(share))}</td>'
@@ -178,7 +178,7 @@ def _overlap(measured: Measured) -> Iterator[str]:
         table = f'<table class="hist">{head}<tbody>{bars}</tbody></table>'
         yield f'<div class="scroll" tabindex="0" role="region" aria-label="Overlap">{table}</div>\n'
     for crowd in report.crowded[:5]:
-        yield _paragraph(f"{crowd.n_rows} rows where {cells_text(crowd.cells, len(crowd.cells))}", "muted")
+        yield paragraph(f"{crowd.n_rows} rows where {cells_text(crowd.cells, len(crowd.cells))}", "muted")
 
 
 def _findings(measured: Measured) -> Iterator[str]:
@@ -188,13 +188,13 @@ def _findings(measured: Measured) -> Iterator[str]:
         return
     yield "<h3>Findings</h3>\n"
     if not report.findings_complete:
-        yield _paragraph("The work ended before every row was decided.", "muted")
+        yield paragraph("The work ended before every row was decided.", "muted")
     lines = [
         [_word(f.level), _word(rule), _cell("" if f.row is None else measured.named(f.row)), _cell(f.message)]
         for rule, found in blocks.items()
         for f in found[:MOST_ROWS]
     ]
-    yield _table("Findings", [("level", False), ("rule", False), ("row", False), ("finding", False)], lines)
+    yield table_of("Findings", [("level", False), ("rule", False), ("row", False), ("finding", False)], lines)
 
 
 def _rows(measured: Measured) -> Iterator[str]:
@@ -223,33 +223,16 @@ def _rows(measured: Measured) -> Iterator[str]:
         lines.append([_cell(str(place), place), _cell(measured.assets[row]), share, *hits, _cell(", ".join(rules.get(row, [])))])
     yield "<h3>Rows</h3>\n"
     if len(order) < len(measured.assets):
-        yield _paragraph(f"{len(order):,} of {len(measured.assets):,} rows are listed, those with findings before others.", "muted")
-    yield _table("Rows", columns, lines)
-
-
-def _table(label: str, columns: Sequence[tuple[str, bool]], lines: Iterable[Sequence[str]]) -> str:
-    head = "".join(f'<th{" class=n" if is_number else ""} scope="col">{escape(name)}</th>' for name, is_number in columns)
-    body = "".join(f"<tr>{''.join(line)}</tr>\n" for line in lines)
-    return (
-        f'<div class="scroll" tabindex="0" role="region" aria-label="{escape(label)}"><table class="sortable">'
-        f"<thead><tr>{head}</tr></thead>\n<tbody>\n{body}</tbody></table></div>\n"
-    )
+        yield paragraph(f"{len(order):,} of {len(measured.assets):,} rows are listed, those with findings before others.", "muted")
+    yield table_of("Rows", columns, lines)
 
 
 def _cell(text: str, value: float | None = None) -> str:
-    return f"<td>{_text(text)}</td>" if value is None else f'<td class="n" data-v="{value!r}">{_text(text)}</td>'
+    return f"<td>{escaped(text)}</td>" if value is None else f'<td class="n" data-v="{value!r}">{escaped(text)}</td>'
 
 
 def _word(text: str) -> str:
-    return f'<td class="k">{_text(text)}</td>'
-
-
-def _paragraph(text: str, kind: str = "") -> str:
-    return f"<p{f' class={kind}' if kind else ''}>{_text(text)}</p>\n"
-
-
-def _text(text: str) -> str:
-    return escape(printable(text))
+    return f'<td class="k">{escaped(text)}</td>'
 
 
 def _width(share: float) -> str:

@@ -15,7 +15,7 @@ from contextdb.errors import plural, some
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.measuring.coverage import ContextCoverage
 from contextdb.motion.measuring.moves import LEAST_FRAMES, MAPS, Counts, Map
-from contextdb.report.coverage_html import POLICY
+from contextdb.report.html_parts import POLICY, escaped, paragraph, table_of
 from contextdb.report.measure_results import Gate
 from contextdb.report.motion_coverage_results import (
     AHEAD_ALONE,
@@ -67,17 +67,17 @@ def render(results: MotionCoverageResults) -> str:
 
 def _section(measured: MotionMeasured) -> Iterator[str]:
     found = measured.motion.coverage
-    yield f"<h2>{_text(measured.motion.name)}</h2>\n"
-    yield _paragraph(measured.size, "muted")
-    yield _paragraph(measured.headline, "headline")
+    yield f"<h2>{escaped(measured.motion.name)}</h2>\n"
+    yield paragraph(measured.size, "muted")
+    yield paragraph(measured.headline, "headline")
     width = f"{100 * found.covered:.2f}%"
     yield f'<div class="bar" role="img" aria-label="{escape(measured.headline)}"><i style="width:{width}"></i></div>\n'
-    yield from (_paragraph(sentence, "muted") for sentence in measured.notes())
+    yield from (paragraph(sentence, "muted") for sentence in measured.notes())
     if measured.gates:
         yield _gates(measured.gates)
     if measured.lost:
         lines = [[_cell(each.words), _share(each.before), _share(each.now)] for each in measured.lost]
-        yield "<h3>Lost since the baseline</h3>\n" + _table("Lost", (("movement", False), ("before", True), ("now", True)), lines)
+        yield "<h3>Lost since the baseline</h3>\n" + table_of("Lost", (("movement", False), ("before", True), ("now", True)), lines)
     for name, of in MAPS.items():
         yield f"<h3>{escape(of.told.capitalize())}</h3>\n"
         yield _map(of, found.frames[name], found.wanted_shares[name], found.hole_shares[name])
@@ -90,7 +90,7 @@ def _section(measured: MotionMeasured) -> Iterator[str]:
             [_cell(f"{c.words}{both[c.is_both_sides]}"), _share(c.fills), _share(c.contexts), _cell(_named(c.elsewhere))]
             for c in found.to_capture
         ]
-        yield _table("Capture next", columns, lines)
+        yield table_of("Capture next", columns, lines)
     yield from _contexts(measured)
     for heading, told, items in measured.asides():
         if items:
@@ -103,7 +103,7 @@ def _contexts(measured: MotionMeasured) -> Iterator[str]:
         return
     yield "<h3>Contexts that miss movements</h3>\n"
     if len(worst) > MOST_CONTEXTS:
-        yield _paragraph(f"The {MOST_CONTEXTS} of {len(worst):,} that miss most.", "muted")
+        yield paragraph(f"The {MOST_CONTEXTS} of {len(worst):,} that miss most.", "muted")
     for each in worst[:MOST_CONTEXTS]:
         yield _context(each)
 
@@ -118,15 +118,15 @@ def _context(each: ContextCoverage) -> str:
         for name, of in MAPS.items()
         if each.wanted[name].any()
     )
-    valid = _paragraph(f"Valid: {', '.join(sorted(contexts.assets)) or 'none'}")
-    valid += _paragraph(f"Valid mirrored: {', '.join(sorted(contexts.mirrored))}") if contexts.mirrored else ""
-    missing = _paragraph(f"Missing: {'; '.join(hole_words(each))}")
-    return f'<details id="c{contexts.id}"><summary>{_text(told)}</summary>\n{valid}{missing}{maps}</details>\n'
+    valid = paragraph(f"Valid: {', '.join(sorted(contexts.assets)) or 'none'}")
+    valid += paragraph(f"Valid mirrored: {', '.join(sorted(contexts.mirrored))}") if contexts.mirrored else ""
+    missing = paragraph(f"Missing: {'; '.join(hole_words(each))}")
+    return f'<details id="c{contexts.id}"><summary>{escaped(told)}</summary>\n{valid}{missing}{maps}</details>\n'
 
 
 def _map(of: Map, frames: Counts, wanted: Floats, holes: Floats) -> str:
     if is_ahead_alone(of, frames, holes):
-        return _paragraph(AHEAD_ALONE, "muted")
+        return paragraph(AHEAD_ALONE, "muted")
     head = "".join(f'<th scope="col">{"<br>".join(filter(None, header_of(column.name)))}</th>' for column in of.columns)
     last = max((row for row in range(of.shape[0]) if frames[row].any() or wanted[row].any()), default=-1)
     body = "".join(
@@ -160,34 +160,25 @@ def _legend() -> str:
     squares = " ".join(f'<span class="square {colour}">{text}</span> {escape(told)}' for colour, text, told in LEGEND)
     told = f"Numbers are frames of clips; a bin is filled in a context from {LEAST_FRAMES} on. ! is missing in some contexts."
     squares += ' <span class="square none">·</span> nothing, and not wanted'
-    return f'<p class="heat legend">{squares}</p>\n{_paragraph(told, "muted")}'
+    return f'<p class="heat legend">{squares}</p>\n{paragraph(told, "muted")}'
 
 
 def _gates(gates: Iterable[Gate]) -> str:
     items = "".join(
         f'<li><span class="{"passed" if g.passed else "failed"}">{"Passed" if g.passed else "Failed"}</span> '
-        f"{escape(g.name)}: {_text(g.message)}</li>"
+        f"{escape(g.name)}: {escaped(g.message)}</li>"
         for g in gates
     )
     return f'<ul class="gates">{items}</ul>\n'
 
 
 def _list(heading: str, items: Sequence[str]) -> str:
-    listed = "".join(f"<li>{_text(item)}</li>\n" for item in items)
-    return f"<h3>{_text(heading)}</h3>\n<ul>\n{listed}</ul>\n"
+    listed = "".join(f"<li>{escaped(item)}</li>\n" for item in items)
+    return f"<h3>{escaped(heading)}</h3>\n<ul>\n{listed}</ul>\n"
 
 
 def _named(assets: Sequence[str]) -> str:
     return some(assets) if assets else ""
-
-
-def _table(label: str, columns: Sequence[tuple[str, bool]], lines: Iterable[Sequence[str]]) -> str:
-    head = "".join(f'<th{" class=n" if is_number else ""} scope="col">{escape(name)}</th>' for name, is_number in columns)
-    body = "".join(f"<tr>{''.join(line)}</tr>\n" for line in lines)
-    return (
-        f'<div class="scroll" tabindex="0" role="region" aria-label="{escape(label)}"><table class="sortable">'
-        f"<thead><tr>{head}</tr></thead>\n<tbody>\n{body}</tbody></table></div>\n"
-    )
 
 
 def _share(share: float) -> str:
@@ -195,12 +186,4 @@ def _share(share: float) -> str:
 
 
 def _cell(text: str) -> str:
-    return f"<td>{_text(text)}</td>"
-
-
-def _paragraph(text: str, kind: str = "") -> str:
-    return f"<p{f' class={kind}' if kind else ''}>{_text(text)}</p>\n"
-
-
-def _text(text: str) -> str:
-    return escape(printable(text))
+    return f"<td>{escaped(text)}</td>"

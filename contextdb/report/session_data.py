@@ -41,7 +41,7 @@ class Detail:
         Of how many assets.
     candidates : int
     searches : bool
-        Whether searches that changed nothing are told too.
+        Whether searches that changed nothing are included.
     """
 
     ghosts: int

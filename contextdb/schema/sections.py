@@ -14,9 +14,10 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
 from contextdb.errors import Fault, SchemaError, in_quotes, nearest, shown, some
 from contextdb.files.toml_text import as_toml
+from contextdb.schema.faults import KINDS_WITH
 from contextdb.schema.jobs import columns_checked
 from contextdb.schema.outputs import fallback_to_toml, outputs_faults, outputs_to_toml
-from contextdb.schema.settings import KINDS_WITH, Schema, TableSettings, conditions_from_dict, settings_fields
+from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict, settings_fields
 from contextdb.schema.shapes import NAMES, SECTIONS, wrong_name
 
 Part = dict[str, object]

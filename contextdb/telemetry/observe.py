@@ -32,7 +32,7 @@ MOST_GAPS = 20
 MOST_THREADS = 4
 """Beside those that read: more would wait for them, and each holds a chunk in memory."""
 Tell = Callable[[float, int], None]
-"""Is told how many files are done, and how many there are; a file that is half done counts half."""
+"""Called with how many files are done, and how many there are; a file that is half done counts half."""
 
 
 def observe(
@@ -47,7 +47,7 @@ def observe(
     max_gaps: int = MOST_GAPS,
     known: Sequence[Gap] = (),
 ) -> Observed:
-    """Hold recorded contexts against a table. Files are streamed, and only sums are kept.
+    """Evaluate recorded contexts against a table. Files are streamed, and only sums are kept.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def observe(
     engine : {"local", "dask"}
         This process, or Dask (`pip install "contextdb[dask]"`): the workers of `scheduler`, or a cluster of this machine's own.
     progress : callable of (float, int), optional
-        Is told how many files are done, of how many; first with 0. A file that is half done counts half, where it is read here.
+        Called with how many files are done, of how many; first with 0. A file that is half done counts half, where it is read here.
     resume : path of a folder, optional
         Where the sums of finished files are kept. A run that was interrupted goes on there; a changed file or table is read anew.
     max_gaps : int

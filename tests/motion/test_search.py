@@ -17,7 +17,8 @@ from contextdb.errors import QueryError
 from contextdb.motion.features.normalisation import Normalisation
 from contextdb.motion.markup.left_out import LeftOut, Skip
 from contextdb.motion.markup.marks import Mark, Marks, TagFilter
-from contextdb.motion.search.database import Biases, Hit, MotionDatabase
+from contextdb.motion.search.database import Biases, MotionDatabase
+from contextdb.motion.search.hit import Hit
 
 TAGS = ("Move", "Move.Run", "Stop")
 EIGHTHS = st.integers(-16, 16).map(lambda i: i / 8)  # sums of these and of their squares are exact: a tie is a tie

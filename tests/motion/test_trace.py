@@ -20,7 +20,7 @@ from contextdb.errors import ArtefactError, FileError, MotionError
 from contextdb.motion import Entry, Selector, TagFilter
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.search.candidates import Candidate, Candidates
-from contextdb.motion.search.database import NOTHING, Hit
+from contextdb.motion.search.hit import NOTHING, Hit
 from contextdb.motion.selection.choice import Choice, Reason, Search, Status
 from contextdb.motion.selection.controller import Controller
 from contextdb.motion.selection.controller_settings import ControllerSettings

@@ -16,7 +16,7 @@ from test_trace import DECISIONS, recorded
 from contextdb.console import width_of
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.search.candidates import Candidate, Candidates
-from contextdb.motion.search.database import Hit
+from contextdb.motion.search.hit import Hit
 from contextdb.motion.selection.choice import Choice, Reason, Search, Status
 from contextdb.motion.selection.decision import Action, Decision, Playing
 from contextdb.motion.selection.root_motion import RootMotion

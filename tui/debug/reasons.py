@@ -77,6 +77,7 @@ def _table(recording: Recording, moment: Moment, row: Row) -> Iterator[Line]:
 
 
 def fact_text(value: object) -> str:
+    """A fact as a line shows it."""
     if value is None:
         return "not given"
     if isinstance(value, float):

@@ -8,7 +8,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -28,12 +27,10 @@ from textual.worker import Worker, WorkerState, get_current_worker
 
 from contextdb.console import printable
 from contextdb.edits.schema_file import SchemaChange
-from contextdb.edits.weights import weights_change
 from contextdb.errors import ContextDBError, MotionError
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.output.bank import PoseBank
-from contextdb.motion.selection.decision import Action, Playing
-from contextdb.motion.trace.cost_views import cost_text
+from contextdb.motion.selection.decision import Action
 from tui.debug import ladder, reasons
 from tui.debug.bars import Bars
 from tui.debug.channels import Channels, Dial
@@ -47,6 +44,8 @@ from tui.debug.recording import MEASURES, Moment, Recording, Turned
 from tui.debug.stage import NEARER, TURN, Stage
 from tui.debug.timeline import Timeline
 from tui.debug.whole import Cancelled, Outcome, outcome_of
+from tui.debug.words import channel_costs, detail, instead, named
+from tui.debug.writing import write_turned
 
 LARGE = (100, 34)
 """From so many columns and lines on all panes are seen."""
@@ -390,7 +389,7 @@ class DebugScreen(Screen[None]):
     def _show_head(self, moment: Moment) -> None:
         decision, line = moment.decision, self.recording.line
         action = "jumps, forced" if line.forced[self.index] else str(decision.action)
-        plays = "" if decision.playing is None else f" {_named(decision.playing)} at {decision.playing.time_s:.2f} s"
+        plays = "" if decision.playing is None else f" {named(decision.playing)} at {decision.playing.time_s:.2f} s"
         head = f"{decision.time_s:.2f} s of {line.times_s[-1]:.2f} · tick {decision.tick:,} · {action}{plays}"
         text = Text(printable(f"{self.recording.name}  {head}"))
         if self.live is not None:
@@ -414,19 +413,9 @@ class DebugScreen(Screen[None]):
         else:
             yield "Nothing was searched up to here."
         if self.turned and moment.turned is not None and moment.asked is not None:
-            yield self._instead(moment)
+            yield instead(moment)
         else:
             yield self._facts(moment)
-
-    def _instead(self, moment: Moment) -> str:
-        assert moment.turned is not None, "was looked at before"
-        choice = moment.turned.choice
-        if choice is None or choice.database is None:
-            return "With these weights nothing may play."
-        what = f"{choice.hit.asset} at cost {cost_text(choice.hit.cost)}"
-        if not moment.turned.is_changed:
-            return f"With these weights the same is chosen: {what}."
-        return f"With these weights {'another asset' if moment.turned.is_other_asset else 'another frame'} is chosen: {what}."
 
     def _facts(self, moment: Moment) -> str:
         """What the game said of the moment, behind the speeds where these have no line of their own."""
@@ -462,26 +451,8 @@ class DebugScreen(Screen[None]):
         row, moment = self.bars.row, self.moment
         text = ""
         if row is not None and moment is not None:
-            text = "\n".join(self._detail(moment, row))
+            text = "\n".join(detail(moment, row))
         self.query_one("#detail", Static).update(Text(text))
-
-    def _detail(self, moment: Moment, row: Row) -> Iterator[str]:
-        """What is known of the asset under the cursor, in two lines."""
-        search = moment.landscape.searches[row.database]
-        database = search.database
-        rate = 30.0 if database.schema is None else database.schema.rate
-        at_s = (row.frame - int(database.starts[row.range])) / rate
-        out = "" if row.may_play else f" · left out: {row.reason}"
-        tags = [
-            tag
-            for tag, has in zip(database.marks.tags, database.marks.kind_tags[database.marks.kinds[row.frame]], strict=True)
-            if has
-        ]
-        said = f" · {', '.join(tags)}" if tags else ""
-        yield printable(f"{row.name} at {at_s:.2f} s: cost {cost_text(row.cost)}{out}{said} · {row.database}")
-        own = database.cost_weights * search.sums[:, row.frame]
-        parts = sorted(zip(database.channel_names, own.tolist(), strict=True), key=lambda part: -part[1])
-        yield printable(" + ".join(f"{name} {cost_text(value)}" for name, value in parts) + _biases(search.biases[row.frame]))
 
     def _show_channels(self) -> None:
         self.channels.show(list(self._dials()))
@@ -489,7 +460,7 @@ class DebugScreen(Screen[None]):
     def _dials(self) -> Iterator[Dial]:
         moment, row = self.moment, self.bars.row
         frames = [self.bars.chosen, self.bars.playing, None if row is None else (row.database, row.frame)]
-        costs = [{} if frame is None or moment is None else _costs(moment, *frame) for frame in frames]
+        costs = [{} if frame is None or moment is None else channel_costs(moment, *frame) for frame in frames]
         for name, weight in self._recorded.items():
             own = costs[0].get(name), costs[1].get(name), costs[2].get(name)
             yield Dial(name, True, weight, self.turned.weights.get(name, weight), own)
@@ -633,29 +604,13 @@ class DebugScreen(Screen[None]):
             self.say(f"There is no project to write into: {self.recording.missing}")
             return
         try:
-            done = [change for change in self._changes() if change is not None]
+            done = [change for change in write_turned(self.recording, self.turned) if change is not None]
         except ContextDBError as error:
             self.say(str(error), is_error=True)
             return
         self._written += done
         path = self.recording.schema_file
         self.say(f"{path} says these weights now; u takes it back." if done else f"{path} says so already.")
-
-    def _changes(self) -> Iterator[SchemaChange | None]:
-        """Write what is turned, a section at a time, and give what was written."""
-        config, path = self.recording.config, Path(self.recording.schema_file)
-        assert config is not None, "was looked at before"
-        selector = config.selector_of(self.recording.controller) if self.recording.controller in config.controllers else ""
-        if not selector and self.turned.thresholds:
-            databases = set(self.turned.thresholds)
-            selector = next((name for name, each in config.selectors.items() if databases <= {db for db, _ in each.order}), "")
-        named = dict.fromkeys(config.databases[name].features for name in self.recording.databases if name in config.databases)
-        for features in named:
-            channels = {channel.name for channel in config.features[features].channels}
-            weights = {name: weight for name, weight in self.turned.weights.items() if name in channels}
-            yield _written(weights_change(path, features, weights))
-        if self.turned.thresholds:
-            yield _written(weights_change(path, next(iter(named), ""), {}, selector, self.turned.thresholds))
 
     def action_undo(self) -> None:
         """Take back what was written last."""
@@ -796,30 +751,6 @@ class DebugScreen(Screen[None]):
         if pane is not None and pane != self._pane:
             self._pane = pane
             self._arrange()
-
-
-def _named(playing: Playing) -> str:
-    permutation = "" if playing.permutation_s is None else f" +{playing.permutation_s:g} s"
-    return f"{playing.asset}{' ~' if playing.mirrored else ''}{permutation}"
-
-
-def _biases(bias: float) -> str:
-    return f" + biases {cost_text(float(bias))}" if bias else ""
-
-
-def _costs(moment: Moment, name: str, frame: int) -> dict[str, float]:
-    """What each channel adds to the cost of a frame."""
-    search = moment.landscape.searches.get(name)
-    if search is None:
-        return {}
-    own = search.database.cost_weights * search.sums[:, frame]
-    return dict(zip(search.database.channel_names, own.tolist(), strict=True))
-
-
-def _written(change: SchemaChange | None) -> SchemaChange | None:
-    if change is not None:
-        change.write()
-    return change
 
 
 def _counted(progress: Callable[[float], None], n: int) -> Callable[[], None]:

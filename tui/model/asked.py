@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.bitmask import Rows
-from contextdb.cells.facts import Fact
+from contextdb.cells.conditions import Condition
+from contextdb.cells.facts import Fact, read_fact_text
 from contextdb.compiled.casting import Actor, CastMatches
 from contextdb.compiled.explain import Explanation
 from contextdb.compiled.matches import Matches
@@ -28,6 +29,17 @@ from tui.model.behind import Inside
 
 Offered = Mapping[str, Sequence[Actor]]
 """The actors of each role."""
+
+
+def fact_fault(text: str, condition: Condition | None) -> Fault | None:
+    """Why a text cannot be read as a fact of a condition; None where it can, or where there is nothing to read."""
+    if condition is None or not text.strip():
+        return None
+    try:
+        read_fact_text(text, condition)
+    except ContextError as error:
+        return error.faults[0]
+    return None
 
 
 class Asked:

@@ -18,6 +18,7 @@ from contextdb.errors import ContextError, Fault, FileError, Place, in_quotes
 from contextdb.schema.settings import TableSettings
 from contextdb.tables.table import Table
 from contextdb.telemetry.recordings import fact_text
+from tui.model.asked import fact_fault
 from tui.model.roomy_sheet import RoomySheet
 from tui.model.shown import Header
 from tui.model.wanted import wanted_by
@@ -61,14 +62,7 @@ class TeamSheet(RoomySheet):
 
     def fault_of(self, column: int, text: str) -> Fault | None:
         """Why a text of a column cannot be read."""
-        found = self.of_column(column)
-        if found is None or not text.strip():
-            return None
-        try:
-            read_fact_text(text, found)
-        except ContextError as error:
-            return error.faults[0]
-        return None
+        return fact_fault(text, self.of_column(column))
 
     @property
     def texts(self) -> list[dict[str, str]]:

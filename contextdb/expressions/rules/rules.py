@@ -31,7 +31,7 @@ from contextdb.expressions.scalar import Run, Value
 FEW = 4
 """With so many times more rules than rows left, the rules are found by the rows."""
 MOST_TOLD = 6
-"""So many facts of a rule are told in a message."""
+"""So many facts of a rule are named in a message."""
 
 """The types of which every value but NaN is in canonical form already."""
 

@@ -195,7 +195,7 @@ def doubts_of(clips: Iterable[Clip]) -> list[ClipFinding]:
 
 
 def grouped(findings: Iterable[ClipFinding], n_clips: int) -> Iterator[str]:
-    """The findings as sentences: a rule that many clips break for one mend is told of the first, with how many others break it."""
+    """The findings as sentences; of many clips that break a rule for one mend the first, with how many others there are."""
     groups: dict[tuple[str, str], list[ClipFinding]] = defaultdict(list)
     for finding in findings:
         groups[finding.rule, finding.mend].append(finding)

@@ -35,7 +35,8 @@ from contextdb.motion.markup.left_out import LeftOut, Skip
 from contextdb.motion.markup.marks import TagFilter
 from contextdb.motion.reading import as_number
 from contextdb.motion.search import cost
-from contextdb.motion.search.database import NOTHING, Hit, MotionDatabase
+from contextdb.motion.search.database import MotionDatabase
+from contextdb.motion.search.hit import NOTHING, Hit
 from contextdb.motion.search.searcher import compile_loop
 from contextdb.motion.selection.choice import Choice
 from contextdb.motion.selection.selector import Entry, Selector, choice_of

@@ -258,7 +258,7 @@ class MotionCoverage:
                 other = MAPS[name].opposite[column]
                 is_both = self.is_mirrored and other != column
                 if is_both and (shares[row, other], -other) > (shares[row, column], -column):
-                    continue  # that of the other side is told of
+                    continue  # that of the other side is listed
                 fills = float(shares[row, column] + (shares[row, other] if is_both else 0.0)) / wanted
                 elsewhere = self._elsewhere(name, row, column)
                 found.append(ToCapture(name, row, column, fills, float(shares[row, column]), elsewhere, is_both))
@@ -303,7 +303,7 @@ def coverage(
     pattern : str
         How clips of transitions are named, with `{from}` and `{to}`.
     near_cost : float
-        Clips that lie within this cost of another are told; see `near_clips`.
+        Clips that lie within this cost of another are listed; see `near_clips`.
     progress : function of (done, total, clip name), optional
 
     Raises
@@ -320,14 +320,7 @@ def coverage(
     never = tuple(
         require_text(each, "one of never_valid") for each in require_many(never_valid, "never_valid", "the names of clips")
     )
-    given = dict(require_mapping(databases, "databases", "a mapping of names to MotionDatabase"))
-    for name, database in given.items():
-        require_kind(database, MotionDatabase, "one of databases", "a MotionDatabase")
-        if database.root is None or database.schema is None:
-            found = f"the database {in_quotes(str(name))} was made from features, so that nobody knows how its clips move."
-            raise MotionError(Fault(found, "a database built from clips"))
-    if not given:
-        raise MotionError(Fault("there is no database to measure.", "at least one"))
+    given = _measurable(databases)
     clips = tuple(_clips(given))
     listed = [_all_of(clips)] if contexts is None else list(require_many(contexts, "contexts", "a list of ClipContexts"))
     for each in listed:
@@ -345,6 +338,19 @@ def coverage(
         tuple(sorted(once.values(), key=lambda each: (each.cost, each.asset))),
         never,
     )
+
+
+def _measurable(databases: Mapping[str, MotionDatabase]) -> dict[str, MotionDatabase]:
+    """The databases, of which it is known how their clips move; at least one."""
+    given = dict(require_mapping(databases, "databases", "a mapping of names to MotionDatabase"))
+    for name, database in given.items():
+        require_kind(database, MotionDatabase, "one of databases", "a MotionDatabase")
+        if database.root is None or database.schema is None:
+            found = f"the database {in_quotes(str(name))} was made from features, so that nobody knows how its clips move."
+            raise MotionError(Fault(found, "a database built from clips"))
+    if not given:
+        raise MotionError(Fault("there is no database to measure.", "at least one"))
+    return given
 
 
 def _all_of(clips: Sequence[ClipFrames]) -> ClipContexts:

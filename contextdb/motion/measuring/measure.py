@@ -85,12 +85,7 @@ def measure(
     ContextError
         An argument of another type.
     """
-    if banks is not None and not isinstance(banks, PoseBank):
-        for each in require_mapping(banks, "banks", "a PoseBank, or a mapping of databases to them").values():
-            require_kind(each, PoseBank, "one of banks", "a PoseBank")
-    for each in require_mapping({} if databases is None else databases, "databases", "a mapping of databases").values():
-        require_kind(each, MotionDatabase, "one of databases", "a MotionDatabase")
-    require_kind(settings, (PoseSettings, type(None)), "settings", "PoseSettings, or None")
+    _check(banks, databases, settings)
     clips = None if not banks else Clips.of(banks)
     found = _shown(session_or_poses, banks, poses, settings, rate)
     n = len(found.times_s)
@@ -114,6 +109,16 @@ def measure(
     missing = {name: value for name, value in told.items() if isinstance(value, str)}
     values: dict[str, Any] = {name: value for name, value in told.items() if name not in missing}
     return Measures(found.seconds, n, int(found.jumped.sum()), missing=missing, **values)
+
+
+def _check(banks: Banks | None, databases: Mapping[str, MotionDatabase] | None, settings: PoseSettings | None) -> None:
+    """Refuse arguments of other types."""
+    if banks is not None and not isinstance(banks, PoseBank):
+        for each in require_mapping(banks, "banks", "a PoseBank, or a mapping of databases to them").values():
+            require_kind(each, PoseBank, "one of banks", "a PoseBank")
+    for database in require_mapping({} if databases is None else databases, "databases", "a mapping of databases").values():
+        require_kind(database, MotionDatabase, "one of databases", "a MotionDatabase")
+    require_kind(settings, (PoseSettings, type(None)), "settings", "PoseSettings, or None")
 
 
 # ---- what is measured

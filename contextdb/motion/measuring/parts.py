@@ -32,6 +32,7 @@ NEVER_PLANTED = "no foot is ever down"
 
 
 def jumps(it: Shown) -> dict[str, object]:
+    """How often something jumps, how often it must, and for how long what was entered stays."""
     forced = it.costs[it.forced]
     n_entered, seconds = int(it.entered.sum()), it.seconds
     known = forced[~np.isnan(forced)]
@@ -51,6 +52,7 @@ def _playing_s(it: Shown) -> float:
 
 
 def steps(it: Shown, clips: Clips | None) -> dict[str, object]:
+    """How far joints are apart at jumps, and by how much their speeds differ."""
     names = ("jump_cm", "jump_worst_cm", "jump_mps")
     if clips is None:
         return dict.fromkeys(names, NO_BANKS)
@@ -82,6 +84,7 @@ def _moving(it: Shown) -> Ints:
 
 
 def skate(it: Shown, clips: Clips | None) -> dict[str, object]:
+    """How much feet slide that are down."""
     planted, height = ("skate_cm_s", "skate_m_min"), ("skate_weighted_cm_s", "skate_ratio")
     played = "skate_played_cm_s"
     if it.positions is None:
@@ -119,6 +122,7 @@ def _played(it: Shown, clips: Clips) -> float | None:
 
 
 def raw_skate(clips: Clips | None) -> dict[str, object]:
+    """How much feet slide in the clips themselves."""
     names = ("skate_raw_cm_s", "skate_raw_m_min", "skate_weighted_raw_cm_s", "skate_ratio_raw")
     if clips is None:
         return dict.fromkeys(names, NO_BANKS)
@@ -134,6 +138,7 @@ def raw_skate(clips: Clips | None) -> dict[str, object]:
 
 
 def accelerations(it: Shown, clips: Clips | None) -> dict[str, object]:
+    """How hard joints accelerate, beside the clips, and how often harder than these ever do."""
     at = _moving(it)
     times_s = it.times_s[at]
     step = formulas.step_of(times_s)
@@ -158,6 +163,7 @@ def accelerations(it: Shown, clips: Clips | None) -> dict[str, object]:
 
 
 def path(it: Shown) -> dict[str, object]:
+    """How far the root is from where the game had the body."""
     names = ("path_rms_m", "path_p95_m", "heading_rms_deg", "heading_p95_deg")
     if it.roots is None or it.bodies is None:
         return dict.fromkeys(names, NO_BODY if it.bodies is None else NO_POSES)
@@ -168,6 +174,7 @@ def path(it: Shown) -> dict[str, object]:
 
 
 def reach(it: Shown, wanted: Floats | None) -> dict[str, object]:
+    """How long the motion takes to follow a change of what is wanted."""
     kinds = ("direction", "speed", "stop")
     names = ("reach_s", *(f"reach_{kind}_s" for kind in kinds), "n_changes", "n_missed")
     at = _moving(it)
@@ -199,6 +206,7 @@ def reach(it: Shown, wanted: Floats | None) -> dict[str, object]:
 
 
 def usage(it: Shown, databases: Mapping[str, MotionDatabase] | None, banks: Banks | None) -> dict[str, object]:
+    """How much of the databases plays, and which assets never do."""
     names = ("frames_used_share", "assets_used_share", "assets_never_used", "frames_unusable_share")
     of: Mapping[str, HasRanges] = databases or ({"": banks} if isinstance(banks, PoseBank) else banks or {})
     if not of:

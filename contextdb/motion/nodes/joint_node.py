@@ -27,7 +27,7 @@ from contextdb.motion.joint.searcher import JointOptions, JointSearcher, Places,
 from contextdb.motion.markup.spans import TOLERANCE_S
 from contextdb.motion.nodes.match_node import MatchCosts, MatchPlay
 from contextdb.motion.nodes.warping import Target, Window, warped
-from contextdb.motion.search.database import Hit
+from contextdb.motion.search.hit import Hit
 from contextdb.motion.selection.decision import Action, Decision, Together
 from contextdb.motion.selection.playhead import Playhead
 from contextdb.motion.selection.root_motion import RootMotion, between

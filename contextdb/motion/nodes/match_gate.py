@@ -20,7 +20,8 @@ from contextdb.motion.arguments import Valid
 from contextdb.motion.nodes.match_node import MatchNode, MatchOptions, MatchPlay
 from contextdb.motion.nodes.warping import Target
 from contextdb.motion.reading import as_number
-from contextdb.motion.search.database import Hit, MotionDatabase
+from contextdb.motion.search.database import MotionDatabase
+from contextdb.motion.search.hit import Hit
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,8 +34,9 @@ from contextdb.motion.markup.spans import TOLERANCE_S
 from contextdb.motion.nodes.warping import Target, WarpedPath, WarpShare, Window, warped, wrapped
 from contextdb.motion.reading import as_number
 from contextdb.motion.search.candidates import Candidates
-from contextdb.motion.search.database import Hit, MotionDatabase
+from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.filtering import Penalties, Tags
+from contextdb.motion.search.hit import Hit
 from contextdb.motion.selection.decision import Action, Decision
 from contextdb.motion.selection.ongoing import playing_at
 from contextdb.motion.selection.playhead import Playhead

@@ -32,8 +32,9 @@ from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.markup.spans import TOLERANCE_S
 from contextdb.motion.markup.tag_filter import TagFilter
 from contextdb.motion.reading import as_number
-from contextdb.motion.search.database import Hit, MotionDatabase
+from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.filtering import Penalties
+from contextdb.motion.search.hit import Hit
 
 HAND_WORDS = ("hand", "wrist")
 

@@ -1,6 +1,6 @@
 """Loops over the feet of one pose: where they are without a lock, where they are shown, and the legs that bend to that.
 
-What and why is told in `contextdb.motion.output.feet`; how these are compiled in `contextdb.motion.output.kernels`. F feet, and for
+`contextdb.motion.output.feet` says what they do and why, `contextdb.motion.output.kernels` how they are compiled. F feet, and for
 each its joints [F, 4]: hip, knee, ankle and what stands, all below 0 for a foot without a leg. A footing is the height of the
 ground below a foot and by how much it rises along x and z: [F, 3].
 """

@@ -18,8 +18,9 @@ from contextdb.errors import Fault, QueryError
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.markup.left_out import LeftOut
-from contextdb.motion.search import cost, scan
+from contextdb.motion.search import cost
 from contextdb.motion.search.filters import Filter
+from contextdb.motion.search.scan import Scan
 from contextdb.motion.search.searched import Searched
 
 
@@ -92,7 +93,7 @@ def of(database: Searched, query: Floats, chosen: Filter, k: int, with_left_out:
     why = chosen.why(lay.frame_ranges, kinds)
     in_ranges = lay.frames
     frames = in_ranges if with_left_out else in_ranges[why[in_ranges] == LeftOut.NO]
-    totals = scan.totals(lay, query, database.slices, database.cost_weights, chosen, kinds, frames)
+    totals = Scan(lay, kinds, database.slices, database.cost_weights).totals(query, chosen, frames)
     is_other = frames != chosen.playing(lay.frame_ranges, kinds)
     best = _least_first(totals, is_other, k)
     counted = np.bincount(why[in_ranges], minlength=len(LeftOut))

@@ -31,10 +31,9 @@ from contextdb.errors import Fault, MotionError, QueryError, in_quotes, nearest,
 from contextdb.motion import arguments
 from contextdb.motion.arguments import Currents, Flags, Valid, ValidForMany, ValidRanges
 from contextdb.motion.clips.clip import Clip
-from contextdb.motion.clips.feet import NO_MARKS
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
-from contextdb.motion.features.extraction import ClipFeatures, clip_permutations
+from contextdb.motion.features.extraction import ClipFeatures
 from contextdb.motion.features.normalisation import Normalisation
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.markup.left_out import Skip
@@ -47,39 +46,12 @@ from contextdb.motion.search.candidates import Candidates
 from contextdb.motion.search.cost import weights_of_features
 from contextdb.motion.search.filtering import FilterMaker, Penalties, SearchOptions, Tags
 from contextdb.motion.search.filters import NO_BIAS, Biases, Filter
+from contextdb.motion.search.hit import NOTHING, Hit
+from contextdb.motion.search.inputs import as_features, check_finite, check_permutations, parts_of
 from contextdb.motion.search.layout import Features, Layout
 from contextdb.motion.search.many_filters import ManyFilters, together
 from contextdb.motion.search.searched import Searched
 from contextdb.motion.search.searcher import Searcher
-from contextdb.records import quickly_made
-
-
-@quickly_made
-@dataclass(frozen=True, slots=True)
-class Hit:
-    """The frame that a search chose. False when nothing may play; its cost is then infinite, its asset None, range and frame -1.
-
-    Attributes
-    ----------
-    asset : str or None
-    range : int
-        The range that holds the frame, 0…R-1.
-    frame : int
-        Counted over the whole database, 0…N-1.
-    cost : float
-        A weighted mean of squared differences, without a unit; the biases are in it.
-    """
-
-    asset: str | None
-    range: int
-    frame: int
-    cost: float
-
-    def __bool__(self) -> bool:
-        return self.frame >= 0
-
-
-NOTHING = Hit(None, -1, -1, math.inf)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -164,7 +136,7 @@ class MotionDatabase(Searched):
         require_kind(biases, Biases, "biases", "Biases")
         require_kind(markup, (Markup, type(None)), "markup", "a Markup, or None")
         require_number(end_s, "end_s")
-        _check_permutations(parts, schema)
+        check_permutations(parts, schema)
         shared = Normalisation.of([part.features for part in parts], schema) if normalisation is None else normalisation
         lengths = np.array([len(part.features) for part in parts], np.int64)
         stops = np.cumsum(lengths)
@@ -208,9 +180,9 @@ class MotionDatabase(Searched):
         MotionError
             Shapes or ranges that do not fit, or a feature that is not finite.
         """
-        array = _as_features(features)
+        array = as_features(features)
         first, last, names = check_ranges(starts, stops, assets, len(array))
-        _check_finite(array, first, last, names)
+        check_finite(array, first, last, names)
         n_features = array.shape[1]
         return cls(
             Layout.of(array, first, last, np.ones(n_features)),
@@ -522,68 +494,3 @@ def build_databases(sets: Mapping[str, Iterable[Clip]], schema: FeatureSchema) -
     parts = {name: parts_of(clips, schema) for name, clips in given.items()}
     shared = Normalisation.of([part.features for each in parts.values() for part in each], schema)
     return {name: MotionDatabase.from_parts(each, schema, normalisation=shared) for name, each in parts.items()}
-
-
-def parts_of(
-    clips: Iterable[Clip], schema: FeatureSchema, mirror: bool | Collection[str] = False, markup: Markup | None = None
-) -> list[ClipFeatures]:
-    """The features of each clip in all its permutations, and of those to be mirrored once more; the faults of all clips together.
-
-    Clips that loop by the markup go on at their ends, and feet that it marks are down just then.
-    """
-    parts = []
-    faults: list[Fault] = []
-    seen: set[str] = set()
-    for name in () if isinstance(mirror, bool) else require_many(mirror, "mirror", "True, False, or the names of clips"):
-        require_text(name, "one of mirror")
-    for clip in require_many(clips, "clips", "a list of Clip"):
-        require_kind(clip, Clip, "one of clips", "a Clip")
-        if clip.name in seen:
-            faults.append(
-                Fault(f"two clips are named {in_quotes(clip.name)}.", "a different name for each asset", rule="duplicate")
-            )
-        seen.add(clip.name)
-        is_mirrored = mirror if isinstance(mirror, bool) else clip.name in mirror
-        try:
-            looping = markup is not None and markup.is_looping(clip.name)
-            ways = (False, True) if is_mirrored else (False,)
-            marks = NO_MARKS if markup is None else markup.contacts_of(clip.name)
-            for way in ways:
-                parts += clip_permutations(clip, schema, mirrored=way, looping=looping, contacts=marks)
-        except MotionError as error:
-            faults.extend(error.faults)
-    if faults:
-        raise MotionError(*faults)
-    return parts
-
-
-# ---- checks
-
-
-def _as_features(features: ArrayLike) -> Features:
-    array = arguments.array_of(features, "the features", MotionError)
-    if array.ndim != 2:
-        raise MotionError(Fault(f"the features have shape {array.shape}.", "frames x features"))
-    with np.errstate(over="ignore"):
-        return np.ascontiguousarray(array, np.float32)
-
-
-def _check_permutations(parts: Sequence[ClipFeatures], schema: FeatureSchema) -> None:
-    """Refuse parts that are not all permutations of a clip, then all of the next."""
-    n = len(schema.permutation_s)
-    for first in range(0, len(parts), n):
-        same = {(part.asset, part.mirrored, len(part.features)) for part in parts[first : first + n]}
-        if len(same) > 1 or len(parts) - first < n:
-            found = f"the features of {in_quotes(parts[first].asset)} are not those of its {n} permutations."
-            raise MotionError(Fault(found, "all that `clip_permutations` gives of a clip, in order"))
-
-
-def _check_finite(features: Features, starts: Ints, stops: Ints, assets: Sequence[str]) -> None:
-    """Refuse features that are not finite inside a range; what lies between ranges is never looked at."""
-    is_wrong: Flags = np.logical_not(np.isfinite(features).all(axis=1))
-    for i, (start, stop) in enumerate(zip(starts.tolist(), stops.tolist(), strict=True)):
-        if is_wrong[start:stop].any():
-            frame = start + int(np.argmax(is_wrong[start:stop]))
-            feature = int(np.argmin(np.isfinite(features[frame])))
-            found = f"feature {feature} of frame {frame} is {features[frame, feature]} (range {i}, asset {in_quotes(assets[i])})."
-            raise MotionError(Fault(found, "finite numbers within every range"))

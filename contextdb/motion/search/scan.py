@@ -35,22 +35,6 @@ MOST_KINDS = 16
 """So many tag filters are kept as what they add to frames."""
 
 
-def totals(
-    layout: Layout,
-    query: Floats,
-    slices: tuple[slice, ...],
-    weights: Floats,
-    chosen: Filter,
-    kinds: NDArray[np.integer],
-    frames: Ints,
-) -> Floats:
-    """Cost and bias of some frames, each in a range: float64 [len(frames)]; `kinds` is the kind of every frame."""
-    if not len(frames):
-        return np.empty(0)
-    biases = chosen.biases(layout.frame_ranges, kinds)[frames]
-    return np.asarray(cost.costs(layout, frames, query, slices, weights) + biases)
-
-
 @dataclass(eq=False)
 class Scan:
     """The frames of one database, ready for a product with queries. Made once, they take as much memory again as the features."""
@@ -61,10 +45,17 @@ class Scan:
     weights: Floats
     _added: dict[int, tuple[Kinds, Features, float]] = field(default_factory=dict)
 
+    def totals(self, query: Floats, chosen: Filter, frames: Ints) -> Floats:
+        """Cost and bias of some frames, each in a range: float64 [len(frames)]."""
+        if not len(frames):
+            return np.empty(0)
+        biases = chosen.biases(self.layout.frame_ranges, self.kinds)[frames]
+        return np.asarray(cost.costs(self.layout, frames, query, self.slices, self.weights) + biases)
+
     def least(self, query: Floats, chosen: Filter, within: float) -> tuple[Ints, Ints, Floats]:
         """The lowest total of each range, if it is at most `within`: the ranges, the frames and the totals. Of every frame."""
         frames = self._allowed(chosen)
-        found = totals(self.layout, query, self.slices, self.weights, chosen, self.kinds, frames)
+        found = self.totals(query, chosen, frames)
         near = (found <= within) & (found < np.inf)
         frames, found = frames[near], found[near]
         ranges = self.layout.frame_ranges[frames]

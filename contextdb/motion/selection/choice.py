@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
-from contextdb.motion.search.database import Hit
+from contextdb.motion.search.hit import Hit
 from contextdb.records import quickly_made
 
 

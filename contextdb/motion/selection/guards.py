@@ -16,11 +16,9 @@ conditions declare. It then competes in searches as any that plays, but no other
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from contextdb.motion.selection.controller_settings import ControllerSettings
-    from contextdb.motion.selection.ongoing import Ongoing
+from contextdb.motion.selection.controller_settings import ControllerSettings
+from contextdb.motion.selection.ongoing import Ongoing
 
 
 class Held(StrEnum):

@@ -29,7 +29,8 @@ from contextdb.motion import arguments
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.markup.left_out import Skip
 from contextdb.motion.search.candidates import Candidates
-from contextdb.motion.search.database import NOTHING, Hit, MotionDatabase
+from contextdb.motion.search.database import MotionDatabase
+from contextdb.motion.search.hit import NOTHING, Hit
 from contextdb.motion.selection.asked import Among, Asked, Current, OfPenalties, OfTags, OfValid, Options
 from contextdb.motion.selection.asked_of_many import OfValidForMany, each_of, valid_of_each
 from contextdb.motion.selection.choice import Choice, Reason, Search, Status

@@ -10,7 +10,7 @@ from enum import Enum, auto
 from contextdb.motion.arguments import ValidRanges, widened_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.markup.left_out import LeftOut, Skip
-from contextdb.motion.search.database import Hit
+from contextdb.motion.search.hit import Hit
 from contextdb.motion.selection import guards, trigger
 from contextdb.motion.selection.asked import Asked, OfValid
 from contextdb.motion.selection.choice import Choice, Reason

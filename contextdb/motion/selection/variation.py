@@ -18,7 +18,7 @@ from typing import TypeAlias
 import numpy as np
 
 from contextdb.errors import Fault, MotionError
-from contextdb.motion.search.database import Hit
+from contextdb.motion.search.hit import Hit
 
 Rng: TypeAlias = random.Random | np.random.Generator
 

@@ -122,7 +122,7 @@ class Inputs:
 
 
 def told_once(faults: Iterable[Fault]) -> list[Fault]:
-    """The faults; one that all clips of a rig share is told of the first, with how many others have it. Each once."""
+    """The faults; one that all clips of a rig share is reported for the first, with how many others have it. Each once."""
     clips: dict[Fault, list[Place]] = {}
     for fault in dict.fromkeys(faults):  # a clip may be in several databases
         clips.setdefault(fault.at(NOWHERE) if fault.rule == "unknown-bone" else fault, []).append(fault.place)

@@ -102,7 +102,7 @@ def _measured(files: Iterable[ClipFile]) -> Iterator[tuple[str, str, Measures]]:
 
 
 def _of_clips(built: Mapping[str, Built], left_out: Iterable[ClipFinding]) -> Iterator[Finding]:
-    """What is doubtful of clips; a clip in several databases is told once."""
+    """What is doubtful of clips; a clip in several databases is reported once."""
     used = (doubt for each in built.values() for doubt in each.doubts)
     for doubt in dict.fromkeys(chain(used, left_out)):
         yield Finding(doubt.rule, "warning", doubt.message, file=doubt.file, asset=doubt.asset)

@@ -70,10 +70,12 @@ def rows_of(asked: ReaskedDecision, at: Place) -> list[Row]:
 
 
 def is_mirrored(at: Place) -> bool:
+    """Whether a place plays its asset mirrored."""
     return bool(at.search.database.mirrored[at.range])
 
 
 def let_in(chosen: Filter, at: int) -> Filter:
+    """A filter that lets one more range play."""
     ranges = chosen.ranges.copy()
     ranges[at] = True
     return chosen._replace(ranges=ranges, is_whole=bool(ranges.all()))

@@ -13,7 +13,7 @@ from contextdb.motion.arguments import query_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.search import candidates
-from contextdb.motion.search.database import Hit
+from contextdb.motion.search.hit import Hit
 from contextdb.motion.selection.choice import Choice, Status
 from contextdb.motion.selection.continuing import continuing_cost
 from contextdb.motion.selection.decision import Decision

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.search import cost
-from contextdb.motion.search.database import Hit, MotionDatabase
+from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.filters import Filter
+from contextdb.motion.search.hit import Hit
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,7 +23,7 @@ import numpy as np
 from contextdb.motion.clips.ground_place import GroundPlace
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.search.candidates import Candidate, Candidates
-from contextdb.motion.search.database import NOTHING, Hit
+from contextdb.motion.search.hit import NOTHING, Hit
 from contextdb.motion.selection.choice import Choice, Reason, Search, Status
 from contextdb.motion.selection.decision import Action, Decision, Playing, Together
 from contextdb.motion.selection.root_motion import RootMotion

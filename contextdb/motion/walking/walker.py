@@ -16,7 +16,6 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -32,9 +31,7 @@ from contextdb.motion.output.stream import Pose
 from contextdb.motion.walking.blending import Gait, Mix, same_rig
 from contextdb.motion.walking.footsteps import AN_ADJUST, Adjust, Footstep, Going, Steps, stepped
 from contextdb.motion.walking.gaits import GaitState, advanced, wanted_gait
-
-if TYPE_CHECKING:
-    from contextdb.motion.walking.standing import GroundState
+from contextdb.motion.walking.standing import LEVEL, GroundState, Legs
 
 STILL: Place3 = (0.0, 0.0, 0.0)
 FAR_M, FASTEST_MPS = 1.0, 30.0
@@ -106,8 +103,6 @@ class Walker:
     """
 
     def __init__(self, gaits: Iterable[Gait], settings: WalkSettings = USUAL, *, phase: float = 0.0) -> None:
-        from contextdb.motion.walking.standing import Legs
-
         require_kind(settings, WalkSettings, "settings", "WalkSettings")
         self.gaits: tuple[Gait, ...] = tuple(require_many_of(gaits, Gait, "gaits", "a list of Gait"))
         self.settings = settings
@@ -271,8 +266,6 @@ class Walker:
         self, state: WalkState, mix: Mix, steps: tuple[Steps, Steps], ground: Ground | None, dt: float, is_new: bool, step: float
     ) -> Pose:
         """The pose on its ground; the walker then is in that state."""
-        from contextdb.motion.walking.standing import LEVEL
-
         assert state.going is not None
         place = state.going.place
         below = self._legs.grounded(state.ground or LEVEL, mix, state.phase, steps, ground, dt, is_new or state.ground is None)

@@ -58,7 +58,7 @@ class FlatTable(TableData):
 
     @cached_property
     def faults(self) -> list[Fault]:
-        """Nothing: what cannot be read is told of the tables it is made of."""
+        """Nothing: the tables it is made of report what cannot be read."""
         return []
 
     @cached_property

@@ -33,7 +33,7 @@ def read_all(paths: Iterable[Path]) -> dict[Path, bytes]:
     for path in paths:
         try:
             found[path] = read_bytes(path)
-        except ContextDBError:  # why it cannot be read is told by whoever needs it
+        except ContextDBError:  # whoever needs it says why it cannot be read
             continue
     return found
 

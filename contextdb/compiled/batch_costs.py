@@ -13,6 +13,7 @@ from contextdb.bitmask import Rows
 from contextdb.compiled.batch import BatchMatches, query_many
 from contextdb.compiled.data import CompiledData, SoftMasks
 from contextdb.compiled.many import FewerMatches, ManyMatches
+from contextdb.compiled.matches import layered_penalties
 
 CostsOfPairs = Callable[[Rows, Rows], NDArray[np.float64]]
 """Of P contexts and rows what the soft cells of each depth cost: float64 [D, P]."""
@@ -31,7 +32,7 @@ def _one_by_one(many: ManyMatches, contexts: Rows, rows: Rows) -> NDArray[np.flo
     costs = np.empty((many.compiled.n_depths, len(rows)))
     for context in np.unique(contexts).tolist():
         start, stop = np.searchsorted(contexts, [context, context + 1])
-        costs[:, start:stop] = many[context].layered_penalties[:, rows[start:stop]]
+        costs[:, start:stop] = layered_penalties(many[context])[:, rows[start:stop]]
     return costs
 
 

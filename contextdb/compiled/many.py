@@ -260,10 +260,10 @@ class FewerMatches(ManyMatches):
 
     def __iter__(self) -> Iterator[Matches]:
         bits = [bitmask.to_int(mask) for mask in self.others]
-        return (one.kept(bits[i if len(bits) > 1 else 0]) for i, one in enumerate(self.whole))
+        return (one._kept(bits[i if len(bits) > 1 else 0]) for i, one in enumerate(self.whole))
 
     def _answer(self, context: int) -> Matches:
-        return self.whole[context].kept(bitmask.to_int(self.others[context if len(self.others) > 1 else 0]))
+        return self.whole[context]._kept(bitmask.to_int(self.others[context if len(self.others) > 1 else 0]))
 
     def _masks(self, start: int, stop: int) -> Words:
         return self.whole._masks(start, stop) & (self.others[start:stop] if len(self.others) > 1 else self.others)
@@ -297,10 +297,10 @@ class JoinedMatches(ManyMatches):
         return len(self.first)
 
     def __iter__(self) -> Iterator[Matches]:
-        return (one.joined(other, self.join) for one, other in zip(self.first, self.second, strict=True))
+        return (one._joined(other, self.join) for one, other in zip(self.first, self.second, strict=True))
 
     def _answer(self, context: int) -> Matches:
-        return self.first[context].joined(self.second[context], self.join)
+        return self.first[context]._joined(self.second[context], self.join)
 
     def _masks(self, start: int, stop: int) -> Words:
         masks: Words = self.join(self.first._masks(start, stop), self.second._masks(start, stop))

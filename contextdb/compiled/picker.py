@@ -29,7 +29,7 @@ from contextdb.compiled.choosing import Choosing, highest, starts_of
 from contextdb.compiled.choosing_masks import EvenChoosing
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.many import ManyMatches
-from contextdb.compiled.matches import Matches
+from contextdb.compiled.matches import Matches, answering_of, layered_penalties
 from contextdb.compiled.pick import not_unique
 from contextdb.compiled.picked import Picked
 from contextdb.compiled.why_picked import Left, why
@@ -276,8 +276,9 @@ class Picker:
     # ---- the version of the table
 
     def _compiled_of(self, matches: Matches) -> CompiledData:
-        self._require(matches.answering.name)
-        found = matches.answering.asked_of
+        table = answering_of(matches)
+        self._require(table.name)
+        found = table.asked_of
         if not isinstance(found, CompiledData):
             raise ContextError(Fault("the answer comes out of a pickle, without its table.", "an answer of query or live here"))
         return found
@@ -331,7 +332,7 @@ class Picker:
         """A pick as one of many."""
         valid = matches.indices
         contexts, slots = np.zeros(len(valid), np.int64), np.array([slot])
-        costs = None if not matches.has_penalties else lambda _, rows: matches.layered_penalties[:, rows]
+        costs = None if not matches.has_penalties else lambda _, rows: layered_penalties(matches)[:, rows]
         awake, may, fresh = self._left(known, contexts, valid, slots, costs, time_s, is_one=True)
         turns = self._picked.turns[slots]
         drawn = known.choosing.drawn(contexts[fresh], valid[fresh], lambda d, _: uniforms(self._seed, np.array([who]), turns, d))

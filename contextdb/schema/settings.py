@@ -16,6 +16,7 @@ from functools import cached_property
 from pathlib import PurePosixPath
 from typing import Any, cast
 
+from contextdb.cells.arguments import require_text
 from contextdb.cells.conditions import Condition, Mirror
 from contextdb.cells.domains import NUMBER, Domain
 from contextdb.cells.kinds import KINDS, Kind, names_where
@@ -84,7 +85,7 @@ class TableSettings:
         return tuple(typed.get(name) or Output(name) for name in self.outputs)
 
     def output(self, name: str) -> Output | None:
-        """What is declared of an output; None for a column of another kind, or one of which nothing is."""
+        """What is declared of an output; None for a column of another kind, or one of which nothing is. Never fails."""
         return next((output for output in self.typed if output.name == name), None)
 
     @property
@@ -170,8 +171,9 @@ class Schema:
         }
 
     def settings_for(self, file: str) -> TableSettings:
-        """The settings of the table in `file`, a path below the folder; one that is not declared has the file's stem as name."""
-        path = PurePosixPath(composed(file))
+        """The settings of the table in `file`, a path below the folder; one that is not declared has the file's stem as
+        name. Raises ContextError for no text."""
+        path = PurePosixPath(composed(require_text(file, "file")))
         declared = (settings for settings in self.tables.values() if str(path) in map(composed, settings.files))
         return next(declared, TableSettings(path.stem))
 

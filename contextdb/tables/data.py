@@ -115,11 +115,11 @@ class TableData(Unchanging):
         return self.settings.asset or (self.columns[0].name if self.columns else "")
 
     def text_column(self, name: str) -> TextColumn:
-        """The texts of a column."""
+        """The texts of a column; raises TableError, with the nearest, for one that the table does not have."""
         return self.columns[self._column_at(name)]
 
     def condition(self, name: str) -> ConditionColumn:
-        """The column of a condition."""
+        """The column of a condition; raises TableError, with the nearest, for one that the table does not have."""
         require_text(name, "name")
         for column in self.conditions:
             if column.condition.name == name:
@@ -131,7 +131,8 @@ class TableData(Unchanging):
         return self.text_column(column)[require_row(row, self.n_rows)]
 
     def place(self, row: int, column: str | None = None) -> Place:
-        """Where a row is: its file and line where it has one, else its number."""
+        """Where a row is: its file and line where it has one, else its number. Raises ContextError for no whole
+        number; a row that there is not has no line."""
         row = require_whole(row, "row")
         file = str(self.path) if self.path else None
         record = int(self.origin[row]) if self.source is not None and row < len(self.origin) else -1

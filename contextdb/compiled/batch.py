@@ -37,6 +37,7 @@ from contextdb.compiled.batch_columns import (
     mirrored_columns,
     plain_values,
 )
+from contextdb.compiled.batch_costs import CostsOfPairs, costs_of_pairs
 from contextdb.compiled.classes import NumberMasks, TagMasks, ValueMasks, WideMasks
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.many import BLOCK, ManyMatches, one_by_one
@@ -169,6 +170,14 @@ class BatchMatches(ManyMatches):
         if self.compiled.is_soft:
             with_penalties(matches, lambda: self.compiled.layered_penalties(kept.of_context(context), kept.unknown))
         return matches
+
+    def _costs_of_pairs(self) -> CostsOfPairs:
+        """What tells what soft cells cost in some rows of some contexts."""
+        kept = self.kept
+        assert kept is not None, "a table with soft cells keeps its facts"
+        return costs_of_pairs(
+            self.compiled, kept.columns, self.n_contexts, lambda table, given: query_many(table, given, kept.unknown).mask
+        )
 
     @property
     def _work(self) -> int:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from contextdb import bitmask
 from contextdb.bitmask import Rows, read_only
 from contextdb.cells.arguments import require_kind, require_whole
-from contextdb.compiled.batch_costs import CostsOfPairs, costs_of_pairs
+from contextdb.compiled.batch_costs import CostsOfPairs
 from contextdb.compiled.casting.stage import CastMatches
 from contextdb.compiled.chance import uniform, uniforms
 from contextdb.compiled.choosing import Choosing, highest, starts_of
@@ -229,7 +229,7 @@ class Picker:
         """The row of each of many characters, -1 for none, by the pairs of a context and a row that is valid in it."""
         compiled, masks = many.compiled, many.mask
         rows = np.full(len(many), -1, np.int64)
-        costs = costs_of_pairs(many) if "cheapest" in compiled.policies else None
+        costs = many._costs_of_pairs() if compiled.is_soft and "cheapest" in compiled.policies else None
         block = max(1, MOST_PAIRS // max(1, compiled.n_rows))
         for start in range(0, len(many), block):
             contexts, valid = bitmask.places(masks[start : start + block])

@@ -85,7 +85,7 @@ class TableSettings:
         return tuple(typed.get(name) or Output(name) for name in self.outputs)
 
     def output(self, name: str) -> Output | None:
-        """What is declared of an output; None for a column of another kind, or one of which nothing is. Never fails."""
+        """What is declared of an output; None for a column of another kind, or one of which nothing is. Raises nothing."""
         return next((output for output in self.typed if output.name == name), None)
 
     @property

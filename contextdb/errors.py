@@ -87,7 +87,7 @@ class Fault:
         return f"{place}: {self.message}" if place else self.message
 
     def at(self, place: Place) -> Fault:
-        """The same fault, placed."""
+        """The same fault, placed. Raises nothing."""
         return replace(self, place=place)
 
 

@@ -9,7 +9,7 @@ import dataclasses
 import inspect
 import re
 import sys
-from collections.abc import Iterator, MutableMapping
+from collections.abc import Iterator, Mapping, MutableMapping, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import get_type_hints
@@ -132,15 +132,30 @@ def test_a_public_name_has_a_docstring_and_a_call_says_what_it_raises(name: str)
         assert re.search(r"\b[Rr]aise|Never fails", said), f"{name} does not say what it raises"
 
 
-@pytest.mark.parametrize("kind", [cdb.CompiledTable, cdb.LiveContext, cdb.Picker, cdb.Pick, cdb.Explanation])
-def test_a_class_shows_the_names_of_the_page_and_no_others(kind: type):
-    """What an editor offers after the dot; the names of a mapping are those of every mapping."""
+def names_said_of(name: str) -> set[str]:
+    """The names that the page has of a class: those of its own lines, and those in what its line says."""
+    said = {full.removeprefix(f"{name}.") for full in NAMES if full.startswith(f"{name}.")}
+    for line in PAGE.splitlines():
+        cells = line.split(" | ")
+        if name in CODE.findall(cells[0]):
+            said |= {found[1] for code in CODE.findall(" | ".join(cells[1:])) if (found := NAME.fullmatch(code))}
+    return said
+
+
+TYPES = [name for name in cdb.__all__ if isinstance(kind := getattr(cdb, name), type) and not issubclass(kind, Exception)]
+MOST_USED = ("Character", "Controller", "ControllerGroup", "Crowd", "Measures", "MotionDatabase", "PoseStream", "Steered", "Trace")
+
+
+@pytest.mark.parametrize("name", [*TYPES, *(f"motion.{name}" for name in MOST_USED)])
+def test_a_class_shows_the_names_of_the_page_and_no_others(name: str):
+    """What an editor offers after the dot; the names of mappings and sequences are those of all of them."""
+    kind = value_of(name)
+    assert isinstance(kind, type)
     fields = {field.name for field in dataclasses.fields(kind)} if dataclasses.is_dataclass(kind) else set()
-    set_at_start = re.findall(r"^ +self\.(\w+)\b.* = ", inspect.getsource(kind), re.MULTILINE)
-    shown = {name for name in {*dir(kind), *fields, *set_at_start} if not name.startswith("_")}
-    on_page = {name.split(".")[1] for name in NAMES if name.startswith(f"{kind.__name__}.")}
-    inherited = set(dir(MutableMapping)) if issubclass(kind, MutableMapping) else set()
-    assert sorted(shown - inherited) == sorted(on_page - inherited)
+    set_at_start = re.findall(r"^ +(self\.\w+.*?)(?::.*?)? = ", inspect.getsource(kind), re.MULTILINE)
+    own = {*dir(kind), *fields, *re.findall(r"self\.(\w+)(?![\w.\[(])", " ".join(set_at_start))}
+    inherited = {*dir(MutableMapping)} if issubclass(kind, Mapping) else {*dir(Sequence)} if issubclass(kind, Sequence) else set()
+    assert sorted(each for each in own - inherited - names_said_of(name) if not each.startswith("_")) == []
 
 
 def test_a_compiled_table_holds_nothing_else_that_is_public_and_takes_nothing():

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from datetime import date
 from decimal import Decimal
 from fractions import Fraction
+from typing import Literal
 from unittest import mock
 
 import numpy as np
@@ -429,3 +430,14 @@ def test_few_bounds_and_many_give_the_classes_that_bisection_gives(n_bounds: int
     bounds = np.linspace(-9.0, 9.0, n_bounds)
     facts = np.array([-np.inf, -9.0, *np.random.default_rng(3).uniform(-10.0, 10.0, 50), *bounds, 9.0, np.inf])
     assert batch._n_not_above(facts, bounds).tolist() == [bisect_right(bounds.tolist(), fact) for fact in facts.tolist()]
+
+
+@pytest.mark.parametrize("unknown", ["any", "never"])
+def test_what_soft_cells_cost_in_many_contexts_is_what_they_cost_in_each(unknown: Literal["any", "never"]):
+    cells = {"A": ["a", "b", "c"], "speed": ["0..2 ~1.5", "Any", "2.. ~0.1"], "gait": ["Walk ~0.7", "Run ~0.2", "Walk"]}
+    schema = {"speed": {"type": "number"}, "gait": {"type": "enum", "values": ["Walk", "Run"]}}
+    contexts = {"speed": [1.0, 3.0, None, 2.0], "gait": ["Walk", "Run", "Run", None]}
+    many = Table.from_columns(cells, schema).compile().query_many(contexts, unknown=unknown)
+    each = [matches.penalties.tolist() for matches in many]
+    assert each[1] == pytest.approx([2.2, 0.0, 0.0])
+    assert many.penalties.tolist() == many.only([0]).penalties.tolist() == (many | many).penalties.tolist() == each

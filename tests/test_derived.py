@@ -26,7 +26,7 @@ from contextdb.cli import main
 from contextdb.compiled.table import CompiledTable, data_of
 from contextdb.errors import ContextError, SchemaError
 from contextdb.expressions import derive
-from contextdb.schema.settings import Schema, read_schema
+from contextdb.schema.settings import Schema, derivation_of, read_schema
 from contextdb.tables.table import Table
 
 CONDITIONS = """
@@ -260,7 +260,7 @@ def test_a_pick_and_codes_see_derived_facts():
 
 
 def test_what_computes_facts_can_be_sent_to_another_process():
-    derivation = schema().derivation
+    derivation = derivation_of(schema(), schema().conditions)
     assert derivation is not None
     expected = derivation.compute(WHOLE)
     assert pickle.loads(pickle.dumps(derivation)).compute(WHOLE) == expected

@@ -18,7 +18,9 @@ from contextdb.cells.words import format_number
 from contextdb.errors import some
 from contextdb.files.toml_text import as_toml
 from contextdb.findings import Finding
+from contextdb.schema.settings import derivation_of
 from contextdb.tables.condition_column import ConditionColumn
+from contextdb.tables.data import known_conditions
 from contextdb.tables.nesting.links import reached
 from contextdb.tables.table import Table
 
@@ -54,8 +56,9 @@ def _asked(table: Table) -> dict[str, Condition]:
     """The conditions whose facts the table is asked with: its columns, those of rules, and those that others are computed from."""
     found = {c.condition.name: c.condition for c in table.conditions}
     if table.when is not None:
-        found |= {name: table.known_conditions[name] for name in table.when.names if name in table.known_conditions}
-    derivation = table.schema.derivation_of(found)
+        known = known_conditions(table)
+        found |= {name: known[name] for name in table.when.names if name in known}
+    derivation = derivation_of(table.schema, found)
     return found | {c.name: c for c in (derivation.inputs if derivation is not None else ())}
 
 

@@ -87,7 +87,7 @@ from contextdb.files.tensors import (
     texts_to_array,
     write_tensors,
 )
-from contextdb.schema.settings import Schema
+from contextdb.schema.settings import Schema, derivation_of
 
 __all__ = ["SUFFIX", "open_artefact", "save"]
 
@@ -229,7 +229,7 @@ def _derivation(about: dict[str, Any], conditions: tuple[Condition, ...]) -> Der
         return None
     others = [_condition_from_json(c) for c in (*about["computed_from"], *about.get("when", {"conditions": ()})["conditions"])]
     known = Schema(conditions={c.name: c for c in (*conditions, *others)})
-    return known.derivation_of(known.conditions)
+    return derivation_of(known, known.conditions)
 
 
 def _computed_from(compiled: CompiledData) -> list[Condition]:

@@ -36,10 +36,11 @@ from contextdb.compiled.batch_columns import (
     mirrored_columns,
     plain_values,
 )
+from contextdb.compiled.batch_costs import CostsOfPairs, costs_of_pairs
 from contextdb.compiled.classes import NumberMasks, TagMasks, ValueMasks, WideMasks
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.many import BLOCK, ManyMatches, one_by_one
-from contextdb.compiled.matches import Matches
+from contextdb.compiled.matches import Matches, with_mirrored, with_penalties, with_widened
 from contextdb.console import announce, has_numba
 from contextdb.errors import ContextError, Fault, Place, plural
 from contextdb.expressions.rules import ManyRules
@@ -162,12 +163,20 @@ class BatchMatches(ManyMatches):
         if kept is None:
             return matches
         if self.compiled.mirroring:
-            matches.with_mirrored(lambda: self.mirrored[context])
+            with_mirrored(matches, lambda: self.mirrored[context])
         if self.compiled.widening:
-            matches.with_widened(lambda: self.compiled.query_widened(kept.of_context(context), kept.unknown))
+            with_widened(matches, lambda: self.compiled.query_widened(kept.of_context(context), kept.unknown))
         if self.compiled.is_soft:
-            matches.with_penalties(lambda: self.compiled.layered_penalties(kept.of_context(context), kept.unknown))
+            with_penalties(matches, lambda: self.compiled.layered_penalties(kept.of_context(context), kept.unknown))
         return matches
+
+    def _costs_of_pairs(self) -> CostsOfPairs:
+        """What tells what soft cells cost in some rows of some contexts."""
+        kept = self.kept
+        assert kept is not None, "a table with soft cells keeps its facts"
+        return costs_of_pairs(
+            self.compiled, kept.columns, self.n_contexts, lambda table, given: query_many(table, given, kept.unknown).mask
+        )
 
     @property
     def _work(self) -> int:

@@ -2,52 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import bitmask
-from contextdb.bitmask import Rows
-from contextdb.compiled.batch import BatchMatches, query_many
+from contextdb.bitmask import Rows, Words
 from contextdb.compiled.data import CompiledData, SoftMasks
-from contextdb.compiled.many import FewerMatches, ManyMatches
 
 CostsOfPairs = Callable[[Rows, Rows], NDArray[np.float64]]
 """Of P contexts and rows what the soft cells of each depth cost: float64 [D, P]."""
 
 
-def costs_of_pairs(many: ManyMatches) -> CostsOfPairs | None:
-    """What tells the costs of rows of many answers; None for a table without soft cells."""
-    if not many.compiled.is_soft:
-        return None
-    if isinstance(many, FewerMatches):
-        return costs_of_pairs(many.whole)
-    return _of_batch(many) if isinstance(many, BatchMatches) else lambda contexts, rows: _one_by_one(many, contexts, rows)
-
-
-def _one_by_one(many: ManyMatches, contexts: Rows, rows: Rows) -> NDArray[np.float64]:
-    costs = np.empty((many.compiled.n_depths, len(rows)))
-    for context in np.unique(contexts).tolist():
-        start, stop = np.searchsorted(contexts, [context, context + 1])
-        costs[:, start:stop] = many[context].layered_penalties[:, rows[start:stop]]
-    return costs
-
-
-def _of_batch(many: BatchMatches) -> CostsOfPairs:
-    """A batch asks each condition with soft cells as a table of its own: which of them match."""
-    compiled, kept = many.compiled, many.kept
-    assert kept is not None, "a table with soft cells keeps its facts"
-    columns: Any = kept.columns
+def costs_of_pairs(
+    compiled: CompiledData, columns: Any, n_contexts: int, mask_of: Callable[[CompiledData, Mapping[str, Any]], Words]
+) -> CostsOfPairs:
+    """What tells the costs of rows in contexts of plain facts. Each condition with soft cells is asked as a table of its own, by
+    `mask_of`: which of them match."""
     if compiled.derivation is not None:
-        columns = compiled.derivation.complete_frame(columns, len(many))
+        columns = compiled.derivation.complete_frame(columns, n_contexts)
     parts = []
     for at, soft in enumerate(compiled.soft):
         if soft is not None:
             name = compiled.conditions[at].name
-            given = {name: columns[name]} if name in columns else {name: [None] * len(many)}
-            parts.append((query_many(_soft_table(compiled, at, soft), given, kept.unknown).mask, soft[1]))
+            given = {name: columns[name]} if name in columns else {name: [None] * n_contexts}
+            parts.append((mask_of(_soft_table(compiled, at, soft), given), soft[1]))
 
     def costs(contexts: Rows, rows: Rows) -> NDArray[np.float64]:
         found = np.zeros((compiled.n_depths, len(rows)))

@@ -34,7 +34,7 @@ from contextdb.columns import TextColumn
 from contextdb.compiled.classes import ColumnMasks
 from contextdb.compiled.lookup import UNUSUAL, SingleLookup, StraightAsk, build_ask, ruled_ask, single_lookup
 from contextdb.compiled.mask_bits import bits_of, nbytes
-from contextdb.compiled.matches import Answering, Matches
+from contextdb.compiled.matches import Answering, Matches, with_mirrored, with_penalties, with_widened
 from contextdb.compiled.memory import Memory
 from contextdb.compiled.outputs import NO_OUTPUTS, Outputs
 from contextdb.compiled.pick_columns import NOTHING, PickColumns, ranks_of
@@ -238,8 +238,8 @@ class CompiledData(Unchanging):
         bits, always = self._bits_carefully(context, unknown, widened_fact)
         found = self.matches(bits, always)
         if self.mirroring:
-            found.with_mirrored(lambda: self.query_widened(mirrored_facts(context, self.mirroring), unknown))
-        return found.with_penalties(partial(self.layered_penalties, context, unknown, widened_fact)) if self.is_soft else found
+            with_mirrored(found, lambda: self.query_widened(mirrored_facts(context, self.mirroring), unknown))
+        return with_penalties(found, partial(self.layered_penalties, context, unknown, widened_fact)) if self.is_soft else found
 
     def query_mirrored(self, context: Context, unknown: Unknown = "error") -> Matches:
         """The answer to a context as a mirror shows it. What is derived is computed from mirrored facts."""
@@ -252,16 +252,16 @@ class CompiledData(Unchanging):
         """An answer that knows what else hangs on the facts of its moment: what soft cells cost, and the answer in a mirror."""
         if self.keeps_facts:
             self.with_others(matches, context, unknown)
-        return matches.with_penalties(partial(self.layered_penalties, self.keep(context), unknown)) if self.is_soft else matches
+        return with_penalties(matches, partial(self.layered_penalties, self.keep(context), unknown)) if self.is_soft else matches
 
     def with_others(self, matches: Matches, context: Context, unknown: Unknown) -> Matches:
         """An answer that knows what its context answers in a mirror, and with widened facts."""
         if self.mirroring:
-            matches.with_mirrored(self.keeping(unknown)(context))
-        return matches.with_widened(partial(self.query_widened, self.keep(context), unknown)) if self.widening else matches
+            with_mirrored(matches, self.keeping(unknown)(context))
+        return with_widened(matches, partial(self.query_widened, self.keep(context), unknown)) if self.widening else matches
 
     def keeping(self, unknown: Unknown) -> Callable[[Context], dict[str, object] | Callable[[], Matches]]:
-        """What makes of a context that an answer was asked with what `Matches.with_mirrored` takes."""
+        """What makes of a context that an answer was asked with what `with_mirrored` takes."""
         return self.keep if unknown == "error" else lambda context: partial(self.query_mirrored, self.keep(context), unknown)
 
     @cached_property

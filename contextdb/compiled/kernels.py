@@ -172,9 +172,20 @@ def batch(values, starts, absent, groups, numbers, slots, bounds, masks, wide, e
 
 @njit(**_options)
 def batch_masks(codes, masks, n_plain, wide, enabled, out):  # type: ignore[no-untyped-def]
-    """The mask of each context, from codes int32 [N, slots], into `out` uint64 [N, W]."""
+    """The mask of each context, from codes int32 [N, slots], into `out` uint64 [N, W].
+
+    Places are counted, and no rows cut out: for a table of few words that took longer than the work itself.
+    """
+    n_words = out.shape[1]
     for k in range(codes.shape[0]):
-        intersect(masks, codes[k], n_plain, wide, enabled, out[k])
+        for w in range(n_words):
+            out[k, w] = enabled[w]
+        for j in range(n_plain):
+            code = codes[k, j]
+            for w in range(n_words):
+                out[k, w] &= masks[code, w]
+        for i in range(wide.shape[0]):
+            _intersect_wide(masks, codes[k, n_plain + i], wide[i], out[k])
 
 
 @njit(**_options)

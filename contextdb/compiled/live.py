@@ -24,7 +24,7 @@ from contextdb.compiled.casting.live import LiveActors
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.explain import Explanation, explain
 from contextdb.compiled.lookup import UNUSUAL
-from contextdb.compiled.matches import Matches
+from contextdb.compiled.matches import Matches, with_mirrored
 from contextdb.compiled.memory import Rng
 from contextdb.compiled.pick import pick
 from contextdb.errors import Fault, NoSuchFact, in_quotes, plural, some
@@ -307,7 +307,7 @@ class LiveContext(MutableMapping[str, object]):
         if self._is_bound:
             answer = Matches(bits, self._answering)
             if self._keep is not None:
-                return answer.with_mirrored(self._keep(self._told))
+                return with_mirrored(answer, self._keep(self._told))
             return self._compiled.bound(answer, self._told, self._unknown)
         if bits != self._answer.bits:
             self._answer = Matches(bits, self._answering)
@@ -487,7 +487,7 @@ class AskingLiveContext(LiveContext):
         if left == answer.bits:
             return answer
         if self._keep is not None:
-            return Matches(left, self._answering).with_mirrored(self._keep(self._told))
+            return with_mirrored(Matches(left, self._answering), self._keep(self._told))
         if self._is_bound:
             return self._compiled.bound(Matches(left, self._answering), self._told, self._unknown)
         if left != self._left.bits:

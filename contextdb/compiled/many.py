@@ -19,14 +19,17 @@ from contextdb import bitmask
 from contextdb.bitmask import Rows, Words, read_only
 from contextdb.cells.arguments import require_place
 from contextdb.cells.notebook import one_line
+from contextdb.compiled.batch_costs import CostsOfPairs
 from contextdb.compiled.data import CompiledData
-from contextdb.compiled.matches import Join, Matches, minus
+from contextdb.compiled.matches import Join, Matches, layered_penalties, minus
 from contextdb.compiled.said_rows import SaidRows
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.errors import ContextError, Fault, Place, WrongType, plural
 
 BLOCK = 2048
 """Contexts whose masks are worked out together."""
+MOST_PAIRS = 2**18
+"""Pairs of a context and a row whose costs are worked out together."""
 
 
 class ManyMatches(Unchanging, Sequence[Matches]):
@@ -94,10 +97,27 @@ class ManyMatches(Unchanging, Sequence[Matches]):
     @property
     def penalties(self) -> NDArray[np.float64]:
         """What each row's soft cells cost in each context: float64 [N, n_rows]; see `Matches.penalties`. Not kept."""
-        costs = np.zeros((len(self), self.n_rows))
-        for context, matches in enumerate(self) if self.compiled.is_soft else ():
-            costs[context] = matches.penalties
-        return read_only(costs)
+        found = np.zeros((len(self), self.n_rows))
+        if self.compiled.is_soft:
+            costs, rows = self._costs_of_pairs(), np.arange(self.n_rows)
+            block = max(1, MOST_PAIRS // max(1, self.n_rows))
+            for start in range(0, len(self), block):
+                contexts = np.arange(start, min(start + block, len(self)))
+                own = costs(np.repeat(contexts, len(rows)), np.tile(rows, len(contexts))).sum(axis=0)
+                found[contexts] = own.reshape(len(contexts), len(rows))
+        return read_only(found)
+
+    def _costs_of_pairs(self) -> CostsOfPairs:
+        """What tells what soft cells cost in some rows of some contexts, which ascend; of a table with soft cells."""
+
+        def costs(contexts: Rows, rows: Rows) -> NDArray[np.float64]:
+            found = np.empty((self.compiled.n_depths, len(rows)))
+            for context in np.unique(contexts).tolist():
+                start, stop = np.searchsorted(contexts, [context, context + 1])
+                found[:, start:stop] = layered_penalties(self[context])[:, rows[start:stop]]
+            return found
+
+        return costs
 
     def lists(self) -> list[Rows]:
         """The row numbers of each context: a list of int64 arrays."""
@@ -258,12 +278,16 @@ class FewerMatches(ManyMatches):
     def __len__(self) -> int:
         return len(self.whole)
 
+    def _costs_of_pairs(self) -> CostsOfPairs:
+        """Those of the whole."""
+        return self.whole._costs_of_pairs()
+
     def __iter__(self) -> Iterator[Matches]:
         bits = [bitmask.to_int(mask) for mask in self.others]
-        return (one.kept(bits[i if len(bits) > 1 else 0]) for i, one in enumerate(self.whole))
+        return (one._kept(bits[i if len(bits) > 1 else 0]) for i, one in enumerate(self.whole))
 
     def _answer(self, context: int) -> Matches:
-        return self.whole[context].kept(bitmask.to_int(self.others[context if len(self.others) > 1 else 0]))
+        return self.whole[context]._kept(bitmask.to_int(self.others[context if len(self.others) > 1 else 0]))
 
     def _masks(self, start: int, stop: int) -> Words:
         return self.whole._masks(start, stop) & (self.others[start:stop] if len(self.others) > 1 else self.others)
@@ -297,10 +321,10 @@ class JoinedMatches(ManyMatches):
         return len(self.first)
 
     def __iter__(self) -> Iterator[Matches]:
-        return (one.joined(other, self.join) for one, other in zip(self.first, self.second, strict=True))
+        return (one._joined(other, self.join) for one, other in zip(self.first, self.second, strict=True))
 
     def _answer(self, context: int) -> Matches:
-        return self.first[context].joined(self.second[context], self.join)
+        return self.first[context]._joined(self.second[context], self.join)
 
     def _masks(self, start: int, stop: int) -> Words:
         masks: Words = self.join(self.first._masks(start, stop), self.second._masks(start, stop))

@@ -86,6 +86,11 @@ class Answering:
             raise ContextError(Fault(f"the answer is of another version of {its}, {versions}.", _OWN_ANSWER, _ASK_AGAIN))
         raise ContextError(Fault(f"the answer is of the table {its}), not of {own}).", _OWN_ANSWER, _ASK_AGAIN))
 
+    def require_own(self, answer: Matches) -> None:
+        """Raise ContextError unless an answer is one of this table in this version."""
+        if answer._table is not self:
+            self.require(answer._table)
+
     def answer(self, bits: int, always: int, stages: Stages = ()) -> Matches:
         """An answer of this table from its rows as integers, and who plays what in them."""
         if stages:
@@ -95,7 +100,7 @@ class Answering:
     def bits_of(self, said: SaidRows | Matches) -> int:
         """Some rows as bits: those of an answer of this table, or as `Matches.only` takes them."""
         if isinstance(said, Matches):
-            said.require_own(self)
+            self.require_own(said)
             return said.bits
         return bits_said(said, len(self.assets), self.bits_of_assets)
 
@@ -190,11 +195,6 @@ class Matches:
         self._rows: Rows | None = None
 
     @property
-    def answering(self) -> Answering:
-        """What all answers of the table share."""
-        return self._table
-
-    @property
     def n_rows(self) -> int:
         """The number of rows of the table, valid or not."""
         return len(self._table.row_numbers)
@@ -259,17 +259,7 @@ class Matches:
     @property
     def penalties(self) -> NDArray[np.float64]:
         """What each row's soft cells cost in a search with this context: float64 [n_rows]; see `CompiledTable.penalties`."""
-        return read_only(self.layered_penalties.sum(axis=0) if self.has_penalties else np.zeros(self.n_rows))
-
-    @property
-    def layered_penalties(self) -> NDArray[np.float64]:
-        """The same for the cells of each depth of tables inside tables: float64 [D, n_rows]."""
-        return read_only(self._penalties() if self.has_penalties else np.zeros((1, self.n_rows)))
-
-    def with_penalties(self, penalties: Callable[[], NDArray[np.float64]]) -> Matches:
-        """The same answer of a table with soft cells; what they cost at each depth is worked out when it is asked for."""
-        self._penalties = penalties
-        return self
+        return read_only(layered_penalties(self).sum(axis=0) if self.has_penalties else np.zeros(self.n_rows))
 
     @property
     def mirrored(self) -> Matches:
@@ -295,11 +285,6 @@ class Matches:
             known = self._mirrored = known()
         return known
 
-    def with_mirrored(self, asked: dict[str, object] | Callable[[], Matches]) -> Matches:
-        """The same answer, of a table with conditions whose facts change in a mirror: with its facts, kept, or with what asks."""
-        self._mirrored = asked
-        return self
-
     @property
     def widened(self) -> Matches:
         """The answer to the same query with widened facts: the rows that stay valid where they play already, by the `hysteresis` of
@@ -322,11 +307,6 @@ class Matches:
     def is_widening(self) -> bool:
         """Whether `widened` may be another answer: whether a condition of the table has a hysteresis."""
         return hasattr(self, "_widened")
-
-    def with_widened(self, ask: Callable[[], Matches]) -> Matches:
-        """The same answer, of a table with conditions with a hysteresis, with what asks with widened facts."""
-        self._widened = ask
-        return self
 
     def casting(self, row: int) -> Mapping[str, Mapping[str, Any]]:
         """Who fills which role in a valid row, as {role: actor}; for an answer to a query with actors.
@@ -391,16 +371,16 @@ class Matches:
         NoSuchPlace, WrongType
             A row that the table does not have; rows are said in another way.
         """
-        return self.kept(self._table.bits_of(rows))
+        return self._kept(self._table.bits_of(rows))
 
-    def kept(self, bits: int) -> Self:
+    def _kept(self, bits: int) -> Self:
         """The same answer without the rows that are not among some, given as bits."""
         found = copy(self)
         found._keep(bits)
         if self._table.is_mirroring:
-            found.with_mirrored(lambda: self.mirrored.kept(bits))
+            found._mirrored = lambda: self.mirrored._kept(bits)
         if self.is_widening:
-            found.with_widened(lambda: self.widened.kept(bits))
+            found._widened = lambda: self.widened._kept(bits)
         return found
 
     def _keep(self, bits: int) -> None:
@@ -408,51 +388,46 @@ class Matches:
         self._rows = None
 
     @property
-    def always_bits(self) -> int:
+    def _always_bits(self) -> int:
         """The rows that hold all values of set-valued facts, as one integer."""
         return self.bits
 
     def __and__(self, other: SaidRows | Matches) -> Matches:
-        return self.joined(other, and_) if isinstance(other, Matches) else self.only(other)
+        return self._joined(other, and_) if isinstance(other, Matches) else self.only(other)
 
     __rand__ = __and__
 
     def __sub__(self, other: SaidRows | Matches) -> Matches:
-        return self.joined(other, minus) if isinstance(other, Matches) else self.kept(~self._table.bits_of(other))
+        return self._joined(other, minus) if isinstance(other, Matches) else self._kept(~self._table.bits_of(other))
 
     def __or__(self, other: Matches) -> Matches:
-        return self.joined(other, or_)
+        return self._joined(other, or_)
 
     def __xor__(self, other: Matches) -> Matches:
-        return self.joined(other, xor)
+        return self._joined(other, xor)
 
     @property
     def _stages(self) -> Stages:
         """Who plays what in it; nothing for an answer without actors."""
         return ()
 
-    def joined(self, other: object, join: Join) -> Matches:
+    def _joined(self, other: object, join: Join) -> Matches:
         """The answer of the rows that two answers of one table give together."""
         if not isinstance(other, Matches):
             raise WrongType(Fault(f"an answer cannot be joined with {type(other).__name__}.", "an answer of the same table"))
-        other.require_own(self._table)
+        self._table.require_own(other)
         bits = join(self.bits, other.bits)
-        every = self.always_bits & other.always_bits if join is and_ else self.always_bits | other.always_bits
+        every = self._always_bits & other._always_bits if join is and_ else self._always_bits | other._always_bits
         tellers = (self,) if join is minus else (self, other)
         stages = tuple((rows & m.bits, stage) for m in tellers for rows, stage in m._stages)
         found = self._table.answer(bits, every & bits, stages)
         if costs := [m for m in tellers if m.has_penalties]:
-            found.with_penalties(costs[0]._penalties if len(costs) == 1 or join is and_ else lambda: _costs_of_both(*costs))
+            found._penalties = costs[0]._penalties if len(costs) == 1 or join is and_ else lambda: _costs_of_both(*costs)
         if self._table.is_mirroring:
-            found.with_mirrored(lambda: self.mirrored.joined(other.mirrored, join))
+            found._mirrored = lambda: self.mirrored._joined(other.mirrored, join)
         if self.is_widening:
-            found.with_widened(lambda: self.widened.joined(other if join is minus else other.widened, join))
+            found._widened = lambda: self.widened._joined(other if join is minus else other.widened, join)
         return found
-
-    def require_own(self, table: Answering) -> None:
-        """Raise ContextError unless this is an answer of a table, in that version."""
-        if self._table is not table:
-            table.require(self._table)
 
     def __copy__(self) -> Self:
         copied: Self = object.__new__(type(self))
@@ -466,7 +441,7 @@ class Matches:
             state["_mirrored"] = seen
         if state.pop("_widened", None) is not None and (wide := self._widened_or_none()) is not None:
             state["_widened"] = wide
-        return state | {"_penalties": partial(_known, self.layered_penalties)} if self.has_penalties else state
+        return state | {"_penalties": partial(_known, layered_penalties(self))} if self.has_penalties else state
 
     def _mirrored_or_none(self) -> Matches | None:
         """The answer in a mirror, which knows this one as its own; None where it cannot be had."""
@@ -521,13 +496,41 @@ class SetMatches(Matches):
         return bitmask.from_int(self._always, self.n_rows)
 
     @property
-    def always_bits(self) -> int:
+    def _always_bits(self) -> int:
         """The rows that hold all values of set-valued facts, as one integer."""
         return self._always
 
     def _keep(self, bits: int) -> None:
         super()._keep(bits)
         self._always &= bits
+
+
+def answering_of(answer: Matches) -> Answering:
+    """What all answers of the table of an answer share."""
+    return answer._table
+
+
+def with_mirrored(answer: Matches, asked: dict[str, object] | Callable[[], Matches]) -> Matches:
+    """The same answer, of a table with conditions whose facts change in a mirror: with its facts, kept, or with what asks."""
+    answer._mirrored = asked
+    return answer
+
+
+def with_widened(answer: Matches, ask: Callable[[], Matches]) -> Matches:
+    """The same answer, of a table with conditions with a hysteresis, with what asks with widened facts."""
+    answer._widened = ask
+    return answer
+
+
+def with_penalties(answer: Matches, penalties: Callable[[], NDArray[np.float64]]) -> Matches:
+    """The same answer of a table with soft cells; what they cost at each depth is worked out when it is asked for."""
+    answer._penalties = penalties
+    return answer
+
+
+def layered_penalties(answer: Matches) -> NDArray[np.float64]:
+    """What the soft cells of each depth of tables inside tables cost: float64 [D, n_rows]; see `Matches.penalties`."""
+    return read_only(answer._penalties() if answer.has_penalties else np.zeros((1, answer.n_rows)))
 
 
 def rows_of(bits: int, numbers: Rows) -> Rows:
@@ -561,7 +564,7 @@ def minus(rows: Bits, others: Bits) -> Bits:
 
 def _costs_of_both(first: Matches, second: Matches) -> NDArray[np.float64]:
     """What the soft cells of each row cost in the first answer, and of those that only the second holds in that."""
-    return np.where(second.flags & ~first.flags, second.layered_penalties, first.layered_penalties)
+    return np.where(second.flags & ~first.flags, layered_penalties(second), layered_penalties(first))
 
 
 def _slots(matches: Matches) -> dict[str, Any]:

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from contextdb.bitmask import Rows
 from contextdb.compiled.data import CompiledData
-from contextdb.compiled.matches import Matches
+from contextdb.compiled.matches import Matches, layered_penalties
 from contextdb.compiled.memory import Rng
 from contextdb.compiled.pick_columns import PickColumns
 from contextdb.compiled.ways import Ways, WayTable
@@ -80,7 +80,7 @@ def pick(compiled: CompiledData, matches: Matches, rng: Rng | int | None = None,
 
 def pick_row(compiled: CompiledData, matches: Matches, rng: Rng | int | None = None, last: str | None = None) -> int | None:
     """The row that `pick` picks, or None."""
-    matches.require_own(compiled.answering)
+    compiled.answering.require_own(matches)
     source = compiled.memory.rng(rng)
     if last is not None and not isinstance(last, str):
         raise ContextError(Fault(f"last is of type {type(last).__name__}.", "the name of an asset, or None"))
@@ -118,7 +118,7 @@ def _pickable(ways: Ways, rows: Rows) -> Rows:
 
 def _costs(compiled: CompiledData, matches: Matches) -> Costs | None:
     """What soft cells cost, where a policy asks for it."""
-    return matches.layered_penalties if "cheapest" in compiled.policies and matches.has_penalties else None
+    return layered_penalties(matches) if "cheapest" in compiled.policies and matches.has_penalties else None
 
 
 def _possible(ways: Ways, rows: Rows, depth: int, costs: Costs | None) -> Rows:
@@ -208,7 +208,7 @@ class Outcome:
 
     def __init__(self, compiled: CompiledData, matches: Matches) -> None:
         """Raises ContextError where the answer is of another table, or of another version of it."""
-        matches.require_own(compiled.answering)
+        compiled.answering.require_own(matches)
         self.compiled = compiled
         self._matches = matches
         self.rows = matches.indices

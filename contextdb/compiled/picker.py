@@ -21,14 +21,14 @@ from numpy.typing import NDArray
 from contextdb import bitmask
 from contextdb.bitmask import Rows, read_only
 from contextdb.cells.arguments import require_kind, require_real, require_whole
-from contextdb.compiled.batch_costs import CostsOfPairs, costs_of_pairs
+from contextdb.compiled.batch_costs import CostsOfPairs
 from contextdb.compiled.casting.stage import CastMatches
 from contextdb.compiled.chance import uniform, uniforms
 from contextdb.compiled.choosing import Choosing, highest, starts_of
 from contextdb.compiled.choosing_masks import EvenChoosing
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.many import ManyMatches
-from contextdb.compiled.matches import Matches
+from contextdb.compiled.matches import Matches, answering_of, layered_penalties
 from contextdb.compiled.pick import not_unique
 from contextdb.compiled.picked import Picked
 from contextdb.compiled.why_picked import Left, why
@@ -230,7 +230,7 @@ class Picker:
         """The row of each of many characters, -1 for none, by the pairs of a context and a row that is valid in it."""
         compiled, masks = many.compiled, many.mask
         rows = np.full(len(many), -1, np.int64)
-        costs = costs_of_pairs(many) if "cheapest" in compiled.policies else None
+        costs = many._costs_of_pairs() if compiled.is_soft and "cheapest" in compiled.policies else None
         block = max(1, MOST_PAIRS // max(1, compiled.n_rows))
         for start in range(0, len(many), block):
             contexts, valid = bitmask.places(masks[start : start + block])
@@ -277,8 +277,9 @@ class Picker:
     # ---- the version of the table
 
     def _compiled_of(self, matches: Matches) -> CompiledData:
-        self._require(matches.answering.name)
-        found = matches.answering.asked_of
+        table = answering_of(matches)
+        self._require(table.name)
+        found = table.asked_of
         if not isinstance(found, CompiledData):
             raise ContextError(Fault("the answer comes out of a pickle, without its table.", "an answer of query or live here"))
         return found
@@ -332,7 +333,7 @@ class Picker:
         """A pick as one of many."""
         valid = matches.indices
         contexts, slots = np.zeros(len(valid), np.int64), np.array([slot])
-        costs = None if not matches.has_penalties else lambda _, rows: matches.layered_penalties[:, rows]
+        costs = None if not matches.has_penalties else lambda _, rows: layered_penalties(matches)[:, rows]
         awake, may, fresh = self._left(known, contexts, valid, slots, costs, time_s, is_one=True)
         turns = self._picked.turns[slots]
         drawn = known.choosing.drawn(contexts[fresh], valid[fresh], lambda d, _: uniforms(self._seed, np.array([who]), turns, d))

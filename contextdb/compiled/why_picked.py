@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contextdb.compiled.choosing import Choosing
-from contextdb.compiled.matches import Matches
+from contextdb.compiled.matches import Matches, layered_penalties
 from contextdb.compiled.pick import Ranked, percent
 
 
@@ -80,7 +80,7 @@ def _preference(table: Ranked, own: int, rows: np.ndarray[tuple[int], np.dtype[n
     if table.policy == "specific" and specificities is not None and (specificities[equals] < specificities[own]).any():
         return f"most specific: {specificities[own]:g}"
     if table.policy == "cheapest" and len(equals) > 1 and left.matches.has_penalties:
-        return f"least penalty {left.matches.layered_penalties[depth, row]:g}"
+        return f"least penalty {layered_penalties(left.matches)[depth, row]:g}"
     return f"highest priority {priority}"
 
 

@@ -22,6 +22,7 @@ from contextdb.expressions.assume import WANTS, read_assumptions
 from contextdb.expressions.expression import read_expression
 from contextdb.expressions.faults import ExpressionError
 from contextdb.expressions.tokens import written_name
+from contextdb.schema.settings import derivation_of
 from contextdb.tables.nesting.flat import FlatTable
 from contextdb.tables.table import EitherTable, Table
 
@@ -72,7 +73,7 @@ def opened(
     restricted = _restricted(space)
     drawn = [c for c in _drawn(table, assumed) if c.name in restricted]
     named = [c.name for expression in assumed.unboxed for c in expression.conditions]
-    derivation = table.schema.derivation_of([*(c.name for c in compiled.conditions), *named])
+    derivation = derivation_of(table.schema, [*(c.name for c in compiled.conditions), *named])
     unboxed = _that_matter(assumed.unboxed, derivation, restricted)
     if not drawn and not unboxed:
         return Opened(compiled, table, space, None, texts, ruled=ruled)

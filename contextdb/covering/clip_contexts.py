@@ -33,6 +33,7 @@ from contextdb.covering.witness import BoxSet, OutOfSteps, Steps
 from contextdb.errors import some
 from contextdb.motion.measuring.coverage import ClipContexts
 from contextdb.motion.measuring.moves import DIRECTION, SPEED, TURN
+from contextdb.schema.settings import derivation_of
 from contextdb.tables.nesting.flat import FlatTable
 from contextdb.tables.table import EitherTable, Table
 
@@ -336,7 +337,7 @@ def _not_mirrored(ready: Opened) -> set[str]:
     """The conditions that are computed from facts which change in a mirror: what they are there, cells do not tell."""
     found = set()
     for condition in ready.compiled.conditions:
-        derivation = ready.table.schema.derivation_of([condition.name]) if ready.table is not None else None
+        derivation = derivation_of(ready.table.schema, [condition.name]) if ready.table is not None else None
         if derivation is not None and changed_in_mirror(derivation.inputs):
             found.add(condition.name)
     return found

@@ -22,8 +22,9 @@ from contextdb.expressions.rules import check_rule
 from contextdb.files.csv_source import name_faults
 from contextdb.schema.jobs import PlainJob
 from contextdb.schema.sections import condition_to_dict, differences, has_place, settings_to_dict, settings_with
-from contextdb.schema.settings import conditions_from_dict
+from contextdb.schema.settings import conditions_from_dict, with_outputs
 from contextdb.tables.changes import CameFrom, Cells, Change, Columns, Edit, Rows, Sections
+from contextdb.tables.data import known_conditions
 from contextdb.tables.merging.building import edit_to
 from contextdb.tables.plain_columns import plain_fault
 from contextdb.tables.table import Table
@@ -51,7 +52,7 @@ def check_cell(table: Table, column: str, text: str) -> Fault | None:
         if one.condition.name == column:
             return check_text(one.condition, text)
     if column == settings.when and table.when is not None:
-        return check_rule(text, table.known_conditions) or unwritable(text)
+        return check_rule(text, known_conditions(table)) or unwritable(text)
     if text.strip() and (output := settings.output(column)) is not None:
         return output.fault(text) or unwritable(text)
     for job in get_args(PlainJob):
@@ -184,7 +185,7 @@ def insert_columns(table: Table, at: int, columns: Sequence[NewColumn]) -> Edit:
     layout[at:at] = [(column.name, None) for column in columns]
     settings: dict[str, Any] = {c.job: c.name for c in columns if c.job not in ("condition", "output")}
     if outputs := [c.name for c in columns if c.job == "output"]:
-        settings["outputs"] = settings_to_dict(table.settings.with_outputs([*table.settings.outputs, *outputs]))["outputs"]
+        settings["outputs"] = settings_to_dict(with_outputs(table.settings, [*table.settings.outputs, *outputs]))["outputs"]
     declared = {c.name: c.declared for c in columns if c.declared}
     said = Sections(settings, {"conditions": declared} if declared else {})
     changes: list[Change] = [Columns(tuple(layout))]
@@ -260,7 +261,7 @@ def set_settings(table: Table, **said: Any) -> Edit:
 
 def set_outputs(table: Table, names: Sequence[str]) -> Edit:
     """Say which columns are outputs; what is declared of those that stay, and what the fallback gives to them, is kept."""
-    after = settings_to_dict(table.settings.with_outputs(names))
+    after = settings_to_dict(with_outputs(table.settings, names))
     changed = differences(settings_to_dict(table.settings), after)
     return _checked(table, Edit("Set outputs of the table", (Sections(changed),) if changed else ()))
 

@@ -29,7 +29,7 @@ from contextdb.expressions.names import names_in, with_names
 from contextdb.expressions.rules import has_no_rule
 from contextdb.files.texts import AnySource, read_texts, written_over
 from contextdb.schema import toml_edit
-from contextdb.schema.settings import TableSettings, read_schema
+from contextdb.schema.settings import TableSettings, plain_names, read_schema
 from contextdb.tables.other_files import CASE_COLUMNS, cases_path
 from contextdb.tables.project import SCHEMA_FILE, read_folder_schema, table_files
 from contextdb.tables.table import Table
@@ -128,7 +128,7 @@ class TableFile:
 
     def has_condition(self, condition: str) -> bool:
         """Whether the table has a column that is this condition."""
-        return condition not in self.settings.plain(self.columns) and any(c.name == condition for c in self.columns)
+        return condition not in plain_names(self.settings, self.columns) and any(c.name == condition for c in self.columns)
 
     @property
     def rules(self) -> TextColumn | None:

@@ -21,6 +21,7 @@ from contextdb.errors import Fault, Place, TableError, in_quotes, row_name
 from contextdb.exchange.feel import feel_number, feel_type, literal, unary_tests
 from contextdb.exchange.reading import Remark, capped
 from contextdb.tables.condition_column import ConditionColumn
+from contextdb.tables.data import output_columns_of, require_readable
 from contextdb.tables.table import Table
 
 NAMESPACE = "https://www.omg.org/spec/DMN/20191111/MODEL/"
@@ -39,7 +40,7 @@ def write_dmn(table: Table) -> tuple[bytes, tuple[Remark, ...]]:
     TableError
         Cells that cannot be read, or texts that XML cannot hold.
     """
-    table.require_readable()
+    require_readable(table)
     _require_xml(table)
     inputs = [column for column in table.conditions if not column.condition.domain.type.is_tags]
     tags = [column for column in table.conditions if column.condition.domain.type.is_tags]
@@ -190,7 +191,7 @@ def _about(table: Table, tags: Sequence[ConditionColumn]) -> Iterator[Remark]:
 
 def _about_outputs(table: Table) -> Iterator[Remark]:
     """What FEEL has no words for in the types and values of outputs."""
-    for column in table.output_columns:
+    for column in output_columns_of(table):
         kind, place = column.output.type, f"column {in_quotes(column.output.name)}"
         if kind.has_size:
             yield Remark("lists of numbers become texts.", place, True)

@@ -19,7 +19,7 @@ from contextdb.exchange.mapping import PLAIN_JOBS, Mapped, propose
 from contextdb.exchange.reading import Reading, listed
 from contextdb.files.texts import AnySource, new_source
 from contextdb.schema.sections import condition_to_dict, job_faults
-from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict
+from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict, settings_renamed, with_outputs
 from contextdb.tables.project import schema_for, settings_of
 from contextdb.tables.table import Table
 
@@ -184,9 +184,9 @@ def _settings(settings: TableSettings, placed: Sequence[tuple[int, Mapped]], rea
     own = next(iter(reading.schema.tables.values()), None)
     if own is not None and settings == TableSettings(settings.name, settings.file):
         said |= {"fallback": own.fallback, "policy": own.policy, "assume": own.assume}
-        named = own.renamed({reading.columns[at].name: column.name for at, column in placed}.get)
+        named = settings_renamed(own, {reading.columns[at].name: column.name for at, column in placed}.get)
         said |= {"typed": named.typed, "fallback_outputs": named.fallback_outputs}
-    return replace(settings, **said).with_outputs(column.name for column in kept if column.job == "output")
+    return with_outputs(replace(settings, **said), (column.name for column in kept if column.job == "output"))
 
 
 def declared_differently(reading: Reading, schema: Schema) -> list[str]:

@@ -20,7 +20,7 @@ from contextdb.exchange.proposals import n_unreadable, names_of, pair_in, propos
 from contextdb.exchange.reading import Reading
 from contextdb.schema.jobs import PlainJob
 from contextdb.schema.sections import condition_to_dict
-from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict
+from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict, settings_renamed
 from contextdb.tables.table import Table
 
 Job = Literal["asset", "condition", "output", PlainJob, "when", "left out"]
@@ -199,7 +199,7 @@ def _merged(settings: TableSettings, kept: TableSettings | None, renames: Mappin
     """What the project says of the table, and where it says nothing, what the file itself keeps, under the new names."""
     if kept is None or settings != TableSettings(settings.name, settings.file):
         return settings
-    return replace(kept.renamed(lambda name: renames.get(name, name) or None), name=settings.name, file=settings.file)
+    return replace(settings_renamed(kept, lambda name: renames.get(name, name) or None), name=settings.name, file=settings.file)
 
 
 def _asset(reading: Reading, settings: TableSettings, renames: Mapping[str, str]) -> str:

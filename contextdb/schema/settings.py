@@ -13,6 +13,7 @@ from functools import cached_property
 from pathlib import PurePosixPath
 from typing import Any
 
+from contextdb.cells.arguments import require_text
 from contextdb.cells.conditions import Condition
 from contextdb.cells.notebook import one_line
 from contextdb.cells.output_types import OutputValue
@@ -72,7 +73,7 @@ class TableSettings:
         return tuple(typed.get(name) or Output(name) for name in self.outputs)
 
     def output(self, name: str) -> Output | None:
-        """What is declared of an output; None for a column of another kind, or one of which nothing is."""
+        """What is declared of an output; None for a column of another kind, or one of which nothing is. Raises nothing."""
         return next((output for output in self.typed if output.name == name), None)
 
     @property
@@ -80,35 +81,37 @@ class TableSettings:
         """Each job with a column that has it, as far as columns are named."""
         return columns_with_jobs(vars(self))
 
-    def plain(self, columns: Sequence[TextColumn]) -> set[str]:
-        """The names of columns that are not conditions."""
-        return {*(column.name for column in columns[:1] if not self.asset), *(name for _, name in self.jobs)}
-
-    def renamed(self, name_of: Callable[[str], str | None]) -> TableSettings:
-        """The settings under other names of the columns; one that is gone, None, has no job."""
-        now: dict[str, Any] = {job: name_of(getattr(self, job) or "") for job in JOBS}
-        typed = ((name_of(output.name), output) for output in self.typed)
-        given = ((name_of(name), value) for name, value in self.fallback_outputs)
-        return replace(
-            self,
-            **now,
-            outputs=tuple(name for name in map(name_of, self.outputs) if name is not None),
-            typed=tuple(replace(output, name=name) for name, output in typed if name is not None),
-            fallback_outputs=tuple((name, value) for name, value in given if name is not None),
-        )
-
-    def with_outputs(self, names: Iterable[str]) -> TableSettings:
-        """The settings with other outputs; what is said of those that stay is kept."""
-        outputs = tuple(names)
-        typed = tuple(output for output in self.typed if output.name in outputs)
-        return replace(
-            self, outputs=outputs, typed=typed, fallback_outputs=tuple(o for o in self.fallback_outputs if o[0] in outputs)
-        )
-
     @property
     def files(self) -> tuple[str, ...]:
         """The files that may hold the table, the most wanted first."""
         return table_files(self.name, self.file)
+
+
+def plain_names(settings: TableSettings, columns: Sequence[TextColumn]) -> set[str]:
+    """The names of columns that are not conditions."""
+    return {*(column.name for column in columns[:1] if not settings.asset), *(name for _, name in settings.jobs)}
+
+
+def settings_renamed(settings: TableSettings, name_of: Callable[[str], str | None]) -> TableSettings:
+    """Settings under other names of the columns; one that is gone, None, has no job."""
+    now: dict[str, Any] = {job: name_of(getattr(settings, job) or "") for job in JOBS}
+    typed = ((name_of(output.name), output) for output in settings.typed)
+    given = ((name_of(name), value) for name, value in settings.fallback_outputs)
+    return replace(
+        settings,
+        **now,
+        outputs=tuple(name for name in map(name_of, settings.outputs) if name is not None),
+        typed=tuple(replace(output, name=name) for name, output in typed if name is not None),
+        fallback_outputs=tuple((name, value) for name, value in given if name is not None),
+    )
+
+
+def with_outputs(settings: TableSettings, names: Iterable[str]) -> TableSettings:
+    """Settings with other outputs; what is said of those that stay is kept."""
+    outputs = tuple(names)
+    typed = tuple(output for output in settings.typed if output.name in outputs)
+    given = tuple(output for output in settings.fallback_outputs if output[0] in outputs)
+    return replace(settings, outputs=outputs, typed=typed, fallback_outputs=given)
 
 
 @dataclass(frozen=True, repr=False)
@@ -133,26 +136,15 @@ class Schema:
         return one_line("Schema", self.name, told)
 
     def __getstate__(self) -> dict[str, object]:
-        """What is pickled: not `derivation`, which is functions."""
-        return {key: value for key, value in self.__dict__.items() if key != "derivation"}
+        """What is pickled: not how facts are derived, which is functions."""
+        return {key: value for key, value in self.__dict__.items() if key != "_derivation"}
 
     @cached_property
-    def derivation(self) -> Derivation | None:
-        """How the conditions with an `expr` are computed from the others; None where there are none.
-
-        Raises
-        ------
-        SchemaError
-            An expression cannot be used. `read_schema` has checked that already; a schema made in Python has not.
-        """
+    def _derivation(self) -> Derivation | None:
+        """How the conditions with an `expr` are computed from the others; None where there are none."""
         if not any(condition.expr for condition in self.conditions.values()):
             return None
         return derive(self.conditions)
-
-    def derivation_of(self, names: Iterable[str]) -> Derivation | None:
-        """What is needed to compute those of some conditions that are derived; None where none is."""
-        derived = self.derivation.only(names) if self.derivation else None
-        return derived if derived and derived.steps else None
 
     @property
     def motion(self) -> dict[str, Mapping[str, object]]:
@@ -166,10 +158,23 @@ class Schema:
         }
 
     def settings_for(self, file: str) -> TableSettings:
-        """The settings of the table in `file`, a path below the folder; one that is not declared has the file's stem as name."""
-        path = PurePosixPath(composed(file))
+        """The settings of the table in `file`, a path below the folder; one that is not declared has the file's stem as
+        name. Raises ContextError for no text."""
+        path = PurePosixPath(composed(require_text(file, "file")))
         declared = (settings for settings in self.tables.values() if str(path) in map(composed, settings.files))
         return next(declared, TableSettings(path.stem))
+
+
+def derivation_of(schema: Schema, names: Iterable[str]) -> Derivation | None:
+    """What is needed to compute those of some conditions that are derived; None where none is.
+
+    Raises
+    ------
+    SchemaError
+        An expression cannot be used. `read_schema` has checked that already; a schema made in Python has not.
+    """
+    derived = schema._derivation.only(names) if schema._derivation else None
+    return derived if derived and derived.steps else None
 
 
 EMPTY = Schema()

@@ -32,7 +32,7 @@ from contextdb.schema.sections import (
     settings_to_dict,
     settings_with,
 )
-from contextdb.schema.settings import expression_faults
+from contextdb.schema.settings import expression_faults, settings_renamed
 from contextdb.tables.data import AnyTable, TableData, conditions_of, with_columns
 
 CameFrom = NDArray[np.int64]
@@ -107,7 +107,7 @@ class Columns:
                 conditions[new] = replace(conditions[old], name=new)
         columns = [_column(table, before, new, old) for new, old in self.layout]
         schema = replace(table.schema, conditions=conditions)
-        settings, known = table.settings.renamed(renamed.get), {c.condition.name: c for c in table.conditions}
+        settings, known = settings_renamed(table.settings, renamed.get), {c.condition.name: c for c in table.conditions}
         moved = {new: known[old] for new, old in self.layout if old in known}
         found = conditions_of(columns, schema, settings, moved)
         return replace(table, columns=tuple(columns), conditions=found, settings=settings, schema=schema)

@@ -7,7 +7,8 @@ from contextdb.cells.outputs import SLOT_COLUMNS
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.pick_columns import NOTHING
 from contextdb.expressions.rules.rules import WhenRules
-from contextdb.tables.data import TableData
+from contextdb.schema.settings import derivation_of
+from contextdb.tables.data import TableData, picking_of
 
 
 def compile_table(table: TableData) -> CompiledData:
@@ -25,11 +26,11 @@ def compile_table(table: TableData) -> CompiledData:
         texts=tuple(c.texts for c in table.conditions),
         policy=table.settings.policy,
         fallback=table.settings.fallback,
-        derivation=table.schema.derivation_of([*(c.condition.name for c in table.conditions), *(when.names if when else ())]),
+        derivation=derivation_of(table.schema, [*(c.condition.name for c in table.conditions), *(when.names if when else ())]),
         slots=tuple(c for c in table.columns if c.name in SLOT_COLUMNS and c.name in table.settings.outputs),
         when=when,
-        ways=table.ways,
+        ways=table._ways,
         declared=frozenset(table.schema.conditions),
         outputs=table.outputs,
-        picking=table.picking if table.ways is None else NOTHING,
+        picking=picking_of(table) if table._ways is None else NOTHING,
     )

@@ -34,7 +34,7 @@ from contextdb.compiled.ways import Ways
 from contextdb.errors import ContextError, Fault, Place, TableError, in_quotes, nearest, plural, some
 from contextdb.expressions.rules import WhenColumn
 from contextdb.files.texts import AnySource
-from contextdb.schema.settings import EMPTY, Schema, TableSettings
+from contextdb.schema.settings import EMPTY, Schema, TableSettings, plain_names
 from contextdb.tables.condition_column import ConditionColumn
 from contextdb.tables.nesting.names import inner_name
 from contextdb.tables.output_columns import OutputColumn, output_columns, outputs_of
@@ -115,11 +115,11 @@ class TableData(Unchanging):
         return self.settings.asset or (self.columns[0].name if self.columns else "")
 
     def text_column(self, name: str) -> TextColumn:
-        """The texts of a column."""
+        """The texts of a column; raises TableError, with the nearest, for one that the table does not have."""
         return self.columns[self._column_at(name)]
 
     def condition(self, name: str) -> ConditionColumn:
-        """The column of a condition."""
+        """The column of a condition; raises TableError, with the nearest, for one that the table does not have."""
         require_text(name, "name")
         for column in self.conditions:
             if column.condition.name == name:
@@ -131,7 +131,8 @@ class TableData(Unchanging):
         return self.text_column(column)[require_row(row, self.n_rows)]
 
     def place(self, row: int, column: str | None = None) -> Place:
-        """Where a row is: its file and line where it has one, else its number."""
+        """Where a row is: its file and line where it has one, else its number. Raises ContextError for no whole
+        number; a row that there is not has no line."""
         row = require_whole(row, "row")
         file = str(self.path) if self.path else None
         record = int(self.origin[row]) if self.source is not None and row < len(self.origin) else -1
@@ -155,11 +156,6 @@ class TableData(Unchanging):
         names = [c.condition.name for c in self.conditions]
         found.sort(key=lambda item: item[:2])
         return [f if at < 0 else f.at(self.place(row, names[at])) for row, at, f in found]
-
-    def require_readable(self) -> None:
-        """Raise TableError with every cell that cannot be read, if there is one."""
-        if self.faults:
-            raise TableError(*self.faults)
 
     def with_cell(self, row: int, column: str, text: str) -> Self:
         """The table with one cell changed; every other column is shared. Raises what `with_cells` raises."""
@@ -225,7 +221,7 @@ class TableData(Unchanging):
         return with_columns(self, [c.with_rows_taken(taken) for c in self.columns], self.origin[taken])
 
     @property
-    def ways(self) -> Ways | None:
+    def _ways(self) -> Ways | None:
         """The way of each row through tables inside tables, for a table that was made of several; else None."""
         return None
 
@@ -245,7 +241,7 @@ class TableData(Unchanging):
         return self._plain.weights
 
     @cached_property
-    def picking(self) -> PickColumns:
+    def _picking(self) -> PickColumns:
         """How specific the rows are, where the policy asks for it, and how long they rest after they were picked."""
         if self.settings.policy != "specific":
             return self._plain.resting
@@ -254,23 +250,23 @@ class TableData(Unchanging):
         return replace(self._plain.resting, specificities=specificities(columns, has_rule, self.n_rows))
 
     @cached_property
-    def output_columns(self) -> tuple[OutputColumn, ...]:
+    def _output_columns(self) -> tuple[OutputColumn, ...]:
         """The outputs' columns, in the order of the settings."""
         return output_columns(self.columns, self.settings)
 
     @cached_property
     def outputs(self) -> Outputs:
         """What the rows give the game besides their assets, to be read by row."""
-        return outputs_of(self.output_columns, self.settings)
+        return outputs_of(self._output_columns, self.settings)
 
     @property
     def _output_faults(self) -> Iterator[tuple[int, Fault]]:
         """The cells of outputs that cannot be read; a row that refers to a table may leave them empty."""
-        if any(column.faults for column in self.output_columns):
+        if any(column.faults for column in self._output_columns):
             texts = self.text_column(self.asset_column)
             refers = np.array([inner_name(text) is not None for text in texts.texts], np.bool_)
             may_be_empty = frozenset(np.flatnonzero(refers[texts.codes]).tolist())
-            for column in self.output_columns:
+            for column in self._output_columns:
                 yield from column.faulty_rows(may_be_empty)
 
     @cached_property
@@ -278,12 +274,7 @@ class TableData(Unchanging):
         """The rows' own rules; None without a `when` column."""
         if self.settings.when is None:
             return None
-        return WhenColumn.read(self.text_column(self.settings.when), self.known_conditions)
-
-    @property
-    def known_conditions(self) -> dict[str, Condition]:
-        """The conditions that rules may name: those of the table, and all that are declared."""
-        return {**self.schema.conditions, **{c.condition.name: c.condition for c in self.conditions}}
+        return WhenColumn.read(self.text_column(self.settings.when), known_conditions(self))
 
     @cached_property
     def _plain(self) -> PlainColumns:
@@ -301,11 +292,32 @@ class TableData(Unchanging):
         raise TableError(_no_such("column", name, [c.name for c in self.columns]))
 
 
+def known_conditions(table: TableData) -> dict[str, Condition]:
+    """The conditions that rules may name: those of the table, and all that are declared."""
+    return {**table.schema.conditions, **{c.condition.name: c.condition for c in table.conditions}}
+
+
+def picking_of(table: TableData) -> PickColumns:
+    """How specific the rows of a table are, where the policy asks for it, and how long they rest after they were picked."""
+    return table._picking
+
+
+def output_columns_of(table: TableData) -> tuple[OutputColumn, ...]:
+    """The columns of a table's outputs, in the order of the settings."""
+    return table._output_columns
+
+
+def require_readable(table: TableData) -> None:
+    """Raise TableError with every cell that cannot be read, if there is one."""
+    if table.faults:
+        raise TableError(*table.faults)
+
+
 def conditions_of(
     columns: Sequence[TextColumn], schema: Schema, settings: TableSettings, before: Mapping[str, ConditionColumn]
 ) -> tuple[ConditionColumn, ...]:
     """Those of some columns that are conditions; what is known of them from `before` is not worked out again."""
-    plain, declared = settings.plain(columns), schema.conditions
+    plain, declared = plain_names(settings, columns), schema.conditions
     return tuple(ConditionColumn.like(before.get(c.name), c, declared.get(c.name)) for c in columns if c.name not in plain)
 
 
@@ -314,7 +326,7 @@ def with_columns(table: AnyTable, columns: Sequence[TextColumn], origin: NDArray
     now = {c.name: c for c in columns}
     conditions = tuple(c if now[c.condition.name] is c.texts else c.with_texts(now[c.condition.name]) for c in table.conditions)
     after = replace(table, columns=tuple(columns), conditions=conditions, origin=origin)
-    after.__dict__["output_columns"] = tuple(column.with_texts(now[column.output.name]) for column in table.output_columns)
+    after.__dict__["_output_columns"] = tuple(column.with_texts(now[column.output.name]) for column in table._output_columns)
     return after
 
 

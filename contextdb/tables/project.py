@@ -31,6 +31,7 @@ from contextdb.errors import (
 from contextdb.files import texts as files
 from contextdb.files.file_names import alike, composed, spelled
 from contextdb.schema.settings import EMPTY, Schema, TableSettings, read_schema
+from contextdb.tables.data import require_readable
 from contextdb.tables.nesting.links import Neighbours, inner_tables, is_nested, require_sound
 from contextdb.tables.other_files import other_form, stray_sentence
 from contextdb.tables.table import Table
@@ -91,7 +92,7 @@ class Project(Unchanging, ByName[Table]):
             raise TableError(*faults)
         project = cls(folder, schema, around_each_other(tables))
         if strict:
-            project.require_sound()
+            require_all_sound(project)
         return project
 
     def __getitem__(self, name: str) -> Table:
@@ -121,21 +122,22 @@ class Project(Unchanging, ByName[Table]):
         """The names of the tables that rows of other tables refer to."""
         return inner_tables(self.tables.values()) & set(self.tables)
 
-    def require_sound(self) -> None:
-        """Raise TableError with what is wrong with rows that refer to tables."""
-        faults: dict[Fault, None] = {}
-        for table in self.tables.values():
-            if is_nested(table):
-                try:
-                    require_sound(table, self.tables)
-                except ContextDBError as error:
-                    faults |= dict.fromkeys(error.faults)
-        if faults:
-            raise TableError(*faults)
-
     def compile(self) -> dict[str, CompiledTable]:
         """Every table compiled, by name."""
         return {name: table.compile() for name, table in self.tables.items()}
+
+
+def require_all_sound(project: Project) -> None:
+    """Raise TableError with what is wrong with rows that refer to tables."""
+    faults: dict[Fault, None] = {}
+    for table in project.tables.values():
+        if is_nested(table):
+            try:
+                require_sound(table, project.tables)
+            except ContextDBError as error:
+                faults |= dict.fromkeys(error.faults)
+    if faults:
+        raise TableError(*faults)
 
 
 def load(path: str | Path, strict: bool = True) -> Table:
@@ -341,7 +343,7 @@ def _read_table(path: Path, schema: Schema, folder: Path, strict: bool, around: 
     source, columns = files.read_texts(path)
     table = replace(Table.build(settings.name, columns, schema, settings, path, source), around=around)
     if strict:
-        table.require_readable()
+        require_readable(table)
     return table
 
 

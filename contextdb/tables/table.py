@@ -14,7 +14,7 @@ from contextdb.compiled.table import CompiledTable
 from contextdb.errors import Fault, SchemaError, TableError, in_quotes
 from contextdb.schema.settings import EMPTY, Schema, TableSettings, conditions_from_dict, expression_faults, settings_from_dict
 from contextdb.tables.compiling import compile_table
-from contextdb.tables.data import TableData
+from contextdb.tables.data import TableData, require_readable
 from contextdb.tables.given_columns import columns_given
 from contextdb.tables.nesting.flat import FlatTable, flatten
 from contextdb.tables.nesting.links import inner_rows, is_nested, nesting_faults
@@ -72,7 +72,7 @@ class Table(TableData):
             settings = settings_from_dict(name, require_mapping(settings, "settings", accepted), schema.conditions.keys())
         texts = columns_given(columns)
         table = cls.build(name, texts, schema, settings)
-        table.require_readable()
+        require_readable(table)
         return table
 
     @cached_property
@@ -116,7 +116,7 @@ class Table(TableData):
         TableError
             Cells that cannot be read, all of them; in tables inside the table too.
         """
-        self.require_readable()
+        require_readable(self)
         return CompiledTable(compile_table(self.flat(tables)))
 
     def flat(self, tables: Mapping[str, Table] | None = None) -> Table | FlatTable:

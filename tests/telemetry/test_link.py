@@ -270,6 +270,15 @@ def test_a_controller_tells_its_decisions_and_gets_its_own_recorder_back(meeting
     assert (line["who"], line["decision"]["playing"]["asset"]) == ("player", "run")
 
 
+def test_a_link_watches_all_controllers_of_a_group(meeting: Path, file: Path):
+    group = motion.ControllerGroup(motion.Controller(two_databases()) for _ in range(2))
+    with cdb.link("game", record=file) as link:
+        link.watch(group, "npc")
+        group.update(0.1, [[0.0], [2.0]])
+    told = [(line["who"], line["decision"]["playing"]["asset"]) for line in recorded(file, "decision")]
+    assert told == [("npc 0", "walk"), ("npc 1", "run")]
+
+
 def test_a_decision_and_a_choice_can_be_told_without_watching(meeting: Path, file: Path):
     selector = two_databases()
     with cdb.link("game", record=file) as link:

@@ -21,7 +21,7 @@ from contextdb.expressions.names import names_in as expression_names
 from contextdb.schema.jobs import JOBS, PlainJob
 from contextdb.schema.outputs import declared_outputs, outputs_faults
 from contextdb.schema.sections import condition_to_dict, differences, has_place, settings_to_dict
-from contextdb.schema.settings import TableSettings
+from contextdb.schema.settings import TableSettings, with_outputs
 from contextdb.schema.shapes import wrong_name
 from contextdb.tables.changes import Change, Columns, Edit, Sections
 from contextdb.tables.table import Table
@@ -320,7 +320,7 @@ def _settings(before: TableSettings, rows: Sequence[ColumnRow], said: Sequence[M
         jobs["asset"] = None
     outputs = {row.name: dict(part) for row, part in zip(rows, said, strict=True) if row.job == OUTPUT}
     names = [name for name in before.outputs if name in outputs] + [name for name in outputs if name not in before.outputs]
-    after = settings_to_dict(replace(before.with_outputs(names), **jobs))
+    after = settings_to_dict(replace(with_outputs(before, names), **jobs))
     after.pop("outputs", None)
     is_typed = any(part and part != {"type": "text"} for part in outputs.values())
     if names:

@@ -30,6 +30,7 @@ from contextdb.cells.sets import Cell
 from contextdb.columns import TextColumn
 from contextdb.compiled.data import CompiledData, costs_of
 from contextdb.compiled.explain import Explanation, Failure, RowExplanation, describe_fact
+from contextdb.compiled.matches import layered_penalties, with_penalties
 from contextdb.compiled.pick import Outcome, percent
 from contextdb.compiled.table import CompiledTable
 from contextdb.errors import Fault, some
@@ -37,6 +38,7 @@ from contextdb.expressions.rules import WhenColumn, WhenRules
 from contextdb.schema.settings import TableSettings
 from contextdb.tables.compiling import compile_table
 from contextdb.tables.condition_column import ConditionColumn
+from contextdb.tables.data import picking_of
 from contextdb.tables.nesting.links import is_nested
 from contextdb.tables.nesting.names import asset_name
 from contextdb.tables.table import Table
@@ -317,11 +319,11 @@ class QueryRow:
             if asked is not None and asked.fault is None and asked.matches is not None:
                 found = may = asked.matches
                 if not self.is_nested:
-                    may = asked.compiled.matches(self.bits).with_penalties(lambda: found.layered_penalties)
+                    may = with_penalties(asked.compiled.matches(self.bits), lambda: layered_penalties(found))
                 self._outcome = Outcome(asked.compiled, may)
             else:
                 compiled = self._ranks()
-                self._outcome = Outcome(compiled, compiled.matches(self.bits).with_penalties(self._costs))
+                self._outcome = Outcome(compiled, with_penalties(compiled.matches(self.bits), self._costs))
         return self._outcome
 
     def _ranks(self) -> CompiledData:
@@ -339,7 +341,7 @@ class QueryRow:
             or len(known[1]) != len(columns)
             or any(a is not b for a, b in zip(known[1], columns, strict=True))
         ):
-            compiled = replace(compile_table(replace(table, conditions=(), settings=settings)), picking=table.picking)
+            compiled = replace(compile_table(replace(table, conditions=(), settings=settings)), picking=picking_of(table))
             self._ranked = known = settings, tuple(columns), compiled
         return known[2]
 

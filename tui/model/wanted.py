@@ -14,6 +14,8 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import Fact, read_fact, read_fact_text
 from contextdb.errors import ContextDBError, ContextError, Fault, shown, some
 from contextdb.expressions import Derivation
+from contextdb.schema.settings import derivation_of
+from contextdb.tables.data import known_conditions
 from contextdb.tables.nesting.links import is_nested
 from contextdb.tables.table import EitherTable
 
@@ -32,8 +34,8 @@ class Wanted:
         """What a table asks for; with the tables inside it, where it was made flat."""
         ruled = table.when.names if table.when is not None else ()
         columns = [column.condition for column in table.conditions]
-        derivation = table.schema.derivation_of([*(c.name for c in columns), *ruled])
-        known, inner = table.known_conditions, derivation.conditions if derivation is not None else ()
+        derivation = derivation_of(table.schema, [*(c.name for c in columns), *ruled])
+        known, inner = known_conditions(table), derivation.conditions if derivation is not None else ()
         conditions = [*columns, *(known[name] for name in ruled), *inner]
         return cls({c.name: c for c in conditions}, derivation)
 

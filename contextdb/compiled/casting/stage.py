@@ -30,7 +30,7 @@ from contextdb.compiled.casting.roles import roles_of_table
 from contextdb.compiled.casting.rules import CastRules
 from contextdb.compiled.casting.together import CastRows, casts_of
 from contextdb.compiled.data import CompiledData
-from contextdb.compiled.matches import Answering, SetMatches, Stages
+from contextdb.compiled.matches import Answering, SetMatches, Stages, with_mirrored, with_penalties, with_widened
 from contextdb.errors import ContextError, Fault, in_quotes, nearest, some
 
 Casting = dict[str, Actor]
@@ -159,11 +159,11 @@ class Stage:
         some_bits, all_bits = self.left_by_rules(some_bits, all_bits)
         found = self.answer(some_bits, all_bits, ((some_bits, self),), self.compiled.answering)
         if self.compiled.mirroring:
-            found.with_mirrored(self.mirrored)
+            with_mirrored(found, self.mirrored)
         if self.compiled.widening:
-            found.with_widened(self.widened)
+            with_widened(found, self.widened)
         if self.compiled.is_soft:
-            found.with_penalties(lambda: self.penalties(found))
+            with_penalties(found, lambda: self.penalties(found))
         return found
 
     def answer(self, bits: int, always: int, stages: Stages, table: Answering) -> CastMatches:
@@ -178,7 +178,7 @@ class Stage:
         found = replace(self, plain_facts=facts).matches(plain)
         del found._widened  # nothing is widened twice
         if self.compiled.mirroring:
-            found.with_mirrored(lambda: self.mirrored().widened)
+            with_mirrored(found, lambda: self.mirrored().widened)
         return found
 
     def mirrored(self) -> CastMatches:

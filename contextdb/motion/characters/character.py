@@ -360,18 +360,18 @@ class Character:
         """
         if path is not None:
             require_kind(path, Trajectory, "path", "a Trajectory over the ground")
-        step = self.step(dt, stick, facts, facing, body)
-        wished = self.wished(step, self.steered(step, stick, facing) if path is None else path)
-        query = with_path(self.schema, self.features(step.dt_s, step.body), wished)
+        step = self._step(dt, stick, facts, facing, body)
+        wished = self._wished(step, self._steered(step, stick, facing) if path is None else path)
+        query = with_path(self.schema, self._features(step.dt_s, step.body), wished)
         if "valid" not in options:
-            options["valid"] = self.valid(step.facts)
+            options["valid"] = self._valid(step.facts)
         before = self.controller.state
         decision = self.controller.update(step.dt_s, query, context=step.facts or None, body=step.body, **options)
-        return self.answer(step, wished, decision, before)
+        return self._answer(step, wished, decision, before)
 
     # ---- the parts of an update, for a crowd
 
-    def step(self, dt: float, stick: Ground, facts: Facts | None, facing: float | None, body: Steered | None) -> Step:
+    def _step(self, dt: float, stick: Ground, facts: Facts | None, facing: float | None, body: Steered | None) -> Step:
         """The body and the facts of an update."""
         dt = require_real(dt, "dt", 0.0)
         stick = require_point(stick, "stick", "two numbers, x and z in metres a second")
@@ -380,9 +380,9 @@ class Character:
         if facing is not None:
             require_real(facing, "facing")
         moved = self._body.moved(dt, stick, facing) if body is None else body
-        return self.step_of(dt, stick, given, facing, moved)
+        return self._step_of(dt, stick, given, facing, moved)
 
-    def step_of(self, dt: float, stick: Ground, given: Facts, facing: float | None, moved: Steered) -> Step:
+    def _step_of(self, dt: float, stick: Ground, given: Facts, facing: float | None, moved: Steered) -> Step:
         """The same with the body that has moved."""
         place = place_beside((*moved.position, moved.heading), self._apart)
         own, facts = self.asked_facts, given
@@ -400,46 +400,47 @@ class Character:
         bank = banks if isinstance(banks, PoseBank) else banks.get(playing.database)
         return Played(playing, self.controller.selector.databases.get(playing.database), bank)
 
-    def steered(self, step: Step, stick: Ground, facing: float | None) -> Trajectory:
+    def _steered(self, step: Step, stick: Ground, facing: float | None) -> Trajectory:
         """The path of the body if the stick stays as it is, as far as a search must know it."""
         reach = ahead_s(self.schema, math.hypot(*stick), step.body.velocity_halflife_s)
         return steered_path([step.body], stick, facing, reach_s=reach, rate=self.schema.rate)
 
-    def wished(self, step: Step, path: Trajectory) -> Trajectory:
+    def _wished(self, step: Step, path: Trajectory) -> Trajectory:
         """The path from where the animation is: what lies behind it is where it was."""
         return _after_trail(path_from_place(step.place, path), step.trail)
 
-    def features(self, dt_s: float = 0.0, body: Steered | None = None) -> Features | Floats:
-        """The features of the pose that a query begins with: of the frame that plays next, or of rest where nothing plays.
+    def features(self) -> Features | Floats:
+        """The features of the pose as it is now, which a query begins with, such as for `MatchNode.enter`. Never fails."""
+        return self._features(0.0, self._body)
 
-        With no argument the pose as it is now, such as for `MatchNode.enter`. Never fails.
-        """
+    def _features(self, dt_s: float, body: Steered) -> Features | Floats:
+        """The features of the pose that a query begins with: of the frame that plays next, or of rest where nothing plays."""
         if self.pose is not None:
             return np.asarray(self.pose(self, dt_s))
         upcoming, databases = self.controller.upcoming(dt_s), self.controller.selector.databases
         if upcoming is not None:
             return databases[upcoming.database].raw(upcoming.frame)
-        return resting_pose(databases, self.schema, self._body if body is None else body)
+        return resting_pose(databases, self.schema, body)
 
-    def valid(self, facts: Facts) -> OfValid | None:
+    def _valid(self, facts: Facts) -> OfValid | None:
         """What the tables allow with some facts."""
         answers: dict[int, HasAssets] = {
             id(table): asking.answer(table, facts, self.unknown) for table in asking.each_of(self._tables)
         }
         return asking.valid_of(self._tables, answers)
 
-    def answer(self, step: Step, wished: Trajectory, decision: Decision, before: ControllerState) -> Updated:
+    def _answer(self, step: Step, wished: Trajectory, decision: Decision, before: ControllerState) -> Updated:
         """The pose after a decision; `before` is where the controller stood."""
         if self.stream is None:
-            return self.shown(step, (wished,), decision, (), 0, None)
+            return self._shown(step, (wished,), decision, (), 0, None)
         try:
             pose = self.stream.update(decision, step.dt_s, step.body, self.ground)
         except Exception:
             self.controller.restore(before)
             raise
-        return self.shown(step, (wished,), decision, (pose,), 0, pose.root)
+        return self._shown(step, (wished,), decision, (pose,), 0, pose.root)
 
-    def shown(
+    def _shown(
         self, step: Step, paths: Paths, decision: Decision, poses: Sequence[Pose | None], at: int, root: Place3 | None
     ) -> Updated:
         """What an update gave, once the pose of a number among some is shown, with its root."""

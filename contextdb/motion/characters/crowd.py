@@ -135,7 +135,7 @@ class Crowd(Sequence[Character]):
         steps = []
         for i, (character, (x, z), body) in enumerate(zip(self, wanted.tolist(), bodies, strict=True)):
             heading = None if headings is None else float(headings[i])
-            steps.append(character.step_of(dt, (x, z), given[i], heading, body))
+            steps.append(character._step_of(dt, (x, z), given[i], heading, body))
         group = ControllerGroup(character.controller for character in self)
         queries, paths = self._queries(dt, group, steps, bodies, wanted, headings)
         valid = self._valid(steps)
@@ -147,7 +147,7 @@ class Crowd(Sequence[Character]):
             group.restore(before)
             raise
         together = enumerate(zip(self, steps, decisions, roots, strict=True))
-        return [each.shown(step, paths, decision, poses, i, root) for i, (each, step, decision, root) in together]
+        return [each._shown(step, paths, decision, poses, i, root) for i, (each, step, decision, root) in together]
 
     def _shown(
         self, dt: float, decisions: list[Decision], places: Floats
@@ -177,7 +177,7 @@ class Crowd(Sequence[Character]):
             if stream is None:
                 continue
             for other, numbers in found:
-                if stream.pipeline.is_like(other.pipeline):
+                if stream.is_like(other):
                     numbers.append(i)
                     break
             else:
@@ -194,12 +194,12 @@ class Crowd(Sequence[Character]):
         features = np.asarray(group.poses(dt))
         for i, character in enumerate(self):
             if character.pose is not None or character.playing is None:
-                features[i] = character.features(dt, steps[i].body)
+                features[i] = character._features(dt, steps[i].body)
         halflife_s = float(bodies.velocity_halflives_s.max())
         reach = ahead_s(schema, min(map(math.hypot, *sticks.T.tolist())), halflife_s)
         steered = steered_paths([bodies], sticks, facing, reach_s=reach, rate=schema.rate)
         if back_s(schema):
-            paths = [each.wished(step, steered[i]) for i, (each, step) in enumerate(zip(self, steps, strict=True))]
+            paths = [each._wished(step, steered[i]) for i, (each, step) in enumerate(zip(self, steps, strict=True))]
             return np.array([with_path(schema, own, path) for own, path in zip(features, paths, strict=True)]), paths
         wished = _paths_from(np.array([step.place for step in steps]), steered)
         return with_paths(schema, features, wished).astype(np.float64), wished

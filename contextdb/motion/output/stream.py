@@ -76,8 +76,8 @@ class PoseStream:
 
     def __init__(self, bank: PoseBank | Mapping[str, PoseBank], settings: PoseSettings = DEFAULT_SETTINGS) -> None:
         require_kind(settings, PoseSettings, "settings", "PoseSettings")
-        self.pipeline = Pipeline(bank, settings)
-        self._rows, self._at = self.pipeline.begun(), 0
+        self._pipeline = Pipeline(bank, settings)
+        self._rows, self._at = self._pipeline.begun(), 0
         self._state: PoseState | None = None
 
     def __repr__(self) -> str:
@@ -86,17 +86,23 @@ class PoseStream:
     @property
     def settings(self) -> PoseSettings:
         """The settings, as given."""
-        return self.pipeline.settings
+        return self._pipeline.settings
 
     @property
     def banks(self) -> PoseBank | Mapping[str, PoseBank]:
         """The pose bank, or those of the databases by their names."""
-        return self.pipeline.only or self.pipeline.banks
+        return self._pipeline.only or self._pipeline.banks
 
     @property
     def rig(self) -> PoseBank:
         """A bank of the rig that the poses are of, such as for `write_poses`."""
-        return self.pipeline.rig
+        return self._pipeline.rig
+
+    def is_like(self, other: PoseStream) -> bool:
+        """Whether another stream has the same banks and settings, so that a `PoseStreams` takes both.
+        Raises ContextError for no stream."""
+        require_kind(other, PoseStream, "other", "a PoseStream")
+        return self._pipeline.is_like(other._pipeline)
 
     @property
     def state(self) -> PoseState:
@@ -112,16 +118,16 @@ class PoseStream:
         Raises ContextError for what is no state, or one of another rig or other settings.
         """
         require_kind(state, PoseState, "state", "a PoseState, what `state` gives")
-        if state.settings != self.settings or state.n_joints != self.rig.n_joints or len(state.row) != self.pipeline.width:
+        if state.settings != self.settings or state.n_joints != self.rig.n_joints or len(state.row) != self._pipeline.width:
             raise ContextError(OTHER_STATE)
         self._rows, self._at, self._state = Rows(state.row[None], [state.playing]), 0, state
 
     @property
-    def place(self) -> tuple[Rows, int]:
+    def _place(self) -> tuple[Rows, int]:
         """The rows that the stream is among, and its own."""
         return self._rows, self._at
 
-    def go_on(self, rows: Rows, at: int) -> None:
+    def _go_on(self, rows: Rows, at: int) -> None:
         """Go on from one of some rows, of a stream with the same banks and settings."""
         self._rows, self._at, self._state = rows, at, None
 
@@ -159,8 +165,8 @@ class PoseStream:
         place = checked_place(body, self.settings)
         places = None if place is None else np.array([place])
         grounds = None if ground is None else [ground]
-        rows, poses = self.pipeline.update(self._rows.row(self._at), [decision], dt, places, grounds)
-        self.go_on(rows, 0)
+        rows, poses = self._pipeline.update(self._rows.row(self._at), [decision], dt, places, grounds)
+        self._go_on(rows, 0)
         return poses[0]
 
 

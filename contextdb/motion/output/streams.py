@@ -49,8 +49,8 @@ class PoseStreams(Sequence[PoseStream]):
             raise MotionError(Fault("there is no stream.", "at least one"))
         if len(set(map(id, self._streams))) < len(self._streams):
             raise MotionError(Fault("the same stream is there twice.", "one of its own for each, such as copy.copy(stream)"))
-        self._pipeline = self._streams[0].pipeline
-        if not all(stream.pipeline.is_like(self._pipeline) for stream in self._streams):
+        self._pipeline = self._streams[0]._pipeline
+        if not all(stream.is_like(self._streams[0]) for stream in self._streams):
             raise MotionError(Fault("the streams have different banks or settings.", "streams of the same banks and settings"))
 
     @overload
@@ -131,11 +131,11 @@ class PoseStreams(Sequence[PoseStream]):
     def go_on(self, rows: Rows) -> None:
         """Go on from some rows, one for each."""
         for i, stream in enumerate(self._streams):
-            stream.go_on(rows, i)
+            stream._go_on(rows, i)
 
     def _rows(self) -> Rows:
         """The rows of all: as the last update left them, unless a stream was elsewhere meanwhile."""
-        each = [stream.place for stream in self._streams]
+        each = [stream._place for stream in self._streams]
         first = each[0][0]
         if len(first) == len(each) and all(rows is first and at == i for i, (rows, at) in enumerate(each)):
             return first

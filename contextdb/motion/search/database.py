@@ -26,7 +26,15 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from contextdb.cells.arguments import require_kind, require_many, require_mapping, require_number, require_text, require_whole
+from contextdb.cells.arguments import (
+    require_kind,
+    require_many,
+    require_mapping,
+    require_number,
+    require_real,
+    require_text,
+    require_whole,
+)
 from contextdb.errors import Fault, MotionError, QueryError, in_quotes, nearest, plural, some
 from contextdb.motion import arguments
 from contextdb.motion.arguments import Currents, Flags, Valid, ValidForMany, ValidRanges
@@ -370,7 +378,8 @@ class MotionDatabase(Searched):
         return candidates.of(self, self._searcher.normalised(query), chosen, k, left_out)
 
     def channel_costs(self, frame: Hit | int, query: ArrayLike) -> dict[str, float]:
-        """What each channel adds to the cost of one frame. Their sum, in order, is the frame's cost without its biases."""
+        """What each channel adds to the cost of one frame. Their sum, in order, is the frame's cost without its
+        biases. Raises QueryError for a frame that is in no range, or a query that does not fit."""
         frames = np.array([self._number(frame)])
         found = cost.channel_costs(self.layout, frames, self._searcher.normalised(query), self.slices, self.cost_weights)
         return dict(zip(self.channel_names, found[:, 0].tolist(), strict=True))
@@ -401,17 +410,21 @@ class MotionDatabase(Searched):
         return {}
 
     def normalised(self, query: ArrayLike) -> Floats:
-        """A query [F] in the schema's units, checked, as costs are computed with it: float64."""
+        """A query [F] in the schema's units, checked, as costs are computed with it: float64. Raises QueryError for another."""
         return self._searcher.normalised(query)
 
     def time_s(self, hit: Hit) -> float:
-        """Seconds from the start of the hit's range to its frame."""
+        """Seconds from the start of the hit's range to its frame. Raises QueryError for a hit of nothing, and for a database of
+        arrays."""
+        require_kind(hit, Hit, "hit", "a Hit of this database")
         if self.schema is None or not hit:
             raise QueryError(Fault("there is no time to return.", "a hit of this database, built from clips"))
         return (hit.frame - int(self.starts[hit.range])) / self.schema.rate
 
     def frame_at(self, range_number: int, time_s: float) -> int:
-        """The frame of a range that is nearest to a time since the range's start, inside the range."""
+        """The frame of a range that is nearest to a time since the range's start, inside the range. Raises QueryError where there
+        is no such range, or no time, and for a database of arrays."""
+        range_number, time_s = require_whole(range_number, "range_number"), require_real(time_s, "time_s")
         if self.schema is None or not 0 <= range_number < len(self.assets) or not math.isfinite(time_s):
             found = f"there is no frame at {time_s!r} s of range {range_number}."
             raise QueryError(Fault(found, "a range of this database, built from clips, and seconds"))
@@ -419,13 +432,13 @@ class MotionDatabase(Searched):
         return min(max(start, start + round(time_s * self.schema.rate)), stop - 1)
 
     def range_of(self, frame: int) -> int:
-        """The range that holds a frame, or -1 for a frame between ranges."""
+        """The range that holds a frame, or -1 for a frame between ranges. Raises ContextError for no whole number."""
         return self.layout.range_of(require_whole(frame, "frame"))
 
     def with_weights(self, weights: Mapping[str, float]) -> MotionDatabase:
         """The same database with some channels weighed otherwise; nothing is rebuilt, the features are shared.
 
-        Costs stay on their scale: see `cost_weights`.
+        Costs stay on their scale: see `cost_weights`. Raises MotionError for a channel that there is not, or a weight below 0.
         """
         changed = self.weights.copy()
         for name, weight in require_mapping(weights, "weights", "a mapping of channels to weights").items():
@@ -450,11 +463,13 @@ class MotionDatabase(Searched):
         return f"<MotionDatabase: {', '.join(sizes)}>"
 
     def filter(self, valid: Valid | None = None, **options: Unpack[SearchOptions]) -> Filter:
-        """What a search with these arguments may choose from, and what it adds to each frame's cost; see `search`."""
+        """What a search with these arguments may choose from, and what it adds to each frame's cost; see `search`, and what
+        that raises."""
         return self._filters.make(valid, **options)
 
     def ranges_of(self, valid: Valid | None) -> Flags:
-        """Which ranges a search may choose from that is given nothing else: bool [R]."""
+        """Which ranges a search may choose from that is given nothing else: bool [R]. Raises QueryError for an answer that does
+        not fit."""
         return self._filters.ranges_of(valid)
 
     def valid_of_each(self, valid: ValidForMany | None, n: int) -> list[ValidRanges]:

@@ -127,6 +127,7 @@ class Controller:
         """What plays in some seconds if it plays on: the pose that the query of the next update is to be made of.
 
         A query with the pose of the last update lags behind, and the frame that it fits best is always one that steps back.
+        Raises QueryError for what is no time.
         """
         ongoing = self._ongoing(_seconds(dt_s))
         return None if ongoing is None else ongoing.playing
@@ -210,14 +211,14 @@ class Controller:
             `body` is none.
         """
         asked = Asked(valid, tags, None, bias, among, None, penalties)
-        asking = self.ask(dt_s, self.checked(query), asked, context, force, interrupt, place_of(body))
+        asking = self._ask(dt_s, self._checked(query), asked, context, force, interrupt, place_of(body))
         if asking.wanted is None:
-            return self.answer(asking)
-        began_s = self.now_s()
+            return self._answer(asking)
+        began_s = self._now_s()
         choice = self.selector.search(asking.query, **asking.wanted.options())
-        return self.answer(asking, choice, (self.now_s() - began_s) * 1e6)
+        return self._answer(asking, choice, (self._now_s() - began_s) * 1e6)
 
-    def ask(
+    def _ask(
         self,
         dt_s: float,
         query: Floats,
@@ -227,7 +228,7 @@ class Controller:
         interrupt: bool,
         body: GroundPlace | None = None,
     ) -> Asking:
-        """The first half of an update, of a `checked` query: move what plays on, say what is to be searched. Changes nothing."""
+        """The first half of an update, of a checked query: move what plays on, say what is to be searched. Changes nothing."""
         dt_s = _seconds(dt_s)
         step = Step.of(self.selector, self.settings, self._state, dt_s, query, asked, self._ongoing(dt_s))
         cause = step.trigger(force, interrupt)
@@ -238,7 +239,7 @@ class Controller:
         wanted = None if cause is None else step.wanted(cause)
         return Asking(step, cause, wanted, context, force, interrupt, body, held)
 
-    def answer(self, asking: Asking, choice: Choice | None = None, search_us: float = 0.0) -> Decision:
+    def _answer(self, asking: Asking, choice: Choice | None = None, search_us: float = 0.0) -> Decision:
         """The second half: decide by what the selector chose, None where nothing was to be searched."""
         decision = self._decided(asking, choice, search_us if self._clock else None)
         if self.recorder is not None:
@@ -247,7 +248,7 @@ class Controller:
         self._moved, self._head = None, None if asking.step.ongoing is None else asking.step.ongoing.head
         return decision
 
-    def now_s(self) -> float:
+    def _now_s(self) -> float:
         """What the clock says; 0 without one."""
         return self._clock() if self._clock else 0.0
 
@@ -337,11 +338,16 @@ class Controller:
         is_new = outcome.action in (Action.START, Action.JUMP)
         return wanted if is_new else eased(self._state.play_rate, wanted, step.dt_s)
 
-    def checked(self, query: ArrayLike) -> Floats:
+    def _checked(self, query: ArrayLike) -> Floats:
         """The query as float64 [F], checked as long as any database is there to say how long it must be."""
         for database in self.selector.databases.values():
             return arguments.query_of(query, database.feature_names)
         return arguments.numbers_of(query, "the query")
+
+
+def halves_of(controller: Controller) -> tuple[Callable[..., Asking], Callable[..., Decision]]:
+    """The two halves of an update, for a search between them that is not the selector's."""
+    return controller._ask, controller._answer
 
 
 def _filters_in(tags: Mapping[str, Tags]) -> dict[str, TagFilter]:

@@ -186,12 +186,12 @@ class ControllerGroup(Sequence[Controller]):
         for i, (controller, query, own_tags, own_bias, own_among, own_penalties, *others) in enumerate(each):
             try:
                 asked = nothing or Asked(masks[controller.selector][i], own_tags, None, own_bias, own_among, None, own_penalties)
-                own_query = query if are_checked else controller.checked(query)
-                asking.append(controller.ask(dt_s, own_query, asked, *others))
+                own_query = query if are_checked else controller._checked(query)
+                asking.append(controller._ask(dt_s, own_query, asked, *others))
             except QueryError as error:
                 raise QueryError(*(fault.at(Place(f"character {i}")) for fault in error.faults)) from None
         answers = self._searched(asking)
-        return [controller.answer(*given) for controller, given in zip(self, answers, strict=True)]
+        return [controller._answer(*given) for controller, given in zip(self, answers, strict=True)]
 
     def _have_width(self, n_features: int) -> bool:
         """Whether queries of so many features fit all databases."""
@@ -206,12 +206,12 @@ class ControllerGroup(Sequence[Controller]):
             if asking[i].wanted is not None:
                 of_selector.setdefault(controller.selector, []).append(i)
         for selector, numbers in of_selector.items():
-            began_s = self[numbers[0]].now_s()
+            began_s = self[numbers[0]]._now_s()
             wanted = [asking[i].wanted for i in numbers]
             choices = selector.search_each(
                 np.array([asking[i].query for i in numbers]), [each for each in wanted if each is not None]
             )
-            each_us = (self[numbers[0]].now_s() - began_s) * 1e6 / len(numbers)
+            each_us = (self[numbers[0]]._now_s() - began_s) * 1e6 / len(numbers)
             for i, choice in zip(numbers, choices, strict=True):
                 found[i] = asking[i], choice, each_us
         return found

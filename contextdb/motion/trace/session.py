@@ -29,9 +29,20 @@ from itertools import islice
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Unpack, overload
 
-from contextdb.cells.arguments import require_kind, require_mapping, require_path, require_place, require_text
+from contextdb.cells.arguments import require_kind, require_many, require_mapping, require_path, require_place, require_text
 from contextdb.disk import read_bytes, write_atomic
-from contextdb.errors import ArtefactError, ContextDBError, Fault, MotionError, Place, in_quotes, plural
+from contextdb.errors import (
+    ArtefactError,
+    ContextDBError,
+    ContextError,
+    Fault,
+    MotionError,
+    Place,
+    in_quotes,
+    nearest,
+    plural,
+    some,
+)
 from contextdb.files.parquet_frame import MAGIC, UNSEALED, DamagedFrame, Frame, require_whole, sealed
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.decision import Decision, Playing
@@ -152,15 +163,21 @@ class Trace(Sequence[Decision]):
             yield self._decision_of({**row, "query": None, "candidates": [], FILTERS: [], INPUTS: None}, place)
 
     def columns(self, names: Sequence[str]) -> pl.DataFrame:
-        """Some columns of all rows, as the file has them."""
+        """Some columns of all rows, as the file has them. Raises ContextError for one that there is not, with the nearest."""
         import polars as pl
 
         own = frame_of_rows([{**dict.fromkeys(columns()), **row} for row in map(_unpacked, self._rows)])
         frames = [own] if self._loaded is None else [self._loaded, own]
+        names = [require_text(name, "one of names") for name in require_many(names, "names", "a list of names")]
+        for name in names:
+            if name not in frames[0].columns:
+                near, found = nearest(name, frames[0].columns), f"a session has no column {in_quotes(name)}."
+                raise ContextError(Fault(found, some(frames[0].columns), in_quotes(near) if near else ""))
         return pl.concat([frame.select(names) for frame in frames])
 
     def events(self, index: int) -> Events:
-        """What the markup says of the frames that a decision mentions, by (database, frame), as far as it says anything."""
+        """What the markup says of the frames that a decision mentions, by (database, frame), as far as it says anything. Raises
+        NoSuchPlace where there is no such decision."""
         place = self._place(index)
         told = events_in(self._row(place))
         for name, found in self._decision(place).candidates:
@@ -241,7 +258,7 @@ class Trace(Sequence[Decision]):
         write_atomic(require_path(path), self.to_bytes(timings=timings))
 
     def to_bytes(self, *, timings: bool = True) -> bytes:
-        """The bytes of the file that `save` writes."""
+        """The bytes of the file that `save` writes. Never fails."""
         import polars as pl
 
         frames = [] if self._loaded is None else [self._loaded]
@@ -271,7 +288,7 @@ class Trace(Sequence[Decision]):
 
     @classmethod
     def from_bytes(cls, raw: bytes, file: str = "") -> Trace:
-        """Read the bytes of a saved session; `file` is its name in messages."""
+        """Read the bytes of a saved session; `file` is its name in messages. Raises what `load` raises."""
         require_kind(raw, bytes, "raw", "the bytes of a saved session")
         trace = cls()
         trace._loaded, trace.about, trace.n_candidates = _read(raw, file)

@@ -23,7 +23,7 @@ from contextdb.motion.arguments import Flags, ValidRanges
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.search.filters import Filter
 from contextdb.motion.selection.asked import Asked
-from contextdb.motion.selection.controller import Controller
+from contextdb.motion.selection.controller import Controller, halves_of
 from contextdb.motion.selection.decision import Decision, Playing
 from contextdb.motion.selection.inputs import Inputs
 from contextdb.motion.selection.selector import Entry, Selector
@@ -181,9 +181,10 @@ class _Runner:
         if self.given is None or self.given[0] is not inputs or self.asked.tables:
             self.given = inputs, self._asked(recorded, inputs)
         query = self._query(recorded, inputs.dt_s, at)
-        asking = controller.ask(inputs.dt_s, query, self.given[1], recorded.context, inputs.force, inputs.interrupt)
+        ask, answer = halves_of(controller)
+        asking = ask(inputs.dt_s, query, self.given[1], recorded.context, inputs.force, inputs.interrupt)
         choice = None if asking.wanted is None else controller.selector.search(asking.query, **asking.wanted.options())
-        return controller.answer(asking, choice)
+        return answer(asking, choice)
 
     def _asked(self, recorded: Decision, inputs: Inputs) -> Asked:
         """What an update is given but its query."""

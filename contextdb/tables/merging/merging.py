@@ -18,7 +18,7 @@ from contextdb.cells.outputs import Output
 from contextdb.columns import TextColumn
 from contextdb.schema.jobs import JOB_KEYS, JOBS
 from contextdb.schema.sections import job_faults
-from contextdb.schema.settings import Schema, TableSettings
+from contextdb.schema.settings import Schema, TableSettings, settings_renamed, with_outputs
 from contextdb.tables.changes import CameFrom, Edit
 from contextdb.tables.data import AnyTable, TableData
 from contextdb.tables.merging.alignment import align
@@ -113,7 +113,11 @@ def _settings(
 ) -> TableSettings:
     """The settings of ours, with what only theirs changed where that goes together, under the names of the merge."""
     was, mine, yours = (
-        vars(table.settings.renamed({table.columns[at].name: name for at, name in zip(places, names, strict=True) if at >= 0}.get))
+        vars(
+            settings_renamed(
+                table.settings, {table.columns[at].name: name for at, name in zip(places, names, strict=True) if at >= 0}.get
+            )
+        )
         for table, places in ((base, fields.base), (ours, fields.ours), (theirs, fields.theirs))
     )
     is_same = yours["outputs"] == was["outputs"]
@@ -124,7 +128,7 @@ def _settings(
     for tried in (wanted, *({key: value} for key, value in wanted.items())):  # all at once, else what can be
         if not any(job_faults(now := replace(said, **tried), names, schema)):
             said = now
-    return said.with_outputs(said.outputs)
+    return with_outputs(said, said.outputs)
 
 
 def _merged_types(was: tuple[Output, ...], ours: tuple[Output, ...], theirs: tuple[Output, ...]) -> tuple[Output, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from contextdb.files.texts import is_parquet, texts_of, written_over
-from contextdb.schema.settings import EMPTY, Schema, TableSettings
+from contextdb.schema.settings import EMPTY, Schema, TableSettings, settings_renamed
 from contextdb.tables.data import AnyTable
 from contextdb.tables.merging.merging import Merge
 
@@ -23,7 +23,7 @@ def table_of(
         The bytes are not a table.
     """
     source, columns = texts_of(raw, file, is_parquet(raw))
-    settings = (settings or TableSettings(Path(file).stem)).renamed({c.name: c.name for c in columns}.get)
+    settings = settings_renamed(settings or TableSettings(Path(file).stem), {c.name: c.name for c in columns}.get)
     return kind.build(settings.name, columns, schema, settings, Path(file), source)
 
 

@@ -24,7 +24,7 @@ from contextdb.errors import Fault, Place, TableError, in_quotes
 from contextdb.schema.settings import Schema, TableSettings
 from contextdb.tables.compiling import compile_table
 from contextdb.tables.condition_column import ConditionColumn
-from contextdb.tables.data import TableData
+from contextdb.tables.data import TableData, picking_of
 from contextdb.tables.nesting.expansion import NO_ROWS, Expansion, expand
 from contextdb.tables.nesting.flat_columns import FlatColumn
 from contextdb.tables.nesting.flat_outputs import declared_of, flat_outputs
@@ -47,7 +47,7 @@ class FlatTable(TableData):
     """Rows that are not enabled whatever their tables say, as bits."""
 
     @cached_property
-    def ways(self) -> Ways:
+    def _ways(self) -> Ways:
         """The way of each row, as a compiled table keeps it."""
         made_of = self.expansion
         layers = tuple(column.layers if isinstance(column, FlatColumn) else None for column in self.conditions)
@@ -100,7 +100,7 @@ def _way_table(name: str, table: TableData) -> WayTable:
     file = str(table.path) if table.path else None
     settings = table.settings
     weights = table.row_weights
-    return WayTable(name, file, settings.policy, table.priorities, weights, None, table, settings.when, table.picking)
+    return WayTable(name, file, settings.policy, table.priorities, weights, None, table, settings.when, picking_of(table))
 
 
 def flatten(table: TableData, tables: Mapping[str, TableData]) -> FlatTable:

@@ -8,6 +8,7 @@ from contextdb.cells.outputs import Output
 from contextdb.columns import TextColumn
 from contextdb.compiled.outputs import NO_OUTPUTS, Outputs, cells_of, outputs_of_cells
 from contextdb.errors import Fault, Place, TableError, in_quotes
+from contextdb.tables.data import output_columns_of
 from contextdb.tables.nesting.expansion import Expansion
 from contextdb.tables.output_columns import layered
 
@@ -42,7 +43,7 @@ def flat_outputs(expansion: Expansion, slots: Mapping[str, TextColumn]) -> Outpu
         if output.name in slots:
             cells.append(cells_of(output, list(slots[output.name].texts), slots[output.name].codes))
             continue
-        named = [(n, c) for n, t in enumerate(expansion.tables) for c in t.output_columns if c.output.name == output.name]
+        named = [(n, c) for n, t in enumerate(expansion.tables) for c in output_columns_of(t) if c.output.name == output.name]
         cells.append(cells_of(output, *layered(named, expansion.numbers, expansion.rows, output.nothing)))
     return outputs_of_cells(declared, cells, dict(expansion.tables[0].settings.fallback_outputs))
 

@@ -15,6 +15,7 @@ from contextdb.cells.words import quoted, slot_words
 from contextdb.columns import TextColumn
 from contextdb.expressions import Expression
 from contextdb.expressions.rules import WhenColumn
+from contextdb.schema.settings import derivation_of
 from contextdb.tables.condition_column import ConditionColumn
 from contextdb.tables.data import TableData
 from contextdb.tables.nesting.expansion import Expansion
@@ -70,7 +71,7 @@ def _ruled(table: TableData, rule: Expression | None) -> set[str]:
     """The roles of the facts that a rule names, and of those that they are computed from."""
     if rule is None:
         return set()
-    derivation = table.schema.derivation_of(rule.names)
+    derivation = derivation_of(table.schema, rule.names)
     conditions = (*rule.conditions, *(derivation.conditions if derivation is not None else ()))
     return {c.role for c in conditions if c.role}
 

@@ -17,8 +17,9 @@ from contextdb.disk import read_bytes
 from contextdb.errors import ContextDBError, Fault, FileError, Place, SchemaError, TableError, plural
 from contextdb.files.texts import texts_of
 from contextdb.schema.settings import EMPTY, Schema, read_schema
+from contextdb.tables.data import require_readable
 from contextdb.tables.nesting.links import reached
-from contextdb.tables.project import SCHEMA_FILE, ByName, Project, around_each_other, settings_of, twice_named
+from contextdb.tables.project import SCHEMA_FILE, ByName, Project, around_each_other, require_all_sound, settings_of, twice_named
 from contextdb.tables.table import Table
 from contextdb.tables.watching.sharing import table_like
 from contextdb.tables.watching.stamps import Digests, digests_of
@@ -39,9 +40,9 @@ class Snapshot(Unchanging, ByName[CompiledTable]):
     """Every table compiled, by name."""
     changed: tuple[str, ...]
     """The tables that are new or differ from the version before, in a table inside them too."""
-    digests: Digests
+    _digests: Digests
     """Of each file, as it was read."""
-    alone: Mapping[str, Table]
+    _alone: Mapping[str, Table]
     """The tables as their files have them, knowing nothing of each other."""
 
     def __repr__(self) -> str:
@@ -71,13 +72,13 @@ def schema_from(folder: Path, contents: Contents, last: Snapshot | None) -> Sche
     path = folder / SCHEMA_FILE
     raw = contents.get(path)
     if raw is None:
-        if last is not None and path in last.digests:
+        if last is not None and path in last._digests:
             gone = "the file is gone; the tables stay as they were."
             raise FileError(Fault(gone, mend="to put it back", place=Place(str(path)), rule="no-such-path"))
         if path.exists():
             read_bytes(path)
         return EMPTY
-    if last is not None and digests_of({path: raw})[path] == last.digests.get(path):
+    if last is not None and digests_of({path: raw})[path] == last._digests.get(path):
         return last.project.schema
     return read_schema(_decoded(raw, path), str(path))
 
@@ -102,8 +103,8 @@ def next_snapshot(folder: Path, schema: Schema, found: Found, contents: Contents
     if faults:
         raise TableError(*faults)
     project = Project(folder, schema, around_each_other(tables, last.project.tables if last else {}))
-    project.require_sound()
-    before = last.alone if last else {}
+    require_all_sound(project)
+    before = last._alone if last else {}
     changed = tuple(n for n, t in tables.items() if any(before.get(m) is not inner for m, inner in reached(t, tables).items()))
     older = last.tables if last else {}
     compiled = {n: older[n] if last and n not in changed else _compiled(t, older.get(n)) for n, t in project.tables.items()}
@@ -112,16 +113,16 @@ def next_snapshot(folder: Path, schema: Schema, found: Found, contents: Contents
 
 def _table(path: Path, folder: Path, schema: Schema, contents: Contents, digests: Digests, last: Snapshot | None) -> Table:
     settings = settings_of(path, folder, schema)
-    old = last.alone.get(settings.name) if last else None
+    old = last._alone.get(settings.name) if last else None
     if path not in contents:
         read_bytes(path)  # raises FileError, which says why it cannot be read
         raise FileError(Fault("the file came while the folder was read.", mend="to save it again", place=Place(str(path))))
-    is_same = old is not None and old.path == path and last is not None and digests[path] == last.digests.get(path)
+    is_same = old is not None and old.path == path and last is not None and digests[path] == last._digests.get(path)
     if is_same and old is not None and old.schema is schema:
         return old
     source, columns = (old.source, old.columns) if is_same and old and old.source else texts_of(contents[path], str(path))
     table = table_like(old, columns, schema, settings, path, source)
-    table.require_readable()
+    require_readable(table)
     return table
 
 

@@ -78,7 +78,7 @@ def watch(
         require_number(poll_s, "poll_s")
     watch = Watch(folder_of(require_path(path)), on_change, on_error, require_number(settle_s, "settle_s"), clock)
     if poll_s is not None:
-        watch.start(poll_s)
+        watch._start(poll_s)
     return watch
 
 
@@ -148,7 +148,7 @@ class Watch(ByName[CompiledTable]):
                 return False  # written while it was read: the next look sees that it moved
             return self._is_new(stamps, digests_of(contents), now) and self._take(contents)
 
-    def start(self, poll_s: float) -> None:
+    def _start(self, poll_s: float) -> None:
         """Have a thread poll until the watch is closed. What a callback raises goes to `threading.excepthook`."""
         self._thread = threading.Thread(target=self._run, args=(poll_s,), name="contextdb.watch", daemon=True)
         self._thread.start()
@@ -207,7 +207,7 @@ class Watch(ByName[CompiledTable]):
                 self._schema = schema  # these files have to rest too
                 return False
             self._tried, self._schema = self._digests, schema
-            new = last if self._digests == last.digests else next_snapshot(self.folder, schema, tables, contents, last)
+            new = last if self._digests == last._digests else next_snapshot(self.folder, schema, tables, contents, last)
         except ContextDBError as error:
             self._tried = self._digests
             self._refuse(error)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 import weakref
+from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 
@@ -102,9 +103,10 @@ class Link:
 
         Parameters
         ----------
-        what : CompiledTable, LiveContext, Controller, Character, Watch or mapping of CompiledTable
+        what : CompiledTable, LiveContext, Controller, Character, Watch or mapping of CompiledTable, or a sequence of them
             A folder that is watched for changes, `cdb.watch(folder)`, stays watched when its tables are exchanged. Tables, live
-            contexts and controllers that the game lets go are watched no more.
+            contexts and controllers that the game lets go are watched no more. Of a sequence, such as a Crowd or ControllerGroup,
+            those that are in it now are watched, as "WHO 0", "WHO 1" and so on where `who` is a name.
         who : str or function, optional
             The character that asks; a function gives it, and is called in each question. Who watches again, renames.
 
@@ -113,6 +115,10 @@ class Link:
         ContextError
             It is none of these, another link watches it, or the link is closed.
         """
+        if isinstance(what, Sequence) and not isinstance(what, str):
+            for i, each in enumerate(what):
+                self.watch(each, f"{who} {i}" if isinstance(who, str) else who)
+            return
         if self._is_closed:
             raise ContextError(Fault("the link is closed.", "an open link"))
         with self._publisher.lock:

@@ -277,7 +277,7 @@ class Taps:
             self._put(what, who, lambda: ControllerTap(what, self.ring, who))
         else:
             found = f"a link cannot watch what is of type {type(what).__name__}."
-            accepted = "a compiled table, a live context, a controller, a character, or cdb.watch(folder)"
+            accepted = "a compiled table, a live context, a controller, a character, a crowd of them, or cdb.watch(folder)"
             mend = "to compile it first" if hasattr(what, "compile") else ""
             raise ContextError(Fault(found, accepted, mend))
 

@@ -1,5 +1,4 @@
-"""Unreal DataTables, as CSV and as JSON: the row names are the assets; a field that is a set is (A,B) there and A B here, as are tags.
-
+"""Unreal DataTables, as CSV and as JSON: the row names are the assets; a set, (A,B) there, is A B here, and so are gameplay tags.
 
 Unreal's CSV begins with a header whose first name is "---" or empty; its JSON is a list of objects with a "Name". A name of a
 column there is a C++ identifier, so a dot becomes two underscores and back.

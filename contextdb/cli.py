@@ -160,6 +160,11 @@ def _main(given: Sequence[str]) -> int:
         drop_output()
         place = Place(str(error.filename)) if error.filename else Place("standard output")
         return _failed(Fault(f"{error.strerror or error}.", place=place))
+    except UnicodeEncodeError as error:
+        if error.encoding != sys.getfilesystemencoding() or error.encoding == "utf-8":
+            raise
+        found = f"files are named in {error.encoding} here, which has no {in_quotes(error.object[error.start : error.end])}."
+        return _failed(Fault(found, "an environment in UTF-8", "to set PYTHONUTF8=1", Place(error.object)))
     except KeyboardInterrupt:
         print("contextdb: interrupted", file=sys.stderr)
         return ExitCode.INTERRUPTED

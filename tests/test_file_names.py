@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
+import sys
 import unicodedata
 from pathlib import Path
 
@@ -189,3 +191,18 @@ def test_a_name_is_spelled_as_it_stands_there(wanted, present):
     found = spelled(wanted, present)
     assert (found in present and composed(found) == composed(wanted)) if found is not None else wanted not in present
     assert found == wanted or wanted not in present
+
+
+@pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="files are named in UTF-8 whatever the environment says")
+def test_a_name_that_the_environment_cannot_write_is_an_error_and_no_traceback(tmp_path: Path):
+    (tmp_path / "contextdb.toml").write_text('[tables.trains]\nfile = "züge/trains.csv"\n', encoding="utf-8")
+    (tmp_path / "züge").mkdir()
+    (tmp_path / "züge/trains.csv").write_bytes(RAW)
+    plain = {**os.environ, "LC_ALL": "C", "PYTHONUTF8": "0"}
+    done = subprocess.run(
+        [sys.executable, "-m", "contextdb", "check", "."], cwd=tmp_path, env=plain, capture_output=True, encoding="utf-8"
+    )
+    assert done.returncode == 2
+    assert done.stderr.startswith("contextdb: ")
+    assert 'files are named in ascii here, which has no "ü". Accepted: an environment in UTF-8.' in done.stderr
+    assert done.stderr.endswith("Try to set PYTHONUTF8=1.\n")

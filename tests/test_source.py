@@ -252,6 +252,7 @@ def test_a_cell_that_quotes_a_conflict_is_text():
     ("text", "kind"),
     [
         ('{"a": 1,\n "b": [2, 3]}\n', "JSON"),
+        ("<!DOCTYPE html>\n<html>\n<p>Sign in</p>\n</html>\n", "HTML or XML"),
         ("<!DOCTYPE html>\n<html>a,b\n", "HTML or XML"),
         ('<?xml version="1.0"?>\n<a>1,2</a>\n', "HTML or XML"),
     ],

@@ -6,7 +6,7 @@ import codecs
 
 from contextdb.errors import Fault, Place, TableError, in_quotes, nearest
 from contextdb.exchange.reading import Remark
-from contextdb.files.strangers import line_of
+from contextdb.files.strangers import line_of, other_kind
 
 BOMS = (
     (codecs.BOM_UTF8, "utf-8", "UTF-8 with a byte order mark"),
@@ -39,13 +39,18 @@ def decoded(raw: bytes, file: str, encoding: str | None = None) -> tuple[str, li
     if found := _utf16(raw):
         return _decoded_as(raw, file, found), [Remark("the text is UTF-16 without a byte order mark.")]
     if b"\0" in raw:
-        raise TableError(
-            Fault("not a text file: it contains NUL bytes.", "a text file", place=Place(file, line_of(raw, raw.find(0))))
-        )
+        fault = Fault("not a text file: it contains NUL bytes.", "a text file", place=Place(line=line_of(raw, raw.find(0))))
+        raise _refusal(other_kind(raw) or fault, file)
     try:
         return raw.decode(), []
     except UnicodeDecodeError as error:
+        if other := other_kind(raw):
+            raise _refusal(other, file) from None
         return _old_windows(raw, file, error)
+
+
+def _refusal(fault: Fault, file: str) -> TableError:
+    return TableError(fault.at(Place(file, fault.place.line)))
 
 
 def _old_windows(raw: bytes, file: str, error: UnicodeDecodeError) -> tuple[str, list[Remark]]:

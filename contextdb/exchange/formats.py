@@ -10,7 +10,7 @@ from contextdb.columns import TextColumn
 from contextdb.errors import Fault, FileError, Place, TableError, in_quotes, nearest
 from contextdb.exchange.formulas import Formulas
 from contextdb.exchange.reading import Reading, Remark
-from contextdb.files.strangers import seems_to_be
+from contextdb.files.strangers import page, pointer, seems_to_be
 from contextdb.tables.table import Table
 
 
@@ -115,6 +115,8 @@ def read(raw: bytes, name: str, options: ReadOptions = ReadOptions()) -> Reading
         It is of no known format.
     """
     kind = format_of(name, options.format, raw)
+    if fault := pointer(raw) or (page(raw) if kind.name in ("csv", "tsv", "unreal-csv") else None):
+        raise TableError(fault.at(Place(name)))
     reading = _read(kind.name, raw, name, options)
     if kind.name in _GRIDS:
         from contextdb.exchange.grid import doubts

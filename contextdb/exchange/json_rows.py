@@ -19,6 +19,8 @@ from contextdb.files.csv_source import name_faults
 from contextdb.files.toml_text import what
 
 _ACCEPTED = 'a list of objects, [{"Asset Name": "jog", "speed": "2..4"}], or one object a line'
+_TAG = "TagName"
+"""The only key of a tag in a list of Unreal's: [{"TagName": "Move.Run"}] says what ["Move.Run"] says."""
 MOST_FAULTS = 20
 MOST_LEVELS = 16
 """How deep objects may be in a row: each makes the name of a column longer."""
@@ -154,6 +156,8 @@ def _flat(row: Mapping[str, Any], place: Place, prefix: str = "", level: int = 1
 
 
 def _text(value: object, name: str, place: Place) -> str:
+    if isinstance(value, list) and all(isinstance(item, dict) and [*item] == [_TAG] for item in value):
+        value = [item[_TAG] for item in value]
     if isinstance(value, list) and any(isinstance(item, (list, dict)) for item in value):
         found = f"{in_quotes(name)} holds a list with lists or objects in it."
         raise TableError(Fault(found, "texts, numbers, true, false, null, and lists of texts", place=place))

@@ -1,4 +1,4 @@
-"""Unreal DataTables, as CSV and as JSON: the row names are the assets, a field that is a set is (A,B) there and A B here.
+"""Unreal DataTables, as CSV and as JSON: the row names are the assets; a set, (A,B) there, is A B here, and so are gameplay tags.
 
 Unreal's CSV begins with a header whose first name is "---" or empty; its JSON is a list of objects with a "Name". A name of a
 column there is a C++ identifier, so a dot becomes two underscores and back.
@@ -29,6 +29,8 @@ CSV_NAMES = ("---", "")
 JSON_NAME = "Name"
 _SET = re.compile(r'\(\s*(?:"(?:[^"\\]|\\.)*"|[\w.:/\-]+)(?:\s*,\s*(?:"(?:[^"\\]|\\.)*"|[\w.:/\-]+))*\s*\)')
 _ITEM = re.compile(r'"((?:[^"\\]|\\.)*)"|([\w.:/\-]+)')
+_TAG = r'\(\s*TagName\s*=\s*"([^"\\]*)"\s*\)'
+_TAGS = re.compile(rf"\(\s*GameplayTags\s*=\s*(?:\(\s*(?:{_TAG}(?:\s*,\s*{_TAG})*\s*)?\)\s*)?\)|{_TAG}")
 _STRUCT = re.compile(r"\(\s*\w+\s*=")
 _LOCALISED = ("NSLOCTEXT(", "INVTEXT(", "LOCTEXT(")
 _STRING = re.compile(r'"((?:[^"\\]|\\.)*)("?)', re.DOTALL)
@@ -57,7 +59,7 @@ def _from_unreal(reading: Reading, kind: str) -> Reading:
         texts, lost = _cells(column)
         name = column.name.replace("__", ".")
         columns.append(TextColumn.of(name, (texts[code] for code in column.codes.tolist())))
-        are_sets = np.array([_is_set(text) for text in column.texts], np.bool_)[column.codes]
+        are_sets = np.array([_is_set(text) or _are_tags(text) for text in column.texts], np.bool_)[column.codes]
         sets[name] = are_sets | reading.sets.get(column.name, False)
         remarks += lost
     return replace(reading, columns=tuple(columns), format=kind, remarks=(*reading.remarks, *remarks), sets=sets)
@@ -68,7 +70,9 @@ def _cells(column: TextColumn) -> tuple[list[str], tuple[Remark, ...]]:
     texts = [_cell(text) for text in column.texts]
     place = f"column {in_quotes(column.name)}"
     lost = [
-        Remark(f"{in_quotes(text)} is a struct; it is kept as text.", place, is_loss=True) for text in texts if _STRUCT.match(text)
+        Remark(f"{in_quotes(text)} is a struct; it is kept as text.", place, is_loss=True)
+        for text in column.texts
+        if _STRUCT.match(text) and not _are_tags(text)
     ]
     return texts, capped(lost, "structs")
 
@@ -78,9 +82,16 @@ def _cell(text: str) -> str:
         return said
     if text == "()":
         return ""
+    if _are_tags(text):
+        return " ".join(quoted(tag) for tag in re.findall(_TAG, text) if tag)
     if _is_set(text):
         return " ".join(quoted(bare or inner.replace('\\"', '"')) for inner, bare in _ITEM.findall(text))
     return text
+
+
+def _are_tags(text: str) -> bool:
+    """Whether a text is a tag or a container of tags, the structs that Unreal writes as (GameplayTags=((TagName="Move.Run")))."""
+    return _TAGS.fullmatch(text.strip()) is not None
 
 
 def _is_set(text: str) -> bool:

@@ -17,7 +17,7 @@ from contextdb.columns import TextColumn
 from contextdb.errors import Fault, Place, TableError, in_quotes
 from contextdb.files.csv_faults import record_faults
 from contextdb.files.csv_records import CR, LF, Positions, Records, fields_of, find_records, line_ends, text_of
-from contextdb.files.strangers import UTF8_BOM, line_of, require_text, seems_markup
+from contextdb.files.strangers import UTF8_BOM, line_of, require_text, seems_json
 
 MOST_NAME_FAULTS = 20
 FEW_TEXTS = 8
@@ -114,8 +114,7 @@ def find_rows(raw: bytes, file: str) -> tuple[Records, list[str]]:
         place = Place(file, line_of(raw, int(records.starts[0])))
         faults = [fault.at(place) for fault in name_faults(names)] + faults
     if faults:
-        kind = seems_markup(raw)
-        hint = [Fault(f"not a CSV file: looks like {kind}.", "CSV text in UTF-8", place=Place(file))] if kind else []
+        hint = [Fault("not a CSV file: looks like JSON.", "CSV text in UTF-8", place=Place(file))] if seems_json(raw) else []
         raise TableError(*hint, *faults)
     return records, names
 

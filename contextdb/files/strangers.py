@@ -23,8 +23,10 @@ _SIGNATURES = (
     (b"\xd0\xcf\x11\xe0", "an old Excel workbook (.xls)"),
     (b"SQLite format 3", "an SQLite database"),
 )
+_UTF32 = b"\xff\xfe\0\0"
 _UTF16 = (b"\xff\xfe", b"\xfe\xff")
-_MARKUP = re.compile(rb"\s*(?:(<!doctype|<html|<\?xml)|[{\[]\s*[\"{\[\]}])", re.IGNORECASE)
+_PAGE = re.compile(rb"(?:\xef\xbb\xbf)?\s*<(?:!doctype\b|html\b|\?xml\b)", re.IGNORECASE)
+_JSON = re.compile(rb"\s*[{\[]\s*[\"{\[\]}]")
 _LINE = re.compile(rb"[^\r\n]+")
 _LFS = b"version https://git-lfs.github.com/spec/"
 _DELIMITERS = ((b";", "semicolon"), (b"\t", "tab"), (b"|", "vertical bar"))
@@ -45,12 +47,27 @@ def seems_to_be(raw: bytes) -> str | None:
     return next((name for mark, name in _SIGNATURES if raw.startswith(mark)), None)
 
 
-def seems_markup(raw: bytes) -> str | None:
-    """HTML, XML or JSON by its first characters; a CSV may begin so too, so ask only when the rest is at fault."""
-    found = _MARKUP.match(raw[:200])
-    if not found:
+def seems_json(raw: bytes) -> bool:
+    """Whether the first characters are those of JSON; a CSV may begin so too, so ask only when the rest is at fault."""
+    return _JSON.match(raw[:200]) is not None
+
+
+def other_kind(raw: bytes) -> Fault | None:
+    """Why bytes that are not UTF-8 text are no text in another encoding either; None when they could be."""
+    kind = seems_to_be(raw)
+    return Fault(f"not a text file: looks like {kind}.", "CSV text in UTF-8", _way_out(kind)) if kind else None
+
+
+def pointer(raw: bytes) -> Fault | None:
+    """Why a file is not itself here, but the few lines that Git LFS keeps in its place."""
+    if not raw.startswith(_LFS):
         return None
-    return "HTML or XML" if found[1] else "JSON"
+    return Fault("this is a Git LFS pointer, not the table itself.", "the table", 'to run "git lfs pull"')
+
+
+def page(raw: bytes) -> Fault | None:
+    """Why a text is no table but HTML or XML, such as the page that a server sent instead of a file."""
+    return Fault("not a CSV file: looks like HTML or XML.", "CSV text in UTF-8") if _PAGE.match(raw[:200]) else None
 
 
 def require_text(raw: bytes, file: str) -> None:
@@ -59,9 +76,9 @@ def require_text(raw: bytes, file: str) -> None:
     Raises
     ------
     TableError
-        Empty, binary, in another encoding, a Git LFS pointer, or with another delimiter.
+        Empty, binary, in another encoding, a Git LFS pointer, HTML or XML, or with another delimiter.
     """
-    fault = _empty(raw) or _binary(raw) or _not_utf8(raw) or _pointer(raw) or _delimited_otherwise(raw)
+    fault = _empty(raw) or _binary(raw) or _not_utf8(raw) or pointer(raw) or page(raw) or _delimited_otherwise(raw)
     if fault:
         raise TableError(fault.at(Place(file, fault.place.line)))
 
@@ -85,12 +102,12 @@ def _binary(raw: bytes) -> Fault | None:
     nul = raw.find(b"\0")
     is_utf16 = raw.startswith(_UTF16) or (nul >= 0 and _looks_utf16(raw))
     if is_utf16:
-        return Fault("the file is UTF-16 text.", "UTF-8, with or without BOM", _SAVE_AS_UTF8)
+        named = "UTF-32" if raw.startswith(_UTF32) else "UTF-16"
+        return Fault(f"the file is {named} text.", "UTF-8, with or without BOM", _SAVE_AS_UTF8)
     if nul < 0:
         return None
-    kind = seems_to_be(raw)
-    if kind:
-        return Fault(f"not a text file: looks like {kind}.", "CSV text in UTF-8", _way_out(kind))
+    if fault := other_kind(raw):
+        return fault
     found = f"not a text file: it contains {plural(raw.count(0), 'NUL byte')}, the first on this line."
     return Fault(found, "CSV text in UTF-8", place=Place(line=line_of(raw, nul)))
 
@@ -113,21 +130,14 @@ def _not_utf8(raw: bytes) -> Fault | None:
     try:
         raw.decode()
     except UnicodeDecodeError as error:
-        kind = seems_to_be(raw)
-        if kind:
-            return Fault(f"not a text file: looks like {kind}.", "CSV text in UTF-8", _way_out(kind))
+        if fault := other_kind(raw):
+            return fault
         byte = raw[error.start : error.start + 1]
         read = byte.decode("cp1252", "ignore")
         hint = f" (in Windows-1252 it would be {in_quotes(read)})" if read else ""
         found = f"byte 0x{byte[0]:02X} on this line is not UTF-8{hint}."
         return Fault(found, "UTF-8, with or without BOM", _SAVE_AS_UTF8, Place(line=line_of(raw, error.start)))
     return None
-
-
-def _pointer(raw: bytes) -> Fault | None:
-    if not raw.startswith(_LFS):
-        return None
-    return Fault("this is a Git LFS pointer, not the table itself.", "the table", 'to run "git lfs pull"')
 
 
 def _delimited_otherwise(raw: bytes) -> Fault | None:

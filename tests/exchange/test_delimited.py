@@ -128,6 +128,20 @@ def test_an_empty_file_is_said_to_be_empty(raw: bytes):
     assert "there is nothing to read" in refused(raw)
 
 
+@pytest.mark.parametrize(
+    ("raw", "name", "said"),
+    [
+        (b"\x1f\x8b\x08xxxxxxxxxx", "x.csv", "not a text file: looks like a gzip archive."),
+        (b"PK\x03\x04\x14\0\x08\0", "x.tsv", "not a text file: looks like a ZIP archive."),
+        (b"version https://git-lfs.github.com/spec/v1\noid sha256:ab\nsize 12\n", "x.csv", "this is a Git LFS pointer"),
+        (b"version https://git-lfs.github.com/spec/v1\noid sha256:ab\nsize 12\n", "x.xlsx", "this is a Git LFS pointer"),
+        (b"\xef\xbb\xbf<!DOCTYPE html>\n<html>\n<p>Sign in</p>\n</html>\n", "x.csv", "looks like HTML or XML."),
+    ],
+)
+def test_a_file_of_another_kind_is_named_and_never_read_as_rows(raw: bytes, name: str, said: str):
+    assert said in refused(raw, name)
+
+
 def test_columns_without_a_name_and_names_that_stand_twice_are_refused():
     assert 'column B has no name; it holds "2".' in refused(b"a;;c\n1;2;3\n")
     assert 'the column name "a" appears twice' in refused(b"a;b;a\n1;2;3\n")

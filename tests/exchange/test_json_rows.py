@@ -90,6 +90,25 @@ def test_an_unreal_table_keeps_structs_as_text_and_says_so():
     assert texts(read(json.dumps(rows).encode(), "x.json", ReadOptions("unreal-json")))["on"] == ["True"]
 
 
+def test_tags_of_unreal_are_names_in_json_and_in_structs():
+    tags = [{"TagName": "Tool.Pan"}, {"TagName": "Tool.Lid"}]
+    rows = [{"Name": "cut", "on": {"GameplayTags": tags}}, {"Name": "chop", "on": {"GameplayTags": []}}]
+    for form in ("json", "unreal-json"):
+        reading = read(json.dumps(rows).encode(), "x.json", ReadOptions(form))
+        assert texts(reading)["on.GameplayTags"] == ["Tool.Pan Tool.Lid", ""]
+    structs = [
+        '(GameplayTags=((TagName="Tool.Pan"),(TagName="Tool.Lid")))',
+        '(TagName="Tool.Pan")',
+        "(GameplayTags=())",
+        "(GameplayTags=)",
+    ]
+    rows = [{"Name": f"r{at}", "on": text} for at, text in enumerate(structs)]
+    reading = read(json.dumps(rows).encode(), "x.json", ReadOptions("unreal-json"))
+    assert texts(reading)["on"] == ["Tool.Pan Tool.Lid", "Tool.Pan", "", ""]
+    assert reading.sets["on"].all()
+    assert not any("struct" in str(remark) for remark in reading.remarks)
+
+
 def test_unreal_wants_each_asset_once():
     table = Table.from_columns({"Asset": ["jog", "jog"], "speed": ["5", "6"]})
     with pytest.raises(TableError, match='row 2, column "Asset": the asset "jog" is also in row 1'):

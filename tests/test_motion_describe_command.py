@@ -7,6 +7,7 @@ import os
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from running import Result, run
 
@@ -123,6 +124,15 @@ def test_clips_in_metres_are_taken_for_such(game: Path):
     assert "a unit of 1 m (metres) is taken" in result.err
     speeds = {clip["asset"]: clip["facts"]["speed_mps"]["middle"] for clip in result.json["clips"]}
     assert speeds["walk"] == pytest.approx(1.3, abs=0.02)
+
+
+def test_bodies_that_lie_are_told_with_the_axis_that_may_point_up(game: Path):
+    clip = make_clip("walk").clip
+    around = np.roll(clip.values[:, :3], 1, axis=1)  # z up: x, y, z of the clip become y, z, x
+    skeleton = replace(clip.skeleton, offsets=np.roll(clip.skeleton.offsets, 1, axis=1))
+    write_bvh(replace(clip, skeleton=skeleton, values=np.hstack((around, 0.0 * clip.values[:, 3:]))), game / "clips" / "walk.bvh")
+    assert "walk: the body lies: it reaches" in describe("game/clips").err
+    assert 'Try up = "z"' in describe("game/clips").err
 
 
 @pytest.mark.parametrize(

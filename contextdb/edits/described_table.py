@@ -23,6 +23,7 @@ from contextdb.files.file_names import require_new_table_name
 from contextdb.files.texts import new_source
 from contextdb.files.toml_text import Path as KeyPath
 from contextdb.motion.clips.clip import Up
+from contextdb.motion.clips.doubts import doubts_of, grouped
 from contextdb.motion.preparing.cells_of_clips import CONDITIONS, OUTPUTS
 from contextdb.motion.preparing.describing import (
     Described,
@@ -148,7 +149,7 @@ def rows_for(
     notes: list[str] = []
     with progress("reading clips") as tell:
         found = clips_of(folder, metres_per_unit, up, tell, lambda all_of: _playing_alone(all_of, into, notes))
-    found.notes += notes
+    found.notes += [*notes, *grouped(doubts_of(found.clips), len(found.clips))]
     if not found.clips:
         raise ContextDBError(*(Fault(message) for message in found.left_out))
     joint = {} if found.config.databases else joint_clips(found.clips)

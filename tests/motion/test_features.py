@@ -302,6 +302,14 @@ def test_features_do_not_depend_on_where_the_clip_begins_and_where_it_faces(degr
     assert np.allclose(features_of(moved(clip, degrees, x, z), LOCO), features_of(clip, LOCO), atol=2e-5)
 
 
+def test_no_feature_looks_across_a_moment_at_which_the_body_is_put_elsewhere():
+    walk = make_clip("walk").clip
+    first = np.zeros_like(walk.values[:1])  # a pose of reference, 20 m behind the walk
+    first[0, 2] = walk.values[0, 2] - 20.0 / walk.metres_per_unit
+    clip = Clip(walk.name, walk.skeleton, walk.frame_time_s, np.concatenate((first, walk.values)), walk.metres_per_unit)
+    np.testing.assert_allclose(features_of(clip, LOCO)[1:], features_of(walk, LOCO), atol=1e-5)
+
+
 def test_a_turning_trajectory_bends_to_its_side():
     left, right = (features_of(make_clip(f"walk_turn_{side}_90").clip, LOCO) for side in ("left", "right"))
     at_1s = LOCO.feature_names.index("trajectory position at 1 s left")

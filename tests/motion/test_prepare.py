@@ -130,15 +130,24 @@ def test_a_frame_that_jumps_is_excluded():
     values = np.array(CLIPS["walk"].values)
     values[60, 1] += 80.0
     (each,) = of("noise", motion.prepare([replace(CLIPS["walk"], values=values)]))
-    assert (each.tag, each.from_s, each.to_s) == (ReservedTag.EXCLUDED, 2.0, 2.0)
+    assert (each.tag, each.from_s, each.to_s) == (ReservedTag.EXCLUDED, 1.967, 2.033)  # its neighbours are at 1.9667 and 2.0333
     assert each.measure == pytest.approx(0.8 * 30.0, rel=0.1)
+
+
+def test_a_frame_that_jumps_is_excluded_with_all_that_it_is_a_part_of_at_another_rate():
+    values = np.array(CLIPS["walk"].values)
+    values[60, 1] += 80.0
+    (each,) = of("noise", motion.prepare([replace(CLIPS["walk"], values=values, frame_time_s=1.0 / 24.0)]))
+    at = np.arange(200) / 30.0
+    touched = at[(at > 59.0 / 24.0) & (at < 61.0 / 24.0)]
+    assert each.from_s <= touched[0] <= touched[-1] <= each.to_s
 
 
 def test_another_pose_at_the_start_is_cut_off():
     values = np.array(CLIPS["walk"].values)
     values[:3, 0] += 300.0
     (each,) = of("noise", motion.prepare([replace(CLIPS["walk"], values=values)]))
-    assert (each.from_s, each.to_s) == (None, pytest.approx(2 * FRAME_S, abs=1e-3))
+    assert (each.from_s, each.to_s) == (None, pytest.approx(3 * FRAME_S - 1e-3, abs=1e-3))
 
 
 def test_a_turn_in_a_straight_clip_plays_as_a_whole():

@@ -21,6 +21,7 @@ from contextdb.motion import (
 from contextdb.motion.clips.mirror import mirrored
 from contextdb.motion.clips.poses import Poses
 from contextdb.motion.clips.quaternions import about_axis, rotate
+from contextdb.motion.clips.trajectory import Trajectory, unbroken
 from contextdb.motion.made.recipes import RAMP_S
 from contextdb.motion.made.steps import about_turn, timeline
 
@@ -121,3 +122,20 @@ def test_without_the_key_the_path_is_that_of_the_hips():
     poses = swaying("walk")
     plain = replace(SMOOTH, root_smooth_s=0.0).path_of(poses)
     np.testing.assert_array_equal(plain.positions, root_trajectory(poses).positions)
+
+
+def test_a_first_frame_that_stands_elsewhere_does_not_bend_the_path_behind_it():
+    poses = swaying("walk")
+    elsewhere = replace(
+        poses,
+        positions=np.concatenate((poses.positions[:1] - [0.0, 0.0, 20.0], poses.positions)),
+        rotations=np.concatenate((poses.rotations[:1], poses.rotations)),
+    )
+    path, alone = SMOOTH.path_of(elsewhere), SMOOTH.path_of(poses)
+    np.testing.assert_allclose(path.positions[1:], alone.positions, atol=1e-9)
+    np.testing.assert_allclose(path.headings[1:], alone.headings, atol=1e-9)
+
+
+def test_a_body_that_is_fast_all_the_time_has_one_path():
+    ride = Trajectory(30.0, np.column_stack((np.zeros(30), np.arange(30.0) ** 1.3)), np.zeros(30))
+    assert unbroken(ride) == [slice(0, 30)]

@@ -24,10 +24,10 @@ from contextdb.motion.clips.feet import footfalls_of
 from contextdb.motion.clips.poses import LocalPoses, forward_kinematics, local_poses, poses_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Skeleton
+from contextdb.motion.clips.trajectory import FASTEST_MPS
 
 LEAST_BODY_M, MOST_BODY_M = 0.3, 3.0
 USUAL_BODY_M = 1.7
-FASTEST_MPS = 15.0
 LEAST_RATE, MOST_RATE = 10.0, 240.0
 FEWEST_FRAMES = 3
 """Two frames give one velocity, one frame none."""

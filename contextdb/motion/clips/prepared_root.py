@@ -12,6 +12,8 @@ Source: the README of Motion-Matching-Prep; the parabola is a Savitzky-Golay fil
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from contextdb.errors import MotionError
@@ -19,7 +21,7 @@ from contextdb.motion.clips.foot_bones import FootBones
 from contextdb.motion.clips.poses import Poses
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Skeleton, sided_pairs
-from contextdb.motion.clips.trajectory import Trajectory, ahead_of, heading_vectors, headings_of, rates_of_change
+from contextdb.motion.clips.trajectory import Trajectory, ahead_of, heading_vectors, headings_of, rates_of_change, unbroken
 
 FULL_MPS = 0.5
 """A body that goes no slower than this is smoothed in full."""
@@ -50,6 +52,17 @@ def prepared_path(poses: Poses, path: Trajectory, smooth_s: float, feet: FootBon
     is_facing_given : bool
         The path's headings stay those of the bones that were said, and are not taken from the chest too.
     """
+    parts = []
+    for own in unbroken(path):
+        part = replace(poses, positions=poses.positions[own], rotations=poses.rotations[own])
+        hips = Trajectory(path.rate, path.positions[own], path.headings[own])
+        parts.append(_prepared(part, hips, smooth_s, feet, is_facing_given))
+    positions, headings = (np.concatenate([getattr(part, name) for part in parts]) for name in ("positions", "headings"))
+    return Trajectory(path.rate, positions, np.unwrap(headings), path.now)
+
+
+def _prepared(poses: Poses, path: Trajectory, smooth_s: float, feet: FootBones, is_facing_given: bool) -> Trajectory:
+    """The path of a body that is nowhere put elsewhere."""
     if len(path.headings) < FEWEST_FRAMES:
         return path
     widest = max(NARROWEST, smooth_s * path.rate)
@@ -61,7 +74,7 @@ def prepared_path(poses: Poses, path: Trajectory, smooth_s: float, feet: FootBon
     bends = shares * np.clip(2.0 * turns - 1.0, 0.0, 1.0)
     positions += bends[:, None] * (_along(positions, even[:, 2], path.rate, CYCLE * widest) - positions)
     smooth = _fitted(np.column_stack((positions, headings)), np.maximum(widest * shares, NARROWEST), PARABOLA)
-    return Trajectory(path.rate, smooth[:, :2], smooth[:, 2], path.now)
+    return Trajectory(path.rate, smooth[:, :2], smooth[:, 2])
 
 
 def _body_headings(poses: Poses, of_hips: Floats) -> Floats:

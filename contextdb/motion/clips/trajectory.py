@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -23,6 +24,11 @@ MOST_SMOOTH_S = MOST_REACH_S = 3600.0
 """An hour: more is a slip."""
 STANDING_MPS = 0.05
 """Slower than this at its end, a path is taken to end there; faster, to go straight on."""
+FASTEST_MPS = 15.0
+"""A body does not go faster."""
+JUMP_RATIO = 4.0
+NEAR_STEPS = 3
+"""Where it does, and more so many times faster than it mostly goes so many frames before and behind, it is put elsewhere."""
 LEAST_DEVIATION = 0.1
 """In frames: under a narrower Gaussian the neighbours' weight is lost in rounding."""
 
@@ -202,6 +208,17 @@ def rates_of_change(values: Floats, rate: float) -> Floats:
     if len(values) < 2:
         return np.zeros_like(values)
     return np.asarray(np.gradient(values, 1.0 / rate, axis=0))
+
+
+def unbroken(path: Trajectory) -> list[slice]:
+    """The frames of each part of a path, in order: between two parts the body is put elsewhere, as behind a pose of reference."""
+    speeds = np.linalg.norm(np.diff(path.positions, axis=0), axis=-1) * path.rate
+    cuts = [0]
+    for step in np.flatnonzero(speeds > FASTEST_MPS).tolist():
+        near = speeds[max(0, step - NEAR_STEPS) : step + NEAR_STEPS + 1]
+        if speeds[step] > JUMP_RATIO * np.median(near):
+            cuts.append(step + 1)
+    return [slice(*ends) for ends in pairwise([*cuts, len(path.positions)])]
 
 
 def _at_frames(path: Trajectory, frames: Floats) -> PathPoints:

@@ -6,7 +6,7 @@ F frames at the schema's rate, N features, in the schema's units (m, m/s, rad/s,
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,7 @@ from contextdb.motion.clips.many_paths import ManyTrajectories
 from contextdb.motion.clips.poses import Poses, poses_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints, Skeleton
-from contextdb.motion.clips.trajectory import Trajectory, after_seconds, along_path, rates_of_change, to_own_frame
+from contextdb.motion.clips.trajectory import Trajectory, after_seconds, along_path, rates_of_change, to_own_frame, unbroken
 from contextdb.motion.features.channels import DEFAULT_AXIS, Channel
 from contextdb.motion.features.path_features import point_features, write_paths
 from contextdb.motion.features.schema import CustomFunction, FeatureSchema
@@ -109,7 +109,7 @@ def clip_permutations(
         poses, own = three_rounds(poses, path)
         path = schema.path_of(poses)
     blocks = {
-        channel.name: _channel_features(channel, poses, path, schema, clip.name, marks)[own]
+        channel.name: _unbroken_features(channel, poses, path, schema, clip.name, marks)[own]
         for channel in schema.channels
         if not channel.varies
     }
@@ -117,7 +117,7 @@ def clip_permutations(
     for ahead_s in schema.permutation_s:
         for channel in schema.channels:
             if channel.varies:
-                blocks[channel.name] = _channel_features(channel, poses, path, schema, clip.name, marks, ahead_s)[own]
+                blocks[channel.name] = _unbroken_features(channel, poses, path, schema, clip.name, marks, ahead_s)[own]
         features = np.concatenate([blocks[channel.name] for channel in schema.channels], axis=1).astype(np.float32)
         found.append(ClipFeatures(clip.name, mirrored, features, root))
     return found
@@ -193,6 +193,21 @@ def with_path(schema: FeatureSchema, query: Features | Floats, wanted: Trajector
     changed = np.array(query, np.float32)
     write_paths(schema, changed[None], ManyTrajectories(wanted.rate, wanted.positions[None], wanted.headings[None], wanted.now))
     return changed
+
+
+def _unbroken_features(
+    channel: Channel, poses: Poses, path: Trajectory, schema: FeatureSchema, clip: str, marks: ContactMarks, ahead_s: float = 0.0
+) -> Floats:
+    """A channel's features of every frame; none of a bone or the path looks across a moment at which the body is put elsewhere."""
+    parts = unbroken(path)
+    if len(parts) == 1 or channel.type in ("phase", "custom"):
+        return _channel_features(channel, poses, path, schema, clip, marks, ahead_s)
+    found = []
+    for own in parts:
+        part = replace(poses, positions=poses.positions[own], rotations=poses.rotations[own])
+        way = Trajectory(path.rate, path.positions[own], path.headings[own])
+        found.append(_channel_features(channel, part, way, schema, clip, marks, ahead_s))
+    return np.concatenate(found)
 
 
 def _channel_features(

@@ -140,6 +140,8 @@ class Look:
     def said(self, kind: Kind, tag: str | None, first: int | None, last: int | None, reason: str, measure: float) -> Proposal:
         """A proposal about frames from `first` to `last`."""
         begin, end = span_of_frames(first, last, self.rate)
+        if tag == ReservedTag.EXCLUDED:
+            begin, end = span_about_frames(first, last, self.rate)
         value = None
         if tag == ReservedTag.NEXT_NATURAL_ONLY and begin is not None and end is not None:
             value = min(ENTRY_S, math.floor(100.0 * (end - begin)) / 100.0)  # no longer than the span
@@ -150,6 +152,13 @@ def span_of_frames(first: int | None, last: int | None, rate: float) -> tuple[fl
     """The seconds of a span that holds these frames and, below 1,000 frames a second, no other: rounded outwards to 0.001 s."""
     begin = None if first is None else math.floor(1000.0 * first / rate + NEAR_MS) / 1000.0
     end = None if last is None else math.ceil(1000.0 * last / rate - NEAR_MS) / 1000.0
+    return begin, end
+
+
+def span_about_frames(first: int | None, last: int | None, rate: float) -> tuple[float | None, float | None]:
+    """The seconds between the frames beside these: at another rate, all that these have a part in."""
+    begin = None if first is None else math.floor(1000.0 * (first - 1) / rate + NEAR_MS + 1.0) / 1000.0
+    end = None if last is None else math.ceil(1000.0 * (last + 1) / rate - NEAR_MS - 1.0) / 1000.0
     return begin, end
 
 

@@ -89,7 +89,8 @@ def _same(found: object, wanted: dict[str, object]) -> bool:
 @pytest.mark.parametrize("name", ["Heat (°C)", "speed"])
 def test_a_range_as_people_write_it_becomes_the_interval_that_it_means(name: str):
     found = mapped(reading(a=["x", "y"], **{name: ["20 - 60", "1.5"]}))[name]
-    assert found.cells is not None and found.cells.to_list() == ["20..60", "1.5"]
+    assert found.cells is not None
+    assert found.cells.to_list() == ["20..60", "1.5"]
     assert (found.n_unreadable, '"20 - 60" is read as 20..60' in found.why) == (0, True)
 
 

@@ -71,6 +71,7 @@ def test_rows_that_are_pasted_there_are_seen(tmp_path):
         await press(pilot, "ctrl+end", "down")
         app.main.assets.grid.paste("jog\tTrue\ndash\tFalse\nhop\tAny\n")
         await press(pilot)
+        await press(pilot)
         return screen_text(app), app.main.session.sheet.cursor[0]
 
     shown, row = with_editor(file, script)

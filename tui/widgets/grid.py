@@ -386,17 +386,9 @@ class Grid(GridView, can_focus=True):
             self._do(lambda: self.sheet.paste_below(text))
             self.goes_to_new_row = False
             self.forget_widths()
-            self._show_appended()
         else:
             self._do(lambda: self.sheet.paste(text))
             self.forget_widths()
-
-    def _show_appended(self) -> None:
-        """Scroll to the rows that were just added behind the last one: all of them, or as many as there is room for."""
-        look = self.look
-        top = min(self.sheet.selection.far[0] - max(look.n_body, 1) + 1, self.sheet.cursor[0])
-        if top > look.top:
-            self.scroll_to(look.left, top, animate=False, force=True, immediate=True)
 
     def on_paste(self, event: events.Paste) -> None:
         event.stop()

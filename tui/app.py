@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 from textual.app import SystemCommand
 from textual.binding import BindingType
+from textual.filter import LineFilter
 from textual.screen import Screen
 from textual.theme import BUILTIN_THEMES
 
@@ -17,6 +18,7 @@ from contextdb.tables.merging.conflicts import Side
 from contextdb.tables.merging.merging import Merge
 from contextdb.tables.table import Table
 from tui.commands import BY_ID, COMMANDS, bindings, key_names
+from tui.contrast import READABLE
 from tui.editor import Editor
 from tui.editor_settings import EditorSettings
 from tui.messages import GoToCell
@@ -96,6 +98,10 @@ class EditorApp(Editor):
     def theme_names() -> list[str]:
         """Every theme there is."""
         return sorted([*(theme.name for theme in THEMES), *BUILTIN_THEMES])
+
+    def get_line_filters(self) -> Sequence[LineFilter]:
+        """What is done to all that is painted: every text can be read."""
+        return [*super().get_line_filters(), READABLE]
 
     def on_mount(self) -> None:
         if self.workspace.beginning is not None:

@@ -2,15 +2,45 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable
 from functools import lru_cache
 
 from rich.color import Color
 from rich.color_triplet import ColorTriplet
+from rich.segment import Segment
 from rich.style import Style
+from textual.color import Color as Ground
+from textual.filter import LineFilter
 
 LEAST = 4.5
 """WCAG 2.1, success criterion 1.4.3, level AA."""
 _STEPS = 20
+_READ = re.compile(r"[^\s\u2500-\u259f\u2800-\u28ff]")
+"""What is read, letters, figures and signs: all but lines, blocks and dots that draw something."""
+
+
+class Readable(LineFilter):
+    """Makes all that is read readable, whichever widget paints it; frames, bars and dots stay as they are."""
+
+    def apply(self, segments: list[Segment], background: Ground) -> list[Segment]:
+        """The segments, the style of those that are read readable."""
+        return list(map(_read_well, segments))
+
+
+READABLE = Readable()
+
+
+def _read_well(segment: Segment) -> Segment:
+    text, style, control = segment
+    if style is None or not _READ.search(text):
+        return segment
+    return Segment(text, readable(style), control)
+
+
+def without(filters: Iterable[LineFilter]) -> list[LineFilter]:
+    """The filters without this one: for what lies dimmed behind a dialog."""
+    return [one for one in filters if not isinstance(one, Readable)]
 
 
 @lru_cache(maxsize=4096)

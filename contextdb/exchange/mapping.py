@@ -16,7 +16,7 @@ from contextdb.cells.kinds import KINDS
 from contextdb.columns import TextColumn
 from contextdb.edits.edits import check_cell
 from contextdb.errors import ContextDBError, Fault, in_quotes, nearest, plural, some
-from contextdb.exchange.proposals import n_unreadable, names_of, pair_in, propose_type
+from contextdb.exchange.proposals import as_numbers, n_unreadable, names_of, pair_in, propose_type, rewritten
 from contextdb.exchange.reading import Reading
 from contextdb.schema.jobs import PlainJob
 from contextdb.schema.sections import condition_to_dict
@@ -101,7 +101,7 @@ def as_condition(mapped: Mapped, column: TextColumn, name: str, schema: Schema) 
         return _as_declared(column, schema.conditions[name], "chosen", mapped.names)
     proposal = propose_type(column, mapped.names)
     declared = proposal.declared or {"type": "text"}
-    cells = mapped.names if proposal.are_names or proposal.declared is None else None
+    cells = mapped.names if proposal.declared is None else proposal.cells
     return replace(
         mapped,
         name=name,
@@ -123,7 +123,7 @@ def as_type(mapped: Mapped, column: TextColumn, kind: str) -> Mapped:
         An enum is wanted, and no cell holds a name.
     """
     declared: dict[str, object] = {"type": kind}
-    cells = mapped.names if KINDS[kind].is_named else None
+    cells = mapped.names if KINDS[kind].is_named else as_numbers(column) if KINDS[kind].is_numeric else None
     column = cells or column
     if KINDS[kind].needs_values:
         declared["values"] = names_of(column)
@@ -270,12 +270,13 @@ def _condition(column: TextColumn, name: str, reading: Reading, known: _Known) -
     why = known.noted(proposal.why)
     if proposal.declared is None:
         return Mapped(column.name, name, "output", why, near=near, names=names)
-    cells = names if proposal.are_names else None
-    return Mapped(column.name, name, "condition", why, proposal.declared, True, proposal.n_unreadable, near, names, cells)
+    return Mapped(column.name, name, "condition", why, proposal.declared, True, proposal.n_unreadable, near, names, proposal.cells)
 
 
 def _as_declared(column: TextColumn, condition: Condition, why: str, names: TextColumn | None) -> Mapped:
     cells = _fitting(column, names, condition.domain) if names and condition.domain.type.is_named else None
+    if condition.domain.type.is_numeric and (cells := as_numbers(column)) is not None:
+        why += rewritten(column, cells)
     n_wrong, example = n_unreadable(cells or column, condition.domain)
     if n_wrong:
         why = f"{why}; {plural(n_wrong, 'cell')} cannot be read as {condition.domain.kind}, such as {in_quotes(example)}"

@@ -10,6 +10,7 @@ import numpy as np
 
 from contextdb.cells.domains import ANGLE, BOOL, DATE, INT, NUMBER, TAGS, TEXT, Domain
 from contextdb.cells.grammar import parse_cell, reads
+from contextdb.cells.kinds import KINDS
 from contextdb.cells.numbers import doubtful
 from contextdb.cells.sets import Cell, TagSet, ValueSet
 from contextdb.cells.words import says_any
@@ -23,7 +24,10 @@ MOST_ENUM_VALUES = 40
 """A column with more different names than this is a text: nobody wants to keep such a list."""
 FEW_ROWS = 10
 """Of so few rows nobody can tell whether their names are all there are."""
-_ANGLE_NAME = re.compile(r"angle|direction|heading|bearing|yaw|rotation|degrees|(?:^|_)(?:dir|deg|rot)(?:_|$)", re.IGNORECASE)
+_ANGLE_NAME = re.compile(
+    r"angle|direction|facing|heading|bearing|orientation|azimuth|yaw|rotation|degrees|°(?![CF])|(?:^|_)(?:dir|deg|rot)(?:_|$)",
+    re.IGNORECASE,
+)
 _PAIR = re.compile(r"\s*[+-]?[\d.]+,\d+\s*")
 _SHORT = re.compile(r"[^\s,;!?]+(?: +[^\s,;!?]+){0,3}")
 _WHOLE = re.compile(r"\s*=?\s*[+-]?\d+\s*(?:\|\s*=?\s*[+-]?\d+\s*)*")
@@ -34,6 +38,9 @@ _MEASURE = re.compile(
     "met(?:er|re)s?|mm|mph|ms|mps|percent|pitch|radius|ratio|roll|rotation|scale|sec|seconds|share|speed|time|velocity|weight|width|yaw",
     re.IGNORECASE,
 )
+_RANGE = re.compile(r"\s*([+-]?\d+(?:\.\d+)?)(\s*)(?:[-–—]|to)\2([+-]?\d+(?:\.\d+)?)\s*")
+"""Two ends as people write them: "20 - 60", "20 to 60"; a cell of ours has ".." between them."""
+_DEGREES = re.compile(r"(?<=\d)\s*°(?!\s*[CF])")
 _FRACTION = re.compile(r"\d\.\d|(?<!\.)\.\d|\de-?\d", re.IGNORECASE)
 
 
@@ -45,8 +52,8 @@ class Proposal:
     why: str
     n_unreadable: int = 0
     """Rows whose cell cannot be read as this type."""
-    are_names: bool = False
-    """Whether each text is one whole name."""
+    cells: TextColumn | None = None
+    """The cells that the texts become, where some are written differently: each text one name, or "20 - 60" as 20..60."""
 
 
 @dataclass(frozen=True)
@@ -113,6 +120,11 @@ def propose_type(column: TextColumn, names: TextColumn | None = None) -> Proposa
     names : TextColumn, optional
         The same column with each text as one whole name: what its cells become when they are names.
     """
+    if (numbers := as_numbers(column, _is_measure(column.name))) is not None:
+        has_degrees = any(map(_DEGREES.search, column.texts))
+        proposal = propose_type(replace(numbers, name=f"{column.name} (°)") if has_degrees else numbers)
+        if proposal.declared is not None and KINDS[str(proposal.declared["type"])].is_numeric:
+            return replace(proposal, why=proposal.why + rewritten(column, numbers), cells=numbers)
     said = _Said.by(column)
     if not said.texts:
         return _with_unread("no cell says anything but Any", said, TEXT)
@@ -131,7 +143,30 @@ def propose_type(column: TextColumn, names: TextColumn | None = None) -> Proposa
     if names is None:
         return _names(said, said.mostly(TEXT))
     proposal = _names(_Said.by(names), said.are_mostly(_is_short))
-    return proposal if proposal.declared is None else replace(proposal, are_names=True)
+    return proposal if proposal.declared is None else replace(proposal, cells=names)
+
+
+def as_numbers(column: TextColumn, is_measure: bool = True) -> TextColumn | None:
+    """A column of numbers with its ranges and degrees as cells of ours: "20 - 60" as 20..60, "30°" as 30. None without any.
+
+    Parameters
+    ----------
+    is_measure : bool
+        Whether the column surely has numbers: then "20-60" without blanks is a range too, and no name.
+    """
+    plain = [_DEGREES.sub("", text) for text in column.texts]
+    found = [_RANGE.fullmatch(text) for text in plain]
+    ranges = [one for one in found if one]
+    if any(float(one[1]) > float(one[3]) or not (one[2] or is_measure) for one in ranges):
+        return None
+    texts = [f"{one[1]}..{one[3]}" if one else text for one, text in zip(found, plain, strict=True)]
+    return None if texts == list(column.texts) else TextColumn.of(column.name, (texts[code] for code in column.codes.tolist()))
+
+
+def rewritten(column: TextColumn, cells: TextColumn) -> str:
+    """What is said of a column whose texts become other cells: the first of them."""
+    row = next(row for row in range(column.n_rows) if column[row] != cells[row])
+    return f"; {in_quotes(column[row])} is read as {cells[row]}"
 
 
 def _with_unread(why: str, said: _Said, domain: Domain) -> Proposal:

@@ -58,6 +58,13 @@ def mapped(read: Reading, settings: TableSettings | None = None, **renames: str)
         ("dir_to_target", ["20, 9.99", "-20, 9"], {"type": "angle"}),
         ("Direction", ["400..500"], {"type": "number"}),
         ("x", ["170..-170", "5"], {"type": "angle"}),
+        ("Facing", ["-180 ± 30", "90 ± 20"], {"type": "angle"}),
+        ("Roll (°)", ["5", "30"], {"type": "angle"}),
+        ("Heat (°C)", ["20 - 60", "60-95", "Any"], {"type": "number"}),
+        ("x", ["20 - 60", "60 to 95"], {"type": "number"}),
+        ("x", ["30°", "-20°..20°"], {"type": "angle"}),
+        ("level", ["1-1", "1-2", "1-1"], {"type": "enum", "values": ["1-1", "1-2"]}),
+        ("Score", ["3 - 1", "1 - 1", "1 - 1"], None),
         ("heading", ["170..-170", "2026-01-02", "-30..30"], {"type": "angle"}),
         ("pos", ['"5"', "CB", "FS", "CB"], {"type": "enum", "values": ["5", "CB", "FS"]}),
         ("t", ["+InAir -Stunned", "-Move.Run"], {"type": "tags", "values": ["InAir", "Move.Run", "Stunned"]}),
@@ -77,6 +84,14 @@ def test_a_type_is_proposed_from_the_cells_and_the_name(name: str, cells: list[s
 def _same(found: object, wanted: dict[str, object]) -> bool:
     assert isinstance(found, dict)
     return found["type"] == wanted["type"] and sorted(found.get("values", ())) == sorted(wanted.get("values", ()))  # type: ignore[call-overload]
+
+
+@pytest.mark.parametrize("name", ["Heat (°C)", "speed"])
+def test_a_range_as_people_write_it_becomes_the_interval_that_it_means(name: str):
+    found = mapped(reading(a=["x", "y"], **{name: ["20 - 60", "1.5"]}))[name]
+    assert found.cells is not None
+    assert found.cells.to_list() == ["20..60", "1.5"]
+    assert (found.n_unreadable, '"20 - 60" is read as 20..60' in found.why) == (0, True)
 
 
 def test_names_that_contextdb_toml_could_not_hold_make_a_text():

@@ -71,6 +71,13 @@ def test_a_sheet_left_as_it_is_changes_nothing(table):
     assert not ColumnSheet(table).edit().changes
 
 
+def test_the_step_tells_what_was_changed_and_what_was_added(table):
+    sheet = typed(table, (1, "Most", "9"), (2, "Values", "Walk Run Crawl"))
+    at = len(sheet.first)
+    sheet = typed(table, (1, "Most", "9"), (2, "Values", "Walk Run Crawl"), (at, "Column", "new"), (at, "Type", "bool"))
+    assert sheet.edit().name == "Change 2 columns, add the column new"
+
+
 def test_types_units_bounds_and_values_of_many_columns_are_one_step(table):
     cells = [(1, "Most", "9"), (1, "Weight", "2"), (2, "Values", "Walk Run Crawl"), (3, "Unit", "m"), (3, "Least", "0")]
     sheet = typed(table, *cells)

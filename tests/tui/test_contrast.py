@@ -4,20 +4,21 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
 from terminal import press, with_editor
 
 from tui.contrast import LEAST, contrast
 
-FRAMES = " │╭╮╰╯─║▏▎▋▌▉▁▂▃▄▅▆▇█"
+FRAMES = " │╭╮╰╯─║▏▎▋▌▉▁▂▃▄▅▆▇█▐▊▕▔━┃╸╺"
 
 
-def test_every_text_of_the_main_screen_has_the_contrast_of_wcag_in_every_theme(tmp_path: Path):
-    path = tmp_path / "t.csv"
-    path.write_text("Asset,speed,hit\nwalk,0..2,True\nrun,2..6,Any\njump,Any,False\nbad,5; 9,False\n")
-
-    def faint(app) -> set[tuple[str, str]]:
-        found = set()
-        for segment in (segment for strip in app.screen._compositor.render_strips() for segment in strip):
+def faint(app) -> set[tuple[str, str]]:
+    """Texts without the contrast, with their theme; of a dialog those in its box, for what is behind it is dimmed on purpose."""
+    box = app.screen.query("#dialog")
+    region = box.first().region if box else app.screen.region
+    found = set()
+    for strip in app.screen._compositor.render_strips()[region.y : region.bottom]:
+        for segment in strip.crop(region.x, region.right):
             style = segment.style
             if not segment.text.strip(FRAMES) or style is None or style.color is None or style.bgcolor is None:
                 continue
@@ -25,16 +26,39 @@ def test_every_text_of_the_main_screen_has_the_contrast_of_wcag_in_every_theme(t
                 continue
             if contrast(style.color.get_truecolor(), style.bgcolor.get_truecolor()) < LEAST:
                 found.add((app.theme, segment.text.strip()))
-        return found
+    return found
 
+
+async def faint_in_themes(app, pilot) -> set[tuple[str, str]]:
+    found = set()
+    for theme in app.theme_names():
+        app.theme = theme
+        await pilot.pause()
+        found |= faint(app)
+    return found
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    file = tmp_path / "t.csv"
+    file.write_text("Asset,speed,hit\nwalk,0..2,True\nrun,2..6,Any\njump,Any,False\nbad,5; 9,False\n")
+    return file
+
+
+def test_every_text_of_the_main_screen_has_the_contrast_of_wcag_in_every_theme(path):
     async def script(app, pilot):
         app.main.assets.set_context({"speed": "1"}, "")
         await press(pilot, "down", "right", "shift+down", "shift+right")
-        found = set()
-        for theme in app.theme_names():
-            app.theme = theme
-            await pilot.pause()
-            found |= faint(app)
-        return found
+        return await faint_in_themes(app, pilot)
+
+    assert with_editor(path, script) == set()
+
+
+@pytest.mark.parametrize("keys", [["alt+2"], ["alt+4"], ["alt+4", "2"], ["alt+5"], ["alt+c"], ["alt+j"], ["f1"]], ids="-".join)
+def test_every_text_of_a_tab_or_a_dialog_has_it_too(path, keys):
+    async def script(app, pilot):
+        await press(pilot, *keys)
+        await app.workers.wait_for_complete()
+        return await faint_in_themes(app, pilot)
 
     assert with_editor(path, script) == set()

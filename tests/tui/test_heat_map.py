@@ -137,10 +137,10 @@ def test_a_click_on_a_label_or_beside_the_map_changes_nothing():
 
 
 def test_columns_are_as_wide_as_their_labels_where_there_is_room():
-    wide = played(MapApp(["a"], ["0..0.9)", "0.9..1.8", "a very long label"], 14), size=(60, 5))
+    wide = played(MapApp(["a"], ["0..0.9)", "0.9..1.8", "a very long label"], 14), size=(60, 4))
     assert "0..0.9)" in wide
     assert "a very long …" in wide
-    narrow = played(MapApp(["a"], ["0..0.9)", "0.9..1.8", "a very long label"], 14), size=(24, 5))
+    narrow = played(MapApp(["a"], ["0..0.9)", "0.9..1.8", "a very long label"], 14), size=(24, 4))
     assert "a ver…" in narrow
 
 

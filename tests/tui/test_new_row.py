@@ -63,6 +63,22 @@ def test_a_paste_there_is_appended(path):
     assert cursor == (2, 0)
 
 
+def test_rows_that_are_pasted_there_are_seen(tmp_path):
+    file = tmp_path / "t.csv"
+    file.write_text("Asset,hit\n" + "".join(f"a{at},Any\n" for at in range(40)))
+
+    async def script(app, pilot):
+        await press(pilot, "ctrl+end", "down")
+        app.main.assets.grid.paste("jog\tTrue\ndash\tFalse\nhop\tAny\n")
+        await press(pilot)
+        await press(pilot)
+        return screen_text(app), app.main.session.sheet.cursor[0]
+
+    shown, row = with_editor(file, script)
+    assert all(name in shown for name in ("jog", "dash", "hop"))
+    assert row == 40
+
+
 def test_down_goes_through_it_to_the_test_row_and_up_comes_back(path):
     async def script(app, pilot):
         grid, seen = app.main.assets.grid, []

@@ -357,11 +357,17 @@ def _named(rows: Sequence[ColumnRow]) -> set[str]:
 
 def _name(rows: Sequence[ColumnRow], table: Table) -> str:
     """The name of the step."""
-    changed = [row.name for row in rows if row.before is None or dict(row.texts) != dict(row.first)]
-    names = [*changed, *({c.name for c in table.columns} - {row.before for row in rows})]
-    if not names:
-        return "Move columns"
-    return f"Change the column {shown(names[0])}" if len(names) == 1 else f"Change {plural(len(names), 'column')}"
+    done = {
+        "change": [row.name for row in rows if row.before is not None and dict(row.texts) != dict(row.first)],
+        "add": [row.name for row in rows if row.before is None],
+        "take away": sorted({c.name for c in table.columns} - {row.before for row in rows}),
+    }
+    said = [f"{verb} {_named_or_counted(names)}" for verb, names in done.items() if names]
+    return f"{said[0][:1].upper()}{said[0][1:]}{''.join(f', {one}' for one in said[1:])}" if said else "Move columns"
+
+
+def _named_or_counted(names: Sequence[str]) -> str:
+    return f"the column {shown(names[0])}" if len(names) == 1 else plural(len(names), "column")
 
 
 def _placed(fault: Fault, rows: Sequence[ColumnRow]) -> Wrong:

@@ -64,6 +64,8 @@ def _moved(text: str, domain: Domain, steps: int) -> str:
     low, high = (Decimal(-180), Decimal(180)) if domain.type.is_circular else (_bound(domain.minimum), _bound(domain.maximum))
     if low <= old <= high and not low <= new <= high:
         new = new + (360 if new < low else -360) if domain.type.is_circular else max(low, min(new, high))
+    if "." in text and not text.endswith("0"):  # no zeros are kept that nobody wrote: 1 follows 0.9, and 3.50 follows 3.40
+        new = new.normalize()
     return f"{new:f}" if -30 < new.adjusted() < 30 else str(new)
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
+from rich.cells import cell_len
 from textual.binding import Binding, BindingType
 from textual.message import Message
 
@@ -13,6 +15,7 @@ from tui.model import coverage_lines as lines
 from tui.widgets.heat_map import HeatMap, Square
 
 WIDEST = 14
+CORNER = "least covered, %"
 
 
 class PairMap(HeatMap):
@@ -94,7 +97,7 @@ class PairMap(HeatMap):
         if self.pair is None:
             names = self.pairs.conditions
             rows = [f"{at + 1} {name}" for at, name in enumerate(names)]
-            self.show(rows, [str(at + 1) for at in range(len(names))], self._overview_square, place, corner="least covered, %")
+            self.show(rows, self._numbered(rows), self._overview_square, place, WIDEST, CORNER)
             return
         one, other = self.pair
         rows = [f"{part}" for part in self.pairs.parts[one]]
@@ -102,6 +105,13 @@ class PairMap(HeatMap):
         names = self.pairs.conditions
         corner = names[one] if one == other else f"{names[one]} \\ {names[other]}"
         self.show(rows, columns, self._slice_square, place, WIDEST, corner)
+
+    def _numbered(self, rows: Sequence[str]) -> Sequence[str]:
+        """The labels of the columns of the overview: names where all have room, else their numbers."""
+        longest = max(map(cell_len, rows), default=0)
+        room = (self.scrollable_content_region.width - max(longest, cell_len(CORNER)) - 1) // max(1, len(rows))
+        has_room = longest + 2 <= min(room, WIDEST)
+        return rows if has_room else [row.split(" ")[0] for row in rows]
 
     def _overview_square(self, row: int, column: int) -> Square:
         return _square(self._worst_of(row, column))

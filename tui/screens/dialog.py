@@ -5,13 +5,17 @@ A dialog is given what it shows, and gives back what was decided, or None. It ch
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, ClassVar, Generic, TypeVar
 
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Vertical
+from textual.filter import LineFilter
 from textual.screen import ModalScreen, Screen
 from textual.widgets import Static
+
+from tui.contrast import without
 
 Answer = TypeVar("Answer")
 
@@ -58,6 +62,10 @@ class Dialog(ModalScreen[Answer | None], Generic[Answer]):
     def compose_body(self) -> ComposeResult:
         """What is in the box."""
         yield Static()
+
+    def get_line_filters(self) -> Sequence[LineFilter]:
+        """What lies behind stays dim."""
+        return without(super().get_line_filters())
 
     def action_cancel(self) -> None:
         """Leave without an answer."""

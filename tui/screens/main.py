@@ -173,7 +173,8 @@ class MainScreen(Screen[None]):
         items += [Item(tab, BY_ID[tab].label, is_on=tab == self.tab) for tab in self.tabs]
         has_tools = self.size.height >= WITH_TOOLS
         self.query_one("#tools", Bar).display = has_tools
-        items += [] if has_tools else [Item("palette", BY_ID["palette"].label)]
+        items += [] if has_tools else [Item("palette", f"^P {BY_ID['palette'].label}")]
+        self.query_one(KeyLine).leave_out(() if has_tools else ("app.command_palette",))
         table = self.session.sheet.table
         about = f"{plural(table.n_rows, 'row')} · {plural(len(table.columns), 'column')}"
         self.query_one("#tabs", Bar).show(items, about)
@@ -393,8 +394,13 @@ class MainScreen(Screen[None]):
 
     def take_import(self, answer: Import) -> None:
         """Put the rows of another file into the table, and fit the columns to them."""
-        self.apply(answer.edit, answer.notes)
+        is_short = len(answer.notes) < 2
+        self.apply(answer.edit, answer.notes if is_short else (f"{len(answer.notes)} remarks.",))
         self.assets.grid.forget_widths()
+        if not is_short:
+            from tui.screens.remarks import RemarksDialog
+
+            self.app.push_screen(RemarksDialog(answer.edit.name, answer.notes))
 
     @on(Grid.MenuWanted)
     def _menu(self, event: Grid.MenuWanted) -> None:

@@ -335,6 +335,8 @@ class GridView(ScrollView, inherit_bindings=False):
         """The cursor, where the far corner of the selection is not seen, so that a paste of many rows does not carry one away."""
         look, here = self.look, self.sheet.cursor
         columns = {*range(look.layout.n_frozen), *look.layout.visible(look.left)}
+        if column in columns and 0 < row - here[0] < look.n_body:  # all of it has room, such as rows pasted behind the last one
+            return row, column
         is_seen = look.top <= row < look.top + max(look.n_body, 1) and column in columns
         return (row, column) if is_seen else here
 

@@ -24,7 +24,11 @@ from textual.strip import Strip
 from tui.widgets.fitted import fitted
 
 ROOMY = 9
-"""Where there is room a square takes so many."""
+"""Where there is room a square takes so many cells for each line it is high."""
+TALLEST = 3
+"""A square is so many lines high at most."""
+UNDER = 3
+"""Lines for the labels of the columns, and for the legend below the squares."""
 STEPS = ("<20", "<40", "<60", "<80", "<100")
 LEGEND = (("empty", "0"), *((f"step-{at}", text) for at, text in enumerate(STEPS)), ("full", "100"))
 NARROW = 5
@@ -181,7 +185,14 @@ class HeatMap(ScrollView, can_focus=True):
         """How wide a square is: as its column's label needs, where there is room."""
         longest = max((cell_len(label) + 2 for label in self.columns), default=0)
         room = (self.scrollable_content_region.width - self.label_width) // max(1, len(self.columns))
-        return max(NARROW, min(max(longest, ROOMY), max(self._most_wide, ROOMY), room))
+        roomy = ROOMY * self.square_height
+        return max(NARROW, min(max(longest, roomy), max(self._most_wide, roomy), room))
+
+    @property
+    def square_height(self) -> int:
+        """How high a square is: as many lines as all rows have room for."""
+        room = self.scrollable_content_region.height - UNDER
+        return max(1, min(TALLEST, room // max(1, len(self.rows))))
 
     def go(self, row: int, column: int) -> None:
         """Choose a square."""
@@ -194,13 +205,14 @@ class HeatMap(ScrollView, can_focus=True):
             self.post_message(self.Moved(self, *self.place))
 
     def _resize(self) -> None:
-        self.virtual_size = Size(self.label_width + len(self.columns) * self.square_width, len(self.rows) + 1)
+        self.virtual_size = Size(self.label_width + len(self.columns) * self.square_width, len(self.rows) * self.square_height + 1)
 
     def _keep_in_sight(self) -> None:
         row, column = self.place
         region, wide = self.scrollable_content_region, self.square_width
         height, width = max(1, region.height - 1), max(wide, region.width - self.label_width)
-        y = min(max(self.scroll_offset.y, row - height + 1), row)
+        tall = self.square_height
+        y = min(max(self.scroll_offset.y, (row + 1) * tall - height), row * tall)
         x = min(max(self.scroll_offset.x, (column + 1) * wide - width), column * wide)
         if (x, y) != (self.scroll_offset.x, self.scroll_offset.y):
             self.scroll_to(x=x, y=y, animate=False, immediate=True)
@@ -213,7 +225,7 @@ class HeatMap(ScrollView, can_focus=True):
 
     def action_page(self, down: int) -> None:
         """Go as far as is seen."""
-        self.go(self.place[0] + down * max(1, self.scrollable_content_region.height - 2), self.place[1])
+        self.go(self.place[0] + down * max(1, (self.scrollable_content_region.height - 2) // self.square_height), self.place[1])
 
     def action_end_of_row(self, right: int) -> None:
         """Go to the first or last column."""
@@ -227,7 +239,7 @@ class HeatMap(ScrollView, can_focus=True):
     def on_click(self, event: events.Click) -> None:
         """Go to the square clicked; open the chosen one."""
         column = (event.x - self.label_width + self.scroll_offset.x) // self.square_width
-        row = event.y - 1 + self.scroll_offset.y
+        row = (event.y - 1 + self.scroll_offset.y) // self.square_height
         if event.y < 1 or event.x < self.label_width or row >= len(self.rows) or column >= len(self.columns):
             return
         if (row, column) == self.place:
@@ -246,15 +258,18 @@ class HeatMap(ScrollView, can_focus=True):
     def render_line(self, y: int) -> Strip:
         """One line of the screen."""
         width, base = self.scrollable_content_region.width, self.rich_style
-        row = y - 1 + self.scroll_offset.y
+        tall = self.square_height
+        row, line = divmod(y - 1 + self.scroll_offset.y, tall)
         if y > 0 and row >= len(self.rows):
-            return self._legend(width, base) if self.rows and row == len(self.rows) + 1 else Strip.blank(width, base)
-        labels = self.label_width
-        head = self._label(self.rows[row], labels, row == self.place[0]) if y else self._label(self.corner, labels, False)
+            is_legend = self.rows and row * tall + line == len(self.rows) * tall + 1
+            return self._legend(width, base) if is_legend else Strip.blank(width, base)
+        labels, is_named = self.label_width, line == tall // 2
+        name = self.corner if y == 0 else self.rows[row] if is_named else ""
+        head = self._label(name, labels, y > 0 and row == self.place[0])
         wide = self.square_width
         first = self.scroll_offset.x // wide
         last = min(len(self.columns), first + (width - labels) // wide + 2)
-        paint = self._column_label if y == 0 else self._painted
+        paint = self._column_label if y == 0 else self._painted if is_named else self._plain
         body = Strip([segment for column in range(first, last) for segment in paint(row, column, wide)])
         cut = self.scroll_offset.x - first * wide
         body = body.crop(cut, cut + max(0, width - labels))
@@ -275,6 +290,12 @@ class HeatMap(ScrollView, can_focus=True):
     def _column_label(self, row: int, column: int, wide: int) -> list[Segment]:
         kind = "heat-map--here" if column == self.place[1] else "heat-map--label"
         return [Segment(f"{fitted(self.columns[column], wide - 1, True)} ", self.get_component_rich_style(kind))]
+
+    def _plain(self, row: int, column: int, wide: int) -> list[Segment]:
+        """A line of a square above or below its number."""
+        style = self.get_component_rich_style(f"heat-map--{self._square(row, column).level}")
+        is_here = (row, column) == self.place
+        return [Segment(" " * wide, style + Style(reverse=self.has_focus) if is_here else style)]
 
     def _painted(self, row: int, column: int, wide: int) -> list[Segment]:
         square = self._square(row, column)

@@ -49,6 +49,13 @@ class KeyLine(Widget):
     def __init__(self) -> None:
         super().__init__()
         self._keys: tuple[Key, ...] = ()
+        self._left_out: tuple[str, ...] = ()
+
+    def leave_out(self, actions: tuple[str, ...]) -> None:
+        """Leave out the keys of these actions, which stand elsewhere on the screen."""
+        if actions != self._left_out:
+            self._left_out = actions
+            self._changed(self.screen)
 
     def on_mount(self) -> None:
         self.screen.bindings_updated_signal.subscribe(self, self._changed)
@@ -63,7 +70,7 @@ class KeyLine(Widget):
         seen = set()
         for active in self.screen.active_bindings.values():
             binding = active.binding
-            if binding.show and active.enabled and binding.action not in seen:
+            if binding.show and active.enabled and binding.action not in seen and binding.action not in self._left_out:
                 seen.add(binding.action)
                 yield Key(binding.key, key_name(binding.key).replace("Ctrl+", "^"), binding.description)
 

@@ -57,6 +57,7 @@ SECTIONS = {
     "Open a file of contexts": ("OpenDialog",),
     "Follow a game": ("LiveDialog",),
     "Import": ("ImportDialog", "ChoiceDialog"),
+    "Remarks of an import": ("RemarksDialog",),
     "Export": ("ExportDialog",),
     "Unsaved edits": ("LeavingDialog",),
     "The table is open elsewhere": ("HeldDialog",),

@@ -103,7 +103,7 @@ def test_bounds_and_values_come_back_from_dmn_into_the_proposed_declaration(tmp_
     plan_import(read(write(typed(), FORMATS["dmn"])[0], "t.dmn"), tmp_path / "new.csv").write()
     text = (tmp_path / "contextdb.toml").read_text(encoding="utf-8")
     assert 'hit = { type = "bool" }' in text
-    assert 'blend = { type = "number", min = 0.0, max = 1.0 }' in text
+    assert 'blend = { type = "number", min = 0, max = 1 }' in text
     assert 'kind = { type = "enum", values = ["Fire", "Half Back"] }' in text
 
 

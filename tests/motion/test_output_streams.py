@@ -43,7 +43,7 @@ def many_stairs(x, z):
 @st.composite
 def plays(draw):
     """Ticks of one character: what is decided, now and then by another one, or nothing; and where its body is."""
-    ticks = list(decisions(draw(SEGMENTS), STEP)) * 3
+    ticks = list(decisions(draw(SEGMENTS), STEP)) * 5
     cut = draw(st.integers(1, 6))
     ticks = [*ticks[:cut], *[NOTHING] * draw(st.integers(0, 1)), *ticks[cut + draw(st.integers(0, 5)) :]][:N_TICKS]
     weight, speed, turn = draw(st.sampled_from([1.0, 0.3])), draw(st.floats(0.0, 3.0)), draw(st.floats(-3.0, 3.0))

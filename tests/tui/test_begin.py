@@ -97,7 +97,7 @@ def test_a_workbook_with_a_title_over_its_columns_becomes_a_table_of_its_name(tm
         assert isinstance(app.screen, ImportDialog)
         await imported(app, pilot)
         table = app.main.session.sheet.table
-        await press(pilot, "ctrl+s")
+        await press(pilot, "escape", "ctrl+s")
         return name, app.main.table_name, [c.name for c in table.columns], table.assets
 
     name, table, columns, assets = with_editor(path, script, (100, 40))

@@ -6,6 +6,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from edit_strategies import write_schema
 from terminal import press, said, screen_text, with_editor
 
 import contextdb as cdb
@@ -223,8 +224,6 @@ def test_two_lines_stand_over_the_rows_for_no_fact_leaves_any_here(folder):
 
 
 def test_numbers_are_written_as_people_write_them(table, folder):
-    from contextdb.edits.schema_file import write_schema
-
     cells = [
         (1, "Least", "0"),
         (1, "Most", "7"),

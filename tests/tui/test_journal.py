@@ -45,8 +45,9 @@ def bytes_of(table: Table) -> bytes:
 
 
 def save(sheet: Sheet) -> None:
+    """As the session does, which has looked before at what others wrote."""
     sheet.recorder.saving(bytes_of(sheet.table))
-    sheet.saved(sheet.table.save())
+    sheet.saved(sheet.table.save(overwrite=True))
     sheet.recorder.saved(sheet.table.source.raw, sheet.history.position)
 
 

@@ -361,9 +361,11 @@ class AssetsPane(SheetView):
             self.post_message(Told(f"Copied {rows:,} × {columns:,}."))
 
     @on(Grid.PasteWanted)
-    def _paste(self, event: Grid.PasteWanted) -> None:
+    async def _paste(self, event: Grid.PasteWanted) -> None:
         event.stop()
-        self.grid.paste(self.clipboard.paste())
+        text = self.clipboard.paste()
+        await self.grid.tell_long_paste(text)
+        self.grid.paste(text)
 
     async def action_insert_copied(self) -> None:
         """Put what was copied into new rows above the cursor's."""

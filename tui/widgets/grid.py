@@ -6,6 +6,7 @@ screen to open an editor over a cell.
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
@@ -25,6 +26,9 @@ from tui.model.tab_run import TabRun
 from tui.model.views import Sort
 from tui.widgets.grid_view import GridView
 from tui.widgets.pointer import Pointer
+
+LONG_PASTE = 1_000_000
+"""A text of so many characters takes so long to paste that this is said before."""
 
 
 class Grid(GridView, can_focus=True):
@@ -390,9 +394,19 @@ class Grid(GridView, can_focus=True):
             self._do(lambda: self.sheet.paste(text))
             self.forget_widths()
 
-    def on_paste(self, event: events.Paste) -> None:
+    async def on_paste(self, event: events.Paste) -> None:
         event.stop()
+        await self.tell_long_paste(event.text)
         self.paste(event.text)
+
+    async def tell_long_paste(self, text: str) -> None:
+        """Say that a long text is pasted, and wait until that is on the screen; no key comes between."""
+        if len(text) < LONG_PASTE:
+            return
+        is_painted = asyncio.Event()
+        self.screen.post_message(Told(f"Pasting {len(text) / 1e6:,.1f} MB …"))
+        self.screen.call_later(self.screen.call_after_refresh, is_painted.set)
+        await is_painted.wait()
 
     def on_key(self, event: events.Key) -> None:
         """A character begins a cell again."""

@@ -24,8 +24,8 @@ from tui.screens.context_forms import KeepDialog, Kept
 from tui.widgets.bar import Item
 from tui.widgets.live_line import Said
 
-RATE = 30
-"""So many moments a second are shown at most."""
+RATE = 10
+"""So many moments a second are shown at most, the newest: nobody reads a table faster. All of them can be stepped through."""
 ITEMS = (
     ("live-pause", "Pause Alt+6"), ("previous-context", "◂ F7"), ("next-context", "F8 ▸"), ("live-back", "−1 s"),
     ("live-ahead", "+1 s"), ("live-keep", "Keep Alt+7"), ("live", "Who Alt+U"), ("live-stop", "Stop"),

@@ -92,7 +92,7 @@ def query_of(query: object, names: Sequence[str]) -> Floats:
 
 def refuse_infinite(values: Floats, told: Floats, names: Sequence[str]) -> None:
     """Refuse a query whose `values` are not all finite as float32; the message shows what was given, `told`."""
-    if values.dot(values) < SURELY_FINITE:
+    if np.vdot(values, values) < SURELY_FINITE:  # as dot, without its warning of an overflow
         return
     with np.errstate(over="ignore", invalid="ignore"):
         wrong = np.flatnonzero(~np.isfinite(values.astype(np.float32))).tolist()

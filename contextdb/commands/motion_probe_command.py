@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from contextdb.cells.arguments import as_number
 from contextdb.commands.motion_measure_command import add_bars, gates_of
 from contextdb.commands.motion_run_command import character_of, rate_of, say_where
 from contextdb.commands.motion_stage import Stage, context_text
@@ -30,7 +31,6 @@ from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes,
 from contextdb.motion import Character, Measures, Pose, Trace, measure
 from contextdb.motion.characters.drives import Drive, drives, steered
 from contextdb.motion.characters.probing import Plan, Scene, plan_of
-from contextdb.motion.reading import as_number
 from contextdb.report.render_json import as_json
 
 KINDS = ("straight", "turns", "circle", "eight", "speeds", "stops")

@@ -16,6 +16,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from contextdb.cells.arguments import as_number
 from contextdb.errors import Fault, MotionError
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
@@ -24,7 +25,6 @@ from contextdb.motion.markup.markup import Markup
 from contextdb.motion.markup.reserved import CONTACTS, MOST_SECONDS, ReservedTag
 from contextdb.motion.markup.spans import TOLERANCE_S, Span
 from contextdb.motion.ranges import check_ranges
-from contextdb.motion.reading import as_number
 
 MOST_RATE = 1e5
 

@@ -16,7 +16,7 @@ from contextdb.errors import ContextError, Fault, MotionError
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.trajectory import Trajectory
 from contextdb.motion.features.schema import FeatureSchema
-from contextdb.motion.output.bank import Place3
+from contextdb.motion.output.samples import Place3
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.decision import Playing
 from contextdb.motion.selection.root_motion import RootMotion, between

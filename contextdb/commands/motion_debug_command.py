@@ -61,7 +61,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         databases, why = {}, error.faults[0].message
     why = why or trace.use(databases)
     require_terminal(INSTEAD)
-    from tui.run import debug
+    from tui.debug.run import debug
 
     debug(arguments.file, trace, folder, databases, why)
     return ExitCode.OK
@@ -80,7 +80,7 @@ def _live(name: str | None, folder: str | None, who: str | None) -> ExitCode:
         with building_bar() as progress:
             databases = open_or_build(motion.config, motion.folder, motion.assets, progress)
     require_terminal('to use "contextdb live" in scripts')
-    from tui.run import debug_live
+    from tui.debug.run import debug_live
 
     debug_live(game, path, who, folder or "", databases)
     return ExitCode.OK

@@ -4,7 +4,7 @@ From standing it goes straight, turns by 90 and by 180 degrees, runs circles and
 stops: at speeds and in contexts that are chosen from what the tables ask and allow, and reported. Each drive is measured as by
 `contextdb motion measure`.
 
-Exits with 1 when a drive is over a bar; with 2 where a bar cannot be judged.
+Exits with 1 if a drive is over a bar; with 2 if a bar cannot be judged.
 
   contextdb motion probe game/ player
   contextdb motion probe game/ player --drive straight --drive circle --speed 1.3

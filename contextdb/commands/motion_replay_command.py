@@ -76,7 +76,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--what-if", metavar="NAME=VALUE", action="append", default=[], help="with this weight, bias or threshold; may be repeated"
     )
-    parser.add_argument("--diff", metavar="OTHER", help="where this session and another one part")
+    parser.add_argument("--diff", metavar="OTHER", help="where this session and another one diverge")
     parser.add_argument("--trace", metavar="OUT", help="write a Chrome trace, a .json file that Perfetto opens")
     parser.add_argument("--rrd", metavar="OUT", help="write a .rrd file for the Rerun viewer; needs the extra rerun")
     parser.add_argument("--html", metavar="OUT", help="write a page that plays the session, with --diff both side by side")

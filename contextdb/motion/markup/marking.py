@@ -111,7 +111,7 @@ def marks_of(
     -----
     A span holds the frames from `from` to `to`, both within, to a millionth of a second. Cost modifiers add up. Of root motion
     weights, and of warps, one that names the asset is stronger than one with a pattern. A warp ends with its range; one that
-    starts behind the end is as good as none.
+    starts after the end has no effect.
     """
     per_second = _number(rate, "the rate", "frames a second, more than 0", 1.0 / MOST_SECONDS, MOST_RATE)
     end = _number(end_s, "end_s", "seconds, 0 or more", 0.0, MOST_SECONDS)

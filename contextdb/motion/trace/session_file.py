@@ -71,7 +71,7 @@ def read_rows(raw: bytes, file: str) -> tuple[pl.DataFrame, dict[str, dict[str, 
         raise
     except DamagedFrame as error:
         raise refused(f"the file is damaged: {error}.", file) from None
-    except (Exception, pl.exceptions.PanicException) as error:  # some damage makes polars stumble instead of complain
+    except (Exception, pl.exceptions.PanicException) as error:  # some damage makes polars panic instead of raise
         raise refused(f"the file is damaged ({type(error).__name__}).", file) from None
     _check_columns(frame, file)
     lacking = [pl.lit(None, dtype).alias(name) for name, dtype in columns().items() if name not in frame.columns]

@@ -121,7 +121,7 @@ _SCENES = {
         ),
     ),
     "inside": Scene(
-        "A row that stands for another table: how many of that table's rows are valid for the test row.",
+        "A row that refers to another table: how many of that table's rows are valid for the test row.",
         "hit_mid_air",
         ("f8", "down", "down"),
         before=(_INSIDE,),

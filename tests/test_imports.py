@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 from graphlib import TopologicalSorter
@@ -53,3 +54,17 @@ def test_no_module_imports_itself_by_way_of_others():
     files = {module_of(path): path for package in ("contextdb", "tui") for path in (ROOT / package).rglob("*.py")}
     assert len(files) > 400
     TopologicalSorter({name: imports_of(path, set(files)) for name, path in files.items()}).prepare()  # raises CycleError
+
+
+def test_what_is_imported_for_types_alone_is_of_others_and_heavy():
+    ours = set()
+    for package in ("contextdb", "tui"):
+        for path in (ROOT / package).rglob("*.py"):
+            for block in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                if isinstance(block, ast.If) and ast.unparse(block.test) == "TYPE_CHECKING":
+                    ours |= {
+                        (module_of(path), ast.unparse(node))
+                        for node in block.body
+                        if re.search(r"(contextdb|tui)\.", ast.unparse(node))
+                    }
+    assert {module for module, _ in ours} == {"contextdb"}  # whose public names are loaded when they are first used

@@ -26,7 +26,7 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[Any, ...]]:
     def runs(*arguments: str) -> tuple[Any, ...]:
         with (
             patch("contextdb.commands.motion_debug_command.require_terminal", lambda instead: None),
-            patch("tui.run.debug", lambda *them: given.append(them)),
+            patch("tui.debug.run.debug", lambda *them: given.append(them)),
         ):
             result = run("motion", "debug", *arguments)
         assert result.code == 0, result.err

@@ -15,7 +15,7 @@ from running import Result, run
 from contextdb.commands import watched_work
 from contextdb.commands.motion_prepared import line_of, with_marks
 from contextdb.motion import Markup, MotionConfig, Proposal, clip_features, make_clip, write_bvh
-from contextdb.motion.preparing.proposals import Look
+from contextdb.motion.preparing.look import Look
 
 NAMES = ("idle", "walk", "start_walk", "stop_walk")
 HAND = "tag,asset,to,from\r\nMove.Walk,walk*,,\r\nLooping,idle,,"

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
-from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import Any, ClassVar
 
 from textual.app import SystemCommand
 from textual.binding import BindingType
 from textual.filter import LineFilter
+from textual.message import Message
 from textual.screen import Screen
 from textual.theme import BUILTIN_THEMES
 
@@ -31,11 +31,6 @@ from tui.screens.conflicts import ConflictsDialog
 from tui.screens.leaving import HeldDialog, LeavingDialog
 from tui.screens.main import MainScreen
 from tui.themes import DARK, THEMES
-
-if TYPE_CHECKING:
-    from tui.debug.game import Live
-    from tui.debug.screen import RowWanted, Start
-    from tui.panes.motion import DebugWanted
 
 LOW = 14
 """On a screen of fewer lines the details give way to the rows."""
@@ -83,8 +78,8 @@ class EditorApp(Editor):
         super().__init__()
         self._at = at
         """The cell that is gone to first."""
-        self._debugged: dict[str, Start] = {}
-        """Where sessions were left for a row of a table."""
+        self._debugger: Any = None
+        """The debugger, once it was asked for: a `tui.debug.inside.Inside`."""
         self.workspace = workspace
         self.settings = settings or EditorSettings()
         for one in THEMES:
@@ -113,50 +108,22 @@ class EditorApp(Editor):
 
     # ---- the debugger
 
-    def on_debug_wanted(self, message: DebugWanted) -> None:
+    def on_debug_wanted(self, message: Message) -> None:
         """Show the debugger of a session, or of a running game once it has decided something."""
-        from tui.debug.recording import Recording  # loads the motion search
-        from tui.debug.screen import DebugScreen
-        from tui.debug.waiting import WaitingScreen
+        from tui.debug.inside import Inside  # loads the motion search
 
-        shown = message.shown
-        if isinstance(shown, Recording):
-            self.push_screen(DebugScreen(shown, start=self._debugged.get(shown.file), is_inside=True))
-        elif shown.recording is None:
-            self.push_screen(WaitingScreen(shown, lambda: self._begun(shown), self._left_waiting))
-        else:
-            self._show_live(shown)
+        self._debugger = self._debugger or Inside(self)
+        self._debugger.show(message)
 
-    def _left_waiting(self) -> None:
-        self.pop_screen()
-
-    def _begun(self, live: Live) -> None:
-        self.pop_screen()
-        self._show_live(live)
-
-    def _show_live(self, live: Live) -> None:
-        from tui.debug.screen import DebugScreen
-
-        assert live.recording is not None, "was waited for"
-        self.push_screen(DebugScreen(live.recording, live=live, is_inside=True), lambda _: live.close())
-
-    def on_row_wanted(self, message: RowWanted) -> None:
+    def on_row_wanted(self, message: Message) -> None:
         """Leave the debugger for a row of a table."""
-        from tui.debug.screen import DebugScreen
-
-        screen = self.screen
-        path = Path(message.table).resolve()
-        name = next((name for name, file in self.workspace.files.items() if file.resolve() == path), None)
-        if not isinstance(screen, DebugScreen):
+        left: tuple[str, GoToCell] | None = self._debugger.leave(message, self.workspace.files)
+        if left is None:
             return
-        if name is None:
-            screen.say(f"{message.table} is no table of the editor.", is_error=True)
-            return
-        self._debugged[screen.recording.file] = message.start
-        screen.action_quit()
+        name, place = left
         if name != self.main.table_name:
             self.open_table(name)
-        self.call_later(lambda: self.main.call_after_refresh(self.main.go_to_cell, GoToCell(message.row, message.column)))
+        self.call_later(lambda: self.main.call_after_refresh(self.main.go_to_cell, place))
 
     # ---- tables
 

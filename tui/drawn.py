@@ -1,7 +1,7 @@
 """Signs that terminals draw in different widths, as signs that all of them draw in one, so that no column drifts.
 
 A family of emoji held together by joiners is two cells wide in one terminal and eight in another; so it is with skin tones, flags
-and signs with a variation selector. On the screen their first sign stands for them, as wide as the layout counts them. The text in
+and signs with a variation selector. On the screen their first sign replaces them, as wide as the layout counts them. The text in
 the file stays as it is.
 """
 

@@ -22,7 +22,7 @@ class Editor(OneKeyAtATime):
 
     @abstractmethod
     def go_into(self, name: str, outer: str, facts: Mapping[str, str]) -> None:
-        """Show the table that a row of the table `outer` stands for, with the facts of its test row."""
+        """Show the table that a row of the table `outer` refers to, with the facts of its test row."""
 
     @abstractmethod
     def go_back(self) -> bool:

@@ -4,22 +4,13 @@ from __future__ import annotations
 
 import gc
 import os
-from collections.abc import Mapping
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 from contextdb.errors import ContextDBError, Fault, in_quotes, nearest
 from tui.app import EditorApp
 from tui.editor_settings import EditorSettings, SettingsError, read_settings, settings_path
 from tui.keyboard import read_whole_keys
-from tui.messages import GoToCell
 from tui.model.conflicted import conflicts_in
 from tui.model.workspace import Workspace
-
-if TYPE_CHECKING:
-    from contextdb.motion import MotionDatabase, Trace
-    from tui.debug.game import Live
-    from tui.debug.recording import Recording
 
 FEW_COLOURS = ("ansi", "linux", "vt100", "vt220", "xterm", "xterm-color", "screen", "tmux", "rxvt", "cygwin")
 """Terminals of 16 colours or fewer, by TERM, unless COLORTERM says that they can do more."""
@@ -41,87 +32,10 @@ def edit(path: str | None, theme: str | None = None) -> None:
         found = f"there is no theme {in_quotes(theme)}."
         raise SettingsError(Fault(found, ", ".join(themes), in_quotes(near) if near else ""))
     _require_readable(workspace)
-    _forget_exported_size()
+    forget_exported_size()
     read_whole_keys()
     pass_over_what_stays()
-    EditorApp(workspace, settings, theme or _theme_for(settings)).run()
-
-
-def debug(file: str, trace: Trace, folder: str, databases: Mapping[str, MotionDatabase], missing: str) -> None:
-    """Show a recorded session, and stay until it is left.
-
-    Parameters
-    ----------
-    file : str
-        Its name.
-    trace : Trace
-        With a decision at least.
-    folder : str
-        Of its project; "" where there is none.
-    databases : mapping of name to MotionDatabase
-    missing : str
-        Why its searches cannot be asked again, in a sentence; "" when they can.
-
-    Raises
-    ------
-    ContextDBError
-        The settings cannot be taken.
-    """
-    from tui.debug.recording import Recording
-
-    settings = read_settings(settings_path(), EditorApp.theme_names())
-    recording = Recording(file, trace, folder, databases, missing)
-    _forget_exported_size()
-    read_whole_keys()
-    _debugged(recording, settings)
-
-
-def debug_live(game: str, path: Path, who: str | None, folder: str, databases: Mapping[str, MotionDatabase]) -> None:
-    """Follow a running game, and stay until it is left.
-
-    Parameters
-    ----------
-    game, path
-        Its name and its door.
-    who : str or None
-        The character; None for the first that decides.
-    folder, databases
-        As for `debug`.
-
-    Raises
-    ------
-    ContextDBError
-        The settings cannot be taken.
-    """
-    from tui.debug.game import Live
-
-    settings = read_settings(settings_path(), EditorApp.theme_names())
-    _forget_exported_size()
-    read_whole_keys()
-    live = Live(game, path, who, folder, databases)
-    try:
-        _debugged(live, settings)
-    finally:
-        live.close()
-
-
-def _debugged(shown: Recording | Live, settings: EditorSettings) -> None:
-    """Show the debugger; where a row is wanted the editor with it, and then the debugger again."""
-    from tui.debug.app import DebugApp
-    from tui.debug.recording import Recording
-
-    theme, start = _theme_for(settings), None
-    while True:
-        app = DebugApp(shown, theme, start=start)
-        app.run()
-        wanted = app.wanted
-        if wanted is None:
-            return
-        start = wanted.start
-        EditorApp(Workspace(wanted.table), settings, theme, at=GoToCell(wanted.row, wanted.column)).run()
-        recording = shown if isinstance(shown, Recording) else shown.recording
-        if recording is not None:
-            recording.edited()
+    EditorApp(workspace, settings, theme or theme_for(settings)).run()
 
 
 def pass_over_what_stays() -> None:
@@ -131,7 +45,7 @@ def pass_over_what_stays() -> None:
     gc.set_threshold(20_000, 20, 50)
 
 
-def _forget_exported_size() -> None:
+def forget_exported_size() -> None:
     """Go by the size that the terminal has: one that a shell exports stays as it was at first, and would hide every change."""
     for name in ("COLUMNS", "LINES"):
         os.environ.pop(name, None)
@@ -150,7 +64,7 @@ def _require_readable(workspace: Workspace) -> None:
             raise
 
 
-def _theme_for(settings: EditorSettings) -> str:
+def theme_for(settings: EditorSettings) -> str:
     """The theme of the settings; without one, in a terminal of few colours, the terminal's own colours."""
     has_few = os.environ.get("TERM", "") in FEW_COLOURS and not os.environ.get("COLORTERM")
     return settings.theme or ("ansi-dark" if has_few else "")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from numbers import Real
@@ -65,6 +66,19 @@ def require_real(value: object, what: str, least: float = -MOST, most: float = M
     if is_number and least <= value <= most:  # type: ignore[operator]
         return float(value)  # type: ignore[arg-type]
     raise _wrong(value, what, f"a number from {least:g} to {most:g}")
+
+
+def as_number(value: object) -> float | None:
+    """A finite float, or None for anything else; True is not a number."""
+    if type(value) is float:
+        return value if math.isfinite(value) else None
+    if isinstance(value, bool) or not isinstance(value, Real):
+        return None
+    try:
+        number = float(value)
+    except OverflowError:
+        return None
+    return number if math.isfinite(number) else None
 
 
 def require_point(value: object, what: str, accepted: str) -> tuple[float, float]:

@@ -10,7 +10,7 @@ NUMBER_TEXT = r"[+-]?(?:inf|(?:\d+(?:\.(?!\.)\d*)?|(?<!\.)\.\d+)(?:[eE][+-]?\d+)
 _ANY_WORDS = frozenset(("", "-", "any"))
 
 MARK = "@"
-"""What an asset cell begins with that stands for another table."""
+"""What an asset cell begins with that refers to another table."""
 
 _NAME = re.compile(r"[\w.:/\-]+")
 _RESERVED = re.compile(rf"any|not|-|nan|{NUMBER_TEXT}", re.IGNORECASE)

@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from contextdb.cells.arguments import as_number
 from contextdb.errors import SchemaError
 from contextdb.files.toml_text import as_toml
 from contextdb.findings import Finding
 from contextdb.motion.features.schema import FeatureSchema
-from contextdb.motion.reading import as_number
 from contextdb.schema.settings import Schema
 from contextdb.schema.toml_lines import Path
 

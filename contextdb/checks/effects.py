@@ -237,7 +237,7 @@ def _flat(table: EitherTable) -> EitherTable:
 
 
 def _changed(changes: Diff, space: Shared) -> dict[str, tuple[list[int], list[int]]]:
-    """For each asset whose cells changed, all its rows before and after; an asset that was renamed goes by its new name."""
+    """For each asset whose cells changed, all its rows before and after; an asset that was renamed has its new name."""
     before, after = changes.before, changes.after
     names = list(before.assets)
     for a, b in enumerate(changes.alignment.rows.tolist()):

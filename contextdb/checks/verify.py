@@ -94,7 +94,8 @@ def _safetensors(path: Path) -> Told:
 
 def _parquet(path: Path) -> Told:
     from contextdb.files.parquet_frame import DamagedFrame, require_whole_file
-    from contextdb.motion.trace.session import FORMAT_KEY, Trace
+    from contextdb.motion.trace.session import Trace
+    from contextdb.motion.trace.session_file import FORMAT_KEY
 
     yield "Parquet file", None
     try:

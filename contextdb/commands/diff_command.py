@@ -1,4 +1,4 @@
-"""Show what changed between two versions of a table: rows by asset, columns, and cells, with changes of mere text apart.
+"""Show what changed between two versions of a table: rows by asset, columns, and cells, with changes of text alone listed apart.
 
 Exits with 0 if nothing changed, with 1 if something did, with 2 if a table cannot be read.
 

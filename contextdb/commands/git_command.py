@@ -13,5 +13,5 @@ COMMANDS = {
     "install": "let git merge and show tables cell by cell",
     "uninstall": "remove what install wrote",
     "status": "what is set",
-    "text": "a table as git diff shows it, one line a cell",
+    "text": "a table as git diff shows it, one line per cell",
 }

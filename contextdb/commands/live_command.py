@@ -1,17 +1,17 @@
-"""Show what a running game asks its tables and what it picks, one line a change.
+"""Show what a running game asks its tables and what it picks, one line per change.
 
-The game has opened a link under NAME. Without NAME the only game that runs is meant; where several run, they are listed. A line has
-the seconds since the link was opened, who asks, the table, what was picked, how many rows are valid, and the facts that changed,
-written as for the command `query`. Ctrl+C ends it.
+The game has opened a link under NAME. Without NAME, the command shows the only running game, or lists them if there are
+several. A line has the seconds since the link was opened, who asks, the table, what was picked, how many rows are valid, and the
+facts that changed, written as for the command `query`. Ctrl+C ends it.
 
   contextdb live game
   contextdb live game --who player --table locomotion
   contextdb live game --tables tables/ --explain
   contextdb live game --record session.jsonl
 
-With --tables the questions are also asked of the tables of a folder: the command says where their answers differ from the game's,
-and with --explain which rows were nearest, and which of their cells fail. With --record FILE every question is kept, not only the
-newest; the commands `evaluate` and `coverage --telemetry` read FILE, while it grows too.
+With --tables the command also asks the tables of a folder: it reports where their answers differ from the game's, and with
+--explain which rows were nearest, and which of their cells fail. With --record FILE every question is kept, not only the
+newest; the commands `evaluate` and `coverage --telemetry` read FILE, even while it grows.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Show the bones of clips as a tree, with their channels and heights, and which are found as hips, spine, head, feet and toes.
+"""Show the bones of clips as a tree, with their channels and heights, and which are detected as hips, spine, head, feet and toes.
 
 Files of one rig are shown together; a folder means the BVH files in it and below. The settings of [features.NAME] and
 [databases.NAME] name bones as they are listed here.

@@ -1,8 +1,8 @@
-"""Find what is wrong with clips, markup and motion settings: bones that lack, other units and axes, jumps, idle markup.
+"""Find what is wrong with clips, markup and motion settings: missing bones, other units and axes, jumps, markup without effect.
 
 Every clip is read as a build reads it. Where no motion database is declared, all clips below the folder are checked. Exits
-with 1 if there are findings at the level of --fail-on, with 2 if there is no such folder. What looks wrong and may be right is a
-warning, such as a body of 170 m.
+with 1 if there are findings at the level of --fail-on, with 2 if there is no such folder. What looks wrong but may be right, such
+as a body of 170 m, is a warning.
 
   contextdb motion check game/
   contextdb motion check clips/          clips that no project names yet

@@ -1,13 +1,13 @@
 """See why in the terminal: a recorded session, moment by moment.
 
-A timeline of what plays, the cost of every frame of every asset, why an asset was not chosen, the poses, and weights that can be
-turned: everything is searched again at once. F1 says what the screen shows and which keys there are.
+A timeline of what plays, the cost of every frame of every asset, why an asset was not chosen, the poses, and weights that you can
+change: all searches run again at once. F1 says what the screen shows and which keys there are.
 
 The databases are those of the project that the session was recorded with, or of FOLDER. Exits with 2 without a terminal; "contextdb
 motion replay" answers the same questions in scripts.
 
 With --live the screen follows a running game whose link watches its controllers: what plays now, and the last minute. SESSION is
-then the name of the game, which may be left out where one game runs; FOLDER is its project, by default the current folder.
+then the name of the game, which may be left out if only one game runs; FOLDER is its project, by default the current folder.
 
   contextdb motion debug session.parquet
   contextdb motion debug session.parquet game/
@@ -61,7 +61,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         databases, why = {}, error.faults[0].message
     why = why or trace.use(databases)
     require_terminal(INSTEAD)
-    from tui.run import debug
+    from tui.debug.run import debug
 
     debug(arguments.file, trace, folder, databases, why)
     return ExitCode.OK
@@ -80,7 +80,7 @@ def _live(name: str | None, folder: str | None, who: str | None) -> ExitCode:
         with building_bar() as progress:
             databases = open_or_build(motion.config, motion.folder, motion.assets, progress)
     require_terminal('to use "contextdb live" in scripts')
-    from tui.run import debug_live
+    from tui.debug.run import debug_live
 
     debug_live(game, path, who, folder or "", databases)
     return ExitCode.OK

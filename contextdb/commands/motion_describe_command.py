@@ -1,10 +1,10 @@
 """Make a table of clips: for each one a row with its gait, speed, direction, turn, style, duration, and how it begins and ends.
 
-Cells are ranges from the clips' own movement; neighbours overlap a little, so that for each context some clip is valid. With --out
-the table is written with the contextdb.toml that it needs: conditions, outputs, features, databases, a selector and a controller.
-With --into columns, empty cells and rows that are missing are filled; a cell that does not accept what its clip shows is reported.
+Cells are ranges from the clips' own movement; neighbours overlap a little, so that some clip is valid in each context. --out writes
+the table with the contextdb.toml that it needs: conditions, outputs, features, databases, a selector and a controller. --into adds
+missing columns and rows to a table, fills its empty cells, and reports each cell that does not accept what its clip shows.
 
-Exits with 1 if a cell says other than its clip, or a clip could not be read.
+Exits with 1 if a cell disagrees with its clip, or a clip could not be read.
 
   contextdb motion describe game/clips
   contextdb motion describe game/clips --out game/moves.csv
@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_clip_arguments(parser)
     parser.add_argument("--out", metavar="TABLE", help="write the table to this new file, with its contextdb.toml beside it")
     parser.add_argument(
-        "--into", metavar="TABLE", help="fill what is missing in this table, and tell where it differs from the clips"
+        "--into", metavar="TABLE", help="fill what is missing in this table, and report where it differs from the clips"
     )
     parser.add_argument("--update", action="store_true", help="with --into: replace the cells that differ, too")
     parser.add_argument("--json", action="store_true", help="print a JSON document, with what was measured")

@@ -3,7 +3,7 @@
 The poses of a session are made again from the clips of its project, whose raw clips are measured too. A SESSION may also be a .npz
 file of poses, with --project for the clips.
 
-Exits with 1 if a bar is broken, or if a measure is more than 1 % worse than in the baseline; with 2 if a bar cannot be judged.
+Exits with 1 if a measure is over its bar, or more than 1 % worse than in the baseline; with 2 if a bar cannot be judged.
 
   contextdb motion measure session.parquet
   contextdb motion measure session.parquet --max-skate 8 --max-jumps 1.5

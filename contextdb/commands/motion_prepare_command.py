@@ -1,13 +1,13 @@
-"""Propose markup for clips, as a diff that can be reviewed, edited, applied and taken back: each mark with its reason and measure.
+"""Propose markup for clips, as a diff that you can review, edit, apply and revert: each mark with its reason and measure.
 
-Where hips sway, root_smooth_s is proposed for the features of their databases: then a build makes the path of the body ahead from
-the hips and sideways from the feet. No clip file is changed. Proposed are too contacts of the feet, loops and the cuts that would
-make one, standing ends that are not to be entered, noise that is left out, starts and turns that play as a whole, and
-near-duplicates. What the markup says already stays as it is, and nothing is proposed beside it. The diff fits the folder:
-`patch -p1` applies it there, and `patch -p1 -R` takes it back. With --write what was found is kept in .contextdb-cache: the next
-run looks only at clips that changed, and replaces the marks that were written for them as they were, except those that were edited.
+The command proposes contacts of the feet, loops and the cuts that would make one, standing ends not to enter, noise to leave out,
+starts and turns to play as a whole, and near-duplicates. If hips sway, it also proposes root_smooth_s for the features of the
+databases: a build then computes the body's path from the hips (forward) and the feet (sideways). No clip file changes. Existing
+marks stay, and nothing is proposed where there is one. In the folder, `patch -p1` applies the diff, and `patch -p1 -R` reverts it.
+With --write the results are kept in .contextdb-cache: the next run reads only changed clips, and replaces the marks that were
+written for their earlier versions, except those that were edited.
 
-Exits with 1 if something is proposed that is not written, or a clip could not be read.
+Exits with 1 if a proposal is not written, or a clip could not be read.
 
   contextdb motion prepare game/
   contextdb motion prepare game/ --only loops --only starts

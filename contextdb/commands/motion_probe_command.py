@@ -4,7 +4,7 @@ From standing it goes straight, turns by 90 and by 180 degrees, runs circles and
 stops: at speeds and in contexts that are chosen from what the tables ask and allow, and reported. Each drive is measured as by
 `contextdb motion measure`.
 
-Exits with 1 when a drive is over a bar; with 2 where a bar cannot be judged.
+Exits with 1 if a drive is over a bar; with 2 if a bar cannot be judged.
 
   contextdb motion probe game/ player
   contextdb motion probe game/ player --drive straight --drive circle --speed 1.3
@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from contextdb.cells.arguments import as_number
 from contextdb.commands.motion_measure_command import add_bars, gates_of
 from contextdb.commands.motion_run_command import character_of, rate_of, say_where
 from contextdb.commands.motion_stage import Stage, context_text
@@ -30,7 +31,6 @@ from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes,
 from contextdb.motion import Character, Measures, Pose, Trace, measure
 from contextdb.motion.characters.drives import Drive, drives, steered
 from contextdb.motion.characters.probing import Plan, Scene, plan_of
-from contextdb.motion.reading import as_number
 from contextdb.report.render_json import as_json
 
 KINDS = ("straight", "turns", "circle", "eight", "speeds", "stops")

@@ -33,6 +33,7 @@ from pathlib import Path
 
 import numpy as np
 
+from contextdb.cells.arguments import as_number
 from contextdb.commands.motion_build_command import MotionProject, warn
 from contextdb.commands.motion_page import Played, comment_of, page_file, rerun_file, write_page, write_rerun
 from contextdb.commands.motion_stage import add_view
@@ -43,7 +44,6 @@ from contextdb.disk import path_in_quotes, write_atomic
 from contextdb.errors import ContextDBError, Fault, FileError, MotionError, Place, QueryError, in_quotes
 from contextdb.motion import MotionDatabase, open_database, open_or_build, saved_path
 from contextdb.motion.measuring.measure import warped_poses
-from contextdb.motion.reading import as_number
 from contextdb.motion.selection.decision import Decision, Playing
 from contextdb.motion.storage.pose_files import saved_poses
 from contextdb.motion.trace.asked_views import diff_lines, stats_lines, what_if_lines, why_lines
@@ -76,7 +76,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--what-if", metavar="NAME=VALUE", action="append", default=[], help="with this weight, bias or threshold; may be repeated"
     )
-    parser.add_argument("--diff", metavar="OTHER", help="where this session and another one part")
+    parser.add_argument("--diff", metavar="OTHER", help="where this session and another one diverge")
     parser.add_argument("--trace", metavar="OUT", help="write a Chrome trace, a .json file that Perfetto opens")
     parser.add_argument("--rrd", metavar="OUT", help="write a .rrd file for the Rerun viewer; needs the extra rerun")
     parser.add_argument("--html", metavar="OUT", help="write a page that plays the session, with --diff both side by side")

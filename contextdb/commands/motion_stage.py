@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from contextdb.cells.arguments import as_number
 from contextdb.cells.facts import UNKNOWN_MODES, Fact, Unknown
 from contextdb.commands import missing_facts_by_option
 from contextdb.commands.motion_build_command import LeftOut, MotionProject, warn
@@ -30,7 +31,6 @@ from contextdb.motion import (
 )
 from contextdb.motion.features.extraction import Features
 from contextdb.motion.markup.reserved import MOST_COST
-from contextdb.motion.reading import as_number
 from contextdb.motion.storage.config import JOINTLY
 from contextdb.motion.storage.rigs import Rig
 from contextdb.motion.trace.cost_views import View

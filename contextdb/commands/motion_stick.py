@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from contextdb.cells.arguments import as_number
 from contextdb.cells.facts import Unknown
 from contextdb.columns import TextColumn
 from contextdb.commands import missing_facts_by_option
@@ -21,7 +22,6 @@ from contextdb.disk import path_in_quotes
 from contextdb.errors import ContextDBError, Fault, Place, TableError, in_quotes, nearest, some
 from contextdb.files.texts import AnySource, read_texts
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.reading import as_number
 from contextdb.telemetry.contexts import Contexts, read_contexts
 
 BY_SPEED = ("speed_mps", "turn_dps", "strafe_deg")

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from contextdb.cells.arguments import as_number
 from contextdb.errors import Fault, QueryError, in_quotes, nearest, some
 from contextdb.motion import Biases, MotionDatabase
-from contextdb.motion.reading import as_number
 from contextdb.motion.trace.reasked import Changes
 
 BIASES = ("base", "continuing", "looping")

@@ -58,7 +58,7 @@ class ValueMasks:
     n_rows: int
     values: tuple[Value, ...]
     has_others: bool
-    """Whether class K - 1 stands for every value not in `values` (text)."""
+    """Whether class K - 1 is every value not in `values` (text)."""
     masks: Words
 
     @cached_property

@@ -181,7 +181,7 @@ class CompiledData(Unchanging):
 
     @cached_property
     def ranks(self) -> NDArray[np.float64]:
-        """What the policy goes by before chance, apart from costs, higher first: float64 [n_rows]; for a table without tables
+        """What the policy ranks rows by before chance, apart from costs, higher first: float64 [n_rows]; for a table without tables
         inside."""
         return ranks_of(self.policy, self.priorities, self.picking)
 

@@ -13,7 +13,8 @@ from typing import Any, Protocol, Self, cast
 from contextdb.cells.facts import Context
 from contextdb.compiled.casting.facts import Actors
 from contextdb.compiled.data import CompiledData
-from contextdb.compiled.live import AskingLiveContext, LiveContext
+from contextdb.compiled.live import LiveContext
+from contextdb.compiled.live_asking import AskingLiveContext
 from contextdb.compiled.matches import Matches
 
 
@@ -78,6 +79,11 @@ class _Heard:
         return cast(Self, new)
 
     __copy__ = copy
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """What is pickled: a context that nobody hears."""
+        make, (kind, *facts) = cast("tuple[Any, tuple[Any, ...]]", super().__reduce__())
+        return make, (_UNHEARD[kind], *facts)
 
 
 class HeardLiveContext(_Heard, LiveContext):

@@ -15,7 +15,7 @@ from typing import Any, Never, Self
 
 from contextdb.cells.arguments import by_name
 from contextdb.cells.conditions import Condition
-from contextdb.cells.facts import NAMES, Unknown, alike, as_context, no_condition, read_fact, require_names
+from contextdb.cells.facts import NAMES, Unknown, alike, as_context, no_condition, require_names
 from contextdb.cells.mirroring import kept_facts
 from contextdb.cells.notebook import one_line
 from contextdb.compiled.casting.explaining import explain_with_actors
@@ -28,9 +28,6 @@ from contextdb.compiled.matches import Matches, with_mirrored
 from contextdb.compiled.memory import Rng
 from contextdb.compiled.pick import pick
 from contextdb.errors import Fault, NoSuchFact, in_quotes, plural, some
-from contextdb.expressions.rules import WhenRules
-from contextdb.expressions.rules.rules import Unusual
-from contextdb.expressions.scalar import Value
 
 BLOCK = 5
 """Facts in a block."""
@@ -240,7 +237,7 @@ class LiveContext(MutableMapping[str, object]):
     def __reduce__(self) -> tuple[object, ...]:
         """What is pickled: the table, the facts and the actors. Masks are found again."""
         cast = None if self._cast is None else (self._cast.ask.actors, self._cast.ask.prefer)
-        return _live_again, (self._compiled, self._unknown, self.facts, cast)
+        return _live_again, (type(self), self._compiled, self._unknown, self.facts, cast)
 
     def actors(self, actors: Actors | None, *old: Never, prefer: Prefer = None) -> None:
         """Offer actors for roles from now on, as `query` accepts them; None withdraws them. They are read at the next query.
@@ -369,140 +366,6 @@ class LiveContext(MutableMapping[str, object]):
         return self._compiled.bound(found, kept_facts(self._told), self._unknown)
 
 
-class AskingLiveContext(LiveContext):
-    """The same for a table with derived facts or rules, which asks for facts that are not columns.
-
-    Derived facts are computed again when one that they need was set since the last question, and a rule is asked again when a fact
-    that it names has changed.
-    """
-
-    __slots__ = ("_are_read", "_computed", "_given", "_is_stale", "_left", "_others", "_truths", "_values")
-
-    def __init__(self, compiled: CompiledData, unknown: Unknown = "error") -> None:
-        super().__init__(compiled, unknown)
-        inputs, derived = (compiled.derivation.inputs, compiled.derivation.names) if compiled.derivation else ((), ())
-        ruled = compiled.when.conditions if compiled.when else ()
-        self._others = {c.name: c for c in (*inputs, *ruled) if c.name not in derived}
-        """The conditions that derived facts are computed from, and those that rules name."""
-        self._computed: dict[str, object] = dict.fromkeys(derived)
-        """The derived facts, when they were last computed."""
-        self._given: dict[str, object] = dict.fromkeys(compiled.asked)
-        self._is_stale = True
-        """Whether a fact of `_others` was set since derived facts were computed."""
-        self._are_read = False
-        """Whether `_values` are the facts as they are now."""
-        self._values: dict[str, Value] = {}
-        """The facts that rules name, when rules were last asked."""
-        self._truths: dict[int, Value] = {}
-        """Of the rules that were asked with these facts, by their number, whether they hold."""
-        self._left = Matches(0, self._answering)
-
-    def __setitem__(self, name: str, value: Any) -> None:
-        """Set one fact; a derived one is refused."""
-        condition = self._others.get(name)
-        if condition is not None:
-            if name not in self._lookups:
-                read_fact(value, condition)
-            self._is_stale = True
-        elif name not in self._given:
-            self._refuse(name)
-        if name in self._lookups:
-            super().__setitem__(name, value)
-        self._given[name] = value
-
-    def _value(self, name: str) -> object:
-        """One fact, None where it is missing; a derived one is computed."""
-        if name in self._given:
-            return self._given[name]
-        if name not in self._computed:
-            self._refuse(name)
-        if self._is_stale:
-            self._compute()
-        return self._computed[name]
-
-    def __contains__(self, name: object) -> bool:
-        return (name in self._given or name in self._computed) and self._value(name) is not None
-
-    def _look_at(self, name: str, facts: Mapping[str, object]) -> None:
-        if name not in self._computed:
-            super()._look_at(name, facts)
-        elif facts[name] is not None:
-            self._refuse(name)
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        new = super().__deepcopy__(memo)
-        new._given = deepcopy(self._given, memo)
-        return new
-
-    @property
-    def _told(self) -> dict[str, object]:
-        return self._given
-
-    def matches(self) -> Matches:
-        """The valid rows for the facts as they are now."""
-        when = self._compiled.when
-        if when is not None and self._odd:
-            return self._carefully()
-        if self._is_stale:
-            self._compute()
-        answer = super().matches()
-        if when is None:
-            return answer
-        try:
-            return self._carefully() if self._odd else self._with_rules(answer, when)
-        except Unusual:
-            return self._carefully()
-
-    def _compute(self) -> None:
-        derivation = self._compiled.derivation
-        if derivation is not None:
-            self._computed.update(derivation.compute(self._given))
-            for name, value in self._computed.items():
-                if name in self._lookups and value != self._facts[name]:
-                    super().__setitem__(name, value)
-        self._is_stale = self._are_read = False
-
-    def _refuse(self, name: str) -> None:
-        derivation = self._compiled.derivation
-        if derivation is not None:
-            derivation.refuse([name])
-        raise no_condition(name, self._given)
-
-    def _carefully(self) -> Matches:
-        """The answer where facts are missing or sets, or actors are offered."""
-        return self._compiled.query(self.facts, unknown=self._unknown) if self._cast is None else self._cast.query(self.facts)
-
-    def _with_rules(self, answer: Matches, when: WhenRules) -> Matches:
-        """Of the rows that the cells leave, those whose rule holds."""
-        if not self._are_read:
-            self._read_facts(when)
-        left = answer.bits
-        for number in when.numbers(left):
-            if number not in self._truths:
-                self._truths[number] = when.rules[number].run(self._values)
-            if not self._truths[number]:
-                if self._truths[number] is None:
-                    raise Unusual
-                left &= ~when.rules[number].rows
-        if left == answer.bits:
-            return answer
-        if self._keep is not None:
-            return with_mirrored(Matches(left, self._answering), self._keep(self._told))
-        if self._is_bound:
-            return self._compiled.bound(Matches(left, self._answering), self._told, self._unknown)
-        if left != self._left.bits:
-            self._left = Matches(left, self._answering)
-        return self._left
-
-    def _read_facts(self, when: WhenRules) -> None:
-        values = when.usual_values({**self._given, **self._computed} if self._computed else self._given)
-        for name, value in values.items():
-            if self._values.get(name) != value:
-                for number in when.naming[name]:
-                    self._truths.pop(number, None)
-        self._values, self._are_read = values, True
-
-
 def _lookups(compiled: CompiledData) -> dict[str, LiveLookup]:
     """For each condition how a live context finds the mask of a usual fact, and where it keeps it."""
     found: dict[str, LiveLookup] = {}
@@ -512,17 +375,15 @@ def _lookups(compiled: CompiledData) -> dict[str, LiveLookup]:
 
 
 def _live_again(
-    compiled: CompiledData, unknown: Unknown, facts: Mapping[str, object], cast: tuple[Actors, Prefer] | None
+    kind: type[LiveContext],
+    compiled: CompiledData,
+    unknown: Unknown,
+    facts: Mapping[str, object],
+    cast: tuple[Actors, Prefer] | None,
 ) -> LiveContext:
     """A live context out of a pickle."""
-    live = live_context(compiled, unknown)
+    live = kind(compiled, unknown)
     live.update(facts)
     if cast is not None:
         live.actors(cast[0], prefer=cast[1])
     return live
-
-
-def live_context(compiled: CompiledData, unknown: Unknown = "error") -> LiveContext:
-    """A context of the kind that a table needs."""
-    kind = LiveContext if compiled.when is None and compiled.derivation is None else AskingLiveContext
-    return kind(compiled, unknown)

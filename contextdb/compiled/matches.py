@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import copy
 from functools import partial
@@ -16,75 +15,19 @@ from contextdb import bitmask
 from contextdb.bitmask import Flags, Rows, Words, read_only
 from contextdb.cells.arguments import require_place
 from contextdb.cells.notebook import as_html, one_line
-from contextdb.compiled.outputs import NO_OUTPUTS, Outputs
+from contextdb.compiled.answered_table import AnsweredTable, rows_of
 from contextdb.compiled.said_rows import SaidRows, bits_said
-from contextdb.errors import ContextError, Fault, WrongType, in_quotes, nearest, plural, some
+from contextdb.errors import ContextError, Fault, WrongType, plural
 
 Bits = TypeVar("Bits", int, Words)
 Join = Callable[[Any, Any], Any]
 """How two answers are joined: a function of their rows, as integers or as masks."""
 
-_INT64 = np.dtype(np.int64)
 
-FEW = 48
-"""Up to this many rows are read off the integer bit by bit; beyond, unpacking all bits at once is faster."""
+class Answering(AnsweredTable):
+    """A table as it is asked, which makes its answers."""
 
-_PACK = [struct.Struct(f"={count}q").pack for count in range(FEW + 1)]
-"""For so many row numbers what makes bytes of them: an array over bytes is read-only, and made sooner than one of a list."""
-
-
-class Answering:
-    """What the answers of one table share: its assets, with their paths and without, and 0 … n_rows - 1 to cut row numbers from.
-
-    Two are of the same table where name and `version` are equal; the version is worked out where two have to be compared.
-    """
-
-    __slots__ = (
-        "_of_asset", "_version", "ask_mirrored", "asked_of", "assets", "is_mirroring", "leaves", "name", "outputs", "row_numbers",
-    )  # fmt: skip
-
-    def __init__(
-        self,
-        assets: Sequence[str],
-        leaves: Sequence[str] | None = None,
-        name: str = "",
-        version: str | Callable[[], str] = "",
-        ask_mirrored: Callable[[Mapping[str, object]], Matches] | None = None,
-        is_mirroring: bool = False,
-        outputs: Outputs = NO_OUTPUTS,
-        asked_of: object = None,
-    ) -> None:
-        self.assets = assets
-        self.ask_mirrored = ask_mirrored
-        """Asks with the facts as a mirror shows them; None for a table in which no fact changes there, and where it was pickled."""
-        self.is_mirroring = is_mirroring or ask_mirrored is not None
-        """Whether facts of the table change in a mirror."""
-        self.asked_of = asked_of
-        """The compiled table, for a picker; None where it was pickled."""
-        self.leaves = assets if leaves is None else leaves
-        self.name = name
-        self.outputs = outputs
-        self.row_numbers: Rows = read_only(np.arange(len(assets), dtype=np.int64))
-        self._version = version
-        self._of_asset: dict[str, int] = {}
-        """The rows of each asset, with its path and without; read when they are first asked for."""
-
-    @property
-    def version(self) -> str:
-        """What the table says, as a digest."""
-        if not isinstance(self._version, str):
-            self._version = self._version()
-        return self._version
-
-    def require(self, other: Answering) -> None:
-        """Raise ContextError unless an answer of `other` is one of this table in this version."""
-        if other is self or (self.name == other.name and self.version == other.version):
-            return
-        own, its = (f"{in_quotes(a.name)} ({plural(len(a.assets), 'row')}" for a in (self, other))
-        if self.name == other.name:
-            versions = f"version {other.version[:8]}), this is version {self.version[:8]} ({plural(len(self.assets), 'row')})"
-            raise ContextError(Fault(f"the answer is of another version of {its}, {versions}.", _OWN_ANSWER, _ASK_AGAIN))
-        raise ContextError(Fault(f"the answer is of the table {its}), not of {own}).", _OWN_ANSWER, _ASK_AGAIN))
+    __slots__ = ()
 
     def require_own(self, answer: Matches) -> None:
         """Raise ContextError unless an answer is one of this table in this version."""
@@ -104,31 +47,6 @@ class Answering:
             return said.bits
         return bits_said(said, len(self.assets), self.bits_of_assets)
 
-    def bits_of_assets(self, names: Sequence[str]) -> int:
-        """The rows of some assets, with their paths or without; raises ContextError for one that the table does not have."""
-        if not self._of_asset:
-            self._of_asset = self._rows_by_asset()
-        bits = 0
-        if unknown := set(names) - self._of_asset.keys():
-            raise self.no_asset(min(unknown))
-        for name in names:
-            bits |= self._of_asset[name]
-        return bits
-
-    def _rows_by_asset(self) -> dict[str, int]:
-        found: dict[str, list[int]] = {}
-        for row, names in enumerate(zip(self.assets, self.leaves, strict=True)):
-            for name in dict.fromkeys(names):
-                found.setdefault(name, []).append(row)
-        return {name: bitmask.int_of(rows) for name, rows in found.items()}
-
-    def no_asset(self, asset: str) -> ContextError:
-        """The error for an asset that no row has, with the nearest that one has."""
-        known = dict.fromkeys((*self.assets, *self.leaves))
-        near = nearest(asset, known)
-        found = f"the table {in_quotes(self.name)} has no asset {in_quotes(asset)}."
-        return ContextError(Fault(found, some(known) or "none: the table has no rows", in_quotes(near) if near else ""))
-
     def __copy__(self) -> Answering:
         return self
 
@@ -138,10 +56,6 @@ class Answering:
     def __reduce__(self) -> tuple[type[Answering], tuple[object, ...]]:
         """What is pickled: not the table, which `ask_mirrored` and `asked_of` would bring along."""
         return Answering, (self.assets, self.leaves, self.name, self.version, None, self.is_mirroring, self.outputs)
-
-
-_OWN_ANSWER = "an answer of this compiled table"
-_ASK_AGAIN = "to query this table again: query(facts)"
 
 
 class Staged(Protocol):
@@ -531,30 +445,6 @@ def with_penalties(answer: Matches, penalties: Callable[[], NDArray[np.float64]]
 def layered_penalties(answer: Matches) -> NDArray[np.float64]:
     """What the soft cells of each depth of tables inside tables cost: float64 [D, n_rows]; see `Matches.penalties`."""
     return read_only(answer._penalties() if answer.has_penalties else np.zeros((1, answer.n_rows)))
-
-
-def rows_of(bits: int, numbers: Rows) -> Rows:
-    """The rows of an integer mask: int64 [count], read-only. One row or two, the usual answers, are a view of `numbers`."""
-    top = bits.bit_length() - 1
-    if top < 0:
-        return numbers[:0]
-    power = 1 << top
-    if bits == power:
-        return numbers[top : top + 1]
-    rest = bits ^ power
-    low = rest.bit_length() - 1
-    power = 1 << low
-    if rest == power:
-        return numbers[low : top + 1 : top - low]
-    found = [top]
-    while rest:
-        if len(found) == FEW:
-            return read_only(bitmask.rows(bitmask.from_int(bits, len(numbers))))
-        top = rest.bit_length() - 1
-        found.append(top)
-        rest ^= 1 << top
-    found.reverse()
-    return np.frombuffer(_PACK[len(found)](*found), _INT64)
 
 
 def minus(rows: Bits, others: Bits) -> Bits:

@@ -57,8 +57,8 @@ NOTHING = PickColumns()
 
 
 def ranks_of(policy: Policy, priorities: NDArray[np.int64], picking: PickColumns) -> Numbers:
-    """What the policy goes by before chance, apart from costs: higher first, float64 [R]. Under "specific" the place of priority
-    and specificity among those of all rows."""
+    """What the policy ranks rows by before chance, apart from costs: higher first, float64 [R]. Under "specific" the place of
+    priority and specificity among those of all rows."""
     if policy != "specific" or picking.specificities is None:
         return read_only(priorities.astype(np.float64))
     pairs = np.stack([priorities.astype(np.float64), picking.specificities], axis=1)

@@ -11,7 +11,7 @@ from contextdb.compiled.casting.roles import roles_of_table
 from contextdb.compiled.casting.stage import query_with_actors
 from contextdb.compiled.choosing import Choosing
 from contextdb.compiled.data import CompiledData
-from contextdb.compiled.live import live_context
+from contextdb.compiled.live_asking import live_context
 
 
 def prepare(compiled: CompiledData, casting: bool = False, batches: bool = False) -> None:

@@ -25,7 +25,8 @@ from contextdb.compiled.casting.many import query_many_with_actors
 from contextdb.compiled.casting.stage import query_with_actors
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.explain import Explanation, explain
-from contextdb.compiled.live import LiveContext, live_context
+from contextdb.compiled.live import LiveContext
+from contextdb.compiled.live_asking import live_context
 from contextdb.compiled.lookup import UNUSUAL
 from contextdb.compiled.many import ManyMatches
 from contextdb.compiled.matches import Matches

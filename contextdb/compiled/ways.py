@@ -79,7 +79,7 @@ class WayTable:
 
     @cached_property
     def ranks(self) -> NDArray[np.float64]:
-        """What its policy goes by before chance, apart from costs, higher first: [R]."""
+        """What its policy ranks rows by before chance, apart from costs, higher first: [R]."""
         return ranks_of(self.policy, self.priorities, self.picking)
 
 

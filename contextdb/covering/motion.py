@@ -175,12 +175,7 @@ def motion_coverage(
         else dict(require_mapping(databases, "databases", DATABASES))
     )
     missing, unlisted = unmatched(config.databases.values(), project.folder, assets)
-    groups: dict[str | None, dict[str, MotionDatabase]] = {}
-    for name, settings in config.databases.items():
-        if name in built and not settings.roles:
-            groups.setdefault(settings.table, {})[name] = built[name]
-    if built and not groups:
-        raise MotionError(Fault("all databases hold joint clips, which follow no stick.", "clips that one character plays alone"))
+    groups = _by_table(config, built)
     tables = {name: table for name, table in project.tables.items() if name in groups}
     asked = _axes(tables, axes)
     options: dict[str, Any] = {"pattern": pattern, "near_cost": near_cost, "progress": progress}
@@ -190,6 +185,17 @@ def motion_coverage(
     if None in groups:
         found.append(TableMotion(coverage(groups[None], **options)))
     return ProjectMotion(tuple(found), tuple(unlisted))
+
+
+def _by_table(config: MotionConfig, built: Mapping[str, MotionDatabase]) -> dict[str | None, dict[str, MotionDatabase]]:
+    """The databases of each table, without those of joint clips; None: of no table."""
+    groups: dict[str | None, dict[str, MotionDatabase]] = {}
+    for name, settings in config.databases.items():
+        if name in built and not settings.roles:
+            groups.setdefault(settings.table, {})[name] = built[name]
+    if built and not groups:
+        raise MotionError(Fault("all databases hold joint clips, which follow no stick.", "clips that one character plays alone"))
+    return groups
 
 
 def _of_table(

@@ -139,7 +139,7 @@ def rows_for(
 ) -> ClipRows:
     """Read and describe the clips of a folder: in a project those of the databases of the table that is filled, where it has any.
 
-    `progress` gives, for the name of a part of the work, what is told of it clip by clip.
+    `progress` gives, for the name of a part of the work, the function that is called for each of its clips.
 
     Raises
     ------

@@ -74,7 +74,7 @@ def _require_xml(table: Table) -> None:
 
 
 def _plain(table: Table) -> list[str]:
-    """The columns that are not conditions; the enabled one is told by which rows there are."""
+    """The columns that are not conditions; the enabled one shows in which rows are written."""
     conditions = {column.condition.name for column in table.conditions}
     return [c.name for c in table.columns if c.name not in conditions and c.name != table.settings.enabled]
 

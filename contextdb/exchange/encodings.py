@@ -54,7 +54,7 @@ def _refusal(fault: Fault, file: str) -> TableError:
 
 
 def _old_windows(raw: bytes, file: str, error: UnicodeDecodeError) -> tuple[str, list[Remark]]:
-    """Text that is not UTF-8 is most likely that of an old Windows program in the west; the person is told a word to judge by."""
+    """Text that is not UTF-8 is most likely that of an old Windows program in the west; the message shows a word to judge by."""
     text = _decoded_as(raw, file, "cp1252")
     word = raw[max(error.start - 12, 0) : error.start + 12].decode("cp1252", "replace")
     said = f"byte 0x{raw[error.start]:02X} is not UTF-8; the file is read as Windows-1252: {in_quotes(word.strip())}."

@@ -9,7 +9,7 @@
     not CB                  not("CB")
     2026-01-01..            >= date("2026-01-01")
 
-An angle is told by its numbers from -180 to 180. What has no counterpart (tags and soft cells here; functions, variables and times
+An angle is written as numbers from -180 to 180. What has no counterpart (tags and soft cells here; functions, variables and times
 there) is reported by the callers with its place.
 
 Source: OMG, Decision Model and Notation 1.5, chapters 9 (S-FEEL) and 10.

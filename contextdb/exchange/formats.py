@@ -49,7 +49,7 @@ _BINARY_SIGNS = {"an Excel workbook (.xlsx)": "xlsx", "an old Excel workbook (.x
 
 @dataclass(frozen=True, slots=True)
 class ReadOptions:
-    """What a person may say of a file that is read; None: it is told from the file."""
+    """What a person may say of a file that is read; None: the file decides."""
 
     format: str | None = None
     sheet: str | None = None

@@ -27,7 +27,7 @@ MOST_LEVELS = 16
 
 
 def read_json(text: str, file: str, format_name: str = "json") -> Reading:
-    """Read rows from a JSON document or from JSON lines; which one it is, is told from the text.
+    """Read rows from a JSON document or from JSON lines; the text shows which of the two it is.
 
     A key that a row leaves out, and null, is an empty cell. A list is a set of names; an object inside an object becomes columns
     with a dot: {"Defender": {"speed": 3}} is the column Defender.speed.

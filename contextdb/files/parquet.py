@@ -34,7 +34,7 @@ _WHOLE = re.compile(r"[+-]?\d{1,40}")
 _NUMBER = re.compile(NUMBER_TEXT)
 _NAME = re.compile(r'(?:"((?:[^"]|"")*)"|([^\s"]+))(?:\s+|\Z)')
 _UNFIT = object()
-"""What stands for a text that has no value in a type."""
+"""The mark of a text that has no value in a type."""
 _STRINGS = (pl.String, pl.Categorical, pl.Enum)
 
 
@@ -135,7 +135,7 @@ def _frame(raw: bytes, file: str) -> pl.DataFrame:
         reason = str(error)
     except pl.exceptions.PolarsError as error:
         reason = shown(str(error).split("\n")[0], 200)
-    except (Exception, pl.exceptions.PanicException):  # some damage makes polars stumble instead of complain
+    except (Exception, pl.exceptions.PanicException):  # some damage makes polars panic instead of raise
         reason = "its parts contradict each other"
     raise TableError(Fault(f"the file is damaged: {reason}.", "a Parquet file as it was written", place=Place(file)))
 

@@ -1,6 +1,6 @@
 """What is in the way before a CSV can be read at all: other kinds of file, other encodings, other delimiters.
 
-Each is told by its bytes and named, so that nobody has to guess from a hundred strange rows what has happened to the file.
+Each is recognised by its bytes and named, so that nobody has to guess from a hundred strange rows what the file is.
 """
 
 from __future__ import annotations

@@ -14,13 +14,14 @@ Metres, seconds, y up; angles are positive to the left. numba makes the search f
 """
 
 from contextdb.errors import ClipError, MotionError, QueryError
-from contextdb.motion.characters.character import Character, CharacterState, Updated
+from contextdb.motion.characters.character import Character
 from contextdb.motion.characters.crowd import Crowd
 from contextdb.motion.characters.facts import FACTS, Moment
 from contextdb.motion.characters.motion_project import MotionProject
 from contextdb.motion.characters.one_off import OneOff
 from contextdb.motion.characters.paths import path_ahead, path_from
 from contextdb.motion.characters.readout import Readout
+from contextdb.motion.characters.updates import CharacterState, Updated
 from contextdb.motion.clips.clip import Clip, load_bvh, load_clips, parse_bvh, write_bvh
 from contextdb.motion.clips.doubts import ClipFinding, doubts_of
 from contextdb.motion.clips.feet import Footfalls, footfalls
@@ -58,19 +59,21 @@ from contextdb.motion.markup.marks import ANY_TAGS, Mark, Marks, TagFilter
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.markup.reserved import ReservedTag
 from contextdb.motion.markup.spans import Span
-from contextdb.motion.measuring.coverage import ClipContexts, ClipFrames, ContextCoverage, MotionCoverage, ToCapture, coverage
+from contextdb.motion.measuring.coverage import ClipFrames, ContextCoverage, MotionCoverage, ToCapture, coverage
 from contextdb.motion.measuring.measure import measure
 from contextdb.motion.measuring.measures import Measures
 from contextdb.motion.measuring.near_clips import Near
 from contextdb.motion.measuring.transition_names import TransitionCoverage
+from contextdb.motion.measuring.wanted import ClipContexts
 from contextdb.motion.nodes.joint_node import JointNode, JointPlay
 from contextdb.motion.nodes.match_gate import GateLook, MatchGate
 from contextdb.motion.nodes.match_node import MatchCosts, MatchNode, MatchPlay
 from contextdb.motion.nodes.pose_match import best_start, pose_schema
 from contextdb.motion.nodes.warping import Target, WarpShare
-from contextdb.motion.output.bank import PoseBank, Sample
+from contextdb.motion.output.bank import PoseBank
 from contextdb.motion.output.pose import CrowdPoses, Pose
 from contextdb.motion.output.retargeting import retargeted
+from contextdb.motion.output.samples import Sample
 from contextdb.motion.output.settings import PoseSettings
 from contextdb.motion.output.stream import PoseState, PoseStream
 from contextdb.motion.output.streams import PoseStreams

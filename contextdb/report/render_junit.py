@@ -1,7 +1,7 @@
 """Findings as JUnit XML: one suite a table, one case a rule, so that a case keeps its name from run to run.
 
 A case fails when its rule has a finding of a level that makes the check fail; its text then lists every place. What does not fail
-is told in the case's `system-out`. The first line is complete in itself: some CI systems show no more. No times and no dates, so
+is in the case's `system-out`. The first line is complete in itself: some CI systems show no more. No times and no dates, so
 the same findings give the same bytes.
 """
 

@@ -20,23 +20,23 @@ from contextdb.disk import TABLE_SUFFIXES
 from contextdb.errors import Fault, in_quotes, nearest, shown, some
 from contextdb.expressions import assumption_faults, derivation_faults
 from contextdb.files.file_names import alike
+from contextdb.files.toml_shapes import near_key, no_key, said_of
 from contextdb.files.toml_text import as_toml, what
 from contextdb.schema import shapes
 from contextdb.schema.jobs import columns_checked
 from contextdb.schema.outputs import outputs_faults
 from contextdb.schema.parts import (
-    Section,
+    Said,
     condition_of,
     fitting_of,
     header,
     mirror_of,
     number_of,
     parts_of,
-    said_of,
     shapes_of,
     table_files,
 )
-from contextdb.schema.shapes import KEY_SYNONYMS, SECTIONS, Shape, wrong_name
+from contextdb.schema.shapes import KEY_SYNONYMS, SECTIONS, wrong_name
 from contextdb.schema.toml_lines import Path
 
 Found = tuple[Path, Fault]
@@ -50,7 +50,7 @@ KINDS_WITH = {
 }
 
 
-def document_faults(document: Section) -> Iterator[Found]:
+def document_faults(document: Said) -> Iterator[Found]:
     """What is wrong in a file, but for its expressions."""
     for name, section in document.items():
         if name in SECTIONS:
@@ -66,7 +66,7 @@ def document_faults(document: Section) -> Iterator[Found]:
         yield from _blueprint_faults(("blueprints", name), fitting_of("blueprints", part), conditions)
 
 
-def expression_faults_in(document: Section) -> Iterator[Found]:
+def expression_faults_in(document: Said) -> Iterator[Found]:
     """What is wrong with derived facts and assumptions, for a document whose conditions are sound."""
     conditions = {name: condition_of(name, part) for name, part in parts_of(document, "conditions").items()}
     assumed = {name: fitting_of("tables", part).get("assume", ()) for name, part in parts_of(document, "tables").items()}
@@ -132,30 +132,27 @@ def part_faults(path: Path, part: object) -> Iterator[Found]:
                 yield (*path, *below), replace(fault, found=f"{header(path)} {fault.found}")
 
 
-def _key_faults(path: Path, part: Section) -> Iterator[Found]:
+def _key_faults(path: Path, part: Said) -> Iterator[Found]:
     shapes = shapes_of(path[0])
     for key, value in part.items():
         if key not in shapes:
             yield (*path, key), _no_key(path, key, value)
-        elif wrong := shapes[key].wrong(value):
-            meant = shapes[key].mend(value)
-            mend = "" if meant is None else said_of(key, meant)
-            yield (*path, key), Fault(f"{header(path)} {said_of(key, value)}: {wrong}.", shapes[key].accepted, mend)
+        elif fault := shapes[key].fault(header(path), key, value):
+            yield (*path, key), fault
 
 
 def _no_key(path: Path, key: str, value: object) -> Fault:
     shapes = shapes_of(path[0])
-    near = _near_key(key, shapes)
     if isinstance(value, Mapping) and len(path) == 2:
         mend = header((path[0], f"{path[1]}.{key}"))
         return Fault(f"{header(path)} {said_of(key, value)}: this is a table, not a key.", "a name with a dot in quotes", mend)
-    return Fault(f"{header(path)} has no key {in_quotes(str(key))}.", some(shapes, len(shapes)), in_quotes(near) if near else "")
+    return no_key(header(path), key, shapes, near_key(key, shapes, KEY_SYNONYMS))
 
 
-def _condition_faults(path: Path, part: Section) -> Iterator[Found]:
+def _condition_faults(path: Path, part: Said) -> Iterator[Found]:
     fitting = fitting_of("conditions", part)
     kind = fitting.get("type")
-    meant = {_near_key(key, shapes_of("conditions")) for key in part}
+    meant = {near_key(key, shapes_of("conditions"), KEY_SYNONYMS) for key in part}
     if "type" not in meant and not any(isinstance(v, Mapping) for k, v in part.items() if k != "mirror"):
         guess = 'type = "enum"' if "values" in part else 'type = "number"' if {"min", "max"} & part.keys() else ""
         yield path, Fault(f"{header(path)} has no type.", shapes_of("conditions")["type"].accepted, guess)
@@ -167,7 +164,7 @@ def _condition_faults(path: Path, part: Section) -> Iterator[Found]:
             yield (*path, key), _no_place(path, key, fitting)
     of = KINDS.get(cast("str", kind), NUMBER.type)
     if of.is_bounded:
-        bounds: Section = {key: fitting[key] for key in ("min", "max") if key in fitting}
+        bounds: Said = {key: fitting[key] for key in ("min", "max") if key in fitting}
         unread = {found[-1]: fault for found, fault in _unread_bounds(path, of, bounds)}
         yield from (((*path, key), fault) for key, fault in unread.items())
         if kind in KINDS:
@@ -179,13 +176,13 @@ def _condition_faults(path: Path, part: Section) -> Iterator[Found]:
         yield from _mirror_faults(path, fitting)
 
 
-def _no_place(path: Path, key: str, fitting: Section) -> Fault:
+def _no_place(path: Path, key: str, fitting: Said) -> Fault:
     found = f"{header(path)} {said_of(key, fitting[key])} has no place here: {KINDS[fitting['type']].unbounded}."
     accepted = f"{key} in a condition of type {' or '.join(KINDS_WITH[key])}"
     return Fault(found, accepted, 'type = "enum"' if key == "values" else "to leave it out")
 
 
-def _unread_bounds(path: Path, kind: Kind, bounds: Section) -> Iterator[Found]:
+def _unread_bounds(path: Path, kind: Kind, bounds: Said) -> Iterator[Found]:
     """Bounds that are no numbers as the type writes them."""
     for key, bound in bounds.items():
         said = f"{header(path)} {said_of(key, bound)}"
@@ -200,7 +197,7 @@ def _unread_bounds(path: Path, kind: Kind, bounds: Section) -> Iterator[Found]:
                 yield (*path, key), Fault(f"{said}: {error}.", kind.bound)
 
 
-def _bound_faults(path: Path, kind: Kind, bounds: Section) -> Iterator[Found]:
+def _bound_faults(path: Path, kind: Kind, bounds: Said) -> Iterator[Found]:
     ends = {key: number_of(kind, bound) for key, bound in bounds.items()}
     low, high = ends.get("min", -math.inf), ends.get("max", math.inf)
     if low > high:
@@ -215,7 +212,7 @@ def _bound_faults(path: Path, kind: Kind, bounds: Section) -> Iterator[Found]:
             yield (*path, key), Fault(f"{said}: {kind.noun} has whole bounds.", "a whole number", said_of(key, nearer(bound)))
 
 
-def _mirror_faults(path: Path, fitting: Section) -> Iterator[Found]:
+def _mirror_faults(path: Path, fitting: Said) -> Iterator[Found]:
     """Why the facts of a condition cannot change in a mirror as it says."""
     kind, mirror, values = KINDS[fitting["type"]], fitting["mirror"], fitting.get("values")
     said, key = f"{header(path)} {said_of('mirror', mirror)}", (*path, "mirror")
@@ -236,7 +233,7 @@ def _mirror_faults(path: Path, fitting: Section) -> Iterator[Found]:
         )
 
 
-def _partner_faults(conditions: Mapping[str, Section]) -> Iterator[Found]:
+def _partner_faults(conditions: Mapping[str, Said]) -> Iterator[Found]:
     """Of conditions without names that change places by their own names: those whose partner is not one of the same kind."""
     fitting = {name: fitting_of("conditions", part) for name, part in conditions.items()}
     partners: dict[str, str | None] = {}
@@ -274,7 +271,7 @@ def _unknown_partners(mirror: Mapping[str, str], is_tags: bool, values: Sequence
             yield Fault(found, "values that hold both", f"to add {in_quotes(image)} to the values")
 
 
-def column_faults(path: Path, table: Section, conditions: Set[str]) -> Iterator[Found]:
+def column_faults(path: Path, table: Said, conditions: Set[str]) -> Iterator[Found]:
     """Columns of a table that have two jobs, or that are declared as conditions."""
     for key, column, twice in columns_checked(table):
         if twice:
@@ -285,7 +282,7 @@ def column_faults(path: Path, table: Section, conditions: Set[str]) -> Iterator[
             yield (*path, key), Fault(found, "a column that is not a condition", mend)
 
 
-def _file_faults(tables: Mapping[str, Section]) -> Iterator[Found]:
+def _file_faults(tables: Mapping[str, Said]) -> Iterator[Found]:
     wrong_file = shapes_of("tables")["file"].wrong
     owners: dict[str, str] = {}
     for name, part in tables.items():
@@ -302,16 +299,9 @@ def _file_faults(tables: Mapping[str, Section]) -> Iterator[Found]:
         owners |= dict.fromkeys(standing - owners.keys(), name)
 
 
-def _blueprint_faults(path: Path, blueprint: Section, conditions: Set[str]) -> Iterator[Found]:
+def _blueprint_faults(path: Path, blueprint: Said, conditions: Set[str]) -> Iterator[Found]:
     for name in blueprint.get("conditions", ()):
         if name not in conditions:
             near = nearest(name, conditions)
             found = f"{header(path)} names the condition {in_quotes(name)}, which is not declared."
             yield (*path, "conditions"), Fault(found, some(conditions), in_quotes(near) if near else "")
-
-
-def _near_key(key: str, shapes: Mapping[str, Shape]) -> str | None:
-    if key in shapes:
-        return key
-    synonym = KEY_SYNONYMS.get(str(key).casefold())
-    return synonym if synonym in shapes else nearest(str(key), shapes)

@@ -18,9 +18,10 @@ from typing import Any
 
 from contextdb.cells.output_types import MOST_NUMBERS, OUTPUT_TYPES, OutputType, OutputValue, names_where
 from contextdb.cells.outputs import SLOT_COLUMNS, Output
-from contextdb.errors import Fault, in_quotes, nearest, shown, some
-from contextdb.files.toml_text import as_toml, dotted, what
-from contextdb.schema.shapes import KEY_SYNONYMS, KIND_SYNONYMS, NUMBER, TEXT, VALUES, Shape, wrong_name
+from contextdb.errors import Fault, in_quotes, nearest, some
+from contextdb.files.toml_shapes import Shape, near_key, no_key, nothing, one_of, said_of
+from contextdb.files.toml_text import dotted, what
+from contextdb.schema.shapes import KEY_SYNONYMS, KIND_SYNONYMS, NUMBER, TEXT, VALUES, wrong_name
 
 Found = tuple[tuple[str, ...], Fault]
 Said = Mapping[str, Any]
@@ -47,33 +48,21 @@ def _wrong_size(value: object) -> str | None:
     return None if 1 <= value <= MOST_NUMBERS else "there are no cells of so many numbers"
 
 
-def _wrong_type(value: object) -> str | None:
-    if not isinstance(value, str):
-        return f"this is {what(value)}, not text"
-    return None if value in OUTPUT_TYPES else "there is no such type"
-
-
-def _meant_type(value: object) -> object:
-    return TYPE_SYNONYMS.get(value.strip().casefold()) or nearest(value, OUTPUT_TYPES) if isinstance(value, str) else None
-
-
-def _anything(value: object) -> None:
-    return None
-
-
 OUTPUT_KEYS: Mapping[str, Shape] = {
-    "type": Shape(some(OUTPUT_TYPES), _wrong_type, _meant_type),
-    "default": Shape("a value of the output's type", _anything, _anything),
+    "type": one_of(tuple(OUTPUT_TYPES), "type", TYPE_SYNONYMS),
+    "default": Shape("a value of the output's type", nothing),
     "min": NUMBER,
     "max": NUMBER,
     "values": VALUES,
-    "size": Shape(f"a whole number from 1 to {MOST_NUMBERS}", _wrong_size, _anything),
+    "size": Shape(f"a whole number from 1 to {MOST_NUMBERS}", _wrong_size),
     "unit": TEXT,
     "description": TEXT,
 }
 """The keys of one output and what they accept."""
 
 FALLBACK_KEYS = ("asset", "outputs")
+MOST_SHOWN = 120
+"""Characters of a key and its value in a message."""
 
 
 def outputs_faults(said: Said) -> Iterator[Found]:
@@ -136,19 +125,9 @@ def _key_faults(path: tuple[str, ...], part: Said) -> Iterator[Found]:
     about = f"output {in_quotes(path[-1])}"
     for key, value in part.items():
         if key not in OUTPUT_KEYS:
-            near = _near_key(key)
-            yield (
-                (*path, key),
-                Fault(
-                    f"{about} has no key {in_quotes(str(key))}.",
-                    some(OUTPUT_KEYS, len(OUTPUT_KEYS)),
-                    in_quotes(near) if near else "",
-                ),
-            )
-        elif wrong := OUTPUT_KEYS[key].wrong(value):
-            meant = OUTPUT_KEYS[key].mend(value)
-            mend = "" if meant is None else _said(key, meant)
-            yield (*path, key), Fault(f"{about} {_said(key, value)}: {wrong}.", OUTPUT_KEYS[key].accepted, mend)
+            yield (*path, key), no_key(about, key, OUTPUT_KEYS, _near_key(key))
+        elif fault := OUTPUT_KEYS[key].fault(about, key, value, MOST_SHOWN):
+            yield (*path, key), fault
     if "type" not in map(_near_key, part):
         guess = _said("type", _guess(part)) if part else ""
         yield path, Fault(f"{about} has no type.", OUTPUT_KEYS["type"].accepted, guess)
@@ -199,11 +178,9 @@ def _fallback_faults(fallback: Said, declared: Iterable[Output] | None) -> Itera
     """What is wrong with a fallback that is a table; what it gives to outputs is looked at where those are known."""
     for key in fallback:
         if key not in FALLBACK_KEYS:
-            near = nearest(str(key), FALLBACK_KEYS)
-            mend = in_quotes(near) if near else ""
-            if declared is not None and key in (output.name for output in declared):
-                mend = _said("outputs", {key: fallback[key]})
-            yield ("fallback", key), Fault(f"fallback has no key {in_quotes(str(key))}.", some(FALLBACK_KEYS), mend)
+            fault = no_key("fallback", key, FALLBACK_KEYS, nearest(str(key), FALLBACK_KEYS))
+            is_output = declared is not None and key in (output.name for output in declared)
+            yield ("fallback", key), replace(fault, mend=_said("outputs", {key: fallback[key]})) if is_output else fault
     if "asset" not in fallback:
         yield ("fallback",), Fault("fallback names no asset.", _said("asset", "idle"))
     elif wrong := wrong_name(fallback["asset"]):
@@ -237,12 +214,7 @@ def _given_faults(given: Said, declared: Mapping[str, Output]) -> Iterator[Found
 
 
 def _near_key(key: str) -> str | None:
-    if key in OUTPUT_KEYS:
-        return key
-    synonym = KEY_SYNONYMS.get(str(key).casefold()) or (
-        "size" if str(key).casefold() in ("length", "count", "dimensions") else None
-    )
-    return synonym if synonym in OUTPUT_KEYS else nearest(str(key), OUTPUT_KEYS)
+    return near_key(key, OUTPUT_KEYS, KEY_SYNONYMS | dict.fromkeys(("length", "count", "dimensions"), "size"))
 
 
 def _guess(part: Said) -> str:
@@ -258,7 +230,7 @@ def _guess(part: Said) -> str:
 
 
 def _said(key: str, value: object) -> str:
-    return shown(f"{dotted((str(key),))} = {as_toml(value)}", 120)
+    return said_of(dotted((str(key),)), value, MOST_SHOWN)
 
 
 def _output(name: str, part: Said) -> Output:

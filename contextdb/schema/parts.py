@@ -13,11 +13,12 @@ from contextdb.cells.domains import Domain
 from contextdb.cells.kinds import KINDS, Kind
 from contextdb.disk import TABLE_SUFFIXES
 from contextdb.errors import shown
-from contextdb.files.toml_text import as_toml, dotted
-from contextdb.schema.shapes import SECTIONS, Shape
+from contextdb.files.toml_shapes import Shape
+from contextdb.files.toml_text import dotted
+from contextdb.schema.shapes import SECTIONS
 from contextdb.schema.toml_lines import Path
 
-Section = Mapping[str, Any]
+Said = Mapping[str, Any]
 
 
 def header(path: Path) -> str:
@@ -25,23 +26,18 @@ def header(path: Path) -> str:
     return shown(f"[{dotted(tuple(map(str, path)))}]")
 
 
-def said_of(key: str, value: object) -> str:
-    """A key with its value."""
-    return shown(f"{key} = {as_toml(value)}")
-
-
 def shapes_of(section: str) -> Mapping[str, Shape]:
     """What each key of a section accepts."""
     return SECTIONS[section] or {}
 
 
-def parts_of(document: Section, section: str) -> dict[str, Section]:
+def parts_of(document: Said, section: str) -> dict[str, Said]:
     """The named tables of a section, as far as they are tables."""
     parts = document.get(section)
     return {name: part for name, part in parts.items() if isinstance(part, Mapping)} if isinstance(parts, Mapping) else {}
 
 
-def fitting_of(section: str, part: Section) -> dict[str, Any]:
+def fitting_of(section: str, part: Said) -> dict[str, Any]:
     """What of a section can be used."""
     shapes = shapes_of(section)
     return {key: value for key, value in part.items() if key in shapes and shapes[key].wrong(value) is None}
@@ -62,7 +58,7 @@ def number_of(kind: Kind, bound: Any) -> float:
     return kind.spelling.read(str(bound))
 
 
-def condition_of(name: str, part: Section) -> Condition:
+def condition_of(name: str, part: Said) -> Condition:
     """The condition that a sound `[conditions.NAME]` declares."""
     values = tuple(part["values"]) if "values" in part else None
     kind = KINDS[part["type"]]

@@ -12,8 +12,8 @@ from typing import Any
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
-from contextdb.errors import Fault, SchemaError, in_quotes, nearest, shown, some
-from contextdb.files.toml_text import as_toml
+from contextdb.errors import Fault, SchemaError, in_quotes, nearest, some
+from contextdb.files.toml_shapes import no_key
 from contextdb.schema.faults import KINDS_WITH
 from contextdb.schema.jobs import columns_checked
 from contextdb.schema.outputs import fallback_to_toml, outputs_faults, outputs_to_toml
@@ -122,14 +122,9 @@ def settings_with(settings: TableSettings, said: Mapping[str, Any]) -> TableSett
     faults = []
     for key, value in said.items():
         if key not in shapes:
-            near = nearest(str(key), shapes)
-            faults.append(
-                Fault(f"a table has no setting {in_quotes(str(key))}.", some(shapes, len(shapes)), in_quotes(near) if near else "")
-            )
-        elif value is not None and (wrong := shapes[key].wrong(value)):
-            meant = shapes[key].mend(value)
-            mend = "" if meant is None else f"{key} = {as_toml(meant)}"
-            faults.append(Fault(f"{shown(f'{key} = {as_toml(value)}')}: {wrong}.", shapes[key].accepted, mend))
+            faults.append(no_key("a table", key, shapes, nearest(str(key), shapes), "setting"))
+        elif value is not None and (fault := shapes[key].fault("", key, value)):
+            faults.append(fault)
     if not faults:
         together = {key: value for key, value in {**settings_to_dict(settings), **said}.items() if value is not None}
         faults = [fault for _, fault in outputs_faults(together)]

@@ -32,7 +32,7 @@ from contextdb.schema.faults import (
 )
 from contextdb.schema.jobs import JOBS, columns_with_jobs
 from contextdb.schema.outputs import declared_outputs, fallback_of
-from contextdb.schema.parts import Section, condition_of, fitting_of, parts_of, table_files
+from contextdb.schema.parts import Said, condition_of, fitting_of, parts_of, table_files
 from contextdb.schema.shapes import Policy
 from contextdb.schema.toml_lines import key_lines, line_of, read_toml
 
@@ -239,7 +239,7 @@ def expression_faults(schema: Schema) -> Iterator[Fault]:
 # ---- from checked data
 
 
-def _schema(document: Section, file: str) -> Schema:
+def _schema(document: Said, file: str) -> Schema:
     return Schema(
         document.get("project", {}).get("name", ""),
         {name: condition_of(name, part) for name, part in parts_of(document, "conditions").items()},
@@ -255,11 +255,11 @@ def _schema(document: Section, file: str) -> Schema:
     )
 
 
-def _settings(name: str, part: Section) -> TableSettings:
+def _settings(name: str, part: Said) -> TableSettings:
     return replace(TableSettings(name), **settings_fields(part))
 
 
-def settings_fields(part: Section) -> dict[str, Any]:
+def settings_fields(part: Said) -> dict[str, Any]:
     """What the keys of a sound `[tables.NAME]` are in a `TableSettings`."""
     found: dict[str, Any] = {key: tuple(value) if isinstance(value, (list, tuple)) else value for key, value in part.items()}
     declared = declared_outputs(part.get("outputs", ()))

@@ -6,18 +6,17 @@
 from __future__ import annotations
 
 import datetime
-import json
 import math
 import numbers
 import re
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from pathlib import PurePosixPath, PureWindowsPath
 from typing import Literal, get_args
 
 from contextdb.cells.kinds import KINDS
 from contextdb.disk import TABLE_SUFFIXES
-from contextdb.errors import in_quotes, nearest, some
+from contextdb.errors import in_quotes, nearest
+from contextdb.files.toml_shapes import Shape, meant_number, one_of, wrong_text
 from contextdb.files.toml_text import as_toml, what
 
 Policy = Literal["collect", "first", "unique", "priority", "specific", "cheapest"]
@@ -48,29 +47,11 @@ KEY_SYNONYMS = {
 }
 
 
-@dataclass(frozen=True)
-class Shape:
-    """What a key accepts. `wrong` says what is wrong with a value, or None; `meant` is the value that was likely meant, or None."""
-
-    accepted: str
-    wrong: Callable[[object], str | None]
-    meant: Callable[[object], object]
-
-    def mend(self, value: object) -> object:
-        """What was likely meant, if that is accepted."""
-        meant = self.meant(value)
-        return None if meant is None or self.wrong(meant) else meant
-
-
 def wrong_name(value: object) -> str | None:
     """What is wrong with a name: of a condition, a table, a column, a value."""
     if not isinstance(value, str) or not value.strip():
-        return _wrong_text(value) or "this is empty"
+        return wrong_text(value) or "this is empty"
     return None if value == value.strip() else "a space is before or after it"
-
-
-def _wrong_text(value: object) -> str | None:
-    return None if isinstance(value, str) else f"this is {what(value)}, not text"
 
 
 def _wrong_number(value: object) -> str | None:
@@ -144,13 +125,6 @@ def _meant_file(value: object) -> object:
     return str(inside) if inside.suffix else f"{inside}.csv" if inside.name else None
 
 
-def _meant_number(value: object) -> object:
-    try:
-        return json.loads(value) if isinstance(value, str) else None
-    except (ValueError, RecursionError):
-        return None
-
-
 def _meant_text(value: object) -> object:
     if isinstance(value, bool) or not isinstance(value, (str, int, float)):
         return None
@@ -198,30 +172,20 @@ def _meant_mirror(value: object) -> object:
 
 
 def _wrong_transitions(value: object) -> str | None:
-    if wrong := _wrong_text(value):
+    if wrong := wrong_text(value):
         return wrong
     is_pattern = re.fullmatch(r"[^{}]*\{from\}[^{}]+\{to\}[^{}]*", str(value))
     return None if is_pattern else "this is no pattern of the names of transitions"
 
 
-def _one_of(words: Sequence[str], noun: str, synonyms: Mapping[str, str]) -> Shape:
-    def wrong(value: object) -> str | None:
-        return _wrong_text(value) or (None if value in words else f"there is no such {noun}")
-
-    def meant(value: object) -> object:
-        return synonyms.get(value.strip().casefold()) or nearest(value, words) if isinstance(value, str) else None
-
-    return Shape(some(words, len(words)), wrong, meant)
-
-
-TEXT = Shape('text, such as "m/s"', _wrong_text, _meant_text)
+TEXT = Shape('text, such as "m/s"', wrong_text, _meant_text)
 NAME = Shape('a name, such as "Asset Name"', wrong_name, _meant_text)
 EXPRESSION = Shape('an expression as text, such as "speed - target_speed"', wrong_name, _meant_text)
 EXPRESSIONS = Shape('a list of expressions, such as ["not (IsRunning and IsIdle)"]', _wrong_list, _meant_names(r"\A|\Z"))
-NUMBER = Shape("a number, such as -1.5", _wrong_number, _meant_number)
-WEIGHT = Shape("a number from 0 up, such as 2.0", _wrong_weight, _meant_number)
-HYSTERESIS = Shape("a number from 0 up, such as 0.2", _wrong_weight, _meant_number)
-BOUND = Shape("a number, such as -1.5", _wrong_bound, _meant_number)
+NUMBER = Shape("a number, such as -1.5", _wrong_number, meant_number)
+WEIGHT = Shape("a number from 0 up, such as 2.0", _wrong_weight, meant_number)
+HYSTERESIS = Shape("a number from 0 up, such as 0.2", _wrong_weight, meant_number)
+BOUND = Shape("a number, such as -1.5", _wrong_bound, meant_number)
 """A number as its type writes it; whether that fits is for the type to say."""
 NAMES = Shape('a list of different names, such as ["A", "B"]', _wrong_list, _meant_names(","))
 OUTPUTS = Shape(
@@ -246,7 +210,7 @@ TRANSITIONS = Shape(
 SECTIONS: dict[str, Mapping[str, Shape] | None] = {
     "project": {"name": TEXT, "transitions": TRANSITIONS},
     "conditions": {
-        "type": _one_of(tuple(KINDS), "type", KIND_SYNONYMS),
+        "type": one_of(tuple(KINDS), "type", KIND_SYNONYMS),
         "min": BOUND,
         "max": BOUND,
         "values": VALUES,
@@ -268,7 +232,7 @@ SECTIONS: dict[str, Mapping[str, Shape] | None] = {
         "cooldown_s": NAME,
         "cooldown_turns": NAME,
         "fallback": FALLBACK,
-        "policy": _one_of(POLICIES, "policy", POLICY_SYNONYMS),
+        "policy": one_of(POLICIES, "policy", POLICY_SYNONYMS),
         "assume": EXPRESSIONS,
         "when": NAME,
     },

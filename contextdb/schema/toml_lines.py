@@ -73,7 +73,7 @@ def _require_short_keys(text: str, file: str) -> None:
 
 
 def _bare(found: re.Match[str]) -> str:
-    """What stands for a string or a comment where only its lines count."""
+    """A string or a comment, replaced by what keeps its lines."""
     return "\n" * found[0].count("\n") or "q"
 
 

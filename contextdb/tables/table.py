@@ -77,7 +77,7 @@ class Table(TableData):
 
     @cached_property
     def faults(self) -> list[Fault]:
-        """Every cell that cannot be read, and every row that stands for a table that cannot stand there, in the order of rows."""
+        """Every cell that cannot be read, and every row that refers to a table that cannot be used there, in the order of rows."""
         return self._in_order(() if self.around is None else nesting_faults(self, self.around))
 
     def save(self, path: str | Path | None = None, overwrite: bool = False) -> Table:

@@ -16,7 +16,7 @@ MOST_COUNT = 1 << 40
 
 
 def moments_of(count: str | None, names: Sequence[str], chunk: Chunk, file: str) -> Counts:
-    """How many moments each row stands for: int64 [N]; 1 without a count column.
+    """The number of moments of each row: int64 [N]; 1 without a count column.
 
     Raises
     ------

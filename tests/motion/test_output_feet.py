@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from played import RATE, bank, decisions
 
 from contextdb.motion import PoseSettings, PoseStream
-from contextdb.motion.output import feet_loops, kernels
+from contextdb.motion.output import feet_loops, kernels, leg_kernels
 from contextdb.motion.output.feet import hinges_of
 from contextdb.motion.output.foot_state import POINT, SEEN, SHOWN, WIDTH
 from contextdb.motion.output.stages import damping
@@ -100,7 +100,7 @@ def bent(rotations, target, straight=STRAIGHT, ahead=(0.0, 0.0, 1.0)):
     """The leg's joints before and after it is bent to a target, and its rotations."""
     positions, world = placed(rotations)
     after = rotations.copy()
-    kernels.bend_leg(RIG.parents, positions, world, LEG, np.asarray(target), np.array(ahead), straight, after)
+    leg_kernels.bend_leg(RIG.parents, positions, world, LEG, np.asarray(target), np.array(ahead), straight, after)
     return positions, placed(after)[0], after
 
 
@@ -197,7 +197,7 @@ def test_hips_go_down_for_a_leg_without_a_step_in_their_speed():
     hip, ankle = positions[LEG[0]], positions[LEG[2]]
     ways = np.arange(0.0, 0.2, 0.001)
     places = ankle + ways[:, None] * (ankle - hip) / np.linalg.norm(ankle - hip)
-    down = np.array([kernels.too_high(positions, LEG, LEG[2], place, 0.0, 0.0, STRAIGHT, 0.0) for place in places])
+    down = np.array([leg_kernels.too_high(positions, LEG, LEG[2], place, 0.0, 0.0, STRAIGHT, 0.0) for place in places])
     assert down[0] == 0.0
     speeds = np.diff(down) / 0.001
     assert speeds[0] < 0.01

@@ -48,6 +48,6 @@ def test_what_is_no_mapping_is_told():
 
 
 def test_a_lock_that_is_neither_true_nor_false_is_told():
-    with pytest.raises(SchemaError, match=r'foot_lock = "yes": this is text. Accepted: true or false'):
+    with pytest.raises(SchemaError, match=r'foot_lock = "yes": this is text, neither true nor false. Accepted: true or false'):
         PoseSettings.from_dict({"foot_lock": "yes"})
     assert not PoseSettings.from_dict({"foot_lock": False}).foot_lock

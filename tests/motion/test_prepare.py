@@ -12,8 +12,8 @@ from contextdb import motion
 from contextdb.errors import ContextDBError
 from contextdb.motion.markup.reserved import ReservedTag
 from contextdb.motion.markup.spans import TOLERANCE_S
+from contextdb.motion.preparing.look import span_of_frames
 from contextdb.motion.preparing.proposal import KINDS
-from contextdb.motion.preparing.proposals import span_of_frames
 
 MADE = motion.made_clips()
 CLIPS = {made.name: made.clip for made in MADE}

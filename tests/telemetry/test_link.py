@@ -17,7 +17,8 @@ from links import FACTS, listening, meeting, next_lines, recorded, table, until
 import contextdb as cdb
 from contextdb import motion
 from contextdb.cells.facts import FactSet
-from contextdb.compiled.live import AskingLiveContext, LiveContext
+from contextdb.compiled.live import LiveContext
+from contextdb.compiled.live_asking import AskingLiveContext
 from contextdb.compiled.table import data_of
 from contextdb.telemetry.link.lines import given_facts
 from contextdb.telemetry.link.listeners import FileListener

@@ -132,11 +132,11 @@ def test_the_command_is_listed_and_explains_itself(folder):
 )
 def test_a_terminal_of_few_colours_shows_its_own(monkeypatch, term, colorterm, settings_theme, theme):
     from tui.editor_settings import EditorSettings
-    from tui.run import _theme_for
+    from tui.run import theme_for
 
     monkeypatch.setenv("TERM", term)
     monkeypatch.setenv("COLORTERM", colorterm)
-    assert _theme_for(EditorSettings(theme=settings_theme)) == theme
+    assert theme_for(EditorSettings(theme=settings_theme)) == theme
 
 
 def test_the_editor_starts_without_what_the_first_screen_does_not_need(tmp_path):

@@ -171,7 +171,7 @@ class Bars(Widget, can_focus=True):
         return Strip([Segment(text, plain + over), *self._bars(row, room)]).adjust_cell_length(width, self.rich_style)
 
     def to_chosen(self) -> None:
-        """Move the cursor to what is chosen; nobody is told."""
+        """Move the cursor to what is chosen, without a message."""
         self.at = next((i for i, row in enumerate(self.rows) if self.is_in(row, self.chosen)), self.at)
         self._keep_in_sight()
         self.refresh()

@@ -1,6 +1,6 @@
 """The timeline: what plays, when it was searched and jumped, and measures as strips, about the moment that is seen.
 
-A column of the screen stands for a stretch of time. The window is part of the session, or all of it; the line `session` is always
+A column of the screen shows a stretch of time. The window is part of the session, or all of it; the line `session` is always
 all of it: how often it jumps.
 """
 

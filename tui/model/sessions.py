@@ -37,7 +37,10 @@ def _is_of(path: Path, folder: Path) -> bool:
     """Whether a Parquet file is a session of the project, or says of none and lies in its folder."""
     import polars as pl
 
-    from contextdb.motion.trace.session import ABOUT_KEY, FORMAT_KEY  # loads the motion search, only where there is such a file
+    from contextdb.motion.trace.session_file import (  # loads the motion search, only where there is such a file
+        ABOUT_KEY,
+        FORMAT_KEY,
+    )
 
     try:
         told = pl.read_parquet_metadata(path)

@@ -31,7 +31,7 @@ from tui.model.views import Sort, sorted_rows
 
 
 class Recorder(Protocol):
-    """Who is told of every step, before the verb returns: the journal."""
+    """What hears of every step, before the verb returns: the journal."""
 
     def did(self, edit: Edit) -> None:
         """An edit was made."""

@@ -20,7 +20,7 @@ from contextdb.tables.table import Table
 from tui.model.query_row import QueryRow
 
 NEEDED = "(needed)"
-"""What stands for the cell of a role that is not filled."""
+"""The text for the cell of a role that is not filled."""
 State = Literal["fails", "unreadable", "disabled", "open", "holds", "not given"]
 """Of a cell that is open it is not known whether it holds: its rule lacks a fact, or it accepts some values of a set only."""
 

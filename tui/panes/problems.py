@@ -76,7 +76,7 @@ class ProblemsPane(Pane):
         self.problems = Problems()
         self.level: Level | None = None
         self.is_grouped = False
-        """One line stands for all problems of a kind in a column."""
+        """One line for all problems of a kind in a column."""
         self._of: tuple[Table, dict[str, Fault]] | None = None
         """The table and the faults of the test row that the problems are of."""
         self._found: list[Finding] = []

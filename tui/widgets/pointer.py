@@ -56,7 +56,7 @@ class Pointed(Protocol):
         """Edit the cell."""
 
     def action_open_row(self) -> None:
-        """Go into the table that the row stands for."""
+        """Go into the table that the row refers to."""
 
     def action_select_rows(self) -> None:
         """Select whole rows."""

@@ -61,7 +61,7 @@ _FOOT = """
 
 @dataclass(frozen=True)
 class Plain:
-    """How a fact that is no choice of declared values is kept in C: its type, what stands for a missing one, and its member."""
+    """How a fact that is no choice of declared values is kept in C: its type, the value of a missing one, and its member."""
 
     type: str
     missing: str

@@ -1,6 +1,6 @@
 """Which actor plays which role: assignments of distinct actors, and the best of them.
 
-Pure combinatorics over offers; which rows take whom, and which rules must hold, is told from outside.
+Pure combinatorics over offers; which rows take whom, and which rules must hold, are arguments.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """What changed between two tables, cell by cell.
 
-Rows are compared by asset and not by line; a change of meaning is told from one that only writes the same otherwise. `diff` gives
+Rows are compared by asset and not by line; a change of meaning is kept apart from a mere change of text. `diff` gives
 what changed, and the edit that does it. Nothing here touches the disk.
 """
 

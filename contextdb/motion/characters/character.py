@@ -16,8 +16,8 @@ import math
 import random
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
-from typing import TypedDict, Unpack
+from dataclasses import replace
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,102 +31,29 @@ from contextdb.motion.characters.paths import ahead_s, apart_of, back_s, path_fr
 from contextdb.motion.characters.played import Played
 from contextdb.motion.characters.project import HasTables, Parts
 from contextdb.motion.characters.tables import Facts, Tables, Unknown
-from contextdb.motion.clips.many_paths import ManyTrajectories
+from contextdb.motion.characters.updates import UNKNOWN, CharacterState, Options, Paths, Step, Updated
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.steering import Steered, steered_path
 from contextdb.motion.clips.trajectory import Trajectory, to_own_frame
 from contextdb.motion.features.extraction import Features, with_path
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.nodes.warping import Target
-from contextdb.motion.output.bank import Place3, PoseBank
+from contextdb.motion.output.bank import PoseBank
+from contextdb.motion.output.samples import Place3
 from contextdb.motion.output.stages import Ground as HeightOf
-from contextdb.motion.output.stream import Pose, PoseState, PoseStream
+from contextdb.motion.output.stream import Pose, PoseStream
 from contextdb.motion.search.database import MotionDatabase
-from contextdb.motion.selection.asked import Among, OfPenalties, OfTags, OfValid
+from contextdb.motion.selection.asked import OfValid
 from contextdb.motion.selection.controller import Clock, Controller
 from contextdb.motion.selection.controller_state import ControllerState
 from contextdb.motion.selection.decision import Decision, Playing
 from contextdb.motion.selection.root_motion import NO_MOTION, RootMotion
 from contextdb.motion.selection.variation import Rng
 from contextdb.motion.trace.session import MOST, Trace
-from contextdb.records import quickly_made
 
 AT_REST = Steered()
-UNKNOWN = ("error", "any", "never")
-Paths = ManyTrajectories | Sequence[Trajectory]
 PoseOf = Callable[["Character", float], ArrayLike]
 """Gives the pose features of a query, as all features of the schema: of a character and the seconds since its last update."""
-
-
-class Options(TypedDict, total=False):
-    """What a controller is asked with beside the query; see `Controller.update`."""
-
-    valid: OfValid | None
-    tags: OfTags | None
-    bias: Mapping[str, ArrayLike] | None
-    penalties: OfPenalties | None
-    among: Among | None
-    force: bool
-    interrupt: bool
-
-
-@dataclass(frozen=True, slots=True)
-class CharacterState:
-    """Where a character is: all that its next pose depends on beside what it is then given. Never changed, so it may be kept."""
-
-    body: Steered
-    apart: RootMotion
-    trail: tuple[tuple[float, Place3], ...]
-    controller: ControllerState
-    stream: PoseState | None
-
-
-@quickly_made
-@dataclass(frozen=True, eq=False, slots=True)
-class Updated:
-    """What one update of a character gave.
-
-    Attributes
-    ----------
-    body : Steered
-        Where the game has the body.
-    facts : mapping of str to object
-        Those of the game and the character's own.
-    paths, poses : sequence of Trajectory, of Pose
-        Those of the crowd that is updated together.
-    decision : Decision
-    at : int
-        Which of them are this one's.
-    """
-
-    body: Steered
-    facts: Facts
-    paths: Paths
-    decision: Decision
-    poses: Sequence[Pose | None] = ()
-    at: int = 0
-
-    @property
-    def path(self) -> Trajectory:
-        """The path that was wished for."""
-        return self.paths[self.at]
-
-    @property
-    def pose(self) -> Pose | None:
-        """The pose, made of the arrays of a crowd when it is asked for; None for a character without a stream."""
-        return self.poses[self.at] if self.poses else None
-
-
-@quickly_made
-@dataclass(frozen=True, eq=False, slots=True)
-class Step:
-    """Half an update: what a character is about to ask."""
-
-    dt_s: float
-    body: Steered
-    place: Place3
-    trail: tuple[tuple[float, Place3], ...]
-    facts: Facts
 
 
 class Character:

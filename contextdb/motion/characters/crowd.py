@@ -16,16 +16,17 @@ from contextdb.cells.arguments import require_kind, require_many_of, require_map
 from contextdb.errors import ContextError, Fault, MotionError, in_quotes, plural
 from contextdb.motion.arguments import HasAssets
 from contextdb.motion.characters import tables as asking
-from contextdb.motion.characters.character import Character, CharacterState, Paths, Step, Updated
+from contextdb.motion.characters.character import Character
 from contextdb.motion.characters.paths import MOST_TURN_RAD, ahead_s, back_s, shares_left
 from contextdb.motion.characters.tables import Facts, Table
+from contextdb.motion.characters.updates import CharacterState, Paths, Step, Updated
 from contextdb.motion.clips.many_paths import ManyTrajectories
 from contextdb.motion.clips.many_steered import ManySteered, steered_paths
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.features.extraction import with_path
 from contextdb.motion.features.many_queries import with_paths
-from contextdb.motion.output.bank import Place3
 from contextdb.motion.output.pose import Pose
+from contextdb.motion.output.samples import Place3
 from contextdb.motion.output.stream import PoseStream
 from contextdb.motion.output.streams import PoseStreams
 from contextdb.motion.selection.asked import OfValid

@@ -9,9 +9,10 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from contextdb.motion.characters.character import Character, Updated
+from contextdb.motion.characters.character import Character
 from contextdb.motion.characters.facts import Ground
 from contextdb.motion.characters.tables import Facts
+from contextdb.motion.characters.updates import Updated
 
 RADIUS_M = 2.0
 EVERY_S = 3.0

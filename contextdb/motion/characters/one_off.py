@@ -9,9 +9,10 @@ from dataclasses import replace
 
 from contextdb.cells.arguments import require_kind, require_real, require_text
 from contextdb.errors import ContextError, Fault
-from contextdb.motion.characters.character import Character, Updated
+from contextdb.motion.characters.character import Character
 from contextdb.motion.characters.facts import Ground
 from contextdb.motion.characters.tables import Facts
+from contextdb.motion.characters.updates import Updated
 from contextdb.motion.nodes.match_node import MatchPlay
 from contextdb.motion.selection.decision import Decision
 

@@ -1,6 +1,6 @@
 """The path of a character: how much of it a search must know, where it was, and how it comes to the path of the game's body.
 
-The animation is rarely where the game has the body. A search that is told only the body's path never hears of that; told where the
+The animation is rarely where the game has the body. A search that knows only the body's path never learns of that; told where the
 root really is, it prefers frames that lead back.
 """
 
@@ -16,7 +16,7 @@ from contextdb.errors import ContextError, Fault, MotionError
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.trajectory import Trajectory
 from contextdb.motion.features.schema import FeatureSchema
-from contextdb.motion.output.bank import Place3
+from contextdb.motion.output.samples import Place3
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.decision import Playing
 from contextdb.motion.selection.root_motion import RootMotion, between
@@ -24,7 +24,7 @@ from contextdb.motion.selection.root_motion import RootMotion, between
 RETURN_HALFLIFE_S = 0.27
 """How fast a character is wished to come to the path of the body; as fast as a body follows a stick."""
 MOST_TURN_RAD = math.radians(45.0)
-"""A character that faces farther away than this is told to be so far away: few clips turn more at once, and where none does, a path
+"""A character that faces farther away than this counts as so far away: few clips turn more at once, and where none does, a path
 that asks for all of it makes the search jump to and fro."""
 SETTLED_HALFLIVES = 15.0
 """After so many half-lives a body goes straight on, and so does a path beyond its end."""

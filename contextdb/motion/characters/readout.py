@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any, Protocol, runtime_checkable
 
 from contextdb.cells.arguments import require_kind
-from contextdb.motion.characters.character import Updated
+from contextdb.motion.characters.updates import Updated
 from contextdb.motion.selection.decision import Action, Decision, Playing
 
 

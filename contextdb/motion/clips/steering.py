@@ -18,12 +18,11 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from contextdb.cells.arguments import require_many_of, require_point, require_real
+from contextdb.cells.arguments import as_number, require_many_of, require_point, require_real
 from contextdb.errors import Fault, MotionError
 from contextdb.motion.clips.poses import LEAST_RATE, MOST_RATE
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.trajectory import MOST_REACH_S, Trajectory
-from contextdb.motion.reading import as_number
 from contextdb.records import quickly_made
 
 STANDING_MPS = 0.1

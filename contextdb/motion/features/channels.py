@@ -39,8 +39,8 @@ from dataclasses import dataclass
 from typing import Literal, TypeGuard, cast, get_args
 
 from contextdb.errors import in_quotes, shown
+from contextdb.files.toml_shapes import Section
 from contextdb.files.toml_text import as_toml, what
-from contextdb.motion.reading import Section, as_number
 
 ChannelType = Literal[
     "position", "velocity", "trajectory", "direction", "orientation", "angular_velocity", "phase", "custom", "permutation_time"
@@ -260,14 +260,12 @@ def _bone_channel(part: Section, kind: ChannelType, weight: float, group: str | 
 
 
 def _read_permuted(part: Section) -> bool:
-    value = part.part.get("permuted", False)
-    if not isinstance(value, bool):
-        part.wrong("permuted", f"this is {what(value)}, neither true nor false", "true or false")
-    elif value and "at" in part.part:
+    permuted = "permuted" in part.part and part.flag("permuted") is True
+    if permuted and "at" in part.part:
         part.add(
             f'{part.where} has both "at" and "permuted".', "one of them: a permuted channel looks ahead as its permutation does"
         )
-    return value is True
+    return permuted
 
 
 def _permutation_time(part: Section, kind: ChannelType, weight: float, group: str | None) -> Channel | None:
@@ -284,21 +282,12 @@ def _phase_channel(part: Section, kind: ChannelType, weight: float, group: str |
 def _custom_channel(part: Section, kind: ChannelType, weight: float, group: str | None) -> Channel | None:
     accepted = 'the name of a function given to with_functions, such as "reach"'
     function = part.text("function", accepted) if part.has("function", accepted) else None
-    size = _read_size(part) if "size" in part.part else 1
+    accepted = f"how many features the function gives, a whole number from 1 to {MOST_FEATURES}"
+    size = part.whole("size", accepted, 1, MOST_FEATURES) if "size" in part.part else 1
     at = _read_seconds(part)
     if function is None or size is None or at is None:
         return None
     return Channel(kind, weight, at=at, group=group, function=function, size=size)
-
-
-def _read_size(part: Section) -> int | None:
-    accepted = f"how many features the function gives, a whole number from 1 to {MOST_FEATURES}"
-    value = as_number(part.part.get("size"))
-    if value is not None and not value.is_integer():
-        part.wrong("size", "this is not whole", accepted)
-        return None
-    size = part.number("size", accepted, 1.0, MOST_FEATURES)
-    return None if size is None else int(size)
 
 
 def _trajectory_channel(part: Section, kind: ChannelType, weight: float, group: str | None) -> Channel | None:

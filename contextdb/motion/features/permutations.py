@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from contextdb.cells.arguments import require_real, require_whole
+from contextdb.files.toml_shapes import Section
 from contextdb.files.toml_text import what
 from contextdb.motion.features.channels import MOST_SECONDS
-from contextdb.motion.reading import Section, as_number
 
 MOST_PERMUTATIONS = 100
 ACCEPTED = "{ count = 5, step_s = 0.1 }"
@@ -60,8 +60,9 @@ def read_permutations(parent: Section) -> Permutations | None:
         parent.wrong("permutations", f"this is {what(value)}, not a table", ACCEPTED)
         return None
     n_faults = len(parent.faults)
-    section = Section(f"{parent.where} permutations", value, ("count", "step_s", "from_s"), parent.faults, parent.file)
-    count = _read_count(section)
+    section = parent.inside("permutations", value, ("count", "step_s", "from_s"))
+    accepted = f"how often each clip is searched, a whole number from 1 to {MOST_PERMUTATIONS}"
+    count = section.whole("count", accepted, 1, MOST_PERMUTATIONS) if section.has("count", accepted) else None
     accepted = f"seconds, above 0 and at most {MOST_SECONDS:g}, such as 0.1"
     step_s = 0.0
     if "step_s" in value or (count is not None and count > 1 and section.has("step_s", accepted)):
@@ -75,15 +76,3 @@ def read_permutations(parent: Section) -> Permutations | None:
     if found.seconds[-1] > MOST_SECONDS:
         section.add(f"{section.where}: the last looks {found.seconds[-1]:g} s ahead.", f"at most {MOST_SECONDS:g} s")
     return found
-
-
-def _read_count(section: Section) -> int | None:
-    accepted = f"how often each clip is searched, a whole number from 1 to {MOST_PERMUTATIONS}"
-    if not section.has("count", accepted):
-        return None
-    value = as_number(section.part["count"])
-    if value is not None and not value.is_integer():
-        section.wrong("count", "this is not whole", accepted)
-        return None
-    count = section.number("count", accepted, 1.0, MOST_PERMUTATIONS)
-    return None if count is None else int(count)

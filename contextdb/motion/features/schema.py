@@ -14,6 +14,7 @@ import numpy as np
 
 from contextdb.cells.arguments import require_mapping, require_text
 from contextdb.errors import Fault, SchemaError, in_quotes, nearest, shown, some
+from contextdb.files.toml_shapes import Mapped, Section
 from contextdb.files.toml_text import as_toml, what
 from contextdb.motion.clips.foot_bones import FootBones, Pair
 from contextdb.motion.clips.mirror import Pairs, pattern_fault
@@ -24,7 +25,6 @@ from contextdb.motion.clips.skeleton import Skeleton
 from contextdb.motion.clips.trajectory import Trajectory, root_trajectory
 from contextdb.motion.features.channels import Channel, What, check_together, is_pair, read_channel, read_pair
 from contextdb.motion.features.permutations import ACCEPTED, Permutations, read_permutations
-from contextdb.motion.reading import Mapped, Section
 
 __all__ = ["Channel", "CustomFunction", "FeatureSchema"]
 

@@ -24,14 +24,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contextdb.cells.arguments import require_kind, require_many, require_text
+from contextdb.cells.arguments import as_number, require_kind, require_many, require_text
 from contextdb.errors import Fault, MotionError, in_quotes, nearest, plural, some
 from contextdb.motion.arguments import Flags
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.clips.trajectory import to_own_frame
 from contextdb.motion.features.channels import MOST_WEIGHT
-from contextdb.motion.reading import as_number
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.layout import Features
 

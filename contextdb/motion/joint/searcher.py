@@ -19,7 +19,7 @@ from typing import Any, TypedDict, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from contextdb.cells.arguments import require_kind, require_many_of, require_mapping, require_whole
+from contextdb.cells.arguments import as_number, require_kind, require_many_of, require_mapping, require_whole
 from contextdb.errors import ContextError, Fault, MotionError, QueryError, in_quotes, nearest, some
 from contextdb.motion.clips.ground_place import A_BODY, GroundPlace, OfBody, place_of
 from contextdb.motion.clips.quaternions import Floats
@@ -33,7 +33,6 @@ from contextdb.motion.joint.hit import JointHit, nothing
 from contextdb.motion.joint.scan import Asked
 from contextdb.motion.markup.left_out import LeftOut, Skip
 from contextdb.motion.markup.marks import TagFilter
-from contextdb.motion.reading import as_number
 from contextdb.motion.search import cost
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.hit import NOTHING, Hit

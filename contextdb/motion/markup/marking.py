@@ -16,6 +16,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from contextdb.cells.arguments import as_number
 from contextdb.errors import Fault, MotionError
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
@@ -24,7 +25,6 @@ from contextdb.motion.markup.markup import Markup
 from contextdb.motion.markup.reserved import CONTACTS, MOST_SECONDS, ReservedTag
 from contextdb.motion.markup.spans import TOLERANCE_S, Span
 from contextdb.motion.ranges import check_ranges
-from contextdb.motion.reading import as_number
 
 MOST_RATE = 1e5
 
@@ -111,7 +111,7 @@ def marks_of(
     -----
     A span holds the frames from `from` to `to`, both within, to a millionth of a second. Cost modifiers add up. Of root motion
     weights, and of warps, one that names the asset is stronger than one with a pattern. A warp ends with its range; one that
-    starts behind the end is as good as none.
+    starts after the end has no effect.
     """
     per_second = _number(rate, "the rate", "frames a second, more than 0", 1.0 / MOST_SECONDS, MOST_RATE)
     end = _number(end_s, "end_s", "seconds, 0 or more", 0.0, MOST_SECONDS)

@@ -6,7 +6,7 @@
     vault,NextNaturalOnly,0.2,1.4,0.15
 
 Plain CSV. Columns in any order; `value` may be left out. Times are seconds since the start of the clip, both ends within; an empty
-`from` is the start, an empty `to` the end. `*` in an asset stands for any text. A tag is a reserved one, known in any case, or a
+`from` is the start, an empty `to` the end. `*` in an asset matches any text. A tag is a reserved one, known in any case, or a
 plain one of the project's own, with dots for hierarchy. A span is data; `marking.marks_of` turns spans
 into frames. Only `load` touches the disk.
 

@@ -7,10 +7,10 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 
+from contextdb.cells.arguments import as_number
 from contextdb.errors import Fault, in_quotes
 from contextdb.motion.markup.reserved import MOST_SECONDS, VALUE_RULES, ReservedTag, name_fault, reserved_of
 from contextdb.motion.markup.spans import TOLERANCE_S, Span
-from contextdb.motion.reading import as_number
 
 Found = tuple[int, str, Fault]
 """Which span, in which column, is at fault, and how."""

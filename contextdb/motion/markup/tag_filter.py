@@ -6,9 +6,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
+from contextdb.cells.arguments import as_number
 from contextdb.errors import Fault, QueryError, in_quotes
 from contextdb.motion.markup.reserved import MOST_COST
-from contextdb.motion.reading import as_number
 
 Penalties: TypeAlias = Mapping[str, float] | Iterable[tuple[str, float]]
 

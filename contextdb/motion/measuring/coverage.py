@@ -17,70 +17,25 @@ What goes ahead is judged in the map of turns alone.
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from contextdb.cells.arguments import require_kind, require_many, require_mapping, require_point, require_real, require_text
+from contextdb.cells.arguments import require_kind, require_many, require_mapping, require_real, require_text
 from contextdb.errors import Fault, MotionError, in_quotes
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.measuring.moves import DIRECTION, LEAST_FRAMES, MAPS, SPEED, TURN, WINDOW_S, Bin, Counts, Map, Moves, Span
+from contextdb.motion.measuring.moves import LEAST_FRAMES, MAPS, TURN, WINDOW_S, Counts, Moves
 from contextdb.motion.measuring.near_clips import NEAR_COST, Near, Tell, near_clips
 from contextdb.motion.measuring.transition_names import PATTERN, TransitionCoverage, transitions_of
 from contextdb.motion.measuring.usage import usable
+from contextdb.motion.measuring.wanted import Bools, ClipContexts, wanted_bins
 from contextdb.motion.search.database import MotionDatabase
 
-Bools = NDArray[np.bool_]
-ASKED = 'a mapping such as {"speed": [(0.0, 2.0)]}'
 MOST_ELSEWHERE = 3
 """So many clips are named that move as a hole asks, but are not valid there."""
 NO_FRAMES = {name: np.zeros(of.shape, np.int64) for name, of in MAPS.items()}
-
-
-@dataclass(frozen=True)
-class ClipContexts:
-    """Contexts in which the same clips may play.
-
-    Attributes
-    ----------
-    assets, mirrored : frozenset of str
-        The assets that are valid, and those that are valid mirrored: by mirrored facts.
-    share : float
-        0…1 of all contexts.
-    cells : mapping of str to str
-        The smallest box of cells that holds these contexts; conditions that it does not restrict are left out.
-    asked : mapping of str to spans
-        For "speed" (m/s), "turn" (degrees a second) and "direction" (degrees), as far as the table knows them, the spans asked for.
-    is_symmetric : bool
-        Whether they are the same contexts in a mirror.
-    """
-
-    assets: frozenset[str]
-    mirrored: frozenset[str]
-    share: float = 1.0
-    cells: Mapping[str, str] = field(default_factory=dict)
-    asked: Mapping[str, Sequence[Span]] = field(default_factory=dict)
-    is_symmetric: bool = True
-
-    def __post_init__(self) -> None:
-        for name in ("assets", "mirrored"):
-            listed = require_many(getattr(self, name), name, "the names of clips")
-            object.__setattr__(self, name, frozenset(require_text(each, f"one of {name}") for each in listed))
-        require_real(self.share, "share", 0.0, 1.0)
-        require_mapping(self.cells, "cells", "a mapping of conditions to cells")
-        for axis, spans in require_mapping(self.asked, "asked", ASKED).items():
-            for span in require_many(spans, f"asked[{axis!r}]", ASKED):
-                require_point(span, "a span", ASKED)
-
-    @property
-    def id(self) -> str:
-        """Of the same clips the same from run to run."""
-        text = "\0".join([*sorted(self.assets), "\1", *sorted(self.mirrored)])
-        return hashlib.blake2b(text.encode("utf-8", "surrogatepass"), digest_size=4).hexdigest()
 
 
 @dataclass(frozen=True, eq=False)
@@ -389,7 +344,7 @@ def _measured(clips: Sequence[ClipFrames], contexts: Sequence[ClipContexts]) -> 
         own = [numbers[asset] for asset in each.assets if asset in numbers]
         opposite = [numbers[asset] for asset in each.mirrored if asset in seen]
         frames = {name: plain[name][own].sum(axis=0) + mirrored[name][opposite].sum(axis=0) for name in MAPS}
-        wanted = {name: _wanted(MAPS[name], counts >= LEAST_FRAMES, each) for name, counts in frames.items()}
+        wanted = {name: wanted_bins(MAPS[name], counts >= LEAST_FRAMES, each) for name, counts in frames.items()}
         yield ContextCoverage(each, frames, wanted)
 
 
@@ -407,53 +362,6 @@ def _summed(counts: Iterable[Mapping[str, Counts]]) -> dict[str, Counts]:
 
 
 # ---- what is wanted
-
-
-def _wanted(of: Map, filled: Bools, each: ClipContexts) -> Bools:
-    """Which bins of a map are wanted in some contexts, from those that are filled."""
-    both = filled | filled[:, of.opposite] if each.is_symmetric else filled
-    across = TURN if of.name == TURN else DIRECTION
-    wanted = both | _between(both, axis=0) | (_beside(both) if of.is_round else _between(both, axis=1))
-    rows, columns = _asked(of.rows, each.asked.get(SPEED)), _asked(of.columns, each.asked.get(across))
-    needed: Bools = np.zeros(of.shape, np.bool_)
-    if rows is not None:
-        wanted &= rows[:, None]
-    if columns is not None:
-        wanted &= columns
-    if columns is not None:
-        needed[both.any(axis=1) if rows is None else rows] = columns
-    elif rows is not None and across == TURN:
-        needed[rows & ~both.any(axis=1), _straightest(of, both)] = True
-    wanted |= needed
-    if across == DIRECTION:
-        wanted[:, of.centre] = False
-    return np.asarray(wanted)
-
-
-def _straightest(of: Map, filled: Bools) -> int:
-    """The column nearest to straight ahead that is filled at any speed; straight ahead where none is."""
-    columns = np.flatnonzero(filled.any(axis=0)).tolist() or [of.centre]
-    return int(min(columns, key=lambda column: (abs(column - of.centre), column)))
-
-
-def _between(flags: Bools, axis: int) -> Bools:
-    """The bins with a filled one on both sides, or filled themselves."""
-    after = np.logical_or.accumulate(flags, axis=axis)
-    before = np.flip(np.logical_or.accumulate(np.flip(flags, axis=axis), axis=axis), axis=axis)
-    return np.asarray(after & before)
-
-
-def _beside(flags: Bools) -> Bools:
-    """On a circle: the bins with a filled one right beside them on both sides."""
-    return np.asarray(np.roll(flags, 1, axis=1) & np.roll(flags, -1, axis=1))
-
-
-def _asked(bins: Sequence[Bin], spans: Sequence[Span] | None) -> Bools | None:
-    """The bins whose middle is in a span that is asked for; None where nothing is."""
-    if spans is None:
-        return None
-    middles = [each.middle for each in bins]
-    return np.array([any(low <= middle <= high for low, high in spans) for middle in middles], np.bool_)
 
 
 def about_bins() -> dict[str, object]:

@@ -16,7 +16,8 @@ from contextdb.motion.clips.poses import LocalPoses, forward_kinematics
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints, Skeleton
 from contextdb.motion.measuring.formulas import Slides, accelerations, floor_of
-from contextdb.motion.output.bank import Flags, PoseBank
+from contextdb.motion.output.bank import PoseBank
+from contextdb.motion.output.samples import Flags
 
 ON_FRAME = 1e-4
 """A moment that is nearer to a frame, in frames, is on it."""

@@ -17,7 +17,7 @@ from contextdb.motion.clips.foot_bones import feet_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints, Skeleton
 from contextdb.motion.measuring.raw_clips import At, Clips, toe_of
-from contextdb.motion.output.bank import Flags
+from contextdb.motion.output.samples import Flags
 from contextdb.motion.output.stream import Pose
 from contextdb.motion.selection.decision import Action, Decision, Playing
 

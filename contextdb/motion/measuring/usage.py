@@ -10,7 +10,7 @@ import numpy as np
 from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.measuring.raw_clips import At
-from contextdb.motion.output.bank import Flags
+from contextdb.motion.output.samples import Flags
 from contextdb.motion.search.database import MotionDatabase
 
 

@@ -15,11 +15,11 @@ from typing import Unpack
 
 from numpy.typing import ArrayLike
 
+from contextdb.cells.arguments import as_number
 from contextdb.errors import Fault, MotionError, QueryError
 from contextdb.motion.arguments import Valid
 from contextdb.motion.nodes.match_node import MatchNode, MatchOptions, MatchPlay
 from contextdb.motion.nodes.warping import Target
-from contextdb.motion.reading import as_number
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.hit import Hit
 

@@ -23,7 +23,7 @@ from typing import TypedDict, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from contextdb.cells.arguments import require_kind, require_text
+from contextdb.cells.arguments import as_number, require_kind, require_text
 from contextdb.errors import Fault, MotionError, QueryError, in_quotes
 from contextdb.motion.arguments import Valid
 from contextdb.motion.clips.quaternions import Floats
@@ -32,7 +32,6 @@ from contextdb.motion.clips.trajectory import to_own_frame
 from contextdb.motion.features.channels import MOST_WEIGHT
 from contextdb.motion.markup.spans import TOLERANCE_S
 from contextdb.motion.nodes.warping import Target, WarpedPath, WarpShare, Window, warped, wrapped
-from contextdb.motion.reading import as_number
 from contextdb.motion.search.candidates import Candidates
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.filtering import Penalties, Tags

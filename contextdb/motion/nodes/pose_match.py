@@ -21,7 +21,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from contextdb.cells.arguments import require_kind, require_many, require_text
+from contextdb.cells.arguments import as_number, require_kind, require_many, require_text
 from contextdb.errors import Fault, MotionError, QueryError, in_quotes, nearest, some
 from contextdb.motion.arguments import HasAssets, Valid
 from contextdb.motion.clips.foot_bones import feet_of
@@ -31,7 +31,6 @@ from contextdb.motion.clips.skeleton import Skeleton, sided_pairs
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.markup.spans import TOLERANCE_S
 from contextdb.motion.markup.tag_filter import TagFilter
-from contextdb.motion.reading import as_number
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.filtering import Penalties
 from contextdb.motion.search.hit import Hit

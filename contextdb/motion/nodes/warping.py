@@ -25,12 +25,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from contextdb.cells.arguments import as_number
 from contextdb.errors import Fault, QueryError
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.trajectory import STANDING_MPS, to_own_frame
 from contextdb.motion.features.extraction import FARTHEST_M
 from contextdb.motion.markup.spans import TOLERANCE_S
-from contextdb.motion.reading import as_number
 from contextdb.motion.selection.root_motion import RootMotion
 
 STANDING_RADPS = 0.1

@@ -16,10 +16,8 @@ from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from types import ModuleType
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contextdb.cells.arguments import require_kind, require_many, require_real, require_text
 from contextdb.console import announce
@@ -34,12 +32,8 @@ from contextdb.motion.clips.skeleton import Ints, Skeleton
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.output.legs import leg_of, steps_of
+from contextdb.motion.output.samples import Flags, Frames, Moment, Place3, Sample, Singles
 from contextdb.motion.output.travel import travels
-
-Flags = NDArray[np.bool_]
-Singles = NDArray[np.float32]
-Place3 = tuple[float, float, float]
-"""x and z in metres and a heading in radians, or their change a second."""
 
 SAME_M = 1e-6
 """A joint that is never farther from its offset keeps it."""
@@ -58,49 +52,13 @@ def loops() -> ModuleType:
     return kernels
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Sample:
-    """A moment of a clip: rotations [J, 4] and positions [M, 3], and how fast they change: spins [J, 3], velocities [M, 3].
+@cache
+def leg_loops() -> ModuleType:
+    """The loops over the joints of a leg."""
+    from contextdb.motion.output import leg_kernels
 
-    `root_velocity` is in the body's own frame: to its left, ahead, and its turning.
-    """
-
-    rotations: Floats
-    positions: Floats
-    spins: Floats
-    velocities: Floats
-    root_velocity: Place3
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Moment:
-    """A moment of a clip to be shown.
-
-    Rotations [J, 4] and positions [M, 3]; where the clip has the body; how fast it goes to the left and ahead of its mean facing,
-    and how far it is turned from that; which feet are down; the nearest frame.
-    """
-
-    rotations: Floats
-    positions: Floats
-    root: Place3
-    travel: Place3
-    contacts: Flags
-    frame: int
-
-
-class Frames(NamedTuple):
-    """A bank as loops read it: its arrays, root and travel of each frame [N, 6], and of each range the first frame, the steps to
-    the last, and whether it loops."""
-
-    rotations: Singles
-    positions: Singles
-    root: Singles
-    ways: Floats
-    contacts: Flags
-    starts: Ints
-    n_steps: Ints
-    looping: Flags
-    rate: float
+    loops()  # says the word
+    return leg_kernels
 
 
 @dataclass(frozen=True, eq=False)

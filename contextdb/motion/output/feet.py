@@ -33,10 +33,11 @@ import numpy as np
 
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
-from contextdb.motion.output.bank import Flags, Place3, PoseBank
+from contextdb.motion.output.bank import PoseBank
 from contextdb.motion.output.foot_state import FAR_M, FREE, HIPS_DAMPING, LOCKED, POINT, SEEN
 from contextdb.motion.output.ground import Footing, Triple, standing, swinging
 from contextdb.motion.output.legs import LEFT, eased, hinge_of, leg_of
+from contextdb.motion.output.samples import Flags, Place3
 from contextdb.motion.output.stages import FEET, FOOT, FOOTING, FOOTINGS, HIPS, STRIDE, TURN, Columns, decayed
 
 GONE = (1.0, 0.0, 0.0)

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from contextdb.motion.output import kernels
+from contextdb.motion.output import leg_kernels
 from contextdb.motion.output.bank import STEP_S
 from contextdb.motion.output.foot_state import (
     BACK_SHARE,
@@ -153,7 +153,7 @@ def stand_all(
     for foot in range(n_feet):
         toes[foot] = max(joints[foot, 3], 0)
     if is_locking:
-        kernels.heights(parents, offsets, places, clip_rotations, clip_positions, toes, heights)
+        leg_kernels.heights(parents, offsets, places, clip_rotations, clip_positions, toes, heights)
     most = 0.0
     for foot in range(n_feet):
         to = to_feet[foot]
@@ -168,7 +168,7 @@ def stand_all(
                 to[OFFSET + i] = 0.0
             _free(to, False, over)
         shown = (to[SHOWN], to[SHOWN + 1], to[SHOWN + 2])
-        down = kernels.too_high(
+        down = leg_kernels.too_high(
             positions, joints[foot], joints[foot, 3], shown, footings[foot, 1], footings[foot, 2], STRAIGHT, hips
         )
         most = max(most, min(down, MOST_LOWER))
@@ -189,7 +189,7 @@ def stand_all(
         shown = (to_feet[foot, SHOWN], to_feet[foot, SHOWN + 1], to_feet[foot, SHOWN + 2])
         is_there = shown[0] == positions[toe, 0] and shown[1] == positions[toe, 1] and shown[2] == positions[toe, 2]
         if not is_there or footings[foot, 0] != 0.0 or footings[foot, 1] != 0.0 or footings[foot, 2] != 0.0:
-            kernels.stand(
+            leg_kernels.stand(
                 parents, positions, world, joints[foot], toe, hinges[foot], shown, footings[foot, 1], footings[foot, 2], STRAIGHT,
                 rotations,
             )  # fmt: skip

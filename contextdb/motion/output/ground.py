@@ -16,8 +16,8 @@ import numpy as np
 from contextdb.cells.arguments import require_real
 from contextdb.errors import ContextError, Fault
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.output.bank import Place3
 from contextdb.motion.output.legs import eased
+from contextdb.motion.output.samples import Place3
 from contextdb.motion.output.stages import Ground, decayed
 
 Triple = tuple[float, float, float]

@@ -102,7 +102,7 @@ def root_velocity(root, low, high, share, rate):
 
 
 @compiled
-def _product(a, b):
+def product(a, b):
     return (
         a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
         a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
@@ -112,22 +112,22 @@ def _product(a, b):
 
 
 @compiled
-def _inverse(a):
+def inverse(a):
     return (a[0], -a[1], -a[2], -a[3])
 
 
 @compiled
-def _cross(a, b):
+def cross(a, b):
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 @compiled
-def _turned(q, v):
+def rotated(q, v):
     """The vector turned by the rotation."""
     axis = (q[1], q[2], q[3])
-    t = _cross(axis, v)
+    t = cross(axis, v)
     t = (2.0 * t[0], 2.0 * t[1], 2.0 * t[2])
-    u = _cross(axis, t)
+    u = cross(axis, t)
     return (v[0] + q[0] * t[0] + u[0], v[1] + q[0] * t[1] + u[1], v[2] + q[0] * t[2] + u[2])
 
 
@@ -156,8 +156,8 @@ def _spin_of(turn, speed):
         first, second = 0.5, 1.0 / 6.0
     else:
         first, second = (1.0 - math.cos(a)) / (a * a), (a - math.sin(a)) / (a * a * a)
-    one = _cross(turn, speed)
-    two = _cross(turn, one)
+    one = cross(turn, speed)
+    two = cross(turn, one)
     return (
         speed[0] + first * one[0] + second * two[0],
         speed[1] + first * one[1] + second * two[1],
@@ -170,8 +170,8 @@ def _speed_of(turn, spin):
     """The inverse of `_spin_of`: how fast the rotation vector changes while exp(turn) spins; angles up to π."""
     a = math.sqrt(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2])
     second = 1.0 / 12.0 if a < 1e-3 else (1.0 - 0.5 * a / math.tan(0.5 * a)) / (a * a)
-    one = _cross(turn, spin)
-    two = _cross(turn, one)
+    one = cross(turn, spin)
+    two = cross(turn, one)
     return (
         spin[0] - 0.5 * one[0] + second * two[0],
         spin[1] - 0.5 * one[1] + second * two[1],
@@ -205,7 +205,7 @@ def slopes(rotations, positions, low, high, rate, to_spins, to_velocities):
     """How fast the joints turn (in their parents' frames) and move from one frame to the next."""
     first, second, from_positions, next_positions = rotations[low], rotations[high], positions[low], positions[high]
     for j in range(first.shape[0]):
-        turn = _turn(_product(four(second, j), _inverse(four(first, j))))
+        turn = _turn(product(four(second, j), inverse(four(first, j))))
         for i in range(3):
             to_spins[j, i] = rate * turn[i]
     for j in range(from_positions.shape[0]):
@@ -235,12 +235,12 @@ def leave(offsets, speeds, from_rotations, from_spins, to_rotations, to_spins, n
     for j in range(offsets.shape[0]):
         turn, speed = three(offsets, j), three(speeds, j)
         offset = _rotation(turn)
-        shown = _product(offset, four(from_rotations, j))
+        shown = product(offset, four(from_rotations, j))
         own = _spin_of(turn, speed)
-        carried = _turned(offset, three(from_spins, j))
-        rest = _product(shown, _inverse(four(to_rotations, j)))
+        carried = rotated(offset, three(from_spins, j))
+        rest = product(shown, inverse(four(to_rotations, j)))
         left = _turn(rest)
-        under = _turned(rest, three(to_spins, j))
+        under = rotated(rest, three(to_spins, j))
         spin = (own[0] + carried[0] - under[0], own[1] + carried[1] - under[1], own[2] + carried[2] - under[2])
         pace = _speed_of(left, spin)
         for i in range(3):
@@ -252,7 +252,7 @@ def leave(offsets, speeds, from_rotations, from_spins, to_rotations, to_spins, n
 def turn_by(offsets, rotations, to_rotations):
     """Rotations, each turned by its offset."""
     for j in range(offsets.shape[0]):
-        turned = _product(_rotation(three(offsets, j)), four(rotations, j))
+        turned = product(_rotation(three(offsets, j)), four(rotations, j))
         for i in range(4):
             to_rotations[j, i] = turned[i]
 
@@ -268,18 +268,18 @@ def fade_turns(left, spins, reach, share, slope, braking, playing, playing_spins
     """
     for j in range(left.shape[0]):
         spun, p = three(spins, j), three(playing_spins, j)
-        gone = _product(_rotation((reach * spun[0], reach * spun[1], reach * spun[2])), four(left, j))
-        between = _product(four(playing, j), _inverse(gone))
+        gone = product(_rotation((reach * spun[0], reach * spun[1], reach * spun[2])), four(left, j))
+        between = product(four(playing, j), inverse(gone))
         way = _turn(between)
         part = (share * way[0], share * way[1], share * way[2])
         over = _rotation(part)
-        mixed = _product(over, gone)
+        mixed = product(over, gone)
         own = (braking * spun[0], braking * spun[1], braking * spun[2])
-        carried = _turned(between, own)
+        carried = rotated(between, own)
         pace = _speed_of(way, (p[0] - carried[0], p[1] - carried[1], p[2] - carried[2]))
         grown = (slope * way[0] + share * pace[0], slope * way[1] + share * pace[1], slope * way[2] + share * pace[2])
         spin = _spin_of(part, grown)
-        under = _turned(over, own)
+        under = rotated(over, own)
         for i in range(4):
             to_rotations[j, i] = mixed[i]
         for i in range(3):
@@ -299,22 +299,22 @@ def align(parents, tops, places, spine, left, turn, rotations, positions):
     first = parents[spine[0]]
     above = (1.0, 0.0, 0.0, 0.0)
     while first >= 0:
-        above = _product(four(rotations, first), above)
+        above = product(four(rotations, first), above)
         first = parents[first]
     whole = (math.cos(0.5 * turn), 0.0, math.sin(0.5 * turn), 0.0)
     for k in range(tops.shape[0]):
-        turned = _product(whole, four(rotations, tops[k]))
-        moved = _turned(whole, three(positions, places[k]))
+        turned = product(whole, four(rotations, tops[k]))
+        moved = rotated(whole, three(positions, places[k]))
         for i in range(4):
             rotations[tops[k], i] = turned[i]
         for i in range(3):
             positions[places[k], i] = moved[i]
-    under = _product(whole, above)
+    under = product(whole, above)
     for k in range(spine.shape[0]):
-        above = _product(above, four(rotations, spine[k]))
+        above = product(above, four(rotations, spine[k]))
         angle = 0.5 * turn * left[k]
-        turned = _product((math.cos(angle), 0.0, math.sin(angle), 0.0), above)
-        own = _product(_inverse(under), turned)
+        turned = product((math.cos(angle), 0.0, math.sin(angle), 0.0), above)
+        own = product(inverse(under), turned)
         under = turned
         for i in range(4):
             rotations[spine[k], i] = own[i]
@@ -333,8 +333,8 @@ def place(parents, translations, rotations, x, z, heading, to_positions, to_worl
             start = (x, 0.0, z)
         else:
             above, start = four(to_world, p), three(to_positions, p)
-        moved = _turned(above, three(translations, j))
-        turned = _product(above, four(rotations, j))
+        moved = rotated(above, three(translations, j))
+        turned = product(above, four(rotations, j))
         for i in range(3):
             to_positions[j, i] = start[i] + moved[i]
         for i in range(4):
@@ -407,10 +407,10 @@ def _place_many(
     for j, p in enumerate(parents.tolist()):
         above = (cos, 0.0, sin, 0.0) if p < 0 else tuple(world[:, p].T)
         start = (x, 0.0, z) if p < 0 else tuple(placed[:, p].T)
-        moved = _turned(above, tuple(translations[:, j].T))
+        moved = rotated(above, tuple(translations[:, j].T))
         for i in range(3):
             placed[:, j, i] = start[i] + moved[i]
-        world[:, j] = np.stack(_product(above, tuple(turns[:, j].T)), axis=1)
+        world[:, j] = np.stack(product(above, tuple(turns[:, j].T)), axis=1)
     to_translations[at], to_positions[at], to_world[at] = translations, placed, world
 
 
@@ -418,136 +418,6 @@ place_rows: Any = _place_rows if hasattr(_place_rows, "stats") else _place_many
 
 
 # ---- legs
-
-
-@compiled
-def heights(parents, offsets, places, rotations, positions, joints, to_heights):
-    """How high some joints are over the root.
-
-    `places` says which row of `positions` [M, 3] is each joint's; below 0 it keeps its offset.
-    """
-    for k in range(joints.shape[0]):
-        j = joints[k]
-        x = (0.0, 0.0, 0.0)
-        while j >= 0:
-            t = three(positions, places[j]) if places[j] >= 0 else three(offsets, j)
-            x = (x[0] + t[0], x[1] + t[1], x[2] + t[2])
-            j = parents[j]
-            if j >= 0:
-                x = _turned(four(rotations, j), x)
-        to_heights[k] = x[1]
-
-
-@compiled
-def _about(axis, angle):
-    """The rotation about a unit axis."""
-    sine = math.sin(0.5 * angle)
-    return (math.cos(0.5 * angle), sine * axis[0], sine * axis[1], sine * axis[2])
-
-
-@compiled
-def _length(v):
-    return math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
-
-
-@compiled
-def _arc(u, v):
-    """The shortest rotation of one direction to another; none for directions without length, or opposite ones."""
-    size = _length(u) * _length(v)
-    w = size + u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
-    if size < 1e-12 or w < 1e-9 * size:
-        return (1.0, 0.0, 0.0, 0.0)
-    c = _cross(u, v)
-    n = math.sqrt(w * w + c[0] * c[0] + c[1] * c[1] + c[2] * c[2])
-    return (w / n, c[0] / n, c[1] / n, c[2] / n)
-
-
-@compiled
-def bend_leg(parents, positions, world, leg, target, ahead, straight, rotations):
-    """Bend a leg, its joints `leg` (hip, knee, ankle), so that its ankle comes to a target; the foot keeps its rotation.
-
-    `positions` and `world` place the joints; the leg's `rotations` against their parents are written. A knee that would be
-    straighter than `straight` (radians), and than it is, goes only a quarter of what is over: it never slams. What a knee bends
-    more than it does already it bends to where `ahead` is: the way a nearly stretched leg is bent to says nothing.
-    """
-    hip, knee, ankle = leg[0], leg[1], leg[2]
-    a, b, c = three(positions, hip), three(positions, knee), three(positions, ankle)
-    thigh, shin = (b[0] - a[0], b[1] - a[1], b[2] - a[2]), (c[0] - b[0], c[1] - b[1], c[2] - b[2])
-    way = (target[0] - a[0], target[1] - a[1], target[2] - a[2])
-    upper, lower = _length(thigh), _length(shin)
-    if upper < 1e-9 or lower < 1e-9:
-        return
-    far = min(max(_length(way), abs(upper - lower) + 1e-9), upper + lower)
-    axis = _cross(thigh, shin)
-    now = math.pi - math.atan2(_length(axis), thigh[0] * shin[0] + thigh[1] * shin[1] + thigh[2] * shin[2])
-    wanted = math.acos(min(max((upper * upper + lower * lower - far * far) / (2.0 * upper * lower), -1.0), 1.0))
-    limit = max(straight, now)
-    if wanted > limit:
-        wanted = limit + 0.25 * (wanted - limit)
-    back, size = (1.0, 0.0, 0.0, 0.0), _length(axis)
-    if size > 1e-6 * upper * lower:
-        axis = (axis[0] / size, axis[1] / size, axis[2] / size)
-        back = _about(axis, now - math.pi)
-    else:  # stretched: bent to no side of its own
-        back, now, axis = _arc(shin, thigh), math.pi, (0.0, 0.0, 0.0)
-    if wanted < now:
-        hinge = _cross(thigh, _cross(_cross((a[0] - c[0], a[1] - c[1], a[2] - c[2]), (ahead[0], ahead[1], ahead[2])), thigh))
-        size, more = _length(hinge), now - wanted
-        share = more / size if size > 1e-12 else 0.0
-        bent = math.pi - now
-        axis = (bent * axis[0] + share * hinge[0], bent * axis[1] + share * hinge[1], bent * axis[2] + share * hinge[2])
-    size = _length(axis)
-    if size < 1e-12:
-        return
-    bend = _product(_about((axis[0] / size, axis[1] / size, axis[2] / size), math.pi - wanted), back)
-    moved = _turned(bend, shin)
-    swing = _arc((thigh[0] + moved[0], thigh[1] + moved[1], thigh[2] + moved[2]), way)
-    new_hip = _product(swing, four(world, hip))
-    new_knee = _product(swing, _product(bend, four(world, knee)))
-    first = _product(_inverse(four(world, parents[hip])), new_hip)
-    second = _product(_inverse(new_hip), new_knee)
-    third = _product(_inverse(new_knee), four(world, ankle))
-    for i in range(4):
-        rotations[hip, i], rotations[knee, i], rotations[ankle, i] = first[i], second[i], third[i]
-
-
-@compiled
-def too_high(positions, leg, toe, place, along_x, along_z, straight, raised):
-    """By how much hips that are raised are too high for a leg to bring its toe to a place; 0 where they are not.
-
-    A leg reaches as far as it does now; and farther the harder, up to where its knee is `straight`: it does not come there at once.
-    """
-    a, b, c, t = three(positions, leg[0]), three(positions, leg[1]), three(positions, leg[2]), three(positions, toe)
-    tilt = _arc((0.0, 1.0, 0.0), (-along_x, 1.0, -along_z))
-    way = _turned(tilt, (t[0] - c[0], t[1] - c[1], t[2] - c[2]))
-    upper, lower = _length((b[0] - a[0], b[1] - a[1], b[2] - a[2])), _length((c[0] - b[0], c[1] - b[1], c[2] - b[2]))
-    now = _length((c[0] - a[0], c[1] - a[1], c[2] - a[2]))
-    room = math.sqrt(upper * upper + lower * lower - 2.0 * upper * lower * math.cos(straight)) - now
-    x, y, z = place[0] - way[0] - a[0], a[1] + raised - place[1] + way[1], place[2] - way[2] - a[2]
-    over = math.sqrt(x * x + y * y + z * z) - now
-    if over <= 0.0:
-        return 0.0
-    reach = now + over * room / math.sqrt(room * room + over * over) if room > 0.0 else now
-    return y - math.sqrt(max(reach * reach - x * x - z * z, 0.0))
-
-
-@compiled
-def stand(parents, positions, world, leg, toe, hinge, place, along_x, along_z, straight, rotations):
-    """Bend a leg so that its toe comes to a place, its foot turned by the slope of the ground, which rises along x and z.
-
-    `hinge` is the axis that its knee bends about, against its hip.
-    """
-    ankle = leg[2]
-    tilt = _arc((0.0, 1.0, 0.0), (-along_x, 1.0, -along_z))
-    turned = _product(tilt, four(world, ankle))
-    for i in range(4):
-        world[ankle, i] = turned[i]
-    a, c, t = three(positions, leg[0]), three(positions, ankle), three(positions, toe)
-    way = _turned(tilt, (t[0] - c[0], t[1] - c[1], t[2] - c[2]))
-    axis = _turned(four(world, leg[0]), (hinge[0], hinge[1], hinge[2]))
-    ahead = _cross(axis, (a[0] - c[0], a[1] - c[1], a[2] - c[2]))
-    target = (place[0] - way[0], place[1] - way[1], place[2] - way[2])
-    bend_leg(parents, positions, world, leg, target, ahead, straight, rotations)
 
 
 IS_COMPILED = hasattr(sample, "stats")

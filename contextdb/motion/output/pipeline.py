@@ -14,10 +14,11 @@ from contextdb.cells.arguments import require_kind, require_mapping
 from contextdb.console import announce
 from contextdb.errors import Fault, MotionError, in_quotes, nearest, some
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.output.bank import Flags, PoseBank, tops_of
+from contextdb.motion.output.bank import PoseBank, tops_of
 from contextdb.motion.output.feet import OnGround, hinges_of, legs_of
 from contextdb.motion.output.ground import ManyGround, Triple, below, below_many
 from contextdb.motion.output.pose import CrowdPoses
+from contextdb.motion.output.samples import Flags
 from contextdb.motion.output.settings import PoseSettings
 from contextdb.motion.output.spine import spine_of
 from contextdb.motion.output.stages import (

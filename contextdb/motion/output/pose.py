@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import overload
 
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.output.bank import Flags, Place3
+from contextdb.motion.output.samples import Flags, Place3
 from contextdb.motion.selection.decision import Playing
 
 

@@ -25,7 +25,7 @@ from contextdb.motion.clips.foot_bones import feet_of
 from contextdb.motion.clips.poses import LocalPoses, Poses, forward_kinematics, local_poses
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Skeleton
-from contextdb.motion.output.bank import loops
+from contextdb.motion.output.bank import leg_loops
 from contextdb.motion.output.legs import Leg, leg_of
 from contextdb.motion.output.track import clip_of_tracks
 
@@ -167,7 +167,7 @@ def _rotations(rig: Skeleton, shown: Poses, own: Mapping[int, int]) -> Floats:
 
 def _bend(rig: Skeleton, leg: Leg, placed: Poses, ankles: Floats, rotations: Floats) -> None:
     """Bend a leg in each frame so that its ankle is where it is to be."""
-    kernels, parents = loops(), np.asarray(rig.parents, np.int64)
+    kernels, parents = leg_loops(), np.asarray(rig.parents, np.int64)
     ahead = quaternions.rotate(placed.rotations[:, rig.hips], np.array([0.0, 0.0, 1.0]))
     for frame in range(placed.n_frames):
         of_frame = placed.positions[frame], placed.rotations[frame], leg.joints, ankles[frame], ahead[frame]

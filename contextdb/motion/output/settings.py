@@ -31,10 +31,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from typing import Any, Literal, get_args
 
-from contextdb.cells.arguments import require_mapping
+from contextdb.cells.arguments import as_number, require_mapping
 from contextdb.errors import Fault, MotionError, SchemaError, in_quotes, nearest, some
+from contextdb.files.toml_shapes import Mapped, Section
 from contextdb.files.toml_text import what
-from contextdb.motion.reading import Mapped, Section, as_number
 
 RootMode = Literal["animation", "code", "mixed", "path"]
 Blend = Literal["spring", "dead", "none"]
@@ -145,11 +145,7 @@ class PoseSettings:
         section = Section(f"[output.{name}]", part, KEYS, faults, file)
         said: dict[str, Any] = {key: section.one_of(key, WORDS[key], "word") for key in WORDS if key in part}
         said |= {key: section.number(key, *NUMBERS[key]) for key in NUMBERS if key in part}
-        for key in FLAGS:
-            if key in part:
-                said[key] = part[key]
-                if not isinstance(part[key], bool):
-                    section.wrong(key, f"this is {what(part[key])}", TRUTH)
+        said |= {key: section.flag(key) for key in FLAGS if key in part}
         if faults:
             raise SchemaError(*faults)
         return cls(**said)

@@ -22,7 +22,7 @@ import numpy as np
 
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
-from contextdb.motion.output.bank import Place3
+from contextdb.motion.output.samples import Place3
 
 Ground = Callable[[float, float], tuple[float, tuple[float, float, float]] | None]
 

@@ -27,7 +27,7 @@ BEYOND = 0.15
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """How a number is told apart: clips nearer than `bin_width` are of one kind; a cell reaches beyond the middle by so
+    """How numbers are distinguished: clips nearer than `bin_width` are of one kind; a cell reaches beyond the middle by so
     much at least and at most."""
 
     bin_width: float

@@ -11,38 +11,28 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from functools import cache, cached_property, partial
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.cells.arguments import require_callable, require_kind, require_many, require_many_of
 from contextdb.errors import ContextError, Fault, MotionError, in_quotes, nearest, some
-from contextdb.motion.clips import quaternions
 from contextdb.motion.clips.clip import Clip
 from contextdb.motion.clips.contacts import spans_of
-from contextdb.motion.clips.feet import Footfalls
 from contextdb.motion.clips.foot_bones import UNDECLARED
-from contextdb.motion.clips.poses import Poses, poses_of
 from contextdb.motion.clips.prepared_root import prepared_path
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.clips.trajectory import Trajectory, root_trajectory
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.markup.reserved import CONTACTS, ReservedTag
-from contextdb.motion.preparing.clip_facts import ENDS_S, SLOW_SHARE, STANDING_MPS, Moments, falls_of, require_finite, step_of
+from contextdb.motion.preparing.clip_facts import ENDS_S, STANDING_MPS, step_of
+from contextdb.motion.preparing.look import LOOP_M, Look
 from contextdb.motion.preparing.proposal import KINDS, N_SAMPLES, Kept, Kind, Proposal, Shape
 
-NEAR_MS = 1e-6
-"""Times that differ by less are the same."""
 ROOT_SMOOTH_S = 0.2
 """What is proposed for `root_smooth_s`: it evens out a step, and keeps a start and a bend."""
 SWAY_M, SWAY_DEG = 0.01, 3.0
 """Hips that are farther than this from the body's prepared path, or turned, for a twentieth of the time, sway."""
-LOOP_M, LOOP_MPS = 0.03, 0.3
-"""A clip loops where its joints are so near at both ends, and so alike in speed: root mean squares."""
-LOOP_SHARE = 0.15
-"""Of the body's speed: so unlike may these speeds be, where that is more."""
 SMOOTH_SHARE = 0.95
 """Or where speeds change no more from its end to its start than in this share of its frames: a foot that comes down there changes
 them at once."""
@@ -55,8 +45,6 @@ NEAR_STANDING_S = 0.1
 """So much of a stand before a start is part of it."""
 AT_SPEED = 0.9
 """Of its middle speed: a start is over."""
-ENTRY_S = 0.2
-"""The entry zone of a start and of a turn."""
 BENDING_DPS, TURNING_DPS, LEAST_TURN_DEG, LONGEST_TURN_S = 25.0, 50.0, 60.0, 3.0
 """A turn begins and ends at the first rate, and comes to the second."""
 LONGEST_ONE_OFF_S, LEAST_WAY_M = 6.0, 0.3
@@ -70,96 +58,6 @@ END_SHARE = 0.1
 ALIKE_M, ALIKE_S = 0.02, 0.05
 """Clips are near-duplicates whose joints are on the mean so near at the same share of the clip, and whose lengths differ by such a
 share."""
-
-
-@dataclass(frozen=True, eq=False)
-class Look:
-    """A clip as it is looked at."""
-
-    clip: Clip
-    poses: Poses
-    path: Trajectory
-    falls: Footfalls | None
-
-    @classmethod
-    def at(cls, clip: Clip) -> Look:
-        """Look at a clip of one frame or more."""
-        poses = poses_of(clip)
-        require_finite(clip, poses)
-        return cls(clip, poses, root_trajectory(poses), falls_of(poses))
-
-    @cached_property
-    def own(self) -> Floats:
-        """Where the joints are against the body's place on the ground and its heading: [F, J, 3]."""
-        origin = np.stack((self.path.positions[:, 0], np.zeros(self.poses.n_frames), self.path.positions[:, 1]), axis=-1)
-        half = -self.path.headings / 2.0
-        turn = np.stack((np.cos(half), np.zeros_like(half), np.sin(half), np.zeros_like(half)), axis=-1)
-        return quaternions.rotate(turn[:, None, :], self.poses.positions - origin[:, None])
-
-    @cached_property
-    def own_speeds(self) -> Floats:
-        """How fast they move there: [F, J, 3]."""
-        if self.poses.n_frames < 3:
-            return np.zeros_like(self.own)
-        return np.asarray(np.gradient(self.own, 1.0 / self.poses.rate, axis=0, edge_order=2))
-
-    @cached_property
-    def speeds(self) -> Floats:
-        """How fast the body goes over the ground about each frame, over a fifth of a second: [F]."""
-        n, last = max(1, round(ENDS_S * self.poses.rate / 2.0)), self.poses.n_frames - 1
-        at = np.arange(last + 1)
-        before, behind = np.maximum(at - n, 0), np.minimum(at + n, last)
-        moved = np.linalg.norm(self.path.positions[behind] - self.path.positions[before], axis=-1)
-        return np.asarray(moved * self.poses.rate / np.maximum(behind - before, 1))
-
-    @cached_property
-    def moments(self) -> Moments:
-        """The clip step by step."""
-        return Moments.of(self.path, step_of(self.falls))
-
-    @property
-    def rate(self) -> float:
-        """Frames a second."""
-        return self.poses.rate
-
-    @property
-    def stands_mps(self) -> float:
-        """Slower than this it stands."""
-        return min(STANDING_MPS, SLOW_SHARE * self.usual_mps)
-
-    @property
-    def loop_mps(self) -> float:
-        """How alike in speed its ends must be for it to loop: the faster a body goes, the faster its limbs change."""
-        return max(LOOP_MPS, LOOP_SHARE * self.usual_mps)
-
-    @property
-    def usual_mps(self) -> float:
-        """The middle speed."""
-        return float(np.median(self.moments.speeds))
-
-    def said(self, kind: Kind, tag: str | None, first: int | None, last: int | None, reason: str, measure: float) -> Proposal:
-        """A proposal about frames from `first` to `last`."""
-        begin, end = span_of_frames(first, last, self.rate)
-        if tag == ReservedTag.EXCLUDED:
-            begin, end = span_about_frames(first, last, self.rate)
-        value = None
-        if tag == ReservedTag.NEXT_NATURAL_ONLY and begin is not None and end is not None:
-            value = min(ENTRY_S, math.floor(100.0 * (end - begin)) / 100.0)  # no longer than the span
-        return Proposal(self.clip.name, kind, tag, begin, end, value, reason, round(measure, 4))
-
-
-def span_of_frames(first: int | None, last: int | None, rate: float) -> tuple[float | None, float | None]:
-    """The seconds of a span that holds these frames and, below 1,000 frames a second, no other: rounded outwards to 0.001 s."""
-    begin = None if first is None else math.floor(1000.0 * first / rate + NEAR_MS) / 1000.0
-    end = None if last is None else math.ceil(1000.0 * last / rate - NEAR_MS) / 1000.0
-    return begin, end
-
-
-def span_about_frames(first: int | None, last: int | None, rate: float) -> tuple[float | None, float | None]:
-    """The seconds between the frames beside these: at another rate, all that these have a part in."""
-    begin = None if first is None else math.floor(1000.0 * (first - 1) / rate + NEAR_MS + 1.0) / 1000.0
-    end = None if last is None else math.ceil(1000.0 * (last + 1) / rate - NEAR_MS - 1.0) / 1000.0
-    return begin, end
 
 
 def prepare(

@@ -20,13 +20,12 @@ from dataclasses import dataclass, replace
 
 from numpy.typing import ArrayLike
 
-from contextdb.cells.arguments import require_kind
+from contextdb.cells.arguments import as_number, require_kind
 from contextdb.errors import Fault, MotionError, QueryError, in_quotes
 from contextdb.motion import arguments
 from contextdb.motion.clips.ground_place import GroundPlace, OfBody, place_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.markup.tag_filter import TagFilter
-from contextdb.motion.reading import as_number
 from contextdb.motion.search.candidates import Candidates
 from contextdb.motion.search.filtering import Tags
 from contextdb.motion.search.filters import Filter

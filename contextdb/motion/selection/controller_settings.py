@@ -25,9 +25,9 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
+from contextdb.cells.arguments import as_number
 from contextdb.errors import Fault, MotionError, in_quotes, some
-from contextdb.files.toml_text import what
-from contextdb.motion.reading import Mapped, Section, as_number
+from contextdb.files.toml_shapes import Mapped, Section
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.variation import Variation
 
@@ -140,7 +140,7 @@ def read_controllers(
         if "cost_bar" in part:
             values["cost_bar"] = section.number("cost_bar", BAR, 0.0, MOST_COST)
         if "until_natural" in part:
-            values["until_natural"] = _read_flag(section, "until_natural")
+            values["until_natural"] = section.flag("until_natural")
         values |= {key: section.number(key, *RATES[key]) for key in RATES if key in part}
         variation = _read_variation(section)
         if len(faults) == n_faults and selector is not None:
@@ -150,14 +150,6 @@ def read_controllers(
 def _read_selector(section: Section, selectors: list[str]) -> str | None:
     accepted = some(selectors) or "the name of a [selectors.NAME]"
     return section.one_of("selector", selectors, "selector") if section.has("selector", accepted) else None
-
-
-def _read_flag(section: Section, key: str) -> bool | None:
-    value = section.part[key]
-    if isinstance(value, bool):
-        return value
-    section.wrong(key, f"this is {what(value)}, neither true nor false", "true or false")
-    return None
 
 
 def _read_variation(section: Section) -> Variation | None:

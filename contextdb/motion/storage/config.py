@@ -18,13 +18,13 @@ from typing import TypedDict, TypeVar, Unpack
 
 from contextdb.cells.arguments import require_mapping, require_text
 from contextdb.errors import ClipError, Fault, FileError, MotionError, Place, SchemaError, in_quotes, nearest, shown, some
+from contextdb.files.toml_shapes import Mapped, Section
 from contextdb.files.toml_text import as_toml, what
 from contextdb.motion.clips.clip import Clip
 from contextdb.motion.features.schema import CustomFunction, FeatureSchema
 from contextdb.motion.joint.database import JointDatabase
 from contextdb.motion.joint.searcher import JointSearcher
 from contextdb.motion.output.settings import PoseSettings
-from contextdb.motion.reading import Mapped, Section
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.controller import Clock, Controller
 from contextdb.motion.selection.controller_settings import ControllerSettings, read_controllers
@@ -261,11 +261,12 @@ def _read_selectors(
 
 
 def _read_step(section: Section, i: int, step: object, n_steps: int, known: list[str]) -> tuple[str | None, float | None]:
-    where = f"{section.where} order {i + 1}"
     if not isinstance(step, Mapping):
-        section.add(f"{where} is {shown(as_toml(step))}: this is {what(step)}, not a table.", '{ database = "jog" }')
+        section.add(
+            f"{section.where} order {i + 1} is {shown(as_toml(step))}: this is {what(step)}, not a table.", '{ database = "jog" }'
+        )
         return None, None
-    part = Section(where, step, STEP_KEYS, section.faults, section.file)
+    part = section.inside(f"order {i + 1}", step, STEP_KEYS)
     database = part.one_of("database", known, "database") if part.has("database", some(known) or "the name of a database") else None
     accepted = "a cost, such as 0.1"
     if "threshold" in step:

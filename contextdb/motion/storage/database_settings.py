@@ -31,12 +31,12 @@ from pathlib import PureWindowsPath
 from typing import Any
 
 from contextdb.errors import Fault, some
+from contextdb.files.toml_shapes import Mapped, Section
 from contextdb.files.toml_text import as_toml, what
 from contextdb.motion.clips.clip import CENTIMETRE, UPS, Up
 from contextdb.motion.features.channels import MOST_WEIGHT
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.joint.database import divided, role_fault
-from contextdb.motion.reading import Mapped, Section
 
 JOINT_KEYS = ("roles", "place_weight", "facing_weight")
 """What says how a database is searched for several characters at once; the database itself is the same without."""
@@ -82,7 +82,6 @@ NUMBERS = {
     "place_weight": (WEIGHT, 0.0, MOST_WEIGHT),
     "facing_weight": (WEIGHT, 0.0, MOST_WEIGHT),
 }
-FLAG_WORDS = {**dict.fromkeys(("true", "yes", "on", "1"), True), **dict.fromkeys(("false", "no", "off", "0"), False)}
 
 
 @dataclass(frozen=True)
@@ -182,7 +181,7 @@ def _values(section: Section, features: list[str], tables: Collection[str] | Non
     if "up" in part:
         yield "up", section.one_of("up", UPS, "axis")
     if "mirror" in part:
-        yield "mirror", _read_flag(section, "mirror")
+        yield "mirror", section.flag("mirror")
     if "roles" in part:
         yield "roles", _read_roles(section)
     if "rig" in part:
@@ -216,16 +215,6 @@ def _read_path(section: Section, key: str, suffix: str, why: str, accepted: str)
     return None
 
 
-def _read_flag(section: Section, key: str) -> bool | None:
-    value = section.part[key]
-    if isinstance(value, bool):
-        return value
-    meant = FLAG_WORDS.get(str(value).strip().casefold())
-    mend = "" if meant is None else f"{key} = {as_toml(meant)}"
-    section.wrong(key, f"this is {what(value)}, neither true nor false", "true or false", mend)
-    return None
-
-
 def _read_roles(section: Section) -> tuple[str, ...] | None:
     value = section.part["roles"]
     listed = value if isinstance(value, (list, tuple)) else ()
@@ -250,7 +239,7 @@ def _read_weights(section: Section, schema: FeatureSchema | None) -> dict[str, f
         section.wrong("weights", f"this is {what(value)}, not a table", '{ "NAME OF A CHANNEL" = 2.0 }')
         return None
     names = list(value) if schema is None else [channel.name for channel in schema.channels]
-    inner = Section(f"{section.where} weights", value, names, section.faults, section.file)
+    inner = section.inside("weights", value, names)
     accepted = f"from 0 to {MOST_WEIGHT:g}, such as 2.0"
     read = {name: inner.number(name, accepted, 0.0, MOST_WEIGHT) for name in value if name in names}
     weights = {name: weight for name, weight in read.items() if weight is not None}

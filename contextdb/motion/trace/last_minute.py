@@ -9,7 +9,8 @@ from typing import Any
 from contextdb.errors import ContextDBError
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.trace.rows import Row, columns, decision_of
-from contextdb.motion.trace.session import Trace, frame_of_rows, missing
+from contextdb.motion.trace.session import Trace, missing
+from contextdb.motion.trace.session_file import frame_of_rows
 
 KEPT_S = 60.0
 MOST_ROWS = 7200

@@ -16,7 +16,6 @@ no candidates; sessions of format 1, which did, are read with theirs.
 
 from __future__ import annotations
 
-import hashlib
 import io
 import json
 import marshal
@@ -32,27 +31,24 @@ from typing import TYPE_CHECKING, Any, Unpack, overload
 from contextdb.cells.arguments import require_kind, require_many, require_mapping, require_path, require_place, require_text
 from contextdb.disk import read_bytes, write_atomic
 from contextdb.errors import (
-    ArtefactError,
     ContextDBError,
     ContextError,
     Fault,
     MotionError,
-    Place,
     in_quotes,
     nearest,
     plural,
     some,
 )
-from contextdb.files.parquet_frame import MAGIC, UNSEALED, DamagedFrame, Frame, require_whole, sealed
+from contextdb.files.parquet_frame import UNSEALED, sealed
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.decision import Decision, Playing
 from contextdb.motion.selection.worked_out import WorkedOut, of_searched
-from contextdb.motion.trace.filter_rows import RUNS, fingerprint, is_recorded, markup_digest
+from contextdb.motion.trace.filter_rows import fingerprint, is_recorded, markup_digest
 from contextdb.motion.trace.reasked import Changes, Reasked
 from contextdb.motion.trace.rows import (
     FILTERS,
     INPUTS,
-    OPTIONAL,
     PERMUTATION_S,
     TIMINGS,
     Events,
@@ -63,6 +59,16 @@ from contextdb.motion.trace.rows import (
     row_of,
 )
 from contextdb.motion.trace.session_diff import SessionDiff, diff_sessions
+from contextdb.motion.trace.session_file import (
+    ABOUT_KEY,
+    FORMAT,
+    FORMAT_KEY,
+    N_CANDIDATES,
+    SHOWN_KEY,
+    frame_of_rows,
+    read_rows,
+    refused,
+)
 from contextdb.motion.trace.stats import SessionStats, stats_of
 from contextdb.motion.trace.stock import Stock
 from contextdb.motion.trace.what_if import WhatIf, what_if
@@ -70,17 +76,10 @@ from contextdb.motion.trace.what_if import WhatIf, what_if
 if TYPE_CHECKING:
     import polars as pl
 
-FORMAT, READ = 2, ("1", "2")
-"""Since 2 the costs of databases built with a schema are divided by the sum of weight x features, and the inputs are kept."""
-FORMAT_KEY, ABOUT_KEY, DIGEST_KEY, SHOWN_KEY = "contextdb.trace", "about", "digest", "candidates"
 CHUNK = 512
 """So many decisions become Parquet at a time."""
-N_CANDIDATES = 12
 MOST = 108_000
 """So many decisions stay unless another number is given: an hour at 30 a second."""
-
-ACCEPTED = "a session recorded by contextdb.motion.Trace"
-MEND = "to record the session again"
 
 
 class Trace(Sequence[Decision]):
@@ -291,7 +290,7 @@ class Trace(Sequence[Decision]):
         """Read the bytes of a saved session; `file` is its name in messages. Raises what `load` raises."""
         require_kind(raw, bytes, "raw", "the bytes of a saved session")
         trace = cls()
-        trace._loaded, trace.about, trace.n_candidates = _read(raw, file)
+        trace._loaded, trace.about, trace.n_candidates = read_rows(raw, file)
         trace._file = file
         return trace
 
@@ -325,7 +324,7 @@ class Trace(Sequence[Decision]):
         try:
             decision = decision_of(row)
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError, ContextDBError) as error:
-            raise _refused(f"row {place} holds no decision ({type(error).__name__}).", self._file) from error
+            raise refused(f"row {place} holds no decision ({type(error).__name__}).", self._file) from error
         if any(PERMUTATION_S in about for about in self.about.values()):
             now, before = self._permuted(decision.playing), self._permuted(decision.before)
             decision = replace(decision, playing=now, before=before)
@@ -393,87 +392,3 @@ def _packed(row: Row) -> bytes:
 def _unpacked(packed: bytes) -> Row:
     row: Row = marshal.loads(zlib.decompress(packed))
     return row
-
-
-# ---- rows as Parquet
-
-
-def frame_of_rows(rows: list[Row]) -> pl.DataFrame:
-    """Rows as a table of `columns`."""
-    import polars as pl
-
-    return pl.DataFrame(rows, schema=columns())
-
-
-def _old_digest(raw: bytes, frame: Frame) -> str:
-    """What the sessions of versions without a seal hold: the digest of the columns and of what the databases' features are."""
-    return hashlib.blake2b(raw[: frame.start] + frame.metadata[ABOUT_KEY].encode(), digest_size=16).hexdigest()
-
-
-def _read(raw: bytes, file: str) -> tuple[pl.DataFrame, dict[str, dict[str, Any]], int]:
-    """The rows of a file, what it says of databases, and how many candidates its decisions show; checked."""
-    import polars as pl
-
-    why = _no_parquet(raw)
-    if why:
-        raise _refused(why, file)
-    try:
-        parquet = require_whole(raw)
-        metadata = parquet.metadata
-        _check_format(metadata, file)
-        if metadata.get(DIGEST_KEY, expected := _old_digest(raw, parquet)) != expected:
-            raise _refused("the file was altered after it was saved.", file)
-        about = {name: dict(part) for name, part in json.loads(metadata[ABOUT_KEY]).items()}
-        n_candidates = int(metadata.get(SHOWN_KEY, N_CANDIDATES))
-        frame = _with_runs(pl.read_parquet(io.BytesIO(raw)))
-    except ArtefactError:
-        raise
-    except DamagedFrame as error:
-        raise _refused(f"the file is damaged: {error}.", file) from None
-    except (Exception, pl.exceptions.PanicException) as error:  # some damage makes polars stumble instead of complain
-        raise _refused(f"the file is damaged ({type(error).__name__}).", file) from None
-    _check_columns(frame, file)
-    lacking = [pl.lit(None, dtype).alias(name) for name, dtype in columns().items() if name not in frame.columns]
-    return frame.with_columns(lacking).select(list(columns())), about, n_candidates
-
-
-def _with_runs(frame: pl.DataFrame) -> pl.DataFrame:
-    """Filters with the fields that format 1 lacks."""
-    import polars as pl
-
-    held = frame.schema.get(FILTERS)
-    inner = held.inner if isinstance(held, pl.List) else None
-    if not isinstance(inner, pl.Struct) or any(each.name in RUNS for each in inner.fields):
-        return frame
-    runs = [pl.lit(None, pl.List(pl.Int64())).alias(name) for name in RUNS]
-    return frame.with_columns(pl.col(FILTERS).list.eval(pl.element().struct.with_fields(runs)))
-
-
-def _no_parquet(raw: bytes) -> str:
-    """What is wrong with the file's first and last bytes, if anything."""
-    if not raw.startswith(MAGIC):
-        return "this is not a Parquet file." if raw else "the file is empty."
-    size = int.from_bytes(raw[-8:-4], "little")
-    is_whole = len(raw) >= 12 and raw.endswith(MAGIC) and size <= len(raw) - 12
-    return "" if is_whole else "the file is cut off: its end, where Parquet lists its columns, is missing."
-
-
-def _check_format(metadata: Mapping[str, str], file: str) -> None:
-    if FORMAT_KEY not in metadata:
-        raise _refused("this Parquet file is not a recorded session.", file)
-    if metadata[FORMAT_KEY] not in READ:
-        found = f"the session has format {in_quotes(metadata[FORMAT_KEY])}; this version reads formats {' and '.join(READ)}."
-        raise _refused(found, file)
-
-
-def _check_columns(frame: pl.DataFrame, file: str) -> None:
-    wanted = columns()
-    present = [name for name in wanted if name in frame.columns or name not in OPTIONAL]
-    wrong = [name for name in present if frame.schema.get(name) != wanted[name]]
-    if wrong:
-        found = f"{plural(len(wrong), 'column')} of the session missing, or of another type: {', '.join(map(in_quotes, wrong))}."
-        raise _refused(found, file)
-
-
-def _refused(found: str, file: str) -> ArtefactError:
-    return ArtefactError(Fault(found, ACCEPTED, MEND, Place(file or None), "bad-artefact"))

@@ -26,7 +26,7 @@ import numpy as np
 from contextdb.cells.arguments import require_kind, require_many_of, require_real, require_text
 from contextdb.errors import Fault, MotionError, in_quotes
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.output.bank import Place3
+from contextdb.motion.output.samples import Place3
 from contextdb.motion.walking.cycle import Cycle
 from contextdb.motion.walking.stances import Stances, blended_stances
 

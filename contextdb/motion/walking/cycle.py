@@ -31,8 +31,8 @@ from contextdb.motion.clips.poses import LocalPoses, Poses, forward_kinematics, 
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Skeleton
 from contextdb.motion.clips.trajectory import root_trajectory
-from contextdb.motion.output.bank import Place3
 from contextdb.motion.output.legs import leg_of
+from contextdb.motion.output.samples import Place3
 from contextdb.motion.walking.places import joined, moved, movement_of, movement_to, undone
 from contextdb.motion.walking.stances import Stances
 

@@ -17,7 +17,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from contextdb.errors import ContextError, Fault
-from contextdb.motion.output.bank import Place3
+from contextdb.motion.output.samples import Place3
 from contextdb.motion.walking.blending import Mix
 from contextdb.motion.walking.places import HERE, joined, moved
 

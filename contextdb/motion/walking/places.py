@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from contextdb.motion.output.bank import Place3
+from contextdb.motion.output.samples import Place3
 
 HERE: Place3 = (0.0, 0.0, 0.0)
 LEAST_TURN = 1e-6

@@ -15,11 +15,12 @@ import numpy as np
 from contextdb.motion.clips import quaternions
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Skeleton
-from contextdb.motion.output.bank import Place3, loops, tops_of
+from contextdb.motion.output.bank import leg_loops, loops, tops_of
 from contextdb.motion.output.feet import LEVEL_HIPS, Height
 from contextdb.motion.output.foot_state import HIPS_DAMPING, MOST_LOWER, STRAIGHT
 from contextdb.motion.output.ground import FLAT, Footing, below, standing, swinging
 from contextdb.motion.output.legs import LEFT, Leg, eased, hinge_of, leg_of
+from contextdb.motion.output.samples import Place3
 from contextdb.motion.output.stages import Ground
 from contextdb.motion.walking.blending import Mix
 from contextdb.motion.walking.cycle import Cycle
@@ -102,7 +103,7 @@ class Legs:
         for leg, toe, footing in zip(self.legs, toes, state.footings, strict=True):
             if leg is not None:
                 _, x, z = footing.now
-                most = max(most, loops().too_high(positions, leg.joints, leg.toe, toe, x, z, STRAIGHT, hips))
+                most = max(most, leg_loops().too_high(positions, leg.joints, leg.toe, toe, x, z, STRAIGHT, hips))
         lower = state.lower.gone_down(min(most, MOST_LOWER), dt_s)
         height = hips - lower.now
         positions[:, 1] += height
@@ -111,7 +112,7 @@ class Legs:
         for leg, hinge, toe, footing in zip(self.legs, self.hinges, toes, state.footings, strict=True):
             if leg is not None:
                 _, x, z = footing.now
-                loops().stand(self.rig.parents, positions, world, leg.joints, leg.toe, hinge, toe, x, z, STRAIGHT, rotations)
+                leg_loops().stand(self.rig.parents, positions, world, leg.joints, leg.toe, hinge, toe, x, z, STRAIGHT, rotations)
         positions, _ = self._placed(rotations, translations, place)
         return Shown(rotations, translations, positions), GroundState(state.footings, state.hips, lower)
 

@@ -24,8 +24,8 @@ from contextdb.errors import ContextError, Fault, MotionError
 from contextdb.motion.clips.ground_place import A_BODY, OfBody, place_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.steering import Steered
-from contextdb.motion.output.bank import Place3
 from contextdb.motion.output.ground import A_GROUND
+from contextdb.motion.output.samples import Place3
 from contextdb.motion.output.stages import Ground, damping, decayed
 from contextdb.motion.output.stream import Pose
 from contextdb.motion.walking.blending import Gait, Mix, same_rig

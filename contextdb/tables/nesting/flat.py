@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -32,8 +31,7 @@ from contextdb.tables.nesting.flat_texts import free_name, outputs_of, paths_and
 from contextdb.tables.nesting.links import Neighbours, require_sound
 from contextdb.tables.plain_columns import PlainColumns
 
-if TYPE_CHECKING:
-    Sources = Mapping[str, list[tuple[int, ConditionColumn]]]
+Sources = Mapping[str, list[tuple[int, ConditionColumn]]]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -5,7 +5,7 @@ A listener may send one line of JSON, and again whenever it wants other lines:
     {"format": 1, "token": "…", "every": true, "who": ["player"], "tables": ["locomotion"], "trace": true}
 
 `every`: every question, not only the newest of each character and table. `trace`: every decision in full, and nothing else. What a
-listener does not read in time is lost, and it is told how many lines; nothing here ever waits for it.
+listener does not read in time is lost, and the link sends their number; nothing here ever waits for a listener.
 """
 
 from __future__ import annotations

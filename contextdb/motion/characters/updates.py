@@ -1,0 +1,95 @@
+"""What a character takes for an update, what an update gives, and the state that a character can be put back to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TypedDict
+
+from numpy.typing import ArrayLike
+
+from contextdb.motion.characters.tables import Facts
+from contextdb.motion.clips.many_paths import ManyTrajectories
+from contextdb.motion.clips.steering import Steered
+from contextdb.motion.clips.trajectory import Trajectory
+from contextdb.motion.output.samples import Place3
+from contextdb.motion.output.stream import Pose, PoseState
+from contextdb.motion.selection.asked import Among, OfPenalties, OfTags, OfValid
+from contextdb.motion.selection.controller_state import ControllerState
+from contextdb.motion.selection.decision import Decision
+from contextdb.motion.selection.root_motion import RootMotion
+from contextdb.records import quickly_made
+
+UNKNOWN = ("error", "any", "never")
+Paths = ManyTrajectories | Sequence[Trajectory]
+
+
+class Options(TypedDict, total=False):
+    """What a controller is asked with beside the query; see `Controller.update`."""
+
+    valid: OfValid | None
+    tags: OfTags | None
+    bias: Mapping[str, ArrayLike] | None
+    penalties: OfPenalties | None
+    among: Among | None
+    force: bool
+    interrupt: bool
+
+
+@dataclass(frozen=True, slots=True)
+class CharacterState:
+    """Where a character is: all that its next pose depends on beside what it is then given. Never changed, so it may be kept."""
+
+    body: Steered
+    apart: RootMotion
+    trail: tuple[tuple[float, Place3], ...]
+    controller: ControllerState
+    stream: PoseState | None
+
+
+@quickly_made
+@dataclass(frozen=True, eq=False, slots=True)
+class Updated:
+    """What one update of a character gave.
+
+    Attributes
+    ----------
+    body : Steered
+        Where the game has the body.
+    facts : mapping of str to object
+        Those of the game and the character's own.
+    paths, poses : sequence of Trajectory, of Pose
+        Those of the crowd that is updated together.
+    decision : Decision
+    at : int
+        Which of them are this one's.
+    """
+
+    body: Steered
+    facts: Facts
+    paths: Paths
+    decision: Decision
+    poses: Sequence[Pose | None] = ()
+    at: int = 0
+
+    @property
+    def path(self) -> Trajectory:
+        """The path that was wished for."""
+        return self.paths[self.at]
+
+    @property
+    def pose(self) -> Pose | None:
+        """The pose, made of the arrays of a crowd when it is asked for; None for a character without a stream."""
+        return self.poses[self.at] if self.poses else None
+
+
+@quickly_made
+@dataclass(frozen=True, eq=False, slots=True)
+class Step:
+    """Half an update: what a character is about to ask."""
+
+    dt_s: float
+    body: Steered
+    place: Place3
+    trail: tuple[tuple[float, Place3], ...]
+    facts: Facts

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from hypothesis import strategies as st
 
 from contextdb.edits import edits
@@ -62,7 +64,7 @@ def edits_of(draw: st.DrawFn, table: Table) -> Edit:
         name = draw(st.sampled_from(free))
         can_be_output = declared is None and name not in table.schema.conditions  # a deleted column leaves its declaration
         job = draw(st.sampled_from(["condition", "output"] if can_be_output else ["condition"]))
-        return edits.insert_column(table, draw(place), name, job, declared, draw(st.sampled_from(["", "5"])))
+        return insert_column(table, draw(place), name, job, declared, draw(st.sampled_from(["", "5"])))
     if kind == "columns" and free:
         new = [edits.NewColumn(name, "condition", draw(st.none() | st.sampled_from(PARTS))) for name in free[:2]]
         return edits.insert_columns(table, draw(place), new)
@@ -85,6 +87,11 @@ def edits_of(draw: st.DrawFn, table: Table) -> Edit:
     if kind == "rename" and free:
         return edits.rename_column(table, draw(st.sampled_from(names)), draw(st.sampled_from(free)))
     return edits.set_cells(table, [])
+
+
+def insert_column(table: Table, at: int, *new: Any, **said: Any) -> Edit:
+    """Insert one column before column `at`."""
+    return edits.insert_columns(table, at, [edits.NewColumn(*new, **said)])
 
 
 def write_schema(before: Table | None, after: Table) -> bool:

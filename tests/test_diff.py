@@ -7,7 +7,7 @@ from time import process_time
 
 import numpy as np
 import pytest
-from edit_strategies import TEXTS, edits_of
+from edit_strategies import TEXTS, edits_of, insert_column
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -182,7 +182,7 @@ def test_columns_come_go_and_move(table):
     after = edits.move_column(table, "hit", 1).apply(table)
     assert told(table, after) == "1 column moved"
     after = edits.delete_columns(after, ["speed"]).apply(after)
-    after = edits.insert_column(after, 1, "new", text="A B").apply(after)
+    after = insert_column(after, 1, "new", text="A B").apply(after)
     found = diff(table, after)
     assert (found.columns_added, found.columns_removed) == (["new"], ["speed"])
 

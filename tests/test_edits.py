@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from edit_strategies import edits_of
+from edit_strategies import edits_of, insert_column
 from hypothesis import given
 from hypothesis import strategies as st
 from strategies import examples, tables
@@ -331,7 +331,7 @@ def test_a_selector_takes_another_order_and_another_threshold():
         lambda t: edits.delete_columns(t, ["Asset Name"]),
         lambda t: edits.move_column(t, "speed", 0),
         lambda t: edits.move_column(t, "Asset Name", 2),
-        lambda t: edits.insert_column(t, 0, "x"),
+        lambda t: insert_column(t, 0, "x"),
         lambda t: edits.rename_column(t, "speed", "hit").apply(t),
         lambda t: edits.rename_column(t, "sped", "x"),
         lambda t: edits.set_cells(t, [(3, "speed", "1")]),

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from edit_strategies import TEXTS, edits_of
+from edit_strategies import TEXTS, edits_of, insert_column
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
@@ -253,14 +253,14 @@ def test_two_new_names_of_one_row_are_a_conflict(base):
 
 
 def test_columns_added_on_both_sides_both_stand_in_the_merge(base):
-    ours = after(base, edits.insert_column(base, 2, "mine", text="1"))
-    theirs = after(base, edits.insert_column(base, 4, "yours", text="2"))
+    ours = after(base, insert_column(base, 2, "mine", text="1"))
+    theirs = after(base, insert_column(base, 4, "yours", text="2"))
     assert [c.name for c in clean(base, ours, theirs).columns] == ["Asset", "speed", "mine", "hit", "tags", "yours"]
 
 
 def test_the_same_column_added_with_other_cells_is_a_conflict_cell_by_cell(base):
-    ours = after(base, edits.insert_column(base, 2, "new", text="1"))
-    theirs = after(base, edits.insert_column(base, 2, "new", text="1")).with_cell(3, "new", "2")
+    ours = after(base, insert_column(base, 2, "new", text="1"))
+    theirs = after(base, insert_column(base, 2, "new", text="1")).with_cell(3, "new", "2")
     assert told(merge(base, ours, theirs)) == [("cell", "dive, new", None, "1", "2")]
 
 
@@ -292,7 +292,7 @@ def test_two_names_for_one_column_are_a_conflict(base):
 
 def test_two_columns_that_come_to_one_name_are_both_kept(base):
     ours = after(base, edits.rename_column(base, "speed", "pace"))
-    theirs = after(base, edits.insert_column(base, 4, "pace", text="x"))
+    theirs = after(base, insert_column(base, 4, "pace", text="x"))
     merged = merge(base, ours, theirs).table
     assert [c.name for c in merged.columns] == ["Asset", "pace", "hit", "tags", "pace 2"]
     assert merged.text(0, "pace 2") == "x"

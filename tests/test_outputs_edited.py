@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from edit_strategies import write_schema
+from edit_strategies import insert_column, write_schema
 from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 from strategies import examples
@@ -88,7 +88,7 @@ def test_a_deleted_output_goes_from_the_fallback_too(table: Table):
 
 
 def test_an_output_that_is_added_leaves_the_others_as_they_are_written(table: Table):
-    _, text = saved(table, edits.insert_column(table, 2, "new", "output"))
+    _, text = saved(table, insert_column(table, 2, "new", "output"))
     assert ("# what an ability does" in text) or ("# most do none" in text and "# metres" in text)
     assert 'new = {type = "text"}' in text or 'new = { type = "text" }' in text
 
@@ -171,7 +171,7 @@ def test_whatever_changes_is_written_and_read_back(tmp_path: Path, before, after
 def test_what_both_sides_say_of_outputs_stands_in_the_merge(table: Table):
     said: Any = settings_to_dict(table.settings)["outputs"]
     ours = edits.set_settings(table, outputs=said | {"damage": said["damage"] | {"max": 9}}).apply(table)
-    theirs = edits.insert_column(table, 2, "loud", "output").apply(table)
+    theirs = insert_column(table, 2, "loud", "output").apply(table)
     typed = settings_to_dict(theirs.settings)["outputs"] | {"loud": {"type": "bool", "default": True}}
     theirs = edits.set_settings(theirs, outputs=typed).apply(theirs)
     merged = merge(table, ours, theirs).table

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from edit_strategies import write_schema
+from edit_strategies import insert_column, write_schema
 from hypothesis import given
 from hypothesis import strategies as st
 from strategies import examples
@@ -155,7 +155,7 @@ def test_an_edit_changes_its_lines_and_no_other(tmp_path: Path, edit, lines: lis
     [
         lambda t: edits.set_settings(t, policy="first"),
         lambda t: edits.set_condition(t, "speed", min=0.0),
-        lambda t: edits.insert_column(t, 1, "a.b", declared={"type": "angle"}),
+        lambda t: insert_column(t, 1, "a.b", declared={"type": "angle"}),
     ],
 )
 @pytest.mark.parametrize(
@@ -412,7 +412,7 @@ def any_declaring(draw: st.DrawFn, table: Table) -> Edit:
     free = next(f"new.{i}" for i in range(99) if f"new.{i}" not in [c.name for c in table.columns])
     if kind == "rename" and names:
         return edits.rename_column(table, draw(st.sampled_from(names)), free)
-    return edits.insert_column(table, 1, free, "condition", draw(st.sampled_from([None, {"type": "angle"}, {"type": "bool"}])))
+    return insert_column(table, 1, free, "condition", draw(st.sampled_from([None, {"type": "angle"}, {"type": "bool"}])))
 
 
 FORMS = [

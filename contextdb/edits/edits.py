@@ -171,13 +171,6 @@ class NewColumn:
     text: str = ""
 
 
-def insert_column(
-    table: Table, at: int, column: str, job: Job = "condition", declared: Mapping[str, object] | None = None, text: str = ""
-) -> Edit:
-    """Insert a column before column `at`, with `text` in every row; the rest as in `NewColumn`."""
-    return insert_columns(table, at, [NewColumn(column, job, declared, text)])
-
-
 def insert_columns(table: Table, at: int, columns: Sequence[NewColumn]) -> Edit:
     """Insert columns before column `at`, in this order: those of a blueprint, say."""
     layout = list(_layout(table))

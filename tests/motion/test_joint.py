@@ -41,7 +41,7 @@ from contextdb.motion import (
 )
 from contextdb.motion.joint import searcher as searching
 from contextdb.motion.joint.alignment import aligned
-from contextdb.motion.made.joint import JOINT_ROLES, joint_contact_s
+from contextdb.motion.made.joint import HOLD_S, JOINT_ROLES
 from contextdb.motion.markup.left_out import LeftOut, Skip
 from contextdb.motion.markup.marks import Mark, Marks, TagFilter
 from contextdb.motion.selection.decision import Together
@@ -52,7 +52,7 @@ from contextdb.schema.settings import TableSettings
 ROLES = ("Tackler", "Carrier", "Judge")
 CAST = [{"Host": 7, "Guest": 3}]
 CLIPS = [clip for name in JOINT_RECIPES for clip in make_joint_clip(name).values()]
-CONTACTS = {name: joint_contact_s(make_joint_clip(name)["Host"]) for name in JOINT_RECIPES}
+CONTACTS = {name: make_joint_clip(name)["Host"].duration_s - HOLD_S for name in JOINT_RECIPES}
 SCHEMA = replace(pose_schema(CLIPS[0].skeleton), mirror=(("Left*", "Right*"),))
 MARKUP = Markup.parse("asset,tag,from,to,value\n" + "".join(f"{name}.*,WarpPosition,0,{s:.6f},\n" for name, s in CONTACTS.items()))
 

@@ -25,7 +25,7 @@ SKEW = math.radians(22.5)
 
 
 def speed():
-    return bank().travel_at(range_of("walk"), 1.0)[1]
+    return bank().moment_of(range_of("walk"), 1.0).travel[1]
 
 
 def strafed(skew=SKEW, n=120, pace=1.0, segments=None, **said):
@@ -52,7 +52,7 @@ def skate(poses):
 
 def test_a_made_walk_goes_ahead_at_its_speed_at_every_frame_over_its_loop_too():
     number = range_of("walk")
-    found = np.array([bank().travel_at(number, t) for t in np.linspace(0.0, bank().last_s(number), 50)])
+    found = np.array([bank().moment_of(number, t).travel for t in np.linspace(0.0, bank().last_s(number), 50)])
     clip = bank().root[bank().starts[number] : bank().stops[number]].astype(float)
     mean = math.hypot(*(clip[-1] - clip[0])[:2]) / bank().last_s(number)
     np.testing.assert_allclose(found[:, 1], mean, rtol=0.02)

@@ -22,7 +22,7 @@ from contextdb.motion.output.bank import loops
 def placed(bank, number, time_s):
     """The joints of a moment in the clip's own place, by the forward kinematics of the clips."""
     sample = bank.sample_of(number, time_s)
-    x, z, heading = bank.root_at(number, time_s)
+    x, z, heading = bank.moment_of(number, time_s).root
     local = LocalPoses(bank.skeleton, bank.rate, bank.translations(sample.positions)[None], sample.rotations[None].copy())
     poses = forward_kinematics(local)
     turn = about_axis("y", np.array(heading))

@@ -42,7 +42,7 @@ def slope(x, z):
 
 
 def clip_speed():
-    return bank().travel_at(range_of("walk"), 1.0)[1]
+    return bank().moment_of(range_of("walk"), 1.0).travel[1]
 
 
 # ---- ground

@@ -20,10 +20,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from saved_bytes import bytes_for
+
 from contextdb.edits import edits
 from contextdb.tables.changes import Edit
 from contextdb.tables.table import Table
-from tui.model.session import Session, bytes_for
+from tui.model.session import Session
 from tui.model.watched import digest_of
 
 SYSTEM_CALLS = ("open", "write", "fsync", "replace", "close", "link", "unlink")

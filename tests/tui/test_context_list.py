@@ -8,6 +8,7 @@ import numpy as np
 import polars as pl
 import pytest
 
+from contextdb.checks.cases import exactly
 from contextdb.errors import ContextDBError, ContextError, FileError, TableError
 from contextdb.tables.project import load
 from contextdb.tables.table import Table
@@ -93,7 +94,7 @@ def test_rows_that_cannot_be_read_are_not_valid_as_in_the_test_row(table: Table,
     contexts, query = ContextList.beside(broken), QueryRow(broken)
     query.load(contexts.facts(0))
     assert contexts.verdict(0).missing == ("walk",)
-    assert contexts.valid_now(contexts.facts(0)) == "slide"
+    assert exactly(contexts.valid_assets(contexts.facts(0))) == "slide"
     assert query.n_valid == 1
     assert readable_rows(broken) == 0b110
 
@@ -104,7 +105,7 @@ def test_rows_that_cannot_be_read_are_not_valid_as_in_the_test_row(table: Table,
 def test_a_context_is_kept_with_the_assets_that_are_valid_now(table: Table, tmp_path: Path):
     contexts = ContextList.beside(table)
     facts = {"speed": "5", "gait": "Run", "tags": "", "nothing": "1"}
-    contexts.keep("new", facts, contexts.valid_now(facts), "why")
+    contexts.keep("new", facts, exactly(contexts.valid_assets(facts)), "why")
     assert contexts.title == "new (5 of 5)"
     assert contexts.verdict(4).holds
     assert (tmp_path / "t.cases.csv").read_text().splitlines() == [
@@ -133,7 +134,7 @@ def test_what_cannot_be_kept_is_refused_and_nothing_is_written(table: Table, tmp
 
 def test_what_is_valid_now_cannot_be_told_of_facts_that_cannot_be_read(table: Table):
     with pytest.raises(ContextError, match="quick"):
-        ContextList.beside(table).valid_now({"speed": "quick"})
+        ContextList.beside(table).valid_assets({"speed": "quick"})
 
 
 def test_cases_are_renamed_and_deleted_and_the_current_one_stays(table: Table, tmp_path: Path):

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from rich.style import Style
+from saved_bytes import bytes_for
 from strategies import examples, some
 from terminal import press, said, screen_text, with_editor
 from textual.events import Paste
@@ -20,7 +21,6 @@ from contextdb.schema.settings import Schema, TableSettings, conditions_from_dic
 from contextdb.tables.table import Table
 from tui.commands import GRID
 from tui.model.layout import layout
-from tui.model.session import bytes_for
 from tui.model.sheet import Sheet
 from tui.model.views import Filter, Sort
 from tui.widgets.grid_paint import Look, Painter

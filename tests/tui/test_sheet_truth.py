@@ -178,7 +178,7 @@ def agrees(project: Folder, folder: Path, ask=run) -> None:
         assert not (valid and fails)
     if not actors:
         assets = [m["asset"] for m in answer]
-        kept = ContextList.empty(table).valid_now(sheet.query.texts)
+        kept = exactly(ContextList.empty(table).valid_assets(sheet.query.texts))
         assert read_expected(kept) == read_expected(exactly(assets))
 
 
@@ -283,8 +283,8 @@ def test_a_saved_context_keeps_the_facts_of_rules_and_what_query_says(tmp_path):
     table = cdb.load(tmp_path / "outer.csv")
     facts = {"speed": "3", "target": "0.5", "hurt": "True", "gait": "Run", "closing": "9"}
     contexts = ContextList.beside(table)
-    assert contexts.valid_now(facts) == "A outer/inner/run D"
-    contexts.keep("one", facts, contexts.valid_now(facts))
+    assert exactly(contexts.valid_assets(facts)) == "A outer/inner/run D"
+    contexts.keep("one", facts, exactly(contexts.valid_assets(facts)))
     assert contexts.verdict(0).holds
     assert contexts.facts(0) == {name: text for name, text in facts.items() if name != "closing"}
 
@@ -294,4 +294,4 @@ def test_a_table_whose_inner_table_cannot_be_used_cannot_tell_what_is_valid(tmp_
     (tmp_path / "inner.csv").write_text("Asset,gait\nwalk,Crawl\n")
     contexts = ContextList.beside(cdb.load(tmp_path / "outer.csv", strict=False))
     with pytest.raises(cdb.ContextDBError):
-        contexts.valid_now({"speed": "3"})
+        contexts.valid_assets({"speed": "3"})

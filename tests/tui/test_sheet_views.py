@@ -93,9 +93,3 @@ def test_a_filter_shows_rows_that_pass_everything_it_says():
     assert shown(is_valid=True, columns=(("x", "TRUE"),)) == [0]
     assert shown(has_findings=True) == [2]
     assert shown_rows(table, Filter()) is None
-
-
-def test_a_row_that_is_hidden_has_the_next_shown_one_near_it():
-    view = View(np.array([0, 3, 5]), 8)
-    assert view.place(1) is None
-    assert [view.nearest_place(r) for r in (0, 1, 4, 6)] == [0, 1, 2, 2]

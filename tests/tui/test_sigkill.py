@@ -14,9 +14,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from saved_bytes import bytes_for
 from strategies import IS_FULL
 
-from tui.model.session import Session, bytes_for
+from tui.model.session import Session
 from tui.model.watched import digest_of
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="SIGKILL and fork are of POSIX systems")

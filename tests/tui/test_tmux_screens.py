@@ -16,6 +16,7 @@ from textual.binding import Binding
 
 from docs import keys, terminals
 from docs.terminals import ESC, xterm
+from tui.model.session import Session
 
 __all__ = ["made"]
 """A fixture of another file."""
@@ -23,6 +24,7 @@ __all__ = ["made"]
 pytestmark = pytest.mark.skipif(shutil.which("tmux") is None, reason="tmux is not installed")
 
 TABLE = "Asset,speed,Defender.near,hit\nwalk,0..2,Any,True\nrun,2..6,0..3,Any\nrun,2..6,Any,False\n"
+MARKED = "Asset,speed\n<<<<<<< ours\nwalk,0..2\n=======\nwalk,0..3\n>>>>>>> theirs\n"
 CASES = "Case,Expected,speed,Defender.near,hit\nslow,walk,1,2,True\n"
 CONDITIONS = '[conditions.hit]\ntype = "bool"\n[conditions."Defender.near"]\ntype = "number"\n'
 
@@ -37,6 +39,16 @@ def named(command: str) -> str:
     return f"{xterm('ctrl+p')}{command}\r"
 
 
+def table(name: str) -> str:
+    """What goes to another table."""
+    return f"{xterm('ctrl+o')}{name}\r"
+
+
+MOTION = ((named("motion"), "1.20"),)
+BARS = ("\r", "─Bars · ")
+TYPED = (("enter", "submit"),)
+
+
 @dataclass
 class Screen:
     """What opens a screen, what it shows then, whose keys work in it, which of them do not there, and what leaves it."""
@@ -48,8 +60,10 @@ class Screen:
     leaves: str = "\x1b"
     is_typed_in: bool = False
     """Signs are typed into it."""
-    before: tuple[str, str] | None = None
+    before: tuple[tuple[str, str], ...] = ()
     """What is opened before, and what that shows."""
+    also: tuple[tuple[str, str], ...] = ()
+    """Keys of a part of Textual's, and what they do."""
 
 
 @dataclass
@@ -101,7 +115,23 @@ SCREENS = (
     Screen(alt("4") + "2", "Enter Open the pair", "PairMap HeatMap", leaves=alt("1")),
     Screen(alt("5"), "Warnings", "ProblemsPane ProblemList", leaves=alt("1")),
     Screen(named("motion"), "1 session", "MotionPane SessionList", leaves=alt("1")),
-    Screen("\r", "─Bars · ", "DebugScreen Bars", leaves="q", before=(named("motion"), "1.20")),
+    Screen("\r", "─Bars · ", "DebugScreen Bars", leaves="q", before=MOTION),
+    Screen("\t\t", "─Poses", "Stage", leaves="q", before=(*MOTION, BARS)),
+    Screen("\t\t\t", "─Weights", "Channels", leaves="q", before=(*MOTION, BARS)),
+    Screen("?", "Esc close", "DebugHelp HelpPage Dialog", leaves="qq", before=(*MOTION, BARS)),
+    Screen(xterm("ctrl+g"), "Go to", "AskDialog Dialog", is_typed_in=True, also=TYPED),
+    Screen(xterm("f9") + xterm("f2"), "Rename the context", "NameDialog Dialog", is_typed_in=True, leaves=ESC + ESC, also=TYPED),
+    Screen(xterm("f9") + xterm("delete"), "It cannot be undone", "SureDialog Dialog", leaves=ESC + ESC),
+    Screen(
+        "\r",
+        "Esc as it was",
+        "ChoiceDialog LineList Dialog",
+        leaves=ESC + ESC,
+        before=((named("import"), "Enter read"), ("../cells.csv\r", "Becomes")),
+    ),
+    Screen(table("marks"), "Enter merge", "ConflictsDialog Dialog"),
+    Screen(table("held"), "open elsewhere", "HeldDialog Dialog"),
+    Screen(xterm("ctrl+q"), "not saved", "LeavingDialog Dialog", before=((named("duplicate rows"), "Duplicate"),)),
 )
 
 
@@ -111,21 +141,26 @@ def editor(made: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Edi
     shutil.copytree(made, folder, dirs_exist_ok=True)
     (folder / "game" / "acts.csv").write_text(TABLE, encoding="utf-8")
     (folder / "game" / "acts.cases.csv").write_text(CASES, encoding="utf-8")
+    (folder / "game" / "held.csv").write_text(TABLE, encoding="utf-8")
+    (folder / "game" / "marks.csv").write_text(MARKED, encoding="utf-8")
+    (folder / "cells.csv").write_text(TABLE, encoding="utf-8")
     with (folder / "game" / "contextdb.toml").open("a", encoding="utf-8") as file:
         file.write(CONDITIONS)
     terminal = Terminal(str(folder / "socket"), folder)
     program = ROOT / "tests" / "tui" / "recording_editor.py"
     terminal.start("screen-256color", program=f"{program} game/acts.csv told.txt hold", COLORTERM="")
     terminal.wait("walk", "F2 Edit")
+    elsewhere = Session(folder / "game" / "held.csv")
     yield Editor(terminal, folder)
+    elsewhere.close()
     subprocess.run(["tmux", "-S", terminal.socket, "kill-server"], capture_output=True, check=False)
 
 
 @pytest.mark.parametrize("screen", SCREENS, ids=[screen.widgets for screen in SCREENS])
 def test_each_key_of_a_screen_does_in_a_terminal_what_the_page_says(editor: Editor, screen: Screen):
-    if screen.before:
-        editor.terminal.raw(screen.before[0])
-        editor.terminal.wait(screen.before[1])
+    for opens, shows in screen.before:
+        editor.terminal.raw(opens)
+        editor.terminal.wait(shows)
     editor.terminal.raw(screen.opens)
     editor.terminal.wait(screen.shows)
     actions = actions_of(screen)
@@ -142,8 +177,10 @@ def actions_of(screen: Screen) -> dict[str, set[str]]:
     """The keys of a screen that every terminal sends, and what each may do."""
     actions: dict[str, set[str]] = {}
     for name in screen.widgets.split():
-        for binding in Binding.make_bindings(vars(keys.widgets()[name])["BINDINGS"]):
+        for binding in Binding.make_bindings(vars(keys.widgets()[name]).get("BINDINGS", ())):
             actions.setdefault(binding.key, set()).add(binding.action)
+    for key, action in screen.also:
+        actions.setdefault(key, set()).add(action)
     pressed = [key for key in actions if is_pressed(key, screen)]
     return {key: actions[key] for key in sorted(pressed, key="escape".__eq__)}  # Esc before a sign would be Alt
 

@@ -44,7 +44,6 @@ _FORM = {
 }  # fmt: skip
 _KEYS = {"min": "Least", "max": "Most", "size": "Values", "default": "Default", "expr": "Expression"}
 _OF_CONDITIONS = ("Weight", "Mirror", "Expression")
-_OF_OUTPUTS = ("Default",)
 _TOLD = tuple(HINTS)[2:]
 _JOB_OF = {RULE: "when"}
 Parts = dict[str, Mapping[str, object] | None]

@@ -26,7 +26,6 @@ from contextdb.checks.cases import (
     Case,
     Verdict,
     delete_case,
-    exactly,
     judge,
     keep_case,
     read_cases,
@@ -290,10 +289,6 @@ class ContextList:
         except ContextDBError:
             return None
         return None if verdict.faults else verdict.n_valid
-
-    def valid_now(self, facts: Mapping[str, str]) -> str:
-        """What `Expected` says for exactly the assets that are valid now; raises ContextError as `valid_assets` does."""
-        return exactly(self.valid_assets(facts))
 
     # ---- changes of the file of cases
 

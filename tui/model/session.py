@@ -112,11 +112,6 @@ class Session:
         return self._file.stamp
 
     @property
-    def is_changed_on_disk(self) -> bool:
-        """Whether somebody else has written the file, or taken it away, since it was read or saved here."""
-        return self._file.state != "same"
-
-    @property
     def why_read_only(self) -> str:
         """Why nothing can be saved to the file, for a person; empty when it can."""
         holder = self.holder or self.lock.taken_by()
@@ -329,11 +324,6 @@ class Session:
         self._watch_files()
         self.journal = Journal(target, self._digest)
         self.sheet.recorder = self.journal if self.holder is None else None
-
-
-def bytes_for(table: Table, path: Path) -> bytes:
-    """The bytes that `Table.save` writes."""
-    return new_source(path, table.columns, table.source, table.origin).raw
 
 
 def _schema_path(table: Path) -> Path:

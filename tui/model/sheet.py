@@ -14,7 +14,6 @@ import numpy as np
 
 from contextdb.bitmask import Rows
 from contextdb.edits import edits
-from contextdb.edits.edits import Job
 from contextdb.edits.history import History, Step
 from contextdb.edits.renaming import uses_of
 from contextdb.errors import Fault, TableError, in_quotes, plural, shown
@@ -296,15 +295,6 @@ class Sheet(ShownTable):
         return self._do(edits.reorder_rows(self.table, sorted_rows(self.table, sort), name))
 
     # ---- edits of columns
-
-    def insert_column(
-        self, name: str, job: Job = "condition", declared: Mapping[str, object] | None = None, at: int | None = None
-    ) -> Done:
-        """Insert a column before column `at`; default: behind the cursor's."""
-        place = self.selection.column + 1 if at is None else at
-        done = self._do(edits.insert_column(self.table, min(place, self.shape[1]), name, job, declared))
-        self._select(self.selection.at(self.selection.row, place, self.shape))
-        return done
 
     def delete_columns(self) -> Done:
         """Delete the selected columns."""

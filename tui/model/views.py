@@ -151,11 +151,6 @@ class View:
         at = int(self._places[row]) if 0 <= row < self.n_rows else -1
         return at if at >= 0 else None
 
-    def nearest_place(self, row: int) -> int:
-        """Where a row is shown, or else the next row of the file that is; the last place where there is none."""
-        shown = np.flatnonzero(self._places[max(row, 0) :] >= 0)
-        return int(self._places[max(row, 0) + shown[0]]) if len(shown) else max(len(self) - 1, 0)
-
     def after(self, came_from: CameFrom) -> View:
         """The view of a table whose rows changed. What was shown stays shown, in the order of the file or, in a sorted view, where
         it was; new rows are behind the shown row that is before them in the file."""

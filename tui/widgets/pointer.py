@@ -225,10 +225,6 @@ class Pointer:
         at_corner = row == block.bottom - 1 and look.layout.separator_at(event.x, look.left) == block.right - 1
         return "fill" if at_corner else None
 
-    def _is_chosen_column(self, column: int) -> bool:
-        block = self.grid.sheet.block
-        return self.grid.sheet.selection.kind == "columns" and block.left <= column < block.right
-
     def _begin(self, what: Dragged) -> None:
         self._dragged = what
         self.grid.capture_mouse()

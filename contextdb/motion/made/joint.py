@@ -44,11 +44,6 @@ def make_joint_clip(name: str) -> dict[str, Clip]:
     return {"Host": host, "Guest": replace(host, name=f"{name}.Guest", values=half_turned(host, hand[0], hand[2]))}
 
 
-def joint_contact_s(clip: Clip) -> float:
-    """When the hands meet: seconds since the start of a made joint clip."""
-    return clip.duration_s - HOLD_S
-
-
 def write_joint_clips(folder: str | PathLike[str]) -> list[Path]:
     """Write all made joint clips into a folder that exists, each as NAME.ROLE.bvh; the paths, in order.
 

@@ -215,18 +215,9 @@ class PoseBank:
         near = high if share >= 0.5 else low
         return Moment(rotations, positions, root, travel, np.asarray(self.contacts[near]), near)
 
-    def root_at(self, range_number: int, time_s: float) -> Place3:
-        """Where the clip itself has the body at a moment of a range."""
-        return self.moment_of(range_number, time_s).root
-
     def contacts_at(self, range_number: int, time_s: float) -> Flags:
         """Which feet are down at a moment of a range: in the nearest frame."""
         return self.moment_of(range_number, time_s).contacts
-
-    def travel_at(self, range_number: int, time_s: float) -> Place3:
-        """How fast the clip goes about a moment: metres a second to the left and ahead of its mean facing, and how far it is
-        turned from that then."""
-        return self.moment_of(range_number, time_s).travel
 
     def steps_at(self, frame: int) -> list[list[float]]:
         """How far each foot is through its swing in a frame, 0 to 1, and where it comes down, left and ahead of the body."""

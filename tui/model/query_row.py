@@ -91,7 +91,7 @@ class QueryRow:
         assets = table.text_column(table.asset_column)
         if assets is not self._assets:
             self._assets, self.is_nested = assets, is_nested(table)
-        self._flat = flat_of(table)
+        self._flat = flat_of(table) if self.is_nested else table
         self.wanted = Wanted.of(self._flat or table)
         self._columns = {c.condition.name: c for c in table.conditions}
         for gone in before.keys() - self._columns.keys():

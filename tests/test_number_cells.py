@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import ANGLE, INT, NUMBER, TEXT, Domain
 from contextdb.cells.grammar import parse_cell, reads
-from contextdb.cells.numbers import FEW, NumberCells, are_plain, doubtful, has_soft
+from contextdb.cells.numbers import FEW, NumberCells, are_plain, doubtful, has_soft, holding
 from contextdb.cells.sets import ANY, Cell, NumberSet
 from contextdb.columns import TextColumn
 from contextdb.compiled.classes import column_masks
@@ -69,6 +69,15 @@ def test_many_texts_are_read_as_each_of_them_is(kind, data):
         assert column.cells[i] == expected, text
         assert repr(column.cells[i]) == repr(expected), text  # -0.0 is no 0.0 here
     assert list(column.cells) == [column.cells[i] for i in range(len(column.cells))]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@given(st.data())
+def test_a_number_is_asked_of_all_cells_at_once_as_of_each(kind, data):
+    texts = data.draw(st.lists(LIKELY_TEXTS | strategies.cells(KINDS[kind]), min_size=1, max_size=20))
+    cells, number = column_of(texts, KINDS[kind]).cells, float(data.draw(st.sampled_from([0, 1, -180, 179.5, 540]) | st.integers()))
+    assert isinstance(cells, NumberCells)
+    assert holding(cells, number).tolist() == [cell.is_soft or cell.holds(number) for cell in cells]
 
 
 def test_every_number_cell_of_the_grammar_is_read_as_by_itself():

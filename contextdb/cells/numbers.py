@@ -19,7 +19,7 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from contextdb.cells.angles import wrap_angles
+from contextdb.cells.angles import wrap_angle, wrap_angles
 from contextdb.cells.domains import Domain
 from contextdb.cells.grammar import parse_cell
 from contextdb.cells.intervals import CIRCLE, Spans
@@ -134,6 +134,15 @@ def spans_of(cells: Sequence[Cell]) -> CellSpans:
         owners, layers = np.append(owners, owner), np.append(layers, layer)
         lows, highs = np.append(lows, ends.lows[layer, owner]), np.append(highs, ends.highs[layer, owner])
     return CellSpans(owners.astype(np.int64), layers.astype(np.int64), lows, highs, are_any)
+
+
+def holding(cells: NumberCells, value: float) -> Flags:
+    """Which cells accept a number, soft ones taken for Any: bool [n]."""
+    ends, number = cells.ends, wrap_angle(value) if cells.domain.type.is_circular else value
+    found: Flags = np.logical_or.reduce((ends.lows <= number) & (number <= ends.highs))
+    for at, cell in ends.others.items():
+        found[at] = cell.is_soft or cell.holds(value)
+    return found
 
 
 ColumnCells = tuple[Cell, ...] | NumberCells

@@ -16,7 +16,8 @@ from tui.commands import ASSETS, BY_ID, COMMANDS, GRID, SCREEN, Command
 from tui.editor_settings import _KEYS, MODIFIERS
 from tui.model.views import Filter
 from tui.panes.assets import AssetsPane
-from tui.screens.main import TABS, TOOLS, MainScreen
+from tui.screens.main import MainScreen
+from tui.screens.table_screen import TABS, TOOLS
 from tui.widgets.grid import Grid
 
 TABLES = {

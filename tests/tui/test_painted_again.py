@@ -8,6 +8,8 @@ from terminal import drive, press, with_editor
 from textual.geometry import Region
 from textual.widget import Widget
 
+from tui.model.views import Sort
+
 WIDE = "Asset," + ",".join(f"condition_{at}" for at in range(12)) + "\n" + "".join(f"clip_{at}{',True' * 12}\n" for at in range(60))
 
 
@@ -21,6 +23,7 @@ def painted_anew(screen):
     bars = [bar for part in parts for bar in (part._vertical_scrollbar, part._horizontal_scrollbar) if bar is not None]
     for part in [*parts, *bars]:
         part._set_dirty()
+        part.notify_style_update()
     return painted(screen)
 
 
@@ -38,6 +41,41 @@ async def filter_rows(app, pilot):
 
 async def open_reasons(app, pilot):
     app.main.assets.why_pane.turn(app.main.assets.sheet)
+
+
+async def ask(app, pilot):
+    app.main.assets.set_context({"condition_0": "True", "condition_3": "False"}, "a test")
+
+
+async def follow_a_game(app, pilot):
+    for at in range(3):
+        facts = {"condition_0": "True", "condition_3": str(at == 1)}
+        app.main.assets.follow(facts, {}, at, "a game")
+        app.main.assets.why_pane.follow(app.main.assets.sheet)
+        await pilot.pause()
+
+
+async def go_down(app, pilot):
+    await press(pilot, "down", "shift+down", "pagedown", "pageup", "up")
+
+
+async def note(app, pilot):
+    sheet = app.main.assets.sheet
+    sheet.marks = sheet.marks.with_note("clip_1", "condition_1", "why?").with_colour(["clip_2"], "red")
+    app.main.assets.show()
+
+
+async def undo(app, pilot):
+    await press(pilot, "ctrl+z")
+
+
+async def sort(app, pilot):
+    app.main.assets.sheet.set_sort(Sort.by([Sort("condition_0")]))
+    app.main.assets.show()
+
+
+async def widen(app, pilot):
+    app.main.assets.grid.set_width(1, 20)
 
 
 async def grow(app, pilot):
@@ -68,8 +106,17 @@ def test_after_each_step_the_grid_and_its_scroll_bars_look_as_if_painted_anew(tm
         type_a_cell,
         type_into_the_test_row,
         scroll,
-        filter_rows,
         open_reasons,
+        ask,
+        go_down,
+        type_a_cell,
+        undo,
+        follow_a_game,
+        go_down,
+        note,
+        sort,
+        widen,
+        filter_rows,
         grow,
         hide_columns,
         shrink,

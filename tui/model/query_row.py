@@ -26,6 +26,7 @@ from contextdb import bitmask
 from contextdb.bitmask import Flags, Rows
 from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import Fact
+from contextdb.cells.numbers import NumberCells, holding
 from contextdb.cells.sets import Cell
 from contextdb.columns import TextColumn
 from contextdb.compiled.data import CompiledData, costs_of
@@ -67,6 +68,8 @@ class QueryRow:
         self._words: dict[str, NDArray[np.uint64]] = {}
         self._masks: dict[str, CompiledData | None] = {}
         """Columns that were asked again, compiled: a running game asks them many times a second. None for one asked once."""
+        self._has_made_masks = False
+        """Whether the present facts had masks of a column made."""
         self._readable: dict[str, int] = {}
         self.actors: Offered = {}
         """Who may play each role. The facts of a role with actors are theirs, not those of the test row."""
@@ -91,7 +94,7 @@ class QueryRow:
         assets = table.text_column(table.asset_column)
         if assets is not self._assets:
             self._assets, self.is_nested = assets, is_nested(table)
-        self._flat = flat_of(table)
+        self._flat = flat_of(table) if self.is_nested else table
         self.wanted = Wanted.of(self._flat or table)
         self._columns = {c.condition.name: c for c in table.conditions}
         for gone in before.keys() - self._columns.keys():
@@ -475,6 +478,7 @@ class QueryRow:
         before = self.facts
         self.facts, self.faults = self.wanted.read(self.texts, self.actors)
         self._answered = self._asked = self._behind = self._rules_left = self._outcome = None
+        self._has_made_masks = False
         for name, column in self._columns.items():
             if name in fresh or before.get(name) != self.facts[name]:
                 self._words.pop(name, None)
@@ -484,13 +488,14 @@ class QueryRow:
                 self._bits[name] = (everything, everything) if fact is None else self._accepting(name, column, fact)
 
     def _accepting(self, name: str, column: ConditionColumn, fact: Fact) -> tuple[int, int]:
-        """As `_accepting`; a column of many cells that is asked again is asked by its masks."""
+        """As `_accepting`; a column of many cells that is asked again is asked by its masks, which take long to make: those of one
+        column at a time, where each cell need not be asked by itself."""
         if len(column.cells) < FEW_CELLS or column.soft is not None or column.faults:
             return _accepting(column, fact)
         masks = self._masks.get(name)
-        if masks is None:
-            masks = compile_table(_alone(column)) if name in self._masks else None
-            self._masks[name] = masks
+        if masks is None and name in self._masks and not (self._has_made_masks and isinstance(column.cells, NumberCells)):
+            masks, self._has_made_masks = compile_table(_alone(column)), True
+        self._masks[name] = masks
         return _accepting(column, fact) if masks is None else masks.condition_bits(0, fact)
 
     def _mask(self, name: str) -> NDArray[np.uint64]:
@@ -511,14 +516,20 @@ def _accepting(column: ConditionColumn, fact: Fact) -> tuple[int, int]:
     Each distinct cell is asked, which for a column that has just been edited is cheaper than its masks; the masks are taken for the
     sets of values that a cell cannot be asked for one by one.
     """
+    if isinstance(column.cells, NumberCells) and isinstance(fact, int | float):
+        return (bits := _rows_of(column, holding(column.cells, fact))), bits
     if all(c.is_any for c in column.cells):  # a column of any type: the tables inside say of which
         return (1 << column.texts.n_rows) - 1, (1 << column.texts.n_rows) - 1
     if isinstance(fact, Cell):
         one = compile_table(_alone(column))
         return one.condition_bits(0, fact)
-    holds = np.array([c.is_soft or c.holds(fact) for c in column.cells], np.bool_)
-    bits = bitmask.to_int(bitmask.pack(holds[column.texts.codes])) if len(holds) else 0
+    bits = _rows_of(column, np.array([c.is_soft or c.holds(fact) for c in column.cells], np.bool_))
     return bits, bits
+
+
+def _rows_of(column: ConditionColumn, holds: NDArray[np.bool_]) -> int:
+    """The rows with some of a column's cells."""
+    return bitmask.to_int(bitmask.pack(holds[column.texts.codes])) if len(holds) else 0
 
 
 def _alone(column: ConditionColumn) -> Table:

@@ -82,6 +82,8 @@ class ShownTable:
         """The row of the file that a game which is followed has picked."""
         self._places: dict[str, tuple[TextColumn, int]] = {}
         """For columns of numbers how far they are indented, for the assets how long their shared end is, and of which texts."""
+        self._conditions: tuple[Table | None, list[ConditionColumn | None]] = (None, [])
+        """The table, and by column the condition that it is."""
         self._findings: NDArray[np.bool_] | None = None
         self._inner_faults: tuple[object, dict[str, Fault | None]] = (None, {})
         """The tables of the folder, and what is wrong with naming one in a row, by the text of the cell."""
@@ -196,8 +198,10 @@ class ShownTable:
 
     def condition(self, column: int) -> ConditionColumn | None:
         """The condition that a column is; None for one of another kind."""
-        texts = self.table.columns[column]
-        return next((c for c in self.table.conditions if c.texts is texts), None)
+        if self._conditions[0] is not self.table:
+            of = {id(c.texts): c for c in self.table.conditions}
+            self._conditions = self.table, [of.get(id(texts)) for texts in self.table.columns]
+        return self._conditions[1][column]
 
     @property
     def extra(self) -> tuple[Condition, ...]:

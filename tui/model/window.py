@@ -56,12 +56,15 @@ class WindowRow:
 class Window:
     """Rows `top` up to `top + n_rows` of a sheet's view."""
 
-    def __init__(self, sheet: ShownTable, top: int, n_rows: int) -> None:
+    def __init__(self, sheet: ShownTable, top: int, n_rows: int, before: Window | None = None) -> None:
         self.top = top
-        rows = sheet.view.rows[top : top + n_rows]
+        self._rows = rows = sheet.view.rows[top : top + n_rows]
+        self._conditions: dict[int, tuple[ConditionColumn, list[tuple[str, Kind]]]] = {}
+        """The cells of conditions as they are without facts."""
+        if before is not None and np.array_equal(before._rows, rows):  # a column that no edit touched is the same one
+            self._conditions = before._conditions
         self.n_rows = len(rows)
         self._sheet = sheet
-        self._rows = rows
         is_asked = not sheet.query.is_empty
         self._failing = sheet.failing(top, top + n_rows) if is_asked else None
         enabled = sheet.table.enabled[rows]
@@ -76,7 +79,7 @@ class Window:
             self.rows = [replace(r, is_played=True) if r.number - 1 == sheet.played else r for r in self.rows]
         self._notes = [sheet.notes(row) for row in rows.tolist()] if sheet.query.has_notes else []
         self._texts: dict[int, list[tuple[str, Kind]]] = {}
-        """The cells as they are without facts."""
+        """All cells as they are without facts."""
         self._columns: dict[int, list[tuple[str, Kind]]] = {}
 
     def holds(self, row: int) -> bool:
@@ -123,6 +126,10 @@ class Window:
             self._columns[column] = self._read(column)
         return self._columns[column][row - self.top]
 
+    def notes(self, row: int) -> dict[int, str]:
+        """What is at the right of cells of a row, by column."""
+        return self._notes[row - self.top] if self._notes else {}
+
     def note(self, row: int, column: int) -> str | None:
         """What is at the right of a cell."""
         return self._notes[row - self.top].get(column) if self._notes else None
@@ -138,8 +145,16 @@ class Window:
         return [(text, "failing") if f and kind != "fault" else (text, kind) for (text, kind), f in zip(found, fails, strict=True)]
 
     def _read_texts(self, column: int) -> list[tuple[str, Kind]]:
-        texts = self._sheet.table.columns[column]
         condition = self._sheet.condition(column)
+        if condition is None:
+            return self._read_column(column, None)
+        known = self._conditions.get(column)
+        if known is None or known[0] is not condition:
+            known = self._conditions[column] = condition, self._read_column(column, condition)
+        return known[1]
+
+    def _read_column(self, column: int, condition: ConditionColumn | None) -> list[tuple[str, Kind]]:
+        texts = self._sheet.table.columns[column]
         codes = texts.codes[self._rows].tolist()
         kinds = {code: self._kind(column, condition, code) for code in set(codes)}
         indent = self._sheet.indent(column)

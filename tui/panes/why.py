@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from textual.app import ComposeResult
-from textual.containers import VerticalScroll
-from textual.content import Content
-from textual.widgets import Static
+from textual.content import Content, Span
+from textual.geometry import Region, Size
+from textual.scroll_view import ScrollView
+from textual.strip import Strip
+from textual.style import Style
+from textual.visual import Visual
 
 from tui.model.shown import ShownTable
 from tui.model.why import CellWhy, RowWhy, why_row
@@ -20,15 +22,14 @@ OFTEN_S = 0.2
 NO_FACTS = "The test row is empty: F6 goes there, F9 loads a context."
 
 
-class WhyPane(VerticalScroll, can_focus=False):
-    """Why the row of the cursor is valid, or not."""
+class WhyPane(ScrollView, can_focus=False):
+    """Why the row of the cursor is valid, or not. Only lines that look otherwise than for the row before are painted."""
 
     DEFAULT_CSS = """
     WhyPane {
         dock: right; width: 46; display: none; padding: 0 1; background: $surface; border-left: solid $panel;
-        scrollbar-size-vertical: 1;
+        scrollbar-size-vertical: 1; overflow-x: hidden;
         &.-open { display: block; }
-        & > Static { height: auto; }
     }
     """
 
@@ -36,9 +37,11 @@ class WhyPane(VerticalScroll, can_focus=False):
         super().__init__()
         self._waiting: ShownTable | None = None
         """What is shown when its time comes."""
-
-    def compose(self) -> ComposeResult:
-        yield Static()
+        self._said: list[Content] = []
+        self._strips: list[Strip] = []
+        self._wrapped: dict[tuple[str, tuple[Span, ...]], list[Strip]] = {}
+        """What is said in the lines that it takes, so wide and in such colours."""
+        self._wrapped_for: tuple[int, Style] | None = None
 
     @property
     def is_open(self) -> bool:
@@ -66,17 +69,51 @@ class WhyPane(VerticalScroll, can_focus=False):
         if not self.is_open:
             return
         if sheet.query.is_empty or not len(sheet.view):
-            said = Content(NO_FACTS if sheet.query.is_empty else "No row is shown.")
+            self._said = [Content(NO_FACTS if sheet.query.is_empty else "No row is shown.")]
         else:
             row = int(sheet.view.rows[sheet.cursor[0]])
             why, outputs = why_row(sheet.query, sheet.table, row), sheet.table.settings.outputs
             gives = [f"{name} = {sheet.table.text(row, name) or '–'}" for name in outputs] if why.is_picked else []
-            said = _said(why, gives)
-        static = self.query_one(Static)
-        static.update(said, layout=said.get_height({}, max(static.size.width, 1)) != static.size.height)
+            self._said = _said(why, gives)
+        self._show()
+
+    def on_resize(self) -> None:
+        self._show()
+
+    def notify_style_update(self) -> None:
+        super().notify_style_update()
+        self._show()
+
+    def _show(self) -> None:
+        """Paint the lines that look otherwise than before."""
+        size = self.scrollable_content_region.size
+        if not size:
+            return
+        before, self._strips = self._strips, self._wrap(size.width)
+        height = max(len(self._strips), size.height)
+        if self.virtual_size != (size.width, height):
+            self.virtual_size = Size(size.width, height)
+        top, longest = self.scroll_offset.y, max(len(before), len(self._strips))
+        others = [y for y in range(top, min(top + size.height, longest)) if before[y : y + 1] != self._strips[y : y + 1]]
+        if others:
+            self.refresh(*(Region(0, y - top, size.width, 1) for y in others))
+
+    def _wrap(self, width: int) -> list[Strip]:
+        style = self.visual_style
+        if self._wrapped_for != (width, style):
+            self._wrapped_for, self._wrapped, self._strips = (width, style), {}, []
+        before, self._wrapped = self._wrapped, {}
+        for one in self._said:
+            of = one.plain, tuple(one.spans)
+            self._wrapped[of] = before.get(of) or self._wrapped.get(of) or Visual.to_strips(self, one, width, None, style)
+        return [strip for one in self._said for strip in self._wrapped[one.plain, tuple(one.spans)]]
+
+    def render_line(self, y: int) -> Strip:
+        y += self.scroll_offset.y
+        return self._strips[y] if y < len(self._strips) else Strip.blank(self.size.width, self.visual_style.rich_style)
 
 
-def _said(why: RowWhy, gives: Sequence[str]) -> Content:
+def _said(why: RowWhy, gives: Sequence[str]) -> list[Content]:
     """A row in full: what it gives where it may be picked, the cells that matter, those that hold in few words."""
     lines = [Content.styled(row_state(why), "bold"), Content("")]
     lines += [Content(f"gives {', '.join(gives)}"), Content("")] if gives else []
@@ -88,7 +125,7 @@ def _said(why: RowWhy, gives: Sequence[str]) -> Content:
     lines += [Content.styled(f"✓ {', '.join(holds)}", "$text-muted"), Content("")] if holds else []
     lines += [Content.styled(f"not given: {', '.join(missing)}", "$text-muted"), Content("")] if missing else []
     lines.append(Content.styled("F12 closes · Shift+F12 nearest rows, correct", "$text-muted"))
-    return Content("\n").join(lines)
+    return lines
 
 
 def _told(cell: CellWhy) -> list[Content]:

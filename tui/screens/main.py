@@ -2,53 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from functools import partial
-from typing import ClassVar, Protocol, TypeVar
+from typing import ClassVar, Protocol
 
-from rich.text import Text
 from textual import on
-from textual.app import ComposeResult
 from textual.binding import BindingType
-from textual.reactive import Reactive
-from textual.screen import Screen
-from textual.widget import Widget
-from textual.widgets import ContentSwitcher, Static
 
 from contextdb.disk import write_atomic
 from contextdb.edits.schema_file import schema_path
-from contextdb.errors import ContextDBError, in_quotes, plural
+from contextdb.errors import in_quotes, plural
 from contextdb.tables.changes import Edit
 from contextdb.tables.table import Table
-from tui.clipboard import Clipboard
 from tui.commands import ASSETS, BY_ID, SCREEN, bindings, key_names
-from tui.editor import Editor
-from tui.messages import Edited, FillGap, GoToCell, RenameWanted, SetContext, Told, ValueRenameWanted
-from tui.model.coverage_run import CoverageRun
+from tui.messages import Edited, FillGap, GoToCell, RenameWanted, ValueRenameWanted
 from tui.model.importing import Import
 from tui.model.new_table import make_table, name_fault
-from tui.model.session import Session
-from tui.model.sessions import sessions_of
-from tui.model.workspace import Workspace
-from tui.panes.assets import AssetsPane
-from tui.panes.options import OptionsPane
-from tui.panes.pane import Pane
-from tui.panes.problems import ProblemsPane
 from tui.panes.why import WIDE
 from tui.screens.ask import AskDialog, ChooseDialog
-from tui.screens.asking import TestRow
-from tui.screens.dialog import take_height
-from tui.screens.disk_care import LOOK_EVERY_S, DiskCare
+from tui.screens.disk_care import LOOK_EVERY_S
 from tui.screens.export_table import Export
-from tui.screens.following import Followed, Following
-from tui.screens.renames import Renames
-from tui.screens.steps import StepsDialog
-from tui.widgets.bar import Bar, Item, StatusLine
+from tui.screens.following import Followed
+from tui.screens.table_screen import TableScreen
 from tui.widgets.grid import Grid
-from tui.widgets.key_line import KeyLine
-
-Chosen = TypeVar("Chosen")
 
 
 class Answer(Protocol):
@@ -58,9 +34,6 @@ class Answer(Protocol):
         """The edit that was decided."""
 
 
-TABS = ("assets", "options", "priorities", "coverage", "problems")
-MOTION = "motion"
-"""The tab that there is where the project declares motion databases and has a recorded session, and where it was gone to."""
 CELL_MENU = (
     "edit", "copy", "cut", "paste", "fill-down", "fill-series", "clear", "note", "insert-row", "insert-below",
     "insert-copied", "duplicate", "delete-rows", "enable", "colour-rows", "filter-same", "values", "rename-asset", "nearest",
@@ -70,227 +43,17 @@ COLUMN_MENU = (
     "rename-column", "rename-role", "add-column", "column-left", "column-right", "delete-columns",
 )  # fmt: skip
 """What the right button of the mouse offers."""
-WITH_TOOLS = 30
-"""On a screen of fewer lines the tools give way to the rows; the palette, where all of them are too, stands behind the tabs."""
-TOOLS = ("add-column", "blueprints", "import", "export", "refresh", "autofit", "history", "palette")
 
 
-class MainScreen(Screen[None]):
+class MainScreen(TableScreen):
     """One table of the workspace, with its tabs."""
 
     BINDINGS: ClassVar[list[BindingType]] = bindings([*SCREEN, *ASSETS])
-
-    DEFAULT_CSS = """
-    MainScreen {
-        layout: vertical;
-        & > ContentSwitcher { height: 1fr; & > * { height: 1fr; } }
-        & > #said { height: auto; max-height: 4; padding: 0 1; background: $surface; display: none; }
-        & > #said.-information { display: block; }
-        & > #said.-warning { display: block; color: $text-warning; }
-        & > #said.-error { display: block; color: $text-error; text-style: bold; }
-    }
-    """
-
-    app: Editor
-    focused: Reactive[Widget | None] = Reactive(None, repaint=False)
-    """What has the keys. Of the screen itself nothing looks otherwise then: Textual would paint all of it again."""
-
-    def __init__(self, workspace: Workspace, name: str) -> None:
-        super().__init__()
-        self.workspace = workspace
-        self.table_name = name
-        self.session: Session = workspace.session(name)
-        self.coverage = CoverageRun()
-        self.test_row = TestRow(self)
-        self.following = Following(self)
-        self.renames = Renames(self)
-        self.came_from = ""
-        """The table from a row of which this one was gone into."""
-        self.renamed = ""
-        """What is said of a rename, after which the table was opened again."""
-        self._said = ("", "information")
-        self._warned_at: tuple[int, int] | None = None
-        """Where the cursor was when a warning of a verb was first seen: the next cell takes it away."""
-        self._is_of_verb = False
-        """What is said, not quietly, is of something that was done."""
-        has_databases = bool(self.session.sheet.table.schema.motion.get("databases"))
-        self._has_sessions = has_databases and bool(sessions_of(workspace.folder))
-        self.care = DiskCare(self, self.session, self.say, self.show)
-        self.clipboard = Clipboard(lambda text: self.app.copy_to_clipboard(text))
-
-    @property
-    def tab(self) -> str:
-        """The tab that is seen."""
-        return self.query_one("#panes", ContentSwitcher).current or "assets"
-
-    @property
-    def tabs(self) -> Sequence[str]:
-        """The tabs that there are."""
-        return (*TABS, MOTION) if self._has_sessions or self.tab == MOTION else TABS
-
-    @property
-    def assets(self) -> AssetsPane:
-        """The tab of the grid."""
-        return self.query_one(AssetsPane)
-
-    def compose(self) -> ComposeResult:
-        take_height(self)
-        yield Bar(id="tabs")
-        yield Bar([Item(name, BY_ID[name].label) for name in TOOLS], id="tools")
-        with ContentSwitcher(initial="assets", id="panes"):
-            yield AssetsPane(self.session.sheet, self.clipboard)
-        yield Static(id="said")
-        yield StatusLine()
-        yield KeyLine()
 
     def on_mount(self) -> None:
         self.assets.take_focus()
         self.set_interval(LOOK_EVERY_S, self.care.look)
         self._opened()
-
-    def on_resize(self) -> None:
-        self._show_bars()
-
-    def on_unmount(self) -> None:
-        self.coverage.cancel()
-        self.following.close()
-
-    # ---- what is shown
-
-    def show(self) -> None:
-        """Show the table, and everything said of it, as it is now."""
-        table = self.session.sheet.table
-        self.coverage.follow(table)
-        self.test_row.follow(table)
-        self.assets.show()
-        self._show_bars()
-        if self.tab != "assets":
-            self._pane(self.tab).show()
-
-    def _show_bars(self) -> None:
-        mark = " *" if self.session.sheet.is_modified else ""
-        items = [Item("open", f"{self.table_name}{mark}", is_strong=True)]
-        items += [Item(tab, BY_ID[tab].label, is_on=tab == self.tab) for tab in self.tabs]
-        has_tools = self.size.height >= WITH_TOOLS
-        self.query_one("#tools", Bar).display = has_tools
-        items += [] if has_tools else [Item("palette", f"^P {BY_ID['palette'].label}")]
-        self.query_one(KeyLine).leave_out(() if has_tools else ("app.command_palette",))
-        table = self.session.sheet.table
-        about = f"{plural(table.n_rows, 'row')} · {plural(len(table.columns), 'column')}"
-        self.query_one("#tabs", Bar).show(items, about)
-        self.query_one(StatusLine).show(right=self.assets.summary())
-
-    def say(self, text: str, level: str = "information") -> None:
-        """Say something in the line over the footer; nothing takes away what was said."""
-        is_quiet = level == "information"
-        self._is_of_verb = False
-        status = self.query_one(StatusLine)
-        is_short = is_quiet and status.has_room(text)
-        status.show(text if is_short else "")
-        if (text, level) == self._said:
-            return
-        self._said, said = (text, level), self.query_one("#said", Static)
-        if not is_short:
-            said.update(Text(text if is_quiet else f"! {text}"))
-        if not is_short or said.display:
-            said.set_classes("" if is_short else f"-{level}")
-
-    @on(Told)
-    def _told(self, event: Told) -> None:
-        self.say(event.text, event.level)
-        self._is_of_verb, self._warned_at = event.level != "information", None
-
-    @on(Edited)
-    def edited(self, event: Edited) -> None:
-        """Show the sheet again, and say what was done."""
-        done = event.done
-        text = " ".join([f"{done.name}." if done.name else "", *done.notes, *done.warnings]).strip()
-        self.say(text, "warning" if done.warnings else "information")
-        self._is_of_verb, self._warned_at = bool(done.warnings), None
-        self.show()
-
-    @on(Grid.Moved)
-    @on(Grid.FactChanged)
-    def _moved(self) -> None:
-        self._show_bars()
-        cursor = self.session.sheet.cursor
-        if self._is_of_verb and self._warned_at not in (None, cursor):
-            self.say("")  # one has gone on
-        self._warned_at = cursor
-
-    @on(Bar.Pressed)
-    async def _pressed(self, event: Bar.Pressed) -> None:
-        await self.run_command(event.command)
-
-    # ---- commands
-
-    async def run_command(self, name: str) -> None:
-        """Run a command of the palette or a bar, wherever its keys are."""
-        command = BY_ID[name]
-        if command.scope == "screen":
-            await self.run_action(command.run)
-            return
-        self._switch_to("assets")
-        await (self.assets.grid if command.scope == "grid" else self.assets).run_action(command.run)
-
-    async def action_command(self, name: str) -> None:
-        """A command of the assets' pane, from any tab."""
-        await self.run_command(name)
-
-    async def action_tab(self, name: str) -> None:
-        """Go to a tab, which is made when it is first gone to."""
-        if not self.query(f"#{name}"):
-            with self.app.batch_update():
-                await self.query_one("#panes", ContentSwitcher).mount(self._new_pane(name))
-        self._switch_to(name)
-
-    def _switch_to(self, name: str) -> None:
-        if name != self.tab:
-            self.say("")  # it was of the tab that is left
-        self.query_one("#panes", ContentSwitcher).current = name
-        self._show_bars()
-        if name != "assets":
-            self._pane(name).show()
-        self._pane(name).take_focus()
-
-    def _new_pane(self, name: str) -> Pane:
-        sheet = self.session.sheet
-        if name == "options":
-            return OptionsPane(sheet, id=name)
-        if name == "priorities":
-            from tui.panes.priorities import PrioritiesPane  # with all of motion
-
-            return PrioritiesPane(sheet, id=name)
-        if name == MOTION:
-            from tui.panes.motion import MotionPane  # loads the motion search
-
-            return MotionPane(self.workspace.folder, id=name)
-        return self._coverage_pane(name) if name == "coverage" else ProblemsPane(sheet, id=name)
-
-    def _coverage_pane(self, name: str) -> Pane:
-        from tui.panes.coverage import CoveragePane
-
-        return CoveragePane(self.session.sheet, self.coverage, lambda: self.following.kept, self.workspace.folder, id=name)
-
-    async def action_next_tab(self, by: int) -> None:
-        """Go to the tab beside."""
-        tabs = self.tabs
-        await self.action_tab(tabs[(tabs.index(self.tab) + by) % len(tabs)])
-
-    def action_help(self) -> None:
-        from tui.screens.help import HelpDialog
-
-        self.app.push_screen(HelpDialog(self.app.settings.keys))
-
-    def action_history(self) -> None:
-        """Choose a step to go to."""
-        history = self.session.sheet.history
-
-        def chosen(position: int | None) -> None:
-            if position is not None:
-                self.edited(Edited(self.session.sheet.go_to_step(position)))
-
-        self.app.push_screen(StepsDialog(history.names, history.position), chosen)
 
     # ---- tables and files
 
@@ -507,15 +270,6 @@ class MainScreen(Screen[None]):
         if new:
             self.assets.go_to_column(new[-1])
 
-    def apply(self, edit: Edit, notes: Sequence[str] = ()) -> None:
-        """Make an edit, show it and say what was done; what cannot be done is said."""
-
-        def made() -> None:
-            done = self.session.sheet.apply(edit)
-            self.edited(Edited(replace(done, warnings=(*done.warnings, *notes))))
-
-        self.try_to(made)
-
     def action_find_everywhere(self) -> None:
         """Find a text in all tables of the folder, and go to one of its places."""
         from tui.screens.find_everywhere import FindEverywhere, FoundCell
@@ -591,35 +345,7 @@ class MainScreen(Screen[None]):
         self.assets.refresh_view()
         self.show()
 
-    def _opened(self) -> None:
-        session = self.session
-        if session.n_recovered:
-            self.say(f"{plural(session.n_recovered, 'unsaved edit')} restored from the last session.", "warning")
-        elif session.problem is not None:
-            self.say(str(session.problem), "warning")
-        elif self.renamed:
-            self.say(self.renamed)
-        elif self.came_from:
-            self.say(f"A row of {self.came_from} refers to this table. Alt+Q goes back.")
-            self.assets.grid.test_name = self.came_from if not session.sheet.query.is_empty else ""
-        elif why := session.why_read_only:
-            self.say(f"This table is read-only: {why}.", "warning")
-        self._show_bars()
-
-    def try_to(self, verb: Callable[[], None]) -> None:
-        """Do something; what cannot be done is said."""
-        try:
-            verb()
-        except ContextDBError as error:
-            self.say(str(error), "error")
-
     # ---- what panes ask for
-
-    @on(GoToCell)
-    def go_to_cell(self, event: GoToCell) -> None:
-        """Show a cell in the grid."""
-        self._switch_to("assets")
-        self.assets.go_to(event.row, event.column)
 
     @on(FillGap)
     def _fill_gap(self, event: FillGap) -> None:
@@ -628,13 +354,3 @@ class MainScreen(Screen[None]):
         self.edited(Edited(done))
         self.go_to_cell(GoToCell(sheet.row_number(sheet.cursor[0]) - 1, sheet.table.asset_column))
         self.say("A new row fills the gap: enter its asset.")
-
-    @on(SetContext)
-    def set_context(self, event: SetContext) -> None:
-        """Make these the facts of the test row; a game is not followed any more."""
-        self.following.stop()
-        self._switch_to("assets")
-        self.assets.set_context(dict(event.facts), event.name)
-
-    def _pane(self, name: str) -> Pane:
-        return self.query_one(f"#{name}", Pane)

@@ -14,7 +14,6 @@ from textual.message import Message
 from textual.strip import Strip
 from textual.widget import Widget
 
-from tui.contrast import readable
 from tui.model.layout import cut
 
 
@@ -90,7 +89,7 @@ class Bar(Widget):
         return self._of("bar--hover" if item.command and item.command == self._hovered else "bar--item")
 
     def _of(self, name: str) -> Style:
-        return readable(self.get_component_rich_style(name))
+        return self.get_component_rich_style(name)
 
     def _item_at(self, x: int) -> Item | None:
         end = 0
@@ -142,7 +141,7 @@ class StatusLine(Widget):
 
     def render_line(self, y: int) -> Strip:
         left, right = self._texts
-        width, style = self.size.width, readable(self.rich_style)
+        width, style = self.size.width, self.rich_style
         if not right:
             return Strip([Segment(cut(f" {left}", width), style)])
         room = max(width - cell_len(right) - 2, 0)
@@ -192,4 +191,4 @@ class CellLine(Widget):
         return strip.adjust_cell_length(self.size.width, plain)
 
     def _of(self, part: str) -> Style:
-        return readable(self.get_component_rich_style(f"cell-line--{part}"))
+        return self.get_component_rich_style(f"cell-line--{part}")

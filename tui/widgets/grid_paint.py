@@ -41,6 +41,9 @@ OPENS = "▸"
 LEAST_BESIDE = 6
 """So much of a text stays where something is at its right."""
 
+MOST_LINES = 512
+"""So many lines are kept."""
+
 StyleOf = Callable[[str, str], Style]
 """The style of a ground and of what is on it: `style("cursor", "text")`."""
 
@@ -116,16 +119,21 @@ class Painter:
         self.sheet = sheet
         self.style = style
         self._window: Window | None = None
+        self._before: Window | None = None
+        """The window that was read before the last change."""
         self.flashing: frozenset[tuple[int, int]] = frozenset()
         """Cells that have just begun to fail: rows of the view, and columns."""
         self.began: frozenset[tuple[int, int]] = frozenset()
         """Those of them that began with the last facts."""
         self._headers: dict[int, Header] = {}
         self._read = sheet.table, sheet.view
+        self._lines: dict[int, tuple[object, Strip]] = {}
+        """By row of the view the line that was painted last, and all that it depends on but for what `_lines_of` says."""
+        self._lines_of: tuple[object, ...] = ()
 
     def changed(self) -> None:
         """Read the sheet again."""
-        self._window = None
+        self._before, self._window = self._window or self._before, None
         self.flashing = self.began = frozenset()
         self._headers.clear()
         self._read = self.sheet.table, self.sheet.view
@@ -148,6 +156,8 @@ class Painter:
             self.changed()  # painted between a step and word of it
         if y < look.n_headers:
             return self._header_line(y, look)
+        if y >= look.height:  # under the scroll bar, where nothing is seen; the window of the rows stays as it is
+            return Strip.blank(look.layout.width)
         if y == look.foot:
             return self._test_line(look)
         row = look.top + y - look.n_headers
@@ -231,12 +241,45 @@ class Painter:
 
     # ---- rows
 
+    def forget_lines(self) -> None:
+        """Keep no line: what they are painted with is other."""
+        self._lines.clear()
+
     def _body_line(self, row: int, look: Look) -> Strip:
+        """The line of a row; the one of before where all that is seen of it is as it was."""
+        sheet, layout = self.sheet, look.layout
+        names = [c.name for c in sheet.table.columns] if sheet.marks.texts or sheet.clips.cells else None
+        lines_of = layout, look.left, sheet.marks, sheet.clips, sheet.asset_at, sheet.shared_end, len(sheet.table.columns), names
+        if lines_of != self._lines_of or len(self._lines) > MOST_LINES:
+            self._lines_of, self._lines = lines_of, {}
+        of = self._seen_of(row, look)
+        known = self._lines.get(row)
+        if known is None or known[0] != of:
+            known = self._lines[row] = of, self._painted_line(row, look)
+        return known[1]
+
+    def _seen_of(self, row: int, look: Look) -> object:
+        """What the line of a row is painted from, with what all lines are."""
+        window, block, layout, sheet = self._window_at(row, look), self._block(look), look.layout, self.sheet
+        seen, n_columns = window.row(row), len(sheet.table.columns)
+        columns = [c for c in (*range(layout.n_frozen), *layout.visible(look.left)) if c < n_columns and layout.widths[c]]
+        cells = [window.cell(row, column) for column in columns]
+        is_in_block = block is not None and block.top <= row < block.bottom
+        selected = (block.left, block.right, row == block.bottom - 1, sheet.selection.kind) if block and is_in_block else None
+        asset = sheet.text(row, sheet.asset_at) if sheet.marks.texts or sheet.marks.colours or sheet.clips.cells else ""
+        flashing = [column for at, column in self.flashing if at == row]
+        failing = window.failing(row) if seen.n_failing else []
+        return seen, cells, window.notes(row), self._cursor(row, look), look.has_focus, selected, asset, flashing, failing
+
+    def _cursor(self, row: int, look: Look) -> int | None:
+        """The column of the cursor, where it is in a row."""
+        is_away = look.is_in_test_row or look.is_in_new_row
+        return None if is_away or self.sheet.cursor[0] != row else self.sheet.cursor[1]
+
+    def _painted_line(self, row: int, look: Look) -> Strip:
         window = self._window_at(row, look)
         seen, block, ground = window.row(row), self._block(look), self._ground(row, window)
-        asset = self.sheet.asset_at
-        is_away = look.is_in_test_row or look.is_in_new_row
-        cursor = None if is_away or self.sheet.cursor[0] != row else self.sheet.cursor[1]
+        asset, cursor = self.sheet.asset_at, self._cursor(row, look)
 
         n_columns = len(self.sheet.table.columns)
         noted, colours, names = self.sheet.marks.texts, self.sheet.marks.colours, [c.name for c in self.sheet.table.columns]
@@ -283,7 +326,7 @@ class Painter:
 
     def _window_at(self, row: int, look: Look) -> Window:
         if self._window is None or not self._window.holds(row):
-            self._window = Window(self.sheet, look.top, max(look.n_body, 1))
+            self._window = Window(self.sheet, look.top, max(look.n_body, 1), self._window or self._before)
             if not self._window.holds(row):
                 self._window = Window(self.sheet, row, 1)
         return self._window

@@ -10,10 +10,13 @@ from functools import partial
 from typing import ClassVar, Self
 
 from rich.cells import cell_len
+from rich.segment import Segment
 from rich.style import Style
+from textual.filter import LineFilter
 from textual.geometry import Region, Size
 from textual.reactive import reactive
 from textual.scroll_view import ScrollView
+from textual.scrollbar import ScrollBar, ScrollBarRender
 from textual.strip import Strip
 
 from contextdb.schema.shapes import CHANCE
@@ -282,6 +285,7 @@ class GridView(ScrollView, inherit_bindings=False):
 
     def notify_style_update(self) -> None:
         self._styles.clear()
+        self._painter.forget_lines()
         super().notify_style_update()
 
     def _width(self, at: int, name: str, is_wrapped: bool) -> int:
@@ -347,8 +351,19 @@ class GridView(ScrollView, inherit_bindings=False):
             plain = Style(bgcolor=under.bgcolor, bold=under.bold, underline=under.underline)
             said = Style(color=over.color, bold=over.bold or None, underline=over.underline or None, strike=over.strike or None)
             whole = plain + said
-            self._styles[ground, meant] = whole if meant == "line" else readable(whole)
+            self._styles[ground, meant] = self._filtered(whole if meant == "line" else readable(whole), is_read=meant != "line")
         return self._styles[ground, meant]
+
+    def _filtered(self, style: Style, is_read: bool) -> Style:
+        """A style as the app's filters make it."""
+        segments = [Segment("x" if is_read else "│", style)]
+        for one in super().get_line_filters():
+            segments = one.apply(segments, self.background_colors[1])
+        return segments[0].style or style
+
+    def get_line_filters(self) -> Sequence[LineFilter]:
+        """None: each style is filtered once, in place of every cell of every line."""
+        return ()
 
     def _fit(self) -> None:
         rows, total = len(self.sheet.view), self.grid_layout.extent
@@ -376,6 +391,22 @@ class GridView(ScrollView, inherit_bindings=False):
         if sizes != self._scrolled_in:
             super()._scroll_update(virtual_size)
             self._scrolled_in = virtual_size, self.size, self.container_size, self.scrollbars_enabled
+
+    def watch_scroll_y(self, old_value: float, new_value: float) -> None:
+        """Textual paints the whole bar for every row scrolled by: in a long table it looks the same for many."""
+        bar = self.vertical_scrollbar
+        if self.show_vertical_scrollbar and self._thumb(bar.position) == self._thumb(new_value):
+            bar.set_reactive(ScrollBar.position, bar.validate_position(new_value))
+        super().watch_scroll_y(old_value, new_value)
+
+    def _thumb(self, position: float) -> int:
+        """Where the thumb of the vertical bar begins, in the smallest steps that are painted: see `ScrollBarRender.render_bar`."""
+        bar = self.vertical_scrollbar
+        virtual, window, size = bar.window_virtual_size, bar.window_size, bar.size.height
+        if not (virtual and window and size and virtual != window):
+            return 0
+        thumb = max(1, window / (virtual / size))
+        return int((size - thumb) * position / (virtual - window) * len(ScrollBarRender.VERTICAL_BARS))
 
     def watch_has_focus(self, _has_focus: bool) -> None:
         """No style here depends on the keys. Textual would work out all of them again, and paint the scroll bars: every line."""

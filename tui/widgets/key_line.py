@@ -14,7 +14,6 @@ from textual.strip import Strip
 from textual.widget import Widget
 
 from tui.commands import key_name
-from tui.contrast import readable
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +49,7 @@ class KeyLine(Widget):
         super().__init__()
         self._keys: tuple[Key, ...] = ()
         self._left_out: tuple[str, ...] = ()
+        self._is_due = False
 
     def leave_out(self, actions: tuple[str, ...]) -> None:
         """Leave out the keys of these actions, which stand elsewhere on the screen."""
@@ -61,6 +61,13 @@ class KeyLine(Widget):
         self.screen.bindings_updated_signal.subscribe(self, self._changed)
 
     def _changed(self, screen: Screen[Any]) -> None:
+        """Look which keys are bound, once for all that change them in one go."""
+        if not self._is_due:
+            self._is_due = True
+            self.call_later(self._show, screen)
+
+    def _show(self, screen: Screen[Any]) -> None:
+        self._is_due = False
         keys = tuple(self._bound()) if screen is self.screen else self._keys
         if keys != self._keys:
             self._keys = keys
@@ -83,7 +90,7 @@ class KeyLine(Widget):
             x += key.width
 
     def render_line(self, y: int) -> Strip:
-        key_style, label_style = (readable(self.get_component_rich_style(f"key-line--{part}")) for part in ("key", "label"))
+        key_style, label_style = (self.get_component_rich_style(f"key-line--{part}") for part in ("key", "label"))
         segments = [Segment(" ", label_style)]
         for _, key in self._fitting():
             segments += [Segment(key.name, key_style), Segment(f" {key.label}  ", label_style)]

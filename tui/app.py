@@ -6,12 +6,15 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any, ClassVar
 
+from textual import on
 from textual.app import SystemCommand
 from textual.binding import BindingType
+from textual.command import CommandPalette
 from textual.filter import LineFilter
 from textual.message import Message
 from textual.screen import Screen
 from textual.theme import BUILTIN_THEMES
+from textual.widgets import Input
 
 from contextdb.errors import ContextDBError
 from contextdb.tables.merging.conflicts import Side
@@ -47,17 +50,18 @@ class EditorApp(Editor):
     CommandPalette > Vertical, CommandPalette:dark > Vertical {
         width: 76; max-width: 96%; height: auto; max-height: 86%; margin-top: 2; padding: 0 1; visibility: visible;
         background: $surface; border: round $primary;
+        border-title-color: $text; border-title-style: bold; border-subtitle-color: $text-muted;
     }
     CommandPalette #--input, CommandPalette #--input.--list-visible { border: none; height: 1; }
     CommandPalette CommandInput, CommandPalette CommandInput:focus { border: none; height: 1; padding: 0; background: $surface; }
     CommandPalette #--results { overlay: none; background: $surface; margin: 1 0 0 0; }
     CommandPalette CommandList, CommandPalette CommandList:focus { border: none; background: $surface; max-height: 60vh; }
     OptionList { min-width: 8; }
+    OptionList:ansi > .option-list--option-highlighted { background: ansi_blue; color: ansi_bright_white; }
+    CommandPalette:ansi > .command-palette--help-text { color: ansi_default; text-style: none; }
     Button.-textual-compact {
-        width: auto; min-width: 0; padding: 0 1; margin: 0 1 0 0; background: $panel; text-style: bold;
+        width: auto; min-width: 0; padding: 0; margin: 0 1 0 0; background: $panel; text-style: bold;
         &:focus, &:hover { background: $primary 40%; text-style: bold underline; }
-        &.-primary { background: $primary; }
-        &.-primary:focus, &.-primary:hover { background: $primary; text-style: bold underline; }
     }
     SheetBar Button.-textual-compact { background: $surface; }
     Dialog OptionList, Dialog OptionList:focus { background: $surface; }
@@ -95,8 +99,17 @@ class EditorApp(Editor):
         return sorted([*(theme.name for theme in THEMES), *BUILTIN_THEMES])
 
     def get_line_filters(self) -> Sequence[LineFilter]:
-        """What is done to all that is painted: every text can be read."""
-        return [*super().get_line_filters(), READABLE]
+        """Make every text that is painted readable; what lies behind the palette stays dim, as behind a dialog."""
+        filters = super().get_line_filters()
+        return filters if isinstance(self.screen, CommandPalette) else [*filters, READABLE]
+
+    @on(CommandPalette.Opened)
+    def _palette_opened(self) -> None:
+        """Give the palette the title and the keys that a dialog has."""
+        box, field = self.screen.query_one("#--container"), self.screen.query_one(Input)
+        box.border_title = "Theme" if "theme" in field.placeholder else "Commands"
+        box.border_subtitle = "type to filter · ↑↓ choose · Enter OK · Esc cancel"
+        field.placeholder = "type to filter"
 
     def on_mount(self) -> None:
         if self.workspace.beginning is not None:

@@ -172,7 +172,12 @@ class HeatMap(ScrollView, can_focus=True):
         self._resize()
         self.place = (-1, -1)
         self.go(*place)
-        self.refresh()
+        self.refresh(layout=self.styles.is_auto_height)
+
+    def get_content_height(self, container: Size, viewport: Size, width: int) -> int:
+        """As high as the squares are on half of the screen."""
+        room = viewport.height // 2 - UNDER
+        return len(self.rows) * max(1, min(TALLEST, room // max(1, len(self.rows)))) + UNDER
 
     @property
     def label_width(self) -> int:

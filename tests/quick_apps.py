@@ -4,6 +4,9 @@ After each key Textual sleeps until the process has used little of the processor
 Here a key has done its work once the event loop has nothing left to run, which is sooner, and holds on a busy machine too.
 
 Apps share the rules that Textual reads in their style sheets, which no app changes, and leave nothing behind in Textual's caches.
+
+Every day they also paint when they rest and not at each step before, and make styles and strips with less ado; with EXAMPLES=full
+they are as Textual makes them.
 """
 
 from __future__ import annotations
@@ -12,16 +15,21 @@ import asyncio
 import contextlib
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 from unittest.mock import patch
 
+from strategies import IS_FULL
 from textual._context import active_app
 from textual._styles_cache import StylesCache
 from textual._wait import wait_for_idle
 from textual.app import App
 from textual.css.model import RuleSet
+from textual.css.styles import Styles
 from textual.css.stylesheet import Stylesheet
+from textual.dom import DOMNode
+from textual.screen import Screen
+from textual.strip import Strip
 
 N_UPDATES = 2
 """What is laid out anew may have to be painted anew."""
@@ -29,6 +37,10 @@ LONGEST_WAIT_S = 10.0
 _read_rules = Stylesheet._parse_rules
 _rules: dict[tuple[Any, ...], dict[tuple[Any, ...], list[RuleSet]]] = {}
 """By the variables of a style sheet, and by its source: the rules that stand in it."""
+_replace_rules = Stylesheet.replace_rules
+_values: dict[tuple[str, Any], Any] = {}
+"""What a rule of this name and value becomes in the styles of a part."""
+_paint = Screen._compositor_refresh
 
 
 @contextlib.contextmanager
@@ -47,6 +59,7 @@ def quick() -> Iterator[None]:
         patch("textual.pilot.wait_for_idle", rested),
         patch.object(Stylesheet, "_parse_rules", _shared_rules),
         patch.object(RuleSet, "__hash__", object.__hash__),  # by identity as before, without a call of Python for each
+        contextlib.nullcontext() if IS_FULL else _lighter(),
     ):
         try:
             yield
@@ -80,6 +93,9 @@ async def _rested(app: App[Any]) -> None:
         if app._exception is None and app._running and app.screen_stack:
             app.screen._on_timer_update()
     await _nothing_ready(end)
+    if app._exception is None and app._running and app.screen_stack and app.screen._compositor._dirty_regions:
+        _paint(app.screen)
+        await _nothing_ready(end)
 
 
 async def _nothing_ready(end: float) -> None:
@@ -88,3 +104,69 @@ async def _nothing_ready(end: float) -> None:
     await asyncio.sleep(0)
     while loop._ready and time.monotonic() < end:
         await asyncio.sleep(0)
+
+
+# ---- what is made with less ado
+
+
+@contextlib.contextmanager
+def _lighter() -> Iterator[None]:
+    with (
+        patch.object(Screen, "_compositor_refresh", _paint_later),
+        patch.object(Stylesheet, "replace_rules", staticmethod(_first_rules)),
+        patch.object(Strip, "__init__", _new_strip),
+    ):
+        yield
+
+
+def _paint_later(screen: Any) -> None:
+    """Leave what is to be painted to the next rest."""
+    if screen is screen.app.screen:
+        screen._dirty_widgets.clear()
+    else:
+        _paint(screen)
+
+
+def _first_rules(node: DOMNode, rules: Any, animate: bool = False) -> None:
+    """Give a new part its rules at once, without asking for each what it changes."""
+    base = node.styles.base
+    if base._rules or animate:
+        _replace_rules(node, rules, animate)
+        return
+    for name, value in rules.items():
+        if value is not None:
+            base._rules[name] = _value(name, value)  # type: ignore[literal-required]
+    base._updates += 1
+    if node._is_mounted:
+        node.refresh(layout=True)
+    node.notify_style_update()
+
+
+def _value(name: str, value: Any) -> Any:
+    if (name, value) not in _values:
+        styles = Styles()
+        setattr(styles, name, value)
+        _values[name, value] = styles._rules.get(name)
+    return _values[name, value]
+
+
+class _NoCache:
+    """Keeps nothing."""
+
+    def get(self, key: object, default: object = None) -> object:
+        return default
+
+    def __setitem__(self, key: object, value: object) -> None:
+        pass
+
+
+NO_CACHE: Any = _NoCache()
+
+
+def _new_strip(strip: Strip, segments: Iterable[Any], cell_length: int | None = None) -> None:
+    """A strip without its seven caches: few strips are asked twice before they are painted anew."""
+    strip._segments = list(segments)
+    strip._cell_length = cell_length
+    strip._divide_cache = strip._crop_cache = strip._style_cache = strip._filter_cache = NO_CACHE
+    strip._line_length_cache = strip._crop_extend_cache = strip._offsets_cache = NO_CACHE
+    strip._render_cache = strip._link_ids = strip._cell_count = None

@@ -7,10 +7,11 @@ import io
 import json
 import os
 import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from warm_start import python
 
 from contextdb.cli import main
 
@@ -47,6 +48,6 @@ def run(*arguments: str | Path) -> Result:
 def run_process(*arguments: str | Path, **more: Any) -> Result:
     """Run a command in a process of its own."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT), **more.pop("env", {})}
-    command = [sys.executable, "-m", "contextdb", *map(str, arguments)]
+    command = python("-m", "contextdb", *arguments)
     done = subprocess.run(command, capture_output=True, env=environment, encoding="utf-8", **more)
     return Result(done.returncode, done.stdout, done.stderr)

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 from running import ROOT, Result, run, run_process
 from strategies import some
+from warm_start import python
 
 import contextdb
 from contextdb import cli
@@ -253,7 +254,7 @@ STOPPED = [
 def test_a_reader_who_stops_reading_changes_no_exit_code(here: Path, arguments: list[str], code: int, unbuffered: str):
     (here / "big.csv").write_text("Asset,ok\n" + "".join(f"{'a' * 50}{i},True\n" for i in range(5000)), encoding="utf-8")
     (here / "bad.csv").write_text("Asset,ok\n" + "".join(f"a{i},5..3\n,True\n,True\n" for i in range(500)), encoding="utf-8")
-    command = [sys.executable, "-m", "contextdb", *arguments]
+    command = python("-m", "contextdb", *arguments)
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": unbuffered}
     reading, writing = os.pipe()
     os.close(reading)
@@ -268,7 +269,7 @@ def test_a_reader_who_stops_reading_changes_no_exit_code(here: Path, arguments: 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs /dev/full")
 @pytest.mark.parametrize(("arguments", "unbuffered"), some(((one, how) for one in UNWRITTEN for how in HOW), 3))
 def test_output_that_cannot_be_written_is_an_error(arguments: list[str], unbuffered: str):
-    command = [sys.executable, "-m", "contextdb", *arguments]
+    command = python("-m", "contextdb", *arguments)
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": unbuffered}
     with open("/dev/full", "w", encoding="utf-8") as full:
         done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, env=environment, encoding="utf-8")

@@ -31,6 +31,7 @@ from unittest import mock
 
 import pytest
 from strategies import IS_FULL
+from warm_start import python
 
 from contextdb.cli import main
 from tui.app import EditorApp
@@ -99,7 +100,7 @@ class Session:
     def _command(self, words: list[str]) -> str:
         if words == ["echo", "$?"]:
             return str(self.exit_code)
-        start = {"contextdb": [sys.executable, "-m", "contextdb"], "python": [sys.executable]}
+        start = {"contextdb": python("-m", "contextdb"), "python": python()}
         if words[0] not in start:
             raise ValueError(f"a console block runs contextdb, python and echo $?, not {words[0]}: use a ```sh block")
         if words[0] == "contextdb" and not self.in_processes:
@@ -225,7 +226,7 @@ def test_a_console_block_refuses_a_command_that_it_does_not_know():
 @pytest.mark.parametrize("page", ["keys", "commands"])
 def test_a_page_made_of_the_code_is_as_the_code_is_now(page: str):
     wanted = subprocess.run(
-        [sys.executable, "-c", f"import {page}; print({page}.page(), end='')"],
+        python("-c", f"import {page}; print({page}.page(), end='')"),
         cwd=ROOT / "docs",
         env=UTF8,
         stdout=subprocess.PIPE,

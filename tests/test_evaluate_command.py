@@ -6,7 +6,6 @@ import csv
 import os
 import stat
 import subprocess
-import sys
 from collections.abc import Collection, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from itertools import product
@@ -18,6 +17,7 @@ import strategies
 from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 from running import ROOT, Result, run
+from warm_start import python
 
 from contextdb.cells.domains import Domain
 from contextdb.cells.facts import describe
@@ -506,7 +506,7 @@ def test_a_full_disk_is_told_of_the_file_that_was_asked_for(here: Path, name: st
     rows = "".join(f"{i % 97 / 10},{i % 3 == 0}\n" for i in range(30_000))
     (here / "c.csv").write_text("speed,ok\n" + rows, encoding="utf-8")
     (here / name).write_text("of yesterday", encoding="utf-8")
-    told = [sys.executable, "-c", LIMITED, str(n_bytes), "evaluate", "moves", "c.csv", "--unknown", "any", "--out", name]
+    told = python("-c", LIMITED, str(n_bytes), "evaluate", "moves", "c.csv", "--unknown", "any", "--out", name)
     done = subprocess.run(told, capture_output=True, text=True, cwd=here, env={**os.environ, "PYTHONPATH": str(ROOT)})
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.startswith(f"contextdb: {name}: the ")

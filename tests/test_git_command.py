@@ -12,12 +12,16 @@ import pytest
 from running import ROOT, run
 from strategies import some
 from warm_commands import warm_program
+from warm_start import python
 
 from contextdb import cli
 
 BASE = "Asset,speed,hit\r\nwalk,0..5,True\r\nrun,5..9,Any\r\njump,Any,False\r\n"
 TOML = '[conditions.speed]\ntype = "number"\nmin = 0.0\nmax = 10.0\n'
-PROGRAM = """import sys
+PROGRAM = """import os, sys
+if "cli" not in sys.argv[1:2]:
+    os.execv({python[0]!r}, [*{python!r}, os.path.abspath(__file__), "cli", *sys.argv[1:]])
+del sys.argv[1]
 sys.path.insert(0, {root!r})
 from contextdb import cli
 {change}
@@ -102,7 +106,7 @@ def install(*arguments: str):
 
 def in_a_process_of_its_own(change: str = "") -> None:
     """Let the driver load contextdb, change something in it, and run there."""
-    Path("..", "a driver.py").write_text(PROGRAM.format(root=str(ROOT), change=change), encoding="utf-8")
+    Path("..", "a driver.py").write_text(PROGRAM.format(root=str(ROOT), change=change, python=python()), encoding="utf-8")
 
 
 # ---- install, status, uninstall

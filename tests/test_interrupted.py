@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 from running import ROOT
 from strategies import some
+from warm_start import python
 
 from contextdb.commands.demo_command import make_sample, sample_folder
 
@@ -72,7 +73,7 @@ def test_an_interrupt_after_the_first_line_of_progress_ends_the_command(
 ):
     make(tmp_path)
     before = files_in(tmp_path)
-    line = [sys.executable, "-u", "-m", "contextdb", *command]
+    line = python("-u", "-m", "contextdb", *command)
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     with subprocess.Popen(
         line, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, encoding="utf-8"

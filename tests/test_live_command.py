@@ -8,7 +8,6 @@ import re
 import shlex
 import signal
 import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,6 +15,7 @@ from pathlib import Path
 import pytest
 from running import ROOT, run, run_process
 from telemetry.links import meeting
+from warm_start import python
 
 import contextdb as cdb
 from contextdb.commands.live_views import Changes
@@ -48,7 +48,7 @@ LOCOMOTION = ROOT / "tables" / "locomotion.csv"
 def game(name: str = "game", table: Path = LOCOMOTION) -> Iterator[subprocess.Popen[str]]:
     """A game in another process, which runs until its standard input is closed."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    command = [sys.executable, "-c", GAME, name, str(table)]
+    command = python("-c", GAME, name, table)
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment) as process:
         assert process.stdout is not None
         process.stdout.readline()
@@ -160,7 +160,7 @@ def test_a_game_that_ends_and_one_that_is_killed_are_told(meeting: Path):
     for stop, said in ((end, 'the game "game" has ended.'), (subprocess.Popen.kill, 'the game "game" is gone.')):
         with game() as running:
             live = subprocess.Popen(
-                [sys.executable, "-m", "contextdb", "live", "game"],
+                python("-m", "contextdb", "live", "game"),
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,
                 text=True,
@@ -175,7 +175,7 @@ def test_a_game_that_ends_and_one_that_is_killed_are_told(meeting: Path):
 
 def test_ctrl_c_and_a_reader_that_has_read_enough_end_it_quietly(meeting: Path):
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    command = [sys.executable, "-m", "contextdb", "live", "game"]
+    command = python("-m", "contextdb", "live", "game")
     for is_interrupted in (True, False):
         with (
             game(),

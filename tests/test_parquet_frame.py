@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import subprocess
-import sys
 from contextlib import suppress
 from pathlib import Path
 
@@ -14,6 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from running import run
+from warm_start import python
 
 import contextdb as cdb
 from contextdb.columns import TextColumn
@@ -133,7 +133,7 @@ def test_an_empty_file_and_a_file_that_is_cut_off_are_refused(tmp_path: Path):
 
 
 def test_damaged_telemetry_is_refused_by_a_process_that_goes_on(tmp_path: Path):
-    command = [sys.executable, "-m", "contextdb", "coverage", "t.csv", "--telemetry", str(CORPUS[0])]
+    command = python("-m", "contextdb", "coverage", "t.csv", "--telemetry", CORPUS[0])
     (tmp_path / "t.csv").write_text("Asset,speed\nwalk,0..4\n", encoding="utf-8")
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, encoding="utf-8", check=False)
     assert (done.returncode, "the file is damaged" in done.stderr + done.stdout) == (2, True)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from warm_start import python
 
 from contextdb.errors import FileError
 from contextdb.tables.project import load
@@ -157,7 +157,7 @@ def test_two_processes_that_load_edit_and_save_lose_nothing(tmp_path):
     n_rows, n = 10, 20
     file = tmp_path / "t.csv"
     file.write_text("Asset,a,b\n" + "".join(f"r{i},Any,Any\n" for i in range(n_rows)), encoding="utf-8")
-    commands = [[sys.executable, "-c", EDITING, str(file), column, str(n)] for column in ("a", "b")]
+    commands = [python("-c", EDITING, file, column, str(n)) for column in ("a", "b")]
     started = [subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True) for command in commands]
     for process in started:
         said = process.communicate()[1]

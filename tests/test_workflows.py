@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import shutil
 import subprocess
 import sys
@@ -11,6 +12,7 @@ from typing import Any
 
 import pytest
 import yaml
+from warm_start import python
 
 import contextdb
 
@@ -50,8 +52,11 @@ def run_step(name: str, checkout: Path, max_drop: str = "0") -> subprocess.Compl
     """A step of the workflow as the runner runs it."""
     temporary = checkout.parent / "runner"
     temporary.mkdir(exist_ok=True)
+    program = temporary / "contextdb"
+    program.write_text(f'#!/bin/sh\nexec {shlex.join(python("-m", "contextdb"))} "$@"\n', encoding="utf-8")
+    program.chmod(0o755)
     own = {
-        "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
+        "PATH": os.pathsep.join([str(temporary), str(Path(sys.executable).parent), os.environ["PATH"]]),
         "FOLDER": "tables",
         "MAX_DROP": max_drop,
         "GITHUB_BASE_REF": "main",

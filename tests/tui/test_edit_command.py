@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from strategies import some
+from warm_start import python
 
 ROOT = Path(__file__).parent.parent.parent
 WAIT_S = 120
@@ -31,7 +32,7 @@ def in_a_terminal(folder: Path, *arguments: str, **more: str) -> tuple[int, str]
 
     master, slave = pty.openpty()
     process = subprocess.Popen(
-        [sys.executable, "-m", "contextdb", "edit", *arguments],
+        python("-m", "contextdb", "edit", *arguments),
         cwd=folder,
         env=environment(folder, **more),
         stdin=slave,
@@ -59,7 +60,7 @@ needs_pty = pytest.mark.skipif(os.name == "nt", reason="there is no pty there")
 
 def test_without_a_terminal_it_says_what_to_use_instead(folder):
     done = subprocess.run(
-        [sys.executable, "-m", "contextdb", "edit", "t.csv"],
+        python("-m", "contextdb", "edit", "t.csv"),
         cwd=folder,
         env=environment(folder),
         stdin=subprocess.DEVNULL,
@@ -108,7 +109,7 @@ def test_a_theme_nearly_right_is_mended(folder):
 
 def test_the_command_is_listed_and_explains_itself(folder):
     done = subprocess.run(
-        [sys.executable, "-m", "contextdb", "edit", "--help"],
+        python("-m", "contextdb", "edit", "--help"),
         cwd=folder,
         env=environment(folder),
         capture_output=True,

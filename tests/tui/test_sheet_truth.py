@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import subprocess
-import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,6 +16,7 @@ from hypothesis import strategies as st
 from nested_tables import flat_rows
 from running import run
 from terminal import press, said, screen_text, with_editor
+from warm_start import python
 
 import contextdb as cdb
 from contextdb.checks.cases import exactly, read_expected
@@ -203,7 +203,7 @@ SAMPLE = Folder(
 
 def in_a_process(*arguments: str):
     """The command as the shell runs it."""
-    done = subprocess.run([sys.executable, "-m", "contextdb", *arguments], capture_output=True, text=True, encoding="utf-8")
+    done = subprocess.run(python("-m", "contextdb", *arguments), capture_output=True, text=True, encoding="utf-8")
     done.code, done.out, done.err = done.returncode, done.stdout, done.stderr
     return done
 

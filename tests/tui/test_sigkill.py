@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 from saved_bytes import bytes_for
 from strategies import IS_FULL
+from warm_start import python
 
 from tui.model.session import Session
 from tui.model.watched import digest_of
@@ -52,7 +53,7 @@ class Told:
 def editors(path: Path) -> Iterator[subprocess.Popen[str]]:
     """A process that forks editors of one table; see killed_editor.py."""
     environment = {**os.environ, "PYTHONPATH": str(HERE.parents[1]), "POLARS_MAX_THREADS": "1"}
-    command = [sys.executable, str(HERE / "killed_editor.py"), str(path)]
+    command = python(HERE / "killed_editor.py", path)
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment) as process:
         yield process
         process.stdin.close()

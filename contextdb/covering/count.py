@@ -34,6 +34,8 @@ STEP = 2000
 """A step of that search costs as much as so many of the count; it may take a few in any case."""
 EXACT_FIRST = 6
 """So many eighths of the work go to the exact share; when they do not do, the rest goes to better bounds."""
+WHOLE = 2.0**52
+"""What all classes of a factor weigh together, nearly: whole numbers, whose sums are exact."""
 LOG2_KNOWN = 20
 """How many parts are remembered, as a power of two; 32 bytes each."""
 MOST_DEPTH = 1000
@@ -152,7 +154,7 @@ def _count(boxes: list[Box], full: Box, weights: list[NDArray[np.float64]], work
     if not boxes:
         return Bounds(1.0, 1.0)
     table = table_of(boxes, full, [len(own) for own in weights])
-    low, high, done, is_cut = _run(table, np.concatenate(weights), work, progress)
+    low, high, done, is_cut = _run(table, np.concatenate([_whole(own) for own in weights]), work, progress)
     if is_cut or high - low > EXACT:
         return Bounds(max(0.0, low - ROUNDING), min(1.0, high + ROUNDING), done)
     if high < TINY and high > 0.0:
@@ -223,6 +225,11 @@ def table_of(boxes: Sequence[Box], full: Box, n_classes: Sequence[int]) -> tuple
     return cells, flat, first, hashes, edges
 
 
+def _whole(weights: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Weights as whole numbers whose sums are exact, in whatever order; what weighs anything weighs 1 at least."""
+    return np.where(weights > 0.0, np.maximum(np.rint(weights * (WHOLE / weights.sum())), 1.0), 0.0)
+
+
 def _has_measure(boxes: Sequence[Box], weights: Sequence[NDArray[np.float64]]) -> list[bool]:
     """Whether each box holds a class of some weight of every factor."""
     some = [_weighing(own) for own in weights]
@@ -238,31 +245,59 @@ def _run(
     table: tuple[NDArray[Any], ...], weights: NDArray[np.float64], work: int, progress: Progress
 ) -> tuple[float, float, int, bool]:
     """Bounds of the share, the work done, and whether it was cut short."""
-    from contextdb.covering.count_kernels import CUT, LIMIT, SHARED, WORK, uncovered
+    from contextdb.covering.kernels import IS_COMPILED
     from contextdb.covering.part_kernels import part_of
 
     n_boxes, n_factors = table[0].shape
-    salts = np.zeros(n_factors, np.uint64)
-    low, high = 0.0, 1.0
     with np.errstate(over="ignore"):
-        part = part_of(np.arange(n_boxes), np.arange(n_factors), weights, salts, table)
-        known = np.zeros((1 << LOG2_KNOWN, 2), np.uint64), np.zeros((1 << LOG2_KNOWN, 2))
-        state = np.zeros(5, np.int64)
-        for state[SHARED], state[LIMIT] in ((0, work * EXACT_FIRST // 8), (1, work)):
-            scratch = scratch_of(part, int(np.diff(table[4]).max()))
-            arguments = (part, 0, len(part[0]), weights, salts, table, scratch, known, state)
-            state[CUT] = 0
-            found = uncovered(*arguments) if progress.is_silent else _watched(uncovered, arguments, state, work, progress)
-            low, high = max(low, float(found[0])), min(high, float(found[1]))
-            if not state[CUT] or state[WORK] >= work:
-                break
+        part = part_of(np.arange(n_boxes), np.arange(n_factors), weights, np.zeros(n_factors, np.uint64), table)
+    return (_by_loops if IS_COMPILED else _by_integers)(part, table, weights, work, progress)
+
+
+def _by_integers(
+    part: tuple[NDArray[Any], ...], table: tuple[NDArray[Any], ...], _: NDArray[np.float64], work: int, progress: Progress
+) -> tuple[float, float, int, bool]:
+    from contextdb.covering.count_ints import Count
+
+    count = Count(part, table, 1 << LOG2_KNOWN, depth_of(part), progress)
+    low, high = 0.0, 1.0
+    for is_shared, limit in ((False, work * EXACT_FIRST // 8), (True, work)):
+        found = count.run(limit, work, is_shared)
+        low, high = max(low, found[0]), min(high, found[1])
+        if not count.cut or count.work >= work:
+            break
+    return low, high, count.work, bool(count.cut)
+
+
+def _by_loops(
+    part: tuple[NDArray[Any], ...], table: tuple[NDArray[Any], ...], weights: NDArray[np.float64], work: int, progress: Progress
+) -> tuple[float, float, int, bool]:
+    from contextdb.covering.count_kernels import CUT, LIMIT, SHARED, WORK, uncovered
+
+    salts = np.zeros(table[0].shape[1], np.uint64)
+    low, high = 0.0, 1.0
+    known = np.zeros((1 << LOG2_KNOWN, 2), np.uint64), np.zeros((1 << LOG2_KNOWN, 2))
+    state = np.zeros(5, np.int64)
+    for state[SHARED], state[LIMIT] in ((0, work * EXACT_FIRST // 8), (1, work)):
+        scratch = scratch_of(part, int(np.diff(table[4]).max()))
+        arguments = (part, 0, len(part[0]), weights, salts, table, scratch, known, state)
+        state[CUT] = 0
+        found = uncovered(*arguments) if progress.is_silent else _watched(uncovered, arguments, state, work, progress)
+        low, high = max(low, float(found[0])), min(high, float(found[1]))
+        if not state[CUT] or state[WORK] >= work:
+            break
     return low, high, int(state[WORK]), bool(state[CUT])
 
 
+def depth_of(part: tuple[NDArray[Any], ...]) -> int:
+    """How deep the loop may go: as factors and boxes one after the other may lead."""
+    return min(6 * len(part[0]) + 160, MOST_DEPTH)
+
+
 def scratch_of(part: tuple[NDArray[Any], ...], n_classes: int) -> tuple[NDArray[Any], ...]:
-    """Room for the loop, every box of the part open at depth 0; as deep as factors and boxes one after the other may lead."""
+    """Room for the loop, every box of the part open at depth 0."""
     (n_factors, n_words), n_boxes = part[1].shape, len(part[9])
-    depth = min(6 * n_factors + 160, MOST_DEPTH)
+    depth = depth_of(part)
     opened, kept = np.zeros((depth, n_words), np.uint64), np.zeros((depth, n_words), np.uint64)
     listed = np.zeros((depth, n_factors), np.int64)
     listed[0] = np.arange(n_factors)

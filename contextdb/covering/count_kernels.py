@@ -373,7 +373,7 @@ def choose(part, depth, n, first, scratch):
     leave nothing open. Answer how many they are."""
     opened, _, listed, chosen, shares, _, _, once, twice = scratch
     _, limits, groups, masses, starts = part[:5]
-    n_words, best, most = limits.shape[1], 0, -1.0
+    n_words, best, most, total = limits.shape[1], 0, -1.0, 0.0
     for x in range(n):
         factor, n_limited, last = listed[depth + 1, x], 0, NONE
         for w in range(n_words):
@@ -385,11 +385,12 @@ def choose(part, depth, n, first, scratch):
         if score > most:
             best, most = x, score
     factor, found = listed[depth + 1, best], 0
-    listed[depth + 1, best] = listed[depth + 1, n - 1]
+    for x in range(best, n - 1):  # they stay in their order, in which sizes are multiplied
+        listed[depth + 1, x] = listed[depth + 1, x + 1]
     for w in range(n_words):  # boxes that restrict only this factor
         once[w] = limits[factor, w] & opened[depth, w] & ~twice[w]
     for g in range(starts[factor], starts[factor + 1]):
-        covered, t, differs = NONE, found, ALL
+        covered, t, differs, total = NONE, found, ALL, total + masses[g]
         for w in range(n_words):
             covered |= groups[g, w] & once[w]
         if covered:
@@ -403,6 +404,8 @@ def choose(part, depth, n, first, scratch):
             found += 1
         else:
             shares[depth, t] += masses[g]
+    for t in range(found):
+        shares[depth, t] /= total
     _sort_by_boxes(groups, opened[depth], chosen[depth], shares[depth], found)
     return found
 

@@ -44,7 +44,7 @@ def part_of(boxes: Array, factors: Array, weights: Array, salts: Array, table: P
         ordered = np.argsort(numbers, kind="stable")[(~is_limited).sum() :]
         sides.append(np.where(is_limited[code], numbers[code] + n_sides, -1).astype(np.int32))
         wider.append(_held_by_all(accepted[:, ordered], held))
-        sizes.append(_summed(accepted[:, ordered], shares))
+        sizes.append(_summed(accepted[:, ordered], shares) / np.cumsum(shares)[-1])
         own_hashes = hashes[known[ordered]]
         marks.append(np.stack([own_hashes[:, 0] ^ salts[factor], own_hashes[:, 1] + salts[factor]], axis=1))
         n_sides += len(ordered)
@@ -67,7 +67,7 @@ def _joined(parts: list[Array], nothing: Array) -> Array:
 
 
 def _groups(known: Array, weights: Array, table: Part) -> tuple[Array, Array]:
-    """For each group of classes that the cells cannot distinguish which cells accept it, bool [G, cells], and its share."""
+    """For each group of classes that the cells cannot distinguish which cells accept it, bool [G, cells], and what it weighs."""
     _, runs, first, _, _ = table
     has_any = bool(known[0] < 0)
     limited = known[int(has_any) :]
@@ -100,7 +100,7 @@ def _groups_of(own_runs: bytes, own_counts: bytes, has_any: bool, own_weights: b
     group_of_run = np.array([place.setdefault(row.tobytes(), len(place)) for row in packed[heads]])
     shares = np.bincount(group_of_run[np.cumsum(is_head) - 1], own)
     chosen = heads[_first_places(group_of_run, len(place))]
-    return bitmask.read_only(accepted[chosen]), bitmask.read_only(shares / np.cumsum(own)[-1])
+    return bitmask.read_only(accepted[chosen]), bitmask.read_only(shares)
 
 
 def _first_places(numbers: Array, n: int) -> Array:
@@ -128,7 +128,7 @@ def _held_by_all(accepted: Array, groups: Array) -> Array:
 
 
 def _summed(accepted: Array, shares: Array) -> Array:
-    """The share of each cell, summed in the order of the groups."""
+    """What each cell weighs, summed in the order of the groups."""
     found = np.zeros(accepted.shape[1])
     for flags, share in zip(accepted, shares.tolist(), strict=True):
         found[flags] += share

@@ -5,7 +5,7 @@ m boxes are in W = ceil(m / 64) words each: bit i % 64 of word i // 64 is box i.
     factors   int64 [L]       the number of each factor that some box restricts
     limits    uint64 [L, W]   the boxes that restrict it
     groups    uint64 [G, W]   for each group of classes that the boxes cannot distinguish those that accept it
-    masses    float64 [G]     the share of its factor that the group is
+    masses    float64 [G]     what the group weighs
     starts    int64 [L + 1]   where the groups of each factor begin
     sides     int32 [L, m]    the number of the side of each box, -1 where it accepts everything
     wider     uint64 [C, W]   for each side the boxes that accept all that it accepts
@@ -15,7 +15,8 @@ m boxes are in W = ceil(m / 64) words each: bit i % 64 of word i // 64 is box i.
 
 The table is (cells, runs, first, hashes, edges): cell c, number cells[box, factor] or -1, accepts the classes runs[i, 0] up to, not
 including, runs[i, 1] of its factor for first[c] <= i < first[c + 1]; edges[f] is where the weights of factor f begin. Classes of
-weight 0 do not count. `salts` tell factors apart whose classes were weighed otherwise.
+weight 0 do not count. `salts` tell factors apart whose classes were weighed otherwise. Where weights are whole numbers (`count`
+makes them so) sums of them are exact, in whatever order.
 """
 # mypy: disable-error-code="no-untyped-def, no-untyped-call, untyped-decorator, no-any-return"
 
@@ -80,7 +81,7 @@ def part_of(boxes, factors, weights, salts, table):
 def _add_groups(boxes, factor, weights, table, groups, masses, start):
     """Write the groups of classes of a factor from `start` on; answer where they end."""
     cells, runs, first, _, edges = table
-    n_words, n_classes, stop, total = groups.shape[1], edges[factor + 1] - edges[factor], start, 0.0
+    n_words, n_classes, stop = groups.shape[1], edges[factor + 1] - edges[factor], start
     turns, present = np.zeros((n_classes + 1, n_words), np.uint64), np.zeros(n_words, np.uint64)
     for i in range(boxes.shape[0]):
         cell, bit = cells[boxes[i], factor], ONE << np.uint64(i & 63)
@@ -96,7 +97,6 @@ def _add_groups(boxes, factor, weights, table, groups, masses, start):
         weight = weights[edges[factor] + k]
         if weight == 0.0:
             continue
-        total += weight
         at = start
         while at < stop and not _are_equal(groups[at], present):
             at += 1
@@ -104,8 +104,6 @@ def _add_groups(boxes, factor, weights, table, groups, masses, start):
             groups[at], masses[at] = present, 0.0
             stop += 1
         masses[at] += weight
-    for g in range(start, stop):
-        masses[g] /= total
     return stop
 
 
@@ -158,12 +156,14 @@ def _number_sides(boxes, cells, limits, sides, n):
 @njit(**options)
 def _add_side(i, side, groups, masses, start, stop, wider, sizes):
     """Write the size of a side, which is that of box i, and the boxes that accept all of it."""
-    wider[side], sizes[side] = ALL, 0.0
+    wider[side], sizes[side], total = ALL, 0.0, 0.0
     for g in range(start, stop):
+        total += masses[g]
         if (groups[g, i >> 6] >> np.uint64(i & 63)) & ONE:
             sizes[side] += masses[g]
             for w in range(groups.shape[1]):
                 wider[side, w] &= groups[g, w]
+    sizes[side] /= total
 
 
 if not IS_COMPILED:

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, cast
 
-from textual.app import SystemCommand
+from textual.app import App, SystemCommand
 from textual.binding import BindingType
+from textual.command import CommandPalette
 from textual.filter import LineFilter
 from textual.screen import Screen
-from textual.theme import BUILTIN_THEMES
+from textual.theme import BUILTIN_THEMES, ThemeProvider
 
 from contextdb.errors import ContextDBError
 from contextdb.tables.merging.conflicts import Side
@@ -30,6 +31,7 @@ from tui.screens.begin import Begin
 from tui.screens.conflicts import ConflictsDialog
 from tui.screens.leaving import HeldDialog, LeavingDialog
 from tui.screens.main import MainScreen
+from tui.screens.palette import Palette
 from tui.themes import DARK, THEMES
 
 if TYPE_CHECKING:
@@ -52,17 +54,18 @@ class EditorApp(Editor):
     CommandPalette > Vertical, CommandPalette:dark > Vertical {
         width: 76; max-width: 96%; height: auto; max-height: 86%; margin-top: 2; padding: 0 1; visibility: visible;
         background: $surface; border: round $primary;
+        border-title-color: $text; border-title-style: bold; border-subtitle-color: $text-muted;
     }
     CommandPalette #--input, CommandPalette #--input.--list-visible { border: none; height: 1; }
     CommandPalette CommandInput, CommandPalette CommandInput:focus { border: none; height: 1; padding: 0; background: $surface; }
     CommandPalette #--results { overlay: none; background: $surface; margin: 1 0 0 0; }
     CommandPalette CommandList, CommandPalette CommandList:focus { border: none; background: $surface; max-height: 60vh; }
     OptionList { min-width: 8; }
+    OptionList:ansi > .option-list--option-highlighted { background: ansi_blue; color: ansi_bright_white; }
+    CommandPalette:ansi > .command-palette--help-text { color: ansi_default; text-style: none; }
     Button.-textual-compact {
-        width: auto; min-width: 0; padding: 0 1; margin: 0 1 0 0; background: $panel; text-style: bold;
+        width: auto; min-width: 0; padding: 0; margin: 0 1 0 0; background: $panel; text-style: bold;
         &:focus, &:hover { background: $primary 40%; text-style: bold underline; }
-        &.-primary { background: $primary; }
-        &.-primary:focus, &.-primary:hover { background: $primary; text-style: bold underline; }
     }
     SheetBar Button.-textual-compact { background: $surface; }
     Dialog OptionList, Dialog OptionList:focus { background: $surface; }
@@ -102,6 +105,15 @@ class EditorApp(Editor):
     def get_line_filters(self) -> Sequence[LineFilter]:
         """What is done to all that is painted: every text can be read."""
         return [*super().get_line_filters(), READABLE]
+
+    def action_command_palette(self) -> None:
+        """Show every command."""
+        if not CommandPalette.is_open(cast(App[object], self)):
+            self.push_screen(Palette("Commands"))
+
+    def search_themes(self) -> None:
+        """Show every theme."""
+        self.push_screen(Palette("Theme", [ThemeProvider]))
 
     def on_mount(self) -> None:
         if self.workspace.beginning is not None:

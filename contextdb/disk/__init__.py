@@ -14,7 +14,7 @@ import os
 import stat
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -242,6 +242,19 @@ def refused_writing(file: Path, data: Data) -> AbstractContextManager[None]:
     """Turn what the system refuses into a `FileError` that names the file."""
     size = len(data) if isinstance(data, bytes) else None
     return _refused(file, lambda error, at: _why_unwritten(error, at, size))
+
+
+@contextmanager
+def needing(n_bytes: int) -> Iterator[None]:
+    """Where the disk is full, say how many bytes all that is written together needs, and not only the file that failed."""
+    try:
+        yield
+    except FileError as error:
+        if error.errno not in _FULL:
+            raise
+        raise FileError(
+            *(replace(fault, accepted=f"{n_bytes:,} free bytes") for fault in error.faults), errno=error.errno
+        ) from None
 
 
 @contextmanager

@@ -14,6 +14,7 @@ from textual.pilot import Pilot
 import contextdb as cdb
 from contextdb.commands.check_command import check_path
 from tui.messages import GoToCell, Told
+from tui.model.coverage_lines import in_rows
 from tui.model.problems import Problem, Problems, cell_findings, row_findings
 from tui.model.sheet import Sheet
 from tui.panes import problems
@@ -209,8 +210,10 @@ def test_the_tab_shows_what_the_command_check_finds(tmp_path):
     (tmp_path / "a.cases.csv").write_text("Case,Expected,speed,gait\nat rest,run,0,Walk\n")
     reported = check_path(str(file)).findings
 
-    app, _ = shown(cdb.load(file), "end", "home", "enter")
-    assert sorted((f.rule, f.message) for f in reported) == sorted((p.rule, p.message) for p in app.pane.lines)
+    table = cdb.load(file)
+    app, screen = shown(table, "end", "home", "enter")
+    assert 'row 1 ("slow")' in screen  # and not the line of the file
+    assert sorted((f.rule, in_rows(f, table)) for f in reported) == sorted((p.rule, p.message) for p in app.pane.lines)
     assert {"case-failed", "subsumed-row", "beyond-domain"} <= {p.rule for p in app.pane.lines}
     assert app.pane.lines[0].place == "contexts"
     assert "F9" in app.told[0].text

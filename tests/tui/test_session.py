@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 from pathlib import Path
@@ -630,3 +631,28 @@ def test_table_and_contextdb_toml_are_both_as_they_were_when_one_of_them_cannot_
     session.close()
     assert b'walk,"1",' in path.read_bytes()
     assert b'policy = "first"' in toml.read_bytes()
+
+
+def test_a_full_disk_says_how_many_bytes_the_file_contextdb_toml_and_the_journal_need_together(path, monkeypatch):
+    path.with_name("contextdb.toml").write_text('[conditions.speed]\ntype = "number"\nmin = 0\nmax = 9\n')
+    session = Session(path)
+    session.sheet.apply(edits.set_settings(session.sheet.table, policy="first"))
+    journal = journal_path(path)
+    n_before = journal.stat().st_size
+    real = os.fsync
+
+    def full(handle: int) -> None:
+        if os.fstat(handle).st_ino != journal.stat().st_ino:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        real(handle)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", full)
+        with pytest.raises(FileError) as caught:
+            session.save()
+    n_record = journal.stat().st_size - n_before
+    session.save()
+    n_bytes = n_record + sum(file.stat().st_size for file in (path, path.with_name("contextdb.toml")))
+    session.close()
+    assert n_record > 0
+    assert f"Accepted: {n_bytes:,} free bytes." in str(caught.value)

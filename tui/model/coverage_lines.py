@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 
 from contextdb.checks.rules import RULES
@@ -167,13 +168,24 @@ def crowd_text(crowd: Crowd, table: Table) -> str:
     return f"{crowd.n_rows} rows at once in {share}: {', '.join(named)}{more}.\n{cells_text(crowd.cells)}"
 
 
-def finding_text(finding: Finding) -> str:
+def in_rows(finding: Finding, table: Table) -> str:
+    """The message of a finding with the rows that it names by their numbers in the grid, and not by lines of the file."""
+    numbers = {table.place(row).line: row + 1 for row in finding.by if row < table.n_rows}
+
+    def numbered(found: re.Match[str]) -> str:
+        row = numbers.get(int(found[1]))
+        return found[0] if row is None else f"row {row:,}"
+
+    return re.sub(r"\bline (\d+)\b(?! of )", numbered, finding.message)
+
+
+def finding_text(finding: Finding, table: Table) -> str:
     """A finding in whole, with its cure."""
-    rule = RULES.get(finding.rule)
-    by = f" ({rows_text(finding.by)})" if finding.by else ""
+    rule, message = RULES.get(finding.rule), in_rows(finding, table)
+    by = f" ({rows_text(finding.by)})" if finding.by and message == finding.message else ""
     where = "" if finding.row is None else f"{row_text(finding.row, finding.asset or '')}: "
     cure = f"\n{rule.summary} {rule.cure}" if rule else ""
-    return f"{where}{finding.message}{by}{cure}"
+    return f"{where}{message}{by}{cure}"
 
 
 def about_text(result: Result) -> str:
@@ -196,7 +208,8 @@ def about_text(result: Result) -> str:
     lines += [f"Known to samples only, so that the share is an estimate: {text}" for text in report.sampled]
     lines.append("")
     lines.append(f"Rows valid at once: {report.overlap.mean:.3g} on average ({report.overlap.method}).")
-    lines += [f"  {n:>3}   {format_percent(share)}" for n, share in enumerate(report.overlap.histogram) if share > 0.0]
+    histogram = report.overlap.histogram
+    lines += [f"  {n:>3}   {format_percent(s):>9}  {'█' * round(40 * s)}".rstrip() for n, s in enumerate(histogram) if s > 0.0]
     lines.append("")
     if pairs is None:
         lines.append(result.left_out)

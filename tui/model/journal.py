@@ -92,14 +92,16 @@ class Journal:
         came_from = np.arange(before.n_rows) if step.came_from is None else step.came_from
         self._write({"do": edit_between(before, history.table, came_from, step.name).to_json()})
 
-    def saving(self, raw: bytes, schema: SchemaChange | None = None) -> None:
-        """Write that the file is about to have these bytes, and then contextdb.toml those."""
+    def saving(self, raw: bytes, schema: SchemaChange | None = None) -> int:
+        """Write that the file is about to have these bytes, and then contextdb.toml those; gives how many bytes that takes."""
         if self._is_begun:
             record: dict[str, object] = {"saving": digest_of(raw)}
             if schema is not None:
                 was = digest_of(read_bytes(schema.path)) if schema.path.exists() else None
                 record["schema"] = {"path": str(schema.path.resolve()), "was": was, "text": schema.raw.decode()}
             self._write(record)
+            return len(line_of(record))
+        return 0
 
     def saved(self, raw: bytes, position: int) -> None:
         """The file has these bytes, at this position of the history: begin again with the next edit."""

@@ -17,7 +17,7 @@ from contextdb.errors import ContextDBError, Fault, plural
 from contextdb.findings import LEVELS, Finding, Level
 from contextdb.tables.other_files import cases_path
 from contextdb.tables.table import Table
-from tui.model.coverage_lines import rows_text
+from tui.model.coverage_lines import in_rows, rows_text
 from tui.model.coverage_run import is_quick
 
 AT_ONCE = 200_000
@@ -58,7 +58,8 @@ class Problem:
         rule = RULES.get(self.rule)
         head = f"{WORDS[self.level].capitalize()} {self.rule}: {', '.join(p for p in parts if p)}"
         cure = f"\n{rule.summary} {rule.cure}" if rule else ""
-        by = f" ({rows_text(self.by)})" if self.by else ""
+        is_named = all(f"row {row + 1:,} " in f"{self.message} " for row in self.by)
+        by = "" if is_named else f" ({rows_text(self.by)})"
         return f"{head}\n{self.message}{by}{cure}"
 
 
@@ -105,7 +106,11 @@ class Problems:
 
 def cell_findings(table: Table) -> list[Finding]:
     """What `contextdb check` says of the cells and settings of a table."""
-    return check(table)
+    return _in_rows(check(table), table)
+
+
+def _in_rows(findings: Sequence[Finding], table: Table) -> list[Finding]:
+    return [replace(one, message=in_rows(one, table)) if one.by else one for one in findings]
 
 
 def row_findings(table: Table) -> list[Finding]:
@@ -114,7 +119,7 @@ def row_findings(table: Table) -> list[Finding]:
         rows = check_rows(table)
     except MemoryError:
         rows = []
-    return [*rows, *_of_cases(table)]
+    return [*_in_rows(rows, table), *_of_cases(table)]
 
 
 def findings_at_once(table: Table) -> list[Finding]:

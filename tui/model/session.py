@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from contextdb.disk import Was, path_in_quotes, read_bytes, write_atomic
+from contextdb.disk import Was, needing, path_in_quotes, read_bytes, write_atomic
 from contextdb.disk.folder_lock import sweep
 from contextdb.disk.together import NewFile, write_together
 from contextdb.edits.diffing import diff
@@ -226,14 +226,15 @@ class Session:
         table = self.sheet.table
         schema = schema_change(self.saved_table if is_own else None, replace(table, path=target))
         source = new_source(target, table.columns, table.source, table.origin)
-        if is_own:
-            self.journal.saving(source.raw, schema)
-        if schema is None:
-            is_written = write_atomic(target, source.raw, was)
-        else:
-            is_written = write_together(schema.path.parent, [NewFile(target, source.raw, was), schema.new_file])
-            if is_written:
-                self.schema_written()
+        n_bytes = len(source.raw) + (0 if schema is None else len(schema.raw))
+        n_bytes += self.journal.saving(source.raw, schema) if is_own else 0
+        with needing(n_bytes):
+            if schema is None:
+                is_written = write_atomic(target, source.raw, was)
+            else:
+                is_written = write_together(schema.path.parent, [NewFile(target, source.raw, was), schema.new_file])
+        if is_written and schema is not None:
+            self.schema_written()
         return replace(table, path=target, source=source, origin=np.arange(table.n_rows)) if is_written else None
 
     def close(self, keep_journal: bool = False) -> None:

@@ -25,9 +25,11 @@ from tui.model.coverage_run import CoverageRun, Result, is_quick
 from tui.model.moment import moment_inside
 from tui.model.moments import Moment
 from tui.model.played_run import Played, PlayedRun, moment_in
+from tui.model.rows_near import is_near_at_once, rows_near
 from tui.model.sheet import Sheet
 from tui.panes.pair_map import PairMap
 from tui.panes.pane import Pane
+from tui.panes.rows_below import IN_TABLE, MOST, RowsBelow
 from tui.screens.ask import AskDialog
 from tui.widgets.choice_line import ChoiceLine
 from tui.widgets.fitted import bar
@@ -36,7 +38,8 @@ from tui.widgets.line_list import LineList, ListCell, ListColumn
 SECTIONS = ("gaps", "pairs", "crowded", "rows", "about", "played", "unused")
 NAMES = ("Gaps", "Pairs", "Crowded", "Rows", "About", "Played", "Unused")
 OF_PLAY = ("played", "unused")
-NO_PLAY = "O reads recorded moments, from files; L those of the game that the test row follows."
+NO_PLAY = "O reads recorded moments from files, L those of the game that is followed."
+NEAREST = "The nearest rows: a change of the marked cells would close it"
 EMPTY = {
     "gaps": "No gap is known.",
     "crowded": "Nowhere are two rows valid at once, as far as is known.",
@@ -144,6 +147,7 @@ class CoveragePane(Pane):
                 yield Static(id="about-text", markup=False)
         with VerticalScroll(id="coverage-detail"):
             yield Static(id="coverage-detail-text", markup=False)
+        yield RowsBelow(id="coverage-rows")
 
     def on_mount(self) -> None:
         """Begin to listen."""
@@ -256,8 +260,9 @@ class CoveragePane(Pane):
         return [f"{at + 1} {name}{counts[at]}" for at, name in enumerate(NAMES)]
 
     def on_resize(self) -> None:
-        """Draw the bar again."""
+        """Draw the bar again, and what there is room for."""
         self._show_bar()
+        self.call_after_refresh(self._show_rows)
 
     def take_focus(self) -> None:
         """Give the keys to the section that is seen."""
@@ -273,6 +278,8 @@ class CoveragePane(Pane):
     def _moved(self, event: LineList.Moved) -> None:
         event.stop()
         result, table = self.run.result, self.sheet.table
+        if event.list.id == SECTIONS[self.section]:
+            self._show_rows()
         if event.list.id in OF_PLAY:
             self._details[event.list.id] = self._play_detail(event.list.id, event.index)
             self._show_section()
@@ -285,15 +292,53 @@ class CoveragePane(Pane):
         elif event.index >= 0 and event.list.id == "crowded":
             text = lines.crowd_text(report.crowded[event.index], self.run.table or table)
         elif event.index >= 0:
-            text = lines.finding_text(report.findings[event.index])
+            text = lines.finding_text(report.findings[event.index], self.run.table or table)
         self._details[event.list.id] = text
         self._show_section()
 
     @on(PairMap.Said)
     def _said(self, event: PairMap.Said) -> None:
         event.stop()
+        if SECTIONS[self.section] == "pairs":
+            self._show_rows()
         self._details["pairs"] = event.text
         self._show_section()
+
+    def _show_rows(self) -> None:
+        """The rows of the table that the line of the cursor is about, where there is room for them."""
+        below, section, table = self.query_one(RowsBelow), SECTIONS[self.section], self.sheet.table
+        result, play = self.run.result, self.played.result
+        below.show_none()
+        if not self.has_class("-roomy") or section == "about":
+            return
+        if section == "unused":
+            if play is not None and play.table is table and play.unused:
+                below.show_rows(table, IN_TABLE, range(table.n_rows), {}, play.unused[self._at(section)])
+        elif section == "played":
+            if play is not None and play.table is table and play.gaps:
+                self._show_near(below, play.gaps[self._at(section)].cells)
+        elif result is None or self.run.state != "done":
+            return
+        elif section == "crowded" and result.report.crowded:
+            rows = list(dict.fromkeys(result.report.crowded[self._at(section)].rows))
+            below.show_rows(table, "The rows that are valid there at once", rows)
+        elif section == "rows" and result.report.findings:
+            finding = result.report.findings[self._at(section)]
+            rows = [row for row in (finding.row, *finding.by) if row is not None]
+            below.show_compared(table, [row for row in dict.fromkeys(rows) if row < table.n_rows], {}, finding.column)
+        elif (found := self._cells_here()) is not None:
+            self._show_near(below, found[1])
+
+    def _show_near(self, below: RowsBelow, cells: Mapping[str, str]) -> None:
+        table = self.sheet.table
+        if is_near_at_once(table) and cells.keys() <= {c.condition.name for c in table.conditions}:
+            near = rows_near(table, cells, MOST)
+            tones = {(row, name): "warning" for row, names in near.items() for name in names}
+            first = next(iter(near.values()), ())
+            below.show_rows(table, NEAREST, list(near), tones, 0, first[0] if first else None)
+
+    def _at(self, section: str) -> int:
+        return self.query_one(f"#{section}", LineList).index
 
     def _play_detail(self, section: str, at: int) -> str:
         play = self.played.result
@@ -343,6 +388,7 @@ class CoveragePane(Pane):
         had_focus = self.has_focus_within
         self.section = at
         self._show_state()
+        self._show_rows()
         self.refresh_bindings()
         if had_focus:
             self.take_focus()

@@ -15,7 +15,7 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Vertical
 from textual.content import Content
-from textual.events import DescendantBlur, Resize
+from textual.events import DescendantBlur
 from textual.suggester import SuggestFromList
 from textual.widget import Widget
 from textual.widgets import Input, Select, Static
@@ -144,9 +144,9 @@ class OptionsPane(Pane):
         """The tab is opened: the cursor may be elsewhere."""
         self.show()
 
-    def on_resize(self, event: Resize) -> None:
+    def on_resize(self) -> None:
         """Put the condition next to the settings where there is room."""
-        self.set_class(event.size.width >= WIDE, "-wide")
+        self.set_class(self.size.width >= WIDE, "-wide")
 
     def show(self) -> None:
         """The sheet has changed: show it as it is now. What was typed and not taken is gone then."""

@@ -4,9 +4,22 @@ from __future__ import annotations
 
 from textual.widget import Widget
 
+ROOMY = 26
+"""In a tab of so many lines a list is as high as its lines, and the rows that it is about stand below it."""
+
 
 class Pane(Widget):
     """What is behind a tab."""
+
+    DEFAULT_CSS = """
+    Pane.-roomy {
+        & LineList, & HeatMap { height: auto; max-height: 50vh; }
+        & ContentSwitcher { height: auto; }
+        & RowsBelow.-filled { display: block; height: 1fr; max-height: 100%; }
+        & #about { height: auto; max-height: 70vh; }
+        & #coverage-detail, & #problems-detail { max-height: 10; }
+    }
+    """
 
     def show(self) -> None:
         """Show the sheet as it is now: called when the tab is gone to, and after every edit while it is seen."""
@@ -15,3 +28,7 @@ class Pane(Widget):
     def take_focus(self) -> None:
         """Give the keys to the part of the tab that mostly has them."""
         self.focus()
+
+    def on_resize(self) -> None:
+        """Use the room there is."""
+        self.set_class(self.size.height >= ROOMY, "-roomy")

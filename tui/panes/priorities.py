@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import ClassVar
 
+import numpy as np
 from textual import on
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
@@ -31,6 +32,7 @@ from tui.model.priorities import (
 )
 from tui.model.sheet import Sheet
 from tui.panes.pane import Pane
+from tui.panes.rows_below import RowsBelow
 from tui.widgets.pick import Pick
 
 NO_DATABASES = (
@@ -58,7 +60,7 @@ class PrioritiesPane(Pane):
     PrioritiesPane {
         layout: vertical; height: 1fr; overflow-y: auto; background: $surface;
         & #priorities-context { height: auto; padding: 0 1; color: $text-muted; }
-        & #priorities-list { height: auto; max-height: 1fr; border: none; padding: 0 1; background: transparent; margin: 1 0 0 0; }
+        & #priorities-list { height: auto; max-height: 50vh; border: none; padding: 0 1; background: transparent; margin: 1 0 0 0; }
         & #priorities-list > .option-list--option-disabled { color: $text; }
         & #priorities-list > .option-list--option-highlighted { text-style: bold; }
         & #priorities-list:focus > .option-list--option-highlighted { text-style: bold; }
@@ -89,6 +91,7 @@ class PrioritiesPane(Pane):
         yield Static(id="priorities-context")
         yield OptionList(id="priorities-list", compact=True)
         yield Static(id="priorities-detail")
+        yield RowsBelow(id="priorities-rows")
         yield Static(id="priorities-empty")
         with Vertical(id="priorities-foot"):
             with Vertical(id="priorities-entry"):
@@ -165,6 +168,28 @@ class PrioritiesPane(Pane):
     def _show_detail(self) -> None:
         found = self._chosen()
         self.query_one("#priorities-detail", Static).update(_detail(found[0].databases[found[1]]) if found else "")
+        self._show_rows(found[0].databases[found[1] :] if found else ())
+
+    def _show_rows(self, databases: Sequence[DatabaseNow]) -> None:
+        """The rows of databases of this table, each database's valid ones first; of the others the cells that fail are marked."""
+        below, table, query = self.query_one(RowsBelow), self.sheet.table, self.sheet.query
+        own = [one for one in databases if self.priorities.config.databases[one.name].table == table.settings.name]
+        if own[:1] != list(databases[:1]):
+            own = []
+        found: dict[int, str] = {}
+        for one in own:
+            members = set(one.assets)
+            rows = [row for row, asset in enumerate(table.assets) if asset in members and row not in found]
+            found |= dict.fromkeys(sorted(rows, key=lambda row: not query.bits >> row & 1), one.name)
+        if not found:
+            below.show_none()
+            return
+        rows, names = list(found), [column.condition.name for column in table.conditions]
+        fails = np.nonzero(query.failing(rows))
+        tones = {(rows[row], names[column]): "warning" for row, column in zip(*fails, strict=True)}
+        tones |= {(row, table.asset_column): "info" for row in rows if found[row] == own[0].name}
+        then = "".join(f", then of {shown(one.name)}" for one in own[1:])
+        below.show_rows(table, f"Rows of {shown(own[0].name)}{then}: the valid ones first", rows, tones)
 
     def _chosen(self) -> tuple[SelectorNow, int] | None:
         """The selector and the place in it of the highlighted database."""

@@ -25,6 +25,7 @@ from tui.model.coverage_run import is_quick
 from tui.model.problems import WORDS, Problem, Problems, cell_findings, is_checked_at_once, row_findings
 from tui.model.sheet import Sheet
 from tui.panes.pane import Pane
+from tui.panes.rows_below import IN_TABLE, RowsBelow
 from tui.widgets.choice_line import ChoiceLine
 from tui.widgets.line_list import LineList, ListCell, ListColumn
 
@@ -92,6 +93,7 @@ class ProblemsPane(Pane):
         yield ProblemList([*columns, ListColumn("What is wrong", 20, 5)], empty="Nothing.", id="problems")
         with VerticalScroll(id="problems-detail"):
             yield Static(id="problems-detail-text", markup=False)
+        yield RowsBelow(id="problems-rows")
 
     def on_mount(self) -> None:
         """Check what there is."""
@@ -200,9 +202,25 @@ class ProblemsPane(Pane):
     def _moved(self, event: LineList.Moved) -> None:
         event.stop()
         lines = self.lines
-        text = lines[event.index].text if 0 <= event.index < len(lines) else ""
-        self.query_one("#problems-detail-text", Static).update(Content(text))
+        problem = lines[event.index] if 0 <= event.index < len(lines) else None
+        self.query_one("#problems-detail-text", Static).update(Content(problem.text if problem is not None else ""))
         self.query_one("#problems-detail").scroll_home(animate=False)
+        self._show_rows(problem)
+
+    def _show_rows(self, problem: Problem | None) -> None:
+        """The row of a problem among those that cause it, or else among its neighbours."""
+        below, table = self.query_one(RowsBelow), self.sheet.table
+        if problem is not None and problem.is_of_cases:
+            below.show_none()
+            return
+        tones = {(p.row, p.column): p.level for p in self.problems.items if p.row is not None and p.column is not None}
+        row = problem.row if problem is not None and problem.row is not None else None
+        column = problem.column if problem is not None else None
+        if problem is not None and row is not None and problem.by:
+            rows = [one for one in (row, *problem.by) if one < table.n_rows]
+            below.show_compared(table, rows, tones, column)
+        else:
+            below.show_rows(table, IN_TABLE, range(table.n_rows), tones, min(row or 0, table.n_rows - 1), column)
 
     @on(LineList.Chosen)
     def _chosen(self, event: LineList.Chosen) -> None:

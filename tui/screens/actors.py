@@ -52,9 +52,9 @@ class ActorsDialog(SheetDialog[Teams]):
 
     def on_mount(self) -> None:
         """Show the first role."""
-        keys = [("screen.save", "Ctrl+S Save")] * (teams_path(self.table) is not None)
-        keys += [("screen.turn(1)", "Alt+→ Next role")] * (len(self.teams.sheets) > 1)
-        keys += [("screen.clear", "Alt+X No actors"), ("screen.done", "Esc Done")]
+        keys = [("save", "Ctrl+S Save")] * (teams_path(self.table) is not None)
+        keys += [("turn(1)", "Alt+→ Next role")] * (len(self.teams.sheets) > 1)
+        keys += [("clear", "Alt+X No actors"), ("done", "Esc Done")]
         self.show_keys(keys)
         self.grid.focus()
         self.show_sheet()

@@ -87,7 +87,7 @@ class AddColumn(Dialog[Insertion]):
         where = [(Content(words), at) for words, at in self.places.items()]
         yield Field("Where", Pick(where, compact=True, allow_blank=False, id="column-where"), key="where")
         with Horizontal(id="column-buttons"):
-            yield Button("Insert", compact=True, variant="primary", id="column-insert")
+            yield Button("Insert", compact=True, id="column-insert")
             yield Button("Cancel", compact=True, id="column-cancel")
 
     def on_mount(self) -> None:

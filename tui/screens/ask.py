@@ -71,7 +71,7 @@ class ChooseDialog(Dialog[int]):
 
     def compose_body(self) -> ComposeResult:
         if self._about:
-            yield Static(Text(self._about))
+            yield Static(Text(f"{self._about}\n"))
         yield Input(compact=True, placeholder="type to filter")
         yield OptionList()
 

@@ -90,7 +90,7 @@ class Blueprints(Dialog[BlueprintAnswer]):
             "Keep selection", Input(compact=True, placeholder="name of a new blueprint", id="blueprint-name"), meaning, "keep"
         )
         with Horizontal(id="blueprint-buttons"):
-            yield Button("Insert missing", compact=True, variant="primary", id="blueprint-insert")
+            yield Button("Insert missing", compact=True, id="blueprint-insert")
             yield Button("Keep selection", compact=True, id="blueprint-keep")
             yield Button("Remove", compact=True, id="blueprint-drop")
             yield Button("Cancel", compact=True, id="blueprint-cancel")

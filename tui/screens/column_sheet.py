@@ -48,7 +48,7 @@ class ColumnSheetDialog(SheetDialog[Edit]):
 
     def on_mount(self) -> None:
         """Show the columns."""
-        self.show_keys([("screen.done", "Ctrl+S Apply"), ("screen.discard", "Alt+X Discard")])
+        self.show_keys([("done", "Ctrl+S Apply"), ("discard", "Alt+X Discard")])
         self.grid.focus()
         self.show_sheet()
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
+from rich.cells import cell_len
 from textual import on
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
@@ -14,6 +15,9 @@ from tui.model.columns_shown import ColumnsShown
 from tui.model.shown import ShownTable
 from tui.screens.dialog import Dialog
 from tui.widgets.line_list import LineList, ListCell, ListColumn
+
+WIDEST = 40
+"""A column's name takes so many cells at most."""
 
 
 @dataclass(frozen=True)
@@ -37,9 +41,8 @@ class ColumnsDialog(Dialog[ColumnsAnswer]):
     ]
     DEFAULT_CSS = """
     ColumnsDialog {
-        & > #dialog { width: 110; height: 92%; }
-        & > #dialog > #dialog-body { height: 1fr; }
-        & LineList { height: 1fr; }
+        & > #dialog { width: 110; }
+        & LineList { height: auto; max-height: 72vh; }
     }
     """
     title_text = "Columns"
@@ -53,8 +56,9 @@ class ColumnsDialog(Dialog[ColumnsAnswer]):
 
     def compose_body(self) -> ComposeResult:
         """The columns."""
-        told = [ListColumn("Type", 16), ListColumn("Texts", 7, 0, True), ListColumn("Unread", 6, 0, True), ListColumn("", 10, 1)]
-        yield LineList([ListColumn("", 3), ListColumn("Column", 24, 1), *told])
+        told = [ListColumn("Type", 16), ListColumn("Texts", 5, 0, True), ListColumn("Unread", 6, 0, True), ListColumn("", 10, 1)]
+        width = min(max(map(cell_len, self.names)), WIDEST)
+        yield LineList([ListColumn("", 1), ListColumn("Column", width), *told])
 
     def on_mount(self) -> None:
         """Stand on the column of the cursor."""

@@ -14,7 +14,7 @@ from textual.widgets import Static
 
 from contextdb.errors import plural, shown
 from contextdb.tables.merging.conflicts import Conflict, Side
-from tui.screens.dialog import Dialog
+from tui.screens.dialog import Dialog, buttons
 from tui.widgets.line_list import LineList, ListCell, ListColumn
 
 CHOSEN, OPEN = "●", "○"
@@ -187,8 +187,7 @@ class ConflictsDialog(Dialog[Mapping[int, Side]]):
         status = f"{self.n_open:,} of {len(self.conflicts):,} to decide" if self.n_open else "All decided"
         status = f"Decide {self.n_open:,} first" if is_asked else status
         parts = [("merge", "Merge"), *self._all, ("cancel", "Cancel")]
-        links = "   ".join(f"[@click=screen.{action}]{text}[/]" for action, text in parts)
-        self.query_one("#conflict-choices", Static).update(Content.from_markup(f"{links}     $status", status=status))
+        self.query_one("#conflict-choices", Static).update(buttons(parts) + Content(f"  {status}"))
 
     def _show_texts(self) -> None:
         if not self.conflicts:

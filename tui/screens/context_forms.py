@@ -18,7 +18,7 @@ from contextdb.disk import CONTEXT_SUFFIXES
 from contextdb.errors import ContextDBError
 from tui.model.context_list import ContextList, expectation_fault, summary
 from tui.model.paths import common_start, completions, resolved
-from tui.screens.dialog import Dialog
+from tui.screens.dialog import Dialog, buttons
 from tui.widgets.field import Field
 from tui.widgets.line_list import LineList, ListColumn
 
@@ -176,8 +176,7 @@ class SureDialog(Dialog[bool]):
     def compose_body(self) -> ComposeResult:
         """The question, and its answers to click."""
         yield Static(Content(f"{self.question}\n"))
-        yes, no = ("[@click=screen.answer(True)]Yes[/]", "[@click=screen.answer(False)]No[/]")
-        yield Static(Content.from_markup(f"{yes}     {no}"))
+        yield Static(buttons([("answer(True)", "Yes"), ("answer(False)", "No")]))
 
     def action_answer(self, is_sure: bool) -> None:
         """Give the answer."""

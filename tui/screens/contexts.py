@@ -23,7 +23,7 @@ from contextdb.errors import ContextDBError, in_quotes, plural
 from contextdb.tables.table import Table
 from tui.model.context_list import ContextList, cases_file, summary
 from tui.screens.context_forms import KeepDialog, Kept, NameDialog, OpenDialog, SureDialog
-from tui.screens.dialog import Dialog
+from tui.screens.dialog import Dialog, buttons
 from tui.widgets.line_list import LineList, ListCell, ListColumn
 
 MARKS: Mapping[bool | None, ListCell] = {True: "✓ holds", False: ("✗ fails", "error"), None: ("– open", "muted")}
@@ -185,7 +185,7 @@ class ContextsDialog(Dialog[Loaded]):
     def _say(self) -> None:
         self.query_one("#contexts-state", Static).update(Content(self._state()))
         self.query_one("#contexts-detail", Static).update(Content(self._detail()))
-        self.query_one("#contexts-keys", Static).update(Content.from_markup(self._keys()))
+        self.query_one("#contexts-keys", Static).update(self._keys())
 
     def _state(self) -> str:
         if self.message or self.is_busy:
@@ -202,12 +202,12 @@ class ContextsDialog(Dialog[Loaded]):
         i = self.chosen
         return "" if i is None else detail_of(self.contexts, i)
 
-    def _keys(self) -> str:
+    def _keys(self) -> Content:
         named = [("load", "Enter Load"), *([] if self.contexts.cases else [("next_without", "F3 No row")])]
         named += [("open_file", "F4 Open"), ("keep", "F6 Save")]
         if self.contexts.cases:
-            named += [("update", "F5 Save here"), ("rename", "F2 Rename"), ("delete", "Del Delete")]
-        return "   ".join(f"[@click=screen.{action}]{label}[/]" for action, label in named)
+            named += [("update", "F5 Update"), ("rename", "F2 Rename"), ("delete", "Del Delete")]
+        return buttons(named)
 
     # ---- what happens
 

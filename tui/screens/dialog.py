@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Generic, TypeVar
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Vertical
+from textual.content import Content
 from textual.filter import LineFilter
 from textual.screen import ModalScreen, Screen
 from textual.widgets import Static
@@ -27,6 +28,11 @@ def take_height(screen: Screen[Any]) -> None:
     screen.add_class(*reached[-1:], update=False)
 
 
+def buttons(parts: Sequence[tuple[str, str]]) -> Content:
+    """What can be done, to click: actions of the screen with their labels, which look like the buttons of a form."""
+    return Content(" ").join(Content.from_markup(f"[@click=screen.{action}] $label [/]", label=label) for action, label in parts)
+
+
 class Dialog(ModalScreen[Answer | None], Generic[Answer]):
     """A box over the sheet. Children say `title_text`, `keys_text` and `compose_body`."""
 
@@ -36,12 +42,14 @@ class Dialog(ModalScreen[Answer | None], Generic[Answer]):
     Dialog {
         align: center middle;
         background: $background 60%;
+        & Static { link-background: $panel; link-style: bold; }
+        & Static { link-background-hover: $primary 40%; link-style-hover: bold underline; }
         & > #dialog {
             width: 76; max-width: 96%; height: auto; max-height: 92%;
             background: $surface; border: round $primary; border-title-color: $text; border-title-style: bold;
             border-subtitle-color: $text-muted; padding: 1 2;
         }
-        &.-wide > #dialog { width: 90%; height: 90%; }
+        &.-wide > #dialog { width: 90%; min-width: 76; height: 90%; }
         & > #dialog > #dialog-body { height: auto; max-height: 100%; }
         &.-wide > #dialog > #dialog-body { height: 1fr; }
     }

@@ -22,7 +22,7 @@ from contextdb.tables.table import Table
 from tui.model.importing import suffixes_written, why_not
 from tui.model.paths import common_start, completions, resolved
 from tui.screens.context_forms import SureDialog
-from tui.screens.dialog import Dialog
+from tui.screens.dialog import Dialog, buttons
 from tui.widgets.field import Field
 from tui.widgets.line_list import LineList, ListColumn
 from tui.widgets.pick import Pick
@@ -77,8 +77,7 @@ class ExportDialog(Dialog[Export]):
             [ListColumn(f"In {self.folder.name or self.folder}", 20, 1)], empty="No file of this name yet.", id="export-names"
         )
         yield Static("", id="export-told")
-        yes, no = "[@click=screen.export]Export[/]", "[@click=screen.cancel]Cancel[/]"
-        yield Static(Content.from_markup(f"{yes}     {no}"), id="export-buttons")
+        yield Static(buttons([("export", "Export"), ("cancel", "Cancel")]), id="export-buttons")
 
     def on_mount(self) -> None:
         """Begin with the path, its stem chosen, so that typing gives another name."""

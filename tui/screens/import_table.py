@@ -25,7 +25,7 @@ from contextdb.exchange.reading import SheetWanted
 from contextdb.tables.table import Table
 from tui.model.importing import MODES, Choice, Draft, Import, Mode, suffixes_read, why_not
 from tui.model.paths import common_start, completions, resolved
-from tui.screens.dialog import Dialog
+from tui.screens.dialog import Dialog, buttons
 from tui.widgets.field import Field
 from tui.widgets.line_list import LineList, ListCell, ListColumn
 from tui.widgets.pick import Pick
@@ -134,8 +134,7 @@ class ImportDialog(Dialog[Import]):
         yield Static("", id="import-summary")
         with VerticalScroll(id="import-notes", can_focus=False):
             yield Static("")
-        yes, no = "[@click=screen.import]Import[/]", "[@click=screen.cancel]Cancel[/]"
-        yield Static(Content.from_markup(f"{yes}     {no}"), id="import-buttons")
+        yield Static(buttons([("import", "Import"), ("cancel", "Cancel")]), id="import-buttons")
 
     def on_mount(self) -> None:
         """Show what files there are, or read the clipboard."""

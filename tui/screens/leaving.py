@@ -12,7 +12,7 @@ from textual.widgets import Static
 
 from contextdb.errors import plural, shown
 from tui.model.lock import Holder
-from tui.screens.dialog import Dialog
+from tui.screens.dialog import Dialog, buttons
 
 Leaving = Literal["save", "discard"]
 Opening = Literal["read-only", "take-over"]
@@ -42,7 +42,7 @@ class LeavingDialog(Dialog[Leaving]):
         names += [f"  and {plural(more, 'more table')}"] if more > 0 else []
         what = "This table has" if len(self._tables) == 1 else "These tables have"
         yield Static(Content("\n".join([f"{what} edits that are not saved:", "", *names, ""])))
-        yield Static(_choices([("answer('save')", self._save), ("answer('discard')", "Do not save"), ("cancel", "Stay")]))
+        yield Static(buttons([("answer('save')", self._save), ("answer('discard')", "Do not save"), ("cancel", "Stay")]))
 
     def action_answer(self, answer: Leaving) -> None:
         """Give the answer."""
@@ -74,7 +74,7 @@ class HeldDialog(Dialog[Opening]):
             lines.append("If it is not, take over the table. If it is, each may overwrite what the other saved.")
         choices = [("answer('read-only')", "Open to read"), ("answer('take-over')", "Take over"), ("cancel", "Cancel")]
         yield Static(Content("\n".join([*lines, ""])))
-        yield Static(_choices([c for c in choices if not (self._holder.is_certain and "take-over" in c[0])]))
+        yield Static(buttons([c for c in choices if not (self._holder.is_certain and "take-over" in c[0])]))
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """Nobody takes a table from an editor that surely runs."""
@@ -83,7 +83,3 @@ class HeldDialog(Dialog[Opening]):
     def action_answer(self, answer: Opening) -> None:
         """Give the answer."""
         self.dismiss(answer)
-
-
-def _choices(parts: Sequence[tuple[str, str]]) -> Content:
-    return Content.from_markup("     ".join(f"[@click=screen.{action}]{text}[/]" for action, text in parts))

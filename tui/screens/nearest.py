@@ -18,7 +18,7 @@ from contextdb.tables.table import Table
 from tui.model.query_row import QueryRow
 from tui.model.why import NEEDED, CellWhy, RowWhy, State, nearest_rows, why_row
 from tui.model.window import MAY_BE, PICKED, VALID
-from tui.screens.dialog import Dialog
+from tui.screens.dialog import Dialog, buttons
 from tui.widgets.choice_line import ChoiceLine
 from tui.widgets.line_list import LineList, ListCell, ListColumn
 
@@ -156,9 +156,7 @@ class NearestDialog(Dialog[CellAnswer]):
         self.query_one("#nearest-detail", Static).update(Content(row + cell_state(cell) if cell else ""))
         named = [("go", "Enter Go to the cell")] * (cell is not None)
         named += [("mend", "M Correct the cell")] * (cell is not None and cell.mend is not None)
-        self.query_one("#nearest-keys", Static).update(
-            Content.from_markup("   ".join(f"[@click=screen.{action}]{label}[/]" for action, label in named))
-        )
+        self.query_one("#nearest-keys", Static).update(buttons(named))
 
     @on(LineList.Chosen)
     def action_go(self) -> None:

@@ -14,7 +14,7 @@ from textual.widgets import Static
 from tui.clipboard import Clipboard
 from tui.messages import Edited, Told
 from tui.model.roomy_sheet import RoomySheet
-from tui.screens.dialog import Answer, Dialog
+from tui.screens.dialog import Answer, Dialog, buttons
 from tui.widgets.cell_editor import CellEditor
 from tui.widgets.grid import Grid
 
@@ -76,8 +76,7 @@ class SheetDialog(Dialog[Answer]):
 
     def show_keys(self, keys: Sequence[tuple[str, str]]) -> None:
         """Say what can be done: actions with their labels, which a click runs too."""
-        said = "   ".join(f"[@click={action}]{label}[/]" for action, label in keys)
-        self.query_one(".sheet--keys", Static).update(Content.from_markup(said))
+        self.query_one(".sheet--keys", Static).update(buttons(keys))
 
     # ---- what the grid asks for
 

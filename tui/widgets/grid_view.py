@@ -72,6 +72,8 @@ class GridView(ScrollView, inherit_bindings=False):
         .grid--valid { color: $text-success; text-style: bold; }
         .grid--line { color: $foreground 18%; }
         .grid--on-cursor { color: $block-cursor-foreground; text-style: bold; }
+        &:ansi .grid--row-valid { background: ansi_default; }
+        &:ansi .grid--row-picked { background: ansi_default; text-style: bold; }
     }
     """
 
@@ -301,7 +303,7 @@ class GridView(ScrollView, inherit_bindings=False):
             return wide, min(wide, max(wrapped, len("no column") + 1))
         cells = max(self._fitted_cells(at, [], widest), self._beside(at))
         kind = f"{header.kind} · {header.unit}" if header.unit else header.kind
-        wide = min(max(cells, min(max(cell_len(name) + 4, cell_len(kind) + 2), widest)), WIDEST)
+        wide = min(max(cells, min(max(cell_len(name) + 4, cell_len(kind) + 3), widest)), WIDEST)
         return wide, min(wide, max(wrapped, cells))
 
     def _fitted(self, at: int, widest: int) -> int:
@@ -309,7 +311,7 @@ class GridView(ScrollView, inherit_bindings=False):
         kind = f"{header.kind} · {header.unit}" if header.unit else header.kind
         if header.is_extra:
             return min(max(len("no column"), cell_len(header.name), cell_len(kind)) + 2, widest)
-        fitted = self._fitted_cells(at, [header.name + " ↕", kind], widest)
+        fitted = self._fitted_cells(at, [header.name + " ↕", f"{kind} "], widest)
         return min(max(fitted, self._beside(at)), WIDEST)
 
     def _fitted_cells(self, at: int, heads: Sequence[str], widest: int) -> int:

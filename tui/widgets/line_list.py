@@ -68,6 +68,7 @@ class LineList(ScrollView, can_focus=True):
         & .line-list--muted { color: $text-muted; }
         & .line-list--strong { text-style: bold; }
         &:focus .line-list--cursor { background: $primary 40%; }
+        &:ansi .line-list--cursor { background: ansi_blue; color: ansi_bright_white; }
     }
     """
 
@@ -105,11 +106,15 @@ class LineList(ScrollView, can_focus=True):
 
     def show(self, n_lines: int, line: Callable[[int], Sequence[ListCell]], index: int = 0) -> None:
         """Show these lines, with the cursor on one of them."""
-        self.n_lines, self._line = n_lines, line
+        has_grown, self.n_lines, self._line = n_lines != self.n_lines, n_lines, line
         self.virtual_size = Size(0, n_lines + 1)
         self.index = -1
         self.go(index)
-        self.refresh()
+        self.refresh(layout=has_grown and self.styles.is_auto_height)
+
+    def get_content_height(self, container: Size, viewport: Size, width: int) -> int:
+        """The titles and every line, or the line that says that there is none."""
+        return 1 + max(self.n_lines, 1)
 
     def say_empty(self, text: str) -> None:
         """Say something else where there is no line."""
@@ -187,13 +192,20 @@ class LineList(ScrollView, can_focus=True):
     def _line_strip(self, index: int, width: int, base: Style) -> Strip:
         is_here = index == self.index
         style = base
-        cursor = Style(bgcolor=self.get_component_rich_style("line-list--cursor").bgcolor, bold=True) if is_here else Style.null()
+        cursor = self._cursor if is_here else Style.null()
         segments = [Segment(MARK if is_here else "  ", style + cursor)]
         for cell, column, w in zip(self._line(index), self.columns, self._widths(width), strict=True):
             text, tone = cell if isinstance(cell, tuple) else (cell if isinstance(cell, str) else cell(w), "")
             segments.append(Segment(fitted(text, w, column.to_right), style + self._tone(tone) + cursor))
             segments.append(Segment("  ", style + cursor))
         return _strip(segments, width, style + cursor)
+
+    @property
+    def _cursor(self) -> Style:
+        """The ground of the line of the cursor; in colours of the terminal, of which no other can be read on it, its text too."""
+        whole = self.get_component_rich_style("line-list--cursor")
+        is_terminals = whole.bgcolor is not None and whole.bgcolor.number is not None
+        return Style(bgcolor=whole.bgcolor, color=whole.color if is_terminals else None, bold=True)
 
     def _tone(self, tone: str) -> Style:
         """The colour of a tone as it is on the list's background, and whether it is bold or underlined."""

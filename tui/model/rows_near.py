@@ -1,0 +1,45 @@
+"""Which rows of a table are nearest to a box of contexts, and which of their cells do not hold it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb.cells.grammar import parse_cell
+from contextdb.cells.sets import ANY, Cell, complement, meet_exactly
+from contextdb.tables.condition_column import ConditionColumn
+from contextdb.tables.table import Table
+
+MOST_TEXTS = 3_000
+"""So many different cells are compared with a box between two keys."""
+
+
+def is_near_at_once(table: Table) -> bool:
+    """Whether a table says so few different things that its nearest rows are there at once."""
+    return sum(len(column.texts.texts) for column in table.conditions) <= MOST_TEXTS
+
+
+def rows_near(table: Table, box: Mapping[str, str], most: int) -> dict[int, tuple[str, ...]]:
+    """The rows with fewest cells to change so that they hold all of a box, nearest first, and the conditions of those cells."""
+    short = {c.condition.name: ~_holding(c, box.get(c.condition.name, "")) for c in table.conditions}
+    able = np.array(table.enabled, np.bool_)
+    for column in table.conditions:
+        able &= ~np.isin(column.texts.codes, list(column.faults))
+    rows = np.flatnonzero(able)
+    n_short = sum((flags.astype(np.int64) for flags in short.values()), np.zeros(table.n_rows, np.int64))
+    nearest = rows[np.argsort(n_short[rows], kind="stable")][:most].tolist()
+    return {row: tuple(name for name, flags in short.items() if flags[row]) for row in nearest}
+
+
+def _holding(column: ConditionColumn, text: str) -> NDArray[np.bool_]:
+    """The rows whose cell accepts all that a cell of this text accepts; an empty text: everything."""
+    domain = column.condition.domain
+    inner = parse_cell(text, domain) if text else ANY
+    whole = complement(complement(None, domain), domain) if inner.accepts is None else inner.accepts
+
+    def holds(cell: Cell) -> bool:
+        return cell.is_any or cell.is_soft or meet_exactly(complement(cell.accepts, domain), whole).is_empty
+
+    return np.array([holds(column.cells[i]) for i in range(len(column.texts.texts))], np.bool_)[column.texts.codes]

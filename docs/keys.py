@@ -39,6 +39,7 @@ SECTIONS = {
     "Tab Priorities": ("PrioritiesPane",),
     "Tab Coverage": ("CoveragePane", "GapList", "RowList", "PairMap", "HeatMap"),
     "Tab Problems": ("ProblemsPane", "ProblemList"),
+    "Rows below a list": ("RowsBelow",),
     "Tab Motion": ("MotionPane", "SessionList"),
     "Every dialog": ("Dialog", "AskDialog", "ChooseDialog", "StepsDialog"),
     "A question": ("SureDialog",),

@@ -274,6 +274,8 @@ async def _lines(app: EditorApp, scene: Scene, folder: Path) -> list[list[Run]]:
         return [list(_runs(strip)) for strip in app.screen._compositor.render_strips()]
 
 
+WAIT_S = 60.0
+"""So long a coverage may be counted."""
 WORKING = ("enter", "f9", "alt+4", "2")
 """Keys after which something may be worked out before the next one is pressed."""
 
@@ -282,6 +284,8 @@ async def _settle(pilot: Pilot[Any]) -> None:
     """Wait until nothing is being worked out."""
     await pilot.pause()
     await pilot.app.workers.wait_for_complete()
+    if isinstance(pilot.app, EditorApp):
+        pilot.app.main.coverage.join(WAIT_S)
     await pilot.pause()
 
 

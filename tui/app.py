@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 from textual import on
-from textual.app import SystemCommand
+from textual.app import App, SystemCommand
 from textual.binding import BindingType
 from textual.command import CommandPalette
 from textual.filter import LineFilter
 from textual.message import Message
 from textual.screen import Screen
-from textual.theme import BUILTIN_THEMES
+from textual.theme import BUILTIN_THEMES, ThemeProvider
 from textual.widgets import Input
 
 from contextdb.errors import ContextDBError
@@ -33,6 +33,7 @@ from tui.screens.begin import Begin
 from tui.screens.conflicts import ConflictsDialog
 from tui.screens.leaving import HeldDialog, LeavingDialog
 from tui.screens.main import MainScreen
+from tui.screens.palette import Palette
 from tui.themes import DARK, THEMES
 
 LOW = 14
@@ -110,6 +111,15 @@ class EditorApp(Editor):
         box.border_title = "Theme" if "theme" in field.placeholder else "Commands"
         box.border_subtitle = "type to filter · ↑↓ choose · Enter OK · Esc cancel"
         field.placeholder = "type to filter"
+
+    def action_command_palette(self) -> None:
+        """Show every command."""
+        if not CommandPalette.is_open(cast(App[object], self)):
+            self.push_screen(Palette("Commands"))
+
+    def search_themes(self) -> None:
+        """Show every theme."""
+        self.push_screen(Palette("Theme", [ThemeProvider]))
 
     def on_mount(self) -> None:
         if self.workspace.beginning is not None:

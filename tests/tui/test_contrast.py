@@ -14,7 +14,7 @@ FRAMES = " │╭╮╰╯─║▏▎▋▌▉▁▂▃▄▅▆▇█▐▊▕
 
 def faint(app) -> set[tuple[str, str]]:
     """Texts without the contrast, with their theme; of a dialog those in its box, for what is behind it is dimmed on purpose."""
-    box = app.screen.query("#dialog")
+    box = app.screen.query("#dialog, #--container")
     region = box.first().region if box else app.screen.region
     found = set()
     for strip in app.screen._compositor.render_strips()[region.y : region.bottom]:
@@ -54,11 +54,13 @@ def test_every_text_of_the_main_screen_has_the_contrast_of_wcag_in_every_theme(p
     assert with_editor(path, script) == set()
 
 
-@pytest.mark.parametrize("keys", [["alt+2"], ["alt+4"], ["alt+4", "2"], ["alt+5"], ["alt+c"], ["alt+j"], ["f1"]], ids="-".join)
+@pytest.mark.parametrize(
+    "keys", [["alt+2"], ["alt+4"], ["alt+4", "2"], ["alt+5"], ["alt+c"], ["alt+j"], ["f1"], ["ctrl+p"]], ids="-".join
+)
 def test_every_text_of_a_tab_or_a_dialog_has_it_too(path, keys):
     async def script(app, pilot):
         await press(pilot, *keys)
         await app.workers.wait_for_complete()
         return await faint_in_themes(app, pilot)
 
-    assert with_editor(path, script) == set()
+    assert with_editor(path, script, (120, 36) if keys == ["alt+5"] else (80, 24)) == set()

@@ -10,8 +10,9 @@ from terminal import press, screen_text, with_editor
 
 import contextdb as cdb
 from contextdb.covering import coverage
-from tui.model.rows_near import rows_near
+from tui.model.rows_near import is_near_at_once, rows_near
 from tui.panes.rows_below import RowsBelow
+from tui.widgets.heat_map import HeatMap
 
 TABLES = Path(__file__).parents[2] / "tables"
 TOML = '[conditions.speed]\ntype = "number"\nmin = 0\nmax = 10\n[conditions.hit]\ntype = "bool"\n'
@@ -58,6 +59,12 @@ def test_a_row_with_a_cell_that_cannot_be_read_or_switched_off_is_not_near(path)
     assert near == {3: (), 0: ("speed", "hit")}
 
 
+def test_rows_are_ranked_at_once_by_how_many_different_cells_there_are_and_not_by_how_many_rows():
+    many = cdb.Table.from_columns({"Asset": ["a"] * 5_000, "speed": ["0..5"] * 5_000})
+    different = cdb.Table.from_columns({"Asset": ["a"] * 5_000, "speed": [f"0..{n}" for n in range(1, 5_001)]})
+    assert [is_near_at_once(table) for table in (many, different)] == [True, False]
+
+
 def test_a_gap_is_shown_with_its_nearest_rows_and_the_cells_that_keep_them_from_closing_it(path):
     path.write_text(ROWS.replace("4..5; 3", "4..5"))
     title, header, *rows = below(path, "alt+4")
@@ -85,9 +92,8 @@ def test_the_rows_of_a_database_are_shown_with_the_valid_ones_first(tmp_path):
     assert all("×" in row for row in rows[1:11])
 
 
-@pytest.mark.parametrize("keys", [("alt+3",), ("alt+4",), ("alt+5",)])
-def test_a_small_screen_has_no_room_for_them(path, keys):
-    assert below(path, *keys, size=(80, 24)) == []
+def test_a_small_screen_has_no_room_for_them(path):
+    assert below(path, "alt+5", size=(80, 24)) == []
 
 
 def test_enter_on_such_a_row_goes_to_it(path):
@@ -98,3 +104,22 @@ def test_enter_on_such_a_row_goes_to_it(path):
         return app.main.tab, app.main.session.sheet.cursor
 
     assert with_editor(path, script, ROOMY) == ("assets", (1, 1))
+
+
+def test_all_lines_of_the_chosen_square_of_a_map_have_one_ground(path):
+    path.write_text(ROWS.replace("4..5; 3", "4..5"))
+
+    async def script(app, pilot):
+        app.theme = "catppuccin-latte"
+        await press(pilot, "alt+4", "2")
+        await app.workers.wait_for_complete()
+        await press(pilot)
+        square = app.main.query_one("PairMap", HeatMap)
+        x, y = square.content_region.x + square.label_width, square.content_region.y + 1
+        x += square.place[1] * square.square_width
+        lines = app.screen._compositor.render_strips()[y : y + square.square_height]
+        return [next(iter(line.crop(x, x + 1))).style for line in lines]
+
+    styles = with_editor(path, script, ROOMY)
+    assert len(styles) == 3
+    assert len({style.color if style.reverse else style.bgcolor for style in styles}) == 1

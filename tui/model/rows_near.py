@@ -12,6 +12,14 @@ from contextdb.cells.sets import ANY, Cell, complement, meet_exactly
 from contextdb.tables.condition_column import ConditionColumn
 from contextdb.tables.table import Table
 
+MOST_TEXTS = 3_000
+"""So many different cells are compared with a box between two keys."""
+
+
+def is_near_at_once(table: Table) -> bool:
+    """Whether a table says so few different things that its nearest rows are there at once."""
+    return sum(len(column.texts.texts) for column in table.conditions) <= MOST_TEXTS
+
 
 def rows_near(table: Table, box: Mapping[str, str], most: int) -> dict[int, tuple[str, ...]]:
     """The rows with fewest cells to change so that they hold all of a box, nearest first, and the conditions of those cells."""

@@ -25,7 +25,7 @@ from tui.model.coverage_run import CoverageRun, Result, is_quick
 from tui.model.moment import moment_inside
 from tui.model.moments import Moment
 from tui.model.played_run import Played, PlayedRun, moment_in
-from tui.model.rows_near import rows_near
+from tui.model.rows_near import is_near_at_once, rows_near
 from tui.model.sheet import Sheet
 from tui.panes.pair_map import PairMap
 from tui.panes.pane import Pane
@@ -309,7 +309,7 @@ class CoveragePane(Pane):
         below, section, table = self.query_one(RowsBelow), SECTIONS[self.section], self.sheet.table
         result, play = self.run.result, self.played.result
         below.show_none()
-        if not self.has_class("-roomy") or section == "about" or not is_quick(table):
+        if not self.has_class("-roomy") or section == "about":
             return
         if section == "unused":
             if play is not None and play.table is table and play.unused:
@@ -331,7 +331,7 @@ class CoveragePane(Pane):
 
     def _show_near(self, below: RowsBelow, cells: Mapping[str, str]) -> None:
         table = self.sheet.table
-        if cells.keys() <= {c.condition.name for c in table.conditions}:
+        if is_near_at_once(table) and cells.keys() <= {c.condition.name for c in table.conditions}:
             near = rows_near(table, cells, MOST)
             tones = {(row, name): "warning" for row, names in near.items() for name in names}
             first = next(iter(near.values()), ())

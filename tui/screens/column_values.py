@@ -42,10 +42,9 @@ class ValuesDialog(Dialog[ValuesAnswer]):
     ]
     DEFAULT_CSS = """
     ValuesDialog {
-        & > #dialog { width: 100; height: 92%; }
-        & > #dialog > #dialog-body { height: 1fr; }
+        & > #dialog { width: 100; }
         & #values-about { height: auto; max-height: 4; }
-        & #values-lines { height: 1fr; margin: 1 0; }
+        & #values-lines { height: auto; max-height: 50vh; margin: 1 0; }
         & #values-detail { height: auto; min-height: 1; max-height: 3; color: $text-muted; }
     }
     """

@@ -41,9 +41,8 @@ class ColumnsDialog(Dialog[ColumnsAnswer]):
     ]
     DEFAULT_CSS = """
     ColumnsDialog {
-        & > #dialog { width: 110; height: 92%; }
-        & > #dialog > #dialog-body { height: 1fr; }
-        & LineList { height: 1fr; }
+        & > #dialog { width: 110; }
+        & LineList { height: auto; max-height: 72vh; }
     }
     """
     title_text = "Columns"

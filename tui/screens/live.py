@@ -34,10 +34,9 @@ class LiveDialog(Dialog[Followed]):
     BINDINGS: ClassVar[list[BindingType]] = [Binding("f4,ctrl+o", "open_file", "Open a recording")]
     DEFAULT_CSS = """
     LiveDialog {
-        & > #dialog { width: 90%; max-width: 110; height: 70%; padding: 0 1; }
-        & > #dialog > #dialog-body { height: 1fr; }
+        & > #dialog { width: 90%; min-width: 76; max-width: 110; padding: 0 1; }
         & #live-state { height: auto; max-height: 3; padding: 0 1; text-style: bold; }
-        & #live-lines { height: 1fr; margin: 1 0; }
+        & #live-lines { height: auto; max-height: 50vh; margin: 1 0; }
     }
     """
     title_text = "Follow a game"

@@ -300,12 +300,21 @@ class HeatMap(ScrollView, can_focus=True):
         """A line of a square above or below its number."""
         style = self.get_component_rich_style(f"heat-map--{self._square(row, column).level}")
         is_here = (row, column) == self.place
-        return [Segment(" " * wide, style + Style(reverse=self.has_focus) if is_here else style)]
+        return [Segment(" " * wide, self._chosen(style) if is_here else style)]
+
+    def _chosen(self, style: Style) -> Style:
+        """The colours of the chosen square: turned round where the keys are here. Only the terminal can turn its own colours."""
+        ground = style.bgcolor
+        if not self.has_focus:
+            return style
+        if ground is None or ground.is_default or ground.number is not None:
+            return style + Style(reverse=True)
+        return style + Style(color=ground, bgcolor=style.color)
 
     def _painted(self, row: int, column: int, wide: int) -> list[Segment]:
         square = self._square(row, column)
         style = self.get_component_rich_style(f"heat-map--{square.level}")
         if (row, column) == self.place:
             text = fitted(f"[{square.text}", wide - 1, True) + "]"
-            return [Segment(text, style + Style(bold=True, reverse=self.has_focus))]
+            return [Segment(text, self._chosen(style) + Style(bold=True))]
         return [Segment(fitted(square.text, wide - 1, True) + " ", style)]

@@ -1,0 +1,67 @@
+"""What dialogs share: one kind of button, a title and keys in the frame, and room for what is longer than the screen."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from terminal import press, screen_text, with_editor
+
+from tui.screens.remarks import RemarksDialog
+
+REMARKS = [f"column {n} is of another type than its condition" for n in range(1, 31)]
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    file = tmp_path / "t.csv"
+    file.write_text("Asset,speed\nwalk,0..2\n")
+    return file
+
+
+def test_remarks_are_scrolled_through_to_the_last_and_left_with_escape(path):
+    async def script(app, pilot):
+        app.push_screen(RemarksDialog("Import moves.csv", REMARKS))
+        await press(pilot)
+        first = screen_text(app)
+        await press(pilot, "end")
+        last = screen_text(app)
+        await press(pilot, "escape")
+        return first, last, isinstance(app.screen, RemarksDialog)
+
+    first, last, is_open = with_editor(path, script)
+    assert "Import moves.csv" in first
+    assert f"· {REMARKS[0]}" in first
+    assert REMARKS[-1] not in first
+    assert f"· {REMARKS[-1]}" in last
+    assert not is_open
+
+
+def look_of(app, label: str) -> tuple[str, str, bool | None]:
+    """The text with its spaces, the ground, and the weight of a button."""
+    for strip in app.screen._compositor.render_strips():
+        for segment in strip:
+            if segment.text.strip() == label:
+                return segment.text.replace(label, "…"), segment.style.bgcolor.name, segment.style.bold
+    raise AssertionError(label)
+
+
+def test_what_one_clicks_looks_the_same_in_a_form_and_in_other_dialogs(path):
+    async def script(app, pilot):
+        await press(pilot, "alt+c")
+        form = look_of(app, "Cancel")
+        await press(pilot, "escape", "delete", "ctrl+q")
+        return form, look_of(app, "Stay")
+
+    form, other = with_editor(path, script)
+    assert form == other
+
+
+def test_the_palette_has_the_title_and_the_keys_of_a_dialog(path):
+    async def script(app, pilot):
+        await press(pilot, "ctrl+p")
+        return screen_text(app)
+
+    text = with_editor(path, script)
+    assert "╭─ Commands ─" in text
+    assert "↑↓ choose · Enter OK · Esc cancel ─╯" in text

@@ -396,7 +396,7 @@ when = "When"
 @pytest.mark.parametrize(
     ("conditions", "columns", "says"),
     [
-        ("mirror = { Left = 'Right' }", "LeftFoot.Down", "RightFoot.Down is no column, so this fact stays as it is"),
+        ("mirror = { Left = 'Right' }", "LeftFoot.Down", "RightFoot.Down is not a column, so this fact stays as it is"),
         ("", "LeftFoot.Down,RightFoot.Down", 'Try mirror = { Left = "Right" }, or "none".'),
         ("mirror = { Left = 'Right' }", "LeftFoot.Down,RightFoot.Down", ""),
     ],

@@ -68,3 +68,8 @@ def test_what_is_imported_for_types_alone_is_of_others_and_heavy():
                         if re.search(r"(contextdb|tui)\.", ast.unparse(node))
                     }
     assert {module for module, _ in ours} == {"contextdb"}  # whose public names are loaded when they are first used
+
+
+def test_the_house_has_twenty_rooms_beside_its_doors():
+    entries = {path.stem for path in (ROOT / "contextdb").iterdir() if path.suffix == ".py" or (path / "__init__.py").exists()}
+    assert len(entries - {"__init__", "__main__", "cli"}) <= 20

@@ -258,7 +258,9 @@ def test_nothing_that_a_game_sends_moves_the_cursor_or_stops_the_listener():
     assert len(lines) == 1
     assert all(character.isprintable() for character in lines[0])
     own = cdb.Table.from_columns({"Asset": ["a"]}, name="x").compile()
-    assert Changes({"x": own}, True).of(ask(facts={"z": {"odd": 1}})).notes == ['your "x" cannot be asked that: this is no fact.']
+    assert Changes({"x": own}, True).of(ask(facts={"z": {"odd": 1}})).notes == [
+        'your "x" cannot be asked that: this is not a fact.'
+    ]
     assert "cannot be asked" in Changes({"x": own}, True).of(ask(actors={"A": [{"hp": 3}]})).notes[0]
     assert Changes({"x": own}, True).of(ask(rows="0")).notes == ['your "x" answers otherwise than the game\'s.']
 

@@ -190,7 +190,7 @@ def test_faults_of_the_settings_and_markup_are_findings_too(game: Path):
     (game / "contextdb.toml").write_text("[tables", encoding="utf-8")
     assert [f["level"] for f in findings()] == ["error"]
     (game / "contextdb.toml").write_text(TOML.replace("clips/*.bvh", "clip/*.bvh"), encoding="utf-8")
-    assert "no file fits" in findings()[0]["message"]
+    assert "no file matches" in findings()[0]["message"]
 
 
 def test_a_stick_and_markup_beside_the_tables_are_no_tables_of_any_motion_command(game: Path):

@@ -342,7 +342,7 @@ def test_a_database_without_any_of_its_table_s_clips_plays_nothing(here: Path):
 
 def test_clips_that_are_not_there_are_told(here: Path):
     shutil.rmtree(here / "game" / "clips")
-    assert "contextdb.toml: [databases.free] no file fits clips" in refused("search", "game", "free", "--query", "walk@1")
+    assert "contextdb.toml: [databases.free] no file matches clips" in refused("search", "game", "free", "--query", "walk@1")
 
 
 # ---- select
@@ -930,8 +930,8 @@ def test_without_its_databases_a_session_says_what_is_missing(here: Path):
         (["--at", "1", "--why", "jog"], "nothing was searched at tick 1: what played, played on."),
         (["--what-if", "LeftFoot positon=2"], 'Did you mean "LeftFoot position=2"?'),
         (["--what-if", "threshold tird=2"], 'Did you mean "threshold tired=2"?'),
-        (["--what-if", "LeftFoot position"], '"LeftFoot position" is no change.'),
-        (["--what-if", "LeftFoot position=much"], '"much" is no number.'),
+        (["--what-if", "LeftFoot position"], '"LeftFoot position" is not a change.'),
+        (["--what-if", "LeftFoot position=much"], '"much" is not a number.'),
         (["--what-if", "LeftFoot position=-1"], 'the weight of "LeftFoot position" is -1.'),
         (["--diff", "sesion.parquet"], 'sesion.parquet: there is no such file. Did you mean "session.parquet"?'),
         (["--trace", "session.txt"], "a name that ends in .json"),

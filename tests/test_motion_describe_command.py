@@ -266,9 +266,7 @@ def meeting(game: Path) -> Path:
 def test_joint_clips_make_no_rows(meeting: Path):
     result = describe("game")
     assert sorted(line.split(",")[0] for line in result.lines[1:]) == sorted([*NAMES, "run"])
-    assert result.err == (
-        'contextdb: left out: the joint clips of "greetings": what the actors of each role do is no cell of a row.\n'
-    )
+    assert result.err == ('contextdb: left out: the joint clips of "greetings": a row has no cell for what each actor does.\n')
     assert 'contextdb: "greetings" holds joint clips' in describe("game", "--into", "game/greetings.csv", code=2).err
 
 

@@ -196,7 +196,7 @@ def test_the_output_of_the_controller_says_how_poses_are_made(here: Path):
         (["poses.npz", "--poses", "poses.npz"], "poses.npz: --poses goes with a session, and these are poses."),
         (["session.parquet", "--controller", "nobody"], "there is no [controllers.nobody]"),
         (["session.parquet", "--project", "nowhere"], "nowhere"),
-        (["session.parquet", "--baseline", "stick.csv"], "stick.csv: the baseline is no report of measures."),
+        (["session.parquet", "--baseline", "stick.csv"], "stick.csv: the baseline is not a report of measures."),
         (["session.parquet", "--baseline", "other.json"], 'other.json: the baseline has no session "session.parquet".'),
         (["session.parquet", "--baseline", "newer.json"], 'newer.json: the baseline has format "2"; this version reads format 1.'),
         (["poses.npz", "--max-path", "1"], "--max-path cannot be judged: the session does not say where the game had the body."),

@@ -503,7 +503,7 @@ def test_settings_come_back_from_what_the_file_says_of_them(drawn):
         ('outputs = { Mandatory_Slots = { type = "int" } }', "says which roles a row fills"),
         ('fallback = { assets = "a" }', 'fallback has no key "assets".*Did you mean "asset"'),
         ('fallback = { outputs = { a = 1 } }\noutputs = { a = { type = "int" } }', "fallback names no asset"),
-        ('fallback = { asset = "i", outputs = { b = 1 } }\noutputs = ["a"]', 'fallback gives "b", which is no output'),
+        ('fallback = { asset = "i", outputs = { b = 1 } }\noutputs = ["a"]', 'fallback gives "b", which is not an output'),
         ('fallback = { asset = "i", outputs = { a = 1 } }\noutputs = ["a"]', "fallback a = 1: this is not a text"),
         ('fallback = { asset = "i", outputs = 3 }', "fallback outputs = 3: this is a number, not a table"),
         ("outputs = { ' a' = { type = 'int' } }", "a space is before or after it"),

@@ -120,7 +120,7 @@ def test_outputs_of_which_nothing_is_said_any_more_are_a_list(table: Table):
 
 
 def test_a_fallback_for_an_output_that_is_none_is_refused(table: Table):
-    with pytest.raises(SchemaError, match='fallback gives "hurt", which is no output'):
+    with pytest.raises(SchemaError, match='fallback gives "hurt", which is not an output'):
         edits.set_settings(table, fallback={"asset": "idle", "outputs": {"hurt": 3}})
 
 

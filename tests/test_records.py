@@ -10,7 +10,7 @@ from dataclasses import FrozenInstanceError, dataclass, replace
 
 import pytest
 
-from contextdb.records import collector_at_rest, quickly_made
+from contextdb.motion.records import collector_at_rest, quickly_made
 
 
 @dataclass(frozen=True, slots=True)

@@ -353,7 +353,7 @@ SECTIONS_SAID = (
         ("[project]\nnmae = 'x'", 'line 2: [project] has no key "nmae". Accepted: "name", "transitions". Did you mean "name"?'),
         (
             "[project]\ntransitions = 'to_{to}'",
-            'line 2: [project] transitions = "to_{to}": this is no pattern of the names of transitions. Accepted: {from} and '
+            'line 2: [project] transitions = "to_{to}": this is not a pattern for names of transitions. Accepted: {from} and '
             '{to}, each once, with text between them, such as "{from}_to_{to}". Did you mean transitions = "{from}_to_{to}"?',
         ),
         ("conditions = 5", "line 1: conditions = 5: this is a number, not a section. Accepted: [conditions.NAME]."),

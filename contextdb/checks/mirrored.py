@@ -42,7 +42,7 @@ def check_mirroring(table: Table) -> Iterator[Finding]:
     columns = {c.condition.name: c for c in table.conditions}
     for condition in conditions.values():
         if (partner := partner_of(condition)) is not None and partner not in conditions:
-            told = f"{partner} is no column, so this fact stays as it is for mirrored clips of {by}."
+            told = f"{partner} is not a column, so this fact stays as it is for mirrored clips of {by}."
             told += f" Try a column {partner}, Any in each row."
             yield Finding("undeclared-mirror", "info", told, table.name, _file(table), column=condition.name)
         pairs = _sides(condition, columns.get(condition.name)) or _other_sides(condition, conditions)

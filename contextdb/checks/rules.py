@@ -288,7 +288,7 @@ RULES: dict[str, Rule] = {
     "undeclared-mirror": Rule(
         "info",
         "A condition has names of both sides, or is itself of one side, and its clips are played mirrored, but it does not declare"
-        " how its facts change, or the condition of the other side is no column.",
+        " how its facts change, or the condition of the other side is not a column.",
         'Declare `mirror = { Left = "Right" }`, with both conditions as columns, or `mirror = "none"` if its facts are the same in'
         " a mirror.",
         ("checks.mirrored",),

@@ -57,7 +57,7 @@ class Changes:
                 continue
             version = told.get("version")
             if name not in self.own:
-                notes += self._note(f"{in_quotes(name)} is no table of yours: it is not asked.")
+                notes += self._note(f"{in_quotes(name)} is not one of your tables, so it is not asked.")
             elif version is not None and version != self.own[name].version:
                 here = self.own[name].version
                 notes += self._note(f"the game has another version of {in_quotes(name)}: {str(version)[:8]}, yours is {here[:8]}.")

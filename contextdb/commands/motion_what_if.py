@@ -46,7 +46,7 @@ def changes_of(texts: Sequence[str], databases: Mapping[str, MotionDatabase]) ->
 def _read(text: str, known: Sequence[str]) -> tuple[str, float]:
     name, equals, number = (part.strip() for part in text.rpartition("="))
     if not equals or not name:
-        raise QueryError(Fault(f"{in_quotes(text)} is no change.", ACCEPTED))
+        raise QueryError(Fault(f"{in_quotes(text)} is not a change.", ACCEPTED))
     if name not in known:
         near = nearest(name, known)
         found = f"there is no channel, bias or threshold {in_quotes(name)}."
@@ -56,5 +56,5 @@ def _read(text: str, known: Sequence[str]) -> tuple[str, float]:
     except ValueError:
         value = None
     if value is None or abs(value) > MOST:
-        raise QueryError(Fault(f"{in_quotes(number)} is no number.", ACCEPTED))
+        raise QueryError(Fault(f"{in_quotes(number)} is not a number.", ACCEPTED))
     return name, value

@@ -139,7 +139,7 @@ class Judge:
                 if self.space.rows[i] not in told:
                     first = same[0] if first_same == i else first_same
                     yield self._at(
-                        i, "equal-row", "warning", f"is valid in just the contexts of {self._named(first, i)}.", 1 << first
+                        i, "equal-row", "warning", f"is valid in exactly the contexts of {self._named(first, i)}.", 1 << first
                     )
                 continue
             yield from self._contained(i, box, same)

@@ -179,7 +179,7 @@ def _playing_alone(databases: Databases, path: Path | None, notes: list[str]) ->
         said = f"{joint} holds joint clips, each of several actors; a row of its table asks the actor of each role for facts."
         raise ContextDBError(Fault(said, "clips that one character plays alone"))
     if len(found) < len(databases):
-        notes.append(f"left out: the joint clips of {joint}: what the actors of each role do is no cell of a row.")
+        notes.append(f"left out: the joint clips of {joint}: a row has no cell for what each actor does.")
     return found
 
 

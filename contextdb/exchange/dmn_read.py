@@ -367,7 +367,7 @@ def _typed(outputs: Sequence[_Column]) -> tuple[tuple[Output, ...], list[Remark]
         wrong = next((entry for entry in one.entries if not output.reads(value_of(entry) or "")), None)
         said = outputs_to_toml([one.name], [output])
         if wrong is not None:
-            told = f"{in_quotes(wrong)} is no value of its type" if wrong else "an entry is empty"
+            told = f"{in_quotes(wrong)} is not a value of its type" if wrong else "an entry is empty"
             remarks.append(Remark(f"{told}, so it is read as text.", place))
         elif not any(outputs_faults({"outputs": said})):
             typed.append(output)

@@ -188,7 +188,7 @@ def read_baseline(text: str, file: str) -> dict[str, Mapping[str, object]]:
         version = document["format"]
         sessions: dict[str, Mapping[str, object]] = {str(session["file"]): dict(session) for session in document["sessions"]}
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        raise ContextError(Fault("the baseline is no report of measures.", BASELINE, place=Place(file))) from None
+        raise ContextError(Fault("the baseline is not a report of measures.", BASELINE, place=Place(file))) from None
     if version != 1:
         found = f"the baseline has format {in_quotes(str(version))}; this version reads format 1."
         raise ContextError(Fault(found, BASELINE, place=Place(file)))

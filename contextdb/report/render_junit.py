@@ -14,7 +14,8 @@ from contextdb.checks.rules import TABLE_RULES
 from contextdb.console import printable
 from contextdb.errors import plural
 from contextdb.findings import Finding, Level
-from contextdb.report.results import CheckReport, Group, as_path, place_of, told
+from contextdb.report.junit_parts import case_in, document
+from contextdb.report.results import CheckReport, Group, place_of, told
 
 MOST_LISTED = 200
 """A case lists so many findings, then says how many more there are: CI systems refuse reports that grow without end."""
@@ -22,23 +23,16 @@ MOST_LISTED = 200
 
 def render(report: CheckReport, failing: Collection[Level], shows_all: bool = False) -> str:
     """The findings as a JUnit document; levels in `failing` make a case fail."""
-    root = ET.Element("testsuites", name="contextdb check")
-    for group in report.groups():
-        root.append(_suite(group, failing, shows_all))
-    if not len(root):  # some CI systems take a report without a case for a broken one
-        root.append(_counted(_suite_of_nothing()))
-    for name in ("tests", "failures", "errors", "skipped"):
-        root.set(name, str(sum(int(suite.get(name, "0")) for suite in root)))
-    ET.indent(root)
-    return f'<?xml version="1.0" encoding="UTF-8"?>\n{ET.tostring(root, encoding="unicode")}\n'
+    suites = [_suite(group, failing, shows_all) for group in report.groups()]
+    return document(
+        "contextdb check", suites or [_suite_of_nothing()]
+    )  # some CI systems take a report without a case for a broken one
 
 
 def _suite(group: Group, failing: Collection[Level], shows_all: bool) -> ET.Element:
     suite = ET.Element("testsuite", name=group.label)
     for rule, findings in _by_rule(group).items():
-        case = ET.SubElement(suite, "testcase", classname=group.label, name=printable(rule), time="0")
-        if group.file:
-            case.set("file", as_path(group.file))
+        case = case_in(suite, printable(rule), group.file)
         failed = [f for f in findings if f.level in failing]
         passed = [f for f in findings if f.level not in failing]
         if failed:
@@ -46,19 +40,12 @@ def _suite(group: Group, failing: Collection[Level], shows_all: bool) -> ET.Elem
             failure.text = "\n".join(_lines(failed, shows_all))
         if passed:
             ET.SubElement(case, "system-out").text = "\n".join(_lines(passed, shows_all))
-    return _counted(suite)
+    return suite
 
 
 def _suite_of_nothing() -> ET.Element:
     suite = ET.Element("testsuite", name="contextdb check")
-    ET.SubElement(suite, "testcase", classname="contextdb check", name="nothing found", time="0")
-    return suite
-
-
-def _counted(suite: ET.Element) -> ET.Element:
-    counts = {"tests": len(suite), "failures": len(suite.findall("testcase/failure")), "errors": 0, "skipped": 0}
-    for name, count in counts.items():
-        suite.set(name, str(count))
+    case_in(suite, "nothing found")
     return suite
 
 

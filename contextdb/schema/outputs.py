@@ -201,7 +201,7 @@ def _given_faults(given: Said, declared: Mapping[str, Output]) -> Iterator[Found
             accepted = some(declared) or "no name: the table has no outputs"
             yield (
                 path,
-                Fault(f"fallback gives {in_quotes(str(name))}, which is no output.", accepted, in_quotes(near) if near else ""),
+                Fault(f"fallback gives {in_quotes(str(name))}, which is not an output.", accepted, in_quotes(near) if near else ""),
             )
             continue
         try:

@@ -175,7 +175,7 @@ def _wrong_transitions(value: object) -> str | None:
     if wrong := wrong_text(value):
         return wrong
     is_pattern = re.fullmatch(r"[^{}]*\{from\}[^{}]+\{to\}[^{}]*", str(value))
-    return None if is_pattern else "this is no pattern of the names of transitions"
+    return None if is_pattern else "this is not a pattern for names of transitions"
 
 
 TEXT = Shape('text, such as "m/s"', wrong_text, _meant_text)

@@ -439,7 +439,7 @@ def test_missing_clips_and_markup_are_told_together(folder):
     with pytest.raises(MotionError) as error:
         build(config_of(clips="nowhere/*.bvh"), folder)
     assert len(error.value.faults) == 2
-    assert 'contextdb.toml: [databases.jog] no file fits clips = "nowhere/*.bvh".' in str(error.value)
+    assert 'contextdb.toml: [databases.jog] no file matches clips = "nowhere/*.bvh".' in str(error.value)
     assert "marks.csv: there is no such file." in str(error.value)
 
 

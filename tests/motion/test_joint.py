@@ -502,7 +502,7 @@ def test_an_asset_is_mirrored_for_all_its_roles_or_none():
 
 @pytest.mark.parametrize("roles", [["Host"], ["Host", "Host"], ["a.b", "c"], "Host", [1, 2]])
 def test_roles_that_cannot_be_are_refused(roles):
-    with pytest.raises(SchemaError, match="these are no roles of clips that play together"):
+    with pytest.raises(SchemaError, match="these are not roles of clips that play together"):
         settings(roles=roles)
 
 

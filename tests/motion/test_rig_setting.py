@@ -131,7 +131,7 @@ def test_a_rig_that_is_no_file_is_told_with_its_place(folder):
         ({"rig": "clips/idle.fbx"}, "this is not a BVH file"),
         ({"rig": "../idle.bvh"}, "this leaves the folder"),
         ({"rig_bones": {"Hips": "Pelvis"}}, "there is no rig that it could be about"),
-        ({"rig": "clips/idle.bvh", "rig_bones": {"Hips": 3}}, "these are no names of bones"),
+        ({"rig": "clips/idle.bvh", "rig_bones": {"Hips": 3}}, "these are not names of bones"),
         ({"rigg": "clips/idle.bvh"}, 'Did you mean "rig"'),
     ],
 )

@@ -43,7 +43,7 @@ class Inside:
         path = Path(wanted.table).resolve()
         name = next((name for name, file in files.items() if file.resolve() == path), None)
         if name is None:
-            screen.say(f"{wanted.table} is no table of the editor.", is_error=True)
+            screen.say(f"{wanted.table} is not a table of the editor.", is_error=True)
             return None
         self._left[screen.recording.file] = wanted.start
         screen.action_quit()

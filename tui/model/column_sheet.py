@@ -211,7 +211,7 @@ def _condition_said(row: ColumnRow) -> dict[str, Any]:
     if not kind:
         raise row.wrong(TYPE, f"Say the type{f': {typed[0]} is given' if typed else ''}.")
     if kind not in KINDS:
-        raise row.wrong(TYPE, f'"{kind}" is no type of a condition. Accepted: {", ".join(KINDS)}.')
+        raise row.wrong(TYPE, f'"{kind}" is not a type of a condition. Accepted: {", ".join(KINDS)}.')
     if row.texts["Default"].strip():
         raise row.wrong("Default", "Only an output has a default.")
     for key, column in (("min", "Least"), ("max", "Most"), ("values", "Values"), ("mirror", "Mirror")):
@@ -230,7 +230,7 @@ def _output_said(row: ColumnRow) -> dict[str, Any]:
         return {}
     kind = texts[TYPE] or "text"
     if kind not in OUTPUT_TYPES:
-        raise row.wrong(TYPE, f'"{kind}" is no type of an output. Accepted: {", ".join(OUTPUT_TYPES)}.')
+        raise row.wrong(TYPE, f'"{kind}" is not a type of an output. Accepted: {", ".join(OUTPUT_TYPES)}.')
     said: dict[str, Any] = {"type": kind}
     for key, column in (("min", "Least"), ("max", "Most")):
         if texts[column]:

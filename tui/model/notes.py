@@ -57,7 +57,7 @@ class Notes:
             return cls()
         columns = {c.name: c.to_list() for c in read_texts(path)[1]}
         if not set(FIELDS) <= set(columns) or (len(columns) > len(FIELDS) and not or_more):
-            raise FileError(Fault("this is no file of notes.", f"the columns {', '.join(FIELDS)}", place=Place(str(path))))
+            raise FileError(Fault("this is not a file of notes.", f"the columns {', '.join(FIELDS)}", place=Place(str(path))))
         lines = list(zip(*(columns[name] for name in FIELDS), strict=True))
         texts = {(asset, column): note for asset, column, note, _ in lines if note.strip()}
         return cls(texts, {(asset, column): colour for asset, column, _, colour in lines if colour.strip()})

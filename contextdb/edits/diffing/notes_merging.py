@@ -56,5 +56,5 @@ def _read(raw: bytes, file: str) -> Lines:
         header, rows = [], []
     lines = {(row[0], row[1]): row[2:] for row in rows if len(row) == len(FIELDS)}
     if tuple(header) != FIELDS or len(lines) != len(rows):
-        raise FileError(Fault("this is no file of notes.", f"the columns {', '.join(FIELDS)}, a place once", place=Place(file)))
+        raise FileError(Fault("this is not a file of notes.", f"the columns {', '.join(FIELDS)}, a place once", place=Place(file)))
     return lines

@@ -29,10 +29,10 @@ from contextdb.motion.output.pose import Pose
 from contextdb.motion.output.samples import Place3
 from contextdb.motion.output.stream import PoseStream
 from contextdb.motion.output.streams import PoseStreams
+from contextdb.motion.records import collector_at_rest
 from contextdb.motion.selection.asked import OfValid
 from contextdb.motion.selection.controller_group import ControllerGroup
 from contextdb.motion.selection.decision import Decision
-from contextdb.records import collector_at_rest
 
 FactsOfMany = Mapping[str, Any] | Sequence[Facts]
 

@@ -14,11 +14,11 @@ from contextdb.motion.clips.steering import Steered
 from contextdb.motion.clips.trajectory import Trajectory
 from contextdb.motion.output.samples import Place3
 from contextdb.motion.output.stream import Pose, PoseState
+from contextdb.motion.records import quickly_made
 from contextdb.motion.selection.asked import Among, OfPenalties, OfTags, OfValid
 from contextdb.motion.selection.controller_state import ControllerState
 from contextdb.motion.selection.decision import Decision
 from contextdb.motion.selection.root_motion import RootMotion
-from contextdb.records import quickly_made
 
 UNKNOWN = ("error", "any", "never")
 Paths = ManyTrajectories | Sequence[Trajectory]

@@ -23,7 +23,7 @@ from contextdb.errors import Fault, MotionError
 from contextdb.motion.clips.poses import LEAST_RATE, MOST_RATE
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.trajectory import MOST_REACH_S, Trajectory
-from contextdb.records import quickly_made
+from contextdb.motion.records import quickly_made
 
 STANDING_MPS = 0.1
 """Asked to go slower than this, a body keeps its facing."""

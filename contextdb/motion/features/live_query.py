@@ -146,7 +146,9 @@ class PoseHistory:
         try:
             self._positions[self._end], self._rotations[self._end] = positions, rotations
         except (TypeError, ValueError):
-            raise QueryError(Fault("the pose holds what is no number.", "positions in metres and unit quaternions")) from None
+            raise QueryError(
+                Fault("the pose contains something that is not a number.", "positions in metres and unit quaternions")
+            ) from None
         if not np.isfinite(self._positions[self._end]).all() or not math.isfinite(heading):
             raise QueryError(Fault("the pose holds a number that is not finite.", "positions in metres, a heading in radians"))
         self._headings[self._end] = heading

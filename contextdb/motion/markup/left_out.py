@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 
-from contextdb.records import quickly_made
+from contextdb.motion.records import quickly_made
 
 
 class LeftOut(IntEnum):

@@ -60,5 +60,5 @@ def _expression(pattern: str) -> str:
     before, found, rest = pattern.partition("{from}")
     between, found_too, behind = rest.partition("{to}")
     if not (found and found_too and between) or any("{from}" in part or "{to}" in part for part in (before, between, behind)):
-        raise MotionError(Fault(f"{in_quotes(pattern)} is no pattern of transitions.", ACCEPTED, in_quotes(PATTERN)))
+        raise MotionError(Fault(f"{in_quotes(pattern)} is not a pattern of transitions.", ACCEPTED, in_quotes(PATTERN)))
     return f"{re.escape(before)}(?P<a>.+?){re.escape(between)}(?P<b>.+){re.escape(behind)}"

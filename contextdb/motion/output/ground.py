@@ -76,7 +76,7 @@ def below_many(ground: ManyGround, points: Sequence[tuple[float, float]]) -> lis
         raise ContextError(Fault(f"the ground at {len(at)} places is {found!r}.", MANY_GROUND))
     if not (np.isfinite(heights).all() and np.isfinite(normals).all() and (normals[:, 1] > 0.0).all()):
         accepted = "finite heights, and normals upwards: y above 0"
-        raise ContextError(Fault("some heights or normals of the ground are none.", accepted))
+        raise ContextError(Fault("some heights or normals of the ground are not usable.", accepted))
     rise = -normals[:, [0, 2]] / normals[:, 1:2]
     share = np.minimum(1.0, STEEPEST / np.maximum(np.hypot(rise[:, 0], rise[:, 1]), 1e-9))
     return [(height, x, z) for height, (x, z) in zip(heights.tolist(), (share[:, None] * rise).tolist(), strict=True)]

@@ -103,6 +103,7 @@ def root_velocity(root, low, high, share, rate):
 
 @compiled
 def product(a, b):
+    """The rotation of b, then of a."""
     return (
         a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
         a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
@@ -113,11 +114,13 @@ def product(a, b):
 
 @compiled
 def inverse(a):
+    """The rotation back."""
     return (a[0], -a[1], -a[2], -a[3])
 
 
 @compiled
 def cross(a, b):
+    """The cross product of two vectors."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 

@@ -337,9 +337,13 @@ def _noise(look: Look) -> Iterator[Proposal]:
         fastest = float(steps[first:stop].max())
         reason = f"a joint moves at {fastest:.0f} m/s from one frame to the next"
         if stop <= END_SHARE * n:
-            yield look.said("noise", ReservedTag.EXCLUDED, None, stop - 1, f"{reason}: what is before is no part of it", fastest)
+            yield look.said(
+                "noise", ReservedTag.EXCLUDED, None, stop - 1, f"{reason}: what is before is not part of the clip", fastest
+            )
         elif first >= (1.0 - END_SHARE) * n:
-            yield look.said("noise", ReservedTag.EXCLUDED, first + 1, None, f"{reason}: what is behind is no part of it", fastest)
+            yield look.said(
+                "noise", ReservedTag.EXCLUDED, first + 1, None, f"{reason}: what is after is not part of the clip", fastest
+            )
         else:
             last = max(first + 1, stop - 1)
             yield look.said("noise", ReservedTag.EXCLUDED, first + 1, last, reason, fastest)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from contextdb.records import quickly_made
+from contextdb.motion.records import quickly_made
 
 
 @quickly_made

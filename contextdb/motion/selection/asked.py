@@ -14,9 +14,9 @@ from contextdb.errors import Fault, QueryError
 from contextdb.motion.arguments import HasAssets, Valid
 from contextdb.motion.markup.left_out import Skip
 from contextdb.motion.markup.tag_filter import TagFilter
+from contextdb.motion.records import quickly_made
 from contextdb.motion.search.filtering import Penalties, Tags
 from contextdb.motion.selection.choice import Choice
-from contextdb.records import quickly_made
 
 Among: TypeAlias = Collection[str] | HasAssets
 OfValid: TypeAlias = Valid | Mapping[str, Valid]

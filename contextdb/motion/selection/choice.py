@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
+from contextdb.motion.records import quickly_made
 from contextdb.motion.search.hit import Hit
-from contextdb.records import quickly_made
 
 
 class Status(StrEnum):

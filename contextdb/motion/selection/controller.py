@@ -26,6 +26,7 @@ from contextdb.motion import arguments
 from contextdb.motion.clips.ground_place import GroundPlace, OfBody, place_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.markup.tag_filter import TagFilter
+from contextdb.motion.records import quickly_made
 from contextdb.motion.search.candidates import Candidates
 from contextdb.motion.search.filtering import Tags
 from contextdb.motion.search.filters import Filter
@@ -47,7 +48,6 @@ from contextdb.motion.selection.step import Outcome, Step
 from contextdb.motion.selection.trigger import Trigger
 from contextdb.motion.selection.variation import Rng
 from contextdb.motion.selection.worked_out import WorkedOut
-from contextdb.records import quickly_made
 
 Clock = Callable[[], float]
 

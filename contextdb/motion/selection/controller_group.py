@@ -18,6 +18,7 @@ from contextdb.motion import arguments
 from contextdb.motion.clips.ground_place import GroundPlace, OfBody, place_of
 from contextdb.motion.clips.many_steered import ManySteered
 from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.records import collector_at_rest
 from contextdb.motion.selection.asked import Among, Asked, OfPenalties, OfTags
 from contextdb.motion.selection.asked_of_many import OfValidForMany, each_of, valid_of_each
 from contextdb.motion.selection.choice import Choice
@@ -25,7 +26,6 @@ from contextdb.motion.selection.controller import Asking, Controller
 from contextdb.motion.selection.controller_state import ControllerState
 from contextdb.motion.selection.decision import Decision, Playing
 from contextdb.motion.selection.selector import Selector
-from contextdb.records import collector_at_rest
 
 HAS_IT = Fault("the group has this controller already.", "a controller of its own for each character")
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from contextdb.motion.records import quickly_made
 from contextdb.motion.selection.decision import Playing
 from contextdb.motion.selection.history import Played
-from contextdb.records import quickly_made
 
 
 @quickly_made

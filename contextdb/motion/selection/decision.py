@@ -12,12 +12,12 @@ from typing import Protocol
 
 from contextdb.motion.clips.ground_place import GroundPlace
 from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.records import quickly_made
 from contextdb.motion.search.candidates import Candidates
 from contextdb.motion.search.filters import Filter
 from contextdb.motion.selection.choice import Choice
 from contextdb.motion.selection.inputs import Inputs
 from contextdb.motion.selection.root_motion import NO_MOTION, RootMotion
-from contextdb.records import quickly_made
 
 
 @quickly_made

@@ -17,9 +17,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from contextdb.motion.markup.left_out import LeftOut, Skip
+from contextdb.motion.records import quickly_made
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.playhead import TOLERANCE_S, Playhead
-from contextdb.records import quickly_made
 
 
 @quickly_made

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.records import quickly_made
 from contextdb.motion.search import cost
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.filters import Filter
 from contextdb.motion.selection.decision import Playing
 from contextdb.motion.selection.playhead import Move, Playhead, rate_of
 from contextdb.motion.selection.selector import Selector
-from contextdb.records import quickly_made
 
 
 @quickly_made

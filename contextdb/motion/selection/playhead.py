@@ -12,10 +12,10 @@ from functools import cached_property
 
 import numpy as np
 
+from contextdb.motion.records import quickly_made
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.layout import Features
 from contextdb.motion.selection.root_motion import NO_MOTION, RootMotion, motion_between
-from contextdb.records import quickly_made
 
 TOLERANCE_S = 1e-6
 """Times that are nearer than this are the same: sums of time steps are rounded."""

@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from contextdb.motion.records import quickly_made
 from contextdb.motion.search.layout import Features
-from contextdb.records import quickly_made
 
 
 @quickly_made

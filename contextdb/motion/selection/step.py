@@ -10,6 +10,7 @@ from enum import Enum, auto
 from contextdb.motion.arguments import ValidRanges, widened_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.markup.left_out import LeftOut, Skip
+from contextdb.motion.records import quickly_made
 from contextdb.motion.search.hit import Hit
 from contextdb.motion.selection import guards, trigger
 from contextdb.motion.selection.asked import Asked, OfValid
@@ -33,7 +34,6 @@ from contextdb.motion.selection.playhead import TOLERANCE_S, Playhead
 from contextdb.motion.selection.selector import Selector
 from contextdb.motion.selection.trigger import Trigger
 from contextdb.motion.selection.variation import Rng
-from contextdb.records import quickly_made
 
 
 class Standing(Enum):

@@ -99,7 +99,7 @@ def clip_files(
     """
     paths = paths_of(settings, folder, file)
     if not paths:
-        found = f"[databases.{settings.name}] no file fits clips = {as_toml(settings.clips)}."
+        found = f"[databases.{settings.name}] no file matches clips = {as_toml(settings.clips)}."
         raise MotionError(Fault(found, place=Place(file), rule="file"))
     wanted = [path for path in paths if assets is None or settings.asset_of(path.stem) in assets]
     faults = list(_twice_named(settings.name, wanted, file))

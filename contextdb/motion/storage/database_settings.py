@@ -220,7 +220,7 @@ def _read_roles(section: Section) -> tuple[str, ...] | None:
     listed = value if isinstance(value, (list, tuple)) else ()
     if all(isinstance(role, str) for role in listed) and not role_fault(listed):
         return tuple(listed)
-    section.wrong("roles", "these are no roles of clips that play together", ROLES)
+    section.wrong("roles", "these are not roles of clips that play together", ROLES)
     return None
 
 
@@ -228,7 +228,7 @@ def _read_bones(section: Section) -> dict[str, str] | None:
     value = section.part["rig_bones"]
     if isinstance(value, Mapping) and all(isinstance(bone, str) for pair in value.items() for bone in pair):
         return dict(value)
-    section.wrong("rig_bones", "these are no names of bones", RIG_BONES)
+    section.wrong("rig_bones", "these are not names of bones", RIG_BONES)
     return None
 
 

@@ -64,7 +64,7 @@ def write_arrays(arrays: Mapping[str, NDArray[Any]], path: str | PathLike[str]) 
     given = require_mapping(arrays, "arrays", "a mapping of names to arrays")
     wrong = [name for name, array in given.items() if not isinstance(name, str) or np.asanyarray(array).dtype.hasobject]
     if wrong:
-        raise ContextError(Fault(f"{wrong[0]!r} is no array of numbers or texts.", "a mapping of names to arrays"))
+        raise ContextError(Fault(f"{wrong[0]!r} is not an array of numbers or texts.", "a mapping of names to arrays"))
     if target.suffix != NPZ:
         raise FileError(Fault("arrays cannot be written to such a file.", f"a name that ends in {NPZ}", place=Place(str(target))))
     with zipfile.ZipFile(whole, "w", zipfile.ZIP_DEFLATED) as archive:

@@ -117,4 +117,5 @@ def _check_columns(frame: pl.DataFrame, file: str) -> None:
 
 
 def refused(found: str, file: str) -> ArtefactError:
+    """The error for a file that is no whole session."""
     return ArtefactError(Fault(found, ACCEPTED, MEND, Place(file or None), "bad-artefact"))

@@ -92,7 +92,7 @@ def _mesh(points: ArrayLike | None, weights: ArrayLike | None, n_joints: int) ->
     try:
         own, shares = (np.asarray(each, np.float64) for each in (points, weights))
     except (TypeError, ValueError):
-        raise MotionError(Fault("points or weights are no numbers.", f"{POINTS}; {WEIGHTS}")) from None
+        raise MotionError(Fault("points or weights are not numbers.", f"{POINTS}; {WEIGHTS}")) from None
     if own.ndim != 2 or own.shape[1] != 3 or shares.shape != (len(own), n_joints):
         found = f"points have the shape {own.shape}, weights {shares.shape}, and there are {n_joints} joints."
         raise MotionError(Fault(found, f"{POINTS}; {WEIGHTS}"))

@@ -160,7 +160,7 @@ def _port(path: Path) -> tuple[int, str]:
         read = None
     port, token = (read.get("port"), read.get("token")) if isinstance(read, dict) else (None, None)
     if not isinstance(port, int) or not 0 < port <= MOST_PORT or not isinstance(token, str):
-        raise OSError(f"{path} is no file of a game that listens")
+        raise OSError(f"{path} is not the file of a listening game")
     return port, token
 
 

@@ -76,7 +76,7 @@ def _require_own(folder: Path, found: os.stat_result) -> None:
     """Raise FileError unless a folder is one, of this user, that nobody else may open."""
     place = Place(str(folder))
     if not stat.S_ISDIR(found.st_mode):
-        raise FileError(Fault("the folder for running games is no folder.", "a folder", "to delete what is there", place))
+        raise FileError(Fault("the folder for running games is not a folder.", "a folder", "to delete what is there", place))
     if not HAS_OWNERS:
         return
     if found.st_uid != os.getuid():

@@ -117,7 +117,7 @@ class Hearing:
 def require_header(line: Line, place: Place) -> None:
     """Raise ContextDBError for a first line that is no header of this format."""
     if line["line"] != HEADER:
-        raise ContextDBError(Fault("the first line is no header of a link.", 'a line with "line": "header"', place=place))
+        raise ContextDBError(Fault("the first line is not the header of a link.", 'a line with "line": "header"', place=place))
     if line["format"] != FORMAT:
         found = f"the lines are of format {line['format']}; this contextdb reads format {FORMAT}."
         raise ContextDBError(Fault(found, f"format {FORMAT}", place=place))

@@ -53,7 +53,7 @@ def read_line(raw: bytes) -> Line:
     except (ValueError, RecursionError):
         raise ValueError("this is not JSON.") from None
     if not isinstance(read, dict):
-        raise ValueError("this is no object of JSON.")
+        raise ValueError("this is not a JSON object.")
     if not isinstance(read.get("line"), str):
         raise ValueError('the key "line" is missing.')
     _require(read)
@@ -170,7 +170,7 @@ def given_fact(sent: object) -> object:
             return FactSet(text)
         if (number := sent.get("number")) in ("inf", "-inf"):
             return float(number)
-    raise ValueError("this is no fact.")
+    raise ValueError("this is not a fact.")
 
 
 def given_facts(sent: Mapping[str, object]) -> dict[str, object]:

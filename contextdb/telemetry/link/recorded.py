@@ -165,7 +165,7 @@ class _Reader:
     def end(self) -> None:
         """Raise TableError where lines were damaged, or none is about the table."""
         if not self._has_header:
-            found = "this is no recording of a link: its first line is no header."
+            found = "this is not a recording of a link: its first line is not a header."
             accepted = "lines that `contextdb live --record` or link(record=...) wrote"
             raise TableError(Fault(found, accepted, place=self._at(1)), *self._faults)
         if self._n_faults > len(self._faults):
@@ -205,7 +205,7 @@ def _question(raw: bytes) -> Line:
     """A line that is a question; ValueError for any other."""
     line = read_line(raw)
     if line["line"] != ASK:
-        raise ValueError("this is no question.")
+        raise ValueError("this is not a question.")
     return line
 
 

@@ -7,6 +7,12 @@ from pathlib import Path
 import pytest
 from running import run
 
+import contextdb as cdb
+from contextdb.commands.motion_page import Played, parting_of
+from contextdb.commands.motion_stick import conditions_of
+from contextdb.errors import ContextDBError
+from contextdb.motion import Action, Decision, Playing, Trace
+
 TABLE = "Asset,speed\nwalk,0..2\nwalk,1..3\nrun,2..6\n"
 TOML = '[conditions.speed]\ntype = "number"\nmin = 0\nmax = 9\n'
 
@@ -70,3 +76,34 @@ def test_a_merge_goes_on_without_a_toml_that_cannot_be_read(folder: Path):
     assert result.code == 0, result.err
     assert "Merging without it." in result.err
     assert (folder / "ours.tmp").read_text("utf-8") == TABLE.replace("0..2", "0..3")
+
+
+def test_a_condition_that_is_called_as_a_column_of_the_stick_is_refused():
+    table = cdb.Table.from_columns({"Asset": ["walk"], "speed_mps": ["0..2"]}).compile()
+    with pytest.raises(ContextDBError, match='the condition "speed_mps" has the name of a column of the stick'):
+        conditions_of({"moves": table})
+
+
+def test_bones_that_are_not_found_are_named_with_what_declares_them(folder: Path):
+    lines = ["HIERARCHY", "ROOT Ball", "{", "OFFSET 0 0 0", "CHANNELS 3 Xposition Yposition Zposition"]
+    lines += ["End Site", "{", "OFFSET 0 9 0", "}", "}", "MOTION", "Frames: 2", "Frame Time: 0.033", "0 90 0", "0 91 0", ""]
+    (folder / "ball.bvh").write_text("\n".join(lines), encoding="utf-8")
+    result = run("motion", "bones", "ball.bvh")
+    assert result.code == 0, result.err
+    assert result.lines[-1].startswith("not found: feet, toes, mirror pairs; [features.NAME] can declare")
+
+
+def test_where_two_sessions_part_is_a_sentence():
+    def played(name: str, *actions: Action) -> Played:
+        trace = Trace()
+        for tick, action in enumerate(actions):
+            playing = Playing("loco", action.name.lower(), 0, 0, 0.0, False)
+            trace.record(Decision(tick, tick / 30.0, action, "So.", False, playing, None))
+        return Played(f"some/{name}.parquet", trace, ".", {})
+
+    one, longer, other = played("a", Action.START), played("b", Action.START, Action.CONTINUE), played("c", Action.JUMP)
+    assert parting_of([one]) == ""
+    assert parting_of([one, one]) == "Both play the same."
+    assert parting_of([one, longer]) == "Both play the same as long as both last."
+    assert parting_of([one, other]).startswith("They part at 0.00 s: a.parquet plays start")
+    assert parting_of([one, other]).endswith("Of 1 update, 1 play another asset.")

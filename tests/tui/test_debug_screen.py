@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Awaitable, Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, TypeVar
 
 import pytest
@@ -498,7 +499,9 @@ def test_the_mouse_goes_to_a_bar_and_a_weight_and_turns_the_view(recording: Reco
     shown(recording, script)
 
 
-def test_escape_leaves_the_filter_and_space_stops_what_plays(recording: Recording):
+def test_escape_leaves_the_filter_and_space_stops_what_plays(recording: Recording, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("tui.debug.screen.time", SimpleNamespace(monotonic=lambda: 0.0))  # no time passes while it plays
+
     async def script(screen: DebugScreen, pilot: Pilot[Any]) -> list[bool]:
         await press(pilot, "slash", "w", "escape")
         seen = [screen.focused is screen.bars]

@@ -252,6 +252,17 @@ def test_decisions_are_printed_where_they_change_what_plays():
     ]
 
 
+def test_a_table_that_is_not_here_is_noted_once_and_lost_lines_are_counted():
+    own = cdb.Table.from_columns({"Asset": ["a"]}, name="x").compile()
+    changes = Changes({"x": own}, False)
+    header = {"line": "tables", "tables": {"y": {"rows": 1}, "x": {"rows": 1, "version": "0" * 64}}}
+    unknown, version = changes.of(header).notes
+    assert unknown == '"y" is no table of yours: it is not asked.'
+    assert version.startswith('the game has another version of "x": 00000000, yours is ')
+    assert changes.of(header).notes == []
+    assert changes.of({"line": "lost", "count": 2}).notes == ["2 lines lost: the game told more than could be sent."]
+
+
 def test_nothing_that_a_game_sends_moves_the_cursor_or_stops_the_listener():
     hostile = ask(who="\x1b[2J", table="x\n", facts={"\x07": "\x1b]0;x\x07", "z": {"odd": 1}})
     lines = said(hostile, {"line": "weather"})

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from contextdb.commands.motion_build_command import MotionProject
 from contextdb.disk import path_in_quotes, write_atomic
-from contextdb.errors import Fault, FileError, MotionError, Place
+from contextdb.errors import Fault, FileError, MotionError, Place, plural
 from contextdb.motion import MotionDatabase, PoseBank, PoseSettings, measure, open_or_build_poses
 from contextdb.motion.trace.session import Trace
 from contextdb.report import session_html, session_markdown, session_rerun
@@ -116,4 +116,5 @@ def parting_of(sessions: Sequence[Played]) -> str:
         return "Both play the same." if not told.longer else "Both play the same as long as both last."
     where, names = told.parting, [os.path.basename(each.file) for each in sessions]
     plays = f"{names[0]} plays {where.one or 'nothing'}, {names[1]} {where.other or 'nothing'}"
-    return f"They part at {where.time_s:.2f} s: {plays}. Of {told.updates:,} updates, {told.other_assets:,} play another asset."
+    others = f"Of {plural(told.updates, 'update')}, {told.other_assets:,} play another asset."
+    return f"They part at {where.time_s:.2f} s: {plays}. {others}"

@@ -146,9 +146,25 @@ ONE = PoseStream(bank(), PoseSettings(root="animation"))
         (lambda: PoseStreams([ONE]).update([NOTHING], 0.0, None, [3.0]), "character 0"),
         (lambda: PoseStreams([ONE]).update([NOTHING], 0.0, None, lambda x, z: x), "the ground at"),
         (lambda: PoseStreams([ONE]).update([NOTHING], 0.0, None, lambda x, z: (x, np.zeros((len(x), 3)))), "y above 0"),
+        (lambda: PoseStreams([ONE]).update([NOTHING], 0.0, None, lambda x, z: (x, 1.0, z)), "the ground at"),
+        (lambda: PoseStreams([ONE]).update([NOTHING], 0.0, None, lambda x, z: (x, np.zeros((9, 3)))), "the ground at"),
         (lambda: PoseStreams([ONE]).restore([]), "0 states for 1 character"),
     ],
 )
 def test_what_a_crowd_cannot_do_is_told(wrong, said):
     with pytest.raises((MotionError, ContextError), match=said):
         wrong()
+
+
+def test_a_crowd_of_banks_of_different_rigs_is_refused():
+    other = copy(bank())
+    object.__setattr__(other, "skeleton", replace(bank().skeleton, names=tuple(f"my{name}" for name in bank().skeleton.names)))
+    with pytest.raises(MotionError, match="different rigs"):
+        PoseStream({"one": bank(), "other": other})
+
+
+def test_a_ground_that_says_nothing_is_level():
+    level, unsaid = (PoseStreams([PoseStream(bank(), PoseSettings(root="animation"))]) for _ in range(2))
+    start = Decision(0, 0.0, Action.START, "", True, playing_at("walk", 0.2), None)
+    shown = [each.update([start], 0.0, None, ground).positions for each, ground in ((level, None), (unsaid, lambda x, z: None))]
+    np.testing.assert_array_equal(*shown)

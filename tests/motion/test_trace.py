@@ -324,6 +324,7 @@ def test_sessions_of_another_version_or_with_other_columns_are_refused(tmp_path:
         '2 columns of the session missing, or of another type: "why", "choice".'
     )
     assert '"tick"' in refused(altered(lambda frame: frame.cast({"tick": pl.String})), tmp_path)
+    assert refused(altered(lambda frame: frame, digest="00"), tmp_path) == "the file was altered after it was saved."
     assert f'"{TIMINGS}"' in refused(altered(lambda frame: frame.cast({TIMINGS: pl.String})), tmp_path)
 
 

@@ -77,6 +77,29 @@ def test_typing_filters_and_enter_inserts_what_is_highlighted(table: Table):
     assert now.condition("speed").condition.unit == "m/s"
 
 
+def test_the_list_is_gone_through_from_the_name_and_elsewhere_the_fields(table: Table):
+    app = DialogApp(AddColumn(table, 1))
+    press(app, "down", "down", "up", "enter")
+    listed = choices(table)
+    assert isinstance(app.answer, Insertion)
+    assert app.answer.columns == listed[1].columns
+    form = DialogApp(AddColumn(table, 1))
+
+    async def script(pilot):
+        await pilot.press(*"brand new", "enter")
+        form.screen.query_one("#column-unit").focus()
+        seen = []
+        for key in ("down", "up"):
+            await pilot.press(key)
+            await pilot.pause()
+            seen.append(form.screen.focused.id)
+        return seen
+
+    below, unit = drive(form, script)
+    assert unit == "column-unit"
+    assert below not in (unit, "column-name")
+
+
 def test_a_blueprint_brings_all_that_is_missing_of_it(table: Table):
     app = DialogApp(AddColumn(table, 99))
     press(app, *"locomotion", "enter")

@@ -111,6 +111,23 @@ def test_a_derived_fact_a_rule_and_a_typed_output_are_made(table, folder):
     assert "# as the game says" in (folder / "contextdb.toml").read_text()
 
 
+def test_what_is_said_of_an_output_stands_in_the_sheet_as_it_was_typed(table):
+    texts = {
+        "Type": "numbers",
+        "Unit": "m",
+        "Least": "-1.5",
+        "Most": "8",
+        "Values": "3",
+        "Default": "1 2 3",
+        "Description": "where",
+    }
+    after = changed(table, *((4, column, text) for column, text in texts.items()))
+    assert {column: ColumnSheet(after).first[4][column] for column in texts} == texts
+    assert not ColumnSheet(after).edit().changes
+    named = changed(table, (4, "Type", "enum"), (4, "Values", "Mid Low Mid"), (4, "Default", "Low"))
+    assert [ColumnSheet(named).first[4][column] for column in ("Values", "Default")] == ["Mid Low", "Low"]
+
+
 def test_rows_that_move_come_and_go_are_columns_that_do(table):
     sheet = ColumnSheet(table)
     sheet.go(3, 0)
@@ -154,6 +171,13 @@ def test_a_column_that_nothing_else_names_is_renamed_with_what_is_declared_of_it
         ([(4, "Weight", "2")], (4, "Weight"), "Only a condition"),
         ([(4, "Type", "enum")], (4, "Values"), "values"),
         ([(4, "Type", "int"), (4, "Default", "x")], (4, "Default"), "annot read"),
+        ([(4, "Type", "color9")], (4, "Type"), "no type of an output"),
+        ([(4, "Type", "number"), (4, "Least", "low")], (4, "Least"), "is not a number"),
+        ([(4, "Type", "number"), (4, "Least", "nan")], (4, "Least"), "nothing is above or below it"),
+        ([(4, "Type", "int"), (4, "Least", "5"), (4, "Most", "3")], (4, "Least"), "above max"),
+        ([(4, "Type", "bool"), (4, "Values", "a")], (4, "Values"), "has no place"),
+        ([(4, "Type", "numbers"), (4, "Values", "many")], (4, "Values"), "is not a number"),
+        ([(4, "Column", "a\ud800")], (0, "Column"), "Field 5 of the column names has half a surrogate pair"),
         ([(5, "Expression", "speed >")], (5, "Expression"), ""),
         ([(5, "Expression", "sped > 3")], (5, "Expression"), "sped"),
         ([(6, "Type", "bool")], (6, "Column"), "needs a name"),

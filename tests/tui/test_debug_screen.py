@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Awaitable, Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, TypeVar
 
 import pytest
@@ -14,9 +15,11 @@ from test_debug_parts import recording_of
 from test_motion_measure_command import here, made
 from textual.pilot import Pilot
 
+from contextdb.errors import MotionError
 from contextdb.motion import Action, Decision, Playing, Together, Trace
 from contextdb.motion.trace.cost_views import cost_text
 from tui.debug.app import DebugApp
+from tui.debug.opening import opened
 from tui.debug.recording import Recording
 from tui.debug.screen import DebugScreen
 from tui.debug.timeline import Timeline
@@ -424,3 +427,96 @@ def test_the_pose_is_the_one_that_was_shown_and_the_pane_says_so(recording: Reco
     assert "not blended" in of_clips
     assert "as shown, blended" in blended
     assert is_other
+
+
+# ---- looking and measuring by hand
+
+
+def test_the_next_measure_is_marked_and_said_and_a_window_is_zoomed(recording: Recording):
+    async def script(screen: DebugScreen, pilot: Pilot[Any]) -> tuple[list[str], list[float | None]]:
+        measures, windows = [], []
+        for _ in range(2):
+            await press(pilot, "m")
+            measures.append(screen.timeline.measure)
+            assert "goes to the next peak of" in screen_text(screen.app)
+        for key in ("comma", "comma", "full_stop", "full_stop"):
+            await press(pilot, key)
+            windows.append(screen.timeline.window_s)
+        return measures, windows
+
+    measures, windows = shown(recording, script)
+    assert len(set(measures)) == 2
+    assert windows == [2.0, 2.0, None, None]
+
+
+def test_what_is_not_there_is_said(recording: Recording):
+    async def script(screen: DebugScreen, pilot: Pilot[Any]) -> list[str]:
+        seen = []
+        for *keys, last in (("home", "left_square_bracket"), ("home", "N"), ("r",), ("w",), ("u",)):
+            await press(pilot, *keys, last)
+            seen.append(screen_text(screen.app))
+        return seen
+
+    jump, peak, run, write, undo = shown(recording, script)
+    assert "There is no jump before this moment." in jump
+    assert "There is no peak of" in peak
+    for text in (run, write):
+        assert "Nothing is turned" in text
+    assert "Nothing was written" in undo
+
+
+def test_a_weight_that_is_turned_back_is_turned_no_more(recording: Recording):
+    async def script(screen: DebugScreen, pilot: Pilot[Any]) -> list[bool]:
+        await press(pilot, "shift+tab")
+        seen = []
+        for key in ("plus", "minus"):
+            await press(pilot, key)
+            seen.append(bool(screen.turned))
+        return seen
+
+    assert shown(recording, script) == [True, False]
+
+
+def test_the_mouse_goes_to_a_bar_and_a_weight_and_turns_the_view(recording: Recording):
+    banks = recording.open_banks()
+
+    async def script(screen: DebugScreen, pilot: Pilot[Any]) -> None:
+        await pilot.click(screen.bars, offset=(5, 3))
+        assert screen.bars.at == 1
+        await pilot.click(screen.channels, offset=(screen.channels.size.width // 2, 3))
+        assert screen.channels.at == 1
+        assert screen._pane == "channels"
+        screen._take_banks(banks)
+        before = screen.stage.camera
+        await pilot.mouse_down(screen.stage, offset=(10, 5))
+        await pilot.hover(screen.stage, offset=(20, 8))
+        await pilot.mouse_up(screen.stage, offset=(20, 8))
+        turned = screen.stage.camera
+        assert turned != before
+        await pilot.hover(screen.stage, offset=(5, 5))
+        assert screen.stage.camera == turned  # let go
+
+    shown(recording, script)
+
+
+def test_escape_leaves_the_filter_and_space_stops_what_plays(recording: Recording, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("tui.debug.screen.time", SimpleNamespace(monotonic=lambda: 0.0))  # no time passes while it plays
+
+    async def script(screen: DebugScreen, pilot: Pilot[Any]) -> list[bool]:
+        await press(pilot, "slash", "w", "escape")
+        seen = [screen.focused is screen.bars]
+        for key in ("space", "escape", "space", "space"):
+            await pilot.press(key)
+            seen.append(screen._playing is not None)
+        await press(pilot, "end", "space")
+        seen.append(screen.index < 150)
+        screen.action_stop()
+        return seen
+
+    assert shown(recording, script) == [True, True, False, True, False, True]
+
+
+def test_a_session_without_a_decision_is_refused(here):
+    (here / "none.parquet").write_bytes(Trace().to_bytes())
+    with pytest.raises(MotionError, match="the session has no decision"):
+        opened(here / "none.parquet", here / "game")

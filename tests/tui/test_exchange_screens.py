@@ -12,7 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from strategies import tables
-from terminal import drive, screen_text
+from terminal import drive, screen_text, with_editor
+from terminal import said as said_by
 from textual.app import App
 from textual.pilot import Pilot
 from textual.screen import Screen
@@ -437,3 +438,60 @@ def test_a_path_that_cannot_be_exported_to_stays_with_its_reason(table: Table, p
     answers, text = played(exporting(table), script)
     assert not answers
     assert said in text
+
+
+def test_the_names_of_an_export_are_completed_chosen_and_gone_through(table: Table):
+    (table.path.parent / "work" / "more.tsv").write_text("x", encoding="utf-8")
+    seen: list[str] = []
+
+    async def script(pilot: Pilot[Any]) -> None:
+        entry = pilot.app.screen.query_one("#export-path", Input)
+        entry.value = "m"
+        await settled(pilot)
+        for key in ("tab", "down", "enter", "tab"):
+            await pilot.press(key)
+            await settled(pilot)
+            seen.append(entry.value)
+        assert not entry.has_focus
+
+    assert played(exporting(table), script)[0] == []
+    common, _, chosen, still = seen
+    assert common == "more."
+    assert chosen == still
+    assert chosen in ("more.csv", "more.tsv")
+
+
+def test_an_import_goes_into_a_folder_and_leaves_a_path_that_is_none(table: Table):
+    seen: list[str] = []
+
+    async def script(pilot: Pilot[Any]) -> None:
+        entry = pilot.app.screen.query_one("#import-path", Input)
+        for text in ("..", "m\0re.csv"):
+            await read_file(pilot, text)
+            seen.append(entry.value)
+        entry.value = ""
+        await settled(pilot)
+        await pilot.press("down", "up", "enter")
+        await settled(pilot)
+        seen.append(entry.value)
+        await pilot.press("f2")
+        assert entry.has_focus
+
+    assert played(importing(table), script)[0] == []
+    folder, none, chosen = seen
+    assert folder == "../"
+    assert none == "m\0re.csv"
+    assert chosen in ("book.xlsx", "broken.xlsx", "more.csv")
+
+
+def test_the_editor_writes_an_export_and_says_so(table: Table):
+    async def script(app: Any, pilot: Pilot[Any]) -> str:
+        app.main.action_export()
+        await pilot.pause()
+        app.screen.query_one("#export-path", Input).value = "work/out.tsv"
+        await pilot.press("enter")
+        await settled(pilot)
+        return said_by(app)
+
+    assert with_editor(table.path, script) == "Wrote out.tsv."
+    assert (table.path.parent / "work" / "out.tsv").read_text("utf-8").splitlines()[0] == "Asset Name\tspeed"

@@ -6,10 +6,14 @@ from pathlib import Path
 
 import pytest
 from terminal import press, screen_text, settled, with_editor
+from textual.events import MouseScrollDown, MouseScrollUp
+from textual.widgets import Input
 
 from tui.app import EditorApp
 from tui.model.layout import NARROWEST
 from tui.model.selection import Block
+from tui.widgets.bar import Bar
+from tui.widgets.editing.choice_list import ChoiceList
 from tui.widgets.grid import Grid
 
 
@@ -318,3 +322,52 @@ def test_a_click_on_a_tab_and_on_a_tool_does_what_its_key_does(path):
     tab, shown = with_editor(path, script, (80, 30))
     assert tab == "options"
     assert "the table as it was opened" in shown
+
+
+def test_a_click_on_the_key_line_presses_the_key_and_a_tool_is_lit_under_the_mouse(path):
+    async def script(app, pilot):
+        lines = screen_text(app).splitlines()
+        await click(pilot, (lines[-1].index("F6") + 1, len(lines) - 1))
+        tools = app.main.query_one("#tools", Bar)
+        await pilot.hover(offset=(lines[1].index("Undo history") + 1, 1))
+        lit = tools._hovered
+        await pilot.hover(offset=at(app, 4, 2))
+        return app.main.assets.grid.is_in_test_row, lit, tools._hovered
+
+    assert with_editor(path, script, (80, 30)) == (True, "history", None)
+
+
+def test_the_buttons_of_find_replace_here_and_everywhere(path):
+    async def script(app, pilot):
+        await press(pilot, "ctrl+f", *"clip")
+        app.main.query_one("#find-replacement", Input).value = "take"
+        seen = []
+        for name in ("replace", "all"):
+            await pilot.click(f"#find-{name}")
+            await settled(pilot)
+            seen.append(sum(asset.startswith("take") for asset in app.main.session.sheet.table.assets))
+        return seen
+
+    assert with_editor(path, script, (120, 30)) == [1, 40]
+
+
+def test_the_wheel_goes_through_a_list_of_values_and_a_click_takes_one(tmp_path):
+    values = [f"v{i:02}" for i in range(40)]
+    (tmp_path / "contextdb.toml").write_text(f'[conditions.way]\ntype = "enum"\nvalues = {values}\n')
+    (tmp_path / "t.csv").write_text("Asset,way\na,v00\n")
+
+    async def script(app, pilot):
+        await press(pilot, "right", "f4")
+        choices = app.main.query_one(ChoiceList)
+        await pilot._post_mouse_events([MouseScrollDown], choices, offset=(2, 1))
+        await pilot._post_mouse_events([MouseScrollDown], choices, offset=(2, 1))
+        await settled(pilot)
+        down = screen_text(app)
+        await pilot._post_mouse_events([MouseScrollUp], choices, offset=(2, 1))
+        await settled(pilot)
+        return down, screen_text(app)
+
+    down, up = with_editor(tmp_path / "t.csv", script, (80, 24))
+    assert "v01" not in down
+    assert "v06" in down
+    assert "v03" in up

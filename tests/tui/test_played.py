@@ -6,13 +6,18 @@ import asyncio
 import json
 import time
 from pathlib import Path
+from threading import Event
 
 import pytest
 from terminal import press, said, screen_text, with_editor
 
 import contextdb as cdb
+from contextdb.tables.table import Table
 from contextdb.telemetry import observe
+from tui.model.game_answer import GameAnswer
 from tui.model.moments import Moment
+from tui.model.played_run import PlayedRun
+from tui.model.query_row import QueryRow
 
 TOML = """[conditions.speed]
 type = "number"
@@ -110,3 +115,41 @@ def test_the_last_minute_of_a_game_is_read_too(path):
     assert "the last minute of game · player (1 moment with actors left out): 50.00 % of 6 recorded moments" in screen
     plain = observe(cdb.load(path), path.with_name("play.csv")).to_json()
     assert json.dumps(result.observed.to_json()["gaps"]) == json.dumps(plain["gaps"])
+
+
+@pytest.fixture
+def outer(path: Path) -> Table:
+    """A table one of whose rows refers to another one."""
+    path.write_text("Asset,speed,gait\nslow,0..3,Walk\n@inner,Any,Run\nnever,8.5..,Walk\n")
+    path.with_name("inner.csv").write_text("Asset,speed\njog,3..5\nrun,5..9\n")
+    return cdb.Project.load(path.parent)["t"]
+
+
+def test_a_row_that_refers_to_a_table_is_used_where_a_row_inside_is(outer, path):
+    run, done = PlayedRun(), Event()
+    run.start(outer, str(path.with_name("play.csv")), "play", done.set)
+    assert done.wait(LIMIT_S)
+    assert run.problem == ""
+    assert list(run.result.unused) == [2]
+    assert run.result.observed.to_json() == observe(outer.flat(), path.with_name("play.csv")).to_json()
+
+
+def test_moments_without_any_and_moments_with_actors_alone_are_told(outer):
+    cast = Moment(0.0, {}, 0, 0, actors={"Defender": [{"id": 1}]})
+    for moments, why in (([], "nothing was asked yet"), ([cast], "each was asked with actors")):
+        run, done = PlayedRun(), Event()
+        run.start_live(outer, lambda kept=moments: kept, "game", done.set)
+        assert done.wait(LIMIT_S)
+        assert why in run.problem
+        run.close()
+
+
+def test_the_answer_of_a_game_is_that_of_the_rows_inside_here(outer):
+    facts = {"speed": 6.0, "gait": "Run"}
+    answer = outer.compile().query(facts)
+    query = QueryRow(outer)
+    query.load({"speed": "6", "gait": "Run"})
+    assert GameAnswer(Moment(0.0, facts, answer.bits, len(answer)), query).differs == ""
+    other = GameAnswer(Moment(0.0, facts, 0, 0, pick=(0, None)), query)
+    assert other.differs == "≠ the game: 0 rows valid there, here 1 more"
+    assert other.said.endswith("the game plays nothing")

@@ -22,7 +22,6 @@ from contextdb.schema.jobs import JOBS, PlainJob
 from contextdb.schema.outputs import declared_outputs, outputs_faults
 from contextdb.schema.sections import condition_to_dict, differences, has_place, settings_to_dict
 from contextdb.schema.settings import TableSettings, with_outputs
-from contextdb.schema.shapes import wrong_name
 from contextdb.tables.changes import Change, Columns, Edit, Sections
 from contextdb.tables.table import Table
 from tui.model.condition_form import ConditionForm, names_in, plain
@@ -194,8 +193,6 @@ def _require_row(row: ColumnRow) -> dict[str, Any]:
     """What contextdb.toml is to say of a condition or an output; raises Wrong."""
     if not row.name:
         raise row.wrong(NAME, "A column needs a name; Ctrl+K deletes one.")
-    if why := wrong_name(row.name):
-        raise row.wrong(NAME, f"This cannot be a name: {why}.")
     for key in () if row.is_condition else _OF_CONDITIONS:
         if row.texts[key].strip() and row.job not in ("", *JOBS):
             raise row.wrong(key, f"Only a condition has {'an' if key[0] == 'E' else 'a'} {key.lower()}.")

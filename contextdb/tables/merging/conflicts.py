@@ -37,8 +37,3 @@ class Conflict:
     def place(self) -> str:
         """Where it is, in words."""
         return {"cell": f"{self.asset}, {self.column}", "row": self.asset}.get(self.kind, self.column)
-
-    def to_json(self) -> dict[str, object]:
-        """The conflict as plain data."""
-        names = ("kind", "row", "asset", "column", "base", "ours", "theirs")
-        return {name: getattr(self, name) for name in names}

@@ -40,11 +40,6 @@ class Expansion:
         """How many flat rows there are."""
         return int(self.rows.shape[1])
 
-    @property
-    def depth(self) -> int:
-        """How many tables the longest way passes."""
-        return len(self.rows)
-
     def layers(self, columns: Iterable[tuple[int, TextColumn]]) -> Layers:
         """The texts of some tables' columns, given with the numbers of the tables."""
         texts, codes = [""], np.zeros(self.rows.shape, np.int32)

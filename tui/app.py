@@ -9,16 +9,17 @@ from typing import TYPE_CHECKING, ClassVar
 
 from textual.app import SystemCommand
 from textual.binding import BindingType
+from textual.command import CommandPalette
 from textual.filter import LineFilter
 from textual.screen import Screen
-from textual.theme import BUILTIN_THEMES
+from textual.theme import BUILTIN_THEMES, ThemeProvider
 
 from contextdb.errors import ContextDBError
 from contextdb.tables.merging.conflicts import Side
 from contextdb.tables.merging.merging import Merge
 from contextdb.tables.table import Table
 from tui.commands import BY_ID, COMMANDS, bindings, key_names
-from tui.contrast import READABLE
+from tui.contrast import READABLE, without
 from tui.editor import Editor
 from tui.editor_settings import EditorSettings
 from tui.messages import GoToCell
@@ -39,6 +40,13 @@ if TYPE_CHECKING:
 
 LOW = 14
 """On a screen of fewer lines the details give way to the rows."""
+
+
+class Palette(CommandPalette):
+    """Textual's list of commands; what lies behind is as dim as behind a dialog."""
+
+    def get_line_filters(self) -> Sequence[LineFilter]:
+        return without(super().get_line_filters())
 
 
 class EditorApp(Editor):
@@ -102,6 +110,13 @@ class EditorApp(Editor):
     def get_line_filters(self) -> Sequence[LineFilter]:
         """What is done to all that is painted: every text can be read."""
         return [*super().get_line_filters(), READABLE]
+
+    def action_command_palette(self) -> None:
+        if not isinstance(self.screen, CommandPalette):
+            self.push_screen(Palette(id="--command-palette"))
+
+    def search_themes(self) -> None:
+        self.push_screen(Palette(providers=[ThemeProvider], placeholder="Search for themes…"))
 
     def on_mount(self) -> None:
         if self.workspace.beginning is not None:

@@ -141,6 +141,10 @@ class TableScreen(Screen[None]):
         table = self.session.sheet.table
         about = f"{plural(table.n_rows, 'row')} · {plural(len(table.columns), 'column')}"
         self.query_one("#tabs", Bar).show(items, about)
+        self.show_summary()
+
+    def show_summary(self) -> None:
+        """Say how much of the table is valid, shown and selected."""
         self.query_one(StatusLine).show(right=self.assets.summary())
 
     def say(self, text: str, level: str = "information") -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import shutil
 from pathlib import Path
 from typing import Any
 
+import pytest
 from terminal import alone, drive, press, screen_text
 from test_debug_parts import recording_of
 from test_motion_measure_command import here, made
@@ -87,6 +89,23 @@ def test_the_tab_opens_the_debugger_its_row_is_shown_in_the_sheet_and_esc_comes_
         await press(pilot, "escape", "escape")
         assert app.screen is main
         assert main.query_one(MotionPane).entries
+
+    with alone(Path.cwd()):
+        drive(app, script, (120, 40))
+
+
+def test_a_session_that_is_recorded_while_the_tab_is_seen_is_listed_by_itself(here: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("tui.panes.motion.LOOK_EVERY_S", 0.01)
+    app = EditorApp(Workspace("game"))
+
+    async def script(pilot: Pilot[Any]) -> None:
+        await app.main.action_tab("motion")
+        await settled(pilot)
+        assert "1 session" in screen_text(app)
+        shutil.copy("session.parquet", "another.parquet")
+        async with asyncio.timeout(30.0):
+            while "2 sessions" not in screen_text(app) or "another.parquet" not in screen_text(app):
+                await pilot.pause()
 
     with alone(Path.cwd()):
         drive(app, script, (120, 40))

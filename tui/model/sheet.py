@@ -440,9 +440,9 @@ class Sheet(ShownTable):
         return Done(edit.name, warnings=self._unreadable(edit.changes))
 
     def _set(self, cells: Iterable[tuple[int, int, str]], name: str = "") -> Done:
-        rows, names = self.view.rows.tolist(), [c.name for c in self.table.columns]
+        rows, names = self.view.rows, [c.name for c in self.table.columns]
         cells = told(cells, len(cells) if isinstance(cells, list) else self.block.n_cells)
-        return self._do(edits.set_cells(self.table, ((rows[r], names[c], text) for r, c, text in cells), name))
+        return self._do(edits.set_cells(self.table, ((int(rows[r]), names[c], text) for r, c, text in cells), name))
 
     def _cells(self, block: Block) -> Iterable[tuple[int, int]]:
         return ((r, c) for r in range(block.top, block.bottom) for c in range(block.left, block.right))

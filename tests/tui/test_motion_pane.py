@@ -160,3 +160,18 @@ def test_a_project_without_a_session_has_no_tab_until_it_is_gone_to(here: Path):
 
     with alone(Path.cwd()):
         assert "Motion" not in drive(EditorApp(Workspace("alone")), script, (120, 40))
+
+
+def test_the_tab_comes_with_the_first_session_when_one_looks_again(here: Path):
+    (here / "session.parquet").rename(here / "away")
+    app = EditorApp(Workspace("game"))
+
+    async def script(pilot: Pilot[Any]) -> list[bool]:
+        seen = ["Motion" in screen_text(app).splitlines()[0]]
+        (here / "away").rename(here / "session.parquet")
+        await app.main.run_command("refresh")
+        await settled(pilot)
+        return [*seen, "Motion" in screen_text(app).splitlines()[0]]
+
+    with alone(Path.cwd()):
+        assert drive(app, script, (120, 40)) == [False, True]

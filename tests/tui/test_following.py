@@ -227,7 +227,8 @@ def test_a_game_that_ends_leaves_its_last_moment(path):
 
     ended, stopped, speed = with_editor(path, script, (100, 24))
     assert "the game has ended" in ended
-    assert "game · player" not in stopped
+    assert "■ game · player" in ended
+    assert "■ game · player" not in stopped
     assert speed == "1"
 
 

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any, ClassVar, cast
 
-from textual import on
 from textual.app import App, SystemCommand
 from textual.binding import BindingType
 from textual.command import CommandPalette
@@ -14,7 +13,6 @@ from textual.filter import LineFilter
 from textual.message import Message
 from textual.screen import Screen
 from textual.theme import BUILTIN_THEMES, ThemeProvider
-from textual.widgets import Input
 
 from contextdb.errors import ContextDBError
 from contextdb.tables.merging.conflicts import Side
@@ -100,17 +98,8 @@ class EditorApp(Editor):
         return sorted([*(theme.name for theme in THEMES), *BUILTIN_THEMES])
 
     def get_line_filters(self) -> Sequence[LineFilter]:
-        """Make every text that is painted readable; what lies behind the palette stays dim, as behind a dialog."""
-        filters = super().get_line_filters()
-        return filters if isinstance(self.screen, CommandPalette) else [*filters, READABLE]
-
-    @on(CommandPalette.Opened)
-    def _palette_opened(self) -> None:
-        """Give the palette the title and the keys that a dialog has."""
-        box, field = self.screen.query_one("#--container"), self.screen.query_one(Input)
-        box.border_title = "Theme" if "theme" in field.placeholder else "Commands"
-        box.border_subtitle = "type to filter · ↑↓ choose · Enter OK · Esc cancel"
-        field.placeholder = "type to filter"
+        """What is done to all that is painted: every text can be read."""
+        return [*super().get_line_filters(), READABLE]
 
     def action_command_palette(self) -> None:
         """Show every command."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from textual import events
 from textual.app import App
@@ -27,6 +27,17 @@ class OneKeyAtATime(App[None]):
         self._ahead: deque[events.Event] = deque()
         """What was typed before the key before it has done all it does."""
         self._settling: asyncio.Task[None] | None = None
+        self._stop: Callable[[], None] | None = None
+        """Stops long work, while which keys wait."""
+
+    def hold_keys(self, stop: Callable[[], None]) -> None:
+        """From now on keys wait, but for Esc, which stops something."""
+        self._stop = stop
+
+    def let_keys(self) -> None:
+        """Take the keys that waited."""
+        self._stop = None
+        self.call_later(self._take_next)
 
     def get_line_filters(self) -> Sequence[LineFilter]:
         """Also one that keeps columns from drifting."""
@@ -34,7 +45,10 @@ class OneKeyAtATime(App[None]):
 
     async def on_event(self, event: events.Event) -> None:
         """Take one key at a time. A key can open an editor or a dialog, and what is typed after it is meant for that."""
-        is_waiting = self._settling is not None or bool(self._ahead)
+        if self._stop is not None and isinstance(event, events.Key) and event.key == "escape":
+            self._stop()
+            return
+        is_waiting = self._stop is not None or self._settling is not None or bool(self._ahead)
         if is_waiting and isinstance(event, (events.InputEvent, events.Paste)) and not event.is_forwarded:
             self._ahead.append(event)
         else:
@@ -61,7 +75,7 @@ class OneKeyAtATime(App[None]):
         return [*(self.focused or self.screen).ancestors_with_self, *new, self]
 
     async def _take_next(self) -> None:
-        while self._ahead and self._settling is None:
+        while self._ahead and self._settling is None and self._stop is None:
             await self._take(self._ahead.popleft())
 
 

@@ -78,12 +78,13 @@ def set_cells(table: Table, cells: Iterable[tuple[int, str, str]], name: str = "
     end first, and can be set too."""
     texts: dict[str, dict[int, str]] = {}
     columns: dict[str, TextColumn] = {}
+    n_before, n_rows = table.n_rows, table.n_rows + n_new
     for row, column, text in cells:
         if column not in columns:
             columns[column] = table.text_column(column)
-        if not 0 <= row < table.n_rows + n_new:
-            raise TableError(Fault(f"there is no row {row}.", f"rows 0 to {table.n_rows + n_new - 1}"))
-        if text != (columns[column][row] if row < table.n_rows else ""):
+        if not 0 <= row < n_rows:
+            raise TableError(Fault(f"there is no row {row}.", f"rows 0 to {n_rows - 1}"))
+        if text != (columns[column][row] if row < n_before else ""):
             texts.setdefault(column, {})[row] = text
     grown = (Rows(np.append(np.arange(table.n_rows), np.full(n_new, -1))),) if n_new else ()
     return Edit(name or _cells_name(table, texts), (*grown, Cells(texts)) if texts else grown)

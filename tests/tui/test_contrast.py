@@ -64,3 +64,16 @@ def test_every_text_of_a_tab_or_a_dialog_has_it_too(path, keys):
         return await faint_in_themes(app, pilot)
 
     assert with_editor(path, script, (120, 36) if keys == ["alt+5"] else (80, 24)) == set()
+
+
+def test_what_lies_behind_the_palette_is_as_dim_as_behind_a_dialog(path):
+    async def script(app, pilot):
+        feet = []
+        for key in ("f1", "ctrl+p"):
+            await press(pilot, key)
+            feet.append(list(app.screen._compositor.render_strips()[-1].simplify()))
+            await press(pilot, "escape")
+        return feet
+
+    dialog, palette = with_editor(path, script)
+    assert palette == dialog

@@ -113,7 +113,8 @@ def test_the_test_row_follows_a_game_and_marks_its_pick(path):
     assert "≠" not in first
     assert "version" not in first
     assert (bits, bits_after) == (0b110, 0b010)
-    assert "1 valid" in second
+    assert "2 valid for game · player" in first
+    assert "1 valid for game · player" in second
 
 
 def test_an_edit_that_is_not_saved_is_answered_beside_the_game(path):
@@ -226,7 +227,8 @@ def test_a_game_that_ends_leaves_its_last_moment(path):
 
     ended, stopped, speed = with_editor(path, script, (100, 24))
     assert "the game has ended" in ended
-    assert "game · player" not in stopped
+    assert "■ game · player" in ended
+    assert "■ game · player" not in stopped
     assert speed == "1"
 
 

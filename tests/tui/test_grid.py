@@ -12,10 +12,8 @@ from rich.style import Style
 from saved_bytes import bytes_for
 from strategies import examples, some
 from terminal import press, said, screen_text, with_editor
-from textual.events import Paste
 from textual.strip import Strip
 
-import tui.widgets.grid
 from contextdb.columns import TextColumn
 from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict
 from contextdb.tables.table import Table
@@ -471,22 +469,6 @@ def test_after_a_paste_of_many_rows_one_stays_where_one_was(tmp_path):
         return pasted, grid.look.top > 0
 
     assert with_editor(file, script) == ((0, 0), True)
-
-
-def test_a_long_paste_is_said_before_it_begins_and_no_key_comes_between(tmp_path, monkeypatch):
-    monkeypatch.setattr(tui.widgets.grid, "LONG_PASTE", 5)
-    file, seen = tmp_path / "t.csv", []
-    file.write_text("Asset,note\nwalk,x\nrun,y\n")
-
-    async def script(app, pilot):
-        real = app.main.session.sheet.paste
-        monkeypatch.setattr(app.main.session.sheet, "paste", lambda text: (seen.append(screen_text(app)), real(text))[1])
-        app.main.assets.grid.post_message(Paste("hop\tz\nskip\tz\n"))
-        await press(pilot, "ctrl+z")
-        return said(app), app.main.session.sheet.table.assets
-
-    assert with_editor(file, script) == ("Undo: Paste 2 × 2.", ["walk", "run"])
-    assert ["Pasting 0.0 MB …" in text for text in seen] == [True]
 
 
 def test_a_selection_of_filtered_rows_does_not_grow_when_all_are_shown(tmp_path):

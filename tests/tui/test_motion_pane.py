@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import shutil
 from pathlib import Path
 from typing import Any
 
+import pytest
 from terminal import alone, drive, press, screen_text
 from test_debug_parts import recording_of
 from test_motion_measure_command import here, made
@@ -92,6 +94,23 @@ def test_the_tab_opens_the_debugger_its_row_is_shown_in_the_sheet_and_esc_comes_
         drive(app, script, (120, 40))
 
 
+def test_a_session_that_is_recorded_while_the_tab_is_seen_is_listed_by_itself(here: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("tui.panes.motion.LOOK_EVERY_S", 0.01)
+    app = EditorApp(Workspace("game"))
+
+    async def script(pilot: Pilot[Any]) -> None:
+        await app.main.action_tab("motion")
+        await settled(pilot)
+        assert "1 session" in screen_text(app)
+        shutil.copy("session.parquet", "another.parquet")
+        async with asyncio.timeout(30.0):
+            while "2 sessions" not in screen_text(app) or "another.parquet" not in screen_text(app):
+                await pilot.pause()
+
+    with alone(Path.cwd()):
+        drive(app, script, (120, 40))
+
+
 def test_the_debugger_by_itself_is_left_for_the_row_and_begins_where_it_was(here: Path):
     recording = recording_of(here)
     app = DebugApp(recording, measures=False)
@@ -141,3 +160,18 @@ def test_a_project_without_a_session_has_no_tab_until_it_is_gone_to(here: Path):
 
     with alone(Path.cwd()):
         assert "Motion" not in drive(EditorApp(Workspace("alone")), script, (120, 40))
+
+
+def test_the_tab_comes_with_the_first_session_when_one_looks_again(here: Path):
+    (here / "session.parquet").rename(here / "away")
+    app = EditorApp(Workspace("game"))
+
+    async def script(pilot: Pilot[Any]) -> list[bool]:
+        seen = ["Motion" in screen_text(app).splitlines()[0]]
+        (here / "away").rename(here / "session.parquet")
+        await app.main.run_command("refresh")
+        await settled(pilot)
+        return [*seen, "Motion" in screen_text(app).splitlines()[0]]
+
+    with alone(Path.cwd()):
+        assert drive(app, script, (120, 40)) == [False, True]

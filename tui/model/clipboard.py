@@ -17,6 +17,7 @@ Texts = list[list[str]]
 """Rows of cells, all equally wide."""
 
 _FIELD = re.compile(r'(?:"((?:[^"]|"")*)"(?=[\t\r\n]|\Z)|([^\t\r\n]*))(\t|\r\n|\r|\n|\Z)')
+_LINE_END = re.compile(r"\r\n|\r|\n")
 _NEEDS_QUOTES = re.compile(r'[\t\r\n]|^"')
 
 
@@ -25,7 +26,11 @@ def parse_tsv(text: str) -> Texts:
 
     A quote that is not closed, or is inside a cell, is taken as it is.
     """
-    rows: Texts = [[]]
+    if '"' not in text:
+        lines = _LINE_END.split(text)
+        rows = [line.split("\t") for line in (lines if lines[-1] else lines[:-1])]
+        return _as_wide(rows)
+    rows = [[]]
     at = 0
     while at < len(text):
         found = _FIELD.match(text, at)
@@ -36,9 +41,12 @@ def parse_tsv(text: str) -> Texts:
             rows[-1].append("")
         elif end not in ("\t", ""):
             rows.append([])
-    rows = rows if rows[-1] else rows[:-1]
+    return _as_wide(rows if rows[-1] else rows[:-1])
+
+
+def _as_wide(rows: Texts) -> Texts:
     width = max(map(len, rows), default=0)
-    return [row + [""] * (width - len(row)) for row in rows]
+    return [row if len(row) == width else row + [""] * (width - len(row)) for row in rows]
 
 
 def format_tsv(rows: Sequence[Sequence[str]]) -> str:

@@ -14,6 +14,7 @@ from contextdb.edits.renaming_values import with_value
 from contextdb.errors import Fault, TableError, in_quotes, plural, shown
 from contextdb.tables.changes import Cells, Edit
 from contextdb.tables.table import Table
+from tui.model.long_work import told
 from tui.model.meaning import mend_of
 from tui.model.shown import ShownTable
 
@@ -65,7 +66,8 @@ def mends_of(sheet: ShownTable, column: int, texts: Iterable[str] | None = None)
     domain = condition.condition.domain if condition is not None else None
     wanted = None if texts is None else set(texts)
     mends: dict[str, str] = {}
-    for code, text in enumerate(table.columns[column].texts):
+    texts_of = table.columns[column].texts
+    for code, text in told(enumerate(texts_of), len(texts_of)):
         known = _fault(sheet, column, code) if wanted is None or text in wanted else None
         if known is not None:
             check = partial(edits.check_cell, table, name)

@@ -19,6 +19,7 @@ from contextdb.columns import TextColumn
 from contextdb.errors import ContextDBError, Fault, in_quotes, plural, shown
 from contextdb.tables.changes import Cells, Edit
 from contextdb.tables.table import Table
+from tui.model.long_work import told
 
 
 class PatternError(ContextDBError):
@@ -91,7 +92,7 @@ def replace_all(table: Table, search: Search, replacement: str, rows: Rows, colu
         The pattern cannot be read.
     """
     changed: dict[str, dict[int, str]] = {}
-    for name in columns if search.text else ():
+    for name in told(columns, len(columns), every=1) if search.text else ():
         column = table.text_column(name)
         now = _replaced(column, search, replacement)
         differs = np.array([a != b for a, b in zip(column.texts, now, strict=True)], np.bool_)

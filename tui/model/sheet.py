@@ -23,6 +23,7 @@ from tui.model.clipboard import format_tsv, parse_tsv, place_paste
 from tui.model.column_values import mends_of, renamed_value, replaced
 from tui.model.condition_form import undeclared
 from tui.model.find import Search, find, next_hit, replace_all
+from tui.model.long_work import in_turn, told
 from tui.model.selection import Block
 from tui.model.series import continued, tells_step
 from tui.model.shown import ShownTable
@@ -162,7 +163,8 @@ class Sheet(ShownTable):
         table, n_before = self.table, self.table.n_rows
         rows = [*self.view.rows.tolist(), *range(n_before, n_before + n_new)]
         names = [c.name for c in table.columns]
-        edit = edits.set_cells(table, ((rows[r], names[c], t) for r, c, t in placed.cells()), placed.name, n_new)
+        cells = told(placed.cells(), placed.block.n_cells)
+        edit = edits.set_cells(table, ((rows[r], names[c], t) for r, c, t in cells), placed.name, n_new)
         done = self._do(edit)
         block = placed.block
         self._select(self.selection.at(block.top, block.left, self.shape))
@@ -415,6 +417,9 @@ class Sheet(ShownTable):
         return Done(f"{verb}: {step.name}")
 
     def _do(self, edit: Edit) -> Done:
+        return in_turn(lambda: self._made(edit))
+
+    def _made(self, edit: Edit) -> Done:
         before, position = self.table, self.history.position
         step = self.history.do(edit)
         if self.history.position == position:
@@ -425,8 +430,9 @@ class Sheet(ShownTable):
         return Done(edit.name, warnings=self._unreadable(edit.changes))
 
     def _set(self, cells: Iterable[tuple[int, int, str]], name: str = "") -> Done:
-        rows, names = self.view.rows.tolist(), [c.name for c in self.table.columns]
-        return self._do(edits.set_cells(self.table, ((rows[r], names[c], text) for r, c, text in cells), name))
+        rows, names = self.view.rows, [c.name for c in self.table.columns]
+        cells = told(cells, len(cells) if isinstance(cells, list) else self.block.n_cells)
+        return self._do(edits.set_cells(self.table, ((int(rows[r]), names[c], text) for r, c, text in cells), name))
 
     def _cells(self, block: Block) -> Iterable[tuple[int, int]]:
         return ((r, c) for r in range(block.top, block.bottom) for c in range(block.left, block.right))

@@ -204,6 +204,12 @@ class ShownTable:
         return self._conditions[1][column]
 
     @property
+    def n_unread(self) -> int:
+        """How many texts of the cursor's column cannot be read."""
+        condition = self.condition(self.selection.column)
+        return 0 if condition is None else len(condition.faults)
+
+    @property
     def extra(self) -> tuple[Condition, ...]:
         """The facts that the test row has behind those of the columns: see `QueryRow.extra`."""
         return self.query.extra

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -22,6 +23,7 @@ from tui.model.asked import Offered, fact_fault
 from tui.model.column_values import selection_said
 from tui.model.find import PatternError, Search
 from tui.model.notes import COLOURS, Notes
+from tui.model.selection import Block
 from tui.model.sheet import Done, Sheet
 from tui.panes.sheet_view import SheetView
 from tui.panes.why import WhyPane
@@ -361,11 +363,9 @@ class AssetsPane(SheetView):
             self.post_message(Told(f"Copied {rows:,} × {columns:,}."))
 
     @on(Grid.PasteWanted)
-    async def _paste(self, event: Grid.PasteWanted) -> None:
+    def _paste(self, event: Grid.PasteWanted) -> None:
         event.stop()
-        text = self.clipboard.paste()
-        await self.grid.tell_long_paste(text)
-        self.grid.paste(text)
+        self.grid.paste(self.clipboard.paste())
 
     async def action_insert_copied(self) -> None:
         """Put what was copied into new rows above the cursor's."""
@@ -410,11 +410,12 @@ class AssetsPane(SheetView):
     def _replace(self, event: FindBar.Replaced) -> None:
         event.stop()
         sheet = self.sheet
+        count = partial(self._seek, FindBar.Sought(event.search, only_counts=True))
         if event.is_all:
-            self._try(lambda: sheet.replace_all(event.search, event.replacement, event.in_selection))
+            n_cells = (sheet.block if event.in_selection else Block(0, 0, *sheet.shape)).n_cells
+            self._try(lambda: sheet.replace_all(event.search, event.replacement, event.in_selection), n_cells, count)
         else:
-            self._try(lambda: sheet.replace_here(event.search, event.replacement))
-        self._seek(FindBar.Sought(event.search, only_counts=True))
+            self._try(lambda: sheet.replace_here(event.search, event.replacement), then=count)
 
     # ---- filter, notes, colours
 

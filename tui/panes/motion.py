@@ -29,6 +29,7 @@ from tui.model.sessions import sessions_of
 from tui.panes.pane import Pane
 from tui.widgets.line_list import LineList, ListCell, ListColumn
 
+LOOK_EVERY_S = 1.0
 NONE = 'No session is recorded here: "contextdb motion run" records one, and so does motion.Trace in your game.'
 
 
@@ -79,6 +80,15 @@ class MotionPane(Pane):
         columns = [ListColumn("Session", 18, 3), ListColumn("When", 12), ListColumn("Lasts", 9, 0, True)]
         columns += [ListColumn("Jumps/s", 8, 0, True), ListColumn("Forced", 7, 0, True)]
         yield SessionList([*columns, ListColumn("In a clip", 10, 0, True)], empty=NONE, id="sessions")
+
+    def on_mount(self) -> None:
+        self.set_interval(LOOK_EVERY_S, self._look_again)
+
+    def _look_again(self) -> None:
+        """Look for what came while the list is seen, unless somebody is still looking."""
+        is_at_it = any(worker.node is self and worker.group == "look" and worker.is_running for worker in self.workers)
+        if self.display and self.screen.is_current and not is_at_it:
+            self.look()
 
     def show(self) -> None:
         """Look for games and sessions."""

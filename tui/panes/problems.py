@@ -20,7 +20,8 @@ from textual.widgets import Static
 from contextdb.errors import Fault
 from contextdb.findings import LEVELS, Finding, Level
 from contextdb.tables.table import Table
-from tui.messages import Edited, GoToCell, Told
+from tui.doing import SLOW, do
+from tui.messages import GoToCell, Told
 from tui.model.coverage_run import is_quick
 from tui.model.problems import WORDS, Problem, Problems, cell_findings, is_checked_at_once, row_findings
 from tui.model.sheet import Sheet
@@ -185,7 +186,7 @@ class ProblemsPane(Pane):
             self.post_message(Told("Only cells that cannot be read are mended here.", "warning"))
             return
         self.sheet.go(self.sheet.cursor[0], names.index(problem.column))
-        self.post_message(Edited(self.sheet.mend_all()))
+        do(self, self.sheet, self.sheet.mend_all, SLOW * self.sheet.n_unread)
 
     def action_check(self) -> None:
         """Check again."""

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 from textual import on
 
-from contextdb.errors import ContextDBError, TableError
-from tui.messages import Edited, Told, ValueRenameWanted
+from tui.doing import SLOW, do
+from tui.messages import Told, ValueRenameWanted
 from tui.model.columns_shown import prefix_of
 from tui.model.problems import findings_at_once
 from tui.model.sheet import Done, Sheet
@@ -33,14 +33,9 @@ class SheetView(Pane):
         """The grid."""
         return self.query_one(Grid)
 
-    def _try(self, verb: Callable[[], Done]) -> None:
-        """Do something to the sheet; where it cannot be done, say why."""
-        try:
-            done = verb()
-        except (TableError, ContextDBError) as error:
-            self.post_message(Told(str(error), "error"))
-            return
-        self.post_message(Edited(done))
+    def _try(self, verb: Callable[[], Done], n_cells: int = 0, then: Callable[[], None] = lambda: None) -> None:
+        """Do something to the sheet that looks at so many cells; where it cannot be done, say why."""
+        do(self, self.sheet, verb, n_cells, then)
 
     def action_filter_same(self) -> None:
         """Only rows whose cell in this column has the text under the cursor."""
@@ -60,7 +55,7 @@ class SheetView(Pane):
             if answer is None:
                 return
             if answer.act == "mend":
-                self._try(lambda: self.sheet.mend_all(answer.texts))
+                self._try(lambda: self.sheet.mend_all(answer.texts), SLOW * len(answer.texts))
             elif answer.act in ("only", "without"):
                 self._show_only(column, answer.texts, is_without=answer.act == "without")
             else:

@@ -60,6 +60,9 @@ class Follows(Protocol):
     def say(self, text: str, level: str = "information") -> None:
         """Say something in a line below."""
 
+    def show_summary(self) -> None:
+        """Say how much of the table is valid."""
+
     def set_interval(self, interval: float, callback: Callable[[], None]) -> Timer:
         """Call something again and again."""
         ...
@@ -266,6 +269,7 @@ class Following:
         if is_first or played != sheet.played:
             self._texts = texts
             self.screen.assets.follow(texts, moment.actors or {}, played, followed.name)
+            self.screen.show_summary()
 
     # ---- what is said
 

@@ -342,6 +342,7 @@ class MainScreen(TableScreen):
         self.say("Refreshed.")
         self.try_to(self.workspace.look_again)
         self.care.look()
+        self._look_for_sessions()
         self.assets.refresh_view()
         self.show()
 

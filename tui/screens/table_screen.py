@@ -81,10 +81,14 @@ class TableScreen(Screen[None]):
         """Where the cursor was when a warning of a verb was first seen: the next cell takes it away."""
         self._is_of_verb = False
         """What is said, not quietly, is of something that was done."""
-        has_databases = bool(self.session.sheet.table.schema.motion.get("databases"))
-        self._has_sessions = has_databases and bool(sessions_of(workspace.folder))
+        self._has_sessions = False
+        self._look_for_sessions()
         self.care = DiskCare(self, self.session, self.say, self.show)
         self.clipboard = Clipboard(lambda text: self.app.copy_to_clipboard(text))
+
+    def _look_for_sessions(self) -> None:
+        has_databases = bool(self.session.sheet.table.schema.motion.get("databases"))
+        self._has_sessions = has_databases and bool(sessions_of(self.workspace.folder))
 
     @property
     def tab(self) -> str:
@@ -141,6 +145,10 @@ class TableScreen(Screen[None]):
         table = self.session.sheet.table
         about = f"{plural(table.n_rows, 'row')} · {plural(len(table.columns), 'column')}"
         self.query_one("#tabs", Bar).show(items, about)
+        self.show_summary()
+
+    def show_summary(self) -> None:
+        """Say how much of the table is valid, shown and selected."""
         self.query_one(StatusLine).show(right=self.assets.summary())
 
     def say(self, text: str, level: str = "information") -> None:

@@ -6,7 +6,6 @@ screen to open an editor over a cell.
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
@@ -16,8 +15,8 @@ from textual.binding import Binding, BindingType
 from textual.geometry import Region
 from textual.message import Message
 
-from contextdb.errors import ContextDBError
 from tui.commands import BY_ID, GRID, JUMPS, bindings
+from tui.doing import CELL, SLOW, do
 from tui.messages import Edited, Told
 from tui.model.clipboard import asks_how_to_read
 from tui.model.selection import Selection
@@ -26,9 +25,6 @@ from tui.model.tab_run import TabRun
 from tui.model.views import Sort
 from tui.widgets.grid_view import GridView
 from tui.widgets.pointer import Pointer
-
-LONG_PASTE = 1_000_000
-"""A text of so many characters takes so long to paste that this is said before."""
 
 
 class Grid(GridView, can_focus=True):
@@ -262,18 +258,14 @@ class Grid(GridView, can_focus=True):
         elif self.is_in_new_row and BY_ID[name].group in ("Edit", "Rows"):
             self._say_new_row()
         else:
-            self._do(lambda: verb(self.sheet))
+            n_cells = self.sheet.block.n_cells if BY_ID[name].group in ("Edit", "Rows") else 0
+            self._do(lambda: verb(self.sheet), self.sheet.n_unread * SLOW if name == "mend-all" else n_cells)
 
     def _say_new_row(self) -> None:
         self.post_message(Told("The cursor is below the last row. Type or paste there to make a new row; Up goes back.", "warning"))
 
-    def _do(self, verb: Callable[[], Done]) -> None:
-        try:
-            done = verb()
-        except ContextDBError as error:
-            self.post_message(Told(str(error), "error"))
-            return
-        self.post_message(Edited(done))
+    def _do(self, verb: Callable[[], Done], n_cells: int = 0, then: Callable[[], None] = lambda: None) -> None:
+        do(self, self.sheet, verb, n_cells, then)
 
     def action_insert_rows(self, below: bool) -> None:
         """As many rows as are selected."""
@@ -340,7 +332,7 @@ class Grid(GridView, can_focus=True):
         elif self.is_in_new_row:
             self._say_new_row()
         else:
-            self._do(self.sheet.clear)
+            self._do(self.sheet.clear, self.sheet.block.n_cells)
 
     def set_fact(self, text: str) -> None:
         """Write the fact under the cursor; one that is computed says why it cannot be written."""
@@ -375,7 +367,7 @@ class Grid(GridView, can_focus=True):
             self.post_message(self.CopyWanted(text, is_told=False))
             return done
 
-        self._do(cut)
+        self._do(cut, self.sheet.block.n_cells)
 
     def action_paste(self) -> None:
         self.post_message(self.PasteWanted())
@@ -386,27 +378,15 @@ class Grid(GridView, can_focus=True):
             self.set_fact(text.splitlines()[0].split("\t")[0] if text.strip() else "")
         elif asks_how_to_read(text, self.sheet.table):
             self.post_message(self.ImportWanted(text))
-        elif self.is_in_new_row:
-            self._do(lambda: self.sheet.paste_below(text))
-            self.goes_to_new_row = False
-            self.forget_widths()
         else:
-            self._do(lambda: self.sheet.paste(text))
-            self.forget_widths()
+            is_below, sheet = self.is_in_new_row, self.sheet
+            self.goes_to_new_row = False
+            verb = sheet.paste_below if is_below else sheet.paste
+            self._do(lambda: verb(text), max(len(text) // CELL, sheet.block.n_cells), self.forget_widths)
 
-    async def on_paste(self, event: events.Paste) -> None:
+    def on_paste(self, event: events.Paste) -> None:
         event.stop()
-        await self.tell_long_paste(event.text)
         self.paste(event.text)
-
-    async def tell_long_paste(self, text: str) -> None:
-        """Say that a long text is pasted, and wait until that is on the screen; no key comes between."""
-        if len(text) < LONG_PASTE:
-            return
-        is_painted = asyncio.Event()
-        self.screen.post_message(Told(f"Pasting {len(text) / 1e6:,.1f} MB …"))
-        self.screen.call_later(self.screen.call_after_refresh, is_painted.set)
-        await is_painted.wait()
 
     def on_key(self, event: events.Key) -> None:
         """A character begins a cell again."""
@@ -453,7 +433,9 @@ class Grid(GridView, can_focus=True):
             "move columns": lambda: sheet.move_columns_to(column),
             "fill": lambda: sheet.fill_to(row, column),
         }
-        self._do(verbs[what])
+        block = sheet.block
+        n_filled = max((row + 1 - block.top) * block.shape[1], (column + 1 - block.left) * block.shape[0])
+        self._do(verbs[what], n_filled if what == "fill" else 0)
 
     def on_click(self, event: events.Click) -> None:
         if event.chain == 2:

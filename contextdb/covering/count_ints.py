@@ -172,8 +172,9 @@ class Count:
             size, hashes = 1.0, 0
             for factor in own:
                 _, _, share, mark = factor[box]
-                size *= share
-                hashes ^= mark
+                if mark:
+                    size *= share
+                    hashes ^= mark
             stir = stirred.get(hashes)
             if stir is None:
                 stir = stirred[hashes] = mixed(hashes >> 64) << LANE | mixed((hashes & WORD) ^ GOLDEN)
@@ -240,11 +241,16 @@ class Count:
     ) -> Shares:
         """The product of what two sets of boxes leave that share no factor."""
         found_low = found_high = 1.0
+        listing = 2 + (len(own) * part.n_words >> 4)
         for opened in (kept, rest):
-            self.work += 2 + (len(own) * part.n_words >> 4)
-            pairs = [(factor, limited & opened) for factor, limited in zip(own, limits, strict=True) if limited & opened]
+            self.work += listing
             held = [box for box in boxes if opened >> box[0] & 1]
-            low, high = self._left(part, depth, opened, held, [factor for factor, _ in pairs], [limited for _, limited in pairs])
+            if len(held) == 1:  # as `_left` would do
+                self.work += part.n_words >> 2
+                low = high = 1.0 - held[0][1]
+            else:
+                pairs = [(factor, here) for factor, limited in zip(own, limits, strict=True) if (here := limited & opened)]
+                low, high = self._left(part, depth, opened, held, [factor for factor, _ in pairs], [here for _, here in pairs])
             if opened == kept and high == 0.0:
                 return 0.0, 0.0
             found_low, found_high = found_low * low, found_high * high

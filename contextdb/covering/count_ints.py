@@ -53,7 +53,7 @@ class Factor(dict[int, tuple[int, int, float, int]]):
     """A factor: groups of classes with the boxes that accept them and what they weigh; for each box, when asked, those that accept
     all that it accepts, those that accept some of it, the share that it accepts, and its mark."""
 
-    __slots__ = ("base", "free", "groups", "limits", "number", "salt", "total")
+    __slots__ = ("base", "free", "groups", "limits", "number", "of_cell", "salt", "total")
 
     def __init__(self, base: Base, number: int, groups: list[tuple[int, float]], salt: int) -> None:
         self.base, self.number, self.groups, self.salt = base, number, groups, salt
@@ -64,20 +64,25 @@ class Factor(dict[int, tuple[int, int, float, int]]):
             total += weight
         self.limits, self.total = base.all & ~everywhere, total
         self.free = everywhere, somewhere, 1.0, 0  # of a box that accepts everything
+        self.of_cell: dict[int, tuple[int, int, float, int]] = {}  # boxes of one cell share what is known of them
 
     def __missing__(self, box: int) -> tuple[int, int, float, int]:
         bit, around, meets, size = 1 << box, -1, 0, 0.0
         if not self.limits & bit:
             self[box] = self.free
             return self.free
+        cell = self.base.cells[self.number][self.base.boxes[box]]
+        if cell in self.of_cell:
+            self[box] = self.of_cell[cell]
+            return self[box]
         for boxes, weight in self.groups:
             if boxes & bit:
                 around &= boxes
                 meets |= boxes
                 size += weight
-        first, second = self.base.hashes[self.base.cells[self.number][self.base.boxes[box]]]
+        first, second = self.base.hashes[cell]
         mark = mixed(first ^ self.salt) << 64 | mixed(second + self.salt & WORD)
-        self[box] = found = around, meets, size / self.total, mark
+        self[box] = self.of_cell[cell] = found = around, meets, size / self.total, mark
         return found
 
     def inside(self, box: int) -> Factor:

@@ -32,6 +32,7 @@ if __package__ in (None, ""):
     sys.path[0] = str(ROOT)  # not this folder: its coverage.py is no package of that name
 
 SIZE = (2_000, 30)
+NARROW = (2_000, 20)
 SHAPE = "tree"
 WORK_OF_COUNT = 40_000_000
 N_CONTEXTS, N_MOMENTS, N_QUERIES = 100_000, 300_000, 100
@@ -113,10 +114,10 @@ def _tables() -> list[Any]:
     return [table.flat() for table in Project.load(ROOT / "tables").tables.values()]
 
 
-def _made() -> Any:
+def _made(shape: str = SHAPE, size: tuple[int, int] = SIZE) -> Any:
     from benchmarks.coverage_tables import made_table
 
-    return made_table(SHAPE, *SIZE)
+    return made_table(shape, *size)
 
 
 def _contexts(table: Any, n: int, folder: Path) -> list[dict[str, Any]]:
@@ -284,6 +285,9 @@ WORK: dict[str, Callable[[Path], Work]] = {
     "compile, with the making of the table": _compile,
     "coverage of the samples": partial(_coverage, _tables, WORK_OF_COUNT),
     "coverage, 2,000 x 30, a hundredth of the work": partial(_coverage, lambda: [_made()], WORK_OF_COUNT // 100),
+    "coverage, 2,000 x 20, few cells": partial(_coverage, lambda: [_made("few", NARROW)], WORK_OF_COUNT),
+    "coverage, 2,000 x 20, many cells": partial(_coverage, lambda: [_made("many", NARROW)], WORK_OF_COUNT),
+    "coverage, 2,000 x 20, a tree": partial(_coverage, lambda: [_made("tree", NARROW)], WORK_OF_COUNT),
     "check of the samples": partial(_check, _tables),
     "check, 2,000 x 30": partial(_check, lambda: [_made()]),
     "telemetry, contexts that come back": partial(_observe, "skewed"),

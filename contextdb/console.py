@@ -26,6 +26,10 @@ PREPARING = "Preparing the loops, for the first time on this machine only"
 """What is reported while numba compiles loops."""
 LOOPS = logging.getLogger("contextdb.loops")
 """Where the library reports it: silent by itself; commands show it on standard error."""
+READING = logging.getLogger("contextdb.reading")
+"""Where it reports that it reads a large file, likewise."""
+MANY_BYTES = 1_000_000
+"""A table's file of so many bytes is large: to read it may take a second."""
 
 STYLES = {"bold": "1", "dim": "2", "red": "31", "green": "32", "yellow": "33", "cyan": "36"}
 
@@ -141,6 +145,12 @@ def announce(loop: Any) -> None:
         LOOPS.info(PREPARING)
 
 
+def announce_file(file: str, n_bytes: int) -> None:
+    """Say that a file is read, where it is large."""
+    if n_bytes >= MANY_BYTES:
+        READING.info("reading %s, %.1f MB", printable(file), n_bytes / 1e6)
+
+
 class _OnStandardError(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         print(f"contextdb: {record.getMessage()}", file=sys.stderr, flush=True)
@@ -148,12 +158,14 @@ class _OnStandardError(logging.Handler):
 
 @contextmanager
 def announced() -> Iterator[None]:
-    """Show on standard error that loops are compiled."""
-    handler, level = _OnStandardError(), LOOPS.level
-    LOOPS.addHandler(handler)
-    LOOPS.setLevel(logging.INFO)
+    """Show on standard error that loops are compiled, and that large files are read."""
+    handler, levels = _OnStandardError(), {logger: logger.level for logger in (LOOPS, READING)}
+    for logger in levels:
+        logger.addHandler(handler)
+        logger.setLevel(logging.INFO)
     try:
         yield
     finally:
-        LOOPS.setLevel(level)
-        LOOPS.removeHandler(handler)
+        for logger, level in levels.items():
+            logger.setLevel(level)
+            logger.removeHandler(handler)

@@ -15,6 +15,7 @@ from running import ROOT, run
 from contextdb.commands.progress import log_of
 from contextdb.console import LOOPS, PREPARING, announce, announced
 from contextdb.covering import count, coverage
+from contextdb.tables.project import load_table
 from contextdb.tables.table import Table
 
 
@@ -33,6 +34,30 @@ def test_of_a_small_table_only_the_preparing_is_told(capsys: pytest.CaptureFixtu
     log(10, 1000, PREPARING)
     log(10, 1000, "Counting contexts")
     assert capsys.readouterr().err == f"contextdb: measuring t: 0 % {PREPARING}\n"
+
+
+def test_work_that_gets_long_is_told_of_however_small_the_table(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    seconds = iter([100.0, 101.0, 102.0, 102.5, 103.0])
+    monkeypatch.setattr("contextdb.commands.progress.process_time", lambda: next(seconds))
+    log = log_of("measuring t", False)
+    assert log is not None
+    for tenth in range(1, 5):
+        log(100 * tenth, 1000, "Counting contexts")
+    assert capsys.readouterr().err.splitlines() == [f"contextdb: measuring t: {n} % Counting contexts" for n in (30, 40)]
+
+
+@pytest.mark.parametrize("command", ["query", "check", "compile", "coverage"])
+def test_a_command_says_that_it_reads_a_large_file_and_the_library_is_silent(
+    command: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    (tmp_path / "t.csv").write_text("Asset,up\na,True\n", encoding="utf-8")
+    assert "reading" not in run(command, tmp_path / "t.csv").err
+    monkeypatch.setattr("contextdb.console.MANY_BYTES", 10)
+    assert f"contextdb: reading {tmp_path / 't.csv'}, 0.0 MB\n" in run(command, tmp_path / "t.csv").err
+    load_table(tmp_path / "t.csv")
+    assert capsys.readouterr().err == ""
 
 
 @pytest.mark.parametrize("command", ["check", "coverage"])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import zipfile
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from contextdb.errors import TableError
+from contextdb.files import csv_source
 from contextdb.files.csv_faults import MOST_CHARACTERS, MOST_FAULTS
 from contextdb.files.csv_source import Source, read_csv
 
@@ -56,6 +58,17 @@ def fault_of(raw: bytes | str) -> str:
 def test_a_file_reads_as_pythons_csv_module_reads_it(file: CsvFile):
     _, rows = read(file.text)
     assert rows == as_python_reads(file.text) == [file.names, *file.rows]
+
+
+@given(csv_files())
+def test_texts_and_codes_are_the_same_by_polars_and_by_python(file: CsvFile):
+    def columns() -> list[tuple[str, tuple[str, ...], str, list[int]]]:
+        return [(c.name, c.texts, str(c.codes.dtype), c.codes.tolist()) for c in read_csv(file.text.encode(), "t.csv")[1]]
+
+    assert len(file.rows) <= csv_source.FEW_ROWS
+    by_python = columns()
+    with patch.object(csv_source, "FEW_ROWS", -1):
+        assert columns() == by_python
 
 
 @given(st.text(st.sampled_from('ab,"\n\r '), max_size=24))

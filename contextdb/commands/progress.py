@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from time import process_time
 from typing import Protocol
 
 from contextdb.console import PREPARING, printable
@@ -16,6 +17,8 @@ MANY_CELLS = 20_000
 """From so many cells of a table on, a log gets lines of progress."""
 MANY_BYTES = 10_000_000
 """From so many bytes of recorded contexts on, a log gets lines of progress."""
+LONG_S = 2.0
+"""Other work gets them when the process has worked so long on it, in seconds of CPU: columns of a thousand tags have few cells."""
 MANY_CLIPS = 100
 """From so many clips on, a log gets lines of progress."""
 
@@ -54,15 +57,16 @@ def bar(label: str, is_long: bool) -> Iterator[Bar | None]:
 
 def log_of(label: str, is_long: bool) -> Bar | None:
     """Tells of the work in plain lines on standard error, one for each tenth that is done; None for a terminal. Where the work is
-    not long it tells only that loops are compiled."""
+    not long, and does not get long, it tells only that loops are compiled."""
     if sys.stderr.isatty():
         return None
     told: set[object] = set()
+    start = process_time()
 
     def tell(done: float, total: int, part: str = "") -> None:
         tenth = int(10 * done / total) if total else 0
         mark = part if part == PREPARING else tenth
-        if mark not in told and (mark == PREPARING or is_long):
+        if mark not in told and (mark == PREPARING or is_long or process_time() - start > LONG_S):
             told.add(mark)
             print(f"contextdb: {label}: {10 * tenth} % {part}".rstrip(), file=sys.stderr, flush=True)
 

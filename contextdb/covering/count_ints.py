@@ -53,7 +53,7 @@ class Factor(dict[int, tuple[int, int, float, int]]):
     """A factor: groups of classes with the boxes that accept them and what they weigh; for each box, when asked, those that accept
     all that it accepts, those that accept some of it, the share that it accepts, and its mark."""
 
-    __slots__ = ("base", "free", "groups", "limits", "number", "salt", "total")
+    __slots__ = ("base", "free", "groups", "limits", "number", "of_cell", "salt", "total")
 
     def __init__(self, base: Base, number: int, groups: list[tuple[int, float]], salt: int) -> None:
         self.base, self.number, self.groups, self.salt = base, number, groups, salt
@@ -64,20 +64,25 @@ class Factor(dict[int, tuple[int, int, float, int]]):
             total += weight
         self.limits, self.total = base.all & ~everywhere, total
         self.free = everywhere, somewhere, 1.0, 0  # of a box that accepts everything
+        self.of_cell: dict[int, tuple[int, int, float, int]] = {}  # boxes of one cell share what is known of them
 
     def __missing__(self, box: int) -> tuple[int, int, float, int]:
         bit, around, meets, size = 1 << box, -1, 0, 0.0
         if not self.limits & bit:
             self[box] = self.free
             return self.free
+        cell = self.base.cells[self.number][self.base.boxes[box]]
+        if cell in self.of_cell:
+            self[box] = self.of_cell[cell]
+            return self[box]
         for boxes, weight in self.groups:
             if boxes & bit:
                 around &= boxes
                 meets |= boxes
                 size += weight
-        first, second = self.base.hashes[self.base.cells[self.number][self.base.boxes[box]]]
+        first, second = self.base.hashes[cell]
         mark = mixed(first ^ self.salt) << 64 | mixed(second + self.salt & WORD)
-        self[box] = found = around, meets, size / self.total, mark
+        self[box] = self.of_cell[cell] = found = around, meets, size / self.total, mark
         return found
 
     def inside(self, box: int) -> Factor:
@@ -172,8 +177,9 @@ class Count:
             size, hashes = 1.0, 0
             for factor in own:
                 _, _, share, mark = factor[box]
-                size *= share
-                hashes ^= mark
+                if mark:
+                    size *= share
+                    hashes ^= mark
             stir = stirred.get(hashes)
             if stir is None:
                 stir = stirred[hashes] = mixed(hashes >> 64) << LANE | mixed((hashes & WORD) ^ GOLDEN)
@@ -240,11 +246,16 @@ class Count:
     ) -> Shares:
         """The product of what two sets of boxes leave that share no factor."""
         found_low = found_high = 1.0
+        listing = 2 + (len(own) * part.n_words >> 4)
         for opened in (kept, rest):
-            self.work += 2 + (len(own) * part.n_words >> 4)
-            pairs = [(factor, limited & opened) for factor, limited in zip(own, limits, strict=True) if limited & opened]
+            self.work += listing
             held = [box for box in boxes if opened >> box[0] & 1]
-            low, high = self._left(part, depth, opened, held, [factor for factor, _ in pairs], [limited for _, limited in pairs])
+            if len(held) == 1:  # as `_left` would do
+                self.work += part.n_words >> 2
+                low = high = 1.0 - held[0][1]
+            else:
+                pairs = [(factor, here) for factor, limited in zip(own, limits, strict=True) if (here := limited & opened)]
+                low, high = self._left(part, depth, opened, held, [factor for factor, _ in pairs], [here for _, here in pairs])
             if opened == kept and high == 0.0:
                 return 0.0, 0.0
             found_low, found_high = found_low * low, found_high * high

@@ -20,6 +20,8 @@ from contextdb.files.csv_records import CR, LF, Positions, Records, fields_of, f
 from contextdb.files.strangers import UTF8_BOM, line_of, require_text, seems_json
 
 MOST_NAME_FAULTS = 20
+FEW_ROWS = 1000
+"""Columns of so few rows are gone through by Python, which takes less time than to ask polars about a column."""
 FEW_TEXTS = 8
 """A column of so many distinct texts is compared with each of them, which is faster than looking each row up."""
 
@@ -156,6 +158,9 @@ def _name_faults(names: Sequence[str]) -> Iterator[Fault]:
 
 def text_columns(frame: pl.DataFrame, names: Sequence[str]) -> list[TextColumn]:
     """Columns of strings, null meaning empty, as their distinct texts in the order they first appear, and their codes."""
+    if frame.height <= FEW_ROWS:
+        columns = zip(names, frame.iter_columns(), strict=True)
+        return [TextColumn.of(name, (text or "" for text in column.to_list())) for name, column in columns]
     numbers = [str(i) for i in range(frame.width)]  # polars would read a name such as "*" or "^a$" as a pattern
     frame = frame.rename(dict(zip(frame.columns, numbers, strict=True)))
     if with_nulls := [column for column in numbers if frame[column].null_count()]:

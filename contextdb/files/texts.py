@@ -10,6 +10,7 @@ import numpy as np
 import polars as pl
 
 from contextdb.columns import TextColumn
+from contextdb.console import announce_file
 from contextdb.disk import TABLE_SUFFIXES, path_in_quotes, read_bytes, write_atomic
 from contextdb.errors import ContextDBError, Fault, FileError, Place, TableError, in_quotes, nearest
 from contextdb.files.csv_rewrite import Origin, rewritten
@@ -47,6 +48,7 @@ def read_texts(path: str | Path) -> tuple[AnySource, list[TextColumn]]:
     """
     raw = read_bytes(path)
     _require_table(path)
+    announce_file(str(path), len(raw))
     return texts_of(raw, str(path))
 
 

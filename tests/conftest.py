@@ -31,6 +31,7 @@ if providers := sys.modules.get("hypothesis.internal.conjecture.providers"):
     # Hypothesis draws constants of the modules that happen to be loaded; then one seed would draw other examples in each worker.
     vars(providers)["is_local_module_file"] = lambda path: False
 
+gc.disable()
 if SIZE not in SIZES:
     raise pytest.UsageError(f"EXAMPLES={SIZE}: expected one of {', '.join(SIZES)}")
 settings.register_profile(
@@ -74,7 +75,7 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """What is loaded and collected by now stays: the search for what can be thrown away leaves it out, and comes less often."""
-    gc.collect()
+    """What is loaded and collected by now stays: the search for what can be thrown away begins here, and comes less often."""
     gc.freeze()
+    gc.enable()
     gc.set_threshold(5000)

@@ -129,7 +129,7 @@ def test_a_folder_that_others_may_open_is_refused_in_c(game: Path, meeting: Path
 
 
 def test_a_listener_that_stalls_stops_no_game_in_c(game: Path, meeting: Path):
-    with running(game, 3000) as process:
+    with running(game, 1500) as process:
         name = named(process)
         path = meeting / f"{name}.sock"
         stalled = [connected(path) for _ in range(2)]

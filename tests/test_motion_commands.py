@@ -12,6 +12,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from motion_project import MARKS, STICK, TABLE, session_folder, work_in_copy
 from running import Result, run
 
 from contextdb.commands.motion_stage import read_tags
@@ -19,99 +20,22 @@ from contextdb.motion import (
     MotionConfig,
     TagFilter,
     load_bvh,
-    make_clip,
     open_or_build,
     poses_of,
     query_from,
     steady_path,
-    write_bvh,
 )
 from contextdb.motion.trace.session import Trace
 from contextdb.motion.trace.what_if import run_again
 from contextdb.tables.project import Project
 
-TOML = """
-[tables.moves]
-policy = "collect"
-[conditions.gait]
-type = "enum"
-values = ["Idle", "Walk", "Run"]
-[conditions.speed]
-type = "number"
-[conditions.style]
-type = "enum"
-values = ["normal", "tired"]
-[features.loco]
-rate = 30.0
-channels = [
-  { type = "position", bone = "LeftFoot" },
-  { type = "velocity", bone = "Hips" },
-  { type = "trajectory", what = "position", at = [0.33, 1.0] },
-  { type = "trajectory", what = "speed", along = [1.0] },
-]
-[databases.all]
-table = "moves"
-clips = "clips/*.bvh"
-features = "loco"
-markup = "clips/marks.csv"
-[databases.tired]
-table = "moves"
-clips = "clips/*_tired.bvh"
-features = "loco"
-[databases.free]
-clips = "clips/jog.bvh"
-features = "loco"
-[selectors.moves]
-order = [{ database = "tired", threshold = 0.05 }, { database = "all" }]
-[selectors.free]
-order = [{ database = "free" }]
-[controllers.player]
-selector = "moves"
-variation_within = 0.01
-"""
-TABLE = """Asset,gait,speed,style
-idle,Idle,0..0.3,Any
-walk,Walk,0.3..2,Any
-walk_tired,Walk,0.3..2,tired
-jog,Run,1..5,normal ~0.75
-swim,Idle,9,Any
-"""
-MARKS = "asset,tag,from,to,value\nwalk*,Move.Walk,,,\njog,Move.Run,,,\nidle,Looping,,,\nwalk,DoNotChoose,0,0.5,\n"
-STICK = """time_s,speed_mps,turn_dps,gait,speed,style
-10,0,0,Idle,0,normal
-11,1.3,0,Walk,1.2,normal
-12.5,2.5,20,Run,2,normal
-14,1.2,,Walk,1.2,tired
-15,0,,Idle,0,tired
-"""
 WALK = ("gait=Walk", "speed=1.2", "style=tired")
 
 
-@pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A project in game/, its features computed, and a recorded session."""
-    folder = tmp_path_factory.mktemp("made")
-    (folder / "game" / "clips").mkdir(parents=True)
-    (folder / "game" / "contextdb.toml").write_text(TOML, encoding="utf-8")
-    (folder / "game" / "moves.csv").write_text(TABLE, encoding="utf-8")
-    (folder / "game" / "clips" / "marks.csv").write_text(MARKS, encoding="utf-8")
-    for name in ("idle", "walk", "walk_tired", "jog"):
-        write_bvh(make_clip(name).clip, folder / "game" / "clips" / f"{name}.bvh", digits=3)
-    (folder / "stick.csv").write_text(STICK, encoding="utf-8")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(folder)
-        assert run("motion", "run", "game", "player", "stick.csv", "--out", "session.parquet").code == 0
-    return folder
-
-
 @pytest.fixture(autouse=True)
-def here(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A working folder with a copy of it all."""
-    folder = tmp_path / "here"
-    shutil.copytree(made, folder)
-    monkeypatch.chdir(folder)
-    monkeypatch.setenv("COLUMNS", "100")
-    return folder
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working folder with a project in game/, its features computed, and a recorded session."""
+    return work_in_copy(session_folder(), tmp_path, monkeypatch)
 
 
 def motion(*arguments: str, code: int = 0) -> Result:

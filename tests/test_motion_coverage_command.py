@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
 from html.parser import HTMLParser
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import pytest
+from motion_project import work_in_copy, write_project
 from running import Result, run
 
 import contextdb as cdb
@@ -70,13 +70,7 @@ CLIPS = {
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A project in game/, with its features computed."""
     folder = tmp_path_factory.mktemp("made")
-    clips = folder / "game" / "clips"
-    clips.mkdir(parents=True)
-    (folder / "game" / "contextdb.toml").write_text(TOML, encoding="utf-8")
-    (folder / "game" / "moves.csv").write_text(TABLE, encoding="utf-8")
-    (clips / "marks.csv").write_text(MARKS, encoding="utf-8")
-    for name, recipe in CLIPS.items():
-        write_bvh(make_clip(recipe).clip, clips / f"{name}.bvh", digits=3)
+    write_project(folder / "game", TOML, TABLE, MARKS, CLIPS)
     result = run("motion", "coverage", folder / "game", "--json", "-o", folder / "before.json")
     assert result.code == 0, result.err
     return folder
@@ -85,11 +79,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(autouse=True)
 def here(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A working folder with a copy of it all."""
-    folder = tmp_path / "here"
-    shutil.copytree(made, folder)
-    monkeypatch.chdir(folder)
-    monkeypatch.setenv("COLUMNS", "80")
-    return folder
+    return work_in_copy(made, tmp_path, monkeypatch, 80)
 
 
 def covered(*arguments: str, code: int = 0) -> Result:

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import json
 import shutil
+from functools import cache
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
+from motion_project import session_folder, work_in_copy
 from running import Result, run
-from test_motion_commands import MARKS, STICK, TABLE, TOML
 
-from contextdb.motion import Trace, make_clip, measure, write_bvh
+from contextdb.motion import Trace, measure
 
 OUTPUT = "[output.player]\nfoot_lock = false\n"
 """So that feet slide."""
@@ -35,33 +36,25 @@ KEYS = [
 ]
 
 
-@pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A project in game/, a session of it, its poses, and its measures."""
-    folder = tmp_path_factory.mktemp("made")
-    (folder / "game" / "clips").mkdir(parents=True)
-    (folder / "game" / "contextdb.toml").write_text(f"{TOML}{OUTPUT}", encoding="utf-8")
-    (folder / "game" / "moves.csv").write_text(TABLE, encoding="utf-8")
-    (folder / "game" / "clips" / "marks.csv").write_text(MARKS, encoding="utf-8")
-    for name in ("idle", "walk", "walk_tired", "jog"):
-        write_bvh(make_clip(name).clip, folder / "game" / "clips" / f"{name}.bvh", digits=3)
-    (folder / "stick.csv").write_text(STICK, encoding="utf-8")
+@cache
+def _made() -> Path:
+    folder = session_folder(OUTPUT, "--poses", "poses.npz")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        result = run("motion", "run", "game", "player", "stick.csv", "--out", "session.parquet", "--poses", "poses.npz")
-        assert result.code == 0
         (folder / "before.json").write_text(run("motion", "measure", "session.parquet", "--json").out, encoding="utf-8")
     return folder
+
+
+@pytest.fixture(scope="session")
+def made() -> Path:
+    """A project in game/, a session of it, its poses, and its measures."""
+    return _made()
 
 
 @pytest.fixture(autouse=True)
 def here(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A working folder with a copy of it all."""
-    folder = tmp_path / "here"
-    shutil.copytree(made, folder)
-    monkeypatch.chdir(folder)
-    monkeypatch.setenv("COLUMNS", "100")
-    return folder
+    return work_in_copy(made, tmp_path, monkeypatch)
 
 
 def measured(*arguments: str, code: int = 0) -> Result:

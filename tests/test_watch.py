@@ -13,12 +13,14 @@ from pathlib import Path
 
 import polars as pl
 import pytest
+from strategies import IS_FULL
 
 import contextdb as cdb
 from contextdb.compiled.table import data_of
 from contextdb.tables.watching import Snapshot, Watch, table_like
 from contextdb.tables.watching.rest import Rest
 
+N_SAVED = 1000 if IS_FULL else 250
 STEP_S = 0.06
 """Between two looks; the files have to rest for 0.1 s, so a change is taken at the third look that sees it."""
 
@@ -360,7 +362,7 @@ def asking(ask: Callable[[], None], n_threads: int = 4) -> Iterator[Callable[[],
     assert raised == []
 
 
-def test_every_answer_is_of_one_good_version_while_a_thousand_are_saved_and_four_threads_ask(tmp_path: Path):
+def test_every_answer_is_of_one_good_version_while_hundreds_are_saved_and_four_threads_ask(tmp_path: Path):
     rng = random.Random(3)
     time_s = 0.0
 
@@ -393,7 +395,7 @@ def test_every_answer_is_of_one_good_version_while_a_thousand_are_saved_and_four
         seen.add(int(version[1:]))
 
     with asking(ask) as let_ask:
-        for version in range(1, 1001):
+        for version in range(1, N_SAVED + 1):
             files, kind = whole(version), rng.choice(["good", "good", "broken", "half"])
             if kind == "half":  # stopped in the middle of a file, perhaps at the end of a line, and gone on with in time
                 cut = rng.randrange(len(files["a.csv"]))
@@ -415,9 +417,9 @@ def test_every_answer_is_of_one_good_version_while_a_thousand_are_saved_and_four
                 assert watch["a"].fallback == f"v{latest}", "a good version that rested for the stated delay is at hand"
             elif n_looks == 3:
                 assert watch.faults
-    assert latest > 900
+    assert latest > 0.9 * N_SAVED
     assert len(seen) > 10
-    assert len(errors) > 50
+    assert len(errors) > 0.05 * N_SAVED
 
 
 def test_a_thread_of_the_watch_swaps_in_by_itself_until_it_is_closed(tmp_path: Path):

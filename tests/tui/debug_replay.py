@@ -15,13 +15,13 @@ from typing import Any
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parent), str(HERE.parent.parent)]
 
+from motion_project import write_project  # noqa: E402
 from replay import SCROLL_BAR, Replay, ReplayError, Step, _text  # noqa: E402
 from running import run  # noqa: E402
 from terminal import drive, screen_text  # noqa: E402
-from test_motion_commands import MARKS, STICK, TABLE, TOML  # noqa: E402
 
 from contextdb.commands.motion_replay_command import databases_of  # noqa: E402
-from contextdb.motion import Trace, make_clip, write_bvh  # noqa: E402
+from contextdb.motion import Trace  # noqa: E402
 from tui.debug.app import DebugApp  # noqa: E402
 from tui.debug.recording import Recording  # noqa: E402
 
@@ -47,12 +47,7 @@ class DebugReplay(Replay):
         return [opening, *drive(app, lambda pilot: self._all(pilot, rest), (columns, rows))]
 
     def _make(self) -> None:
-        clips = self._path("clips")
-        clips.mkdir(parents=True)
-        for name, text in (("contextdb.toml", TOML), ("moves.csv", TABLE), ("clips/marks.csv", MARKS), ("../stick.csv", STICK)):
-            self._path(name).write_text(text, encoding="utf-8")
-        for name in ("idle", "walk", "walk_tired", "jog"):
-            write_bvh(make_clip(name).clip, clips / f"{name}.bvh", digits=3)
+        write_project(self.folder / "game")
         session = ("player", str(self.folder / "stick.csv"), "--out", str(self.folder / "session.parquet"))
         assert run("motion", "run", str(self.folder / "game"), *session).code == 0
         self.at_first = {"contextdb.toml": _text(self._path("contextdb.toml"))}

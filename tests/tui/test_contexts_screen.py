@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import polars as pl
@@ -257,6 +259,32 @@ def test_a_recording_is_searched(table: Table, recording: Path):
     text = pressed(app, *"speed=24999.")
     assert "filter: speed=24999.▏ 8 found" in text
     assert app.chosen == 199_992
+
+
+def test_while_a_recording_is_searched_what_was_shown_before_stays(table: Table, recording: Path):
+    contexts, may_go_on = ContextList.open(recording, table), threading.Event()
+    app, search = Stage(table, contexts=contexts), type(contexts.rows).search
+
+    def held(rows, text):
+        may_go_on.wait(60)
+        yield from search(rows, text)
+
+    async def script(pilot) -> tuple[list[str], list[str], int | None]:
+        before = shown(screen_text(app))
+        await pilot.press(*"speed=24999.")
+        app.dialog.lines.refresh()
+        await pilot.pause()
+        during = shown(screen_text(app))
+        assert app.dialog.chosen == 0
+        may_go_on.set()
+        await app.workers.wait_for_complete()
+        await pilot.pause()
+        return before, during, app.dialog.chosen
+
+    with patch.object(type(contexts.rows), "search", held):
+        before, during, chosen = drive(app, script)
+    assert during == before
+    assert chosen == 199_992
 
 
 def test_a_moment_of_a_recording_is_saved_among_the_cases_of_the_table(table: Table, recording: Path, tmp_path: Path):

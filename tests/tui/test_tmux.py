@@ -15,10 +15,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from test_motion_commands import MARKS, STICK, TABLE, TOML
+from motion_project import session_folder
 from textual.binding import Binding
 
-from contextdb.motion import make_clip, write_bvh
 from tui.commands import COMMANDS
 from tui.widgets.editing.keys import KEYS as CELL_KEYS
 
@@ -239,19 +238,9 @@ def test_each_key_that_the_help_names_does_in_a_terminal_what_it_says(recorded, 
 
 
 def test_the_debugger_works_in_a_real_terminal(terminal):
-    game = terminal.folder / "game"
-    (game / "clips").mkdir(parents=True)
-    (game / "contextdb.toml").write_text(TOML, encoding="utf-8")
-    (game / "moves.csv").write_text(TABLE, encoding="utf-8")
-    (game / "clips" / "marks.csv").write_text(MARKS, encoding="utf-8")
-    (terminal.folder / "stick.csv").write_text(STICK, encoding="utf-8")
-    for name in ("idle", "walk", "walk_tired", "jog"):
-        write_bvh(make_clip(name).clip, game / "clips" / f"{name}.bvh", digits=3)
-    run = "-m contextdb motion run game player stick.csv --out s.parquet"
-    subprocess.run([sys.executable, *run.split()], cwd=terminal.folder, env={**os.environ, "PYTHONPATH": str(ROOT)}, check=True)
-
-    terminal.start("screen-256color", program="-m contextdb motion debug s.parquet")
-    terminal.wait("s.parquet  1.00 s of 5.00", "▶ walk", "1 of 5 may play", "F1 Help")
+    shutil.copytree(session_folder(), terminal.folder, dirs_exist_ok=True)
+    terminal.start("screen-256color", program="-m contextdb motion debug session.parquet")
+    terminal.wait("session.parquet  1.00 s of 5.00", "▶ walk", "1 of 5 may play", "F1 Help")
     terminal.keys("]")
     terminal.wait("tick 61", "walk has ended: walk at 1.03 s")
     terminal.keys("Home", "Right")

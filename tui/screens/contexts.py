@@ -261,8 +261,8 @@ class ContextsDialog(Dialog[Loaded]):
         elif self.contexts.cases:
             self.found = next(self.contexts.rows.search(event.text))
             self._show_lines()
-        else:
-            self.found = np.empty(0, np.int64)
+        else:  # what was shown before stays until something is found
+            self.is_busy = ""
             self._search(self.contexts, event.text)
 
     @work(thread=True, group="search", exclusive=True, exit_on_error=False)
@@ -286,7 +286,7 @@ class ContextsDialog(Dialog[Loaded]):
             self.app.call_from_thread(call, *arguments)
 
     def _found(self, found: NDArray[np.int64], busy: str) -> None:
-        at = self.lines.index if self.found is not None and len(self.found) else 0
+        at = self.lines.index if self.is_busy else 0
         self.found, self.is_busy = found, busy
         self._show_lines(at)
 

@@ -26,7 +26,7 @@ import contextdb
 from contextdb import bitmask
 from contextdb.cells.domains import Domain
 from contextdb.compiled import batch, kernels
-from contextdb.compiled.classes import FLAT_BYTES
+from contextdb.compiled.classes import FLAT_BYTES, TagMasks
 from contextdb.compiled.many import ManyMatches
 from contextdb.compiled.table import CompiledTable
 from contextdb.errors import ContextError
@@ -377,6 +377,17 @@ def test_a_frame_with_a_column_of_nulls_has_missing_facts():
     frame = pl.DataFrame({"speed": pl.Series([None, None], dtype=pl.Null), "state": ["Ground", "Air"], "steps": [1, 2]})
     assert [rows.tolist() for rows in TABLE.query_many(frame, unknown="any").lists()] == [[0], [1]]
     assert [rows.tolist() for rows in TABLE.query_many(frame, unknown="never").lists()] == [[], [1]]
+
+
+@pytest.mark.parametrize("kind", [list, set, frozenset, tuple])
+def test_each_distinct_set_of_tags_is_looked_up_once(kind: type):
+    compiled = Table.from_columns({"Asset": ["a", "b"], "x": ["+InAir", "not +Move"]}, {"x": {"type": "tags"}}).compile()
+    given = [kind(tags) for tags in (["InAir"], ["Move"], []) * 100]
+    codes = TagMasks.codes
+    with mock.patch.object(TagMasks, "codes", autospec=True, side_effect=codes) as asked:
+        many = compiled.query_many({"x": [*given, None]}, unknown="never")
+        assert asked.call_count <= 5  # three sets, and what a missing fact is
+    assert [rows.tolist() for rows in many.lists()] == [*([0, 1], [], [1]) * 100, []]
 
 
 def test_tags_may_be_lists_sets_or_texts():

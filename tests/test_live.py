@@ -152,6 +152,28 @@ def test_facts_that_the_table_does_not_ask_for_are_passed_over_by_live_and_updat
     assert set(live.facts) == set(FACTS)
 
 
+@pytest.mark.parametrize("n_updates", [1, LOOKED_AT * 3], ids=["at once", "with facts that move"])
+@pytest.mark.parametrize("wrong", [{"state": "Water"}, {"heading": "north"}, {"state": []}])
+def test_an_update_with_a_wrong_fact_sets_none(wrong: dict[str, object], n_updates: int):
+    live = TABLE.compile().live(FACTS)
+    for i in range(n_updates):
+        live.update({"speed": float(i)})
+        live.matches()
+    live.update(FACTS)
+    with pytest.raises(ContextError):
+        live.update({"speed": 6.0, **wrong})
+    assert live.facts == FACTS
+    assert live.matches().assets == ["run", "fall"]
+
+
+def test_an_update_with_a_wrong_fact_leaves_missing_facts_missing():
+    live = TABLE.compile().live({"state": "Air"}, unknown="any")
+    rows = told(live.matches())
+    with pytest.raises(ContextError, match="heading"):
+        live.update([("speed", 2.0), ("heading", "north")])
+    assert (dict(live), told(live.matches())) == ({"state": "Air"}, rows)
+
+
 def test_a_fact_that_is_set_to_none_or_deleted_is_missing():
     live = TABLE.compile().live(FACTS)
     live["speed"] = None

@@ -22,8 +22,9 @@ from numpy.typing import NDArray
 from contextdb import bitmask
 from contextdb.bitmask import Rows, Words, read_only
 from contextdb.cells.angles import wrap_angles
+from contextdb.cells.conditions import Condition
 from contextdb.cells.fact_columns import listed, plain_numbers
-from contextdb.cells.facts import Unknown, check_mode, missing_error, misspelt, read_fact
+from contextdb.cells.facts import Fact, Unknown, check_mode, missing_error, misspelt, read_fact
 from contextdb.cells.mirroring import in_mirror
 from contextdb.cells.sets import Cell
 from contextdb.compiled.batch_columns import (
@@ -54,6 +55,8 @@ FEW_BOUNDS = 100
 """So few bounds are compared with every fact sooner than each fact is bisected among them."""
 THREAD_CONTEXTS = 8192
 """Fewer contexts than this are not worth a second thread."""
+SEVERAL = (list, set, tuple)
+"""What has no hash, or may hold what has none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -352,7 +355,8 @@ class _Encoder:
         missing = first + masks.codes(None)[0]
         facts = np.full(self.n_contexts, np.nan) if given is None else plain_numbers(given, condition.domain.type)
         if facts is None:
-            facts = np.array([np.nan if f is None else f for f in self._read_each(at, given)], np.float64)
+            distinct, numbers = self._read_each(at, given)
+            facts = np.array([np.nan if f is None else f for f in distinct], np.float64)[numbers]
         elif condition.domain.type.is_circular:
             facts = wrap_angles(facts)
         if self.unknown == "error":
@@ -381,30 +385,36 @@ class _Encoder:
         """Codes int32 [slots, N] read fact by fact, -1 where missing."""
         n_slots = self.compiled.stack.n_slots[at]
         absent = tuple(3 * i - 1 for i in range(n_slots))  # -1 once the slot's start is removed
-        facts = [None] * self.n_contexts if given is None else self._read_each(at, given)
+        facts, numbers = ([None], np.zeros(self.n_contexts, np.int64)) if given is None else self._read_each(at, given)
         if self.unknown == "error":
-            self._refuse_missing(self.compiled.conditions[at].name, np.flatnonzero([f is None for f in facts]))
+            self._refuse_missing(self.compiled.conditions[at].name, np.flatnonzero(np.array([f is None for f in facts])[numbers]))
         codes = [absent if f is None else masks.codes(f) for f in facts]
-        return np.array(codes, np.int32).reshape(self.n_contexts, n_slots).T
+        return np.ascontiguousarray(np.array(codes, np.int32).reshape(len(codes), n_slots).T[:, numbers])
 
-    def _read_each(self, at: int, given: Any) -> list[Any]:
-        """Every fact in canonical form; each distinct one is read once."""
+    def _read_each(self, at: int, given: Any) -> tuple[list[Any], NDArray[np.int64]]:
+        """The distinct facts in canonical form, each of them read once, and which of them each context has."""
         condition = self.compiled.conditions[at]
-        known: dict[object, Any] = {}
-        facts = []
+        known: dict[object, int] = {}
+        facts: list[Any] = []
+        numbers: list[int] = []
         for row, value in enumerate(listed(given)):
-            key = (type(value), tuple(value)) if isinstance(value, (list, set, tuple)) else (type(value), value)
             try:
-                if key not in known:
-                    known[key] = read_fact(value, condition)
+                key = (type(value), tuple(value) if isinstance(value, SEVERAL) else value)
+                number = known.get(key)
+                if number is None:
+                    facts.append(self._read_one(row, value, condition))
+                    number = known[key] = len(known)
             except (ContextError, TypeError) as error:
                 raise _in_context(error, row, condition.name, value) from None
-            if isinstance(known[key], Cell):
-                place = Place(row=row, column=condition.name)
-                mend = "to query these contexts one by one: query(facts)"
-                raise ContextError(Fault("a set of values is for one query at a time.", "one value in each context", mend, place))
-            facts.append(known[key])
-        return facts
+            numbers.append(number)
+        return facts, np.array(numbers, np.int64)
+
+    def _read_one(self, row: int, value: object, condition: Condition) -> Fact:
+        fact = read_fact(value, condition)
+        if isinstance(fact, Cell):
+            mend = "to query these contexts one by one: query(facts)"
+            raise ContextError(Fault("a set of values is for one query at a time.", "one value in each context", mend))
+        return fact
 
     def _refuse_missing(self, name: str, rows: NDArray[np.int64]) -> None:
         if len(rows):

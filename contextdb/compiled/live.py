@@ -176,20 +176,26 @@ class LiveContext(MutableMapping[str, object]):
         return self._facts[name]
 
     def update(self, facts: Mapping[str, object] | Iterable[tuple[str, object]]) -> None:  # type: ignore[override]
-        """Set several facts; facts that the table does not use are ignored, as in `query`.
+        """Set several facts, all or none; facts that the table does not use are ignored, as in `query`.
 
         Raises
         ------
         ContextError
-            A name looks like the misspelt name of a condition whose fact is not given: then none is set. Names that the
-            project declares belong to other tables and are not misspelt. Or a value is wrong; the message names the fact.
+            A name looks like the misspelt name of a condition whose fact is not given; names that the project declares belong to
+            other tables and are not misspelt. Or a value is wrong; the message names the fact. Then none is set.
         """
         if type(facts) is not dict:
             facts = as_context(facts)
         if not self._known.issuperset(facts):
             facts = self._own(facts)
-        for name, value in facts.items():
-            self[name] = value
+        before, put = self._told.copy(), self.__setitem__
+        try:
+            for name, value in facts.items():
+                put(name, value)
+        except BaseException:
+            for name in facts:
+                put(name, before[name])
+            raise
 
     def _own(self, facts: Mapping[str, object]) -> dict[str, object]:
         """Of some facts those that the table asks for; raises ContextError where another is very likely one of them, misspelt."""

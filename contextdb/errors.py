@@ -7,7 +7,8 @@ correction, in that order. One error reports all faults of a file together. In b
     ├── CellError       a cell whose text does not follow the grammar (ValueError)
     ├── SchemaError     contextdb.toml has an invalid setting (ValueError)
     ├── TableError      a table file that cannot be read, or rows that cannot be compiled (ValueError)
-    │   └── NoSuchTable     a name that no table has (KeyError)
+    │   ├── NoSuchTable     a name that no table has (KeyError)
+    │   └── NoSuchRow       a row that a table to be changed does not have; a NoSuchPlace too (IndexError)
     ├── FileError       the disk refuses: missing, not permitted, full, changed under us (OSError)
     ├── ContextError    facts that a query cannot use, or an invalid argument (ValueError)
     │   ├── NoSuchFact      a fact that does not exist (KeyError)
@@ -151,6 +152,10 @@ class NoSuchOutput(ContextError, KeyError):
 
 class NoSuchPlace(ContextError, IndexError):
     """A row that a table does not have, or a place that an answer does not have."""
+
+
+class NoSuchRow(TableError, NoSuchPlace):
+    """A row that a table does not have of which another is to be made."""
 
 
 class WrongType(ContextError, TypeError):

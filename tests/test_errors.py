@@ -25,6 +25,7 @@ BUILT_IN: dict[type[ContextDBError], tuple[type[Exception], ...]] = {
     errors.SchemaError: (ValueError,),
     errors.TableError: (ValueError,),
     errors.NoSuchTable: (ValueError, KeyError),
+    errors.NoSuchRow: (ValueError, IndexError),
     errors.FileError: (OSError,),
     errors.ContextError: (ValueError,),
     errors.NoSuchFact: (ValueError, KeyError),

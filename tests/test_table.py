@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,7 +12,7 @@ from hypothesis import strategies as st
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import NUMBER
 from contextdb.columns import TextColumn
-from contextdb.errors import SchemaError, TableError
+from contextdb.errors import NoSuchPlace, NoSuchRow, SchemaError, TableError
 from contextdb.schema.settings import EMPTY, TableSettings
 from contextdb.tables.condition_column import MOST_MENDS
 from contextdb.tables.table import Table
@@ -163,6 +165,24 @@ def test_a_table_after_any_edits_is_the_table_of_its_texts(edits):
     if not edited.faults:
         for context in ({"speed": s, "state": t} for s in (0, 5, 6) for t in ("Ground", "Air")):
             assert edited.compile().query(context) == anew.compile().query(context)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda table: table.with_cell(2, "n", "5"),
+        lambda table: table.with_cell(-1, "n", "5"),
+        lambda table: table.with_cells([(0, "n", "5"), (99, "n", "5")]),
+        lambda table: table.with_rows(3, [{}]),
+        lambda table: table.with_rows_taken([0, 2]),
+    ],
+)
+def test_a_row_that_is_not_there_cannot_be_changed_and_is_an_index_error_too(change: Callable[[Table], Table]):
+    with pytest.raises(NoSuchRow, match="there is no row") as caught:
+        change(faulty({"Asset": ["a", "b"], "n": ["1", "5"]}))
+    assert isinstance(caught.value, IndexError)
+    assert isinstance(caught.value, TableError)
+    assert isinstance(caught.value, NoSuchPlace)
 
 
 # ---- faults

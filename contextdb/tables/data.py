@@ -31,7 +31,7 @@ from contextdb.compiled.outputs import Outputs
 from contextdb.compiled.pick_columns import PickColumns, specificities
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.compiled.ways import Ways
-from contextdb.errors import ContextError, Fault, Place, TableError, in_quotes, nearest, plural, some
+from contextdb.errors import ContextError, Fault, NoSuchRow, Place, TableError, in_quotes, nearest, plural, some
 from contextdb.expressions.rules import WhenColumn
 from contextdb.files.texts import AnySource
 from contextdb.schema.settings import EMPTY, Schema, TableSettings, plain_names
@@ -166,8 +166,8 @@ class TableData(Unchanging):
 
         Raises
         ------
-        TableError
-            There is no such row or column.
+        NoSuchRow, TableError
+            There is no such row, or no such column.
         ContextError
             An edit is no row, column and text.
         """
@@ -179,7 +179,7 @@ class TableData(Unchanging):
             row, name, text = require_whole(edit[0], "row"), edit[1], require_text(edit[2], "text")
             at = self._column_at(name)
             if not 0 <= row < self.n_rows:
-                raise TableError(self._no_row(row))
+                raise NoSuchRow(self._no_row(row))
             changed[at] = changed.get(at, self.columns[at]).with_text(row, text)
         return with_columns(self, [changed.get(i, c) for i, c in enumerate(self.columns)], self.origin)
 
@@ -188,8 +188,8 @@ class TableData(Unchanging):
 
         Raises
         ------
-        TableError
-            There is no such column, or no such place.
+        NoSuchRow, TableError
+            There is no such place, or no such column.
         ContextError
             A row is no mapping of columns to texts.
         """
@@ -199,7 +199,7 @@ class TableData(Unchanging):
                 self._column_at(name)
                 require_text(text, f"the text for {in_quotes(name)}")
         if not 0 <= at <= self.n_rows:
-            raise TableError(Fault(f"there is no row {at}.", f"0 to {self.n_rows}, to insert before"))
+            raise NoSuchRow(Fault(f"there is no row {at}.", f"0 to {self.n_rows}, to insert before"))
         columns = [c.with_inserted(at, [row.get(c.name, "") for row in rows]) for c in self.columns]
         return with_columns(self, columns, np.insert(self.origin, at, np.full(len(rows), -1)))
 
@@ -208,7 +208,7 @@ class TableData(Unchanging):
 
         Raises
         ------
-        TableError
+        NoSuchRow
             There is no such row.
         ContextError
             `rows` are no whole numbers.
@@ -216,7 +216,7 @@ class TableData(Unchanging):
         numbers = rows.tolist() if isinstance(rows, np.ndarray) else require_many(rows, "rows", "a list of row numbers")
         numbers = [require_whole(row, "a row of rows") for row in require_many(numbers, "rows", "a list of row numbers")]
         if wrong := [row for row in numbers if not 0 <= row < self.n_rows]:
-            raise TableError(self._no_row(wrong[0]))
+            raise NoSuchRow(self._no_row(wrong[0]))
         taken = np.array(numbers, np.int64)
         return with_columns(self, [c.with_rows_taken(taken) for c in self.columns], self.origin[taken])
 

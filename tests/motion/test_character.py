@@ -312,6 +312,17 @@ def test_what_a_character_is_made_of_shows_itself_in_one_line():
     assert re.fullmatch(r"<PoseBank: \d+ ranges, [\d,]+ frames, 19 joints>", repr(one.stream.rig))
 
 
+def test_what_a_character_gives_and_is_put_back_to_shows_itself_in_one_short_line():
+    one = character()
+    assert repr(one.state) == "<CharacterState: plays nothing, at x 0, z 0>"
+    [updated] = driven(one, 1)
+    assert repr(updated) == '<Updated: tick 0, plays "idle", at x 0, z 0>'
+    assert (repr(one.state), repr(one.stream.state)) == (
+        '<CharacterState: plays "idle", at x 0, z 0>',
+        '<PoseState: plays "idle", 19 joints>',
+    )
+
+
 def test_what_is_refused_leaves_the_character_where_it_stood():
     one = character()
     driven(one, 30)

@@ -14,6 +14,7 @@ from contextdb.motion import (
     Channel,
     Clip,
     FeatureSchema,
+    MotionConfig,
     Skeleton,
     features_of,
     make_clip,
@@ -221,7 +222,13 @@ def test_schemas_can_be_compared_whatever_their_functions():
     schema = FeatureSchema.from_dict("new", NEW)
     assert schema.with_functions({"reach": len}) == schema
     assert hash(schema.with_functions({"reach": len})) == hash(schema)
-    assert "function" not in repr(FeatureSchema.from_dict("x", POINTS)).replace("function=None", "")
+
+
+def test_a_schema_and_a_configuration_show_themselves_in_one_short_line():
+    schema = FeatureSchema.from_dict("new", NEW)
+    assert repr(schema) == '<FeatureSchema "new": 29 features, 8 channels, 30 frames a second>'
+    config = MotionConfig({"new": schema}, file="contextdb.toml")
+    assert repr(config) == "<MotionConfig: 1 schema, 0 databases, 0 selectors, 0 controllers>"
 
 
 def test_all_faults_of_a_schema_are_reported_together():

@@ -46,7 +46,7 @@ from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.asked import OfValid
 from contextdb.motion.selection.controller import Clock, Controller
 from contextdb.motion.selection.controller_state import ControllerState
-from contextdb.motion.selection.decision import Decision, Playing
+from contextdb.motion.selection.decision import Decision, Playing, plays
 from contextdb.motion.selection.root_motion import NO_MOTION, RootMotion
 from contextdb.motion.selection.variation import Rng
 from contextdb.motion.trace.session import MOST, Trace
@@ -176,7 +176,7 @@ class Character:
     __copy__ = copy
 
     def __repr__(self) -> str:
-        return f"<Character: plays {'nothing' if self.playing is None else in_quotes(self.playing.asset)}>"
+        return f"<Character: {plays(self.playing)}>"
 
     def record(self, n_candidates: int = 12, *, most: int = MOST) -> Trace:
         """Keep the decisions from now on, the last `most`, in the trace that is given back, with so many candidates of each search.

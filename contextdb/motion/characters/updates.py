@@ -17,7 +17,7 @@ from contextdb.motion.output.stream import Pose, PoseState
 from contextdb.motion.records import quickly_made
 from contextdb.motion.selection.asked import Among, OfPenalties, OfTags, OfValid
 from contextdb.motion.selection.controller_state import ControllerState
-from contextdb.motion.selection.decision import Decision
+from contextdb.motion.selection.decision import Decision, plays
 from contextdb.motion.selection.root_motion import RootMotion
 
 UNKNOWN = ("error", "any", "never")
@@ -36,6 +36,10 @@ class Options(TypedDict, total=False):
     interrupt: bool
 
 
+def _at(body: Steered) -> str:
+    return f"at x {body.position[0]:.6g}, z {body.position[1]:.6g}"
+
+
 @dataclass(frozen=True, slots=True)
 class CharacterState:
     """Where a character is: all that its next pose depends on beside what it is then given. Never changed, so it may be kept."""
@@ -45,6 +49,9 @@ class CharacterState:
     trail: tuple[tuple[float, Place3], ...]
     controller: ControllerState
     stream: PoseState | None
+
+    def __repr__(self) -> str:
+        return f"<CharacterState: {plays(self.controller.playing)}, {_at(self.body)}>"
 
 
 @quickly_made
@@ -71,6 +78,9 @@ class Updated:
     decision: Decision
     poses: Sequence[Pose | None] = ()
     at: int = 0
+
+    def __repr__(self) -> str:
+        return f"<Updated: tick {self.decision.tick:,}, {plays(self.decision.playing)}, {_at(self.body)}>"
 
     @property
     def path(self) -> Trajectory:

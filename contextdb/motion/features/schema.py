@@ -13,7 +13,8 @@ from functools import cached_property
 import numpy as np
 
 from contextdb.cells.arguments import require_mapping, require_text
-from contextdb.errors import Fault, SchemaError, in_quotes, nearest, shown, some
+from contextdb.cells.notebook import one_line
+from contextdb.errors import Fault, SchemaError, in_quotes, nearest, plural, shown, some
 from contextdb.files.toml_shapes import Mapped, Section
 from contextdb.files.toml_text import as_toml, what
 from contextdb.motion.clips.foot_bones import FootBones, Pair
@@ -89,6 +90,10 @@ class FeatureSchema:
     toes: Pair | None = None
     permutations: Permutations | None = None
     functions: Mapping[str, CustomFunction] = field(default_factory=dict, compare=False, repr=False)
+
+    def __repr__(self) -> str:
+        sizes = plural(self.n_features, "feature"), plural(len(self.channels), "channel"), f"{self.rate:g} frames a second"
+        return one_line("FeatureSchema", self.name, ", ".join(sizes))
 
     @cached_property
     def feature_names(self) -> tuple[str, ...]:

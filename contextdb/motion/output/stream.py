@@ -23,7 +23,7 @@ from contextdb.motion.output.pipeline import Pipeline, Rows
 from contextdb.motion.output.pose import Pose
 from contextdb.motion.output.settings import PoseSettings
 from contextdb.motion.output.stages import STRIDE, TURN, Ground
-from contextdb.motion.selection.decision import Decision, Playing
+from contextdb.motion.selection.decision import Decision, Playing, plays
 
 __all__ = ["Pose", "PoseState", "PoseStream"]
 
@@ -49,6 +49,9 @@ class PoseState:
     n_joints: int
     playing: Playing | None
     row: Floats
+
+    def __repr__(self) -> str:
+        return f"<PoseState: {plays(self.playing)}, {plural(self.n_joints, 'joint')}>"
 
     @property
     def warp(self) -> tuple[float, float]:

@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 from numpy.typing import ArrayLike
 
 from contextdb.cells.arguments import as_number, require_kind
-from contextdb.errors import Fault, MotionError, QueryError, in_quotes
+from contextdb.errors import Fault, MotionError, QueryError
 from contextdb.motion import arguments
 from contextdb.motion.clips.ground_place import GroundPlace, OfBody, place_of
 from contextdb.motion.clips.quaternions import Floats
@@ -35,7 +35,7 @@ from contextdb.motion.selection.asked import Among, Asked, OfPenalties, OfTags, 
 from contextdb.motion.selection.choice import Choice
 from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.controller_state import ControllerState
-from contextdb.motion.selection.decision import Action, Decision, Playing, Recorder
+from contextdb.motion.selection.decision import Action, Decision, Playing, Recorder, plays
 from contextdb.motion.selection.guards import Held
 from contextdb.motion.selection.history import played_spans, remembered
 from contextdb.motion.selection.inputs import Inputs
@@ -150,7 +150,7 @@ class Controller:
     __copy__ = copy
 
     def __repr__(self) -> str:
-        return f"<Controller: plays {'nothing' if self.playing is None else in_quotes(self.playing.asset)}>"
+        return f"<Controller: {plays(self.playing)}>"
 
     @property
     def state(self) -> ControllerState:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Protocol
 
+from contextdb.errors import in_quotes
 from contextdb.motion.clips.ground_place import GroundPlace
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.records import quickly_made
@@ -44,6 +45,11 @@ class Playing:
     time_s: float
     mirrored: bool
     permutation_s: float | None = None
+
+
+def plays(playing: Playing | None) -> str:
+    """What plays, in the line by which things show themselves."""
+    return "plays nothing" if playing is None else f"plays {in_quotes(playing.asset)}"
 
 
 class Action(StrEnum):

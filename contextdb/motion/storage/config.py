@@ -17,7 +17,8 @@ from pathlib import Path
 from typing import TypedDict, TypeVar, Unpack
 
 from contextdb.cells.arguments import require_mapping, require_text
-from contextdb.errors import ClipError, Fault, FileError, MotionError, Place, SchemaError, in_quotes, nearest, shown, some
+from contextdb.cells.notebook import one_line
+from contextdb.errors import ClipError, Fault, FileError, MotionError, Place, SchemaError, in_quotes, nearest, plural, shown, some
 from contextdb.files.toml_shapes import Mapped, Section
 from contextdb.files.toml_text import as_toml, what
 from contextdb.motion.clips.clip import Clip
@@ -65,6 +66,11 @@ class MotionConfig:
     controllers: Mapping[str, tuple[str, ControllerSettings]] = field(default_factory=dict)
     output: Mapping[str, PoseSettings] = field(default_factory=dict)
     file: str | None = None
+
+    def __repr__(self) -> str:
+        sections = ("schema", self.features), ("database", self.databases), ("selector", self.selectors)
+        counts = [plural(len(own), noun) for noun, own in (*sections, ("controller", self.controllers))]
+        return one_line("MotionConfig", "", ", ".join(counts))
 
     @classmethod
     def from_dict(cls, mapping: Mapped, *, tables: Collection[str] | None = None, file: str | None = None) -> MotionConfig:

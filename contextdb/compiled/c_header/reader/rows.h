@@ -68,22 +68,26 @@ static inline cdb_status cdb_penalties(const cdb_table *table, const cdb_column 
 #define CDB_DISABLED (-2)           /* the row is disabled */
 
 /* Why a row is not valid: the numbers of the conditions whose cells fail, CDB_RULE and CDB_DISABLED, as many as have room in
- * `reasons`; *n is their whole number, 0 for a valid row. */
+ * `reasons`; *n is their whole number, 0 for a valid row. With CDB_UNKNOWN_ERROR a row that an open rule alone keeps from being
+ * valid is a fault, as in a query. */
 static inline cdb_status cdb_why_not(const cdb_table *table, const cdb_column *columns, const cdb_schema *schema, cdb_fact *facts,
     cdb_unknown unknown, int64_t row, int *reasons, size_t room, size_t *n, cdb_fault *fault)
 {
     size_t i;
+    int truth, is_open;
     cdb_status status;
     *n = 0;
     if (row < 0 || (uint64_t)row >= table->n_rows) return cdbi_fault(fault, CDB_TOO_SHORT, "the table has no such row", -1, "");
     status = cdbi_ready(table, columns, schema, facts, unknown, fault);
     if (status != CDB_OK) return status;
+    truth = cdbi_rule(table, schema, facts, (size_t)row);
+    is_open = truth < 0 && unknown == CDB_UNKNOWN_ERROR;
     for (i = 0; i < schema->n_conditions + 2; i++) {
         int reason = (int)i;
         if (i < schema->n_conditions) {
             if (cdbi_accepts(&columns[i], &schema->conditions[i], &facts[i], unknown, (size_t)row, table->n_words)) continue;
         } else if (i == schema->n_conditions) {
-            if (!cdbi_is_out(cdbi_rule(table, schema, facts, (size_t)row), unknown)) continue;
+            if (!cdbi_is_out(truth, unknown)) continue;
             reason = CDB_RULE;
         } else {
             if (table->enabled[row / 64] >> row % 64 & 1) continue;
@@ -91,6 +95,9 @@ static inline cdb_status cdb_why_not(const cdb_table *table, const cdb_column *c
         }
         if (*n < room) reasons[*n] = reason;
         *n += 1;
+        is_open = is_open && reason == CDB_RULE;
     }
-    return cdbi_fault(fault, CDB_OK, "", -1, "");
+    if (*n == 0 || !is_open) return cdbi_fault(fault, CDB_OK, "", -1, "");
+    *n = 0;
+    return cdbi_open_rule(fault, table, (size_t)row);
 }

@@ -142,12 +142,13 @@ class BatchMatches(ManyMatches):
         values = self.values
         out = np.empty((len(values.slots) + len(self.numbers.slots), self.n_contexts), np.int32)
         for slot, classes, start, absent in zip(values.slots, values.classes, values.starts, values.absent, strict=True):
-            out[slot] = np.where(classes < 0, absent, classes + start)
+            np.add(classes, np.int32(start), out=out[slot])
+            out[slot][classes < 0] = absent
         if kernels := load_kernels(self._work):
             kernels.encode(self.numbers.facts, *self.numbers.arrays, self.numbers.slots, out)
-        else:
-            _encode_with_numpy(self.numbers, out)
-        return np.ascontiguousarray(out.T)
+            return np.ascontiguousarray(out.T)
+        _encode_with_numpy(self.numbers, out)
+        return out.T
 
     def __len__(self) -> int:
         return self.n_contexts
@@ -227,7 +228,7 @@ class BatchMatches(ManyMatches):
         stack, enabled = self.compiled.stack, self.compiled.enabled
         if kernels := load_kernels(self._work):
             out = np.empty((len(codes), len(enabled)), np.uint64)
-            kernels.batch_masks(codes, stack.masks, stack.n_plain, stack.wide, enabled, out)
+            kernels.batch_masks(np.ascontiguousarray(codes), stack.masks, stack.n_plain, stack.wide, enabled, out)
             return out
         return self.compiled.stack.masks_of(codes, self.compiled.enabled)
 
@@ -439,15 +440,16 @@ def _in_context(error: Exception, row: int, name: str, value: object) -> Context
 def _encode_with_numpy(numbers: Numbers, out: Codes) -> None:
     for j, facts in enumerate(numbers.facts):
         own = numbers.bounds[numbers.edges[j] : numbers.edges[j + 1]]
-        classes = numbers.firsts[j] + _n_not_above(facts, own)
-        out[numbers.slots[j]] = np.where(np.isnan(facts), numbers.missing[j], classes)
+        classes = out[numbers.slots[j]]
+        np.add(_n_not_above(facts, own), np.int32(numbers.firsts[j]), out=classes, casting="same_kind")
+        classes[np.isnan(facts)] = numbers.missing[j]
 
 
-def _n_not_above(facts: NDArray[np.float64], bounds: NDArray[np.float64]) -> NDArray[np.int64]:
+def _n_not_above(facts: NDArray[np.float64], bounds: NDArray[np.float64]) -> NDArray[np.integer[Any]]:
     """How many of the ascending bounds are not above each fact; of a NaN any number."""
     if len(bounds) > FEW_BOUNDS:
         return np.searchsorted(bounds, facts, "right")
     found = np.zeros(len(facts), np.uint8)
     for bound in bounds:
         found += facts >= bound
-    return found.astype(np.int64)
+    return found

@@ -30,8 +30,10 @@ def uniform(seed: int, who: int, turn: int, depth: int) -> float:
 def uniforms(seed: int, who: NDArray[np.int64], turns: NDArray[np.int64], depth: int) -> NDArray[np.float64]:
     """The same for many characters: float64 [N]."""
     z = np.full(len(who), seed & _ALL, np.uint64)
-    for part in (who.astype(np.uint64), turns.astype(np.uint64), np.array([depth], np.uint64)):
-        z += (part + np.uint64(1)) * np.uint64(_STEP)
+    for part in (who.view(np.uint64), turns.view(np.uint64), np.array([depth], np.uint64)):
+        step = part + np.uint64(1)
+        step *= np.uint64(_STEP)
+        z += step
         z ^= z >> np.uint64(30)
         z *= np.uint64(_FIRST)
         z ^= z >> np.uint64(27)

@@ -61,8 +61,8 @@ class EvenChoosing:
             left = _unless_empty(left, valid & level)
         n_assets = len(self.of_asset) - 1
         for numbers in recent.T:
-            known = np.where((numbers < 0) | (numbers >= n_assets), n_assets, numbers)
-            left = _unless_empty(left & ~self.of_asset[known], left)
+            own = self.of_asset.take(np.minimum(numbers, n_assets), axis=0)  # -1 is the last one: none
+            left = _unless_empty(left & ~own, left)
         return left
 
     @staticmethod
@@ -92,10 +92,10 @@ def _places(words: Words, nth: NDArray[np.int64]) -> NDArray[np.int64]:
     """Which bit of each word is the nth that is set, from 0: halves are counted, and the one that holds it is gone into."""
     found, left = np.zeros(len(words), np.uint8), nth.astype(np.uint8)  # small: they stay in the fastest cache
     for half in _HALVES:
-        low = words & ((np.uint64(1) << half) - np.uint64(1))
-        n_low = np.bitwise_count(low)
+        n_low = np.bitwise_count(words & ((np.uint64(1) << half) - np.uint64(1)))
         is_above = np.asarray(left >= n_low)
         left -= n_low * is_above
-        found += np.uint8(half) * is_above
-        words = np.where(is_above, words >> half, low)
+        step = np.uint8(half) * is_above
+        found += step
+        words = words >> step  # what is above the half that was gone into stays: no count looks there again
     return found.astype(np.int64)

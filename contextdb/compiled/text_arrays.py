@@ -67,9 +67,12 @@ def _characters(texts: NDArray[Any]) -> NDArray[np.uint32]:
 
 
 def _padded(characters: NDArray[np.uint32], width: int, size: type[np.unsignedinteger[Any]]) -> NDArray[Any]:
-    padded, given = np.empty((len(characters), width), size), characters.shape[1]
-    padded[:, :given] = characters
-    padded[:, given:] = 0
+    padded, given = np.zeros((len(characters), width), size), characters.shape[1]
+    if given > len(characters):
+        padded[:, :given] = characters
+        return padded
+    for at in range(given):  # numpy is slow on many short rows
+        padded[:, at] = characters[:, at]
     return padded
 
 

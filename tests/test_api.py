@@ -10,6 +10,7 @@ import inspect
 import re
 import sys
 from collections.abc import Iterator, Mapping, MutableMapping, Sequence
+from enum import Enum
 from pathlib import Path
 from types import ModuleType
 from typing import get_type_hints
@@ -143,19 +144,40 @@ def names_said_of(name: str) -> set[str]:
 
 
 TYPES = [name for name in cdb.__all__ if isinstance(kind := getattr(cdb, name), type) and not issubclass(kind, Exception)]
-MOST_USED = ("Character", "Controller", "ControllerGroup", "Crowd", "Measures", "MotionDatabase", "PoseStream", "Steered", "Trace")
+OF_MOTION = [f"motion.{name}" for name in motion.__all__ if isinstance(kind := getattr(motion, name), type)]
+PLAIN = (MutableMapping, Sequence, str, int, Exception)
+"""Kinds whose own names are those of all of them."""
 
 
-@pytest.mark.parametrize("name", [*TYPES, *(f"motion.{name}" for name in MOST_USED)])
-def test_a_class_shows_the_names_of_the_page_and_no_others(name: str):
-    """What an editor offers after the dot; the names of mappings and sequences are those of all of them."""
+def unsaid_names(name: str) -> list[str]:
+    """What an editor offers after the dot of a class and the page does not say; of motion's records docstrings say the fields."""
     kind = value_of(name)
     assert isinstance(kind, type)
     fields = {field.name for field in dataclasses.fields(kind)} if dataclasses.is_dataclass(kind) else set()
     set_at_start = re.findall(r"^ +(self\.\w+.*?)(?::.*?)? = ", inspect.getsource(kind), re.MULTILINE)
     own = {*dir(kind), *fields, *re.findall(r"self\.(\w+)(?![\w.\[(])", " ".join(set_at_start))}
-    inherited = {*dir(MutableMapping)} if issubclass(kind, Mapping) else {*dir(Sequence)} if issubclass(kind, Sequence) else set()
-    assert sorted(each for each in own - inherited - names_said_of(name) if not each.startswith("_")) == []
+    inherited = {each for plain in PLAIN if issubclass(kind, Mapping if plain is MutableMapping else plain) for each in dir(plain)}
+    members = {*kind.__members__} if issubclass(kind, Enum) else set()
+    documented = {each for each in fields if name in OF_MOTION and re.search(rf"\b{each}\b", kind.__doc__ or "")}
+    said = inherited | members | documented | names_said_of(name)
+    return sorted(each for each in own - said if not each.startswith("_"))
+
+
+@pytest.mark.parametrize("name", [*TYPES, *OF_MOTION])
+def test_a_class_shows_the_names_of_the_page_and_no_others(name: str):
+    assert unsaid_names(name) == []
+
+
+FURTHER = PAGE.partition("## Further names of motion")[2].partition("\n## ")[0]
+
+
+@pytest.mark.parametrize("line", [line for line in FURTHER.splitlines() if line.startswith("| `")])
+def test_further_names_exist_and_have_a_docstring(line: str):
+    name, *further = CODE.findall(line)
+    for each in further:
+        value = value_of(f"{name}.{each}")
+        is_field = value is None or inspect.ismemberdescriptor(value)
+        assert is_field or inspect.getdoc(value), f"{name}.{each} has no docstring"
 
 
 def test_a_compiled_table_holds_nothing_else_that_is_public_and_takes_nothing():

@@ -28,7 +28,7 @@ LOOPS = logging.getLogger("contextdb.loops")
 """Where the library reports it: silent by itself; commands show it on standard error."""
 READING = logging.getLogger("contextdb.reading")
 """Where it reports that it reads a large file, likewise."""
-MANY_BYTES = 1_000_000
+MANY_BYTES = 2_000_000
 """A table's file of so many bytes is large: to read it may take a second."""
 
 STYLES = {"bold": "1", "dim": "2", "red": "31", "green": "32", "yellow": "33", "cyan": "36"}

@@ -48,9 +48,10 @@ def refusals(path: str = "t.csv") -> list[str]:
     """What a query says of a table that cannot be read; a check must say the same as findings, a compile as errors."""
     result = run("query", path, "speed=1")
     assert (result.code, result.out) == (2, "")
-    told = [line.removeprefix("contextdb: ") for line in result.err.splitlines()]
+    lines = [line.removeprefix("contextdb: ") for line in result.err.splitlines()]
+    told = [line for line in lines if not line.startswith("reading ")]  # as is said of large files
     checked = run("check", path, "--json")
-    assert (checked.code, checked.err) == (1, "")
+    assert (checked.code, len(checked.err.splitlines())) == (1, len(lines) - len(told))
     findings = [f for f in checked.json["findings"] if f["level"] == "error"]
     assert sorted(f["message"] for f in findings) == sorted(_unplaced(line, f) for line, f in zip(told, findings, strict=True))
     compiled = run("compile", path, "-o", "build/")

@@ -257,7 +257,7 @@ def test_a_table_that_is_not_here_is_noted_once_and_lost_lines_are_counted():
     changes = Changes({"x": own}, False)
     header = {"line": "tables", "tables": {"y": {"rows": 1}, "x": {"rows": 1, "version": "0" * 64}}}
     unknown, version = changes.of(header).notes
-    assert unknown == '"y" is no table of yours: it is not asked.'
+    assert unknown == '"y" is not one of your tables, so it is not asked.'
     assert version.startswith('the game has another version of "x": 00000000, yours is ')
     assert changes.of(header).notes == []
     assert changes.of({"line": "lost", "count": 2}).notes == ["2 lines lost: the game told more than could be sent."]

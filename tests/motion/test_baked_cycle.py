@@ -74,5 +74,5 @@ def test_a_mesh_or_a_file_that_does_not_fit_is_refused(tmp_path):
         motion.baked_cycle(CYCLE, 1)
     with pytest.raises(FileError, match=r"ends in \.npz"):
         motion.write_arrays(BAKED, tmp_path / "walk.txt")
-    with pytest.raises(ContextError, match="no array of numbers"):
+    with pytest.raises(ContextError, match="not an array of numbers"):
         motion.write_arrays({"x": [object()]}, tmp_path / "walk.npz")

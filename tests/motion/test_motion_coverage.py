@@ -217,7 +217,7 @@ def test_transitions_without_a_clip_are_told_by_names(names: list[str], pattern:
 
 @pytest.mark.parametrize("pattern", ["", "{from}", "{from}{to}", "{to}_to_{from}", "{from}_{to}_{to}", "{from}_{from}_{to}"])
 def test_a_pattern_without_both_places_is_refused(pattern: str):
-    with pytest.raises(MotionError, match="no pattern of transitions"):
+    with pytest.raises(MotionError, match="not a pattern of transitions"):
         transitions_of(["a_to_b"], pattern)
 
 

@@ -88,7 +88,7 @@ def test_facts_that_no_condition_is_about_are_sent_where_json_has_a_word_for_the
 
 @pytest.mark.parametrize("sent", [{"cell": 3}, {"number": "1"}, {"number": "inf", "cell": "x"}, [1], {"x": "y"}, {}])
 def test_what_is_no_fact_is_refused(sent: object):
-    with pytest.raises(ValueError, match="no fact"):
+    with pytest.raises(ValueError, match="not a fact"):
         given_fact(sent)
 
 
@@ -102,7 +102,7 @@ ASK = {"line": "ask", "t": 1, "who": None, "table": "x", "facts": {}, "rows": "0
         (b"{", "not JSON"),
         (b"[" * 100_000, "not JSON"),
         (b"\xff", "not JSON"),
-        (b"[]", "no object"),
+        (b"[]", "not a JSON object"),
         (b"{}", '"line" is missing'),
         (b'{"line":3}', '"line" is missing'),
         (json.dumps(ASK | {"rows": "xyz"}).encode(), "hexadecimal"),

@@ -61,7 +61,7 @@ def test_a_folder_of_another_user_is_refused(meeting: Path, monkeypatch: pytest.
 def test_a_link_in_place_of_the_folder_is_refused(meeting: Path, tmp_path: Path):
     tmp_path.chmod(0o700)
     meeting.symlink_to(tmp_path)
-    with pytest.raises(cdb.FileError, match="is no folder"):
+    with pytest.raises(cdb.FileError, match="is not a folder"):
         cdb.link("game")
 
 
@@ -266,7 +266,7 @@ def test_a_game_that_hangs_up_in_the_middle_of_a_line_is_gone(meeting: Path):
 @pytest.mark.parametrize(
     ("sent", "why"),
     [
-        (b'{"line":"end"}\n', "no header"),
+        (b'{"line":"end"}\n', "not the header"),
         (b"GET / HTTP/1.1\r\n", "cannot be read"),
         (b'{"line":"header","format":9,"game":"x","pid":1,"tables":{}}\n', "format 9"),
         (b"x" * (1 << 21), "does not end"),

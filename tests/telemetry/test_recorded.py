@@ -150,7 +150,7 @@ def test_of_many_damaged_lines_some_are_told_and_how_many_more(file: Path):
 
 @pytest.mark.parametrize("first", ["", '{"a":1}', '{"line":"end"}', "speed,gait\n1,Walk", "PK\x03\x04"])
 def test_what_is_no_recording_is_refused(tmp_path: Path, first: str):
-    with pytest.raises(cdb.TableError, match=r"m\.jsonl, line 1: this is no recording of a link"):
+    with pytest.raises(cdb.TableError, match=r"m\.jsonl, line 1: this is not a recording of a link"):
         read_contexts(written(tmp_path / "m.jsonl", first), table())
 
 

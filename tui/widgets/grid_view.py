@@ -21,6 +21,7 @@ from textual.strip import Strip
 
 from contextdb.schema.shapes import CHANCE
 from tui.contrast import readable
+from tui.drawn import SameWidths
 from tui.model.alignment import MOST_ALIGNED, indented
 from tui.model.layout import COMPACT, MOST_TEXTS, WIDEST, Layout, fitted_width, layout, name_lines, name_width
 from tui.model.sheet import Sheet
@@ -364,8 +365,8 @@ class GridView(ScrollView, inherit_bindings=False):
         return segments[0].style or style
 
     def get_line_filters(self) -> Sequence[LineFilter]:
-        """None: each style is filtered once, in place of every cell of every line."""
-        return ()
+        """What texts ask for; each style is filtered once, in place of every cell of every line."""
+        return [one for one in super().get_line_filters() if isinstance(one, SameWidths)]
 
     def _fit(self) -> None:
         rows, total = len(self.sheet.view), self.grid_layout.extent

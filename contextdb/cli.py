@@ -14,10 +14,12 @@ from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from importlib import import_module
+from pathlib import Path
 from types import ModuleType
 from typing import IO, Any, NoReturn
 
 from contextdb.console import ExitCode, drop_output, printable
+from contextdb.disk import unnameable
 from contextdb.disk.together import UnfinishedWarning
 from contextdb.errors import ContextDBError, Fault, Place, in_quotes, nearest, some
 
@@ -163,8 +165,7 @@ def _main(given: Sequence[str]) -> int:
     except UnicodeEncodeError as error:
         if error.encoding != sys.getfilesystemencoding() or error.encoding == "utf-8":
             raise
-        found = f"files are named in {error.encoding} here, which has no {in_quotes(error.object[error.start : error.end])}."
-        return _failed(Fault(found, "an environment in UTF-8", "to set PYTHONUTF8=1", Place(error.object)))
+        return _failed(unnameable(error, Path(error.object)))
     except KeyboardInterrupt:
         print("contextdb: interrupted", file=sys.stderr)
         return ExitCode.INTERRUPTED

@@ -183,9 +183,24 @@ class QueryError(MotionError):
 
 
 def shown(text: str, most: int = SHOWN_CHARACTERS) -> str:
-    """Text as a message shows it: control characters escaped, the middle of a long text left out."""
+    """Text as a message shows it: control characters escaped, the middle of a long text left out.
+
+    An accent that stands after its letter as a character of its own is escaped too, so that "e\u0301" is told from "é".
+    """
     short = text if len(text) <= most else f"{text[: most - 20]} … ({len(text):,} characters)"
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in short)
+    if short.isascii() and short.isprintable():
+        return short
+    before = ("", *short)
+    loose = [False] * len(short) if unicodedata.is_normalized("NFC", short) else list(map(_is_loose, before, short))
+    return "".join(
+        c.encode("unicode_escape").decode("ascii") if is_loose or not c.isprintable() else c
+        for c, is_loose in zip(short, loose, strict=True)
+    )
+
+
+def _is_loose(before: str, character: str) -> bool:
+    """Whether a character is an accent of the one before it, or part of it, or would be another one when composed."""
+    return bool(unicodedata.combining(character)) or not unicodedata.is_normalized("NFC", before + character)
 
 
 def in_quotes(text: str, most: int = SHOWN_CHARACTERS) -> str:

@@ -86,8 +86,21 @@ def test_two_files_of_one_name_in_two_forms_are_refused(tmp_path):
         put(tmp_path, form)
     if len(list(tmp_path.iterdir())) < 2:
         pytest.skip("this disk has one of them only")
-    assert run("check", tmp_path).code == 1
-    assert "is also defined in" in run("coverage", tmp_path).err
+    checked = run("check", tmp_path, "--json")
+    assert checked.code == 1
+    assert "are one file on disks that ignore the Unicode form of names." in checked.out
+    said = run("coverage", tmp_path).err
+    assert 'is also defined in "' in said
+    assert said.count("o\\u0308v") == 1  # the second of the two alone
+
+
+def test_two_names_that_look_alike_are_shown_apart(tmp_path, monkeypatch):
+    put(tmp_path, "walk", "walk")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "walk.csv").write_text(f"Asset,{FORMS['NFC']},on\nwalk,0..5,True\n", encoding="utf-8")
+    said = run("query", "walk.csv", f"{FORMS['NFD']}=1", "on=true").err
+    assert r'there is no condition "mo\u0308ve\u0300s". Accepted: "mövès"' in said
+    assert r'Did you mean "mövès"?' in said
 
 
 # ---- capitals
@@ -194,15 +207,17 @@ def test_a_name_is_spelled_as_it_stands_there(wanted, present):
 
 
 @pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="files are named in UTF-8 whatever the environment says")
-def test_a_name_that_the_environment_cannot_write_is_an_error_and_no_traceback(tmp_path: Path):
-    (tmp_path / "contextdb.toml").write_text('[tables.trains]\nfile = "züge/trains.csv"\n', encoding="utf-8")
-    (tmp_path / "züge").mkdir()
-    (tmp_path / "züge/trains.csv").write_bytes(RAW)
-    plain = {**os.environ, "LC_ALL": "C", "PYTHONUTF8": "0"}
+@pytest.mark.parametrize(("command", "file"), [("check", "züge/trains.csv"), ("coverage", "züge.csv")])
+def test_a_name_that_the_environment_cannot_write_is_an_error_and_no_traceback(tmp_path: Path, command: str, file: str):
+    (tmp_path / "contextdb.toml").write_text(f'[tables.trains]\nfile = "{file}"\n', encoding="utf-8")
+    (tmp_path / file).parent.mkdir(exist_ok=True)
+    (tmp_path / file).write_bytes(RAW)
+    plain = {**os.environ, "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
     done = subprocess.run(
-        [sys.executable, "-m", "contextdb", "check", "."], cwd=tmp_path, env=plain, capture_output=True, encoding="utf-8"
+        [sys.executable, "-m", "contextdb", command, "."], cwd=tmp_path, env=plain, capture_output=True, encoding="utf-8"
     )
     assert done.returncode == 2
+    assert "codec" not in done.stderr
     assert done.stderr.startswith("contextdb: ")
     assert 'files are named in ascii here, which has no "ü". Accepted: an environment in UTF-8.' in done.stderr
     assert done.stderr.endswith("Try to set PYTHONUTF8=1.\n")

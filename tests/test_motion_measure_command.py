@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import shutil
 from functools import cache
 from pathlib import Path
@@ -13,7 +14,9 @@ import pytest
 from motion_project import session_folder, work_in_copy
 from running import Result, run
 
+from contextdb.errors import ContextError
 from contextdb.motion import Trace, measure
+from contextdb.report.measure_results import read_baseline
 
 OUTPUT = "[output.player]\nfoot_lock = false\n"
 """So that feet slide."""
@@ -145,6 +148,32 @@ def test_the_same_session_is_no_worse_than_its_baseline():
     assert measured("session.parquet", "--baseline", "before.json").lines[-1] == "kept  baseline: nothing is worse"
 
 
+@pytest.mark.parametrize("value", ["x", True, [1], {}, math.nan, math.inf, "gone"])
+def test_a_measure_of_the_baseline_that_is_no_number_is_refused_and_never_passed_over(here: Path, value: object):
+    document = json.loads((here / "before.json").read_text(encoding="utf-8"))
+    session = document["sessions"][0]
+    if value == "gone":
+        del session["jumps_per_s"]
+    else:
+        session["jumps_per_s"] = value
+    with pytest.raises(ContextError, match=r'b\.json: in the baseline "session\.parquet" has no number as "jumps_per_s"'):
+        read_baseline(json.dumps(document), "b.json")
+
+
+def test_a_baseline_that_was_merged_badly_is_refused_in_words(here: Path):
+    text = (here / "before.json").read_text(encoding="utf-8")
+    document = json.loads(text)
+    merged = text.replace("\n", "\n<<<<<<< HEAD\n", 1)
+    for wrong, said in (
+        (merged, "line 2 begins a conflict of git"),
+        ("[" * 100_000, "lists are nested too deeply"),
+        (text.replace('"updates": ', '"updates": ' + "1" * 400), "a number has 40"),
+        (json.dumps(document | {"sessions": document["sessions"] * 2}), '"session.parquet" is there twice'),
+    ):
+        with pytest.raises(ContextError, match=said):
+            read_baseline(wrong, "b.json")
+
+
 def test_what_got_worse_than_the_baseline_fails_and_is_told(here: Path):
     document = json.loads((here / "before.json").read_text(encoding="utf-8"))
     now = document["sessions"][0]["jumps_per_s"]
@@ -189,7 +218,10 @@ def test_the_output_of_the_controller_says_how_poses_are_made(here: Path):
         (["poses.npz", "--poses", "poses.npz"], "poses.npz: --poses goes with a session, and these are poses."),
         (["session.parquet", "--controller", "nobody"], "there is no [controllers.nobody]"),
         (["session.parquet", "--project", "nowhere"], "nowhere"),
-        (["session.parquet", "--baseline", "stick.csv"], "stick.csv: the baseline is not a report of measures."),
+        (
+            ["session.parquet", "--baseline", "stick.csv"],
+            "stick.csv: the baseline is not a report of measures: line 1 is no JSON: Expecting value at character 1.",
+        ),
         (["session.parquet", "--baseline", "other.json"], 'other.json: the baseline has no session "session.parquet".'),
         (["session.parquet", "--baseline", "newer.json"], 'newer.json: the baseline has format "2"; this version reads format 1.'),
         (["poses.npz", "--max-path", "1"], "--max-path cannot be judged: the session does not say where the game had the body."),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from datetime import time
+from datetime import date, datetime, time
 from decimal import Decimal
 
 import numpy as np
@@ -61,6 +61,8 @@ def test_values_become_the_texts_of_cells():
             "g": pl.Series([0.1, 16777216.0, None, 3.3], dtype=pl.Float32),
             "h": [["CB", "FS"], ["Half Back"], None, ["Any", 'say "hi"', "5"]],
             "i": [None, None, None, None],
+            "j": [date(2026, 1, 31), None, date(1, 1, 1), date(9999, 12, 31)],
+            "k": pl.Series([datetime(2026, 1, 31), None, datetime(1700, 1, 1), datetime(2200, 12, 31)], dtype=pl.Datetime("ns")),
         }
     ) == [
         ["x", "", "", "20, 9.99"],
@@ -72,6 +74,8 @@ def test_values_become_the_texts_of_cells():
         ["0.1", "16777216.0", "", "3.3"],
         ["CB FS", '"Half Back"', "", '"Any" "say ""hi""" "5"'],
         ["", "", "", ""],
+        ["2026-01-31", "", "0001-01-01", "9999-12-31"],
+        ["2026-01-31", "", "1700-01-01", "2200-12-31"],
     ]
 
 
@@ -110,6 +114,14 @@ def test_every_column_of_a_type_that_no_cell_has_is_refused_with_what_it_is():
     accepted = "Accepted: strings, categories, bools, numbers, dates, and lists of strings. Try to write it as strings."
     assert messages[0] == f't.parquet, column "when": the column is of type Time. {accepted}'
     assert [m.split('"')[1] for m in messages] == ["when", "who", "raw", "list", "deep"]
+
+
+def test_a_time_of_day_and_a_time_zone_which_no_date_has_are_refused():
+    noon = [datetime(2026, 1, 31), None, datetime(2026, 1, 31, 12)]
+    first, second = faults_of(parquet({"a": noon, "b": pl.Series(noon).dt.replace_time_zone("UTC")}))
+    accepted = "Accepted: days: dates, or midnights without a time zone. Try to write it as dates or strings."
+    assert first == f't.parquet, column "a": the column has times of day. {accepted}'
+    assert second == f't.parquet, column "b": the column has a time zone. {accepted}'
 
 
 def test_a_list_that_is_empty_or_has_a_null_is_refused():
@@ -184,6 +196,8 @@ def test_without_an_edit_the_same_bytes_are_written():
         (pl.Series([1.5, 2.5], dtype=pl.Float32), "0.1", pytest.approx(0.1)),
         ([["x"], ["y"]], 'CB "Half Back"', ["CB", "Half Back"]),
         ([["x"], ["y"]], "Any", None),
+        ([datetime(2026, 1, 31)] * 2, "2026-02-01", datetime(2026, 2, 1)),
+        (pl.Series([datetime(2026, 1, 31)] * 2, dtype=pl.Datetime("ns")), "Any", None),
     ],
 )
 def test_a_column_keeps_its_type_where_the_new_text_fits(values, text: str, value: object):
@@ -204,6 +218,7 @@ def test_a_column_keeps_its_type_where_the_new_text_fits(values, text: str, valu
         (pl.Series([1.5, 2.5], dtype=pl.Float32), "0.123456789", "2.5"),
         ([1.5, 2.5], "20, 9.99", "2.5"),
         ([["x"], ["y"]], "not CB", "y"),
+        ([datetime(2026, 1, 31)] * 2, "2026-02-01..", "2026-01-31"),
         ([["x"], ["y"]], "CB  FS", "y"),
     ],
 )

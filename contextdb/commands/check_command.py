@@ -108,7 +108,8 @@ def _unportable(files: Sequence[tuple[str, Path]], schema: Schema) -> Iterator[F
         declared = next((one for one in wanted if alike(one) == alike(path.name)), path.name)
         told = [f"{why}." for why in [why_unportable(path.name)] if why]
         if other := others.get(str(path)):
-            told.append(f"this and {path_in_quotes(other)} are one file on disks that ignore case.")
+            ignored = "the Unicode form of names" if composed(other) == composed(str(path)) else "case"
+            told.append(f"this and {path_in_quotes(other)} are one file on disks that ignore {ignored}.")
         if composed(declared) != composed(path.name):
             told.append(f"{SCHEMA_FILE} calls it {in_quotes(declared)}: there is no such file on disks that distinguish case.")
         yield from (Finding("unportable-name", "warning", message, name, str(path)) for message in told)

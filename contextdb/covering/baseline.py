@@ -23,6 +23,7 @@ from contextdb.covering.report import CoverageReport, Gap
 from contextdb.covering.space import Box, Space
 from contextdb.covering.witness import BoxSet, OutOfSteps, Steps
 from contextdb.errors import ContextDBError, ContextError, Fault, Place
+from contextdb.files.reports import document_of
 from contextdb.findings import Finding
 
 FORMAT = 1
@@ -99,14 +100,14 @@ def read_baseline(text: str, file: str) -> dict[str, Earlier]:
         It is no such report; the place names the file.
     """
     try:
-        document = json.loads(text)
+        document = document_of(text)
         if not isinstance(document, dict) or document.get("format") != FORMAT:
             raise ValueError('it has no "format": 1')
         if document.get("digest", expected := digest_of(document)) != expected:
             raise ValueError("it was altered after it was written: its contents do not match its digest")
         return {_text(entry["table"]): _earlier(entry) for entry in document["tables"]}
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-        why = f"{error} is missing" if isinstance(error, KeyError) else str(error) or "lists are nested too deeply"
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        why = f"{error} is missing" if isinstance(error, KeyError) else str(error)
         fault = Fault(f"the baseline cannot be read: {why}.", ACCEPTED, place=Place(file))
         raise ContextError(fault) from None
 
@@ -114,7 +115,10 @@ def read_baseline(text: str, file: str) -> dict[str, Earlier]:
 def digest_of(document: Mapping[str, Any]) -> str:
     """BLAKE2b-128 of all that a report says but its digest, whatever the order of its keys and the form of its numbers."""
     about = {name: value for name, value in document.items() if name != "digest"}
-    text = json.dumps(_plain(about), sort_keys=True, separators=(",", ":"))
+    try:
+        text = json.dumps(_plain(about), sort_keys=True, separators=(",", ":"))
+    except RecursionError:
+        raise ValueError("lists are nested too deeply") from None
     return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
 
 

@@ -235,6 +235,17 @@ def sync_folder(folder: int | None) -> None:
             os.fsync(folder)
 
 
+def matching(folder: Path, pattern: str) -> list[Path]:
+    """The files below a folder that fit a pattern, sorted; the suffix of a file may be in capitals where the pattern's is not.
+
+    Raises ValueError or NotImplementedError where it is no pattern.
+    """
+    suffix = Path(pattern).suffix
+    if suffix[1:].isalnum():
+        pattern = pattern.removesuffix(suffix) + "".join(f"[{c.lower()}{c.upper()}]" if c.isalpha() else c for c in suffix)
+    return sorted(folder.glob(pattern))
+
+
 # ---- what the system refuses
 
 
@@ -265,8 +276,19 @@ def _refused(file: Path, why: Callable[[OSError, Path], Fault]) -> Iterator[None
         raise
     except OSError as error:
         raise FileError(why(error, file), errno=error.errno) from None
+    except UnicodeEncodeError as error:
+        raise FileError(unnameable(error, file)) from None
     except ValueError as error:  # a path with a NUL character
         raise FileError(Fault(f"this is not a valid path: {error}.", "a path", place=Place(str(file)))) from None
+
+
+def unnameable(error: UnicodeEncodeError, file: Path) -> Fault:
+    """Why files cannot be named so here, and what to do."""
+    encoding = "UTF-8" if error.encoding == "utf-8" else error.encoding
+    found = f"files are named in {encoding} here, which has no {in_quotes(error.object[error.start : error.end])}."
+    if encoding == "UTF-8":
+        return Fault(found, "names of characters that Unicode has", place=Place(str(file)))
+    return Fault(found, "an environment in UTF-8", "to set PYTHONUTF8=1", Place(str(file)))
 
 
 def _is_folder(folder: Path) -> Fault:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from contextdb.columns import TextColumn
-from contextdb.disk import read_bytes
+from contextdb.disk import matching, read_bytes
 from contextdb.edits.renaming import Renaming, Rewrite, TableFile, folder_of, rewritten, rewritten_notes, rewritten_toml, with_texts
 from contextdb.edits.renaming_values import with_value
 from contextdb.errors import ContextDBError, Fault, TableError, in_quotes, plural
@@ -71,7 +71,7 @@ def asset_uses(table: Table, asset: str) -> AssetUses:
         columns = _read(path)
         n_markup += sum(text == asset for c in columns if c.name == "asset" for text in c.to_list())
     patterns = [str(part.get("clips", "")) for part in schema.databases.values()]
-    clips = [path.name for pattern in patterns if pattern for path in folder.glob(pattern) if path.stem == asset]
+    clips = [path.name for pattern in patterns if pattern for path in matching(folder, pattern) if path.stem == asset]
     return AssetUses(tuple(others), n_cases, n_fallbacks, n_markup, tuple(dict.fromkeys(clips)))
 
 

@@ -1,4 +1,4 @@
-"""JSON both ways: a list of objects, or one object a line, each a row by the names of its columns."""
+"""JSON both ways: a list of objects, or one object a line, each a row by the names of its columns. Other shapes: `json_shapes`."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from contextdb.columns import TextColumn
 from contextdb.errors import Fault, Place, TableError, in_quotes, row_name
 from contextdb.exchange.conflicts import require_no_conflicts
+from contextdb.exchange.json_shapes import rows_of_shape
 from contextdb.exchange.reading import Reading, Remark, listed
 from contextdb.exchange.values import text_of_value
 from contextdb.files.csv_faults import MOST_CHARACTERS
@@ -72,9 +73,11 @@ def parsed_rows(text: str, file: str) -> tuple[list[dict[str, Any]], list[int | 
         raise TableError(Fault("the file is empty.", _ACCEPTED, place=Place(file)))
     if stripped.startswith("["):
         rows = _loaded(text, file)
-        return _objects(rows, [None] * len(rows), file)
+        return _shaped(rows, file) or _objects(rows, [None] * len(rows), file)
     lines = [(number, line) for number, line in enumerate(text.split("\n"), 1) if line.strip()]
     document = _tried(stripped)
+    if rows_of_shape(document) is not None and (shaped := _shaped(_loaded(text, file), file)):
+        return shaped
     inner = _only_list(document)
     if inner is not None:
         return _objects(inner, [None] * len(inner), file)
@@ -87,6 +90,14 @@ def parsed_rows(text: str, file: str) -> tuple[list[dict[str, Any]], list[int | 
         return _objects(found, [number for number, _ in lines][: len(found)], file)
     document = _loaded(text, file)
     raise TableError(Fault(f"the document is {what(document)} without one list of rows.", _ACCEPTED, place=Place(file)))
+
+
+def _shaped(document: object, file: str) -> tuple[list[dict[str, Any]], list[int | None]] | None:
+    """The rows of a document that is no list of them, but is a table all the same; None for all others."""
+    rows = rows_of_shape(document)
+    if isinstance(rows, Fault):
+        raise TableError(rows.at(Place(file)))
+    return None if rows is None else _objects(rows, [None] * len(rows), file)
 
 
 def _only_list(document: object) -> list[Any] | None:

@@ -163,6 +163,12 @@ def _type_faults(series: pl.Series) -> Iterator[Fault]:
             yield Fault("a list without names in it, which would match nothing.", "null for Any, or at least one name")
         if series.list.eval(pl.element().is_null()).list.any().any():
             yield Fault("a list with a null in it.", "names only")
+    elif isinstance(dtype, pl.Datetime):
+        if dtype.time_zone or (series.dt.time() != datetime.time()).any():
+            has = "a time zone" if dtype.time_zone else "times of day"
+            yield Fault(
+                f"the column has {has}.", "days: dates, or midnights without a time zone", "to write it as dates or strings"
+            )
     elif not (isinstance(dtype, (*_STRINGS, pl.Boolean, pl.Date, pl.Null)) or dtype.is_integer() or dtype.is_float()):
         yield Fault(f"the column is of type {dtype}.", _ACCEPTED, "to write it as strings")
 
@@ -197,7 +203,7 @@ def _texts(frame: pl.DataFrame) -> list[TextColumn]:
 def _as_strings(series: pl.Series) -> pl.Series:
     if isinstance(series.dtype, pl.List):
         return pl.Series([None if names is None else " ".join(map(quoted, names)) for names in series.to_list()], dtype=pl.String)
-    strings = series.cast(pl.String)
+    strings = (series.dt.date() if isinstance(series.dtype, pl.Datetime) else series).cast(pl.String)
     return strings.str.to_titlecase() if series.dtype == pl.Boolean else strings
 
 
@@ -251,6 +257,9 @@ def _value(text: str, old: pl.Series) -> object:
         return _UNFIT if truth is None else truth
     if isinstance(dtype, pl.Date):
         return _date(text)
+    if isinstance(dtype, pl.Datetime):
+        day = _date(text)
+        return datetime.datetime.combine(day, datetime.time()) if isinstance(day, datetime.date) else _UNFIT
     if dtype.is_integer():
         return int(text) if _WHOLE.fullmatch(text) else _UNFIT
     return _float(text, dtype) if dtype.is_float() else _UNFIT

@@ -5,13 +5,14 @@ Data only; the same results give the same bytes.
 
 from __future__ import annotations
 
-import json
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
 from contextdb.covering import format_percent
 from contextdb.errors import ContextError, Fault, Place, in_quotes, plural
+from contextdb.files.reports import document_of
 from contextdb.findings import Finding
 from contextdb.motion.measuring.measures import Measures
 from contextdb.motion.measuring.parts import NO_CHANGE, NO_FORCED, NO_JUMP
@@ -21,6 +22,7 @@ NOTHING_TO_EXCEED = (NO_FORCED, NO_JUMP, NO_CHANGE)
 """A measure that is missing for such a reason keeps every bar."""
 SLACK = 0.01
 """A measure is worse than before when it is larger by more than this share."""
+_AGAIN = "to write the baseline again"
 BASELINE = "a report of `contextdb motion measure --json`"
 
 
@@ -174,7 +176,7 @@ def compared(before: Mapping[str, object], measures: Measures) -> Iterator[Gate]
     """A gate for each measure that an earlier report has too: it is worse when it is larger by more than 1 %."""
     for line in COMPARED:
         old, new = before.get(line.key), getattr(measures, line.key)
-        if isinstance(old, (int, float)) and not isinstance(old, bool) and new is not None:
+        if isinstance(old, (int, float)) and new is not None:
             passed = bool(new <= old + SLACK * abs(old) + 1e-9)
             verdict = "no worse" if passed else "worse"
             told = f"{line.label}: {line.text(new)}, {verdict} than {line.text(old)} before."
@@ -184,12 +186,28 @@ def compared(before: Mapping[str, object], measures: Measures) -> Iterator[Gate]
 def read_baseline(text: str, file: str) -> dict[str, Mapping[str, object]]:
     """The sessions of an earlier report, by file. Raises ContextError for what is none."""
     try:
-        document = json.loads(text)
+        document = document_of(text)
         version = document["format"]
-        sessions: dict[str, Mapping[str, object]] = {str(session["file"]): dict(session) for session in document["sessions"]}
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        raise ContextError(Fault("the baseline is not a report of measures.", BASELINE, place=Place(file))) from None
+        sessions: list[tuple[str, dict[str, object]]] = [(str(each["file"]), dict(each)) for each in document["sessions"]]
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        why = str(error) if type(error) is ValueError else "it has no format and sessions"
+        raise ContextError(Fault(f"the baseline is not a report of measures: {why}.", BASELINE, place=Place(file))) from None
     if version != 1:
         found = f"the baseline has format {in_quotes(str(version))}; this version reads format 1."
         raise ContextError(Fault(found, BASELINE, place=Place(file)))
-    return sessions
+    found_in = dict[str, Mapping[str, object]]()
+    for name, session in sessions:
+        if why := "is there twice" if name in found_in else _no_measure(session):
+            raise ContextError(Fault(f"in the baseline {in_quotes(name)} {why}.", BASELINE, _AGAIN, Place(file)))
+        found_in[name] = session
+    return found_in
+
+
+def _no_measure(session: Mapping[str, object]) -> str:
+    """Which measure of a session of a report is none, as the end of a sentence; empty where all are numbers or null."""
+    for line in COMPARED:
+        value = session.get(line.key, "missing")
+        is_number = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+        if value is not None and not is_number:
+            return f"has no number as {in_quotes(line.key)}"
+    return ""

@@ -14,6 +14,7 @@ from contextdb.covering import format_percent
 from contextdb.covering.motion import TableMotion
 from contextdb.covering.shares import told_apart
 from contextdb.errors import ContextError, Fault, Place, in_quotes, plural, some
+from contextdb.files.reports import document_of
 from contextdb.findings import Finding
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.measuring.coverage import ContextCoverage, ToCapture, about_bins
@@ -213,14 +214,14 @@ def read_baseline(text: str, file: str) -> dict[str, Earlier]:
         It is no such report, or its bins are others.
     """
     try:
-        document = json.loads(text)
+        document = document_of(text)
         if not isinstance(document, dict) or document.get("format") != 1:
             raise ValueError('it has no "format": 1')
         if document["bins"] != json.loads(json.dumps(about_bins())):
             raise ValueError("its bins are others, of another version")
         return {_name(entry): _earlier(entry) for entry in document["tables"]}
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-        why = f"{error} is missing" if isinstance(error, KeyError) else str(error) or "lists are nested too deeply"
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        why = f"{error} is missing" if isinstance(error, KeyError) else str(error)
         raise ContextError(Fault(f"the baseline cannot be read: {why}.", BASELINE, place=Place(file))) from None
 
 

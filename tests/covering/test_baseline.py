@@ -92,6 +92,10 @@ def test_gaps_over_a_condition_that_is_gone_are_closed():
         '{"format": 1, "tables": [{"table": "t", "covered": {"lower": 0}, "gaps": {"complete": true, "items": [1]}}]}',
         '{"format": 1, "tables": [{"table": "t", "covered": {"lower": 0}, "gaps": null}]}',
         "[" * 100_000,
+        '{"format": 1, "tables": [{"table": "t", "covered": {"lower": 1%s}, "gaps": {"complete": true, "items": []}}]}'
+        % ("0" * 400),
+        '{{"format": 1, "digest": "", "tables": {}1{}}}'.format("[" * 800, "]" * 800),
+        '{\n<<<<<<< HEAD\n"format": 1\n=======\n"format": 1\n>>>>>>> theirs\n}',
     ],
 )
 def test_what_is_no_report_is_refused_with_its_file(text: str):

@@ -50,6 +50,50 @@ def test_an_object_in_an_object_becomes_columns_of_a_role():
     }
 
 
+CELLS = {"Asset": ["jog", "run"], "speed": ["1.5", "2"], "on": ["True", "False"]}
+BY_COLUMNS = {"Asset": {"0": "jog", "3": "run"}, "speed": {"0": 1.5, "3": 2}, "on": {"0": True, "3": False}}
+BY_ROWS = {str(at): {name: column[at] for name, column in BY_COLUMNS.items()} for at in "03"}
+SPLIT = {"columns": [*CELLS], "index": [0, 3], "data": [[*row.values()] for row in BY_ROWS.values()]}
+LISTS = {name: [*column.values()] for name, column in BY_COLUMNS.items()}
+
+
+@pytest.mark.parametrize("document", [BY_COLUMNS, BY_ROWS, SPLIT, LISTS])
+@pytest.mark.parametrize("indent", [None, 1])
+def test_a_document_in_another_orientation_is_the_same_table(document: object, indent: int | None):
+    assert texts(read(json.dumps(document, indent=indent).encode(), "x.json")) == CELLS
+
+
+@pytest.mark.parametrize("has_list", [True, False])
+def test_a_data_table_as_fmodel_exports_it_is_its_rows(has_list: bool):
+    rows = {"jog": {"Speed": 1.5, "At": {"X": 1}}, "run": {"Speed": 2.0, "At": {"X": 3}}}
+    one = {"Type": "DataTable", "Name": "DT_Moves", "Properties": {"RowStruct": {"ObjectName": "S"}}, "Rows": rows}
+    raw = json.dumps([one] if has_list else one).encode()
+    assert texts(read(raw, "x.json")) == {"Name": ["jog", "run"], "Speed": ["1.5", "2"], "At.X": ["1", "3"]}
+    assert texts(read(raw, "x.json", ReadOptions("unreal-json")))["Asset Name"] == ["jog", "run"]
+
+
+@pytest.mark.parametrize(
+    ("document", "said"),
+    [
+        ({"jog": {"speed": 1}, "run": {"speed": 2}}, "an object of objects, which may be its rows or its columns"),
+        ({"speed": {"0": 1, "1": 2}, "on": {"0": True}}, "an object of objects, which may be its rows or its columns"),
+        ({"Asset": ["jog", "run"], "speed": [1]}, 'the document is lists of several lengths: "Asset" 2, "speed" 1.'),
+        ({"columns": ["a", "b"], "data": [[1]]}, '"columns" and "data" do not fit together'),
+        ({"Rows": {"jog": {"Name": "x"}}}, 'rows of the DataTable have a "Name" beside their names'),
+    ],
+)
+def test_a_document_that_may_be_several_tables_is_refused_with_what_is_accepted(document: object, said: str):
+    told = refused(json.dumps(document))
+    assert said in told
+    assert "Accepted: a list of objects, one for each row." in told
+    assert 'orient="records"' in told or said.startswith(("rows", "the document is lists"))
+
+
+def test_a_key_that_appears_twice_is_refused_in_every_orientation():
+    assert 'the key "0" appears twice' in refused('{"a": {"0": 1, "0": 2}}')
+    assert 'the key "a" appears twice' in refused('{"a": [1], "a": [2]}')
+
+
 def test_nan_is_empty_and_infinity_is_a_number():
     assert texts(read(b'[{"a": "x", "b": NaN, "c": -Infinity}]', "x.json")) == {"a": ["x"], "b": [""], "c": ["-inf"]}
 

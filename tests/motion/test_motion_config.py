@@ -108,6 +108,15 @@ def test_a_pattern_that_is_none_is_told(folder):
         config.load_clips("jog", folder)
 
 
+def test_a_suffix_in_capitals_is_a_clip_on_every_disk(folder):
+    (folder / "clips" / "walk.bvh").rename(folder / "clips" / "walk.BVH")
+    config = MotionConfig.from_dict(SECTIONS)
+    assert [clip.name for clip in config.load_clips("jog", folder)] == ["idle", "jog", "jog_tired", "walk"]
+    one = {**SECTIONS["databases"]["jog"], "clips": "clips/walk.bvh"}
+    config = MotionConfig.from_dict({**SECTIONS, "databases": {"walk": one}, "selectors": {}})
+    assert [clip.name for clip in config.load_clips("walk", folder)] == ["walk"]
+
+
 def test_no_clips_and_broken_clips_are_told(folder):
     config = MotionConfig.from_dict(SECTIONS, file="contextdb.toml")
     with pytest.raises(MotionError, match=r'contextdb.toml: \[databases.jog_tired\] no file matches clips = "clips/\*_tired.bvh"'):

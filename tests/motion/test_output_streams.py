@@ -159,7 +159,9 @@ def test_what_a_crowd_cannot_do_is_told(wrong, said):
 def test_a_crowd_of_banks_of_different_rigs_is_refused():
     other = copy(bank())
     object.__setattr__(other, "skeleton", replace(bank().skeleton, names=tuple(f"my{name}" for name in bank().skeleton.names)))
-    with pytest.raises(MotionError, match="different rigs"):
+    first = bank().assets[0]
+    said = f'the banks "one" .with "{first}". and "other" .with "{first}". are of different rigs: the second has no joint "Hips". '
+    with pytest.raises(MotionError, match=f"{said}Accepted: banks of one rig. Try to put the clips on one rig: rig ="):
         PoseStream({"one": bank(), "other": other})
 
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path, PurePosixPath
 
+from contextdb.disk import matching
 from contextdb.errors import ContextDBError, Fault, SchemaError, in_quotes
 from contextdb.motion.storage.config import MotionConfig
 from contextdb.motion.storage.database_settings import DatabaseSettings
@@ -160,7 +161,7 @@ class Priorities:
         if key not in self._clips:
             found: list[Path] = []
             with suppress(ValueError, OSError):  # a pattern that pathlib does not know, or a folder that may not be read
-                found = sorted(self.folder.glob(settings.clips)) if self.folder else []
+                found = matching(self.folder, settings.clips) if self.folder else []
             self._clips[key] = tuple(dict.fromkeys(settings.asset_of(path.stem) for path in found))
         return self._clips[key]
 

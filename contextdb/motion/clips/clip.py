@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Real
 from os import PathLike, fspath
 from typing import Literal, TextIO, get_args
@@ -16,7 +16,7 @@ from typing import Literal, TextIO, get_args
 import numpy as np
 
 from contextdb.cells.arguments import require_kind, require_many, require_path, require_text, require_whole
-from contextdb.disk import write_atomic
+from contextdb.disk import read_bytes, write_atomic
 from contextdb.errors import ClipError, ContextError, Fault, FileError, Place, in_quotes, nearest, some
 from contextdb.motion.clips import bvh
 from contextdb.motion.clips.quaternions import Floats
@@ -101,19 +101,16 @@ def load_bvh(path: str | PathLike[str], *, metres_per_unit: float = CENTIMETRE, 
     ClipError
         The text is no BVH: with its line, what was found, what is accepted and the nearest mend.
     FileError
-        The file cannot be opened.
+        The file cannot be opened; where it is missing, with the nearest name there is.
     ContextError
         `path` is none.
     """
     place = require_path(path)
     file = str(path)
     try:
-        raw = place.read_bytes()
-    except OSError as error:
-        is_folder = place.is_dir()
-        found = "this is a folder." if is_folder else f"the file cannot be read: {error.strerror or error}."
-        fault = Fault(found, "a BVH file" if is_folder else "", place=Place(file), rule="file")
-        raise FileError(fault, errno=error.errno) from error
+        raw = read_bytes(place)
+    except FileError as error:
+        raise FileError(*(replace(fault, rule="file") for fault in error.faults), errno=error.errno) from None
     return parse_bvh(text_of(raw, file), place.stem if name is None else name, file=file, metres_per_unit=metres_per_unit, up=up)
 
 

@@ -38,6 +38,7 @@ from contextdb.motion.output.travel import travels
 SAME_M = 1e-6
 """A joint that is never farther from its offset keeps it."""
 FARTHEST_M = 1e6
+RIG_MEND = 'to put the clips on one rig: rig = "clips/idle.bvh" in [databases.NAME], or motion.retargeted'
 STEP_S, USUAL = 1.0 / 30.0, 0.999
 """Accelerations are those over steps of this length, and usual are those of so many frames."""
 
@@ -137,11 +138,11 @@ class PoseBank:
         parts: list[_Part] = []
         faults: list[Fault] = []
         seen: set[str] = set()
-        rig: Skeleton | None = None
+        first: Clip | None = None
         for clip in require_many(clips, "clips", "a list of Clip"):
             require_kind(clip, Clip, "one of clips", "a Clip")
-            rig = clip.skeleton if rig is None else rig
-            wrong = list(_faults(clip, rig, seen))
+            first = clip if first is None else first
+            wrong = list(_faults(clip, first, seen))
             seen.add(clip.name)
             if wrong:
                 faults += [fault.at(Place(clip.name)) for fault in wrong]
@@ -383,19 +384,22 @@ def _contacts(poses: Poses, schema: FeatureSchema, marks: ContactMarks) -> tuple
     return feet, np.column_stack([np.logical_or.reduce([none, *each]) for each in down])
 
 
-def _faults(clip: Clip, rig: Skeleton, seen: set[str]) -> Iterator[Fault]:
+def _faults(clip: Clip, first: Clip, seen: set[str]) -> Iterator[Fault]:
     """What keeps a clip out of a bank."""
     if clip.name in seen:
         yield Fault(f"two clips are named {in_quotes(clip.name)}.", "a different name for each asset", rule="duplicate")
     if clip.n_frames == 0:
         yield Fault("the clip has no frame.", "a clip with at least one frame")
-    names = clip.skeleton.names
+    names, rig = clip.skeleton.names, first.skeleton
     if names != rig.names:
         other = [name for name in names if name not in rig] or [name for name in rig.names if name not in clip.skeleton]
-        differ = f"its bones are not those of the first clip: {some(other)}" if other else "its bones come in another order"
-        yield Fault(f"{differ}.", f"the same {plural(rig.n_joints, 'bone')} in every clip of a bank")
+        differ = (
+            f"its bones are not those of {in_quotes(first.name)}: {some(other)}" if other else "its bones come in another order"
+        )
+        yield Fault(f"{differ}.", f"the same {plural(rig.n_joints, 'bone')} in every clip of a bank", RIG_MEND)
     elif not np.array_equal(clip.skeleton.parents, rig.parents):
-        yield Fault("its bones hang on other parents than those of the first clip.", "one rig for every clip of a bank")
+        found = f"its bones hang on other parents than those of {in_quotes(first.name)}."
+        yield Fault(found, "one rig for every clip of a bank", RIG_MEND)
 
 
 def _joined(parts: list[_Part], rate: float) -> PoseBank:

@@ -14,7 +14,7 @@ from contextdb.cells.arguments import require_kind, require_mapping
 from contextdb.console import announce
 from contextdb.errors import Fault, MotionError, in_quotes, nearest, some
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.output.bank import PoseBank, tops_of
+from contextdb.motion.output.bank import RIG_MEND, PoseBank, tops_of
 from contextdb.motion.output.feet import OnGround, hinges_of, legs_of
 from contextdb.motion.output.ground import ManyGround, Triple, below, below_many
 from contextdb.motion.output.pose import CrowdPoses
@@ -320,9 +320,21 @@ def _checked(banks: object) -> dict[str, PoseBank]:
         require_kind(each, PoseBank, "one of bank", "a PoseBank")
     if not named:
         raise MotionError(Fault("there is no pose bank.", "at least one"))
-    rig, *others = named.values()
-    for other in others:
-        same = rig.skeleton.names == other.skeleton.names and np.array_equal(rig.skeleton.parents, other.skeleton.parents)
-        if not same or not np.array_equal(rig.moving, other.moving):
-            raise MotionError(Fault("the banks are of different rigs.", "banks of one rig"))
+    (first, rig), *others = named.items()
+    for name, other in others:
+        if apart := _apart(rig, other):
+            both = " and ".join(f"{in_quotes(at)} (with {in_quotes(bank.assets[0])})" for at, bank in ((first, rig), (name, other)))
+            found = f"the banks {both} are of different rigs: {apart}."
+            raise MotionError(Fault(found, "banks of one rig", RIG_MEND))
     return named
+
+
+def _apart(rig: PoseBank, other: PoseBank) -> str:
+    """How the rigs of two banks differ, as the end of a sentence; empty where they do not."""
+    if alone := [name for name in rig.skeleton.names if name not in other.skeleton.names]:
+        return f"the second has no joint {in_quotes(alone[0])}"
+    if more := [name for name in other.skeleton.names if name not in rig.skeleton.names]:
+        return f"the first has no joint {in_quotes(more[0])}"
+    if rig.skeleton.names != other.skeleton.names or not np.array_equal(rig.skeleton.parents, other.skeleton.parents):
+        return "their joints have another order or other parents"
+    return "" if np.array_equal(rig.moving, other.moving) else "other joints of theirs move along"

@@ -14,6 +14,7 @@ from os import PathLike
 from pathlib import Path
 
 from contextdb.cells.arguments import require_kind, require_many, require_mapping, require_path, require_text
+from contextdb.disk import matching
 from contextdb.errors import ArtefactError, Fault, FileError, MotionError, Place, in_quotes, plural, some
 from contextdb.motion.clips.doubts import ClipFinding, doubts
 from contextdb.motion.features.normalisation import Normalisation
@@ -287,7 +288,7 @@ def _scale_faults(schema: str, normalisation: Normalisation) -> Iterator[Fault]:
 def _markup_faults(inputs: Inputs, markup: Markup, settings: DatabaseSettings, database: MotionDatabase) -> list[Fault]:
     """What of a markup does nothing: for no clip of the databases that share it, or for no frame of this one's."""
     sharing = [each for each in inputs.config.databases.values() if each.markup == settings.markup]
-    known = {path.stem for each in sharing for path in inputs.root.glob(each.clips)}
+    known = {path.stem for each in sharing for path in matching(inputs.root, each.clips)}
     rate = inputs.config.features[settings.features].rate
     lengths = (database.stops - database.starts).tolist()
     durations_s = {asset: max(0, length - 1) / rate for asset, length in zip(database.assets, lengths, strict=True)}

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 
+from contextdb.disk import matching
 from contextdb.errors import ContextDBError, Fault, MotionError, Place, nearest, plural, some
 from contextdb.findings import Finding
 from contextdb.motion.clips.clip import CENTIMETRE, load_bvh
@@ -144,7 +145,7 @@ def _of_assets(config: MotionConfig, folder: Path, assets: Assets) -> Iterator[F
 def _has_pattern(folder: Path, clips: str) -> bool:
     """Whether a pattern can be looked for; one that cannot is refused where files are found."""
     try:
-        next(iter(folder.glob(clips)), None)
+        matching(folder, clips)
     except (ValueError, NotImplementedError):
         return False
     return True

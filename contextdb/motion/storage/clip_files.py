@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from contextdb.disk import path_in_quotes, read_bytes
+from contextdb.disk import matching, path_in_quotes, read_bytes
 from contextdb.errors import Fault, MotionError, Place, in_quotes
 from contextdb.files.toml_text import as_toml
 from contextdb.motion.clips import bvh, mirror
@@ -114,7 +114,7 @@ def clip_files(
 def paths_of(settings: DatabaseSettings, folder: Path, file: str | None = None) -> list[Path]:
     """The files that fit the pattern of a database, sorted; a MotionError where it is none."""
     try:
-        return sorted(folder.glob(settings.clips))
+        return matching(folder, settings.clips)
     except (ValueError, NotImplementedError):
         found = f"[databases.{settings.name}] clips = {as_toml(settings.clips)} is not a pattern."
         raise MotionError(Fault(found, '"clips/*.bvh", "clips/**/*.bvh"', place=Place(file), rule="file")) from None

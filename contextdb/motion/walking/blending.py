@@ -26,6 +26,7 @@ import numpy as np
 from contextdb.cells.arguments import require_kind, require_many_of, require_real, require_text
 from contextdb.errors import Fault, MotionError, in_quotes
 from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.output.bank import RIG_MEND
 from contextdb.motion.output.samples import Place3
 from contextdb.motion.walking.cycle import Cycle
 from contextdb.motion.walking.stances import Stances, blended_stances
@@ -121,9 +122,8 @@ def same_rig(cycles: Sequence[Cycle]) -> None:
     for other in cycles[1:]:
         same = other.skeleton.names == first.skeleton.names and np.array_equal(other.skeleton.parents, first.skeleton.parents)
         if not same or other.feet != first.feet:
-            raise MotionError(
-                Fault(f"{in_quotes(first.name)} and {in_quotes(other.name)} are of different rigs.", "cycles of one rig")
-            )
+            found = f"{in_quotes(first.name)} and {in_quotes(other.name)} are of different rigs."
+            raise MotionError(Fault(found, "cycles of one rig", RIG_MEND))
 
 
 def _column(value: float) -> tuple[float, float, float]:

@@ -390,6 +390,14 @@ def test_each_distinct_set_of_tags_is_looked_up_once(kind: type):
     assert [rows.tolist() for rows in many.lists()] == [*([0, 1], [], [1]) * 100, []]
 
 
+def test_codes_that_were_made_without_the_kernels_are_answered_with_them():
+    many = TABLE.query_many({"speed": [1.0, 2.0, 9.0], "state": ["Ground", "Air", "Ground"], "steps": [1, 2, 3]})
+    with using(None):
+        codes = many.codes.tolist()
+    with using(kernels):
+        assert many.mask.tolist() == [TABLE.query_codes(np.array(of)).mask.tolist() for of in codes]
+
+
 def test_tags_may_be_lists_sets_or_texts():
     table = Table.from_columns({"Asset": ["a", "b"], "x": ["+InAir", "-Move"]}, {"x": {"type": "tags"}}).compile()
     for column in ([["InAir"], []], [{"InAir"}, set()], ["InAir", ""], pl.Series([["InAir"], []], dtype=pl.List(pl.String))):

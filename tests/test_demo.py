@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import re
 
 import pytest
@@ -28,6 +29,17 @@ def test_it_never_writes_into_a_folder_that_is_there(tmp_path):
     assert (answer.code, answer.out) == (2, "")
     assert "this already exists" in answer.err
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
+
+
+def test_a_disk_that_is_full_is_told_of_the_folder_to_keep_and_nothing_stays(tmp_path, monkeypatch):
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device", "somewhere")
+
+    monkeypatch.setattr("shutil.copyfile", full)
+    done = run("demo", "--keep", tmp_path / "kept")
+    assert done.code == 2
+    assert done.err.startswith(f"contextdb: {tmp_path / 'kept'}: the disk is full.")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_sample_markup_fits_the_made_clips(tmp_path):

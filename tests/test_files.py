@@ -241,6 +241,13 @@ def test_on_a_full_disk_the_old_file_is_whole_and_no_temporary_file_stays(table:
     assert os.listdir(table.parent) == [table.name]
 
 
+def test_a_limit_on_the_size_of_files_is_told_from_a_full_disk(table: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(os, "write", fails_with(errno.EFBIG))
+    said = refused(lambda: write_atomic(table, b"x" * 1234))
+    assert "the file is larger than files may be here. The old file is as it was. Accepted: room for 1,234 bytes." in said
+    assert said.endswith('Try to raise the limit that "ulimit -f" shows.')
+
+
 def test_on_a_disk_that_fills_up_half_way_nothing_half_written_stays(table: Path, monkeypatch: pytest.MonkeyPatch):
     write, calls = os.write, []
 

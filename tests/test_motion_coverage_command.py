@@ -285,7 +285,7 @@ def test_the_project_says_how_transitions_are_named_unless_the_command_does():
 
 def test_other_names_of_transitions_and_other_costs_can_be_given():
     assert covered("--transitions", "{from}_turn_{to}", "--json").json["tables"][0]["transitions"]["states"]
-    assert "is not a pattern of transitions" in refused("--transitions", "x")
+    assert "not a pattern of transitions" in refused("--transitions", "x")
     assert len(covered("--near", "5", "--json").json["tables"][0]["near"]) == 6
     assert "is not a cost" in refused("--near", "-1")
 

@@ -15,6 +15,7 @@ from contextdb.cells.domains import Domain
 from contextdb.cells.facts import describe, read_fact
 from contextdb.cells.sets import Cell
 from contextdb.commands.query_command import read_facts
+from contextdb.compiled.pick import Outcome
 from contextdb.errors import ContextError
 from contextdb.tables.table import Table
 
@@ -330,3 +331,11 @@ def test_any_arguments_are_facts_or_refused(texts: list[str]):
         facts, faults = {}, len(error.faults)
     assert set(facts) <= {"x", "y"}
     assert len(facts) == len(texts) if not faults else faults <= len(texts)
+
+
+def test_the_valid_rows_are_looked_through_once_and_not_for_each_of_them(tmp_path, monkeypatch):
+    (tmp_path / "t.csv").write_text("Asset,on\n" + "".join(f"a{i},True\n" for i in range(50)), encoding="utf-8")
+    asked: list[int] = []
+    monkeypatch.setattr(Outcome, "prefers_some", property(lambda outcome: bool(asked.append(len(outcome.rows)))))
+    assert len(run("query", tmp_path / "t.csv", "on=true").lines) > 50
+    assert asked == [50]

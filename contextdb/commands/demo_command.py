@@ -110,10 +110,21 @@ def make_sample(source: Path, folder: Path) -> None:
     make_folder(folder.parent)
     with refused_writing(folder, ()), temporary_folder(folder.parent.resolve()) as temporary:
         growing = temporary / "growing"
-        shutil.copytree(source, growing, ignore=shutil.ignore_patterns(".*", "*.bvh", "*.safetensors"))
+        _copy(source, growing)
         (growing / "clips").mkdir(exist_ok=True)
         write_made_clips(growing / "clips")
         os.rename(growing, folder)
+
+
+def _copy(source: Path, to: Path) -> None:
+    """Copy a folder without what is hidden or made. (`shutil.copytree` makes one text of all that the system refuses.)"""
+    for at, folders, names in os.walk(source):
+        folders[:] = [name for name in folders if not name.startswith(".")]
+        here = to / Path(at).relative_to(source)
+        here.mkdir(parents=True)
+        for name in names:
+            if not name.startswith(".") and not name.endswith((".bvh", ".safetensors")):
+                shutil.copyfile(Path(at, name), here / name)
 
 
 def sample_folder() -> Path:

@@ -137,7 +137,11 @@ def _git(folder: Path, *arguments: str, accepts: tuple[int, ...]) -> str:
         raise FileError(fault, errno=error.errno) from None
     if done.returncode not in accepts:
         said = done.stderr.decode(errors="replace").strip().splitlines()
-        raise ContextDBError(Fault(f"git {arguments[0]} failed: {said[-1] if said else done.returncode}", place=Place(str(folder))))
+        raise ContextDBError(
+            Fault(
+                f"git {arguments[0]} failed: {said[-1] if said else f'it ended with {done.returncode}.'}", place=Place(str(folder))
+            )
+        )
     return done.stdout.decode(errors="surrogateescape")
 
 

@@ -229,19 +229,20 @@ def _matching(compiled: CompiledTable, explanation: Explanation) -> Iterator[tup
     """The valid rows; where some only may be valid, with a word for that, and where the policy prefers some, how it does."""
     matches, undecided = explanation.matches, explanation.undecided
     outcome = Outcome(data_of(compiled), matches)
+    prefers_some = outcome.prefers_some  # looks at every valid row
     cast = matches if isinstance(matches, CastMatches) else None
     head = [
         "row",
         *(["matches"] if undecided else []),
         "asset",
         *(["cast"] if cast else []),
-        *(["pick"] if outcome.prefers_some else []),
+        *(["pick"] if prefers_some else []),
     ]
     yield tuple(head)
     for r in matches:
         line = [str(r + 1), *(["may" if undecided >> r & 1 else "always"] if undecided else []), compiled.assets[r]]
         line += [_cast(cast, r)] if cast else []
-        line += [outcome.said_of([r])] if outcome.prefers_some else []
+        line += [outcome.said_of([r])] if prefers_some else []
         yield tuple(line)
 
 

@@ -329,10 +329,11 @@ def _why_unwritten(error: OSError, file: Path, size: int | None) -> Fault:
     place, folder = Place(str(file)), path_in_quotes(Path(os.path.realpath(file)).parent)
     kept = " The old file is as it was." if os.path.exists(file) else ""
     if error.errno in _FULL:
+        is_limit = error.errno == errno.EFBIG
         return Fault(
-            f"the disk is full.{kept}",
-            "more room" if size is None else f"{size:,} free bytes",
-            "to free some space and save again",
+            f"the file is larger than files may be here.{kept}" if is_limit else f"the disk is full.{kept}",
+            "more room" if size is None else f"room for {size:,} bytes" if is_limit else f"{size:,} free bytes",
+            'to raise the limit that "ulimit -f" shows' if is_limit else "to free some space and save again",
             place,
         )
     if error.errno == errno.EROFS:

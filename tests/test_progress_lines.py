@@ -39,7 +39,7 @@ def test_of_a_small_table_only_the_preparing_is_told(capsys: pytest.CaptureFixtu
 def test_work_that_gets_long_is_told_of_however_small_the_table(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
-    seconds = iter([100.0, 101.0, 102.0, 102.5, 103.0])
+    seconds = iter([100.0, 105.0, 110.0, 110.5, 111.0])
     monkeypatch.setattr("contextdb.commands.progress.process_time", lambda: next(seconds))
     log = log_of("measuring t", False)
     assert log is not None

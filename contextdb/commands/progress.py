@@ -17,7 +17,7 @@ MANY_CELLS = 20_000
 """From so many cells of a table on, a log gets lines of progress."""
 MANY_BYTES = 10_000_000
 """From so many bytes of recorded contexts on, a log gets lines of progress."""
-LONG_S = 2.0
+LONG_S = 10.0
 """Other work gets them when the process has worked so long on it, in seconds of CPU: columns of a thousand tags have few cells."""
 MANY_CLIPS = 100
 """From so many clips on, a log gets lines of progress."""

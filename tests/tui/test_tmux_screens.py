@@ -46,6 +46,8 @@ def table(name: str) -> str:
 
 MOTION = ((named("motion"), "1.20"),)
 BARS = ("\r", "─Bars · ")
+JUMPED = "walk has ended"
+"""What the next jump shows: by then the keys before it have done what they do."""
 TYPED = (("enter", "submit"),)
 
 
@@ -116,8 +118,8 @@ SCREENS = (
     Screen(alt("5"), "Warnings", "ProblemsPane ProblemList", leaves=alt("1")),
     Screen(named("motion"), "1 session", "MotionPane SessionList", leaves=alt("1")),
     Screen("\r", "─Bars · ", "DebugScreen Bars", leaves="q", before=MOTION),
-    Screen("\t\t", "─Poses", "Stage", leaves="q", before=(*MOTION, BARS)),
-    Screen("\t\t\t", "─Weights", "Channels", leaves="q", before=(*MOTION, BARS)),
+    Screen("\t\t]", JUMPED, "Stage", leaves="q", before=(*MOTION, BARS)),
+    Screen("\t\t\t]", JUMPED, "Channels", leaves="q", before=(*MOTION, BARS)),
     Screen("?", "Esc close", "DebugHelp HelpPage Dialog", leaves="qq", before=(*MOTION, BARS)),
     Screen(xterm("ctrl+g"), "Go to", "AskDialog Dialog", is_typed_in=True, also=TYPED),
     Screen(xterm("f9") + xterm("f2"), "Rename the context", "NameDialog Dialog", is_typed_in=True, leaves=ESC + ESC, also=TYPED),

@@ -40,6 +40,8 @@ _rules: dict[tuple[Any, ...], dict[tuple[Any, ...], list[RuleSet]]] = {}
 _replace_rules = Stylesheet.replace_rules
 _values: dict[tuple[str, Any], Any] = {}
 """What a rule of this name and value becomes in the styles of a part."""
+_components: dict[tuple[Any, ...], dict[str, Any]] = {}
+"""By style sheet and the place of a part in its app: the rules that hold for each of its components."""
 _paint = Screen._compositor_refresh
 
 
@@ -93,9 +95,15 @@ async def _rested(app: App[Any]) -> None:
         if app._exception is None and app._running and app.screen_stack:
             app.screen._on_timer_update()
     await _nothing_ready(end)
+    if IS_FULL:
+        await painted(app)
+
+
+async def painted(app: App[Any]) -> None:
+    """Paint what the screen has to show by now."""
     if app._exception is None and app._running and app.screen_stack and app.screen._compositor._dirty_regions:
         _paint(app.screen)
-        await _nothing_ready(end)
+        await _nothing_ready(time.monotonic() + LONGEST_WAIT_S)
 
 
 async def _nothing_ready(end: float) -> None:
@@ -114,6 +122,7 @@ def _lighter() -> Iterator[None]:
     with (
         patch.object(Screen, "_compositor_refresh", _paint_later),
         patch.object(Stylesheet, "replace_rules", staticmethod(_first_rules)),
+        patch.object(Stylesheet, "_process_component_classes", _shared_components),
         patch.object(Strip, "__init__", _new_strip),
     ):
         yield
@@ -148,6 +157,28 @@ def _value(name: str, value: Any) -> Any:
         setattr(styles, name, value)
         _values[name, value] = styles._rules.get(name)
     return _values[name, value]
+
+
+def _shared_components(sheet: Any, node: Any) -> None:
+    """What Textual's method of this name does: looked up once for all parts that the same rules of the same sheet fit."""
+    names = node._get_component_classes()
+    if not names:
+        return
+    place = tuple((one._css_type_name, one.id, one.classes, one._pseudo_classes_cache_key) for one in node.css_path_nodes)
+    known = _components.setdefault((tuple(sheet._variables.items()), tuple(sheet.source), place), {})
+    before = dict(node._component_styles)
+    node._component_styles.clear()
+    for name in sorted(names):
+        part = DOMNode(classes=name)
+        part._attach(node)
+        if name in known:
+            part.styles.base._rules.update(known[name])
+        else:
+            sheet.apply(part, animate=False)
+            known[name] = dict(part.styles.base._rules)
+        node._component_styles[name] = part.styles
+    if any(before.get(name) != styles for name, styles in node._component_styles.items()):
+        node.refresh()
 
 
 class _NoCache:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -181,8 +181,9 @@ EMPTY = Schema()
 """A schema that declares nothing."""
 
 
+@lru_cache(maxsize=8)
 def read_schema(text: str, file: str) -> Schema:
-    """What the text of a contextdb.toml says; `file` is its name in messages.
+    """What the text of a contextdb.toml says; `file` is its name in messages. The last few are kept: one text is read often.
 
     Raises
     ------

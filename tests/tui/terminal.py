@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 from unittest.mock import patch
 
-from quick_apps import quick
+from quick_apps import painted, quick
 from textual.app import App
 from textual.pilot import Pilot
 
@@ -33,7 +33,9 @@ def drive(app: App[Any], script: Callable[[Pilot[Any]], Awaitable[T]], size: tup
         app.animation_level = "none"
         async with app.run_test(size=size) as pilot:
             await pilot.pause()
-            return await script(pilot)
+            found = await script(pilot)
+            await painted(app)
+            return found
 
     with quick():
         return asyncio.run(run())

@@ -3,6 +3,8 @@
 Every day: a few, and the same ones on every run. With EXAMPLES=full, as `.ci/run` does: all of them, from a seed that is new on
 every run and stands at the top of its output. What fails then is printed, and kept in .hypothesis/, where the next full run tries
 it first; write it over the test as `@example(...)`, and every run tries it. EXAMPLES=thorough draws 2,000 of each.
+
+Files of the tests are in memory where the machine has such a folder with room; TMPDIR=... says another place.
 """
 
 from __future__ import annotations
@@ -11,6 +13,7 @@ import gc
 import os
 import random
 import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +33,23 @@ OF_CHANCE = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.filte
 if providers := sys.modules.get("hypothesis.internal.conjecture.providers"):
     # Hypothesis draws constants of the modules that happen to be loaded; then one seed would draw other examples in each worker.
     vars(providers)["is_local_module_file"] = lambda path: False
+
+MEMORY, ROOM = Path("/dev/shm"), 4 << 30
+"""Where files are kept in memory on Linux, and how many bytes must be free there."""
+
+
+def has_room(folder: Path) -> bool:
+    """Whether the tests can write their files there, and start the programs that they compile."""
+    if sys.platform != "linux" or not os.access(folder, os.W_OK):
+        return False
+    disk = os.statvfs(folder)
+    return disk.f_bavail * disk.f_frsize >= ROOM and not disk.f_flag & os.ST_NOEXEC
+
+
+if "TMPDIR" not in os.environ and has_room(MEMORY):
+    # Each save waits for the disk, for some milliseconds, and there are thousands of saves. The workers and all commands do so too.
+    os.environ["TMPDIR"] = str(MEMORY)
+    tempfile.tempdir = None
 
 gc.disable()
 if SIZE not in SIZES:

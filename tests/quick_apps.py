@@ -5,8 +5,8 @@ Here a key has done its work once the event loop has nothing left to run, which 
 
 Apps share the rules that Textual reads in their style sheets, which no app changes, and leave nothing behind in Textual's caches.
 
-Every day they also paint when they rest and not at each step before, and make styles and strips with less ado; with EXAMPLES=full
-they are as Textual makes them.
+Every day they also paint only what a test looks at, and make styles and strips with less ado; with EXAMPLES=full they are as
+Textual makes them.
 """
 
 from __future__ import annotations
@@ -46,12 +46,15 @@ _paint = Screen._compositor_refresh
 
 
 @contextlib.contextmanager
-def quick() -> Iterator[None]:
-    """Apps that are run here wait so."""
+def quick(paints: bool = IS_FULL) -> Iterator[None]:
+    """Apps that are run here wait so. Without `paints` they paint each screen once when it has opened, and at the end."""
     n_threads = threading.active_count()
 
     async def rested(min_sleep: float = 0.0, max_sleep: float = 1.0) -> None:
-        await _rested(active_app.get())
+        app: Any = active_app.get()
+        await _rested(app)
+        if paints or getattr(app, "painted_screen", None) is not app.screen:
+            await painted(app)
         # A thread that is at work may send the app something later: as long as there is one, Textual's way is the only one.
         if threading.active_count() > n_threads:
             await wait_for_idle(0)
@@ -95,14 +98,13 @@ async def _rested(app: App[Any]) -> None:
         if app._exception is None and app._running and app.screen_stack:
             app.screen._on_timer_update()
     await _nothing_ready(end)
-    if IS_FULL:
-        await painted(app)
 
 
-async def painted(app: App[Any]) -> None:
+async def painted(app: Any) -> None:
     """Paint what the screen has to show by now."""
     if app._exception is None and app._running and app.screen_stack and app.screen._compositor._dirty_regions:
         _paint(app.screen)
+        app.painted_screen = app.screen
         await _nothing_ready(time.monotonic() + LONGEST_WAIT_S)
 
 

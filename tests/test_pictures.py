@@ -30,7 +30,7 @@ LOOKS = re.compile("-(large|light|without-colour).svg$")
 
 @pytest.mark.parametrize("name", [name for name in NAMES if IS_FULL or not LOOKS.search(name)])
 def test_a_picture_shows_what_is_shown_now(name: str):
-    with quick():
+    with quick(paints=True):
         now = pictures.draw(pictures.PICTURES[name])
     assert (pictures.FOLDER / name).read_text(encoding="utf-8") == now, "run: make docs"
 

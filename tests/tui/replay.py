@@ -131,7 +131,7 @@ class Replay:
         self.app = EditorApp(Workspace(self._path(self.last_file)))
         columns, rows = map(int, size or (80, 24))
         try:
-            return drive(self.app, lambda pilot: self._all(pilot, steps), (columns, rows))
+            return drive(self.app, lambda pilot: self._all(pilot, steps), (columns, rows), paints=True)
         finally:
             self.app.workspace.close()
 

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 from unittest.mock import patch
 
 from quick_apps import painted, quick
+from strategies import IS_FULL
 from textual.app import App
 from textual.pilot import Pilot
 
@@ -26,8 +27,13 @@ def screen_text(app: App[Any]) -> str:
     return "\n".join("".join(segment.text for segment in strip).rstrip() for strip in strips)
 
 
-def drive(app: App[Any], script: Callable[[Pilot[Any]], Awaitable[T]], size: tuple[int, int] = (80, 24)) -> T:
-    """Run an app on a screen of (columns, rows) while `script` presses keys; gives what the script gives."""
+def drive(
+    app: App[Any], script: Callable[[Pilot[Any]], Awaitable[T]], size: tuple[int, int] = (80, 24), paints: bool = IS_FULL
+) -> T:
+    """Run an app on a screen of (columns, rows) while `script` presses keys; gives what the script gives.
+
+    `paints`: paint after each key what it has changed, as a terminal is painted; else once when a screen has opened and at the end.
+    """
 
     async def run() -> T:
         app.animation_level = "none"
@@ -37,7 +43,7 @@ def drive(app: App[Any], script: Callable[[Pilot[Any]], Awaitable[T]], size: tup
             await painted(app)
             return found
 
-    with quick():
+    with quick(paints):
         return asyncio.run(run())
 
 

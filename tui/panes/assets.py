@@ -58,6 +58,8 @@ class AssetsPane(SheetView):
         & Grid { height: 1fr; } & #chips { display: none; } & #live { display: none; } & #over { height: 0; }
     }
     """
+    BLANK = True
+    """Its parts cover all of it."""
     BINDINGS: ClassVar[list[BindingType]] = [Binding("f6", "back", "Back to the table", show=False)]
 
     def __init__(self, sheet: Sheet, clipboard: Clipboard) -> None:

@@ -110,6 +110,8 @@ class GridView(ScrollView, inherit_bindings=False):
         self._painted: dict[int, Strip] = {}
         """The lines that were painted last, where the grid was then."""
         self._painted_at: tuple[object, ...] = ()
+        self._rendered: Look | None = None
+        """Where the grid is, while lines are rendered."""
         self._had_focus = False
         self._scrolled_in: tuple[object, ...] = ()
         """The sizes that the scroll bars are of."""
@@ -279,8 +281,16 @@ class GridView(ScrollView, inherit_bindings=False):
         """The row of the view that the cursor is in; behind the last one for the empty row."""
         return len(self.sheet.view) if self.is_in_new_row else self.sheet.cursor[0]
 
+    def render_lines(self, crop: Region) -> list[Strip]:
+        """Render some lines; where the grid is at present is worked out once for all of them."""
+        self._rendered = self.look
+        try:
+            return super().render_lines(crop)
+        finally:
+            self._rendered = None
+
     def render_line(self, y: int) -> Strip:
-        look = self.look
+        look = self._rendered or self.look
         if (place := self._place(look)) != self._painted_at:
             self._painted, self._painted_at = {}, place
         self._painted[y] = strip = self._painter.line(y, look)

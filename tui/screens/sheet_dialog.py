@@ -44,6 +44,8 @@ class SheetDialog(Dialog[Answer]):
         & SmallGrid { height: 1fr; margin: 1 0; }
         & .sheet--said { height: auto; max-height: 4; padding: 0 1; }
         & .sheet--keys { height: auto; max-height: 2; padding: 0 1; color: $text-muted; }
+        &.-tall > #dialog, &.-tall > #dialog > #dialog-body { height: auto; }
+        &.-tall SmallGrid { height: auto; min-height: 14; max-height: 60vh; }
     }
     """
 

@@ -404,9 +404,10 @@ class Painter:
         if query.is_empty:
             return "test row"
         may_be = f", {query.n_undecided:,} may be" if query.n_undecided else ""
-        of = f"{query.n_valid - query.n_undecided:,} of"
-        said = f"{of} {plural(self.sheet.table.n_rows, 'row')} valid{may_be}"
-        return said if cell_len(said) <= width else f"{of} {self.sheet.table.n_rows:,} valid"
+        n_sure, n_rows = f"{query.n_valid - query.n_undecided:,}", f"{self.sheet.table.n_rows:,}"
+        whole = f"{n_sure} of {plural(self.sheet.table.n_rows, 'row')} valid{may_be}"
+        forms = (whole, f"{n_sure} of {n_rows} valid", f"{n_sure} of {n_rows}", f"{n_sure}/{n_rows}", n_sure)
+        return next((form for form in forms if cell_len(form) <= width), n_sure)
 
     # ---- parts
 

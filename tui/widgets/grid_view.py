@@ -206,9 +206,12 @@ class GridView(ScrollView, inherit_bindings=False):
                 self._own_widths[column.name] = max(wide, beside), max(narrow, beside)
 
     def autofit(self) -> None:
-        """Make each column as wide as its texts and its name."""
+        """Make each column as wide as its texts and its name; one without texts as wide as at first."""
         for at, column in enumerate(self.sheet.table.columns):
-            self._widths[column.name] = self._fitted(at, WIDEST)
+            if any(text.strip() for text in column.texts):
+                self._widths[column.name] = self._fitted(at, WIDEST)
+            else:
+                self._widths.pop(column.name, None)
         self.changed()
 
     def set_width(self, column: int, width: int | None) -> None:

@@ -183,6 +183,7 @@ def test_keys_that_come_in_one_packet_type_nothing_and_the_same_signs_typed_come
 
 
 TMUX_NAMES = {"pageup": "PageUp", "pagedown": "PageDown", "insert": "IC", "delete": "DC", "backspace": "BSpace"}
+TMUX_NAMES |= {"comma": ",", "full_stop": "."}
 PLAIN_ONLY = ("enter", "escape", "backspace", "space", "tab")
 """Keys that send the same with Ctrl, Shift or Alt held, or nothing."""
 

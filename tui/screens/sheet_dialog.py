@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import ClassVar
 
 from textual import on
@@ -119,6 +120,7 @@ class SheetDialog(Dialog[Answer]):
             if self.editor is not None:
                 self.editor.refuse(fault)
             return
+        self.grid.again = partial(self.grid.fill, event.text)
         self._close_editor()
         self.sheet.with_room()
         start = None

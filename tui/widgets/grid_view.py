@@ -23,7 +23,7 @@ from contextdb.schema.shapes import CHANCE
 from tui.contrast import readable
 from tui.drawn import SameWidths
 from tui.model.alignment import MOST_ALIGNED, indented
-from tui.model.layout import COMPACT, MOST_TEXTS, WIDEST, Layout, fitted_width, layout, name_lines, name_width
+from tui.model.layout import COMPACT, MOST_TEXTS, NARROWEST, WIDEST, Layout, fitted_width, layout, name_lines, name_width
 from tui.model.sheet import Sheet
 from tui.widgets.grid_paint import Look, Painter
 
@@ -32,6 +32,8 @@ GROUNDS = (
     "selected", "cursor", "cursor-away", "flash", "tint-red", "tint-amber", "tint-green", "tint-blue", "tint-violet",
 )  # fmt: skip
 MEANT = ("text", "any", "muted", "name", "failing", "fault", "disabled", "valid", "line", "on-cursor")
+STEP, WIDEST_BY_KEYS = 2, 200
+"""A key makes a column wider by so many cells; no wider than the second."""
 FLASH_S = 0.4
 """So long a cell is lit that has just begun to fail."""
 
@@ -217,6 +219,15 @@ class GridView(ScrollView, inherit_bindings=False):
     def set_width(self, column: int, width: int | None) -> None:
         """Make a column so wide; None: as wide as its texts."""
         self._widths[self.sheet.header(column).name] = self._fitted(column, WIDEST) if width is None else width
+        self.changed()
+
+    def action_widen(self, steps: int) -> None:
+        """Make the selected columns that are seen wider or narrower by so many steps."""
+        widths, hidden, block = self.grid_layout.widths, self.sheet.hidden, self.sheet.block
+        for at in range(block.left, block.right):
+            if not hidden[at]:
+                width = max(NARROWEST, min(widths[at] + steps * STEP, WIDEST_BY_KEYS))
+                self._widths[self.sheet.table.columns[at].name] = width
         self.changed()
 
     @property

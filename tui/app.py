@@ -34,8 +34,9 @@ from tui.screens.main import MainScreen
 from tui.screens.palette import Palette
 from tui.themes import DARK, THEMES
 
-LOW = 14
-"""On a screen of fewer lines the details give way to the rows."""
+LOW, TALL = 14, 30
+"""On a screen of fewer lines than the first the details give way to the rows. On one of as many as the second a dialog with a list
+is no higher than its lines."""
 
 
 class EditorApp(Editor):
@@ -73,7 +74,7 @@ class EditorApp(Editor):
         & #dialog-body { overflow-y: auto; }
     }
     """
-    VERTICAL_BREAKPOINTS = [(0, "-low"), (LOW, "-high")]  # noqa: RUF012 - Textual declares it so
+    VERTICAL_BREAKPOINTS = [(0, "-low"), (LOW, "-high"), (TALL, "-tall")]  # noqa: RUF012 - Textual declares it so
 
     def __init__(
         self, workspace: Workspace, settings: EditorSettings | None = None, theme: str = "", at: GoToCell | None = None

@@ -128,6 +128,7 @@ GRID: tuple[Command, ...] = (
     ),
     Command("undo", "ctrl+z", "Undo", "Undo the last step; in the test row the last fact.", "Edit", "undo(False)"),
     Command("redo", "ctrl+y,ctrl+shift+z", "Redo", "Redo the step that was undone.", "Edit", "undo(True)"),
+    Command("repeat", "ctrl+u", "Repeat", "Make the last edit again, with what is selected now.", "Edit", "repeat"),
     Command("insert-row", "insert,alt+a", "Insert row", "Insert as many rows above as are selected.", "Rows", "insert_rows(False)"),
     Command("insert-below", "ctrl+n", "Insert below", "Insert as many rows below as are selected.", "Rows", "insert_rows(True)"),
     Command(
@@ -156,6 +157,8 @@ GRID: tuple[Command, ...] = (
         "column-right", "alt+l,alt+shift+right", "Move right", "Move the column right.", "Columns", verb=lambda s: s.move_column(1)
     ),
     Command("sort", "alt+s", "Sort", "Show the rows sorted by this column: up, down, as in the file.", "View", "sort"),
+    Command("narrower", "alt+comma", "Narrower", "Make the selected columns narrower.", "View", "widen(-1)"),
+    Command("wider", "alt+full_stop", "Wider", "Make the selected columns wider.", "View", "widen(1)"),
     Command("test-row", "f6", "Test row", "Go to the test row, or back to the table.", "Test row", "test_row", in_footer=True),
     Command("open-row", "alt+o", "Open the row", "Open the table that the row refers to.", "Move", "open_row"),
     Command(
@@ -267,6 +270,7 @@ def bindings(commands: Iterable[Command]) -> list[BindingType]:
 JUMPS = {"home": Selection.home, "end": Selection.end, "first": Selection.first, "last": Selection.last}
 
 NAMES = {"pageup": "PgUp", "pagedown": "PgDn", "escape": "Esc", "delete": "Del", "insert": "Ins", "backspace": "Backspace"}
+NAMES |= {"comma": ","}
 
 
 def key_name(key: str) -> str:

@@ -3,7 +3,7 @@
     theme = "nord"
 
     [keys]
-    duplicate = "ctrl+u"
+    duplicate = "ctrl+w"
     sort = "shift+f6,f10"
 
 The file is `contextdb/editor.toml` in the folder for settings of the system, or the one that CONTEXTDB_EDITOR names.
@@ -12,8 +12,11 @@ The file is `contextdb/editor.toml` in the folder for settings of the system, or
 from __future__ import annotations
 
 import os
+import re
+import string
 import sys
 import tomllib
+import unicodedata
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -26,7 +29,8 @@ from tui.commands import BY_ID, COMMANDS
 
 VARIABLE = "CONTEXTDB_EDITOR"
 MODIFIERS = ("ctrl", "alt", "shift", "super")
-_KEYS = {key.value for key in Keys} | set(KEY_TO_UNICODE_NAME.values())
+_SIGNS = {re.sub("[ -]", "_", unicodedata.name(sign)).lower() for sign in string.punctuation}
+_KEYS = {key.value for key in Keys} | set(KEY_TO_UNICODE_NAME.values()) | _SIGNS
 
 
 class SettingsError(ContextDBError):
@@ -80,7 +84,7 @@ def _faults(said: Mapping[str, object], themes: Collection[str]) -> Iterator[Fau
         near = nearest(str(theme), themes)
         yield Fault(f"there is no theme {in_quotes(str(theme))}.", ", ".join(sorted(themes)), in_quotes(near) if near else "")
     if not isinstance(keys, dict):
-        yield Fault("[keys] is not a table.", 'lines such as duplicate = "ctrl+u"')
+        yield Fault("[keys] is not a table.", 'lines such as duplicate = "ctrl+w"')
         return
     for name, text in keys.items():
         yield from _key_faults(name, text)
@@ -92,7 +96,7 @@ def _key_faults(name: str, text: object) -> Iterator[Fault]:
         near = nearest(name, BY_ID)
         yield Fault(f"there is no command {in_quotes(name)}.", "those of docs/keys.md", in_quotes(near) if near else "")
     if not isinstance(text, str) or not text.strip():
-        yield Fault(f"the keys of {in_quotes(name)} are not text.", '"ctrl+u", or several with commas between')
+        yield Fault(f"the keys of {in_quotes(name)} are not text.", '"ctrl+w", or several with commas between')
         return
     for key in text.split(","):
         *modifiers, last = key.strip().split("+")
@@ -100,7 +104,7 @@ def _key_faults(name: str, text: object) -> Iterator[Fault]:
             near = nearest(last, _KEYS)
             mend = in_quotes("+".join([*modifiers, near])) if near else ""
             yield Fault(
-                f"there is no key {in_quotes(key.strip())} (for {in_quotes(name)}).", '"ctrl+u", "alt+shift+up", "f10"', mend
+                f"there is no key {in_quotes(key.strip())} (for {in_quotes(name)}).", '"ctrl+w", "alt+shift+up", "f10"', mend
             )
 
 

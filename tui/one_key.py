@@ -82,7 +82,7 @@ class OneKeyAtATime(App[None]):
 async def _done(part: DOMNode) -> None:
     """Wait until a part of the screen has handled all that it was told up to now; one that is being closed is not waited for."""
     done = asyncio.Event()
-    if part.call_later(done.set):
+    if part.post_message(events.Callback(done.set)):  # `call_later` wraps it, and Textual then inspects it anew each time
         try:
             await asyncio.wait_for(done.wait(), WAIT_FOR_PART_S)
         except TimeoutError:

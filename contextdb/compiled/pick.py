@@ -230,24 +230,39 @@ class Outcome:
             if len(self.candidates):
                 _share_out(self.compiled.ways, self.candidates, 0, 1.0, found)
             return found
-        if len(self.candidates) == 1:
-            return {int(self.candidates[0]): 1.0}
-        shares = _shares(self.compiled.row_weights[self.candidates])
-        return dict(zip(self.candidates.tolist(), shares.tolist(), strict=True))
+        return dict(zip(self.candidates.tolist(), self._shares_of_candidates.tolist(), strict=True))
+
+    @cached_property
+    def _shares_of_candidates(self) -> NDArray[np.float64]:
+        """The chance of each of `candidates` in their order, float64 [count]."""
+        if self.compiled.ways is not None:
+            return np.array([self.chances[row] for row in self.candidates.tolist()])
+        return np.ones(1) if len(self.candidates) == 1 else _shares(self.compiled.row_weights[self.candidates])
 
     @property
     def prefers_some(self) -> bool:
         """Whether the valid rows are not all picked alike."""
-        return len(self.candidates) < len(self.rows) or len(set(self.chances.values())) > 1
+        shares = self._shares_of_candidates
+        return len(self.candidates) < len(self.rows) or bool(len(shares) and shares.min() < shares.max())
+
+    def picks_one_of(self, rows: Iterable[int]) -> bool:
+        """Whether one of some rows may be picked."""
+        return any(self._place(row) is not None for row in rows)
 
     def chance(self, rows: Iterable[int]) -> float:
         """The chance that one of some rows is picked, 0...1; 0 for rows that are not valid."""
-        return min(sum(self.chances.get(row, 0.0) for row in rows), 1.0)
+        places = [place for row in rows if (place := self._place(row)) is not None]
+        return min(sum(float(self._shares_of_candidates[place]) for place in places), 1.0)
+
+    def _place(self, row: int) -> int | None:
+        """Where a row stands among the candidates."""
+        at = int(np.searchsorted(self.candidates, row))
+        return at if at < len(self.candidates) and self.candidates[at] == row else None
 
     def said_of(self, rows: Sequence[int]) -> str:
         """How valid rows that are one row of a table, one or those behind it, stand: "picked", "picked, chance 40 %",
         "outranked by B (priority 5)"."""
-        if any(row in self.chances for row in rows):
+        if self.picks_one_of(rows):
             chance = self.chance(rows)
             return "picked" if chance >= 1.0 else f"picked, chance {percent(chance)}"
         return self.why_not(rows[0])

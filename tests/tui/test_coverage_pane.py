@@ -15,6 +15,7 @@ from textual.pilot import Pilot
 import contextdb as cdb
 from contextdb.covering import Cancelled
 from tui.messages import FillGap, GoToCell, SetContext, Told
+from tui.model.coverage_lines import as_typed
 from tui.model.coverage_run import CoverageRun, Result
 from tui.model.sheet import Sheet
 from tui.panes.coverage import CoveragePane
@@ -121,13 +122,21 @@ def test_the_detail_follows_the_cursor_and_shows_the_cell_to_change():
 
 def test_the_one_cell_that_would_close_a_gap_stands_in_its_line():
     _, screen = shown(of=table(gait=["Any", "Any"], speed=["..5", "6.."], up=["Any", "Any"]))
-    assert "row 1: speed → ..6)" in screen
-    assert "Nearest: row 1 Anim_0. It would do to change speed from ..5 to ..6)." in screen
+    assert "row 1: speed → <6" in screen
+    assert "Nearest: row 1 Anim_0. It would do to change speed from ..5 to <6." in screen
 
 
 def test_enter_on_a_gap_asks_for_a_new_row_of_its_cells():
     app, _ = shown(keys=("enter",))
     assert app.told == [FillGap({"speed": "(5..10]"})]
+
+
+def test_a_gap_with_open_ends_is_filled_with_a_cell_as_people_write_it():
+    free = cdb.Table.from_columns({"Asset": ["a"], "speed": ["0.5..3"]}, schema={"speed": {"type": "number"}})
+    app, screen = shown(of=free, keys=("enter",))
+    assert app.told == [FillGap({"speed": "<0.5 | >3"})]
+    assert "speed: <0.5 | >3" in screen
+    assert [as_typed(cell) for cell in ("..0.5) | (3..4]", "(3..", "-5..5", "..x)")] == ["<0.5 | (3..4]", ">3", "-5..5", "..x)"]
 
 
 def test_t_asks_for_a_context_in_the_gap_for_which_no_row_is_valid():

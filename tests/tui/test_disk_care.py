@@ -208,3 +208,22 @@ def test_a_table_that_comes_free_is_told_once(path):
         app.looks(3)
 
     assert run(path, script).said == ["The other editor has closed this table: it can be saved here again."]
+
+
+def test_who_has_the_table_and_what_was_left_of_it_is_told_as_it_changes(path):
+    first = Session(path)
+    others: list[Session] = []
+
+    async def script(app: Host, pilot: Pilot[None]) -> None:
+        first.close()
+        others.append(Session(path))
+        app.looks(3)
+        others[0].sheet.go(0, 0)
+        others[0].sheet.type_text("dash")
+        others[0].lock.release()  # as when it is killed
+        app.looks(3)
+
+    assert run(path, script).said == [
+        f"process {os.getpid()} has opened this table: it can be read here, and saved under another name.",
+        "The other editor has ended and left edits that are not saved. Save yours under another name; then open this table again.",
+    ]

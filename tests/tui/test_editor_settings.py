@@ -41,9 +41,9 @@ def test_without_a_file_nothing_is_set(tmp_path):
 
 
 def test_a_theme_and_keys_are_taken(tmp_path):
-    found = read(tmp_path, '\ufefftheme = "nord"\n[keys]\nduplicate = "ctrl+u"\nsort = "shift+f6, f11"\n')
+    found = read(tmp_path, '\ufefftheme = "nord"\n[keys]\nduplicate = "ctrl+w"\nsort = "shift+f6, f11"\n')
     assert found.theme == "nord"
-    assert dict(found.keys) == {"duplicate": "ctrl+u", "sort": "shift+f6, f11"}
+    assert dict(found.keys) == {"duplicate": "ctrl+w", "sort": "shift+f6, f11"}
 
 
 @pytest.mark.parametrize("name", THEMES)
@@ -58,13 +58,13 @@ def test_every_theme_can_be_set(tmp_path, name):
         ("theme = 3", ['there is no theme "3"']),
         ("theme = [1]", ["there is no theme"]),
         ('thema = "nord"', ['there is no setting "thema"', "theme, [keys]"]),
-        ('keys = "ctrl+u"', ["[keys] is not a table"]),
-        ('[keys]\nduplicat = "ctrl+u"', ['there is no command "duplicat"', 'Did you mean "duplicate"?']),
+        ('keys = "ctrl+w"', ["[keys] is not a table"]),
+        ('[keys]\nduplicat = "ctrl+w"', ['there is no command "duplicat"', 'Did you mean "duplicate"?']),
         ("[keys]\nduplicate = 3", ['the keys of "duplicate" are not text']),
         ('[keys]\nduplicate = ""', ['the keys of "duplicate" are not text']),
         ('[keys]\nduplicate = "ctrl+pageupp"', ['there is no key "ctrl+pageupp"', 'Did you mean "ctrl+pageup"?']),
         ('[keys]\nduplicate = "strg+u"', ['there is no key "strg+u"']),
-        ('[keys]\nduplicate = "ctrl+u,"', ['there is no key ""']),
+        ('[keys]\nduplicate = "ctrl+w,"', ['there is no key ""']),
         ('[keys]\nduplicate = "ctrl+s"', ['"ctrl+s" is the key of', '"duplicate"', '"save"']),
         ("[keys", ["cannot read the settings of the editor"]),
         (b"\xff\xfe\x00", ["cannot read the settings of the editor"]),
@@ -127,25 +127,25 @@ def path(tmp_path: Path) -> Path:
 def test_the_keys_of_a_keymap_work_in_place_of_the_stock_ones(path):
     async def script(app, pilot):
         counts = []
-        for key in ("ctrl+b", "ctrl+u"):
+        for key in ("ctrl+b", "ctrl+w"):
             await press(pilot, key)
             counts.append(app.main.session.sheet.table.n_rows)
         return counts
 
-    assert with_editor(path, script, settings=EditorSettings(keys={"duplicate": "ctrl+u"})) == [2, 3]
+    assert with_editor(path, script, settings=EditorSettings(keys={"duplicate": "ctrl+w"})) == [2, 3]
 
 
 def test_keys_with_a_blank_behind_the_comma_all_work(tmp_path, path):
-    settings = read(tmp_path, '[keys]\nduplicate = "ctrl+u, shift+f6"\n')
+    settings = read(tmp_path, '[keys]\nduplicate = "ctrl+w, shift+f6"\n')
 
     async def script(app, pilot):
-        await press(pilot, "ctrl+u", "shift+f6")
+        await press(pilot, "ctrl+w", "shift+f6")
         return app.main.session.sheet.table.n_rows
 
     assert with_editor(path, script, settings=settings) == 4
 
 
-@pytest.mark.parametrize(("command", "key"), [("sort", "f10"), ("filter", "ctrl+u"), ("save", "f10"), ("find", "ctrl+u")])
+@pytest.mark.parametrize(("command", "key"), [("sort", "f10"), ("filter", "ctrl+w"), ("save", "f10"), ("find", "ctrl+w")])
 def test_a_keymap_holds_for_the_grid_the_pane_and_the_screen(path, command, key):
     async def script(app, pilot):
         await press(pilot, "x", "enter", key)
@@ -170,7 +170,7 @@ def test_the_help_shows_the_keys_of_a_keymap(path):
             await press(pilot, "pagedown")
         return shown
 
-    shown = with_editor(path, script, settings=EditorSettings(keys={"duplicate": "ctrl+u"}))
+    shown = with_editor(path, script, settings=EditorSettings(keys={"duplicate": "ctrl+w"}))
     assert "Ctrl+U" in shown
     assert "Ctrl+B" not in shown
 

@@ -165,3 +165,74 @@ def test_the_right_button_on_a_header_offers_what_can_be_done_with_the_column(pa
         return sheet.hidden, sheet.is_modified
 
     assert with_editor(path, script, (100, 30)) == ((False, True, False), False)
+
+
+# ---- again, and widths
+
+
+def texts(app, name):
+    return app.main.session.sheet.table.text_column(name).to_list()
+
+
+@pytest.mark.parametrize(
+    ("first", "then", "speeds"),
+    [
+        (("5", "enter"), (), ["5", "5", "3"]),
+        (("5", "enter"), ("shift+down",), ["5", "5", "5"]),
+        (("delete",), ("down", "down"), ["", "2", ""]),
+        (("down", "ctrl+d"), ("down",), ["1", "1", "1"]),
+        (("ctrl+b",), (), ["1", "1", "1", "2", "3"]),
+        (("5", "enter", "ctrl+z"), ("down",), ["1", "2", "5"]),
+        (("5", "enter"), ("down", "down"), ["5", "2", "3", "5"]),
+    ],
+)
+def test_ctrl_u_makes_the_last_edit_again_with_what_is_selected_now(path, first, then, speeds):
+    async def script(app, pilot):
+        await press(pilot, "end", *first, *then, "ctrl+u")
+        return texts(app, "speed")
+
+    assert with_editor(path, script) == speeds
+
+
+def test_a_text_that_the_other_column_cannot_read_is_not_repeated_there(path):
+    async def script(app, pilot):
+        await press(pilot, "right", *"Run", "enter", "end", "ctrl+u")
+        return texts(app, "speed"), said(app)
+
+    speeds, told = with_editor(path, script)
+    assert speeds == ["1", "2", "3"]
+    assert 'cannot read "Run"' in told
+
+
+def test_a_fact_is_repeated_in_the_test_row_and_a_paste_anywhere(path):
+    async def script(app, pilot):
+        await press(pilot, "end", "f6", "2", "enter", "ctrl+z", "ctrl+u")
+        fact = app.main.session.sheet.query.text("speed")
+        app.main.assets.clipboard.copy("7\n8\n")
+        await press(pilot, "f6", "ctrl+v", "down", "ctrl+u")
+        return fact, texts(app, "speed")
+
+    assert with_editor(path, script) == ("2", ["7", "7", "8"])
+
+
+def test_before_any_edit_there_is_nothing_to_repeat(path):
+    async def script(app, pilot):
+        await press(pilot, "ctrl+u")
+        return said(app), app.main.session.sheet.is_modified
+
+    assert with_editor(path, script) == ("There is no edit to repeat yet.", False)
+
+
+def test_keys_make_the_selected_columns_wider_and_narrower(path):
+    async def script(app, pilot):
+        grid, seen = app.main.assets.grid, []
+        await press(pilot, "right", "shift+right")
+        for key in ("alt+full_stop", "alt+comma", *["alt+comma"] * 40):
+            before = grid.grid_layout.widths
+            await pilot.press(key)
+            seen.append([now - was for now, was in zip(grid.grid_layout.widths, before, strict=True)])
+        return seen[:2], grid.grid_layout.widths[1:]
+
+    changes, least = with_editor(path, script)
+    assert changes == [[0, 2, 2], [0, -2, -2]]
+    assert least == (6, 6)

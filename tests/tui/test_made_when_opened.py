@@ -48,10 +48,10 @@ def test_a_screen_has_the_class_of_its_height_before_its_parts_are_styled(tmp_pa
     made = MainScreen.on_mount
 
     def on_mount(screen):
-        seen.append((screen.has_class("-low"), screen.has_class("-high")))
+        seen.append([name for name in ("-low", "-high", "-tall") if screen.has_class(name)])
         made(screen)
 
     monkeypatch.setattr(MainScreen, "on_mount", on_mount)
-    for height in (12, 24):
+    for height in (12, 24, 36):
         with_editor(table(tmp_path), lambda app, pilot: pilot.pause(), (80, height))
-    assert seen == [(True, False), (False, True)]
+    assert seen == [["-low"], ["-high"], ["-tall"]]

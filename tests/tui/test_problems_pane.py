@@ -88,7 +88,7 @@ def shown(
 def test_errors_come_first_and_rows_count_from_1_as_in_the_grid(table):
     _, screen = shown(table)
     lines = screen.splitlines()
-    assert lines[0].strip() == "4 errors, 1 warning, 1 info."
+    assert lines[0].strip() == "4 errors, 1 warning, 1 for information."
     assert lines[2].split() == ["1", "All", "6", "2", "Errors", "4", "3", "Warnings", "1", "4", "Information", "1"]
     assert [line.split()[0] for line in lines[4:10]] == ["▸", "error", "error", "error", "warning", "information"]
     assert lines[4].split()[2:5] == ["1", "Jog", "speed"]
@@ -143,7 +143,7 @@ def test_an_edit_that_mends_a_cell_takes_its_problem_away(table):
         pilot.app.pane.show()
 
     app, screen = shown(table, script=mend)
-    assert screen.splitlines()[0].strip() == "3 errors, 1 warning, 1 info."
+    assert screen.splitlines()[0].strip() == "3 errors, 1 warning, 1 for information."
     assert all(p.row != 0 for p in app.pane.lines if p.level == "error")
 
 
@@ -196,7 +196,7 @@ def test_a_large_table_is_checked_beside_the_keys():
 
     app, screen = shown(large, script=wait)
     n_found = len(cell_findings(large)) + len(row_findings(large))
-    assert screen.splitlines()[0].strip() == "1 warning, 1 info."
+    assert screen.splitlines()[0].strip() == "1 warning, 1 for information."
     assert len(app.pane.lines) == n_found
 
 
@@ -243,12 +243,12 @@ def test_the_rows_of_a_larger_table_are_looked_at_beside_the_keys(table, monkeyp
 
     app, screen = shown(table, script=wait)
     assert app.pane.is_all
-    assert screen.splitlines()[0].strip() == "4 errors, 1 warning, 1 info."
+    assert screen.splitlines()[0].strip() == "4 errors, 1 warning, 1 for information."
 
 
 def test_while_the_rows_are_looked_at_that_is_said(table):
     _, screen = shown(table, script=_half_known)
-    assert screen.splitlines()[0].strip() == "4 errors, 1 warning, 1 info. Looking at the rows …"
+    assert screen.splitlines()[0].strip() == "4 errors, 1 warning, 1 for information. Looking at the rows …"
 
 
 def test_while_the_rows_are_looked_at_no_empty_list_says_that_there_is_nothing():

@@ -513,6 +513,30 @@ def test_a_table_with_unsaved_edits_of_an_editor_that_was_killed_is_not_saved_ov
     third.close()
 
 
+def test_an_editor_that_was_killed_with_unsaved_edits_is_told_of_as_one_that_left_them(path):
+    first = Session(path)
+    second = Session(path)
+    type_into(first, 1, 0, "dash")
+    first.lock.release()  # as when it is killed
+    assert second.poll() == OnDisk(has_left=True)
+    second.close()
+
+
+def test_the_editor_that_is_named_is_the_one_that_has_the_table_now(path):
+    first = Session(path)
+    second = Session(path)
+    was = second.holder
+    assert not second.poll()
+    first.close()
+    third = Session(path)
+    assert second.poll() == OnDisk(held_by=second.holder)
+    assert second.holder != was
+    assert second.holder.id == third.lock.id
+    assert not second.poll()
+    third.close()
+    second.close()
+
+
 def test_an_editor_on_another_machine_is_asked_about_and_can_be_taken_over(path):
     there = Lock(path, host="workstation-7")
     there.acquire()

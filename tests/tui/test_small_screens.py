@@ -105,3 +105,57 @@ def test_a_cell_is_edited_in_a_terminal_of_20_columns_and_8_lines(path):
         return app.main.session.sheet.text(0, 1)
 
     assert with_editor(path, script, (20, 8)) == "True"
+
+
+@pytest.mark.parametrize("command", ["contexts", "import", "export", "actors"])
+def test_a_dialog_with_few_lines_is_no_higher_than_they_need(path, command):
+    async def script(app, pilot):
+        await app.main.run_command(command)
+        await pilot.pause()
+        return app.screen.query_one("#dialog").size.height
+
+    file = path.with_name("contested_catch.csv") if command == "actors" else path
+    assert [with_editor(file, script, size) <= most for size, most in (((120, 36), 24), ((160, 48), 24), ((80, 24), 22))] == [
+        True
+    ] * 3
+
+
+def test_a_dialog_does_not_become_lower_while_one_types(path):
+    async def script(app, pilot):
+        await press(pilot, "f9")
+        before = app.screen.query_one("#dialog").size.height
+        await press(pilot, *"no such context")
+        return before, app.screen.query_one("#dialog").size.height
+
+    before, after = with_editor(path, script, (120, 36))
+    assert before == after
+
+
+@pytest.mark.parametrize(
+    ("width", "said"), [(30, "8 of 12 rows valid"), (16, "8 of 12 valid"), (12, "8 of 12"), (7, "8/12"), (4, "8")]
+)
+def test_how_many_rows_are_valid_is_never_cut_however_narrow_the_assets_are(tmp_path, width, said):
+    file = tmp_path / "t.csv"
+    file.write_text("Asset,hit\n" + "".join(f"a{at},{at < 8}\n" for at in range(12)))
+
+    async def script(app, pilot):
+        app.main.assets.set_context({"hit": "True"}, "")
+        app.main.assets.grid.set_width(0, width)
+        await pilot.pause()
+        return next(line for line in screen_text(app).splitlines() if line.startswith("?") or line.startswith(" ?"))
+
+    assert with_editor(file, script, (80, 24)).split("│")[0].removeprefix("  ?").strip(" ?") == said
+
+
+def test_autofit_leaves_columns_without_texts_as_wide_as_they_were(tmp_path):
+    file = tmp_path / "t.csv"
+    file.write_text("Asset,ActivateDiveAtMidAirHigh,ActivateDiveAtMidAirLow\n" + "a,,True\nb,,False\n")
+
+    async def script(app, pilot):
+        grid = app.main.assets.grid
+        before = grid.grid_layout.widths[:3]
+        grid.autofit()
+        return before, grid.grid_layout.widths[:3]
+
+    before, after = with_editor(file, script, (50, 24))
+    assert (after[1], after[2] > before[2]) == (before[1], True)

@@ -5,8 +5,10 @@ Nothing sleeps to be safe: each step waits until the screen shows what it is to 
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -107,6 +109,13 @@ def terminal(tmp_path: Path) -> Iterator[Terminal]:
     subprocess.run(["tmux", "-S", made.socket, "kill-server"], capture_output=True, check=False)
 
 
+@pytest.fixture
+def other_terminal(terminal: Terminal) -> Iterator[Terminal]:
+    made = Terminal(f"{terminal.socket}-other", terminal.folder)
+    yield made
+    subprocess.run(["tmux", "-S", made.socket, "kill-server"], capture_output=True, check=False)
+
+
 @pytest.mark.parametrize(
     ("term", "more"), [("screen-256color", {}), ("xterm", {}), ("xterm-256color", {"NO_COLOR": "1"})], ids=["256", "16", "none"]
 )
@@ -152,6 +161,47 @@ def test_quitting_with_unsaved_edits_asks_and_saves(terminal):
     assert (terminal.folder / "t.csv").read_bytes() == RAW.replace(b"clip_00", b"first")
 
 
+def test_two_editors_of_one_table_lose_nothing_of_what_was_saved_and_each_is_told(terminal, other_terminal):
+    terminal.start("screen-256color")
+    terminal.wait("clip_00", "F2 Edit")
+    other_terminal.start("screen-256color")
+    other_terminal.wait("open elsewhere", "is lost if this editor is killed")
+    other_terminal.keys("Enter", "Right")
+    for one, typed in ((terminal, "2..25"), (other_terminal, "7")):
+        one.keys("C-Home", "Right")
+        one.raw(typed)
+        one.keys("Enter")
+        one.wait("t *", "row 2 · speed")
+    other_terminal.keys("C-s")
+    other_terminal.wait("it is not saved here")
+    terminal.keys("C-s")
+    terminal.wait("Saved t.csv.")
+    other_terminal.wait("The file was changed on disk", "7", "2..25")
+    other_terminal.keys("Right", "Enter")
+    other_terminal.wait("Merged from disk: 1 cell changed.")
+    other_terminal.keys("C-z")
+    other_terminal.wait("Undo: Merge changes on disk.")
+
+    terminal.raw("9")
+    terminal.keys("Enter", "C-z")
+    terminal.wait("Undo: Type speed of clip_01.")
+    terminal.keys("C-y")
+    terminal.wait("Redo: Type speed of clip_01.")
+    os.kill(json.loads((terminal.folder / ".contextdb-journal" / "t.csv.lock").read_text())["pid"], signal.SIGKILL)
+    terminal.wait("exit code 137")
+    other_terminal.wait("left edits that are not saved")
+
+    terminal.tmux("kill-server")
+    terminal.start("screen-256color")
+    terminal.wait("1 unsaved edit restored", "F2 Edit")
+    other_terminal.wait("has opened this table")
+    terminal.keys("C-s")
+    terminal.wait("Saved t.csv.")
+    expected = RAW.replace(b"clip_00,0,", b"clip_00,2..25,").replace(b"clip_01,1,", b"clip_01,9,")
+    assert (terminal.folder / "t.csv").read_bytes() == expected
+    other_terminal.wait("Merged from disk: 1 cell changed.", "clip_01 │  9")
+
+
 def test_a_terminal_that_changes_its_size_while_the_editor_starts_and_later_is_filled_at_once(terminal):
     terminal.start("screen-256color", COLUMNS="80", LINES="24")  # as a shell may export them
     terminal.resize(200, 60)
@@ -183,6 +233,7 @@ def test_keys_that_come_in_one_packet_type_nothing_and_the_same_signs_typed_come
 
 
 TMUX_NAMES = {"pageup": "PageUp", "pagedown": "PageDown", "insert": "IC", "delete": "DC", "backspace": "BSpace"}
+TMUX_NAMES |= {"comma": ",", "full_stop": "."}
 PLAIN_ONLY = ("enter", "escape", "backspace", "space", "tab")
 """Keys that send the same with Ctrl, Shift or Alt held, or nothing."""
 

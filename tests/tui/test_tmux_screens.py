@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+import tempfile
 import time
 from collections.abc import Iterator
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +16,7 @@ from test_motion_measure_command import made
 from test_tmux import DEADLINE_S, ROOT, Terminal
 from textual.binding import Binding
 
+import contextdb as cdb
 from docs import keys, terminals
 from docs.terminals import ESC, xterm
 from tui.model.session import Session
@@ -25,6 +28,7 @@ pytestmark = pytest.mark.skipif(shutil.which("tmux") is None, reason="tmux is no
 
 TABLE = "Asset,speed,Defender.near,hit\nwalk,0..2,Any,True\nrun,2..6,0..3,Any\nrun,2..6,Any,False\n"
 MARKED = "Asset,speed\n<<<<<<< ours\nwalk,0..2\n=======\nwalk,0..3\n>>>>>>> theirs\n"
+REMARKED = "Asset;speed\nr\xe9;1\n"
 CASES = "Case,Expected,speed,Defender.near,hit\nslow,walk,1,2,True\n"
 CONDITIONS = '[conditions.hit]\ntype = "bool"\n[conditions."Defender.near"]\ntype = "number"\n'
 
@@ -66,6 +70,10 @@ class Screen:
     """What is opened before, and what that shows."""
     also: tuple[tuple[str, str], ...] = ()
     """Keys of a part of Textual's, and what they do."""
+    of_game: bool = False
+    """A game runs meanwhile."""
+    is_marked: bool = False
+    """A table with marks of git lies there meanwhile, with which no project can be read."""
 
 
 @dataclass
@@ -74,6 +82,8 @@ class Editor:
 
     terminal: Terminal
     folder: Path
+    meeting: Path
+    """Where running games are met."""
 
     @property
     def told(self) -> list[str]:
@@ -131,9 +141,19 @@ SCREENS = (
         leaves=ESC + ESC,
         before=((named("import"), "Enter read"), ("../cells.csv\r", "Becomes")),
     ),
-    Screen(table("marks"), "Enter merge", "ConflictsDialog Dialog"),
+    Screen(xterm("shift+f4"), "A replace what differs", "AutofillDialog LineList Dialog"),
+    Screen(
+        "\r", "it has decided nothing yet", "WaitingScreen", leaves="q", before=((named("motion"), "1 game running"),), of_game=True
+    ),
+    Screen(table("marks"), "Enter merge", "ConflictsDialog Dialog", is_marked=True),
     Screen(table("held"), "open elsewhere", "HeldDialog Dialog"),
     Screen(xterm("ctrl+q"), "not saved", "LeavingDialog Dialog", before=((named("duplicate rows"), "Duplicate"),)),
+    Screen(
+        xterm("f6"),
+        "PgDn read on",
+        "RemarksDialog Dialog",
+        before=((named("import"), "Enter read"), ("../remarks.csv\r", "F6 import")),
+    ),
 )
 
 
@@ -144,22 +164,36 @@ def editor(made: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Edi
     (folder / "game" / "acts.csv").write_text(TABLE, encoding="utf-8")
     (folder / "game" / "acts.cases.csv").write_text(CASES, encoding="utf-8")
     (folder / "game" / "held.csv").write_text(TABLE, encoding="utf-8")
-    (folder / "game" / "marks.csv").write_text(MARKED, encoding="utf-8")
     (folder / "cells.csv").write_text(TABLE, encoding="utf-8")
     with (folder / "game" / "contextdb.toml").open("a", encoding="utf-8") as file:
         file.write(CONDITIONS)
+    (folder / "remarks.csv").write_text(REMARKED, encoding="cp1252")
+    meeting = Path(tempfile.mkdtemp(prefix="cdb"))  # sockets need a short path
     terminal = Terminal(str(folder / "socket"), folder)
     program = ROOT / "tests" / "tui" / "recording_editor.py"
-    terminal.start("screen-256color", program=f"{program} game/acts.csv told.txt hold", COLORTERM="")
+    terminal.start("screen-256color", program=f"{program} game/acts.csv told.txt hold", COLORTERM="", XDG_RUNTIME_DIR=str(meeting))
     terminal.wait("walk", "F2 Edit")
     elsewhere = Session(folder / "game" / "held.csv")
-    yield Editor(terminal, folder)
+    yield Editor(terminal, folder, meeting)
     elsewhere.close()
+    shutil.rmtree(meeting, ignore_errors=True)
     subprocess.run(["tmux", "-S", terminal.socket, "kill-server"], capture_output=True, check=False)
 
 
 @pytest.mark.parametrize("screen", SCREENS, ids=[screen.widgets for screen in SCREENS])
-def test_each_key_of_a_screen_does_in_a_terminal_what_the_page_says(editor: Editor, screen: Screen):
+def test_each_key_of_a_screen_does_in_a_terminal_what_the_page_says(
+    editor: Editor, screen: Screen, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(editor.meeting))
+    marks = editor.folder / "game" / "marks.csv"
+    if screen.is_marked:
+        marks.write_text(MARKED, encoding="utf-8")
+    with cdb.link("game") if screen.of_game else nullcontext():
+        _press_all(editor, screen)
+    marks.unlink(missing_ok=True)
+
+
+def _press_all(editor: Editor, screen: Screen) -> None:
     for opens, shows in screen.before:
         editor.terminal.raw(opens)
         editor.terminal.wait(shows)

@@ -20,7 +20,7 @@ LOOK_S = 0.1
 class WaitingScreen(Screen[None]):
     """Waits for the first decision; `then` is called with it there."""
 
-    BINDINGS: ClassVar[list[BindingType]] = [Binding("q,ctrl+q,escape", "leave", "Leave")]
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("q,escape", "leave", "Leave")]
     DEFAULT_CSS = """
     WaitingScreen { align: center middle; & > #waiting { width: auto; max-width: 90%; height: auto; } }
     """

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 
+from contextdb.cells.words import NUMBER_TEXT
 from contextdb.checks.rules import RULES
 from contextdb.covering import CoverageReport, Gap, Nearest, PairTable, Slice, format_percent
 from contextdb.covering.report import Crowd
@@ -17,6 +18,8 @@ from tui.model.coverage_run import CoverageRun, Result
 MOST_ROWS_NAMED = 12
 SHORT_NAME = 18
 """A condition's name takes so many characters of a line at most."""
+_BELOW = re.compile(rf"^\.\.({NUMBER_TEXT})\)$")
+_ABOVE = re.compile(rf"^\(({NUMBER_TEXT})\.\.$")
 
 TITLES = {
     "equal-row": "same contexts as another row",
@@ -65,9 +68,14 @@ def summary_text(report: CoverageReport) -> str:
     return f"{n_gaps}, on average {report.overlap.mean:.3g} rows valid"
 
 
+def as_typed(cell: str) -> str:
+    """A cell of numbers as people write it, where one end is open: `<0.5 | (3..4]` for `..0.5) | (3..4]`."""
+    return " | ".join(_BELOW.sub(r"<\1", _ABOVE.sub(r">\1", part)) for part in cell.split(" | "))
+
+
 def cells_text(cells: Mapping[str, str]) -> str:
     """Cells on one line."""
-    return ", ".join(f"{name}: {cell}" for name, cell in cells.items()) or "every context"
+    return ", ".join(f"{name}: {as_typed(cell)}" for name, cell in cells.items()) or "every context"
 
 
 def row_text(row: int, asset: str) -> str:
@@ -92,14 +100,14 @@ def cells_within(cells: Mapping[str, str], width: int) -> str:
     whole = cells_text(cells)
     if len(whole) <= width:
         return whole
-    return ", ".join(f"{short_name(name)}: {cell}" for name, cell in cells.items()) or whole
+    return ", ".join(f"{short_name(name)}: {as_typed(cell)}" for name, cell in cells.items()) or whole
 
 
 def nearest_text(nearest: Nearest | None) -> str:
     """The one cell to change, in few words."""
     if nearest is None:
         return "no row yet"
-    change = f"{short_name(nearest.condition)} → {nearest.cell}"
+    change = f"{short_name(nearest.condition)} → {as_typed(nearest.cell)}"
     return f"row {nearest.row + 1}: {change}" if nearest.n_changes == 1 else f"row {nearest.row + 1}: {nearest.n_changes} cells"
 
 
@@ -119,7 +127,7 @@ def _nearest_sentence(nearest: Nearest, table: Table) -> str:
     names = {c.condition.name for c in table.conditions}
     is_there = nearest.row < table.n_rows and nearest.condition in names
     now = table.text(nearest.row, nearest.condition) or "Any" if is_there else "?"
-    change = f"{nearest.condition} from {now} to {nearest.cell}"
+    change = f"{nearest.condition} from {now} to {as_typed(nearest.cell)}"
     if nearest.n_changes == 1:
         return f"Nearest: {where}. It would do to change {change}."
     return f"Nearest: {where}, with {nearest.n_changes} cells to change: first {change}."

@@ -100,7 +100,7 @@ class Problems:
     @property
     def summary(self) -> str:
         """How many there are, in a sentence."""
-        said = [plural(n, level) for level, n in self.counts.items() if n]
+        said = [f"{n:,} for information" if level == "info" else plural(n, level) for level, n in self.counts.items() if n]
         return f"{', '.join(said)}." if said else "The check found nothing wrong with this table."
 
 

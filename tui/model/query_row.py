@@ -379,7 +379,7 @@ class QueryRow:
             return ""
         is_flat = self.is_nested and self.asked is not None and self.asked.fault is None
         own = self.asked.valid_rows(row) if is_flat and self.asked is not None else [row]
-        if any(one in self.outcome.chances for one in own):
+        if self.outcome.picks_one_of(own):
             chance = self.outcome.chance(own)
             return percent(chance) if chance < 1.0 else ""
         return self.outcome.why_not(own[0]).partition(" (")[0] if own else ""
@@ -420,12 +420,12 @@ class QueryRow:
     @property
     def valid(self) -> Flags:
         """Whether each row is valid: bool [n_rows]."""
-        return self.flags(self.bits)
+        return bitmask.flags_of(self.bits, self._table.n_rows)
 
-    def flags(self, bits: int) -> Flags:
-        """Rows given as bits: bool [n_rows]."""
-        n_rows = self._table.n_rows
-        return bitmask.unpack(bitmask.from_int(bits, n_rows), n_rows)
+    def marks(self, rows: Rows) -> list[tuple[bool, bool, bool]]:
+        """Of some rows whether each is valid, only may be so, and may be picked."""
+        words = [bitmask.from_int(bits, self._table.n_rows) for bits in (self.bits, self.undecided, self.picked)]
+        return list(zip(*(_has(one, rows).tolist() for one in words), strict=True))
 
     def leaves(self, condition: str) -> int | None:
         """How many rows the fact alone leaves; None when it is not asked for."""
@@ -441,10 +441,9 @@ class QueryRow:
         """Which cells of some rows fail: bool [rows, conditions], the conditions in the order of the table."""
         chosen = np.asarray(rows, np.int64)
         fails = np.zeros((len(chosen), len(self._columns)), np.bool_)
-        word, bit = chosen >> 6, (chosen & 63).astype(np.uint64)
         for at, name in enumerate(self._columns):
             if self.facts.get(name) is not None and self.role_of(name) is None:
-                fails[:, at] = (self._mask(name)[word] >> bit) & np.uint64(1) == 0
+                fails[:, at] = ~_has(self._mask(name), chosen)
         if self.actors:
             self._mark_roles(fails, chosen)
         return fails
@@ -525,6 +524,12 @@ def _accepting(column: ConditionColumn, fact: Fact) -> tuple[int, int]:
         return one.condition_bits(0, fact)
     bits = _rows_of(column, np.array([c.is_soft or c.holds(fact) for c in column.cells], np.bool_))
     return bits, bits
+
+
+def _has(words: NDArray[np.uint64], rows: Rows) -> Flags:
+    """Whether each of some rows is in a mask."""
+    flags: Flags = (words[rows >> 6] >> (rows & 63).astype(np.uint64)) & np.uint64(1) == 1
+    return flags
 
 
 def _rows_of(column: ConditionColumn, holds: NDArray[np.bool_]) -> int:

@@ -50,6 +50,10 @@ class OnDisk:
     """Another machine that has taken the table over: nothing is saved here any more."""
     is_free: bool = False
     """The editor that had the table has ended, so that it can be opened again for editing."""
+    has_left: bool = False
+    """It has ended, and left edits that are not saved: who opens the table again gets them."""
+    held_by: Holder | None = None
+    """Another editor than before has the table open."""
 
     def __bool__(self) -> bool:
         return self != OnDisk()
@@ -100,11 +104,14 @@ class Session:
 
     def poll(self) -> OnDisk:
         """What others did to the files; cheap enough for once a second. A file that is being written counts when it is done."""
-        is_free = self.holder is not None and self._is_free()
+        before = self.holder
+        is_free = before is not None and self._is_free()
+        has_left = is_free and journal_path(self.path).exists()
+        held_by = self.holder if self.holder != before else None
         taken_by = self.lock.taken_by()
         if taken_by is not None:
             self.sheet.recorder = None  # the journal is the other's now
-        return OnDisk(self._file.look(), self._schema_file.look(), taken_by, is_free)
+        return OnDisk(self._file.look(), self._schema_file.look(), taken_by, is_free and not has_left, has_left, held_by)
 
     @property
     def disk_stamp(self) -> Seen:
@@ -279,8 +286,13 @@ class Session:
                 sweep(folder)
 
     def _is_free(self) -> bool:
-        with Lock(self.path) as other:
-            return other.is_held
+        """Whether nobody has the table open any more. Somebody who has it since is its holder from now on."""
+        lock = Lock(self.path)
+        holder, is_free = lock.acquire(), lock.is_held
+        lock.release()
+        if holder is not None and holder.pid:  # 0: it is just writing who it is
+            self.holder = holder
+        return is_free
 
     def _require_own(self) -> None:
         if self.holder is not None and self._is_free():

@@ -71,9 +71,9 @@ class Window:
         self.rows = [WindowRow(r + 1, e, False) for r, e in zip(rows.tolist(), enabled.tolist(), strict=True)]
         if is_asked:
             query = sheet.query
-            marks = (query.flags(bits)[rows].tolist() for bits in (query.bits, query.undecided, query.picked))
             counts = self._failing.sum(axis=1).tolist() if self._failing is not None else [0] * self.n_rows
-            self.rows = [WindowRow(r.number, r.is_enabled, *said) for r, *said in zip(self.rows, *marks, counts, strict=True)]
+            said = zip(self.rows, query.marks(rows), counts, strict=True)
+            self.rows = [WindowRow(r.number, r.is_enabled, *marks, count) for r, marks, count in said]
             self.rows = [replace(r, standing=query.brief(r.number - 1)) if r.is_valid else r for r in self.rows]
         if sheet.played is not None:
             self.rows = [replace(r, is_played=True) if r.number - 1 == sheet.played else r for r in self.rows]

@@ -58,6 +58,8 @@ class AssetsPane(SheetView):
         & Grid { height: 1fr; } & #chips { display: none; } & #live { display: none; } & #over { height: 0; }
     }
     """
+    BLANK = True
+    """Its parts cover all of it."""
     BINDINGS: ClassVar[list[BindingType]] = [Binding("f6", "back", "Back to the table", show=False)]
 
     def __init__(self, sheet: Sheet, clipboard: Clipboard) -> None:
@@ -215,6 +217,7 @@ class AssetsPane(SheetView):
         is_elsewhere = is_elsewhere or (self.grid.is_in_test_row, self.grid.is_in_new_row) != (place.is_fact, place.is_new)
         if place.is_fact:
             self.sheet.set_fact(self.sheet.header(place.column).name, event.text)
+            self.grid.again = partial(self.grid.fill, event.text)
             self._close_editor()
             self.grid.post_message(Grid.FactChanged())
             if not is_elsewhere and event.right:
@@ -271,6 +274,7 @@ class AssetsPane(SheetView):
         else:
             done = Done(self.sheet.history.undo_name or "")
         self._close_editor()
+        self.grid.again = partial(self.grid.fill, text)
         self.post_message(Edited(done))
         return True
 

@@ -438,7 +438,8 @@ class CoveragePane(Pane):
                 self._go_to(row, report.findings[event.index].column)
 
     def _fill_gap(self, cells: Mapping[str, str]) -> None:
-        gone = cells.keys() - {c.condition.name for c in self.sheet.table.conditions}
+        conditions = {c.condition.name: c.condition for c in self.sheet.table.conditions}
+        gone = cells.keys() - conditions.keys()
         if gone and self.sheet.query.is_nested:
             self.post_message(
                 Told(f"{in_quotes(min(gone))} is a condition of a table inside: a row for the gap belongs there.", "warning")
@@ -448,7 +449,8 @@ class CoveragePane(Pane):
                 Told(f"{in_quotes(min(gone))} is not a condition any more. R measures the coverage again.", "warning")
             )
         else:
-            self.post_message(FillGap(dict(cells)))
+            is_number = {name: conditions[name].domain.type.is_numeric for name in cells}
+            self.post_message(FillGap({name: lines.as_typed(cell) if is_number[name] else cell for name, cell in cells.items()}))
 
     def _go_to(self, row: int, column: str | None = None) -> None:
         if self.run.state == "stale" and row >= self.sheet.table.n_rows:

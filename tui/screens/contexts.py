@@ -98,6 +98,9 @@ class ContextsDialog(Dialog[Loaded]):
         & #contexts-lines { height: 1fr; margin: 1 0; }
         & #contexts-detail { height: auto; min-height: 3; max-height: 6; padding: 0 1; }
         & #contexts-keys { height: auto; margin: 1 0 0 0; padding: 0 1; color: $text-muted; }
+        &.-tall > #dialog, &.-tall > #dialog > #dialog-body { height: auto; }
+        &.-tall #contexts-lines { height: auto; min-height: 8; max-height: 60vh; }
+        &.-tall #contexts-detail { height: 6; }
     }
     """
     title_text = "Contexts"

@@ -55,6 +55,12 @@ class DiskCare:
             self._say_once(f"{found.taken_by} has taken over this table: you can only save it under another name.", "warning")
         elif found.is_free:
             self._say_once("The other editor has closed this table: it can be saved here again.")
+        elif found.has_left:
+            what = "The other editor has ended and left edits that are not saved."
+            self._say_once(f"{what} Save yours under another name; then open this table again.", "warning")
+        elif found.held_by is not None:
+            what = f"{found.held_by} has opened this table: it can be read here, and saved under another name."
+            self._say_once(what, "warning")
         if found.table == "gone":
             self._say_once(f"{self._session.path.name} is no longer on disk. Saving creates it again.", "warning")
         elif found.table == "changed" and self._session.disk_stamp != self._left:

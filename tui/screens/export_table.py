@@ -51,7 +51,7 @@ class ExportDialog(Dialog[Export]):
     DEFAULT_CSS = """
     ExportDialog {
         & Field:focus-within { height: auto; }
-        & LineList { height: 8; margin: 1 0 0 0; }
+        & LineList { height: auto; max-height: 8; margin: 1 0 0 0; }
         & #export-told { height: auto; margin: 1 0 0 0; }
         & #export-buttons { height: 1; margin: 1 0 0 0; }
     }

@@ -93,6 +93,8 @@ class ImportDialog(Dialog[Import]):
         & #import-notes { height: auto; max-height: 18%; color: $text-muted; }
         & #import-buttons { height: 1; }
         &.-no-sheets #import-sheet { display: none; }
+        &.-tall > #dialog, &.-tall > #dialog > #dialog-body { height: auto; }
+        &.-tall LineList { height: auto; min-height: 8; max-height: 50vh; }
     }
     """
     keys_text = "Enter read · Tab complete · ↑↓ choose · Esc cancel"

@@ -69,6 +69,7 @@ class HeldDialog(Dialog[Opening]):
         lines = [f"{shown(self._table)} is open in another editor: {shown(str(self._holder))}.", ""]
         if self._holder.is_certain:
             lines.append("Close it there to edit it here. Until then it can be read here, and saved under another name.")
+            lines.append("What is edited here meanwhile is lost if this editor is killed.")
         else:
             lines.append("It is on another machine, so this editor cannot tell whether it is still running.")
             lines.append("If it is not, take over the table. If it is, each may overwrite what the other saved.")

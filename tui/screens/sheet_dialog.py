@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import ClassVar
 
 from textual import on
@@ -44,6 +45,8 @@ class SheetDialog(Dialog[Answer]):
         & SmallGrid { height: 1fr; margin: 1 0; }
         & .sheet--said { height: auto; max-height: 4; padding: 0 1; }
         & .sheet--keys { height: auto; max-height: 2; padding: 0 1; color: $text-muted; }
+        &.-tall > #dialog, &.-tall > #dialog > #dialog-body { height: auto; }
+        &.-tall SmallGrid { height: auto; min-height: 14; max-height: 60vh; }
     }
     """
 
@@ -117,6 +120,7 @@ class SheetDialog(Dialog[Answer]):
             if self.editor is not None:
                 self.editor.refuse(fault)
             return
+        self.grid.again = partial(self.grid.fill, event.text)
         self._close_editor()
         self.sheet.with_room()
         start = None

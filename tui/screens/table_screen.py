@@ -59,6 +59,8 @@ class TableScreen(Screen[None]):
     }
     """
 
+    BLANK = True
+    """Its parts cover all of it: Textual would render its empty lines, too, for each paint."""
     app: Editor
     focused: Reactive[Widget | None] = Reactive(None, repaint=False)
     """What has the keys. Of the screen itself nothing looks otherwise then: Textual would paint all of it again."""

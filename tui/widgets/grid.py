@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 from textual import events
@@ -15,6 +16,7 @@ from textual.binding import Binding, BindingType
 from textual.geometry import Region
 from textual.message import Message
 
+from contextdb.errors import TableError
 from tui.commands import BY_ID, GRID, JUMPS, bindings
 from tui.doing import CELL, SLOW, do
 from tui.messages import Edited, Told
@@ -96,6 +98,8 @@ class Grid(GridView, can_focus=True):
         self.test_name = ""
         """Where the context of the test row comes from."""
         self.run = TabRun()
+        self.again: Callable[[], None] | None = None
+        """Makes the last edit again, with what is selected then."""
         self._pointer = Pointer(self)
 
     def post_message(self, message: Message) -> bool:
@@ -253,6 +257,7 @@ class Grid(GridView, can_focus=True):
         """Call the verb of a command; what cannot be done is said."""
         verb = BY_ID[name].verb
         assert verb is not None
+        self.again = partial(self.action_verb, name)
         if self.is_in_test_row and BY_ID[name].group in ("Edit", "Rows"):
             self.post_message(Told("The cursor is in the test row. F6 goes back to the table.", "warning"))
         elif self.is_in_new_row and BY_ID[name].group in ("Edit", "Rows"):
@@ -267,8 +272,33 @@ class Grid(GridView, can_focus=True):
     def _do(self, verb: Callable[[], Done], n_cells: int = 0, then: Callable[[], None] = lambda: None) -> None:
         do(self, self.sheet, verb, n_cells, then)
 
+    def action_repeat(self) -> None:
+        """Make the last edit again, with what is selected now."""
+        if self.again is None:
+            self.post_message(Told("There is no edit to repeat yet.", "warning"))
+        else:
+            self.again()
+
+    def fill(self, text: str) -> None:
+        """Put a text that was typed before into every selected cell, as it would be typed there."""
+        if self.is_in_test_row:
+            self.set_fact(text)
+            return
+        sheet, is_below = self.sheet, self.is_in_new_row
+
+        def fill() -> Done:
+            columns = [sheet.cursor[1]] if is_below else range(sheet.block.left, sheet.block.right)
+            fault = next(filter(None, (sheet.check_at(column, text) for column in columns)), None)
+            fault = fault or (sheet.type_below(text) if is_below else None)
+            if fault is not None:
+                raise TableError(fault)
+            return Done(sheet.history.undo_name or "") if is_below else sheet.fill(text)
+
+        self._do(fill, sheet.block.n_cells)
+
     def action_insert_rows(self, below: bool) -> None:
         """As many rows as are selected."""
+        self.again = partial(self.action_insert_rows, below)
         n_rows = max(self.sheet.block.shape[0], 1) if len(self.sheet.view) and not self.is_in_new_row else 1
         self.is_in_test_row = self.goes_to_new_row = False  # what is typed next is meant for the new row
         self._do(lambda: self.sheet.insert_rows(n_rows, below))
@@ -327,6 +357,7 @@ class Grid(GridView, can_focus=True):
             self.post_message(self.OpenWanted(self.sheet.row_number(self.sheet.cursor[0]) - 1))
 
     def action_clear(self) -> None:
+        self.again = self.action_clear
         if self.is_in_test_row:
             self.set_fact("")
         elif self.is_in_new_row:
@@ -354,6 +385,7 @@ class Grid(GridView, can_focus=True):
         self.post_message(self.CopyWanted(self.cell_text() if self.is_in_test_row else self.sheet.copy()))
 
     def action_cut(self) -> None:
+        self.again = self.action_cut
         if self.is_in_test_row:
             self.action_copy()
             self.set_fact("")
@@ -374,6 +406,7 @@ class Grid(GridView, can_focus=True):
 
     def paste(self, text: str) -> None:
         """Put a text of the clipboard over the selection, or into the fact of the test row."""
+        self.again = partial(self.paste, text)
         if self.is_in_test_row:
             self.set_fact(text.splitlines()[0].split("\t")[0] if text.strip() else "")
         elif asks_how_to_read(text, self.sheet.table):

@@ -6,7 +6,7 @@ Only what is seen is read and painted, so that a line costs the same in a table 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from rich.cells import cell_len
@@ -130,6 +130,8 @@ class Painter:
         self._lines: dict[int, tuple[object, Strip]] = {}
         """By row of the view the line that was painted last, and all that it depends on but for what `_lines_of` says."""
         self._lines_of: tuple[object, ...] = ()
+        self._header_lines: dict[int, tuple[object, Strip]] = {}
+        """The lines of the header that were painted last, and what each was painted from."""
 
     def changed(self) -> None:
         """Read the sheet again."""
@@ -170,6 +172,16 @@ class Painter:
     # ---- headers
 
     def _header_line(self, y: int, look: Look) -> Strip:
+        """A line of the header; the one of before where all that is seen in it is as it was."""
+        layout, block, sort = look.layout, self.sheet.block, self.sheet.sort
+        headers = [self._header(column) for column in (*range(layout.n_frozen), *layout.visible(look.left))]
+        of = replace(look, top=0, has_focus=True), block.left, block.right, sort, headers
+        known = self._header_lines.get(y)
+        if known is None or known[0] != of:
+            known = self._header_lines[y] = of, self._painted_header(y, look)
+        return known[1]
+
+    def _painted_header(self, y: int, look: Look) -> Strip:
         lines = look.header_lines
         says, is_last = lines[y], y == len(lines) - 1
         ground = "header" if says == "name" and len(lines) > 1 else "header-leaves" if is_last else "header-kind"
@@ -244,6 +256,7 @@ class Painter:
     def forget_lines(self) -> None:
         """Keep no line: what they are painted with is other."""
         self._lines.clear()
+        self._header_lines.clear()
 
     def _body_line(self, row: int, look: Look) -> Strip:
         """The line of a row; the one of before where all that is seen of it is as it was."""
@@ -391,9 +404,10 @@ class Painter:
         if query.is_empty:
             return "test row"
         may_be = f", {query.n_undecided:,} may be" if query.n_undecided else ""
-        of = f"{query.n_valid - query.n_undecided:,} of"
-        said = f"{of} {plural(self.sheet.table.n_rows, 'row')} valid{may_be}"
-        return said if cell_len(said) <= width else f"{of} {self.sheet.table.n_rows:,} valid"
+        n_sure, n_rows = f"{query.n_valid - query.n_undecided:,}", f"{self.sheet.table.n_rows:,}"
+        whole = f"{n_sure} of {plural(self.sheet.table.n_rows, 'row')} valid{may_be}"
+        forms = (whole, f"{n_sure} of {n_rows} valid", f"{n_sure} of {n_rows}", f"{n_sure}/{n_rows}", n_sure)
+        return next((form for form in forms if cell_len(form) <= width), n_sure)
 
     # ---- parts
 

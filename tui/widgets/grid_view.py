@@ -23,7 +23,7 @@ from contextdb.schema.shapes import CHANCE
 from tui.contrast import readable
 from tui.drawn import SameWidths
 from tui.model.alignment import MOST_ALIGNED, indented
-from tui.model.layout import COMPACT, MOST_TEXTS, WIDEST, Layout, fitted_width, layout, name_lines, name_width
+from tui.model.layout import COMPACT, MOST_TEXTS, NARROWEST, WIDEST, Layout, fitted_width, layout, name_lines, name_width
 from tui.model.sheet import Sheet
 from tui.widgets.grid_paint import Look, Painter
 
@@ -32,6 +32,8 @@ GROUNDS = (
     "selected", "cursor", "cursor-away", "flash", "tint-red", "tint-amber", "tint-green", "tint-blue", "tint-violet",
 )  # fmt: skip
 MEANT = ("text", "any", "muted", "name", "failing", "fault", "disabled", "valid", "line", "on-cursor")
+STEP, WIDEST_BY_KEYS = 2, 200
+"""A key makes a column wider by so many cells; no wider than the second."""
 FLASH_S = 0.4
 """So long a cell is lit that has just begun to fail."""
 
@@ -110,6 +112,8 @@ class GridView(ScrollView, inherit_bindings=False):
         self._painted: dict[int, Strip] = {}
         """The lines that were painted last, where the grid was then."""
         self._painted_at: tuple[object, ...] = ()
+        self._rendered: Look | None = None
+        """Where the grid is, while lines are rendered."""
         self._had_focus = False
         self._scrolled_in: tuple[object, ...] = ()
         """The sizes that the scroll bars are of."""
@@ -204,14 +208,26 @@ class GridView(ScrollView, inherit_bindings=False):
                 self._own_widths[column.name] = max(wide, beside), max(narrow, beside)
 
     def autofit(self) -> None:
-        """Make each column as wide as its texts and its name."""
+        """Make each column as wide as its texts and its name; one without texts as wide as at first."""
         for at, column in enumerate(self.sheet.table.columns):
-            self._widths[column.name] = self._fitted(at, WIDEST)
+            if any(text.strip() for text in column.texts):
+                self._widths[column.name] = self._fitted(at, WIDEST)
+            else:
+                self._widths.pop(column.name, None)
         self.changed()
 
     def set_width(self, column: int, width: int | None) -> None:
         """Make a column so wide; None: as wide as its texts."""
         self._widths[self.sheet.header(column).name] = self._fitted(column, WIDEST) if width is None else width
+        self.changed()
+
+    def action_widen(self, steps: int) -> None:
+        """Make the selected columns that are seen wider or narrower by so many steps."""
+        widths, hidden, block = self.grid_layout.widths, self.sheet.hidden, self.sheet.block
+        for at in range(block.left, block.right):
+            if not hidden[at]:
+                width = max(NARROWEST, min(widths[at] + steps * STEP, WIDEST_BY_KEYS))
+                self._widths[self.sheet.table.columns[at].name] = width
         self.changed()
 
     @property
@@ -279,8 +295,16 @@ class GridView(ScrollView, inherit_bindings=False):
         """The row of the view that the cursor is in; behind the last one for the empty row."""
         return len(self.sheet.view) if self.is_in_new_row else self.sheet.cursor[0]
 
+    def render_lines(self, crop: Region) -> list[Strip]:
+        """Render some lines; where the grid is at present is worked out once for all of them."""
+        self._rendered = self.look
+        try:
+            return super().render_lines(crop)
+        finally:
+            self._rendered = None
+
     def render_line(self, y: int) -> Strip:
-        look = self.look
+        look = self._rendered or self.look
         if (place := self._place(look)) != self._painted_at:
             self._painted, self._painted_at = {}, place
         self._painted[y] = strip = self._painter.line(y, look)

@@ -100,7 +100,7 @@ class LineList(ScrollView, can_focus=True):
         self.columns = tuple(columns)
         self.empty = empty
         """Stands there when there is no line."""
-        self.n_lines = 0
+        self.n_lines = self._most_lines = 0
         self.index = 0
         self._line: Callable[[int], Sequence[ListCell]] = lambda at: ()
 
@@ -113,8 +113,9 @@ class LineList(ScrollView, can_focus=True):
         self.refresh(layout=has_grown and self.styles.is_auto_height)
 
     def get_content_height(self, container: Size, viewport: Size, width: int) -> int:
-        """The titles and every line, or the line that says that there is none."""
-        return 1 + max(self.n_lines, 1)
+        """The titles and every line, or the line that says that there is none. It never shrinks: nothing jumps while one types."""
+        self._most_lines = max(self._most_lines, self.n_lines, 1)
+        return 1 + self._most_lines
 
     def say_empty(self, text: str) -> None:
         """Say something else where there is no line."""

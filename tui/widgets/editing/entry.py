@@ -57,6 +57,9 @@ class Entry(Input):
         with self.prevent(Input.Changed, self.CaretMoved):
             self.write(text)
 
+    def watch_has_focus(self, _has_focus: bool) -> None:
+        """It looks the same with the keys and without: Textual would work out its styles again whenever they come and go."""
+
     def blur(self) -> Self:
         """Keep what there is: Textual calls this when the line is hidden, and would take the keys from whom they were given to."""
         return self

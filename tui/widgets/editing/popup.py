@@ -75,6 +75,8 @@ class Popup(Vertical):
         self._told = Told()
         self._cell: Cell | None = None
         self._domain: Domain | None = None
+        self._sizes: tuple[int, ...] = ()
+        """Its own size, and those of its parts, that it was laid out in last."""
 
     def compose(self) -> ComposeResult:
         yield self._picture
@@ -105,7 +107,8 @@ class Popup(Vertical):
         if self.is_empty:
             return
         width = min(max(self.wanted_width, min(entry.width, NARROWEST)), screen.width)
-        said = self._say(max(width - GUTTER, 1))
+        parts = self._say(max(width - GUTTER, 1))
+        said = sum(parts)
         below, above = screen.height - entry.bottom, entry.y
         wanted = said + min(len(self.choices.rows), MOST_ROWS) + 2
         is_below = wanted <= below or (wanted > above and below >= above)
@@ -118,10 +121,11 @@ class Popup(Vertical):
         self.styles.width, self.styles.height = width, height
         x = max(0, min(entry.x, screen.width - width))
         self.absolute_offset = Region(x, entry.bottom if is_below else entry.y - height, width, height).offset
-        self.refresh(layout=True)
+        before, self._sizes = self._sizes, (width, height, n_rows, *parts)
+        self.refresh(layout=before != self._sizes)  # it is moved by who stands it
 
-    def _say(self, width: int) -> int:
-        """Fill in picture, words and mend for a width; gives how many lines they take."""
+    def _say(self, width: int) -> tuple[int, int, int]:
+        """Fill in picture, words and mend for a width; gives how many lines each takes."""
         told, domain = self._told, None if self._told.is_refused else self._domain
         is_dial = domain is not None and domain.type.is_circular
         self.set_class(told.is_refused, "-refused")
@@ -131,9 +135,9 @@ class Popup(Vertical):
         picture = self._draw(width, words, domain) if domain is not None else []
         below = [] if is_dial else words
         for part, lines in ((self._picture, picture), (self._words, below), (self._mend, _styled(mend, "bold $text-accent"))):
-            part.update(Content("\n").join(lines))
+            part.update(Content("\n").join(lines), layout=False)  # the box is laid out with all that is in it
             part.display = bool(lines)
-        return len(picture) + len(below) + len(mend)
+        return len(picture), len(below), len(mend)
 
     def _draw(self, width: int, words: Sequence[Content], domain: Domain) -> list[Content]:
         """The line of the numbers, or the dial with the words next to it; without its filling while the text cannot be read."""

@@ -12,7 +12,7 @@ from typing import ClassVar
 
 from contextdb.covering import format_percent
 from contextdb.errors import ContextError, Fault, Place, in_quotes, plural
-from contextdb.files.reports import document_of
+from contextdb.files.reports import document_of, sealed
 from contextdb.findings import Finding
 from contextdb.motion.measuring.measures import Measures
 from contextdb.motion.measuring.parts import NO_CHANGE, NO_FORCED, NO_JUMP
@@ -149,7 +149,7 @@ class MeasureResults:
 
     def to_json(self) -> dict[str, object]:
         """The JSON document."""
-        return {"format": 1, "sessions": [session.to_json() for session in self.sessions]}
+        return sealed({"format": 1, "sessions": [session.to_json() for session in self.sessions]})
 
     def as_check(self) -> CheckReport:
         """The bars that are broken, as findings."""

@@ -252,7 +252,7 @@ def matching(folder: Path, pattern: str) -> list[Path]:
 def refused_writing(file: Path, data: Data) -> AbstractContextManager[None]:
     """Turn what the system refuses into a `FileError` that names the file."""
     size = len(data) if isinstance(data, bytes) else None
-    return _refused(file, lambda error, at: _why_unwritten(error, at, size))
+    return _refused(file, lambda error, at: why_unwritten(error, at, size))
 
 
 @contextmanager
@@ -325,7 +325,8 @@ def _missing(file: Path) -> Fault:
     return Fault(f"there is no such {what}.", place=place, rule="no-such-path")
 
 
-def _why_unwritten(error: OSError, file: Path, size: int | None) -> Fault:
+def why_unwritten(error: OSError, file: Path, size: int | None = None) -> Fault:
+    """Why the system did not write a file, and what to do."""
     place, folder = Place(str(file)), path_in_quotes(Path(os.path.realpath(file)).parent)
     kept = " The old file is as it was." if os.path.exists(file) else ""
     if error.errno in _FULL:

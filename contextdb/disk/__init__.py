@@ -10,6 +10,7 @@ that no save writes over another one that it has not seen. Whoever has the turn 
 from __future__ import annotations
 
 import errno
+import fnmatch
 import os
 import stat
 from collections.abc import Callable, Iterable, Iterator
@@ -240,10 +241,20 @@ def matching(folder: Path, pattern: str) -> list[Path]:
 
     Raises ValueError or NotImplementedError where it is no pattern.
     """
+    return sorted(folder.glob(_of_any_case(pattern)))
+
+
+def fits(name: str, pattern: str) -> bool:
+    """Whether `matching` would find a file of this name by the last part of a pattern."""
+    return fnmatch.fnmatch(name, _of_any_case(pattern))
+
+
+def _of_any_case(pattern: str) -> str:
+    """A pattern whose suffix may be in capitals, or not, in the name of a file."""
     suffix = Path(pattern).suffix
-    if suffix[1:].isalnum():
-        pattern = pattern.removesuffix(suffix) + "".join(f"[{c.lower()}{c.upper()}]" if c.isalpha() else c for c in suffix)
-    return sorted(folder.glob(pattern))
+    if not suffix[1:].isalnum():
+        return pattern
+    return pattern.removesuffix(suffix) + "".join(f"[{c.lower()}{c.upper()}]" if c.isalpha() else c for c in suffix)
 
 
 # ---- what the system refuses

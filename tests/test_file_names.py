@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from running import ROOT, run
+from strategies import some
 
 from contextdb.files.file_names import alike, composed, confusable, spelled, why_unportable
 from contextdb.schema.settings import read_schema
@@ -149,10 +150,11 @@ def test_a_table_declared_in_other_capitals_is_another_one_where_the_disk_tells_
 # ---- names that Windows keeps
 
 
+SIGNS = ["walk:run", "walk?", "a*b", "a|b", "a<b>", 'a"b"', "a\\b", "a\tb"]
 DEVICES = ["con", "CON", "Nul", "aux", "prn", "com1", "COM9", "lpt1", "com¹", "nul.walk", "con "]
 
 
-@pytest.mark.parametrize("name", [*DEVICES, "walk.", "walk ."])
+@pytest.mark.parametrize("name", [*DEVICES, *some(SIGNS, 3), "walk.", "walk ."])
 def test_a_table_is_made_under_no_name_that_windows_keeps(tmp_path, name):
     (tmp_path / "f.csv").write_bytes(RAW)
     result = run("import", tmp_path / "f.csv", tmp_path / f"{name}.csv")
@@ -174,6 +176,11 @@ def test_a_table_is_made_under_no_name_that_tables_do_not_have(tmp_path, name):
 @pytest.mark.parametrize("name", ["walk", "console", "com", "com10", "lpt", "null", "a.con", "mövès", "walk run", ".con"])
 def test_other_names_are_as_good_as_ever(tmp_path, name):
     assert why_unportable(f"{name}.csv") == ""
+
+
+@pytest.mark.parametrize("name", SIGNS)
+def test_a_name_with_a_sign_that_windows_does_not_have_is_told(name):
+    assert "Windows has no " in why_unportable(f"{name}.csv")
 
 
 def test_a_table_that_is_there_under_such_a_name_is_told(tmp_path):

@@ -186,6 +186,16 @@ def test_an_altered_digit_of_a_baseline_is_refused_and_one_without_a_digest_is_t
     assert "before.json: the baseline has no digest" in measured("session.parquet", "--baseline", "before.json").err
 
 
+def test_a_session_of_a_baseline_is_known_however_its_path_is_written(here: Path):
+    shutil.copy("session.parquet", "other.parquet")
+    both = run("motion", "measure", "session.parquet", "other.parquet", "--json").out
+    (here / "both.json").write_text(both, encoding="utf-8")
+    bars = session_of("./other.parquet", "--baseline", "both.json")["bars"]
+    assert bars
+    assert [each["file"] for each in json.loads(both)["sessions"]] == ["session.parquet", "other.parquet"]
+    assert measured("./session.parquet", "--json").json["sessions"][0]["file"] == "session.parquet"
+
+
 def test_what_got_worse_than_the_baseline_fails_and_is_told(here: Path):
     document = json.loads((here / "before.json").read_text(encoding="utf-8"))
     now = document["sessions"][0]["jumps_per_s"]

@@ -33,6 +33,7 @@ from contextdb.motion.storage.written_poses import NPZ
 from contextdb.motion.trace.filter_rows import fingerprint
 from contextdb.motion.trace.session import Trace
 from contextdb.report.measure_results import BASELINE, Bar, Gate, MeasureResults, SessionMeasures, compared, held_to, read_baseline
+from contextdb.report.results import as_path
 
 BARS = {
     "skate": ("skate_cm_s", "CM_S", "the most that planted feet may slide, cm/s"),
@@ -86,8 +87,9 @@ def _results(arguments: argparse.Namespace, poses: Sequence[str]) -> MeasureResu
 
 def _before(earlier: Mapping[str, Mapping[str, object]], file: str, arguments: argparse.Namespace) -> Mapping[str, object]:
     """The session of the baseline: of this name, or the only one where there is one only."""
-    if not arguments.baseline or file in earlier:
-        return earlier.get(file, {})
+    name = as_path(file)
+    if not arguments.baseline or name in earlier:
+        return earlier.get(name, {})
     if len(earlier) == len(arguments.sessions) == 1:
         return next(iter(earlier.values()))
     found = f"the baseline has no session {in_quotes(file)}."

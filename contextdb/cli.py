@@ -135,6 +135,8 @@ class Group:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; gives the exit code. Errors of contextdb go to standard error, each fault on its line."""
+    if arguments is None:
+        _name_files_in_utf8()
     given = list(sys.argv[1:] if arguments is None else arguments)
     _use_utf8()
     with warnings.catch_warnings(record=True) as told:
@@ -222,6 +224,16 @@ def _overview(commands: Mapping[str, str]) -> str:
         + "\n".join(lines)
         + '\n\n"contextdb COMMAND --help" shows its options; --version prints the versions of contextdb and of what it uses.\n'
     )
+
+
+def _name_files_in_utf8() -> None:
+    """Start again in UTF-8 where the environment names files in ASCII.
+
+    Else arguments, names of files and what contextdb.toml says of them would not be the same texts, and nobody could read the names
+    in messages.
+    """
+    if sys.getfilesystemencoding() == "ascii" and sys.executable:
+        os.execv(sys.executable, [sys.executable, "-X", "utf8", *sys.orig_argv[1:]])
 
 
 def _use_utf8() -> None:

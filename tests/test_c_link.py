@@ -167,6 +167,17 @@ def test_the_file_compiles_as_cpp_and_tells_the_facts_of_rules_and_not_derived_o
         assert subprocess.run([str(program)]).returncode == 0
 
 
+def test_a_header_on_another_drive_is_included_by_its_whole_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    def no_way(path: object, start: object) -> str:
+        raise ValueError("path is on mount 'D:', start on mount 'C:'")
+
+    monkeypatch.setattr("contextdb.commands.compile_command.os.path.relpath", no_way)
+    tables = Path(__file__).parent.parent / "tables"
+    done = run("compile", tables, "-o", tmp_path, "--c-header", tmp_path / "tables.h", "--c-link", tmp_path / "cdb_link.h")
+    assert done.code == 0, done.err
+    assert f'#include "{(tmp_path / "tables.h").as_posix()}"' in (tmp_path / "cdb_link.h").read_text()
+
+
 def test_compile_writes_it_beside_the_header(tmp_path: Path):
     tables = Path(__file__).parent.parent / "tables"
     done = run(

@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from running import run
+from running import ROOT, run
+from strategies import some
 
 from contextdb.files.file_names import alike, composed, confusable, spelled, why_unportable
 from contextdb.schema.settings import read_schema
@@ -149,10 +150,11 @@ def test_a_table_declared_in_other_capitals_is_another_one_where_the_disk_tells_
 # ---- names that Windows keeps
 
 
+SIGNS = ["walk:run", "walk?", "a*b", "a|b", "a<b>", 'a"b"', "a\\b", "a\tb"]
 DEVICES = ["con", "CON", "Nul", "aux", "prn", "com1", "COM9", "lpt1", "com¹", "nul.walk", "con "]
 
 
-@pytest.mark.parametrize("name", [*DEVICES, "walk.", "walk ."])
+@pytest.mark.parametrize("name", [*DEVICES, *some(SIGNS, 3), "walk.", "walk ."])
 def test_a_table_is_made_under_no_name_that_windows_keeps(tmp_path, name):
     (tmp_path / "f.csv").write_bytes(RAW)
     result = run("import", tmp_path / "f.csv", tmp_path / f"{name}.csv")
@@ -174,6 +176,11 @@ def test_a_table_is_made_under_no_name_that_tables_do_not_have(tmp_path, name):
 @pytest.mark.parametrize("name", ["walk", "console", "com", "com10", "lpt", "null", "a.con", "mövès", "walk run", ".con"])
 def test_other_names_are_as_good_as_ever(tmp_path, name):
     assert why_unportable(f"{name}.csv") == ""
+
+
+@pytest.mark.parametrize("name", SIGNS)
+def test_a_name_with_a_sign_that_windows_does_not_have_is_told(name):
+    assert "Windows has no " in why_unportable(f"{name}.csv")
 
 
 def test_a_table_that_is_there_under_such_a_name_is_told(tmp_path):
@@ -206,18 +213,38 @@ def test_a_name_is_spelled_as_it_stands_there(wanted, present):
     assert found == wanted or wanted not in present
 
 
-@pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="files are named in UTF-8 whatever the environment says")
-@pytest.mark.parametrize(("command", "file"), [("check", "züge/trains.csv"), ("coverage", "züge.csv")])
-def test_a_name_that_the_environment_cannot_write_is_an_error_and_no_traceback(tmp_path: Path, command: str, file: str):
+in_ascii = pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="files are named in UTF-8 whatever the environment says")
+ASCII = {**os.environ, "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "PYTHONPATH": str(ROOT)}
+
+
+def run_in_ascii(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, *arguments], cwd=folder, env=ASCII, capture_output=True, encoding="utf-8")
+
+
+@in_ascii
+@pytest.mark.parametrize("flags", [(), ("-I",)])
+def test_names_are_shown_and_mean_the_same_where_the_environment_has_ascii_alone(tmp_path: Path, flags: tuple[str, ...]):
+    (tmp_path / "züge").mkdir()
+    (tmp_path / "züge/möve.csv").write_text("Asset,größe\nläuft,0..5\n", encoding="utf-8")
+    toml = '[conditions."größe"]\ntype = "number"\nmin = 0\nmax = 10\n[tables."möve"]\npolicy = "first"\n'
+    (tmp_path / "züge/contextdb.toml").write_text(toml, encoding="utf-8")
+    start = f"import sys; sys.path.insert(0, {str(ROOT)!r}); from contextdb.cli import main; sys.exit(main())"
+    done = run_in_ascii(tmp_path, *flags, "-c", start, "query", "züge/möve.csv", "größe=3", "--json")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert json.loads(done.stdout)["table"] == "möve"
+    missing = run_in_ascii(tmp_path, *flags, "-c", start, "check", "züge/mörve.csv")
+    assert missing.stderr.startswith("contextdb: züge/mörve.csv: ")
+    assert missing.stderr.endswith('Did you mean "züge/möve.csv"?\n')
+
+
+@in_ascii
+@pytest.mark.parametrize("file", ["züge/trains.csv", "züge.csv"])
+def test_a_name_that_the_environment_cannot_write_is_an_error_and_no_traceback(tmp_path: Path, file: str):
     (tmp_path / "contextdb.toml").write_text(f'[tables.trains]\nfile = "{file}"\n', encoding="utf-8")
     (tmp_path / file).parent.mkdir(exist_ok=True)
     (tmp_path / file).write_bytes(RAW)
-    plain = {**os.environ, "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
-    done = subprocess.run(
-        [sys.executable, "-m", "contextdb", command, "."], cwd=tmp_path, env=plain, capture_output=True, encoding="utf-8"
-    )
-    assert done.returncode == 2
-    assert "codec" not in done.stderr
-    assert done.stderr.startswith("contextdb: ")
-    assert 'files are named in ascii here, which has no "ü". Accepted: an environment in UTF-8.' in done.stderr
-    assert done.stderr.endswith("Try to set PYTHONUTF8=1.\n")
+    load = "contextdb.Project.load('.')\nexcept contextdb.ContextDBError as error:\n    sys.exit(ascii(str(error)))"
+    done = run_in_ascii(tmp_path, "-c", f"import sys, contextdb\ntry:\n    {load}")
+    assert done.returncode == 1
+    assert 'files are named in ascii here, which has no "\\xfc". Accepted: an environment in UTF-8.' in done.stderr
+    assert done.stderr.endswith("Try to set PYTHONUTF8=1.'\n")

@@ -15,6 +15,8 @@ from warm_commands import warm_program
 from warm_start import python
 
 from contextdb import cli
+from contextdb.commands.git_setup import Setup
+from contextdb.errors import ContextDBError, Fault
 
 BASE = "Asset,speed,hit\r\nwalk,0..5,True\r\nrun,5..9,Any\r\njump,Any,False\r\n"
 TOML = '[conditions.speed]\ntype = "number"\nmin = 0.0\nmax = 10.0\n'
@@ -139,6 +141,43 @@ def test_uninstall_takes_back_these_lines_and_keys_and_nothing_else(here):
     assert read(".gitattributes") == "*.png binary\n"
     assert git("config", "--local", "--list") == before
     assert run("git", "uninstall").out == "nothing to do: nothing is set\n"
+
+
+@pytest.mark.parametrize("given", ["", "*.png binary\n"])
+def test_an_install_whose_configuration_cannot_be_written_leaves_nothing(here, given):
+    if given:
+        put(".gitattributes", given)
+    put(".git/config.lock", "")
+    before = read(".git/config")
+    result = install()
+    assert (result.code, result.out, result.err.count("\n")) == (2, "", 1)
+    assert "could not lock config file" in result.err
+    assert read(".git/config") == before
+    assert (read(".gitattributes") if given else Path(".gitattributes").exists()) == (given or False)
+
+
+@pytest.mark.parametrize("at", range(4))
+@pytest.mark.parametrize("way", ["install", "uninstall"])
+def test_a_change_that_fails_half_way_is_taken_back_whole(here, monkeypatch, way, at):
+    git("config", "merge.contextdb.name", "an older one")
+    git("config", "--add", "merge.contextdb.name", "of two lines\nor more")
+    if way == "uninstall":
+        install()
+    before = (git("config", "--local", "--list"), Path(".gitattributes").exists())
+    name, changes = ("set", []) if way == "install" else ("unset", [])
+    change = getattr(Setup, name)
+
+    def fails_later(setup: Setup, key: str, *value: str) -> None:
+        changes.append(key)
+        if len(changes) == at + 1:
+            raise ContextDBError(Fault("git config failed: no room."))
+        change(setup, key, *value)
+
+    monkeypatch.setattr(Setup, name, fails_later)
+    result = install() if way == "install" else run("git", "uninstall")
+    assert (result.code, result.err) == (2, "contextdb: git config failed: no room.\n")
+    assert sorted(git("config", "--local", "--list").split("\n")) == sorted(before[0].split("\n"))
+    assert Path(".gitattributes").exists() == before[1]
 
 
 def test_attributes_that_held_nothing_else_are_removed(here):

@@ -13,6 +13,7 @@ from motion_project import work_in_copy, write_project
 from running import Result, run
 
 import contextdb as cdb
+from contextdb.files.reports import sealed
 from contextdb.motion import make_clip, make_joint_clip, write_bvh
 from contextdb.motion.measuring.moves import MAPS
 
@@ -264,6 +265,8 @@ def test_shares_of_a_baseline_that_are_none_are_refused():
     document = before()
     document["tables"][0]["maps"]["turn"]["filled"][0][0] = 7
     Path("bad.json").write_text(json.dumps(document), encoding="utf-8")
+    assert "its contents do not match its digest" in refused("--baseline", "bad.json")
+    Path("bad.json").write_text(json.dumps(sealed(document)), encoding="utf-8")
     assert "no shares from 0 to 1" in refused("--baseline", "bad.json")
 
 

@@ -15,6 +15,7 @@ from motion_project import session_folder, work_in_copy
 from running import Result, run
 
 from contextdb.errors import ContextError
+from contextdb.files.reports import sealed
 from contextdb.motion import Trace, measure
 from contextdb.report.measure_results import read_baseline
 
@@ -151,6 +152,7 @@ def test_the_same_session_is_no_worse_than_its_baseline():
 @pytest.mark.parametrize("value", ["x", True, [1], {}, math.nan, math.inf, "gone"])
 def test_a_measure_of_the_baseline_that_is_no_number_is_refused_and_never_passed_over(here: Path, value: object):
     document = json.loads((here / "before.json").read_text(encoding="utf-8"))
+    del document["digest"]
     session = document["sessions"][0]
     if value == "gone":
         del session["jumps_per_s"]
@@ -168,10 +170,30 @@ def test_a_baseline_that_was_merged_badly_is_refused_in_words(here: Path):
         (merged, "line 2 begins a conflict of git"),
         ("[" * 100_000, "lists are nested too deeply"),
         (text.replace('"updates": ', '"updates": ' + "1" * 400), "a number has 40"),
-        (json.dumps(document | {"sessions": document["sessions"] * 2}), '"session.parquet" is there twice'),
+        (json.dumps({"format": 1, "sessions": document["sessions"] * 2}), '"session.parquet" is there twice'),
     ):
         with pytest.raises(ContextError, match=said):
             read_baseline(wrong, "b.json")
+
+
+def test_an_altered_digit_of_a_baseline_is_refused_and_one_without_a_digest_is_told_of(here: Path):
+    document = json.loads((here / "before.json").read_text(encoding="utf-8"))
+    document["sessions"][0]["jumps_per_s"] += 9.0
+    (here / "before.json").write_text(json.dumps(document), encoding="utf-8")
+    assert "its contents do not match its digest" in refused("session.parquet", "--baseline", "before.json")
+    del document["digest"]
+    (here / "before.json").write_text(json.dumps(document), encoding="utf-8")
+    assert "before.json: the baseline has no digest" in measured("session.parquet", "--baseline", "before.json").err
+
+
+def test_a_session_of_a_baseline_is_known_however_its_path_is_written(here: Path):
+    shutil.copy("session.parquet", "other.parquet")
+    both = run("motion", "measure", "session.parquet", "other.parquet", "--json").out
+    (here / "both.json").write_text(both, encoding="utf-8")
+    bars = session_of("./other.parquet", "--baseline", "both.json")["bars"]
+    assert bars
+    assert [each["file"] for each in json.loads(both)["sessions"]] == ["session.parquet", "other.parquet"]
+    assert measured("./session.parquet", "--json").json["sessions"][0]["file"] == "session.parquet"
 
 
 def test_what_got_worse_than_the_baseline_fails_and_is_told(here: Path):
@@ -179,6 +201,7 @@ def test_what_got_worse_than_the_baseline_fails_and_is_told(here: Path):
     now = document["sessions"][0]["jumps_per_s"]
     document["sessions"][0]["jumps_per_s"] = 0.9 * now
     document["sessions"][0]["skate_raw_cm_s"] *= 0.5  # what the clips do is no fault of the session
+    del document["digest"]
     (here / "before.json").write_text(json.dumps(document), encoding="utf-8")
     result = measured("session.parquet", "--baseline", "before.json", code=1)
     (line,) = [line for line in result.lines if line.startswith("BROKEN")]
@@ -233,7 +256,7 @@ def test_what_cannot_be_measured_is_refused_in_one_sentence(arguments: list[str]
     with np.load("poses.npz") as poses:
         every = ("positions", "root", "asset", "time_s", "mirrored", "jumped", "forced")
         np.savez("short.npz", **{name: poses[name][:9] if name in every else poses[name] for name in poses.files})
-    for name, document in (("other", {"format": 1, "sessions": []}), ("newer", {"format": 2, "sessions": []})):
+    for name, document in (("other", sealed({"format": 1, "sessions": []})), ("newer", {"format": 2, "sessions": []})):
         (here / f"{name}.json").write_text(json.dumps(document), encoding="utf-8")
     assert message in refused(*arguments)
 

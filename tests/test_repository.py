@@ -52,6 +52,12 @@ def test_the_sample_tables_travel_in_the_wheel():
     assert (ROOT / "tables" / "contextdb.toml").is_file()
 
 
+def test_all_that_the_tests_read_travels_in_the_source_archive():
+    packed = PYPROJECT["tool"]["hatch"]["build"]["targets"]["sdist"]["include"]
+    assert [pattern for pattern in packed if not list(ROOT.glob(pattern.removeprefix("/")))] == []
+    assert {"/.ci", "/.github", "/.pre-commit-hooks.yaml", "/*.md", "/CITATION.cff", "/Makefile", "/tests", "/docs"} <= set(packed)
+
+
 def test_make_help_lists_every_target_that_a_person_calls():
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     phony = re.search(r"^\.PHONY: (.+)$", makefile, re.M)

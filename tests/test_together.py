@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from running import ROOT, run
 
-from contextdb.disk import staged, write_atomic
+from contextdb.disk import folder_lock, staged, write_atomic
 from contextdb.disk.folder_lock import UNFINISHED, folder_turn, sweep, temporary_folder, temporary_name
 from contextdb.disk.together import NewFile, UnfinishedWarning, finish, write_together
 from contextdb.tables.project import Project
@@ -246,3 +246,14 @@ def test_nothing_is_warned_of_in_a_folder_at_rest(tmp_path):
         warnings.simplefilter("error")
         finish(tmp_path)
         finish(tmp_path / "missing")
+
+
+# ---- turns as Windows has them
+
+
+def test_the_file_of_a_turn_that_nobody_gives_back_does_not_stop_saves_for_ever(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(folder_lock, "fcntl", None)
+    monkeypatch.setattr(folder_lock, "_MOST_TURN_S", 0.0)
+    (tmp_path / ".contextdb-turn").write_bytes(b"")
+    assert write_atomic(tmp_path / "t.csv", b"new")
+    assert (tmp_path / "t.csv").read_bytes() == b"new"

@@ -17,7 +17,11 @@ import contextdb as cdb
 from contextdb import motion
 from contextdb.disk import write_atomic
 from contextdb.files.journal_lines import line_of
+from contextdb.files.reports import document_of, sealed
 from contextdb.motion.storage.stored import save_database
+from contextdb.report.measure_results import MeasureResults
+from contextdb.report.motion_coverage_results import MotionCoverageResults
+from contextdb.report.render_json import as_json
 
 TABLE = {"Asset": ["walk", "run"], "speed": ["0..4", "Any"]}
 SCHEMA = {"speed": {"type": "number", "min": 0, "max": 10}}
@@ -54,6 +58,14 @@ def report(path: Path) -> None:
     assert run("coverage", str(folder), "--format", "json", "-o", str(path)).code == 0
 
 
+def motion_report(path: Path) -> None:
+    path.write_text(as_json(MotionCoverageResults(()).to_json()), encoding="utf-8")
+
+
+def measures(path: Path) -> None:
+    path.write_text(as_json(MeasureResults(()).to_json()), encoding="utf-8")
+
+
 def journal(path: Path) -> None:
     write_atomic(path, line_of({"format": 1, "file": "t.csv"}) + line_of({"do": {"name": "x"}}) + line_of({"go": 0}))
 
@@ -65,6 +77,8 @@ MAKERS: dict[str, Callable[[Path], None]] = {
     "jog.poses.safetensors": poses,
     "session.parquet": session,
     "coverage.json": report,
+    "motion.json": motion_report,
+    "measures.json": measures,
     "t.csv.journal": journal,
 }
 
@@ -95,10 +109,10 @@ def test_no_flipped_bit_passes_as_whole_unless_it_changes_nothing(name: str, dat
     result = run("verify", str(altered), "--json")
     (verdict,) = result.json["files"]
     if verdict["state"] == "whole":
-        assert name == "coverage.json"
+        assert name.endswith(".json")
         assert json.loads(raw) == json.loads((made / name).read_text(encoding="utf-8"))
     else:
-        assert result.code == (verdict["state"] == "damaged")
+        assert result.code == (verdict["state"] != "no-digest")
 
 
 def test_a_folder_is_looked_through_and_a_damaged_file_in_it_exits_with_1(made: Path, tmp_path: Path):
@@ -138,10 +152,60 @@ def test_a_document_of_another_program_is_neither_whole_nor_damaged(tmp_path: Pa
     assert (result.code, result.json["files"][0]["state"]) == (0, "no-digest")
 
 
-def test_a_report_of_motion_coverage_is_not_taken_for_one_of_coverage(tmp_path: Path):
-    (tmp_path / "motion.json").write_text('{"format": 1, "passed": true, "bins": {}, "tables": []}', encoding="utf-8")
-    result = run("verify", str(tmp_path / "motion.json"), "--json")
-    assert (result.code, result.json["files"][0]["state"]) == (0, "no-digest")
+@pytest.mark.parametrize(
+    ("text", "kind"),
+    [
+        ('{"format": 1, "passed": true, "bins": {}, "tables": []}', "report of motion coverage"),
+        ('{"format": 1, "tables": []}', "coverage report"),
+        ('{"format": 1, "sessions": []}', "report of measures"),
+    ],
+)
+def test_a_report_without_a_digest_is_one_of_an_older_version(text: str, kind: str, tmp_path: Path):
+    (tmp_path / "r.json").write_text(text, encoding="utf-8")
+    result = run("verify", str(tmp_path / "r.json"), "--json")
+    (verdict,) = result.json["files"]
+    assert (result.code, verdict["state"], verdict["kind"]) == (0, "no-digest", kind)
+    assert "by an older version" in verdict["message"]
+
+
+def test_a_report_about_names_that_are_no_text_matches_its_digest():
+    document = sealed({"format": 1, "sessions": [{"file": "z\udcfcge.parquet", "seconds": 1}]})
+    assert document_of(as_json(document))["digest"] == document["digest"]
+
+
+def test_a_file_of_an_older_layout_is_called_older_with_what_renews_it():
+    result = run("verify", str(ROOT / "tests/written_before/walk.database.safetensors"))
+    assert (result.code, result.out.split()[0]) == (1, "OLDER")
+    assert "layout 1, of an older version; this one reads 2. Try to build it again with `contextdb motion build`." in result.out
+
+
+@pytest.mark.parametrize("name", ["t.safetensors", "jog.motion.safetensors", "jog.poses.safetensors", "session.parquet"])
+def test_a_file_of_a_layout_that_this_version_does_not_read_is_no_damaged_one(
+    name: str, made: Path, monkeypatch: pytest.MonkeyPatch
+):
+    known = {"contextdb", "contextdb.motion", "contextdb.poses", "contextdb.trace"}
+    monkeypatch.setattr("contextdb.files.tensors.metadata_of", lambda *_: dict.fromkeys(known & {layout_key(name)}, "9"))
+    monkeypatch.setattr("contextdb.motion.trace.session_file.READ", ("7", "8"))
+    result = run("verify", str(made / name), "--json")
+    state = "older" if name.endswith(".parquet") else "newer"
+    assert (result.code, [each["state"] for each in result.json["files"]]) == (1, [state])
+
+
+def layout_key(name: str) -> str:
+    return {"t": "contextdb", "jog.motion": "contextdb.motion", "jog.poses": "contextdb.poses"}.get(name.rpartition(".")[0], "")
+
+
+@pytest.mark.parametrize(("name", "text"), [("c.json", '{"format": 2, "tables": []}'), ("m.json", '{"format": 2, "sessions": []}')])
+def test_a_report_of_a_newer_version_is_called_newer(name: str, text: str, tmp_path: Path):
+    (tmp_path / name).write_text(text, encoding="utf-8")
+    (verdict,) = run("verify", str(tmp_path / name), "--json").json["files"]
+    assert (verdict["state"], "to install that version" in verdict["message"]) == ("newer", True)
+
+
+def test_a_journal_of_a_newer_version_is_called_newer(tmp_path: Path):
+    write_atomic(tmp_path / "t.csv.journal", line_of({"format": 2, "file": "t.csv"}))
+    (verdict,) = run("verify", str(tmp_path / "t.csv.journal"), "--json").json["files"]
+    assert verdict["state"] == "newer"
 
 
 def test_a_journal_with_an_altered_line_says_how_many_edits_are_lost(tmp_path: Path):

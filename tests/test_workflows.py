@@ -48,7 +48,7 @@ def git(folder: Path, *arguments: str) -> None:
     subprocess.run(["git", *arguments], cwd=folder, check=True, capture_output=True)
 
 
-def run_step(name: str, checkout: Path, max_drop: str = "0") -> subprocess.CompletedProcess[str]:
+def run_step(name: str, checkout: Path, max_drop: str = "0", gone: str = "") -> subprocess.CompletedProcess[str]:
     """A step of the workflow as the runner runs it."""
     temporary = checkout.parent / "runner"
     temporary.mkdir(exist_ok=True)
@@ -58,6 +58,7 @@ def run_step(name: str, checkout: Path, max_drop: str = "0") -> subprocess.Compl
     own = {
         "PATH": os.pathsep.join([str(temporary), str(Path(sys.executable).parent), os.environ["PATH"]]),
         "FOLDER": "tables",
+        "GONE": gone,
         "MAX_DROP": max_drop,
         "GITHUB_BASE_REF": "main",
         "GITHUB_STEP_SUMMARY": str(temporary / "summary.md"),
@@ -87,6 +88,33 @@ def test_the_workflow_fails_a_change_that_opens_a_gap_and_names_it(checkout: Pat
     assert done.returncode == 1
     assert "speed: (2..5]" in done.stdout
     assert (checkout / "coverage.html").is_file()
+
+
+@pytest.mark.parametrize("is_there", [False, True])
+def test_the_workflow_lets_the_first_tables_pass_and_those_that_mend_broken_ones(checkout: Path, is_there: bool):
+    moves = checkout / "tables" / "moves.csv"
+    if is_there:
+        moves.write_text(TABLE.replace("0..2", "slow"), encoding="utf-8")
+        git(checkout, "add", ".")
+    else:
+        git(checkout, "rm", "--quiet", "-r", "--cached", "tables")
+    git(checkout, "-c", "user.name=a", "-c", "user.email=a@example.com", "commit", "--quiet", "--allow-empty", "-m", "before")
+    git(checkout, "update-ref", "refs/remotes/origin/main", "HEAD")
+    moves.write_text(TABLE, encoding="utf-8")
+    done = run_step("coverage", checkout)
+    assert done.returncode == 0, done.stderr
+    assert "::warning::The tables of main cannot be measured" in done.stdout
+    assert (checkout / "coverage.html").is_file()
+
+
+def test_the_workflow_names_a_table_that_is_gone_and_lets_it_go_when_told(checkout: Path):
+    (checkout / "tables" / "moves.csv").rename(checkout / "tables" / "steps.csv")
+    done = run_step("coverage", checkout)
+    assert (done.returncode, "moves" in done.stdout) == (1, True)
+    assert (checkout / "coverage.html").is_file()
+    assert "moves" in (checkout.parent / "runner" / "summary.md").read_text(encoding="utf-8")
+    git(checkout, "worktree", "remove", str(checkout.parent / "runner" / "base"))
+    assert run_step("coverage", checkout, gone="moves others").returncode == 0
 
 
 def test_the_workflow_fails_a_table_that_cannot_be_read_at_its_line(checkout: Path):

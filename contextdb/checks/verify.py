@@ -7,7 +7,7 @@ it, and is only read here; so is a Parquet file that another program wrote.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -15,7 +15,8 @@ from typing import Literal
 from contextdb.disk import read_bytes
 from contextdb.errors import ArtefactError, ContextDBError, Fault, FileError, Place, in_quotes, plural
 
-State = Literal["whole", "no-digest", "damaged"]
+State = Literal["whole", "no-digest", "older", "newer", "damaged"]
+UNUSABLE: frozenset[State] = frozenset({"older", "newer", "damaged"})
 
 NO_DIGEST = "read without a fault; files of this kind hold no digest"
 
@@ -27,6 +28,7 @@ class Verdict:
     file: str
     kind: str
     state: State
+    """`older` and `newer`: of a version of contextdb whose files of this kind this one does not read."""
     message: str
 
     def to_json(self) -> dict[str, str]:
@@ -57,6 +59,8 @@ def verified(path: Path) -> Verdict:
         return Verdict(str(path), kind, "whole", "as it was written")
     except FileError:
         raise
+    except _OtherVersion as other:
+        return Verdict(str(path), kind, other.state, str(other))
     except ContextDBError as error:
         return Verdict(str(path), kind, "damaged", " ".join(fault.message for fault in error.faults[:3]))
 
@@ -66,13 +70,34 @@ def files_under(folder: Path) -> list[Path]:
     return sorted(path for path in folder.rglob("*") if path.suffix.lower() in CHECKS and path.is_file())
 
 
+class _OtherVersion(Exception):
+    """The layout of a file is one that this version does not read: which version wrote it, older or newer, and what to do."""
+
+    def __init__(self, state: State, why: str) -> None:
+        super().__init__(why)
+        self.state = state
+
+
+def _require_layout(found: object, known: Collection[int], mend: str) -> None:
+    """Tell a file of another version from a damaged one; what is no number is for the reader to refuse."""
+    text = str(found)
+    if not (text.isascii() and text.isdecimal() and len(text) < 6) or int(text) in known:
+        return
+    state: State = "older" if int(text) < min(known) else "newer"
+    reads = " and ".join(str(layout) for layout in sorted(known))
+    what = mend if state == "older" else "to install that version"
+    raise _OtherVersion(
+        state, f"layout {text}, of {'an' if state == 'older' else 'a'} {state} version; this one reads {reads}. Try {what}."
+    )
+
+
 # ---- kinds of files. Each check yields what it takes the file for, and at last why it holds no digest, where it holds none.
 
 Told = Iterator[tuple[str, str | None]]
 
 
 def _safetensors(path: Path) -> Told:
-    from contextdb.compiled.artefact import COMPILED, open_artefact
+    from contextdb.compiled.artefact import COMPILED, WITH_RANKS, open_artefact
     from contextdb.files.tensors import metadata_of
     from contextdb.motion.storage.feature_cache import CLIP_FEATURES
     from contextdb.motion.storage.pose_files import STORED_POSES, open_poses
@@ -81,21 +106,24 @@ def _safetensors(path: Path) -> Told:
     keys = metadata_of(path, COMPILED)
     if STORED.key in keys:
         yield "motion database", None
+        _require_layout(keys[STORED.key], (STORED.layout, *STORED.also), STORED.mend)
         open_database(path, verify=True)
     elif STORED_POSES.key in keys:
         yield "pose bank", None
+        _require_layout(keys[STORED_POSES.key], (STORED_POSES.layout, *STORED_POSES.also), STORED_POSES.mend)
         open_poses(path, verify=True)
     elif CLIP_FEATURES.key in keys:
         yield "features of a clip", "cached by a build; the next build checks them and computes altered ones again"
     else:
         yield "compiled table", None
+        _require_layout(keys.get(COMPILED.key), (WITH_RANKS.layout, *WITH_RANKS.also), COMPILED.mend)
         open_artefact(path)
 
 
 def _parquet(path: Path) -> Told:
     from contextdb.files.parquet_frame import DamagedFrame, require_whole_file
     from contextdb.motion.trace.session import Trace
-    from contextdb.motion.trace.session_file import FORMAT_KEY
+    from contextdb.motion.trace.session_file import FORMAT_KEY, MEND, READ
 
     yield "Parquet file", None
     try:
@@ -104,6 +132,7 @@ def _parquet(path: Path) -> Told:
         raise ArtefactError(Fault(f"the file is damaged: {error}.", "a Parquet file as it was written")) from None
     if FORMAT_KEY in frame.metadata:
         yield "recorded session", None
+        _require_layout(frame.metadata[FORMAT_KEY], [int(layout) for layout in READ], MEND)
         Trace.load(path)
     elif frame.is_sealed:
         yield "table", None
@@ -128,31 +157,40 @@ def _toml(path: Path) -> Told:
 
 
 def _json(path: Path) -> Told:
-    import json
+    from contextdb.covering.baseline import ACCEPTED, FORMAT, read_baseline
+    from contextdb.files.reports import DIGEST, document_of
 
-    from contextdb.covering.baseline import ACCEPTED, read_baseline
-
-    yield "coverage report", None
+    yield "JSON", None
     text = read_bytes(path).decode("utf-8-sig", "replace")
     try:
-        document = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise ArtefactError(Fault(f"the file is not JSON: {error}.", ACCEPTED)) from None
-    if not isinstance(document, dict) or not _is_coverage(document):
+        document = document_of(text)
+    except ValueError as error:
+        raise ArtefactError(Fault(f"{error}.", ACCEPTED)) from None
+    kind = _report(document)
+    if not kind:
         yield "JSON", "a document of another program, or of another command; nothing to compare"
         return
-    read_baseline(text, str(path))
-    if "digest" not in document:
-        yield "coverage report", "it reads as a baseline; it was written without a digest, by an older version"
+    yield kind, None
+    _require_layout(document["format"], (FORMAT,), "to write the report again")
+    if kind == COVERAGE:
+        read_baseline(text, str(path))
+    if DIGEST not in document:
+        yield kind, "it reads as a baseline; it was written without a digest, by an older version"
 
 
-def _is_coverage(document: Mapping[str, object]) -> bool:
-    """Whether a document is of `coverage`: that of `motion coverage` has tables too, and says how movements were put into bins."""
-    return {"format", "tables"} <= document.keys() and "bins" not in document
+COVERAGE = "coverage report"
+
+
+def _report(document: object) -> str:
+    """Which of our reports a document is; empty where it is none. Only that of `motion coverage` has bins."""
+    keys = document.keys() if isinstance(document, dict) else set[str]()
+    if {"format", "tables"} <= keys:
+        return COVERAGE if "bins" not in keys else "report of motion coverage"
+    return "report of measures" if {"format", "sessions"} <= keys else ""
 
 
 def _journal(path: Path) -> Told:
-    from contextdb.files.journal_lines import n_lost, read_records
+    from contextdb.files.journal_lines import FORMAT, n_lost, read_records
 
     yield "journal", None
     raw = read_bytes(path)
@@ -161,6 +199,8 @@ def _journal(path: Path) -> Told:
         n_lines = n_lost(raw, n_bytes)
         what = f"altered, and {plural(n_lines, 'line')} cannot be used" if n_lines else "cut off"
         raise ArtefactError(Fault(f"line {len(records) + 1} is {what}.", "lines with their check sums"))
+    if records:
+        _require_layout(records[0].get("format"), (FORMAT,), "the version that wrote it")
 
 
 CHECKS: Mapping[str, Callable[[Path], Told]] = {

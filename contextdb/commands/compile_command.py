@@ -84,7 +84,10 @@ def _link_path(arguments: argparse.Namespace) -> Path | None:
 
 
 def _link_text(tables: list[Table], header: Path, path: Path) -> str:
-    included = PurePath(os.path.relpath(header, path.parent)).as_posix()
+    try:
+        included = PurePath(os.path.relpath(header, path.parent)).as_posix()
+    except ValueError:  # another drive
+        included = header.absolute().as_posix()
     return c_link_of({table.name: table.compile() for table in tables}, included, f"CDB_{path.stem}_LINK_H")
 
 

@@ -17,9 +17,10 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TypeVar
 
 from contextdb.commands import add_format_arguments, coverage_telemetry
 from contextdb.commands.progress import Bar, bar, has_many_cells
@@ -30,6 +31,7 @@ from contextdb.covering.pairs import PairTable
 from contextdb.covering.progress import Tell
 from contextdb.disk import read_bytes, write_atomic
 from contextdb.errors import ContextDBError, ContextError, Fault, FileError, Place, TableError, in_quotes, nearest, plural
+from contextdb.files.reports import has_digest
 from contextdb.report import formats, render
 from contextdb.report.coverage_results import CoverageResults, Measured
 from contextdb.report.results import as_path
@@ -37,6 +39,8 @@ from contextdb.tables.nesting.flat import FlatTable
 from contextdb.tables.places import table_path
 from contextdb.tables.project import SCHEMA_FILE, Project, load_table
 from contextdb.tables.table import EitherTable, Table
+
+AnyReport = TypeVar("AnyReport")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -65,7 +69,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     """Measure one table or a folder of them."""
     _require_sense(arguments)
     tables = [table.flat() for table in tables_at(arguments.path)]
-    baseline = read_baseline(baseline_text(arguments.baseline, ACCEPTED), arguments.baseline) if arguments.baseline else None
+    baseline = earlier_report(arguments.baseline, read_baseline, ACCEPTED) if arguments.baseline else None
     if arguments.gap is not None or arguments.explain is not None:
         text, code = _details(arguments, _only(tables)), ExitCode.OK
     else:
@@ -260,12 +264,17 @@ def _only(tables: Sequence[EitherTable]) -> EitherTable:
     return tables[0]
 
 
-def baseline_text(file: str, accepted: str = "") -> str:
-    """What the file of a baseline says; `accepted` is what it may be."""
+def earlier_report(file: str, read: Callable[[str, str], AnyReport], accepted: str) -> AnyReport:
+    """The baseline in a file, by what reads its text; `accepted` is what it may be. One without a digest is told of."""
     try:
-        return read_bytes(Path(file)).decode("utf-8-sig")
+        text = read_bytes(Path(file)).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise ContextError(Fault("the baseline is not text.", accepted, place=Place(file))) from None
+    earlier = read(text, file)
+    if not has_digest(text):
+        found = "the baseline has no digest, as an older version wrote it, so an altered number would not be noticed"
+        print(f"contextdb: {printable(file)}: {found}. Write the report again to have one.", file=sys.stderr)
+    return earlier
 
 
 def percent(text: str) -> float:

@@ -26,7 +26,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Write what is missing, and say so."""
     setup = setup_of(arguments)
-    said = [*_attributes(setup), *_configuration(setup)] or ["nothing to do: all is set"]
+    with setup.all_or_nothing():
+        said = [*_attributes(setup), *_configuration(setup)] or ["nothing to do: all is set"]
     with output():
         print(*map(printable, said), sep="\n")
     return ExitCode.OK

@@ -9,7 +9,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -81,6 +81,25 @@ class Setup:
     def scope(self) -> str:
         """The option of `git config`."""
         return "--global" if self.is_global else "--local"
+
+    @contextmanager
+    def all_or_nothing(self) -> Iterator[None]:
+        """Put .gitattributes and the keys back as they were where not all of a change could be written."""
+        raw = self.raw()
+        before = {key: self.git("config", self.scope, "--get-all", "--null", key, accepts=(0, 1)) for key in self.settings}
+        try:
+            yield
+        except BaseException:  # also when the user interrupts
+            with suppress(ContextDBError):
+                if self.raw() != raw:
+                    self.write(raw)
+            with suppress(ContextDBError):
+                for key, values in before.items():
+                    if self.git("config", self.scope, "--get-all", "--null", key, accepts=(0, 1)) != values:
+                        self.unset(key)
+                        for value in values.split("\0")[:-1]:
+                            self.git("config", self.scope, "--add", key, value)
+            raise
 
     def set(self, key: str, value: str) -> None:
         """Write one key."""

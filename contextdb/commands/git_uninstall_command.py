@@ -17,7 +17,8 @@ __all__ = ["add_arguments", "run"]
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Remove what is there, and say so."""
     setup = setup_of(arguments)
-    said = [*_attributes(setup), *_configuration(setup)] or ["nothing to do: nothing is set"]
+    with setup.all_or_nothing():
+        said = [*_attributes(setup), *_configuration(setup)] or ["nothing to do: nothing is set"]
     with output():
         print(*map(printable, said), sep="\n")
     return ExitCode.OK

@@ -19,7 +19,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from contextdb.commands import add_format_arguments
-from contextdb.commands.coverage_command import baseline_text, percent
+from contextdb.commands.coverage_command import earlier_report, percent
 from contextdb.commands.motion_build_command import MotionProject
 from contextdb.commands.progress import building_bar
 from contextdb.console import ExitCode, output, terminal_width, wants_colour
@@ -67,7 +67,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     """Measure a project."""
     if arguments.context is not None and (arguments.format != "text" or arguments.baseline or arguments.fail_under is not None):
         raise ContextError(Fault("--context is text about some contexts; other formats and bars do not go with it."))
-    earlier = read_baseline(baseline_text(arguments.baseline, BASELINE), arguments.baseline) if arguments.baseline else None
+    earlier = earlier_report(arguments.baseline, read_baseline, BASELINE) if arguments.baseline else None
     results = _results(arguments, earlier)
     colour, width = wants_colour(sys.stdout) and not arguments.output, terminal_width()
     if arguments.context is not None:

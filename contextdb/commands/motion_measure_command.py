@@ -23,7 +23,7 @@ from pathlib import Path
 
 from contextdb import report
 from contextdb.commands import add_format_arguments
-from contextdb.commands.coverage_command import baseline_text
+from contextdb.commands.coverage_command import earlier_report
 from contextdb.commands.motion_build_command import MotionProject, warn
 from contextdb.commands.motion_replay_command import project_of
 from contextdb.console import ExitCode, output, terminal_width, wants_colour
@@ -32,7 +32,8 @@ from contextdb.motion import Measures, MotionDatabase, PoseBank, PoseSettings, m
 from contextdb.motion.storage.written_poses import NPZ
 from contextdb.motion.trace.filter_rows import fingerprint
 from contextdb.motion.trace.session import Trace
-from contextdb.report.measure_results import Bar, Gate, MeasureResults, SessionMeasures, compared, held_to, read_baseline
+from contextdb.report.measure_results import BASELINE, Bar, Gate, MeasureResults, SessionMeasures, compared, held_to, read_baseline
+from contextdb.report.results import as_path
 
 BARS = {
     "skate": ("skate_cm_s", "CM_S", "the most that planted feet may slide, cm/s"),
@@ -75,7 +76,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
 def _results(arguments: argparse.Namespace, poses: Sequence[str]) -> MeasureResults:
     earlier: Mapping[str, Mapping[str, object]] = {}
     if arguments.baseline:
-        earlier = read_baseline(baseline_text(arguments.baseline), arguments.baseline)
+        earlier = earlier_report(arguments.baseline, read_baseline, BASELINE)
     clips: dict[str, Clips] = {}
     every = [
         _measured(arguments, file, poses[i] if poses else None, clips, _before(earlier, file, arguments))
@@ -86,8 +87,9 @@ def _results(arguments: argparse.Namespace, poses: Sequence[str]) -> MeasureResu
 
 def _before(earlier: Mapping[str, Mapping[str, object]], file: str, arguments: argparse.Namespace) -> Mapping[str, object]:
     """The session of the baseline: of this name, or the only one where there is one only."""
-    if not arguments.baseline or file in earlier:
-        return earlier.get(file, {})
+    name = as_path(file)
+    if not arguments.baseline or name in earlier:
+        return earlier.get(name, {})
     if len(earlier) == len(arguments.sessions) == 1:
         return next(iter(earlier.values()))
     found = f"the baseline has no session {in_quotes(file)}."

@@ -1,10 +1,11 @@
 """Check that files are as they were written.
 
-Compiled tables, motion databases, recorded sessions, Parquet tables, coverage reports and the editor's journals contain a digest
-or checksums of their contents, which detect a single altered bit. In a folder every such file below it is checked. Tables in CSV
-and contextdb.toml have no digest: they are read, and reported as readable.
+Compiled tables, motion databases, recorded sessions, Parquet tables, reports (coverage, motion coverage, motion measure) and the
+editor's journals contain a digest or checksums of their contents, which detect a single altered bit. In a folder every such file
+below it is checked. Tables in CSV and contextdb.toml have no digest: they are read, and reported as readable. A file of an older or
+newer version that this one does not read is reported as such.
 
-Exits with 1 if a file is damaged.
+Exits with 1 if a file is damaged, or of a version that this one does not read.
 
   contextdb verify hit_mid_air.safetensors
   contextdb verify coverage.json recorded/session.parquet
@@ -19,7 +20,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from contextdb.checks.verify import CHECKS, Verdict, files_under, verified
+from contextdb.checks.verify import CHECKS, UNUSABLE, Verdict, files_under, verified
 from contextdb.console import ExitCode, aligned, output, progress, wants_colour
 from contextdb.errors import Fault, FileError, Place
 from contextdb.report.render_json import as_json
@@ -37,7 +38,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     verdicts = [verified(path) for path in progress(paths, "verifying")]
     with output():
         print(_as_json(verdicts) if arguments.json else _as_text(verdicts, wants_colour(sys.stdout)), end="")
-    return ExitCode.FOUND if any(v.state == "damaged" for v in verdicts) else ExitCode.OK
+    return ExitCode.FOUND if any(v.state in UNUSABLE for v in verdicts) else ExitCode.OK
 
 
 def _paths(texts: Sequence[str]) -> list[Path]:
@@ -57,6 +58,6 @@ def _as_json(verdicts: Sequence[Verdict]) -> str:
 
 
 def _as_text(verdicts: Sequence[Verdict], colour: bool) -> str:
-    words = {"whole": "whole", "no-digest": "readable", "damaged": "DAMAGED"}
+    words = {"whole": "whole", "no-digest": "readable", "older": "OLDER", "newer": "NEWER", "damaged": "DAMAGED"}
     lines = aligned([[words[v.state], v.file, f"{v.kind}: {v.message}"] for v in verdicts])
     return "".join(f"{line}\n" for line in lines)

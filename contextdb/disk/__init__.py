@@ -10,6 +10,7 @@ that no save writes over another one that it has not seen. Whoever has the turn 
 from __future__ import annotations
 
 import errno
+import fnmatch
 import os
 import stat
 from collections.abc import Callable, Iterable, Iterator
@@ -240,10 +241,20 @@ def matching(folder: Path, pattern: str) -> list[Path]:
 
     Raises ValueError or NotImplementedError where it is no pattern.
     """
+    return sorted(folder.glob(_of_any_case(pattern)))
+
+
+def fits(name: str, pattern: str) -> bool:
+    """Whether `matching` would find a file of this name by the last part of a pattern."""
+    return fnmatch.fnmatch(name, _of_any_case(pattern))
+
+
+def _of_any_case(pattern: str) -> str:
+    """A pattern whose suffix may be in capitals, or not, in the name of a file."""
     suffix = Path(pattern).suffix
-    if suffix[1:].isalnum():
-        pattern = pattern.removesuffix(suffix) + "".join(f"[{c.lower()}{c.upper()}]" if c.isalpha() else c for c in suffix)
-    return sorted(folder.glob(pattern))
+    if not suffix[1:].isalnum():
+        return pattern
+    return pattern.removesuffix(suffix) + "".join(f"[{c.lower()}{c.upper()}]" if c.isalpha() else c for c in suffix)
 
 
 # ---- what the system refuses
@@ -252,7 +263,7 @@ def matching(folder: Path, pattern: str) -> list[Path]:
 def refused_writing(file: Path, data: Data) -> AbstractContextManager[None]:
     """Turn what the system refuses into a `FileError` that names the file."""
     size = len(data) if isinstance(data, bytes) else None
-    return _refused(file, lambda error, at: _why_unwritten(error, at, size))
+    return _refused(file, lambda error, at: why_unwritten(error, at, size))
 
 
 @contextmanager
@@ -325,7 +336,8 @@ def _missing(file: Path) -> Fault:
     return Fault(f"there is no such {what}.", place=place, rule="no-such-path")
 
 
-def _why_unwritten(error: OSError, file: Path, size: int | None) -> Fault:
+def why_unwritten(error: OSError, file: Path, size: int | None = None) -> Fault:
+    """Why the system did not write a file, and what to do."""
     place, folder = Place(str(file)), path_in_quotes(Path(os.path.realpath(file)).parent)
     kept = " The old file is as it was." if os.path.exists(file) else ""
     if error.errno in _FULL:

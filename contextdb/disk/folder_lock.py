@@ -34,6 +34,8 @@ _TURN = ".contextdb-turn"
 _HELD = ".held"
 _POLL_S = 0.005
 _PATIENCE_S = 2.0
+_MOST_TURN_S = 20.0
+"""No save has a turn for so long: a file of a turn that is still there was left when the machine lost its power."""
 
 
 @cache
@@ -89,14 +91,17 @@ def _let_go(handle: int) -> None:
 def _turn_by_file(path: Path) -> int | None:
     """The turn as a file that goes with its handle; None where no file can be made."""
     flags = os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_TEMPORARY", 0)
-    patience = time.monotonic() + _PATIENCE_S
+    began = time.monotonic()
     while True:
         try:
             return os.open(path, flags)
         except FileExistsError:
-            pass
+            if time.monotonic() > began + _MOST_TURN_S:
+                with suppress(OSError):
+                    path.unlink()
+                return None
         except PermissionError:  # the file is just going, or the folder may not be written in
-            if time.monotonic() > patience:
+            if time.monotonic() > began + _PATIENCE_S:
                 return None
         except OSError:
             return None

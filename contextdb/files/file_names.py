@@ -11,9 +11,11 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path, PurePath
 
 from contextdb.disk import names_a_table
-from contextdb.errors import Fault, FileError, Place
+from contextdb.errors import Fault, FileError, Place, in_quotes
 
 _DEVICES = {"con", "prn", "aux", "nul", "conin$", "conout$", *(f"{port}{n}" for port in ("com", "lpt") for n in "0123456789¹²³")}
+
+_SIGNS = frozenset('<>:"/\\|?*')
 
 
 def composed(name: str) -> str:
@@ -31,6 +33,8 @@ def why_unportable(name: str) -> str:
     stem = name.partition(".")[0].rstrip(" ")
     if stem.casefold() in _DEVICES:
         return f"Windows keeps the name {stem} for a device"
+    if taken := next((c for c in name if c in _SIGNS or c < " "), None):
+        return f"Windows has no {in_quotes(taken)} in names of files"
     if name[-1:] in (".", " ") or PurePath(name).stem[-1:] in (".", " "):
         return "Windows drops a dot or a blank at the end of a name"
     return ""

@@ -9,6 +9,9 @@ from typing import Any
 
 Record = Mapping[str, Any]
 
+FORMAT = 1
+"""What the first line of a journal says; a journal of another format is not read."""
+
 
 def line_of(record: Record) -> bytes:
     """One line of a journal."""

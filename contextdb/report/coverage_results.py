@@ -9,10 +9,11 @@ from functools import cached_property
 from typing import ClassVar
 
 from contextdb.covering import CoverageReport, Gap, PairTable, Slice, format_percent
-from contextdb.covering.baseline import Change, digest_of
+from contextdb.covering.baseline import Change
 from contextdb.covering.pairs import left_out
 from contextdb.covering.shares import told_apart
 from contextdb.errors import in_quotes, plural, row_name, some
+from contextdb.files.reports import sealed
 from contextdb.findings import Finding
 from contextdb.report.results import CheckReport, Subject, TableSummary
 from contextdb.telemetry.observed import Observed, SeenGap
@@ -133,14 +134,15 @@ class CoverageResults:
 
     def to_json(self) -> dict[str, object]:
         """The JSON document."""
-        document: dict[str, object] = {
-            "format": 1,
-            "passed": self.passed,
-            "tables": [measured.to_json() for measured in self.tables],
-            "gone": list(self.gone),
-            "gates": [gate.to_json() for gate in self.gone.values()],
-        }
-        return document | {"digest": digest_of(document)}
+        return sealed(
+            {
+                "format": 1,
+                "passed": self.passed,
+                "tables": [measured.to_json() for measured in self.tables],
+                "gone": list(self.gone),
+                "gates": [gate.to_json() for gate in self.gone.values()],
+            }
+        )
 
     def as_check(self) -> CheckReport:
         """Missed bars, findings and the largest gaps as findings, for formats that know nothing else."""

@@ -12,11 +12,11 @@ from typing import ClassVar
 
 from contextdb.covering import format_percent
 from contextdb.errors import ContextError, Fault, Place, in_quotes, plural
-from contextdb.files.reports import document_of
+from contextdb.files.reports import document_of, sealed
 from contextdb.findings import Finding
 from contextdb.motion.measuring.measures import Measures
 from contextdb.motion.measuring.parts import NO_CHANGE, NO_FORCED, NO_JUMP
-from contextdb.report.results import CheckReport, Subject
+from contextdb.report.results import CheckReport, Subject, as_path
 
 NOTHING_TO_EXCEED = (NO_FORCED, NO_JUMP, NO_CHANGE)
 """A measure that is missing for such a reason keeps every bar."""
@@ -132,7 +132,7 @@ class SessionMeasures:
 
     def to_json(self) -> dict[str, object]:
         """The session in the JSON document."""
-        return {"file": self.file, **self.measures.to_json(), "bars": [gate.to_json() for gate in self.gates]}
+        return {"file": as_path(self.file), **self.measures.to_json(), "bars": [gate.to_json() for gate in self.gates]}
 
 
 @dataclass(frozen=True)
@@ -149,7 +149,7 @@ class MeasureResults:
 
     def to_json(self) -> dict[str, object]:
         """The JSON document."""
-        return {"format": 1, "sessions": [session.to_json() for session in self.sessions]}
+        return sealed({"format": 1, "sessions": [session.to_json() for session in self.sessions]})
 
     def as_check(self) -> CheckReport:
         """The bars that are broken, as findings."""
@@ -188,7 +188,7 @@ def read_baseline(text: str, file: str) -> dict[str, Mapping[str, object]]:
     try:
         document = document_of(text)
         version = document["format"]
-        sessions: list[tuple[str, dict[str, object]]] = [(str(each["file"]), dict(each)) for each in document["sessions"]]
+        sessions: list[tuple[str, dict[str, object]]] = [(as_path(str(each["file"])), dict(each)) for each in document["sessions"]]
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         why = str(error) if type(error) is ValueError else "it has no format and sessions"
         raise ContextError(Fault(f"the baseline is not a report of measures: {why}.", BASELINE, place=Place(file))) from None

@@ -14,7 +14,7 @@ from contextdb.covering import format_percent
 from contextdb.covering.motion import TableMotion
 from contextdb.covering.shares import told_apart
 from contextdb.errors import ContextError, Fault, Place, in_quotes, plural, some
-from contextdb.files.reports import document_of
+from contextdb.files.reports import document_of, sealed
 from contextdb.findings import Finding
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.measuring.coverage import ContextCoverage, ToCapture, about_bins
@@ -141,14 +141,16 @@ class MotionCoverageResults:
 
     def to_json(self) -> dict[str, object]:
         """The JSON document."""
-        return {
-            "format": 1,
-            "passed": self.passed,
-            "bins": about_bins(),
-            "tables": [measured.to_json() for measured in self.tables],
-            "clips_without_row": list(self.unlisted),
-            "gone": list(self.gone),
-        }
+        return sealed(
+            {
+                "format": 1,
+                "passed": self.passed,
+                "bins": about_bins(),
+                "tables": [measured.to_json() for measured in self.tables],
+                "clips_without_row": list(self.unlisted),
+                "gone": list(self.gone),
+            }
+        )
 
     def as_check(self) -> CheckReport:
         """The bars that are missed, as findings."""

@@ -14,7 +14,7 @@ import secrets
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +25,7 @@ from contextdb.cells.facts import Unknown
 from contextdb.compiled.batch import query_encoded
 from contextdb.compiled.table import CompiledTable, data_of
 from contextdb.console import printable
+from contextdb.disk import why_unwritten
 from contextdb.errors import ContextDBError, Fault, FileError, Place
 from contextdb.telemetry.contexts import contexts_in
 from contextdb.telemetry.keys import rows_of
@@ -119,14 +120,21 @@ def answers_written(place: Path) -> Iterator[None]:
     except ContextDBError:  # an OSError too where it is a FileError
         raise
     except (OSError, pl.exceptions.PolarsError) as error:
-        why = error.strerror if isinstance(error, OSError) and error.strerror else _without_paths(str(error))
-        fault = Fault(f"the answers cannot be written: {why}.", "room in that folder", place=Place(str(place)))
-        raise FileError(fault, errno=getattr(error, "errno", None)) from None
+        refused = _of_system(error)
+        new = place.with_suffix(".new") if place.is_dir() else place  # the folder of what is not finished is no old file
+        fault = replace(why_unwritten(refused, new), place=Place(str(place)))
+        raise FileError(fault, errno=refused.errno) from None
 
 
-def _without_paths(said: str) -> str:
-    """The first line of what polars says, without the names of files that nobody asked for."""
-    return re.sub(r"\s*:?\s*\S*\.contextdb-\S*", "", said.strip().splitlines()[0] if said.strip() else "no room").rstrip(".:")
+def _of_system(error: Exception) -> OSError:
+    """What the system refused: polars says its number in a text alone. A text without one loses the names that nobody asked for."""
+    if isinstance(error, OSError) and error.errno is not None:
+        return error
+    said = str(error).strip()
+    if found := re.search(r"\(os error (\d+)\)", said):
+        number = int(found[1])  # of Windows there; Python then knows which number it has elsewhere
+        return OSError(number, os.strerror(number), None, number)
+    return OSError(re.sub(r"\s*:?\s*\S*\.contextdb-\S*", "", said.splitlines()[0] if said else "no reason given").rstrip(".:"))
 
 
 def _write(question: Question, facts: pl.DataFrame, counts: Rows, first: int, file: str, stem: Path) -> None:

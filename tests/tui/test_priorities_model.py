@@ -70,6 +70,18 @@ def test_assets_are_those_with_clips_that_stand_in_the_table(game: Path):
     assert priorities.selectors()[0].databases[1].valid == ("walk", "walk_slow")
 
 
+def test_a_pattern_in_capitals_means_the_same_before_there_are_clips_as_after(game: Path):
+    toml = game / "contextdb.toml"
+    toml.write_text(toml.read_text(encoding="utf-8").replace('_tired.bvh"', '_tired.BVH"'), encoding="utf-8")
+    priorities = Priorities(sheet_of(game / "locomotion.csv"))
+    assets = [asset for asset in load(game / "locomotion.csv").assets if asset.endswith("_tired")]
+    assert priorities.selectors()[0].databases[0].assets == tuple(assets)
+    for i, asset in enumerate(assets):
+        (game / "clips" / f"{asset}.{'bvh' if i % 2 else 'Bvh'}").write_bytes(b"")
+    priorities.reload()
+    assert set(priorities.selectors()[0].databases[0].assets) == set(assets)
+
+
 def test_a_fact_that_is_typed_and_a_row_that_is_edited_count_at_once(game: Path):
     sheet = sheet_of(game / "locomotion.csv", gait="Walk")
     priorities = Priorities(sheet)

@@ -31,14 +31,12 @@ from contextdb.edits.edits import edit_between
 from contextdb.edits.history import History, Step
 from contextdb.edits.schema_file import SchemaChange
 from contextdb.errors import ContextDBError, Fault, Place, plural
-from contextdb.files.journal_lines import Record, line_of, n_lost, read_records
+from contextdb.files.journal_lines import FORMAT, Record, line_of, n_lost, read_records
 from contextdb.files.texts import texts_of
 from contextdb.tables.changes import Edit
 from contextdb.tables.table import Table
 from tui.model.lock import FOLDER, own_folder
 from tui.model.watched import digest_of
-
-FORMAT = 1
 
 
 def journal_path(table: Path) -> Path:

@@ -11,10 +11,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
 from pathlib import Path, PurePosixPath
 
-from contextdb.disk import matching
+from contextdb.disk import fits, matching
 from contextdb.errors import ContextDBError, Fault, SchemaError, in_quotes
 from contextdb.motion.storage.config import MotionConfig
 from contextdb.motion.storage.database_settings import DatabaseSettings
@@ -153,7 +152,7 @@ class Priorities:
             held = tuple(clip for clip in clips if clip in assets)
             return held, tuple(clip for clip in held if clip in valid), ""
         pattern = PurePosixPath(settings.clips).name
-        rows = tuple(asset for asset in assets if fnmatchcase(f"{asset}.bvh", pattern))
+        rows = tuple(asset for asset in assets if fits(f"{asset}.bvh", pattern))
         return rows, tuple(asset for asset in rows if asset in valid), "no clips yet: counted from the rows of the table"
 
     def _clips_of(self, settings: DatabaseSettings) -> tuple[str, ...]:

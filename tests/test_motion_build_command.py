@@ -19,6 +19,7 @@ from running import Result, run
 from contextdb.cli import main
 from contextdb.commands import watched_work
 from contextdb.commands.motion_build_command import MotionProject
+from contextdb.commands.motion_check_command import check_path
 from contextdb.files.tensors import read_tensors
 from contextdb.motion import inputs_of, make_clip, open_poses, write_bvh
 from contextdb.motion.storage import building
@@ -319,7 +320,12 @@ def test_a_rig_whose_sides_differ_is_told_with_bones_and_metres_cached_or_not(he
     expected = 'contextdb: warning: [databases.tired] mirror: the two sides of the rig differ in 1 clip, most in "jog_tired": '
     expected += '"LeftLeg" by 0.030 m, "RightLeg" by 0.030 m. '
     for _ in range(2):
-        assert expected in build("game").err
+        err = build("game").err
+        assert expected in err
+        assert "a rig with equal sides, mirror = false, or" in err
+    (told,) = [each for each in check_path("game").findings if each.rule == "uneven-sides"]
+    assert (told.level, told.file) == ("warning", str(Path("game") / "contextdb.toml"))
+    assert "mirror = false" in told.message
 
 
 # ---- faults stop what needs them

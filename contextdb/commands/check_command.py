@@ -128,8 +128,10 @@ def _check_files(files: Sequence[tuple[str | None, Path]], schema: Schema | None
             continue
         tables.append(TableSummary(table.name, str(path), table.n_rows, len(table.conditions)))
         read.append(table)
-        findings += check(table)
         log = log_of(f"checking {printable(table.name)}", has_many_cells(table))
+        if log is not None:
+            log(0, 1, "Reading rows")
+        findings += check(table)
         findings += check_rows(table, progress=None if log is None else partial(_tell, log))
         findings += _check_cases(table, cases_path(path))
     if schema is not None and len(read) == len(files):

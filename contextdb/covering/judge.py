@@ -38,6 +38,8 @@ from contextdb.tables.alike import identical_rows, named
 from contextdb.tables.table import EitherTable
 from contextdb.tables.variety import NEEDLESS, gathered, lets_choose, needless, softened
 
+AHEAD = 0.2
+"""This share of the work, where rows are many, is done for all of them before the first."""
 MOST_CAUSES = 24
 """Up to so many rows the causes of a redundant row are thinned out to those that are needed."""
 MOST_SIBLINGS = 50
@@ -127,8 +129,12 @@ class Judge:
     def _rows(self) -> Iterator[Finding]:
         told = {f.row for f in self._identical}
         first_of: dict[tuple[int, str], int] = {}
+        before = 0.0
+        if self._questions is not None:
+            self.progress.at(AHEAD / 2 if self.boxes.n_boxes else 0.0)
+            before = AHEAD if len(self._first_holders) else 0.0
         for i, box in enumerate(self.space.boxes):
-            self.progress.at(i / len(self.space.boxes))
+            self.progress.at(before + (1.0 - before) * i / len(self.space.boxes))
             self._asked_of = i
             same = self._equal[box]
             first_same = first_of.setdefault((same[0], self._asset(i)), i)

@@ -10,9 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from strategies import examples
 
+import contextdb as cdb
+from contextdb.checks.rows import check_rows
 from contextdb.covering.count import uncovered_share
 from contextdb.covering.factors import ValueFactor
-from contextdb.covering.questions import Questions
+from contextdb.covering.judge import AHEAD
+from contextdb.covering.questions import MANY, Questions
 from contextdb.covering.space import Box, Space
 from contextdb.covering.witness import BoxSet, Steps
 
@@ -82,3 +85,15 @@ def test_the_first_holder_of_each_box_is_that_of_comparing_all_pairs(boxes):
 def test_a_question_without_steps_is_not_certain():
     boxes = [(1, 3, 7, 15, 3, 7), (3, 1, 7, 15, 3, 7), (2, 2, 7, 15, 3, 7)]
     assert Questions(boxes, FULL).are_held(FULL, 7, 0)[:2] == (False, False)
+
+
+def test_what_is_prepared_for_many_rows_counts_as_work_that_is_told():
+    n = MANY + 200
+    columns = {"a": [f"{i % 37}..{i % 37 + 3}" for i in range(n)], "b": [f"{i % 41}..{i % 41 + 2}" for i in range(n)]}
+    schema = {name: {"type": "number", "min": 0, "max": 50} for name in columns}
+    told: list[float] = []
+    check_rows(
+        cdb.Table.from_columns({"Asset": [f"A{i}" for i in range(n)], **columns}, schema), progress=lambda _, s: told.append(s)
+    )
+    assert told == sorted(told)
+    assert {AHEAD / 2, AHEAD} <= set(told)

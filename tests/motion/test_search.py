@@ -164,13 +164,15 @@ def allowed_frames(database, given):
 
 
 def by(engine, database):
-    """The database as it is, or as it searches where numba cannot be installed."""
+    """The database as it is, or as it searches where numba cannot be installed, few frames or many."""
     if engine != "numba":
         vars(database._searcher)["_compiled"] = None
+    if engine == "groups":
+        database._searcher._scan.small = 0
     return database
 
 
-engines = pytest.mark.parametrize("engine", ["numba", "numpy"])
+engines = pytest.mark.parametrize("engine", ["numba", "numpy", "groups"])
 
 
 @engines
@@ -241,6 +243,22 @@ def test_many_characters_are_answered_like_each_alone(engine, data):
     tags = asked[0].get("tags") if asked else None
     singly = [database.search(q, m, tags, c) for q, m, c in zip(queries, masks, currents, strict=True)]
     assert database.search_many(queries, masks, currents, tags) == singly
+
+
+@pytest.mark.parametrize("features", ["walks", "noise"])
+def test_many_frames_are_searched_in_groups_to_the_same_bit_as_by_the_compiled_search(features):
+    pytest.importorskip("numba")
+    rng = np.random.default_rng(3)
+    steps = rng.normal(size=(9_000, 24))
+    rows = (steps.cumsum(axis=0) / 8 if features == "walks" else steps).astype(np.float32)
+    starts = np.arange(0, 9_000, 90)
+    plain = MotionDatabase.from_features(rows, starts, starts + rng.integers(1, 91, 100), [f"a{i}" for i in range(100)])
+    without = by("groups", replace(plain))
+    for _ in range(30):
+        query = rows[rng.integers(9_000, size=2)].mean(axis=0)
+        valid, current = rng.random(100) < 0.4, int(rng.integers(-1, 9_000))
+        given = {"valid": valid, "current": current, "skip": [Skip(current - 9, current + 30, LeftOut.JUMP)]}
+        assert without.search(query, **given) == plain.search(query, **given)
 
 
 def test_a_new_mask_rebuilds_nothing():

@@ -122,6 +122,11 @@ class Layout:
         """Where each feature is: int64 [F]."""
         return np.argsort(self.order)
 
+    def place_of(self, frame: int) -> tuple[int, int]:
+        """The box and the lane of a frame that is in a range."""
+        box = int(self.box_starts.searchsorted(frame, side="right")) - 1
+        return box, frame - int(self.box_starts[box])
+
     def range_of(self, frame: int) -> int:
         """The range that holds a frame, or -1 for a frame between ranges."""
         box = int(self.box_starts.searchsorted(frame, side="right")) - 1

@@ -60,8 +60,8 @@ class Searcher:
             wanted = self.normalised(query)
             totals[:], frames[:] = within, -1
             if n == 1:
-                of, found, own = self._scan.least_of_many(wanted[None], ManyFilters.alone(chosen))
-                return int(of[0]), own, found
+                own_range, frames[0], totals[0] = self._scan.best(wanted, chosen)
+                return own_range, totals, frames
             at, found, own = self._scan.least(wanted, chosen, within)
             totals[at], frames[at] = own, found
             return 0, totals, frames

@@ -50,7 +50,7 @@ def check_motion(
     built = building.build_all(config, folder, assets, progress, cache=cache, tolerates=takes)
     files = Inputs.of(config, folder, assets, None, Faults(lambda name, error: True)).files
     found = [Finding.of(fault) for fault in _in_files(told_once(refused), files)]
-    found += _of_clips(built, _left_out(files, built))
+    found += _of_clips(built, _left_out(files, built), config)
     found += _of_settings(config)
     found += _of_assets(config, folder, assets)
     return MotionFindings(tuple(found), {name: len(each.computed) + len(each.cached) for name, each in built.items()})
@@ -102,7 +102,7 @@ def _measured(files: Iterable[ClipFile]) -> Iterator[tuple[str, str, Measures]]:
                 yield file.asset, str(file.path), measure(clip)
 
 
-def _of_clips(built: Mapping[str, Built], left_out: Iterable[ClipFinding]) -> Iterator[Finding]:
+def _of_clips(built: Mapping[str, Built], left_out: Iterable[ClipFinding], config: MotionConfig) -> Iterator[Finding]:
     """What is doubtful of clips; a clip in several databases is reported once."""
     used = (doubt for each in built.values() for doubt in each.doubts)
     for doubt in dict.fromkeys(chain(used, left_out)):
@@ -110,7 +110,7 @@ def _of_clips(built: Mapping[str, Built], left_out: Iterable[ClipFinding]) -> It
     for fault in dict.fromkeys(fault for each in built.values() for fault in each.markup_faults):
         yield Finding.of(fault, "warning")
     for fault in dict.fromkeys(fault for each in built.values() for fault in each.mirror_faults):
-        yield Finding("uneven-sides", "warning", fault.message)
+        yield Finding.of(fault.at(Place(config.file)), "warning")
 
 
 def _of_settings(config: MotionConfig) -> Iterator[Finding]:

@@ -851,7 +851,10 @@ def test_without_its_databases_a_session_says_what_is_missing(here: Path):
         (["--why", "jog"], "--why shows an asset in one decision. Accepted: --at N|TIME with it"),
         (["--at", "0", "--why", "jgo"], 'there is no asset "jgo".'),
         (["--at", "0", "--why", "jgo"], 'Did you mean "jog"?'),
-        (["--at", "1", "--why", "jog"], "nothing was searched at tick 1: what played, played on."),
+        (
+            ["--at", "1", "--why", "jog"],
+            "nothing was searched at tick 1: what played, played on. Accepted: an update with a search. Did you mean tick 0?",
+        ),
         (["--what-if", "LeftFoot positon=2"], 'Did you mean "LeftFoot position=2"?'),
         (["--what-if", "threshold tird=2"], 'Did you mean "threshold tired=2"?'),
         (["--what-if", "LeftFoot position"], '"LeftFoot position" is not a change.'),

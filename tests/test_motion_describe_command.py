@@ -126,6 +126,34 @@ def test_clips_in_metres_are_taken_for_such(game: Path):
     assert speeds["walk"] == pytest.approx(1.3, abs=0.02)
 
 
+def test_clips_in_metres_and_in_centimetres_in_one_folder_are_each_taken_for_what_they_are(game: Path):
+    clip = make_clip("jog").clip
+    values = clip.values.copy()
+    values[:, :3] *= 0.01
+    skeleton = replace(clip.skeleton, offsets=clip.skeleton.offsets * 0.01)
+    write_bvh(replace(clip, skeleton=skeleton, values=values), game / "clips" / "a_jog.bvh")
+    result = describe("game/clips", "--json")
+    assert "a_jog and its rig (1 clip)" in result.err
+    speeds = {clip["asset"]: clip["facts"]["speed_mps"]["middle"] for clip in result.json["clips"]}
+    assert speeds["walk"] == pytest.approx(1.3, abs=0.02)
+    assert speeds["a_jog"] == pytest.approx(2.5, abs=0.1)
+
+
+def test_clips_in_which_another_axis_points_up_are_taken_for_such(game: Path):
+    for name in NAMES:
+        clip = make_clip(name).clip
+        around = np.roll(clip.values[:, :3], 1, axis=1)  # z up: x, y, z of the clip become y, z, x
+        skeleton = replace(clip.skeleton, offsets=np.roll(clip.skeleton.offsets, 1, axis=1))
+        write_bvh(
+            replace(clip, skeleton=skeleton, values=np.hstack((around, 0.0 * clip.values[:, 3:]))), game / "clips" / f"{name}.bvh"
+        )
+    result = describe("game/clips", "--out", "game/moves.csv")
+    assert "would lie if y pointed up: z is taken to point up. --up says otherwise." in result.err
+    assert "the body lies" not in result.err
+    assert 'up = "z"' in (game / "contextdb.toml").read_text()
+    assert "the body lies" in describe("game/clips", "--up", "y").err
+
+
 def test_bodies_that_lie_are_told_with_the_axis_that_may_point_up(game: Path):
     clip = make_clip("walk").clip
     around = np.roll(clip.values[:, :3], 1, axis=1)  # z up: x, y, z of the clip become y, z, x

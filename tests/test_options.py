@@ -16,7 +16,7 @@ COMPUTED = {
     "next to each table", "the sample tables", "those that came with contextdb", "tables/, or here", "detected",
     "detected from its cells", "OURS", "next to contextdb.toml", "the rate of the features", "the clip's own path",
     "contextdb, or the Python that runs now", "as recorded", "whole, except in our own workbooks", "from the settings",
-    "200,000, fewer above 500 conditions", "as the project says, else by size", "as the project says, else y",
+    "200,000, fewer above 500 conditions", "as the project says, else by size", "as the project says, else in which bodies stand",
     "as the project says, else that",
     "the first that decides",
 }  # fmt: skip

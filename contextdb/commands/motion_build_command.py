@@ -35,7 +35,7 @@ from contextdb.motion.storage.build_inputs import told_once
 from contextdb.motion.storage.building import Built, saved_path
 from contextdb.motion.storage.clip_files import unmatched
 from contextdb.motion.storage.config import MotionConfig
-from contextdb.motion.storage.pose_files import open_or_build_poses, poses_path, save_poses
+from contextdb.motion.storage.pose_files import poses_alone, poses_path, save_poses
 from contextdb.motion.storage.stored import STORED, save_database
 from contextdb.tables.project import SCHEMA_FILE, Project
 from contextdb.tables.table import leaf_assets
@@ -108,7 +108,7 @@ def _replaced(target: Path) -> Iterator[str]:
 
 def _save_poses(project: MotionProject, built: Mapping[str, Built], targets: Mapping[str, Path]) -> None:
     """Save the poses of some databases beside them."""
-    banks = open_or_build_poses(project.config, project.folder, project.assets, names=list(targets))
+    banks = poses_alone(project.config, project.folder, project.assets, names=list(targets))
     for name, bank in banks.items():
         save_poses(bank, poses_path(targets[name].parent, name), inputs=built[name].digest)
 

@@ -19,7 +19,9 @@ def add_clip_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--metres-per-unit", metavar="M", type=unit_of, help="the unit of the files (default: as the project says, else by size)"
     )
-    parser.add_argument("--up", choices=UPS, help="the axis that points up (default: as the project says, else y)")
+    parser.add_argument(
+        "--up", choices=UPS, help="the axis that points up (default: as the project says, else in which bodies stand)"
+    )
 
 
 def unit_of(text: str) -> float:

@@ -29,7 +29,7 @@ from contextdb.motion.storage.building import CACHE_FOLDER
 from contextdb.motion.storage.feature_cache import make_cache_folder
 
 BOM = "\ufeff"
-FORMAT = 1
+FORMAT = 2
 FILE = "prepared.json"
 Line = tuple[str, ...]
 """A mark as its file has it: asset, tag, from, to, value."""
@@ -111,7 +111,7 @@ def _clips(said: Mapping[str, Any]) -> Iterator[tuple[str, KeptClip]]:
     for name, clip in said.items():
         found = {kind: [Proposal(**each) for each in listed] for kind, listed in clip["found"].items()}
         shape = None if clip["shape"] is None else np.frombuffer(base64.b64decode(clip["shape"]), "<f4")
-        yield name, KeptClip(str(clip["key"]), found, None if shape is None else shape.reshape(N_SAMPLES, -1, 3))
+        yield name, KeptClip(str(clip["key"]), found, None if shape is None else shape.reshape(2, N_SAMPLES, -1, 3))
 
 
 def _written(said: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Written]]]:

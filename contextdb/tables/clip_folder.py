@@ -8,10 +8,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
+
 from contextdb.disk import path_in_quotes
 from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, nearest, plural
 from contextdb.motion.clips.clip import CENTIMETRE, Clip, Up, load_bvh
-from contextdb.motion.clips.doubts import LEAST_BODY_M, UNITS, USUAL_BODY_M, measure
+from contextdb.motion.clips.doubts import LEAST_BODY_M, LYING_SHARE, UNITS, USUAL_BODY_M, measure
 from contextdb.motion.storage.clip_files import paths_of
 from contextdb.motion.storage.config import MotionConfig
 from contextdb.motion.storage.database_settings import DatabaseSettings
@@ -27,6 +29,10 @@ Wanted = Callable[[Databases], Databases]
 """What leaves of the databases of a project those that are wanted: one or more."""
 LEAST_USUAL_M, MOST_USUAL_M = 0.9, 2.6
 """How tall a body is, in a unit that may be right."""
+SAME_UNIT = 2.0
+"""Bodies whose bones are at most so many times as long as the first one's are in its unit; an inch is 2.54 cm."""
+MOST_SEEN = 8
+"""So many clips of a rig are looked at for the axis that points up."""
 MOST_RATE = 1e6
 """Frames a second: speeds of a clip that has more of them are no numbers to reckon with."""
 
@@ -88,8 +94,12 @@ def clips_of(
     for i, (file, (unit, axis, rig)) in enumerate(files.items()):
         tell(i, len(files), file.stem)
         _read(found, file, CENTIMETRE if unit is None else unit, axis, rig)
-    if metres_per_unit is None and not found.config.databases:
-        _guess_units(found)
+    if not found.config.databases:
+        rigs = _rigs(found.clips)
+        if up is None:
+            _guess_axes(found, rigs)
+        if metres_per_unit is None:
+            _guess_units(found, rigs)
     return found
 
 
@@ -154,12 +164,42 @@ def _read(found: FolderClips, file: Path, unit: float, up: Up, rig: Rig | None) 
     found.paths.append(file)
 
 
-def _guess_units(found: FolderClips) -> None:
+def _rigs(clips: Sequence[Clip]) -> list[list[int]]:
+    """The clips of each rig, by their numbers: bones of the same names, in the same unit."""
+    rigs: dict[tuple[str, ...], list[tuple[float, list[int]]]] = {}
+    for i, clip in enumerate(clips):
+        length = float(np.linalg.norm(clip.skeleton.offsets[1:], axis=1).sum())
+        sizes = rigs.setdefault(clip.skeleton.names, [])
+        alike = next((members for size, members in sizes if size <= SAME_UNIT * length and length <= SAME_UNIT * size), None)
+        if alike is None:
+            sizes.append((length, [i]))
+        else:
+            alike.append(i)
+    return [members for sizes in rigs.values() for _, members in sizes]
+
+
+def _guess_axes(found: FolderClips, rigs: Sequence[Sequence[int]]) -> None:
+    """Take clips in which bodies lie for such with another axis up, where they stand with it, rig by rig, and tell of it."""
+    others: tuple[Up, ...] = ("z", "x")
+    for members in rigs:
+        seen = [found.clips[i] for i in members[:: math.ceil(len(members) / MOST_SEEN)]]
+        up = next((up for up in others if not _lie([replace(clip, up=up) for clip in seen])), None) if _lie(seen) else None
+        if up is None:
+            continue
+        about = f"{found.clips[members[0]].name} and its rig ({plural(len(members), 'clip')}) would lie if y pointed up"
+        found.notes.append(f"{about}: {up} is taken to point up. --up says otherwise.")
+        for i in members:
+            found.clips[i] = replace(found.clips[i], up=up)
+
+
+def _lie(clips: Sequence[Clip]) -> bool:
+    """Whether the body lies in most of some clips."""
+    return sum(measure(clip).lying >= LYING_SHARE for clip in clips) > len(clips) / 2
+
+
+def _guess_units(found: FolderClips, rigs: Sequence[Sequence[int]]) -> None:
     """Take clips of an unlikely size for such in another unit, rig by rig, and tell of it."""
-    rigs: dict[tuple[str, ...], list[int]] = {}
-    for i, clip in enumerate(found.clips):
-        rigs.setdefault(clip.skeleton.names, []).append(i)
-    for members in rigs.values():
+    for members in rigs:
         first = found.clips[members[0]]
         size = measure(first).size_m
         if LEAST_USUAL_M <= size <= MOST_USUAL_M or size <= 0.0:

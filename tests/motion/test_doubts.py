@@ -117,6 +117,33 @@ def test_feet_that_never_touch_the_ground_are_told(by_m):
     assert found.measure == pytest.approx(measure(WALK).lowest + by_m)
 
 
+def test_a_body_that_stands_in_the_floor_in_every_pose_is_told():
+    def sink(values):
+        values[:, root_columns(WALK)[1]] -= 0.1 / WALK.metres_per_unit
+
+    found = doubt(with_values(WALK, sink))
+    assert found.rule == "off-ground"
+    assert "below the ground (0 upwards) in every pose" in found.found
+
+
+def test_a_body_that_goes_down_below_the_ground_is_not_told():
+    def descend(values):
+        values[:, root_columns(WALK)[1]] -= np.linspace(0.0, 0.3, len(values)) / WALK.metres_per_unit
+
+    assert rules(with_values(WALK, descend)) == []
+
+
+def test_a_body_in_another_unit_than_the_other_clips_is_told_though_its_size_is_likely():
+    found = doubt(replace(WALK, metres_per_unit=WALK.metres_per_unit / 2.54))
+    assert found.rule == "odd-size"
+    assert found.measure == pytest.approx(1 / 2.54, rel=0.01)
+    assert found.mend == "metres_per_unit = 0.01 (centimetres) in a database of its own"
+
+
+def test_a_body_a_third_larger_than_the_other_clips_is_not_told():
+    assert rules(replace(WALK, metres_per_unit=WALK.metres_per_unit * 1.3)) == []
+
+
 def test_a_body_of_other_proportions_than_the_other_clips_is_told():
     offsets = WALK.skeleton.offsets.copy()
     legs = [i for i, name in enumerate(WALK.skeleton.names) if "Leg" in name or "Foot" in name]

@@ -113,11 +113,18 @@ def test_resampling_keeps_places_in_time_and_bones_in_length():
     local = local_poses(make_clip("walk").clip)
     for rate in (7.0, 30.0, 59.94, 120.0):
         poses = poses_of(make_clip("walk").clip, rate)
-        assert poses.n_frames == int((len(local.positions) - 1) / 30.0 * rate + 1e-6) + 1
+        assert poses.n_frames == int((len(local.positions) - 1) / 30.0 * rate + 0.05) + 1
         legs = np.linalg.norm(np.diff(poses.positions[:, 11:14], axis=1), axis=-1)
         assert np.allclose(legs, legs[0], atol=1e-9)
         speed = (poses.positions[-1, 0, 2] - poses.positions[0, 0, 2]) / ((poses.n_frames - 1) / rate)
         assert speed == pytest.approx(1.3, abs=0.02)
+
+
+@pytest.mark.parametrize("printed", [0.00833333, 0.0083333, 0.008333])
+def test_resampling_keeps_the_last_frame_of_a_clip_whose_frame_time_is_printed_short(printed):
+    skeleton = parse_bvh(SMALL, "clip").skeleton
+    assert poses_of(Clip("five_seconds", skeleton, printed, np.zeros((601, 9))), 30.0).n_frames == 151
+    assert poses_of(Clip("short_of_it", skeleton, printed, np.zeros((600, 9))), 30.0).n_frames == 150
 
 
 def test_one_frame_and_no_frames_can_be_resampled():

@@ -378,6 +378,12 @@ def test_a_span_wholly_behind_the_end_of_its_clip_is_told():
     )
 
 
+def test_a_span_that_begins_behind_the_last_frame_at_the_rate_and_goes_on_to_the_end_is_not_told():
+    """A clip of 120 frames a second ends up to a frame behind the last one at 30; `prepare` marks what it sees there."""
+    assert told_for(["jog,Contact.Left,3.025,,"], {"jog": 3.0}, rate=30.0) == []
+    assert "behind the end of the clip" in told_for(["jog,Contact.Left,3.04,,"], {"jog": 3.0}, rate=30.0)[0]
+
+
 def test_a_pattern_is_measured_by_the_longest_clip_that_fits():
     durations_s = {"jog_a": 1.0, "jog_b": 4.0}
     assert told_for(["jog_*,Move,3.5,9,"], durations_s) == []

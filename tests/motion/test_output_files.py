@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from played import RATE, SCHEMA, bank, clips, decisions
@@ -147,3 +149,27 @@ def test_another_ending_is_refused(tmp_path, poses):
         write_poses(poses, bank(), tmp_path / "shown.fbx", RATE)
     with pytest.raises(ContextError):
         write_poses(["walk"], bank(), tmp_path / "shown.npz", RATE)
+
+
+def test_banks_of_one_rig_of_which_one_alone_moves_a_joint_are_played_together(tmp_path):
+    """A take moves the root, another the hips below it: the second has no positions of the root of its own."""
+    clip = clips()[0]
+    spine, start = clip.skeleton.index("Spine"), int(clip.skeleton.channel_starts[clip.skeleton.index("Spine")])
+    channels = list(clip.skeleton.channels)
+    channels[spine] = ("Xposition", "Yposition", "Zposition", *channels[spine])
+    rig = replace(clip.skeleton, channels=tuple(channels))
+    for name, sway in (("still", 0.0), ("swaying", 5.0)):
+        moved = clip.skeleton.offsets[spine] + sway * np.sin(np.arange(clip.n_frames))[:, None]
+        values = np.hstack((clip.values[:, :start], moved, clip.values[:, start:]))
+        (tmp_path / name).mkdir()
+        write_bvh(replace(clip, name=name, skeleton=rig, values=values), tmp_path / name / f"{name}.bvh")
+    sections = {name: {"clips": f"{name}/*.bvh", "features": "loco"} for name in ("still", "swaying")}
+    config = MotionConfig.from_dict({"features": {"loco": schema_to_dict(SCHEMA)}, "databases": sections})
+    banks = open_or_build_poses(config, tmp_path)
+    assert spine in banks["still"].moving
+    alone = open_or_build_poses(config, tmp_path, names=["still"])["still"]
+    assert spine not in alone.moving
+    hips, at = banks["still"].sample("still", 0.4).positions
+    np.testing.assert_array_equal(hips, alone.sample("still", 0.4).positions[0])
+    np.testing.assert_allclose(at, alone.skeleton.offsets[spine], atol=1e-6)
+    PoseStream(banks)

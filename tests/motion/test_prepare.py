@@ -190,6 +190,11 @@ def test_a_copy_with_a_little_noise_is_a_near_duplicate_of_the_first():
     assert '"walk"' in each.reason
 
 
+def test_a_turn_with_the_steps_of_a_walk_is_no_duplicate_of_it():
+    walk = CLIPS["walk"]
+    assert of("duplicates", motion.prepare([walk, turning_clip(90.0, 2.0)])) == []
+
+
 # ---- markup that is there
 
 

@@ -33,6 +33,12 @@ FEWEST_FRAMES = 3
 """Two frames give one velocity, one frame none."""
 FAR_FROM_GROUND = 0.25
 """Of the body's size: so far above or below the ground no foot stands."""
+UNDER_GROUND = 0.01
+"""Of the body's size: a joint that is deeper than this in every pose is under the floor. Joints lie above their soles."""
+OTHER_SIZE = 1.5
+"""A body so many times as large as those of the other clips, or so many times smaller, is in another unit. Adults differ by 1.3."""
+FEWEST_TO_COMPARE = 3
+"""Of two bodies nobody knows which is the odd one."""
 LONGEST_FLIGHT_S = 2.0
 """No jump takes longer."""
 LYING = 0.65
@@ -90,6 +96,8 @@ class Measures:
         The share of poses that reach less far upwards than `LYING` of their largest extent.
     lowest : float
         The height of the lowest joint of all poses, in metres.
+    raised : float
+        The same of the pose in which the lowest joint is highest.
     fastest_mps, fastest_frame : float, int
         The largest speed of the hips between two frames, and the earlier of the two.
     farthest_m : float
@@ -109,6 +117,7 @@ class Measures:
     extents: tuple[float, float, float] = (0.0, 0.0, 0.0)
     lying: float = 0.0
     lowest: float = 0.0
+    raised: float = 0.0
     fastest_mps: float = 0.0
     fastest_frame: int = 0
     farthest_m: float = 0.0
@@ -142,7 +151,7 @@ def measure(clip: Clip) -> Measures:
         local = _some_poses(clip)
         body = forward_kinematics(local).positions[:, joints]
         lengths = np.median(np.linalg.norm(local.positions[:, joints[1:]], axis=-1), axis=0).tolist()
-        reach = np.ptp(body, axis=1)
+        reach, lows = np.ptp(body, axis=1), body[:, :, 1].min(axis=1)
         hips = _hips(clip)
         steps = np.linalg.norm(np.diff(hips, axis=0), axis=1)
     fastest = int(np.argmax(steps)) if len(steps) else 0
@@ -156,7 +165,8 @@ def measure(clip: Clip) -> Measures:
         clip.up,
         extents=(x, y, z),
         lying=float((reach[:, 1] < LYING * reach.max(axis=1)).mean()),
-        lowest=float(body[:, :, 1].min()),
+        lowest=float(lows.min()),
+        raised=float(lows.max()),
         fastest_mps=step / clip.frame_time_s,
         fastest_frame=fastest,
         farthest_m=step,
@@ -182,9 +192,12 @@ def doubts(clips: Iterable[tuple[str, str | None, Measures]]) -> list[ClipFindin
     """
     listed = list(clips)
     usual = _usual_shape([measures for _, _, measures in listed])
+    lengths = [_length(measures.bones or {}, usual) for _, _, measures in listed]
+    known = [length for length in lengths if length]
+    usual_m = float(np.median(known)) if len(known) >= FEWEST_TO_COMPARE else 0.0
     found = []
-    for asset, file, measures in listed:
-        for rule, at in _rules(measures, usual):
+    for (asset, file, measures), length in zip(listed, lengths, strict=True):
+        for rule, at in _rules(measures, usual, length / usual_m if usual_m and length else 1.0):
             found.append(ClipFinding(rule, asset, **at, file=file))
     return found
 
@@ -214,7 +227,8 @@ Shape = Mapping[str, float]
 """For each bone its share of the length of all."""
 
 
-def _rules(of: Measures, usual: Shape | None) -> Iterator[tuple[str, Told]]:
+def _rules(of: Measures, usual: Shape | None, times: float) -> Iterator[tuple[str, Told]]:
+    """What is doubted of a clip whose bones are so many times as long as those of the others."""
     if of.n_frames < FEWEST_FRAMES:
         yield "few-frames", _few_frames(of)
     rate = 1.0 / of.frame_time_s
@@ -227,12 +241,17 @@ def _rules(of: Measures, usual: Shape | None) -> Iterator[tuple[str, Told]]:
     if not LEAST_BODY_M <= of.size_m <= MOST_BODY_M:
         yield "odd-size", _odd_size(of)
         return
+    if not 1.0 / OTHER_SIZE <= times <= OTHER_SIZE:
+        yield "odd-size", _other_size(of, times)
+        return
     if of.fastest_mps > FASTEST_MPS:
         yield "jump", _jump(of)
     if of.lying >= LYING_SHARE:
         yield "lying", _lying(of)
     elif abs(of.lowest) > FAR_FROM_GROUND * of.size_m and of.n_unmoved < of.n_frames:
         yield "off-ground", _off_ground(of)
+    elif of.raised < -UNDER_GROUND * of.size_m:
+        yield "off-ground", _under_ground(of)
     if of.never_down and of.lying < LYING_SHARE:
         yield "no-footfalls", _no_footfalls(of)
     difference = None if usual is None else _difference(_shape(of.bones or {}, usual), usual)
@@ -300,6 +319,18 @@ def _odd_size(of: Measures) -> Told:
     }
 
 
+def _other_size(of: Measures, times: float) -> Told:
+    unit = min(UNITS, key=lambda unit: abs(math.log(unit / of.metres_per_unit * times)))
+    fits = 1.0 / OTHER_SIZE <= unit / of.metres_per_unit * times <= OTHER_SIZE and not math.isclose(unit, of.metres_per_unit)
+    return {
+        "found": f"the bones are {times:.2g} times as long as those of the other clips, as one unit of the file is taken to be "
+        f"{of.metres_per_unit:g} m.",
+        "expected": f"{1.0 / OTHER_SIZE:.2g} to {OTHER_SIZE:g} times",
+        "mend": f"metres_per_unit = {unit:g} ({UNITS[unit]}) in a database of its own" if fits else "a database of its own, or rig",
+        "measure": times,
+    }
+
+
 def _jump(of: Measures) -> Told:
     where = f"from frame {of.fastest_frame} to {of.fastest_frame + 1}"
     return {
@@ -331,6 +362,15 @@ def _off_ground(of: Measures) -> Told:
         "expected": f"a foot within {_metres(FAR_FROM_GROUND * of.size_m)} of the ground in some frame",
         "mend": "to export the clip with its floor at 0, or nothing where the body flies, climbs or dives",
         "measure": of.lowest,
+    }
+
+
+def _under_ground(of: Measures) -> Told:
+    return {
+        "found": f"a joint is {_metres(-of.raised)} or more below the ground (0 upwards) in every pose: the body is in the floor.",
+        "expected": "a foot that stands on the ground in some frame",
+        "mend": "to export the clip with its floor at 0, or nothing where the body dives or climbs below it",
+        "measure": of.raised,
     }
 
 
@@ -408,6 +448,11 @@ def _usual_shape(all_measures: Sequence[Measures]) -> Shape | None:
     median = {bone: float(np.median([share[bone] for share in shares if bone in share])) for bone in names}
     total = math.fsum(median.values())
     return {bone: share / total for bone, share in median.items()} if total else None
+
+
+def _length(bones: Mapping[str, float], usual: Shape | None) -> float:
+    """The length of the bones that most clips have, together; 0 for a body that lacks one."""
+    return math.fsum(bones[bone] for bone in usual) if usual and all(bone in bones for bone in usual) else 0.0
 
 
 def _difference(shape: Shape, usual: Shape) -> float:

@@ -24,6 +24,8 @@ LEAST_RATE, MOST_RATE = 1e-3, 1e5
 """Frames a second."""
 SAME_RATE = 1e-4
 """Rates this near, as a share, are the same: files print 1/30 s as 0.033333."""
+ROUNDED = 0.05
+"""Of a frame: a last frame that is missing by so little is there: 600 steps of 0.00833333 s are meant to be 5 s."""
 TO_Y_UP: dict[Up, Floats] = {
     "y": np.array([1.0, 0.0, 0.0, 0.0]),
     "z": np.array([math.sqrt(0.5), -math.sqrt(0.5), 0.0, 0.0]),
@@ -102,7 +104,7 @@ def resampled(local: LocalPoses, rate: float) -> LocalPoses:
     n_frames = len(local.positions)
     if n_frames < 2 or abs(local.rate / rate - 1.0) < SAME_RATE:
         return LocalPoses(local.skeleton, rate, local.positions, local.rotations)
-    n_wanted = math.floor((n_frames - 1) / local.rate * rate + 1e-6) + 1
+    n_wanted = math.floor((n_frames - 1) / local.rate * rate + ROUNDED) + 1
     at = np.minimum(np.arange(n_wanted) * (local.rate / rate), n_frames - 1)
     before = np.minimum(at.astype(np.int64), n_frames - 2)
     shares = (at - before)[:, None, None]

@@ -189,6 +189,8 @@ class Markup:
         if not durations_s:
             return None
         longest_s = max(durations_s)
+        if rate is not None and span.to_s == math.inf and longest_s < span.from_s < longest_s + 1.0 / rate:
+            return None  # a clip with more frames a second goes on behind its last frame at this rate
         if span.from_s > longest_s + TOLERANCE_S:
             which = "the longest clip that fits" if span.is_pattern else "the clip"
             found = f"the span starts at {span.from_s:g} s, behind the end of {which}."

@@ -12,7 +12,7 @@ first, and those that do not keep their offset in every clip. All others lie at 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from types import ModuleType
@@ -400,6 +400,19 @@ def _faults(clip: Clip, first: Clip, seen: set[str]) -> Iterator[Fault]:
     elif not np.array_equal(clip.skeleton.parents, rig.parents):
         found = f"its bones hang on other parents than those of {in_quotes(first.name)}."
         yield Fault(found, "one rig for every clip of a bank", RIG_MEND)
+
+
+def moving_alike(banks: Mapping[str, PoseBank]) -> dict[str, PoseBank]:
+    """The banks; those of one rig with positions of the same joints: one take moves its root, another its hips."""
+    found = dict(banks)
+    for name, bank in banks.items():
+        rig = [each.moving for each in banks.values() if each.skeleton.names == bank.skeleton.names]
+        moving = np.unique(np.concatenate(rig))
+        if len(moving) > len(bank.moving):
+            positions = np.tile(bank.skeleton.offsets[moving].astype(np.float32), (bank.n_frames, 1, 1))
+            positions[:, np.searchsorted(moving, bank.moving)] = bank.positions
+            found[name] = replace(bank, moving=moving, positions=positions)
+    return found
 
 
 def _joined(parts: list[_Part], rate: float) -> PoseBank:

@@ -13,6 +13,7 @@ from contextdb.motion.clips.clip import Clip
 from contextdb.motion.clips.feet import Footfalls
 from contextdb.motion.clips.poses import Poses, poses_of
 from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.clips.trajectory import Trajectory, root_trajectory
 from contextdb.motion.markup.reserved import ReservedTag
 from contextdb.motion.preparing.clip_facts import ENDS_S, SLOW_SHARE, STANDING_MPS, Moments, falls_of, require_finite, step_of
@@ -47,10 +48,15 @@ class Look:
     @cached_property
     def own(self) -> Floats:
         """Where the joints are against the body's place on the ground and its heading: [F, J, 3]."""
-        origin = np.stack((self.path.positions[:, 0], np.zeros(self.poses.n_frames), self.path.positions[:, 1]), axis=-1)
-        half = -self.path.headings / 2.0
+        frames = np.arange(self.poses.n_frames)
+        return self.seen(frames, frames)
+
+    def seen(self, frames: Ints, body: Ints) -> Floats:
+        """Where the joints are in some frames, as the body sees them from its place in others: [frames, J, 3]."""
+        origin = np.stack((self.path.positions[body, 0], np.zeros(len(body)), self.path.positions[body, 1]), axis=-1)
+        half = -self.path.headings[body] / 2.0
         turn = np.stack((np.cos(half), np.zeros_like(half), np.sin(half), np.zeros_like(half)), axis=-1)
-        return quaternions.rotate(turn[:, None, :], self.poses.positions - origin[:, None])
+        return quaternions.rotate(turn[:, None, :], self.poses.positions[frames] - origin[:, None])
 
     @cached_property
     def own_speeds(self) -> Floats:

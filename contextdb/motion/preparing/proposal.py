@@ -18,7 +18,7 @@ Shape = NDArray[np.float32]
 
 N_SAMPLES = 24
 """So many poses of a clip are its shape."""
-PREPARING = 1
+PREPARING = 2
 """The version of what is proposed: one more whenever other marks would be for the same clip."""
 
 

@@ -58,6 +58,8 @@ END_SHARE = 0.1
 ALIKE_M, ALIKE_S = 0.02, 0.05
 """Clips are near-duplicates whose joints are on the mean so near at the same share of the clip, and whose lengths differ by such a
 share."""
+ALIKE_AHEAD_S = 0.5
+"""So much later the joints, seen from where the body was, are as near: a turn with the steps of a walk is none."""
 
 
 def prepare(
@@ -363,9 +365,12 @@ def _moved_by(values: Floats, n: int) -> Floats:
 
 
 def _shape(look: Look) -> Shape:
-    """The poses of a clip at shares of its length: float32 [samples, J, 3]."""
-    at = np.linspace(0.0, look.poses.n_frames - 1, N_SAMPLES).round().astype(np.int64)
-    return look.own[at].astype(np.float32)
+    """The poses of a clip at shares of its length, now and a moment later, both as the body sees them now: [2, samples, J, 3]."""
+    last = look.poses.n_frames - 1
+    at = np.linspace(0.0, last, N_SAMPLES).round().astype(np.int64)
+    later = min(round(ALIKE_AHEAD_S * look.poses.rate), last)
+    before = np.minimum(at, last - later)
+    return np.stack((look.own[at], look.seen(before + later, before))).astype(np.float32)
 
 
 def _duplicates(shapes: Sequence[tuple[Clip, Shape]]) -> Iterator[Proposal]:
@@ -375,7 +380,7 @@ def _duplicates(shapes: Sequence[tuple[Clip, Shape]]) -> Iterator[Proposal]:
         for other, seen in firsts:
             if other.skeleton.names != clip.skeleton.names or _differ(clip.duration_s, other.duration_s):
                 continue
-            apart = float(np.linalg.norm(shape - seen, axis=-1).mean())
+            apart = float(np.linalg.norm(shape - seen, axis=-1).mean(axis=(1, 2)).max())
             if apart <= ALIKE_M:
                 reason = f"its joints are {100.0 * apart:.1f} cm from those of {in_quotes(other.name)} on the mean"
                 yield Proposal(clip.name, "duplicates", ReservedTag.DO_NOT_CHOOSE, None, None, None, reason, round(apart, 4))

@@ -32,7 +32,7 @@ from contextdb.motion.features.extraction import ClipFeatures
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.features.schema_dict import unweighted
 
-EXTRACTION = 4
+EXTRACTION = 5
 """The version of what features are made of a clip: one more whenever the same clip would give other features."""
 
 CLIP_FEATURES = FileKind(

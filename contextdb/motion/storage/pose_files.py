@@ -29,7 +29,7 @@ from contextdb.cells.arguments import require_kind, require_path, require_text
 from contextdb.errors import ArtefactError, ContextDBError, FileError
 from contextdb.files.tensors import FileKind, Tensors, digest_of, read_tensors, texts_from_array, texts_to_array, write_tensors
 from contextdb.motion.clips.skeleton import Skeleton
-from contextdb.motion.output.bank import PoseBank
+from contextdb.motion.output.bank import PoseBank, moving_alike
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.storage.build_inputs import Assets, Inputs
 from contextdb.motion.storage.building import checked
@@ -123,7 +123,7 @@ def saved_poses(folder: str | PathLike[str], databases: Mapping[str, MotionDatab
         once = slice(None, None, database.n_permutations)
         if bank.assets == database.assets[once] and bank.n_frames == int((database.stops - database.starts)[once].sum()):
             found[name] = bank
-    return found
+    return moving_alike(found)
 
 
 def open_or_build_poses(
@@ -148,6 +148,18 @@ def open_or_build_poses(
     MotionError, FileError
         As `build`. A saved bank that cannot be used is built anew.
     """
+    return moving_alike(poses_alone(config, folder, assets, names=names, saved=saved))
+
+
+def poses_alone(
+    config: MotionConfig,
+    folder: str | PathLike[str],
+    assets: Assets | None = None,
+    *,
+    names: Collection[str] | None = None,
+    saved: str | PathLike[str] | None = None,
+) -> dict[str, PoseBank]:
+    """The same, each as it is without the others: as it is saved."""
     root = checked(config, folder, assets, names)
     place = root / (require_path(saved, "saved") if saved else "")
     inputs = Inputs.of(config, root, assets or {}, names)

@@ -110,7 +110,17 @@ class Reasked(Sequence[ReaskedDecision]):
         MotionError
             No database has the asset, with the nearest; or nothing was searched.
         """
-        return why_not(self[index], asset)
+        asked = self[index]
+        if asked.choice is None:
+            raise MotionError(self._unsearched(asked.decision.tick))
+        return why_not(asked, asset)
+
+    def _unsearched(self, tick: int) -> Fault:
+        """An update without a search is asked about; the nearest with one is told."""
+        ticks = [each.tick for each in self.decisions if each.choice is not None]
+        near = min(ticks, key=lambda each: abs(each - tick), default=None)
+        mend = "" if near is None else f"tick {near:,}"
+        return Fault(f"nothing was searched at tick {tick:,}: what played, played on.", "an update with a search", mend)
 
     def of(self, decision: Decision) -> ReaskedDecision:
         """A decision of the session, asked again."""

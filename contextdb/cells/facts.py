@@ -88,18 +88,9 @@ def as_context(facts: object) -> Mapping[str, object]:
 
 
 def read_fact(value: object, condition: Condition) -> Fact:
-    """Bring one given fact into canonical form.
-
-    Returns
-    -------
-    bool, float, str, frozenset of str, Cell, or None
-        None when the fact is missing (None or NaN); a Cell when it is a set of values.
-
-    Raises
-    ------
-    ContextError
-        The value is of the wrong type or outside an enum's or tag's domain; names the fact, what is accepted and the nearest value.
-    """
+    """Bring one given fact into canonical form: bool, float, str, frozenset of str; None where it is missing (None or NaN), a Cell
+    where it is a set of values. Raises ContextError for a value of the wrong type, or outside an enum's or tag's domain; it names
+    the fact, what is accepted and the nearest value."""
     if value is None or (isinstance(value, (float, np.floating)) and math.isnan(value)):
         return None
     if isinstance(value, FactSet):

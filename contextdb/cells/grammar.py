@@ -55,13 +55,8 @@ def _patterns(number: str, step: str) -> _Patterns:
 
 
 def parse_cell(text: str, domain: Domain, wants_mend: bool = True) -> Cell:
-    """Read a cell. Looking for a mend costs a thousand times the reading; a caller with many faults may leave it out.
-
-    Raises
-    ------
-    CellError
-        With what was found, what is accepted for the kind and, where one is near, a text that would be read.
-    """
+    """Read a cell. Looking for a mend costs a thousand times the reading; a caller with many faults may leave it out. Raises
+    CellError with what was found, what is accepted for the kind and, where one is near, a text that would be read."""
     try:
         return _read(text, domain)
     except CellError as error:

@@ -149,23 +149,10 @@ def effects(
 ) -> Effects:
     """What the change from one table to another does.
 
-    Parameters
-    ----------
-    before, after : Table
-        Without cells that cannot be read.
-    changes : Diff, optional
-        Of the two tables, where it is known already.
-    work, samples, seed : int
-        As in `contextdb.coverage`, for each question.
-    most : int
-        At most so many changed assets are looked at, in the order of their rows.
-
-    Raises
-    ------
-    TableError
-        Cells cannot be read, or a column is of another type before than after.
-    ExpressionError
-        An assumption of the table cannot be read.
+    The tables have no cells that cannot be read; `changes` is their diff where it is known already. `work`, `samples` and `seed`
+    are as in `contextdb.coverage`, for each question. At most `most` changed assets are looked at, in the order of their rows.
+    Raises TableError where cells cannot be read, or a column is of another type before than after; ExpressionError where an
+    assumption of the table cannot be read.
     """
     if is_nested(before) or is_nested(after):
         before, after, changes = _flat(before), _flat(after), None

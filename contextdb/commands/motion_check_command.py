@@ -86,13 +86,8 @@ def run(arguments: argparse.Namespace) -> ExitCode:
 
 
 def check_path(path: str, *, cache: bool = True) -> MotionReport:
-    """Check the motion of a folder; settings that cannot be read are findings too.
-
-    Raises
-    ------
-    FileError
-        There is no such folder.
-    """
+    """Check the motion of a folder; settings that cannot be read are findings too. Raises FileError where there is no
+    such folder."""
     folder = folder_of(Path(path))
     clips = clips_below(folder)
     if clips and not (folder / SCHEMA_FILE).exists():

@@ -207,13 +207,8 @@ def _write_trace(trace: Trace, path: Path) -> None:
 
 
 def place_of(text: str, trace: Trace, file: str) -> int:
-    """Where the decision is that --at means: of that tick, or the last one at or before that time.
-
-    Raises
-    ------
-    QueryError
-        There is none; with the ticks and times there are.
-    """
+    """Where the decision is that --at means: of that tick, or the last one at or before that time. Raises QueryError, with the
+    ticks and times there are, where there is none."""
     ticks = [decision.tick for decision in trace.brief()]
     times_s = [decision.time_s for decision in trace.brief()]
     place = Place(file)

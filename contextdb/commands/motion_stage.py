@@ -90,12 +90,7 @@ class Stage:
 
     def valid(self, names: Collection[str], given: Sequence[str], unknown: Unknown) -> tuple[dict[str, Matches], dict[str, Fact]]:
         """The valid rows for each of some databases by FACT=VALUE arguments, and the facts. Without any, nothing is filtered.
-
-        Raises
-        ------
-        ContextDBError
-            A fact that no table of these databases asks for, or facts that a table misses.
-        """
+        Raises ContextDBError for a fact that no table of these databases asks for, or facts that a table misses."""
         if not given:
             return {}, {}
         for name in names:
@@ -113,13 +108,8 @@ class Stage:
         return {name: matches[table] for name in names if (table := self.config.databases[name].table) is not None}, every
 
     def query(self, text: str, names: Sequence[str], path: argparse.Namespace) -> Features:
-        """A query from CLIP@SECONDS, of one of some databases, and the path that --speed, --turn and --strafe wish for.
-
-        Raises
-        ------
-        ContextDBError
-            There is no such clip (with the nearest), or no such moment of it.
-        """
+        """A query from CLIP@SECONDS, of one of some databases, and the path that --speed, --turn and --strafe wish for. Raises
+        ContextDBError where there is no such clip (with the nearest), or no such moment of it."""
         clip, at_s = clip_at(text)
         schema = self.schema(names[0])
         if clip.casefold().endswith(".bvh"):

@@ -77,13 +77,8 @@ class Stick:
 
     @classmethod
     def read(cls, path: Path, conditions: Sequence[str]) -> Stick:
-        """Read a file; `conditions` are the columns that are facts.
-
-        Raises
-        ------
-        TableError, FileError
-            The file cannot be read; with every column that is neither the stick's nor a fact, and every value that is not a number.
-        """
+        """Read a file; `conditions` are the columns that are facts. Raises TableError or FileError where the file cannot be read;
+        with every column that is neither the stick's nor a fact, and every value that is not a number."""
         source, columns = read_texts(path)
         faults = [_unknown(path, column.name, conditions) for column in columns if column.name not in (*STICK, *conditions)]
         by_name = {column.name: column for column in columns if column.name in STICK}
@@ -107,12 +102,8 @@ class Moments:
     def read(cls, path: Path, tables: Mapping[str, CompiledTable], unknown: Unknown, own: Collection[str] = ()) -> Moments | None:
         """Read the facts for some tables; those named `own` the character computes where the file does not give them.
 
-        None when the file has no facts, and the tables ask for others than the character's own: nothing is filtered.
-
-        Raises
-        ------
-        ContextDBError
-            Facts that a query cannot use; with file, line and fact.
+        None when the file has no facts, and the tables ask for others than the character's own: nothing is filtered. Raises
+        ContextDBError for facts that a query cannot use; with file, line and fact.
         """
         read = {name: read_contexts(path, table) for name, table in tables.items()}
         known = {name: [c for c in each.facts.columns if c in tables[name].asked] for name, each in read.items()}

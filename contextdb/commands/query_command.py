@@ -72,13 +72,8 @@ def run(arguments: argparse.Namespace) -> ExitCode:
 
 
 def read_facts(given: list[str], compiled: CompiledTable) -> dict[str, Fact]:
-    """FACT=VALUE arguments as facts in canonical form.
-
-    Raises
-    ------
-    ContextError
-        For every argument that is not a fact of the table, together.
-    """
+    """FACT=VALUE arguments as facts in canonical form. Raises ContextError for every argument that is not a fact of the table,
+    together."""
     facts: dict[str, Fact] = {}
     faults: list[Fault] = []
     for text in given:
@@ -96,12 +91,7 @@ def read_facts(given: list[str], compiled: CompiledTable) -> dict[str, Fact]:
 
 def read_actors(given: list[str], compiled: CompiledTable) -> tuple[list[str], dict[str, list[dict[str, object]]] | None]:
     """The arguments that are not facts of actors, and the actors of those that are, in the order of their numbers; None without.
-
-    Raises
-    ------
-    ContextError
-        For every fact that an actor cannot have or has twice, together.
-    """
+    Raises ContextError for every fact that an actor cannot have or has twice, together."""
     plain: list[str] = []
     found: dict[str, dict[int, dict[str, object]]] = {}
     faults: list[Fault] = []

@@ -153,15 +153,8 @@ def _kind_of(compiled: CompiledData) -> FileKind:
 
 
 def open_artefact(path: Path) -> CompiledData:
-    """Open a compiled table by memory map, checked.
-
-    Raises
-    ------
-    ArtefactError
-        The file is truncated, altered, of another layout, or no artefact at all; with the reason and the mend.
-    FileError
-        The file cannot be read.
-    """
+    """Open a compiled table by memory map, checked. Raises ArtefactError where the file is truncated, altered, of another layout,
+    or no artefact at all; with the reason and the mend; FileError where the file cannot be read."""
     tensors, metadata = read_tensors(path, WITH_RANKS)
     with COMPILED.reading(path):
         about = metadata["about"]

@@ -213,13 +213,8 @@ class CompiledTable(Unchanging):
         prefer: Prefer = None,
     ) -> LiveContext:
         """Keep a context between frames: `live["speed"] = 3.2`, then `live.matches()`. Actors are offered from then on, as with
-        `LiveContext.actors`.
-
-        Raises
-        ------
-        ContextError
-            A fact cannot be used, or its name looks misspelt. Facts may be missing until `matches()` is called.
-        """
+        `LiveContext.actors`. Raises ContextError where a fact cannot be used, or its name looks misspelt. Facts may be missing
+        until `matches()` is called."""
         if old:
             return self.live(facts, **by_name("live", old, unknown=unknown, actors=actors, prefer=prefer))
         check_mode(unknown)
@@ -348,15 +343,8 @@ class CompiledTable(Unchanging):
 
     @classmethod
     def open(cls, path: str | Path) -> Self:
-        """Open a compiled file by memory map.
-
-        Raises
-        ------
-        ArtefactError
-            The file is truncated, altered, of another program or of a later version.
-        FileError
-            It is missing, or cannot be read.
-        """
+        """Open a compiled file by memory map. Raises ArtefactError where the file is truncated, altered, of another program or of a
+        later version; FileError where it is missing, or cannot be read."""
         return cls(open_artefact(require_path(path)))
 
 

@@ -90,22 +90,9 @@ def clip_contexts(
 ) -> TableContexts:
     """The contexts of a table that differ in which clips they let play.
 
-    Parameters
-    ----------
-    table : Table
-    clips : collection of str, optional
-        The assets that there are clips of. Default: all of the table.
-    mirrored : collection of str
-        Those that are played mirrored too.
-    axes : mapping of str to str, optional
-        For "speed", "turn" and "direction" the condition that says what is asked for; see `asked_axes`.
-    seed : int
-        Of the contexts that are drawn.
-
-    Raises
-    ------
-    ContextDBError
-        What coverage of a table raises.
+    `clips` are the assets that there are clips of (None: all of the table), `mirrored` those that are played mirrored too. `axes`
+    gives for "speed", "turn" and "direction" the condition that says what is asked for; see `asked_axes`. `seed` is that of the
+    contexts that are drawn. Raises ContextDBError as coverage of a table does.
     """
     require_kind(table, (Table, FlatTable), "table", "a Table")
     ready, flat = opened(table, progress=progress), table.flat()

@@ -53,20 +53,9 @@ class Dialect:
 def read_delimited(
     text: str, file: str, wanted: str | None = None, block: Block | None = None, is_decimal_comma: bool | None = None
 ) -> Reading:
-    """Read a text with delimiters.
-
-    Parameters
-    ----------
-    wanted : str, optional
-        The delimiter; default: the one that fits best.
-    is_decimal_comma : bool, optional
-        Whether 3,5 is a number with a decimal comma; default: told from the cells.
-
-    Raises
-    ------
-    TableError
-        An unresolved git conflict, quotes that do not close, rows of different length, or no table; with the line.
-    """
+    """Read a text with delimiters: those that are `wanted`, else those that fit best. `is_decimal_comma` says whether 3,5 is a
+    number with a decimal comma; None: the cells tell. Raises TableError, with the line, for an unresolved git conflict, quotes that
+    do not close, rows of different length, or no table."""
     require_no_conflicts(text, file)
     dialect = dialect_of(text, wanted)
     grid, notes = _records(text[dialect.first :], dialect.delimiter, file)

@@ -72,18 +72,8 @@ class _Column:
 
 
 def read_dmn(raw: bytes, file: str, decision: str | None = None) -> Reading:
-    """Read a decision table.
-
-    Parameters
-    ----------
-    decision : str, optional
-        The name or the id of the decision; default: the only one with a table.
-
-    Raises
-    ------
-    TableError
-        The file is no DMN, is broken, declares a document type, or has several tables of which none is named.
-    """
+    """Read a decision table: the one whose name or id is `decision`, else the only one there is. Raises TableError where the file
+    is no DMN, is broken, declares a document type, or has several tables of which none is named."""
     root = _parsed(raw, file)
     element, name = _chosen(root, decision, file)
     rules = children_of(element, "rule")

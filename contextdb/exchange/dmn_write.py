@@ -33,13 +33,8 @@ _POLICIES = {"unique": "UNIQUE", "first": "FIRST", "priority": "PRIORITY"}
 
 
 def write_dmn(table: Table) -> tuple[bytes, tuple[Remark, ...]]:
-    """The DMN file of a table, and what could not be said in it.
-
-    Raises
-    ------
-    TableError
-        Cells that cannot be read, or texts that XML cannot hold.
-    """
+    """The DMN file of a table, and what could not be said in it. Raises TableError for cells that cannot be read, or texts that XML
+    cannot hold."""
     require_readable(table)
     _require_xml(table)
     inputs = [column for column in table.conditions if not column.condition.domain.type.is_tags]

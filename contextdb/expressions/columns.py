@@ -48,13 +48,8 @@ Column = Doubles | Truths | Coded
 
 
 def read_column(given: Any, condition: Condition, n_contexts: int) -> Column:
-    """One column of facts; None is a column that was not given, all of it missing.
-
-    Raises
-    ------
-    ContextError
-        A fact is of the wrong type, outside the domain, or a set of values; names its row.
-    """
+    """One column of facts; None is a column that was not given, all of it missing. Raises ContextError where a fact is of the wrong
+    type, outside the domain, or a set of values; names its row."""
     kind = condition.domain.type
     if given is None:
         return _all_missing(kind, n_contexts)

@@ -10,13 +10,7 @@ MOST_DIGITS = 300
 
 
 def document_of(text: str) -> Any:
-    """The JSON document of a text.
-
-    Raises
-    ------
-    ValueError
-        It is none: why, as the end of a sentence.
-    """
+    """The JSON document of a text. Raises ValueError where it is none: why, as the end of a sentence."""
     try:
         return json.loads(text, parse_int=_whole)
     except json.JSONDecodeError as error:

@@ -71,13 +71,8 @@ def page(raw: bytes) -> Fault | None:
 
 
 def require_text(raw: bytes, file: str) -> None:
-    """Refuse bytes that are not the text of a CSV in UTF-8.
-
-    Raises
-    ------
-    TableError
-        Empty, binary, in another encoding, a Git LFS pointer, HTML or XML, or with another delimiter.
-    """
+    """Refuse bytes that are not the text of a CSV in UTF-8: raises TableError for what is empty, binary, in another encoding, a Git
+    LFS pointer, HTML or XML, or has another delimiter."""
     fault = _empty(raw) or _binary(raw) or _not_utf8(raw) or pointer(raw) or page(raw) or _delimited_otherwise(raw)
     if fault:
         raise TableError(fault.at(Place(file, fault.place.line)))

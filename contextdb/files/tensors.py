@@ -84,13 +84,8 @@ class FileKind:
 
 
 def write_tensors(path: Path, kind: FileKind, tensors: Mapping[str, NDArray[Any]], metadata: Mapping[str, str]) -> None:
-    """Write arrays and metadata; the same ones give the same bytes. The old file is whole until the new one is.
-
-    Raises
-    ------
-    FileError
-        The disk refuses.
-    """
+    """Write arrays and metadata; the same ones give the same bytes. The old file is whole until the new one is. Raises FileError
+    where the disk refuses."""
     write_atomic(path, to_bytes(tensors, kind.metadata(metadata)))
 
 
@@ -110,23 +105,11 @@ def to_bytes(tensors: Mapping[str, NDArray[Any]], metadata: Mapping[str, str]) -
 
 
 def read_tensors(path: Path, kind: FileKind, *, writeable: bool = False) -> tuple[Tensors, dict[str, str]]:
-    """Every array as a view of the mapped file, and the metadata.
+    """Every array as a view of the mapped file, and the metadata. The file's frame and its layout are checked, and no array is
+    read: a large file opens as fast as a small one.
 
-    The file's frame and its layout are checked, and no array is read: a large file opens as fast as a small one.
-
-    Parameters
-    ----------
-    path : Path
-    kind : FileKind
-    writeable : bool
-        Whether the arrays may be written; the file stays as it is. A page that is written takes memory of its own.
-
-    Raises
-    ------
-    ArtefactError
-        The file is truncated, of another kind or of another layout.
-    FileError
-        The file cannot be read.
+    `writeable` says whether the arrays may be written; the file stays as it is, and a page that is written takes memory of its own.
+    Raises ArtefactError where the file is truncated, of another kind or of another layout; FileError where it cannot be read.
     """
     _check_frame(path, kind)
     with path.open("rb") as file:
@@ -164,15 +147,8 @@ def texts_from_array(octets: NDArray[np.uint8]) -> list[str]:
 
 
 def metadata_of(path: Path, kind: FileKind) -> dict[str, str]:
-    """The metadata of a .safetensors file, whichever kind it is of; `kind` is for the message.
-
-    Raises
-    ------
-    ArtefactError
-        The file is truncated, or no .safetensors file.
-    FileError
-        The file cannot be read.
-    """
+    """The metadata of a .safetensors file, whichever kind it is of; `kind` is for the message. Raises ArtefactError where the file
+    is truncated, or no .safetensors file; FileError where the file cannot be read."""
     if not os.path.isfile(path) or path.stat().st_size < 8:  # Path raises, where this says no, to a name that no file can have
         raise kind.refused(path, f"the file has {len(read_bytes(path))} bytes, too few for any artefact.")
     from safetensors import SafetensorError, safe_open

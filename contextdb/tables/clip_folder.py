@@ -60,13 +60,8 @@ class FolderClips:
 def clips_of(
     path: str | Path, metres_per_unit: float | None, up: Up | None, tell: Tell, wants: Wanted | None = None
 ) -> FolderClips:
-    """Read the clips of a folder; of a project with `wants` those of the databases that it leaves of all.
-
-    Raises
-    ------
-    ContextDBError
-        There is no such folder, no clip in it, or two clips of one name.
-    """
+    """Read the clips of a folder; of a project with `wants` those of the databases that it leaves of all. Raises ContextDBError
+    where there is no such folder, no clip in it, or two clips of one name."""
     folder = _folder(Path(path))
     found = FolderClips(folder)
     if (folder / SCHEMA_FILE).is_file():
@@ -99,13 +94,7 @@ def clips_below(folder: Path) -> list[Path]:
 
 
 def bvh_files(folder: Path) -> list[Path]:
-    """The same, one or more.
-
-    Raises
-    ------
-    FileError
-        There is none.
-    """
+    """The same, one or more. Raises FileError where there is none."""
     files = clips_below(folder)
     if not files:
         raise FileError(Fault("there is no BVH file in this folder or below it.", "*.bvh", place=Place(str(folder))))

@@ -53,13 +53,7 @@ class Recording:
 
 def open_recording(path: Path, conditions: Collection[str], table: str = "") -> Recording:
     """Open recorded contexts; the columns of these conditions are facts, others are left out. Of the lines of a link those of the
-    table are read.
-
-    Raises
-    ------
-    TableError, FileError
-        The file cannot be read; with every fault of it.
-    """
+    table are read. Raises TableError or FileError where the file cannot be read; with every fault of it."""
     if is_recording(path):
         return _open_lines(path, conditions, table)
     return _open_parquet(path, conditions) if is_parquet(path) else _open_csv(path, conditions)

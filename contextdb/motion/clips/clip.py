@@ -139,14 +139,8 @@ def write_bvh(clip: Clip, target: str | PathLike[str] | TextIO, *, digits: int =
     """Write a clip as BVH to a path or an open text file.
 
     Reading it again gives the same motion, to so many digits behind the point. The unit and the axis that points up are not in the
-    format: read the file with the same ones.
-
-    Raises
-    ------
-    FileError
-        The disk refuses; the old file is then whole.
-    ContextError
-        `clip` is none, `target` neither a path nor an open file, or `digits` no whole number from 0 to 17.
+    format: read the file with the same ones. Raises FileError where the disk refuses; the old file is then whole; ContextError
+    where `clip` is none, `target` neither a path nor an open file, or `digits` no whole number from 0 to 17.
     """
     require_kind(clip, Clip, "clip", "a Clip")
     digits = require_whole(digits, "digits")

@@ -188,12 +188,8 @@ class FeatureSchema:
 
         A function takes `(poses, path)`: the `Poses` of all frames and the `Trajectory` of the body, at the schema's rate. It gives
         a float array [F, size], for each frame what the frame itself and its neighbours tell; it must not change what it is given.
-        It is called on the mirrored poses and path for a mirrored clip, and for a query on those of the query's clip.
-
-        Raises
-        ------
-        SchemaError
-            No channel asks for a name; the nearest that one does ask for is reported.
+        It is called on the mirrored poses and path for a mirrored clip, and for a query on those of the query's clip. Raises
+        SchemaError where no channel asks for a name; the nearest that one does ask for is reported.
         """
         asked = [channel.function for channel in self.channels if channel.function is not None]
         faults = [_unasked(name, asked, self.name) for name in functions if name not in asked]
@@ -203,14 +199,9 @@ class FeatureSchema:
 
     @classmethod
     def from_dict(cls, name: str, mapping: Mapped, *, file: str | None = None) -> FeatureSchema:
-        """Read what `[features.NAME]` of contextdb.toml holds; `file` is its name in messages.
-
-        Raises
-        ------
-        SchemaError
-            With every fault: an unknown key, type or word with the nearest known one, a value of the wrong kind, a channel named
-            twice, or weights that are all zero.
-        """
+        """Read what `[features.NAME]` of contextdb.toml holds; `file` is its name in messages. Raises SchemaError with every fault:
+        an unknown key, type or word with the nearest known one, a value of the wrong kind, a channel named twice, or weights that
+        are all zero."""
         faults: list[Fault] = []
         require_text(name, "name")
         require_mapping(mapping, "mapping", 'a mapping such as {"rate": 30, "channels": [...]}')

@@ -80,14 +80,9 @@ class JointDatabase:
     def of(
         cls, database: MotionDatabase, roles: Sequence[str], *, place_weight: float = 1.0, facing_weight: float = 1.0
     ) -> JointDatabase:
-        """The joint clips of a database whose assets are named ASSET.ROLE.
-
-        Raises
-        ------
-        MotionError
-            An asset that lacks the clip of a role, or whose clips differ in length; a clip of no role; a database without root
-            motion; a weight not from 0 to a million. All faults together.
-        """
+        """The joint clips of a database whose assets are named ASSET.ROLE. Raises MotionError for an asset that lacks the clip of a
+        role, or whose clips differ in length; a clip of no role; a database without root motion; a weight not from 0 to a million.
+        All faults together."""
         require_kind(database, MotionDatabase, "database", "a MotionDatabase")
         names = tuple(require_text(role, "one of roles") for role in require_many(roles, "roles", "a list of roles"))
         lengths = (database.stops - database.starts).tolist()

@@ -39,13 +39,7 @@ class Rows:
 
 
 def text_of(raw: bytes, file: str) -> str:
-    """The text of a file's bytes.
-
-    Raises
-    ------
-    MotionError
-        UTF-16, another encoding, or no text at all.
-    """
+    """The text of a file's bytes. Raises MotionError for UTF-16, another encoding, or no text at all."""
     nul = raw.find(b"\0")
     if raw.startswith((b"\xff\xfe", b"\xfe\xff")) or _looks_utf16(raw):
         raise MotionError(Fault("the file is UTF-16 text.", _ACCEPTED, "to save it as UTF-8", Place(file)))

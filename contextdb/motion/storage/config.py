@@ -131,13 +131,8 @@ class MotionConfig:
         return found
 
     def with_functions(self, functions: Mapping[str, CustomFunction]) -> MotionConfig:
-        """The same with functions for custom channels, by the names that the channels of any schema give.
-
-        Raises
-        ------
-        SchemaError
-            No channel asks for a name.
-        """
+        """The same with functions for custom channels, by the names that the channels of any schema give. Raises SchemaError where
+        no channel asks for a name."""
         asked = {name: {channel.function for channel in schema.channels} for name, schema in self.features.items()}
         every = {function for names in asked.values() for function in names if function is not None}
         for unknown in (function for function in functions if function not in every):

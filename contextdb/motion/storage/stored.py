@@ -144,13 +144,8 @@ def open_database(path: str | PathLike[str], *, verify: bool = False) -> MotionD
 
 
 def inputs_of(path: str | PathLike[str]) -> str:
-    """The digest of what a saved database was built of, without opening it.
-
-    Raises
-    ------
-    ArtefactError, FileError
-        As `open_database` does for a file that is no motion database of this layout.
-    """
+    """The digest of what a saved database was built of, without opening it. Raises ArtefactError or FileError as `open_database`
+    does for a file that is no motion database of this layout."""
     file = require_path(path)
     metadata = read_tensors(file, STORED)[1]
     with STORED.reading(file):

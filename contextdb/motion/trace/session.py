@@ -273,16 +273,8 @@ class Trace(Sequence[Decision]):
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Trace:
-        """Read a saved session.
-
-        Raises
-        ------
-        ArtefactError
-            The file is no session, cut off, damaged or of another version; with the reason. A row that holds no decision is told
-            when it is asked for.
-        FileError
-            The file cannot be read.
-        """
+        """Read a saved session. Raises ArtefactError where the file is no session, cut off, damaged or of another version; with the
+        reason. A row that holds no decision is told when it is asked for. FileError where the file cannot be read."""
         return cls.from_bytes(read_bytes(require_path(path)), str(path))
 
     @classmethod

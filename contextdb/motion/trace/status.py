@@ -130,18 +130,8 @@ def status_of(
     databases: Mapping[str, MotionDatabase],
     warp: tuple[float, float] | None = None,
 ) -> Status:
-    """The status of an update.
-
-    Parameters
-    ----------
-    decision : Decision
-    last : Decision or None
-        The one before; None for the first.
-    databases : mapping of name to MotionDatabase
-        Those that it was made with; what is not among them is not known.
-    warp : (stride, radians), optional
-        Those of the pose that was shown.
-    """
+    """The status of an update after the `last` decision, None for the first. `databases` are those that it was made with, by name;
+    what is not among them is not known. `warp` is (stride, radians) of the pose that was shown."""
     playing = decision.playing
     database = None if playing is None else databases.get(playing.database)
     schema = None if database is None else database.schema

@@ -53,16 +53,8 @@ def summary_line(decisions: Iterable[Decision]) -> str:
 
 
 def session_lines(decisions: Iterable[Decision], *, name: str = "", width: int = WIDTH) -> Iterator[str]:
-    """One row for each decision that changed something, with how long it then went on.
-
-    Parameters
-    ----------
-    decisions : iterable of Decision
-    name : str
-        Only where an asset whose name contains this text plays or is left.
-    width : int
-        Cells of a line; the names of assets are shortened to fit.
-    """
+    """One row for each decision that changed something, with how long it then went on; only where an asset whose name contains
+    `name` plays or is left. `width` is in cells; the names of assets are shortened to fit."""
     spells = [spell for spell in _spells(decisions) if _plays(spell[0], name)]
     assets = Column("asset", [_asset(first.playing) for first, _ in spells])
     columns = list(_session_columns(spells, assets))
@@ -144,19 +136,8 @@ def decision_lines(
 ) -> Iterator[str]:
     """One decision in full: what came of it, what was searched, and what the best candidates cost.
 
-    Parameters
-    ----------
-    decision : Decision
-    view : View
-        Which costs of the candidates are shown.
-    name : str
-        Only candidates whose asset's name holds this text.
-    events : mapping of (database, frame) to sequence of str, optional
-        What the markup says of frames.
-    width : int
-        Cells of a line.
-    asked : sequence of Ranked, optional
-        The frames to show instead of the candidates that were kept.
+    Only candidates whose asset's name holds `name` are shown, with the costs of a view, or instead of them the frames `asked`.
+    `events` is what the markup says of frames, by (database, frame); `width` is in cells of a line.
     """
     told = {} if events is None else events
     yield f"tick {decision.tick:,} at {decision.time_s:.2f} s: {decision.action}"

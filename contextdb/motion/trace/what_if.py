@@ -108,13 +108,8 @@ def what_if(recorded: Reasked, changed: Reasked) -> WhatIf:
 
 
 def run_again(asked: Reasked, on_step: Callable[[], None] | None = None) -> list[Decision]:
-    """The decisions of a session run again in closed loop, with what is asked otherwise; `on_step` is called after each.
-
-    Raises
-    ------
-    MotionError
-        The session does not say how its updates were made.
-    """
+    """The decisions of a session run again in closed loop, with what is asked otherwise; `on_step` is called after each. Raises
+    MotionError where the session does not say how its updates were made."""
     decisions = list(asked.decisions)
     if any(each.inputs is None or each.query is None for each in decisions):
         raise MotionError(

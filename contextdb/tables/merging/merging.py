@@ -70,20 +70,8 @@ class Merge(Generic[AnyTable]):
 
 
 def merge(base: AnyTable, ours: AnyTable, theirs: AnyTable, decided: Decided | None = None) -> Merge[AnyTable]:
-    """Join what two sides made of a table.
-
-    Parameters
-    ----------
-    base, ours, theirs : Table
-        Cells may be unreadable; such a text means itself.
-    decided : mapping, optional
-        Conflicts that are decided already, by their `key`; use `Merge.resolved`.
-
-    Returns
-    -------
-    Merge
-        Merging a table with itself gives it byte for byte.
-    """
+    """Join what two sides made of a table. Cells may be unreadable; such a text means itself. Merging a table with itself gives it
+    byte for byte. `decided` are conflicts that are decided already, by their `key`; use `Merge.resolved`."""
     decided = decided or {}
     of_ours, of_theirs = align(base, ours), align(base, theirs)
     fields, names, about_columns = merge_columns(base, ours, theirs, of_ours, of_theirs, decided)

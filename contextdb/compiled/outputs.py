@@ -29,16 +29,8 @@ OutputCells = Column | TextColumn
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Outputs(Unchanging):
-    """The outputs of a compiled table: a table without outputs has none, which is not an error.
-
-    Attributes
-    ----------
-    declared : tuple of Output
-        Name, type, bounds, values, size, unit and description of each.
-    names : tuple of str
-    fallback : dict
-        The value of each output where no row is valid: what `fallback` gives, else the default, else False, 0, NaN or "".
-    """
+    """The outputs of a compiled table: a table without outputs has none, which is not an error. `fallback` is the value of each
+    where no row is valid: what the table's fallback gives, else the default, else False, 0, NaN or ""."""
 
     declared: tuple[Output, ...] = ()
     cells: tuple[OutputCells, ...] = ()

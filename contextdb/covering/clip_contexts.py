@@ -48,22 +48,11 @@ Answers = dict[int, tuple[float, int]]
 
 @dataclass(frozen=True, eq=False)
 class TableContexts:
-    """The contexts of a table by which clips they let play.
+    """The contexts of a table by which clips they let play: those in which some clip is valid, the largest share first.
 
-    Attributes
-    ----------
-    contexts : tuple of ClipContexts
-        Those in which some clip is valid; the largest share first.
-    without : float
-        The share of the contexts in which none is.
-    never_valid : tuple of str
-        Clips whose rows are valid in no context.
-    n_samples : int
-        How many contexts were drawn; 0 where the shares are exact.
-    why : str
-        Why they were drawn; empty where they were not.
-    not_mirrored : tuple of str
-        Conditions that mirrored clips are not held to: they are computed from facts that change in a mirror.
+    `without` is the share of the contexts in which none is; `never_valid` are clips whose rows are valid in no context. `n_samples`
+    contexts were drawn, for the reason `why`; 0 and empty where the shares are exact. Mirrored clips are not held to the conditions
+    `not_mirrored`: they are computed from facts that change in a mirror.
     """
 
     contexts: tuple[ClipContexts, ...]

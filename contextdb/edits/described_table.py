@@ -192,24 +192,9 @@ def _is_mirrored(found: FolderClips) -> bool:
 
 @dataclass(frozen=True)
 class Filling:
-    """What the clips give to a table that is there.
-
-    Attributes
-    ----------
-    table : Table
-        As it is.
-    new_columns : list of str
-    added : list of Described
-        The rows that are missing.
-    empty : list of Difference
-        Cells of rows that are there and say nothing.
-    differences : list of Difference
-        Cells that do not accept what their clips show.
-    without_clip : list of str
-        The assets that no clip has.
-    sections : Sections
-        What contextdb.toml is to say.
-    """
+    """What the clips give to a table that is there: `added` are the rows that are missing, `empty` the cells of rows that are there
+    and say nothing, `differences` those that do not accept what their clips show, `without_clip` the assets that no clip has.
+    `sections` is what contextdb.toml is to say."""
 
     table: Table
     new_columns: list[str]

@@ -38,23 +38,9 @@ _BROKEN = (ValueError, KeyError, TypeError, IndexError, UnicodeDecodeError, Attr
 
 @dataclass(frozen=True)
 class FileKind:
-    """A sort of file.
-
-    Attributes
-    ----------
-    key : str
-        The name under which the metadata hold the layout's version.
-    layout : int
-        The version that is written and read.
-    found : str
-        What another file is not: "one that contextdb compiled".
-    accepted, mend : str
-        For messages about a file that cannot be used.
-    also : tuple of int
-        Other versions that are read.
-    since : str
-        What has changed since the version before, for messages about an older file.
-    """
+    """A sort of file. The metadata hold the version of its layout under `key`: `layout` is written and read, those in `also` are
+    read too. Messages about a file that cannot be used name what it is not (`found`, such as "one that contextdb compiled"), what
+    is `accepted`, the mend and, for an older file, what has changed `since`."""
 
     key: str
     layout: int

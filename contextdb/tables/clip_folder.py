@@ -33,21 +33,8 @@ MOST_RATE = 1e6
 
 @dataclass
 class FolderClips:
-    """The clips of a folder.
-
-    Attributes
-    ----------
-    folder : Path
-    clips : list of Clip
-        In the order of their paths.
-    paths : list of Path
-    left_out : list of str
-        What is wrong with files that are no clips.
-    notes : list of str
-        What was taken for granted.
-    config : MotionConfig
-        What the project says of motion; nothing of a folder of clips.
-    """
+    """The clips of a folder in the order of their paths; `left_out` says what is wrong with files that are no clips, `notes` what
+    was taken for granted, `config` what the project says of motion (nothing of a folder of clips)."""
 
     folder: Path
     clips: list[Clip] = field(default_factory=list)

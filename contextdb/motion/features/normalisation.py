@@ -48,17 +48,8 @@ FLOORS: dict[str, tuple[float, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class RaisedScale:
-    """A group of channels that varies less than its floor, which is its scale therefore.
-
-    Attributes
-    ----------
-    channels : tuple of str
-        The names of the channels.
-    spread : float
-        The mean of the standard deviations of their features.
-    floor : float
-    unit : str
-    """
+    """A group of channels that varies less than its floor, which is its scale therefore; `spread` is the mean of the standard
+    deviations of their features."""
 
     channels: tuple[str, ...]
     spread: float

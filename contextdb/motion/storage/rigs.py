@@ -28,18 +28,8 @@ SAME_M = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Rig:
-    """What clips are put on.
-
-    Attributes
-    ----------
-    skeleton : Skeleton
-    metres_per_unit : float
-        Of its offsets.
-    bones : mapping of str to str
-        For bones of the rig those of clips that name them otherwise.
-    digest : str
-        Of all that.
-    """
+    """What clips are put on: a skeleton, the unit of its offsets, for bones of it those of clips that name them otherwise, and a
+    digest of all that."""
 
     skeleton: Skeleton
     metres_per_unit: float

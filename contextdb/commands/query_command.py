@@ -231,13 +231,9 @@ def _matching(compiled: CompiledTable, explanation: Explanation) -> Iterator[tup
     yield tuple(head)
     for r in matches:
         line = [str(r + 1), *(["may" if undecided >> r & 1 else "always"] if undecided else []), compiled.assets[r]]
-        line += [_cast(cast, r)] if cast else []
+        line += [", ".join(f"{role}: {offer.label}" for role, offer in cast.cast(r).items())] if cast else []
         line += [outcome.said_of([r])] if prefers_some else []
         yield tuple(line)
-
-
-def _cast(matches: CastMatches, row: int) -> str:
-    return ", ".join(f"{role}: {offer.label}" for role, offer in matches.cast(row).items())
 
 
 def _nearest_lines(rows: list[RowExplanation], width: int) -> Iterator[str]:

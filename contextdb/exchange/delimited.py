@@ -193,7 +193,7 @@ def with_points(
     columns = list(columns)
     if is_decimal_comma is False or (delimiter == "," and not is_decimal_comma):
         return columns, []
-    numeric = [_numeric_texts(column) for column in columns]
+    numeric = [[text for text in column.texts if text and _NUMERIC.fullmatch(text)] for column in columns]
     has_comma = [any(_DECIMAL_COMMA.search(text) for text in texts) for texts in numeric]
     if not any(has_comma):
         return columns, []
@@ -210,10 +210,6 @@ def with_points(
     changed = [_pointed(column, texts) if has else column for column, texts, has in zip(columns, numeric, has_comma, strict=True)]
     told = f"decimal commas became points: {in_quotes(example)} is now {in_quotes(_DECIMAL_COMMA.sub('.', example))}."
     return changed, [Remark(told, f"column {where}")]
-
-
-def _numeric_texts(column: TextColumn) -> list[str]:
-    return [text for text in column.texts if text and _NUMERIC.fullmatch(text)]
 
 
 def _pointed(column: TextColumn, numeric: Sequence[str]) -> TextColumn:

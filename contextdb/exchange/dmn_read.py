@@ -109,7 +109,7 @@ def read_dmn(raw: bytes, file: str, decision: str | None = None) -> Reading:
         asset=data[0].name,
         outputs=plain,
         policy=policy,
-        priority=_priority_name(columns, policy),
+        priority=PRIORITY if policy == "priority" and columns[-1].name == PRIORITY else None,
         fallback=fallback,
         when=when[0].name if when else None,
         typed=typed,
@@ -425,7 +425,3 @@ def _priority(policy: str, output: _Column, asset: TextColumn) -> list[TextColum
         return []
     rank = {value: len(output.values) - at for at, value in enumerate(output.values)}
     return [TextColumn.of(PRIORITY, (str(rank.get(text, 0)) for text in asset.to_list()))]
-
-
-def _priority_name(columns: Sequence[TextColumn], policy: str) -> str | None:
-    return PRIORITY if policy == "priority" and columns[-1].name == PRIORITY else None

@@ -63,7 +63,7 @@ def find_records(raw: bytes) -> tuple[Records, list[Stray]]:
     octets = np.frombuffer(raw, np.uint8, offset=first)
     quotes, commas, returns = (_bits(octets, mark) for mark in (QUOTE, COMMA, CR))
     ends = _line_end_bits(_bits(octets, LF), returns)
-    ends[-1] |= _bit(len(octets))  # the last line ends as all others do
+    ends[-1] |= np.uint64(1 << (len(octets) & 63))  # the last line ends as all others do
     inside, strays = inside_quotes(quotes), list[Stray]()
     if _has_strays(quotes, inside, quotes | commas | returns | ends):
         settled, strays = _settled_quotes(np.append(octets, np.uint8(LF)), bitmask.rows(quotes), bitmask.rows(ends))
@@ -134,10 +134,6 @@ def _bits(octets: Octets, mark: int) -> Words:
         block = np.packbits(octets[start : start + _BLOCK] == mark, bitorder="little")
         packed[start // 8 : start // 8 + len(block)] = block
     return packed.view("<u8").astype(np.uint64, copy=False)
-
-
-def _bit(position: int) -> np.uint64:
-    return np.uint64(1 << (position & 63))
 
 
 def _line_end_bits(feeds: Words, returns: Words) -> Words:

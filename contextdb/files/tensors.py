@@ -97,7 +97,8 @@ def read_tensors(path: Path, kind: FileKind, *, writeable: bool = False) -> tupl
     `writeable` says whether the arrays may be written; the file stays as it is, and a page that is written takes memory of its own.
     Raises ArtefactError where the file is truncated, of another kind or of another layout; FileError where it cannot be read.
     """
-    _check_frame(path, kind)
+    if kind.key not in metadata_of(path, kind):
+        raise kind.refused(path, f"a .safetensors file, but not {kind.found}.")
     with path.open("rb") as file:
         mapped = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_COPY if writeable else mmap.ACCESS_READ)
     with kind.reading(path):
@@ -154,12 +155,6 @@ def other_layout(path: Path, kind: FileKind) -> str | None:
     except ContextDBError:
         return None
     return None if layout in [str(known) for known in (kind.layout, *kind.also)] else layout
-
-
-def _check_frame(path: Path, kind: FileKind) -> None:
-    """Refuse a file that is not wholly there, or not of this kind."""
-    if kind.key not in metadata_of(path, kind):
-        raise kind.refused(path, f"a .safetensors file, but not {kind.found}.")
 
 
 def _view(mapped: mmap.mmap, start: int, entry: Mapping[str, Any]) -> NDArray[Any]:

@@ -222,7 +222,8 @@ def _read_schema(
     cls: type[FeatureSchema], name: str, mapping: Mapped, faults: list[Fault], file: str | None
 ) -> FeatureSchema | None:
     section = Section(f"[features.{name}]", mapping, SCHEMA_KEYS, faults, file)
-    rate = _read_rate(section)
+    accepted = f"frames a second, from 1 to {MOST_RATE:g}, such as 30.0"
+    rate = section.number("rate", accepted, 1.0, MOST_RATE) if section.has("rate", accepted) else None
     channels = _read_channels(section)
     root = section.text("root", 'a bone, such as "Hips"') if "root" in mapping else None
     facing = read_pair(section, "facing", A_FACING) if "facing" in mapping else None
@@ -245,11 +246,6 @@ def _check_permuted(section: Section, channels: list[Channel], permutations: Per
         section.add(
             f"{section.where} has permutations, but no channel looks ahead by them.", "permuted = true in a channel of a bone"
         )
-
-
-def _read_rate(section: Section) -> float | None:
-    accepted = f"frames a second, from 1 to {MOST_RATE:g}, such as 30.0"
-    return section.number("rate", accepted, 1.0, MOST_RATE) if section.has("rate", accepted) else None
 
 
 def _read_smooth(section: Section, key: str) -> float | None:

@@ -104,7 +104,13 @@ def open_poses(path: str | PathLike[str], *, verify: bool = False) -> PoseBank:
         is_whole = digest_of(small, metadata["about"], metadata["inputs"]) == metadata["digest"]
         if not is_whole or (verify and digest_of(large) != metadata["large_digest"]):
             raise STORED_POSES.refused(file, "the file was altered: its contents do not match its digest.")
-        return _bank(json.loads(metadata["about"]), tensors)
+        about = json.loads(metadata["about"])
+        channels = tuple(map(tuple, about["channels"]))
+        ends = tuple((joint, tuple(offset)) for joint, offset in about["end_sites"])
+        rig = Skeleton(tuple(about["names"]), tensors["parents"], tensors["offsets"], channels, ends)
+        arrays: dict[str, Any] = {name: tensors[name] for name in ARRAYS}
+        assets = tuple(texts_from_array(tensors["assets"]))
+        return PoseBank(skeleton=rig, rate=about["rate"], feet=tuple(about["feet"]), assets=assets, **arrays)
 
 
 def poses_path(folder: str | PathLike[str], name: str) -> Path:
@@ -173,12 +179,3 @@ def _divided(tensors: Tensors) -> tuple[Tensors, Tensors]:
     """All but the large arrays, and the large ones."""
     large = {name: tensors[name] for name in LARGE}
     return {name: array for name, array in tensors.items() if name not in large}, large
-
-
-def _bank(about: dict[str, Any], tensors: Tensors) -> PoseBank:
-    channels = tuple(map(tuple, about["channels"]))
-    ends = tuple((joint, tuple(offset)) for joint, offset in about["end_sites"])
-    rig = Skeleton(tuple(about["names"]), tensors["parents"], tensors["offsets"], channels, ends)
-    arrays: dict[str, Any] = {name: tensors[name] for name in ARRAYS}
-    assets = tuple(texts_from_array(tensors["assets"]))
-    return PoseBank(skeleton=rig, rate=about["rate"], feet=tuple(about["feet"]), assets=assets, **arrays)

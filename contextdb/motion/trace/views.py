@@ -143,7 +143,9 @@ def decision_lines(
     yield f"tick {decision.tick:,} at {decision.time_s:.2f} s: {decision.action}"
     yield from _wrapped(decision.why, width)
     yield ""
-    yield from _status_lines(decision, told, width)
+    for label, text in _status(decision, told):
+        lines = _wrapped(text, width - LABEL) or [""]
+        yield from (f"{label if i == 0 else '':<{LABEL}}{line}" for i, line in enumerate(lines))
     if decision.choice is not None:
         yield from ("", "searches", "", *search_lines(decision, width))
     if asked is not None:
@@ -151,12 +153,6 @@ def decision_lines(
         yield from candidate_lines(asked, view, told, width)
     elif decision.candidates:
         yield from ("", f"top candidates ({view})", "", *_top_lines(decision, view, name, told, width))
-
-
-def _status_lines(decision: Decision, events: EventTexts, width: int) -> Iterator[str]:
-    for label, text in _status(decision, events):
-        lines = _wrapped(text, width - LABEL) or [""]
-        yield from (f"{label if i == 0 else '':<{LABEL}}{line}" for i, line in enumerate(lines))
 
 
 def _status(decision: Decision, events: EventTexts) -> Iterator[tuple[str, str]]:

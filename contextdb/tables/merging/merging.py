@@ -83,14 +83,10 @@ def merge(base: AnyTable, ours: AnyTable, theirs: AnyTable, decided: Decided | N
     columns = tuple(column for column, _ in merged)
     schema = _schema(base.schema, ours.schema, theirs.schema)
     settings = _settings(base, ours, theirs, fields, names, schema)
-    asset = _asset_texts(columns, settings)
+    asset = next((c for c in columns if c.name == settings.asset), columns[0])
     cells = sorted((one for _, found in merged for one in found), key=lambda one: one.row or 0)
     named = tuple(replace(one, asset=asset[one.row] if one.row is not None else "") for one in cells)
     return Merge(base, ours, theirs, rows, fields, columns, settings, schema, (*about_columns, *about_rows, *named), decided)
-
-
-def _asset_texts(columns: Sequence[TextColumn], settings: TableSettings) -> TextColumn:
-    return next((c for c in columns if c.name == settings.asset), columns[0])
 
 
 # ---- what is said of the columns

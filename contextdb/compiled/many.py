@@ -129,18 +129,9 @@ class ManyMatches(Unchanging, Sequence[Matches]):
         return found
 
     def only(self, rows: SaidRows | NDArray[np.bool_] | Matches | ManyMatches) -> ManyMatches:
-        """The same answers without the rows that are not among some rows.
-
-        Parameters
-        ----------
-        rows
-            For all contexts alike, as `Matches.only` takes them; or for each context: bool [N, n_rows], or as many answers.
-
-        Raises
-        ------
-        ContextError
-            As `Matches.only`; flags or answers for another number of contexts.
-        """
+        """The same answers without the rows that are not among some: for all contexts alike, as `Matches.only` takes them, or for
+        each context, bool [N, n_rows] or as many answers. Raises ContextError as `Matches.only` does, and for flags or answers for
+        another number of contexts."""
         return FewerMatches(self, self._masks_said(rows))
 
     def _masks_said(self, rows: SaidRows | NDArray[np.bool_] | Matches | ManyMatches) -> Words:

@@ -224,17 +224,11 @@ class CompiledTable(Unchanging):
         return live
 
     def prepare(self, casting: bool = False, batches: bool = False) -> None:
-        """Do the work of the first queries now, while the game loads; answers stay the same.
+        """Do the work of the first queries now, while the game loads; answers stay the same, and nothing is raised: it asks without
+        facts.
 
-        Parameters
-        ----------
-        casting : bool
-            Also the work of the first query with actors.
-        batches : bool
-            Also the work of the first batches: numba is loaded, where it is installed, and the kernels are compiled or
-            read from its cache, which takes about a second.
-
-        Raises nothing: it asks without facts.
+        `casting` also does the work of the first query with actors; `batches` that of the first batches: numba is loaded, where it
+        is installed, and the kernels are compiled or read from its cache, which takes about a second.
         """
         prepare(self._data, casting, batches)
 
@@ -323,17 +317,9 @@ class CompiledTable(Unchanging):
     def picker(self, seed: int = 0, memory: int = 1) -> Picker:
         """Picks for one character or for many, which it remembers: see `contextdb.compiled.picker.Picker`.
 
-        Parameters
-        ----------
-        seed : int
-            The same seed gives the same picks, on every system.
-        memory : int
-            So many of the last assets of a character are not picked again while there is another choice.
-
-        Raises
-        ------
-        ContextError
-            The seed or the memory is no whole number, or the memory is out of range.
+        The same `seed` gives the same picks, on every system. So many of the last assets of a character as `memory` says are not
+        picked again while there is another choice. Raises ContextError where either is no whole number, or the memory is out of
+        range.
         """
         return Picker(self.name, seed, memory)
 

@@ -51,22 +51,11 @@ SAVED_SUFFIX = ".poses.safetensors"
 
 
 def save_poses(bank: PoseBank, path: str | PathLike[str], *, inputs: str = "") -> None:
-    """Write a bank; the old file is whole until the new one is. The same bank gives the same bytes.
+    """Write a bank to a path whose name ends in .safetensors, as a rule in .poses.safetensors; the old file is whole until the new
+    one is. The same bank gives the same bytes.
 
-    Parameters
-    ----------
-    bank : PoseBank
-    path : path
-        Whose name ends in .safetensors, as a rule in .poses.safetensors.
-    inputs : str
-        The digest of what the bank was built of; see `inputs_of`.
-
-    Raises
-    ------
-    FileError
-        The disk refuses.
-    ContextError
-        `bank` is none, or `path` is none.
+    `inputs` is the digest of what the bank was built of; see `inputs_of`. Raises FileError where the disk refuses, ContextError
+    where `bank` or `path` is none.
     """
     require_kind(bank, PoseBank, "bank", "a PoseBank")
     target = require_path(path)
@@ -84,18 +73,9 @@ def save_poses(bank: PoseBank, path: str | PathLike[str], *, inputs: str = "") -
 def open_poses(path: str | PathLike[str], *, verify: bool = False) -> PoseBank:
     """Open a saved bank by memory map: poses are read from the disk when they are first shown.
 
-    Parameters
-    ----------
-    path : path
-    verify : bool
-        Read all poses and compare with their digest too. Default: all but the poses is checked.
-
-    Raises
-    ------
-    ArtefactError
-        The file is truncated, altered, of another layout, or no pose bank; with the reason and the mend.
-    FileError
-        The file cannot be read.
+    All but the poses is checked; `verify` reads all of them and compares with their digest too. Raises ArtefactError, with the
+    reason and the mend, where the file is truncated, altered, of another layout, or no pose bank; FileError where it cannot be
+    read.
     """
     file = require_path(path)
     tensors, metadata = read_tensors(file, STORED_POSES, writeable=True)  # as built ones are: compiled loops tell the two apart
@@ -142,17 +122,9 @@ def open_or_build_poses(
 ) -> dict[str, PoseBank]:
     """The pose banks of the databases of a project: those that are saved and up to date opened, the others built in memory.
 
-    Parameters
-    ----------
-    config, folder, assets, names
-        As for `build`.
-    saved : path, optional
-        Where `contextdb motion build --poses` has put them; a relative one lies in `folder`. Default: `folder`.
-
-    Raises
-    ------
-    MotionError, FileError
-        As `build`. A saved bank that cannot be used is built anew.
+    `config`, `folder`, `assets` and `names` are as for `build`. `saved` is where `contextdb motion build --poses` has put them; a
+    relative path lies in `folder`, which is the default. Raises what `build` raises. A saved bank that cannot be used is built
+    anew.
     """
     root = checked(config, folder, assets, names)
     place = root / (require_path(saved, "saved") if saved else "")

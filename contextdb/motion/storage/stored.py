@@ -55,24 +55,11 @@ Part = TypeVar("Part", Layout, Marks)
 
 
 def save_database(database: MotionDatabase, path: str | PathLike[str], *, inputs: str = "") -> None:
-    """Write a database; the old file is whole until the new one is. The same database gives the same bytes.
+    """Write a database to a path whose name ends in .safetensors, as a rule in .motion.safetensors; the old file is whole until the
+    new one is. The same database gives the same bytes.
 
-    Parameters
-    ----------
-    database : MotionDatabase
-    path : path
-        Whose name ends in .safetensors, as a rule in .motion.safetensors.
-    inputs : str
-        The digest of what the database was built of; see `inputs_of`.
-
-    Raises
-    ------
-    MotionError
-        The schema was made in Python and could not be read back.
-    FileError
-        The disk refuses.
-    ContextError
-        `database` is none, or `path` is none.
+    `inputs` is the digest of what the database was built of; see `inputs_of`. Raises MotionError where the schema was made in
+    Python and could not be read back, FileError where the disk refuses, ContextError where `database` or `path` is none.
     """
     require_kind(database, MotionDatabase, "database", "a MotionDatabase")
     path = require_path(path)

@@ -172,11 +172,12 @@ def require_kind(value: object, kinds: type | tuple[type, ...], what: str, accep
 
 def _wrong(value: object, what: str, accepted: str) -> WrongType:
     if isinstance(value, (str, int, float)):
-        return WrongType(Fault(f"{what} is {type(value).__name__} {in_quotes(_text_of(value))}.", accepted))
+        return WrongType(Fault(f"{what} is {type(value).__name__} {in_quotes(text_of(value))}.", accepted))
     return WrongType(Fault(f"{what} is of type {type(value).__name__}.", accepted))
 
 
-def _text_of(value: object) -> str:
+def text_of(value: object) -> str:
+    """A value as a message shows it."""
     try:
         return str(value)
     except ValueError:  # a whole number of very many digits

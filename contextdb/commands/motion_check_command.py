@@ -58,7 +58,6 @@ class MotionReport(CheckReport):
         return replace(self, findings=tuple(_of_all(findings) for findings in alike.values()))
 
     def to_json(self) -> dict[str, object]:
-        """The JSON document."""
         databases = [{"database": name or None, "clips": n_clips} for name, n_clips in self.n_clips.items()]
         return {"format": 1, "findings": [finding.to_json() for finding in self.findings], "databases": databases}
 

@@ -189,7 +189,7 @@ def _is_fact_of(text: str, table: CompiledTable) -> bool:
 def clip_at(text: str) -> tuple[str, float]:
     """Name and seconds of CLIP@SECONDS."""
     clip, _, seconds = text.rpartition("@")
-    at_s = _number(seconds.removesuffix("s").strip())
+    at_s = number_of(seconds.removesuffix("s").strip())
     if not clip or at_s is None or not 0.0 <= at_s <= MOST_SECONDS:
         mend = "" if clip or not text else in_quotes(f"{text}@0")
         raise QueryError(Fault(f"{in_quotes(text)} is not a moment of a clip.", f"{CLIP_AT}, such as walk@1.5", mend))
@@ -229,7 +229,7 @@ def read_tags(text: str) -> TagFilter:
     for word in text.split():
         sign, body = (word[0], word[1:]) if word[0] in "+-" else ("", word)
         name, tilde, cost_text = body.partition("~")
-        cost = _number(cost_text)
+        cost = number_of(cost_text)
         if not name or (tilde and (cost is None or not 0.0 <= cost <= MOST_COST or sign == "+")):
             accepted = 'Move, +Move, -Move, "Move~2.5" or "-Move~2.5"'
             raise argparse.ArgumentTypeError(Fault(f"{in_quotes(word)} is not a tag to filter by.", accepted).message)
@@ -243,7 +243,8 @@ def read_tags(text: str) -> TagFilter:
 # ---- numbers as arguments
 
 
-def _number(text: str) -> float | None:
+def number_of(text: str) -> float | None:
+    """The finite number that a text is, None for any other."""
     try:
         return as_number(float(text))
     except ValueError:
@@ -251,14 +252,14 @@ def _number(text: str) -> float | None:
 
 
 def _speed(text: str) -> float:
-    number = _number(text)
+    number = number_of(text)
     if number is None or not 0.0 <= number <= MOST_SPEED_MPS:
         raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a speed. Accepted: 0 to {MOST_SPEED_MPS:g} m/s, such as 1.3.")
     return number
 
 
 def _degrees(text: str) -> float:
-    number = _number(text)
+    number = number_of(text)
     if number is None or abs(number) > 3600.0:
         raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not an angle. Accepted: -3600 to 3600 degrees, such as 45.")
     return number

@@ -13,10 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
-from contextdb.cells.arguments import as_number
 from contextdb.cells.facts import Unknown
 from contextdb.columns import TextColumn
 from contextdb.commands import missing_facts_by_option
+from contextdb.commands.motion_stage import number_of
 from contextdb.compiled.table import CompiledTable
 from contextdb.disk import path_in_quotes
 from contextdb.errors import ContextDBError, Fault, Place, TableError, in_quotes, nearest, some
@@ -175,7 +175,7 @@ def _numbers(path: Path, source: AnySource, column: TextColumn, faults: list[Fau
     least, most = LIMITS[column.name]
     values = np.full(len(column.texts), np.nan)
     for code, text in enumerate(column.texts):
-        number = _number(text)
+        number = number_of(text)
         if number is not None and least <= number <= most:
             values[code] = number
         elif text.strip() or column.name == "time_s":
@@ -183,13 +183,6 @@ def _numbers(path: Path, source: AnySource, column: TextColumn, faults: list[Fau
             place = Place(str(path), source.line(row), column.name, row)
             faults.append(Fault(f"{in_quotes(text)} is not a valid number.", f"{least:g} to {most:g}", place=place))
     return np.asarray(values[column.codes])
-
-
-def _number(text: str) -> float | None:
-    try:
-        return as_number(float(text))
-    except ValueError:
-        return None
 
 
 def _check_times(path: Path, source: AnySource, times_s: Floats, faults: list[Fault]) -> None:

@@ -223,11 +223,9 @@ class ListedMatches(ManyMatches):
 
     @cached_property
     def always(self) -> Words:
-        """The rows that hold all values of set-valued facts: uint64 [N, W]."""
         return read_only(self._stacked([m.always for m in self.answers]))
 
     def lists(self) -> list[Rows]:
-        """The row numbers of each context: a list of int64 arrays."""
         return [m.indices for m in self.answers]
 
     def __len__(self) -> int:
@@ -263,7 +261,6 @@ class FewerMatches(ManyMatches):
 
     @cached_property
     def always(self) -> Words:
-        """The rows that hold all values of set-valued facts: uint64 [N, W]."""
         return read_only(self.whole.always & self.others)
 
     def __len__(self) -> int:
@@ -304,7 +301,6 @@ class JoinedMatches(ManyMatches):
 
     @cached_property
     def always(self) -> Words:
-        """The rows that hold all values of set-valued facts: uint64 [N, W]."""
         one, other = self.first.always, self.second.always
         return read_only(self.mask & (one & other if self.join is and_ else one | other))
 

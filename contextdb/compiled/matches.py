@@ -393,12 +393,10 @@ class SetMatches(Matches):
 
     @property
     def always(self) -> Words:
-        """The rows that hold all values of set-valued facts: uint64 [W]."""
         return bitmask.from_int(self._always, self.n_rows)
 
     @property
     def _always_bits(self) -> int:
-        """The rows that hold all values of set-valued facts, as one integer."""
         return self._always
 
     def _keep(self, bits: int) -> None:

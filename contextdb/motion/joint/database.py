@@ -24,13 +24,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contextdb.cells.arguments import as_number, require_kind, require_many, require_text
+from contextdb.cells.arguments import require_kind, require_many, require_text
 from contextdb.errors import Fault, MotionError, in_quotes, nearest, plural, some
 from contextdb.motion.arguments import Flags
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.clips.trajectory import to_own_frame
-from contextdb.motion.features.channels import MOST_WEIGHT
+from contextdb.motion.features.channels import require_weight
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.layout import Features
 
@@ -107,8 +107,8 @@ class JointDatabase:
             tuple(asset for asset, _, _ in found),
             np.array([mirrored for _, mirrored, _ in found], np.bool_),
             ranges,
-            _weight(place_weight, "place_weight"),
-            _weight(facing_weight, "facing_weight"),
+            require_weight(place_weight, "place_weight"),
+            require_weight(facing_weight, "facing_weight"),
         )
 
     @property
@@ -185,8 +185,8 @@ class JointDatabase:
         return replace(
             self,
             database=self.database if weights is None else self.database.with_weights(weights),
-            place_weight=self.place_weight if place_weight is None else _weight(place_weight, "place_weight"),
-            facing_weight=self.facing_weight if facing_weight is None else _weight(facing_weight, "facing_weight"),
+            place_weight=self.place_weight if place_weight is None else require_weight(place_weight, "place_weight"),
+            facing_weight=self.facing_weight if facing_weight is None else require_weight(facing_weight, "facing_weight"),
         )
 
     def __repr__(self) -> str:
@@ -238,10 +238,3 @@ def joint_faults(names: Sequence[str], lengths: Sequence[int], roles: Sequence[s
                 "clips that were recorded together, cut at the same frames",
                 rule="roles",
             )
-
-
-def _weight(weight: object, what: str) -> float:
-    number = as_number(weight)
-    if number is None or not 0.0 <= number <= MOST_WEIGHT:
-        raise MotionError(Fault(f"{what} is {weight!r}.", f"a number from 0 to {MOST_WEIGHT:,.0f}"))
-    return number

@@ -141,10 +141,10 @@ def decision_lines(
     """
     told = {} if events is None else events
     yield f"tick {decision.tick:,} at {decision.time_s:.2f} s: {decision.action}"
-    yield from _wrapped(decision.why, width)
+    yield from wrapped(decision.why, width)
     yield ""
     for label, text in _status(decision, told):
-        lines = _wrapped(text, width - LABEL) or [""]
+        lines = wrapped(text, width - LABEL) or [""]
         yield from (f"{label if i == 0 else '':<{LABEL}}{line}" for i, line in enumerate(lines))
     if decision.choice is not None:
         yield from ("", "searches", "", *search_lines(decision, width))
@@ -256,10 +256,10 @@ def _top_lines(decision: Decision, view: View, name: str, events: EventTexts, wi
     yield ""
     for database, found in decision.candidates:
         if found.counts:
-            yield from _wrapped(f"left out{f' of {database}' if several else ''}: {left_out_text(found)}", width)
+            yield from wrapped(f"left out{f' of {database}' if several else ''}: {left_out_text(found)}", width)
 
 
-def _wrapped(text: str, width: int) -> list[str]:
+def wrapped(text: str, width: int) -> list[str]:
     """A text in lines; no name is broken, however long."""
     return textwrap.wrap(printable(text), width, break_long_words=False, break_on_hyphens=False)
 

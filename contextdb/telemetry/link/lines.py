@@ -175,13 +175,13 @@ def fact_text(sent: object) -> str | None:
     if isinstance(sent, float):
         return format_number(sent) if math.isfinite(sent) else ("inf" if sent > 0 else "-inf") if sent == sent else None
     if isinstance(sent, str):
-        return _name(sent)
+        return name_text(sent)
     given = given_fact(sent)
     if isinstance(given, frozenset):
-        return " ".join(map(_name, sent)) or '""'  # type: ignore[call-overload]
+        return " ".join(map(name_text, sent)) or '""'  # type: ignore[call-overload]
     return given.text if isinstance(given, FactSet) else format_number(given)  # type: ignore[arg-type]
 
 
-def _name(text: str) -> str:
+def name_text(text: str) -> str:
     """A name that is read as that name, even first in a fact."""
     return '"' + text.replace('"', '""') + '"' if text.startswith("-") else quoted(text)

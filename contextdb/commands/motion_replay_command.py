@@ -195,7 +195,6 @@ def _parts(replay: Replay, other: Trace | None) -> Iterator[Part]:
 
 
 def _write_trace(trace: Trace, path: Path) -> None:
-    """Write the Chrome trace."""
     place = Place(str(path))
     if path.suffix != ".json":
         raise FileError(Fault("a Chrome trace cannot be written to such a file.", "a name that ends in .json", place=place))
@@ -226,7 +225,6 @@ def place_of(text: str, trace: Trace, file: str) -> int:
 
 
 def _session(replay: Replay) -> Part:
-    """The whole session."""
     trace, asked = replay.trace, replay.asked
     if asked.json:
         told = [decision for decision in trace.brief() if _is_named(decision.playing, asked.name)]

@@ -41,16 +41,8 @@ LONGEST_S = 24 * 3600.0
 
 @dataclass(frozen=True, eq=False)
 class Stick:
-    """What was asked for at some moments.
-
-    Attributes
-    ----------
-    path : Path
-    times_s : float64 array
-        Ascending, from 0.
-    asked : mapping of str to float64 array
-        By the column's name; NaN where it says nothing.
-    """
+    """What was asked for at some moments, `times_s` float64 [T], ascending from 0: `asked` float64 [T] by the column's name, NaN
+    where it says nothing."""
 
     path: Path
     times_s: Floats

@@ -47,7 +47,7 @@ def stubs_of(tables: Mapping[str, CompiledTable]) -> str:
         for condition in table.asked.values():
             if condition.domain.values and condition not in literals:
                 literals[condition] = names.of(condition.name)
-                parts.append(_literal(literals[condition], condition))
+                parts.append(_listed(literals[condition], condition.name, values_of(condition)))
         parts.append(_facts(names.of(f"{table.name} facts"), table, literals))
         parts += contexts_of(table.name, {c.name: _type(c, literals.get(c)) for c in table.asked.values()}, names.of)
         if len(table.outputs):
@@ -73,10 +73,6 @@ class _Names:
             number, unique = number + 1, f"{name}_{number}"
         self.taken.add(unique)
         return unique
-
-
-def _literal(name: str, condition: Condition) -> str:
-    return _listed(name, condition.name, values_of(condition))
 
 
 def _listed(name: str, of: str, values: Iterable[str]) -> str:

@@ -59,7 +59,7 @@ def read_delimited(
     require_no_conflicts(text, file)
     dialect = dialect_of(text, wanted)
     grid, notes = _records(text[dialect.first :], dialect.delimiter, file)
-    columns, more = columns_of(grid, file, block or _whole(grid), "line")
+    columns, more = columns_of(grid, file, block or Block(0, 0, len(grid), len(grid[0]) if grid else 0), "line")
     columns, decimals = with_points(columns, dialect.delimiter, is_decimal_comma)
     name = "tsv" if dialect.delimiter == "\t" else "csv"
     return Reading(tuple(columns), name, (*dialect.remarks, *notes, *more, *decimals), has_whole_names=True)
@@ -108,11 +108,6 @@ def _fitness(counts: Sequence[int]) -> tuple[float, int]:
         return 0.0, 0
     header, agreeing, total = _fit(counts)
     return (1 + agreeing) / (1 + total), header
-
-
-def _whole(grid: Sequence[Sequence[str]]) -> Block:
-    """All of a text is one table, from its first record on; only a sheet has several."""
-    return Block(0, 0, len(grid), len(grid[0]) if grid else 0)
 
 
 def _records(text: str, delimiter: str, file: str) -> tuple[list[list[str]], list[Remark]]:

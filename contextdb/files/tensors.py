@@ -14,7 +14,7 @@ import json
 import math
 import mmap
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -110,6 +110,12 @@ def read_tensors(path: Path, kind: FileKind, *, writeable: bool = False) -> tupl
             since = f" {kind.since}" if kind.since else ""
             raise kind.refused(path, f"layout {metadata[kind.key]}; this version reads layout {' or '.join(known)}.{since}")
         return {name: _view(mapped, start, entry) for name, entry in header.items()}, metadata
+
+
+def divided(tensors: Tensors, names: Collection[str]) -> tuple[Tensors, Tensors]:
+    """All but the arrays of these names, and those of them that are there."""
+    large = {name: tensors[name] for name in names if name in tensors}
+    return {name: array for name, array in tensors.items() if name not in large}, large
 
 
 def digest_of(tensors: Mapping[str, NDArray[Any]], *texts: str) -> str:

@@ -103,7 +103,6 @@ def floor_of(channel: Channel) -> tuple[float, str]:
 
 
 def _groups(schema: FeatureSchema) -> list[list[Channel]]:
-    """The channels of each group."""
     groups: dict[str, list[Channel]] = {}
     for channel in schema.channels:
         key = f"group {channel.group}" if channel.group else f"channel {channel.name}"

@@ -27,7 +27,16 @@ from typing import Any
 
 from contextdb.cells.arguments import require_kind, require_path, require_text
 from contextdb.errors import ArtefactError, ContextDBError, FileError
-from contextdb.files.tensors import FileKind, Tensors, digest_of, read_tensors, texts_from_array, texts_to_array, write_tensors
+from contextdb.files.tensors import (
+    FileKind,
+    Tensors,
+    digest_of,
+    divided,
+    read_tensors,
+    texts_from_array,
+    texts_to_array,
+    write_tensors,
+)
 from contextdb.motion.clips.skeleton import Skeleton
 from contextdb.motion.output.bank import PoseBank
 from contextdb.motion.search.database import MotionDatabase
@@ -65,7 +74,7 @@ def save_poses(bank: PoseBank, path: str | PathLike[str], *, inputs: str = "") -
     about = json.dumps(
         {"rate": bank.rate, "feet": bank.feet, "names": rig.names, "channels": rig.channels, "end_sites": rig.end_sites}
     )
-    small, large = _divided(tensors)
+    small, large = divided(tensors, LARGE)
     digests = {"digest": digest_of(small, about, inputs), "large_digest": digest_of(large)}
     write_tensors(target, STORED_POSES, tensors, {"about": about, "inputs": inputs, **digests})
 
@@ -80,7 +89,7 @@ def open_poses(path: str | PathLike[str], *, verify: bool = False) -> PoseBank:
     file = require_path(path)
     tensors, metadata = read_tensors(file, STORED_POSES, writeable=True)  # as built ones are: compiled loops tell the two apart
     with STORED_POSES.reading(file):
-        small, large = _divided(tensors)
+        small, large = divided(tensors, LARGE)
         is_whole = digest_of(small, metadata["about"], metadata["inputs"]) == metadata["digest"]
         if not is_whole or (verify and digest_of(large) != metadata["large_digest"]):
             raise STORED_POSES.refused(file, "the file was altered: its contents do not match its digest.")
@@ -145,9 +154,3 @@ def _open(path: Path, digest: str) -> PoseBank | None:
         return open_poses(path) if digest and read_tensors(path, STORED_POSES)[1].get("inputs") == digest else None
     except (ArtefactError, FileError):
         return None
-
-
-def _divided(tensors: Tensors) -> tuple[Tensors, Tensors]:
-    """All but the large arrays, and the large ones."""
-    large = {name: tensors[name] for name in LARGE}
-    return {name: array for name, array in tensors.items() if name not in large}, large

@@ -31,7 +31,16 @@ import numpy as np
 
 from contextdb.cells.arguments import require_kind, require_path
 from contextdb.errors import Fault, MotionError, SchemaError, in_quotes
-from contextdb.files.tensors import FileKind, Tensors, digest_of, read_tensors, texts_from_array, texts_to_array, write_tensors
+from contextdb.files.tensors import (
+    FileKind,
+    Tensors,
+    digest_of,
+    divided,
+    read_tensors,
+    texts_from_array,
+    texts_to_array,
+    write_tensors,
+)
 from contextdb.motion.features.normalisation import Normalisation
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.features.schema_dict import schema_to_dict
@@ -85,7 +94,7 @@ def save_database(database: MotionDatabase, path: str | PathLike[str], *, inputs
             "marks": _others(database.marks),
         }
     )
-    small, large = _divided(tensors)
+    small, large = divided(tensors, LARGE)
     shapes = _shapes(large)
     metadata = {
         "about": about,
@@ -120,7 +129,7 @@ def open_database(path: str | PathLike[str], *, verify: bool = False) -> MotionD
     file = require_path(path)
     tensors, metadata = read_tensors(file, STORED, writeable=True)  # as built ones are: the compiled search tells the two apart
     with STORED.reading(file):
-        small, large = _divided(tensors)
+        small, large = divided(tensors, LARGE)
         expected = digest_of(small, metadata["about"], metadata["inputs"], _shapes(large))
         if expected != metadata["digest"] or (verify and digest_of(large) != metadata["large_digest"]):
             raise STORED.refused(file, "the file was altered: its contents do not match its digest.")
@@ -168,12 +177,6 @@ def _schema_to_json(schema: FeatureSchema) -> dict[str, object]:
         found = f"the schema {in_quotes(schema.name)} cannot be saved: {error.faults[0].found}"
         raise MotionError(Fault(found, "a schema that contextdb.toml could hold")) from error
     return {"name": schema.name, "keys": keys}
-
-
-def _divided(tensors: Tensors) -> tuple[Tensors, Tensors]:
-    """All but the large arrays, and the large ones."""
-    large = {name: tensors[name] for name in LARGE if name in tensors}
-    return {name: array for name, array in tensors.items() if name not in large}, large
 
 
 def _shapes(tensors: Tensors) -> str:

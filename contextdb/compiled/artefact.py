@@ -70,7 +70,8 @@ from contextdb.cells.domains import Domain
 from contextdb.cells.sets import TagMeet, TagSet
 from contextdb.columns import TextColumn
 from contextdb.compiled.classes import ColumnMasks, NumberMasks, TagMasks, ValueMasks, WideMasks
-from contextdb.compiled.data import CompiledData, SoftMasks
+from contextdb.compiled.data import CompiledData
+from contextdb.compiled.mask_bits import SoftMasks
 from contextdb.compiled.outputs_stored import outputs_from, outputs_to_tensors
 from contextdb.compiled.pick_columns import PickColumns
 from contextdb.compiled.programs import programs_to_tensors

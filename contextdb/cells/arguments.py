@@ -97,15 +97,8 @@ def require_pair(value: object, what: str, accepted: str) -> None:
 
 
 def require_path(value: object, what: str = "path") -> Path:
-    """A path as a text or a `Path`, of which the system can make the name of a file.
-
-    Raises
-    ------
-    ContextError
-        It is of another type.
-    FileError
-        It holds a character that no name of a file can hold.
-    """
+    """A path as a text or a `Path`, of which the system can make the name of a file. Raises ContextError where it is of another
+    type, FileError where it holds a character that no name of a file can hold."""
     if not isinstance(value, (str, os.PathLike)) or not isinstance(os.fspath(value), str):
         raise _wrong(value, what, "a text or a pathlib.Path")
     path = Path(value)
@@ -120,17 +113,9 @@ def require_path(value: object, what: str = "path") -> Path:
 
 
 def by_name(call: str, given: Sequence[object], **named: Any) -> dict[str, Any]:
-    """The arguments of a function that takes them by name now, where the first were given by position; warns that they were.
-
-    Parameters
-    ----------
-    call : str
-        What is called, for the warning.
-    given : sequence
-        The arguments that were given by position.
-    named
-        The arguments that are to be given by name, in the order in which they could be given by position.
-    """
+    """The arguments of a function that takes them by name now, where the first, `given`, were given by position; warns that they
+    were. `named` are those that are to be given by name, in the order in which they could be given by position; `call` is what the
+    warning says was called."""
     if len(given) > len(named):
         raise WrongType(Fault(f"{call} is given {plural(len(given) - len(named), 'argument')} too many.", ", ".join(named)))
     now = dict(zip(named, given, strict=False))
@@ -187,11 +172,12 @@ def require_kind(value: object, kinds: type | tuple[type, ...], what: str, accep
 
 def _wrong(value: object, what: str, accepted: str) -> WrongType:
     if isinstance(value, (str, int, float)):
-        return WrongType(Fault(f"{what} is {type(value).__name__} {in_quotes(_text_of(value))}.", accepted))
+        return WrongType(Fault(f"{what} is {type(value).__name__} {in_quotes(text_of(value))}.", accepted))
     return WrongType(Fault(f"{what} is of type {type(value).__name__}.", accepted))
 
 
-def _text_of(value: object) -> str:
+def text_of(value: object) -> str:
+    """A value as a message shows it."""
     try:
         return str(value)
     except ValueError:  # a whole number of very many digits

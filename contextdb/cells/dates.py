@@ -63,15 +63,8 @@ def exact_day(value: datetime.date) -> float:
 
 
 def day_from_python(value: object) -> float | None:
-    """The day that a fact is: a date, of numpy's too, or a whole float, which counts days; None for NaT and NaN.
-
-    Raises
-    ------
-    TypeError
-        It is none of these.
-    ValueError
-        The calendar has no such day.
-    """
+    """The day that a fact is: a date, of numpy's too, or a whole float, which counts days; None for NaT and NaN. Raises TypeError
+    where it is none of these, ValueError where the calendar has no such day."""
     if isinstance(value, np.datetime64):
         if np.isnat(value):
             return None

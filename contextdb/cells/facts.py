@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 
 from contextdb.cells.angles import wrap_angle
-from contextdb.cells.arguments import require_text
+from contextdb.cells.arguments import require_text, text_of
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
 from contextdb.cells.grammar import parse_cell, parse_tags
@@ -73,7 +73,7 @@ def require_names(context: Iterable[object]) -> None:
     """Raise ContextError for keys that are no texts."""
     for name in context:
         if not isinstance(name, str):
-            found = f"a context has the key {in_quotes(_text_of(name))}, of type {type(name).__name__}."
+            found = f"a context has the key {in_quotes(text_of(name))}, of type {type(name).__name__}."
             raise ContextError(Fault(found, "the names of facts, as texts"))
 
 
@@ -88,18 +88,9 @@ def as_context(facts: object) -> Mapping[str, object]:
 
 
 def read_fact(value: object, condition: Condition) -> Fact:
-    """Bring one given fact into canonical form.
-
-    Returns
-    -------
-    bool, float, str, frozenset of str, Cell, or None
-        None when the fact is missing (None or NaN); a Cell when it is a set of values.
-
-    Raises
-    ------
-    ContextError
-        The value is of the wrong type or outside an enum's or tag's domain; names the fact, what is accepted and the nearest value.
-    """
+    """Bring one given fact into canonical form: bool, float, str, frozenset of str; None where it is missing (None or NaN), a Cell
+    where it is a set of values. Raises ContextError for a value of the wrong type, or outside an enum's or tag's domain; it names
+    the fact, what is accepted and the nearest value."""
     if value is None or (isinstance(value, (float, np.floating)) and math.isnan(value)):
         return None
     if isinstance(value, FactSet):
@@ -168,17 +159,10 @@ def _is_slip(name: str, near: str) -> bool:
 
 
 def _fault(value: object, condition: Condition, mend: str = "", accepted: str = "") -> ContextError:
-    what = f"{type(value).__name__} {in_quotes(_text_of(value))}"
+    what = f"{type(value).__name__} {in_quotes(text_of(value))}"
     expected = accepted or condition.domain.type.facts
     place = Place(column=condition.name)
     return ContextError(Fault(f"{what} is not a fact of type {condition.domain.kind}.", expected, mend, place, "wrong-fact"))
-
-
-def _text_of(value: object) -> str:
-    try:
-        return str(value)
-    except ValueError:  # a whole number of very many digits
-        return "…"
 
 
 def _checked_set(found: Cell, condition: Condition) -> Cell:

@@ -55,13 +55,8 @@ def _patterns(number: str, step: str) -> _Patterns:
 
 
 def parse_cell(text: str, domain: Domain, wants_mend: bool = True) -> Cell:
-    """Read a cell. Looking for a mend costs a thousand times the reading; a caller with many faults may leave it out.
-
-    Raises
-    ------
-    CellError
-        With what was found, what is accepted for the kind and, where one is near, a text that would be read.
-    """
+    """Read a cell. Looking for a mend costs a thousand times the reading; a caller with many faults may leave it out. Raises
+    CellError with what was found, what is accepted for the kind and, where one is near, a text that would be read."""
     try:
         return _read(text, domain)
     except CellError as error:
@@ -125,23 +120,15 @@ def _read_plain_set(text: str, domain: Domain) -> Accepted | None:
     if says_any(text):
         return None
     if domain.type.is_numeric:
-        return _read_numbers(text, domain)
+        spans = [span for part in text.split("|") for span in _read_spans(part.strip(), text, domain)]
+        joined = intervals.union(spans)
+        return NumberSet(domain.type.fitted(joined), domain.type.is_circular)
     if domain.type.is_truth:
-        return _read_truth(text, domain)
+        value = truth_of(text)
+        if value is None:
+            raise _unreadable(text, domain)
+        return ValueSet(frozenset((value,)))
     return _read_tags(text, domain) if domain.type.is_tags else _read_names(text, domain)
-
-
-def _read_truth(text: str, domain: Domain) -> ValueSet:
-    value = truth_of(text)
-    if value is None:
-        raise _unreadable(text, domain)
-    return ValueSet(frozenset((value,)))
-
-
-def _read_numbers(text: str, domain: Domain) -> NumberSet:
-    spans = [span for part in text.split("|") for span in _read_spans(part.strip(), text, domain)]
-    joined = intervals.union(spans)
-    return NumberSet(domain.type.fitted(joined), domain.type.is_circular)
 
 
 def _read_spans(part: str, text: str, domain: Domain) -> Spans:

@@ -78,13 +78,8 @@ class InMirror(dict[str, object]):
 
 
 def mirrored_facts(facts: Mapping[str, object], conditions: Conditions) -> InMirror:
-    """Facts as they are given, those of `conditions` as the mirror shows them; the rest as it is.
-
-    Raises
-    ------
-    ContextError
-        A fact that is none of its condition.
-    """
+    """Facts as they are given, those of `conditions` as the mirror shows them; the rest as it is. Raises ContextError for a fact
+    that is none of its condition."""
     found = InMirror(facts)
     for name, condition in conditions.items():
         fact = found.get(name)

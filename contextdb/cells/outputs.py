@@ -80,13 +80,8 @@ class Output:
         return found.reshape(-1, self.size) if self.type.has_size else found
 
     def read(self, text: str, wants_mend: bool = True) -> OutputValue:
-        """The value that a cell gives.
-
-        Raises
-        ------
-        CellError
-            With what was found, what is accepted and, where one is near, a text that would be read.
-        """
+        """The value that a cell gives. Raises CellError with what was found, what is accepted and, where one is near, a text that
+        would be read."""
         if not text.strip():
             if self.needs_cell:
                 raise CellError(
@@ -127,13 +122,8 @@ class Output:
             return False
 
     def taken(self, value: object) -> OutputValue:
-        """The value that Python or TOML gives, such as a default.
-
-        Raises
-        ------
-        ValueError
-            It is no value of the output; with why.
-        """
+        """The value that Python or TOML gives, such as a default. Raises ValueError where it is no value of the output;
+        with why."""
         found = self.type.take(value, self)
         if not self._is_inside(found):
             raise ValueError("this is outside the declared bounds")

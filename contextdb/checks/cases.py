@@ -103,13 +103,8 @@ def exactly(assets: Sequence[str]) -> str:
 
 
 def read_cases(path: Path) -> list[Case]:
-    """The cases of a file; none where there is no file.
-
-    Raises
-    ------
-    TableError, FileError
-        The file cannot be read, or has no column of names.
-    """
+    """The cases of a file; none where there is no file. Raises TableError or FileError where the file cannot be read, or has no
+    column of names."""
     if not os.path.exists(path):
         return []
     source, columns = _read(path)
@@ -123,13 +118,8 @@ def read_cases(path: Path) -> list[Case]:
 
 
 def keep_case(path: Path, case: Case) -> None:
-    """Write a case into a file, in the place of one of its name or at the end. Other lines stay as they are.
-
-    Raises
-    ------
-    TableError, FileError
-        The file cannot be read or written, or a condition has a name that such a file uses itself.
-    """
+    """Write a case into a file, in the place of one of its name or at the end. Other lines stay as they are. Raises TableError or
+    FileError where the file cannot be read or written, or a condition has a name that such a file uses itself."""
     if taken := [name for name in CASE_COLUMNS if name in case.facts]:
         found = f"a condition named {in_quotes(taken[0])} cannot be saved: a file of cases has such a column itself."
         raise TableError(Fault(found, "another name of the condition", place=Place(str(path))))
@@ -149,13 +139,8 @@ def keep_case(path: Path, case: Case) -> None:
 
 
 def rename_case(path: Path, case: Case, name: str) -> None:
-    """Give a case another name.
-
-    Raises
-    ------
-    TableError, FileError
-        There is no such case, another one has that name, or the file cannot be read or written.
-    """
+    """Give a case another name. Raises TableError or FileError where there is no such case, another one has that name, or the file
+    cannot be read or written."""
 
     def renamed(source: AnySource | None, columns: Columns) -> tuple[Columns, Origin]:
         row = _find(path, case, source, columns)
@@ -167,13 +152,8 @@ def rename_case(path: Path, case: Case, name: str) -> None:
 
 
 def delete_case(path: Path, case: Case) -> None:
-    """Take a case out of a file.
-
-    Raises
-    ------
-    TableError, FileError
-        There is no such case, or the file cannot be read or written.
-    """
+    """Take a case out of a file. Raises TableError or FileError where there is no such case, or the file cannot be read
+    or written."""
 
     def without(source: AnySource | None, columns: Columns) -> tuple[Columns, Origin]:
         rest = np.delete(np.arange(columns[0].n_rows), _find(path, case, source, columns))
@@ -255,13 +235,8 @@ def check_cases(table: Table, cases: Sequence[Case], file: str | None = None) ->
 
 
 def judge(compiled: CompiledData, case: Case, readable: int | None = None) -> Verdict:
-    """Whether what a case expects comes out. Facts that the table has no condition for are left out of the question.
-
-    Parameters
-    ----------
-    readable : int, optional
-        The rows that may be valid, as bits; for a table with cells that cannot be read. Default: all.
-    """
+    """Whether what a case expects comes out. Facts that the table has no condition for are left out of the question. `readable` are
+    the rows that may be valid, as bits, of a table with cells that cannot be read; None: all."""
     facts: dict[str, Fact] = {}
     faults: list[Fault] = []
     expected = Expected()
@@ -299,13 +274,8 @@ def told(verdict: Verdict, assets: Sequence[str]) -> str:
 
 
 def read_expected(text: str) -> Expected:
-    """Read what a case expects.
-
-    Raises
-    ------
-    CellError, ContextError
-        It is not written as asset names, signed names or "(none)".
-    """
+    """Read what a case expects. Raises CellError or ContextError where it is not written as asset names, signed names or
+    "(none)"."""
     body = text.strip()
     if body == NONE:
         return Expected(is_exact=True)

@@ -149,23 +149,10 @@ def effects(
 ) -> Effects:
     """What the change from one table to another does.
 
-    Parameters
-    ----------
-    before, after : Table
-        Without cells that cannot be read.
-    changes : Diff, optional
-        Of the two tables, where it is known already.
-    work, samples, seed : int
-        As in `contextdb.coverage`, for each question.
-    most : int
-        At most so many changed assets are looked at, in the order of their rows.
-
-    Raises
-    ------
-    TableError
-        Cells cannot be read, or a column is of another type before than after.
-    ExpressionError
-        An assumption of the table cannot be read.
+    The tables have no cells that cannot be read; `changes` is their diff where it is known already. `work`, `samples` and `seed`
+    are as in `contextdb.coverage`, for each question. At most `most` changed assets are looked at, in the order of their rows.
+    Raises TableError where cells cannot be read, or a column is of another type before than after; ExpressionError where an
+    assumption of the table cannot be read.
     """
     if is_nested(before) or is_nested(after):
         before, after, changes = _flat(before), _flat(after), None
@@ -216,7 +203,7 @@ def merge_effects(
     measure = Measure(shared_space(without_rules(ours).table, without_rules(merged).table), work, samples, 0)
     both = [measure.common(one, other) for one in mine.opened for other in yours.opened]
     gaps = sorted({box.text: box for box in both if box is not None}.values(), key=lambda box: -box.share)
-    kept = _keys(merged, (*yours.dead, *yours.overlaps))
+    kept = {_key(merged, finding) for finding in (*yours.dead, *yours.overlaps)}
     findings = tuple(f for f in (*mine.dead, *mine.overlaps) if _key(merged, f) in kept)
     return MergeEffects(tuple(gaps), findings)
 
@@ -373,10 +360,6 @@ def _told(table: EitherTable, report: CoverageReport) -> Iterator[Finding]:
 def _key(table: EitherTable, finding: Finding) -> Key:
     others = sorted(table.assets[row] for row in finding.by if row < table.n_rows) if finding.rule in OVERLAP_RULES else ()
     return finding.rule, table.assets[finding.row or 0], tuple(others)
-
-
-def _keys(table: EitherTable, findings: Sequence[Finding]) -> set[Key]:
-    return {_key(table, finding) for finding in findings}
 
 
 def _placed(table: EitherTable, finding: Finding) -> Finding:

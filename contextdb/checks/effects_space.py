@@ -128,13 +128,8 @@ class Shared:
 
 
 def shared_space(before: EitherTable, after: EitherTable) -> Shared:
-    """The conditions of two tables together.
-
-    Raises
-    ------
-    TableError
-        Cells cannot be read, or a column is of another type before than after.
-    """
+    """The conditions of two tables together. Raises TableError where cells cannot be read, or a column is of another type before
+    than after."""
     if faults := [fault for table in (before, after) for fault in table.faults]:
         raise TableError(*faults)
     conditions = dict(_conditions(before, after))

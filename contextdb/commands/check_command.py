@@ -135,17 +135,13 @@ def _check_files(files: Sequence[tuple[str | None, Path]], schema: Schema | None
         findings += check_rows(table, progress=None if log is None else partial(_tell, log))
         findings += _check_cases(table, cases_path(path))
     if schema is not None and len(read) == len(files):
-        lines = _lines_of(schema)
+        lines = key_lines(read_bytes(Path(schema.file)).decode("utf-8-sig")) if schema.file else {}
         findings += [*unused_conditions(schema, read, lines), *check_costs(schema, lines)]
     return CheckReport(tuple(tables), tuple(findings))
 
 
 def _tell(told: Bar, part: str, share: float) -> None:
     told(int(1000 * share), 1000, part)
-
-
-def _lines_of(schema: Schema) -> dict[tuple[str, ...], int]:
-    return key_lines(read_bytes(Path(schema.file)).decode("utf-8-sig")) if schema.file else {}
 
 
 def _check_cases(table: Table, path: Path) -> list[Finding]:

@@ -94,13 +94,7 @@ def _code(results: CoverageResults) -> ExitCode:
 
 def tables_at(text: str) -> list[Table]:
     """The tables under a path: a folder of them, one file, or a table by its name. Of a folder those that are in no other: the
-    others are measured where they are.
-
-    Raises
-    ------
-    ContextDBError
-        With every fault of every file; a folder without a table is one.
-    """
+    others are measured where they are. Raises ContextDBError with every fault of every file; a folder without a table is one."""
     if not os.path.isdir(text) and Path(text).name != SCHEMA_FILE:
         return [load_table(table_path(text))]
     project = Project.load(text)

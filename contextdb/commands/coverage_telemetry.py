@@ -40,13 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser, percent: Callable[[str], floa
 
 
 def require_telemetry(arguments: argparse.Namespace) -> None:
-    """Refuse options about telemetry where there is none.
-
-    Raises
-    ------
-    ContextError
-        The first of them is named.
-    """
+    """Refuse options about telemetry where there is none: raises ContextError that names the first of them."""
     if arguments.telemetry:
         if arguments.scheduler is not None and arguments.engine != "dask":
             raise ContextError(Fault("--scheduler is the address of Dask's.", "--engine dask with it"))

@@ -96,13 +96,8 @@ def run(arguments: argparse.Namespace) -> ExitCode:
 
 
 def make_sample(source: Path, folder: Path) -> None:
-    """Copy the sample tables into a new folder and make their clips.
-
-    Raises
-    ------
-    FileError
-        The folder is there already, or cannot be made.
-    """
+    """Copy the sample tables into a new folder and make their clips. Raises FileError where the folder is there already, or cannot
+    be made."""
     Project.load(source)  # says what is wrong with it
     if folder.exists():
         found = Fault("this already exists.", "the name of a folder that does not exist yet", place=Place(str(folder)))
@@ -128,13 +123,8 @@ def _copy(source: Path, to: Path) -> None:
 
 
 def sample_folder() -> Path:
-    """Where the sample tables are: inside an installed package, or in the checkout next to it.
-
-    Raises
-    ------
-    FileError
-        They are in neither.
-    """
+    """Where the sample tables are: inside an installed package, or in the checkout next to it. Raises FileError where they are in
+    neither."""
     package = Path(contextdb.__file__).parent
     for folder in (package / "_tables", package.parent / "tables"):
         if (folder / SCHEMA_FILE).is_file():

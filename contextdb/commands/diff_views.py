@@ -47,18 +47,13 @@ def as_markdown(found: Diff, shows_all: bool = False, more: str = "") -> str:
     rows = [f"| {' | '.join(escaped(shown(t, 200)) for t in _markdown_texts(c))} |" for c in found.cells]
     room = sys.maxsize if shows_all else MOST_BYTES - len(more.encode())
     for head, listed in (([], parts), (["| asset | column | before | after |", "| --- | --- | --- | --- |"], rows)):
-        kept = _fitting(listed, room)
+        ends = list(accumulate(map(_size, listed)))
+        kept = listed[: bisect_right(ends, room)]
         room -= sum(map(_size, kept))
         left = len(listed) - len(kept)
         lines += ["", *head, *kept] if kept else []
         lines += ["", f"… and {left:,} more; `contextdb diff --all` shows every one."] if left else []
     return "\n".join(lines) + "\n" + more
-
-
-def _fitting(lines: Sequence[str], room: int) -> Sequence[str]:
-    """The first lines that go into so many bytes."""
-    ends = list(accumulate(map(_size, lines)))
-    return lines[: bisect_right(ends, room)]
 
 
 def _size(line: str) -> int:

@@ -83,13 +83,8 @@ def run(arguments: argparse.Namespace) -> ExitCode:
 def _answered(
     arguments: argparse.Namespace, compiled: CompiledTable, files: Sequence[Path], folder: Path | None
 ) -> dict[Path, Answered]:
-    """What the contexts of each file found, in the order of the files.
-
-    Raises
-    ------
-    ContextDBError
-        A file cannot be read, holds facts that the table cannot use, or was not finished; then nothing is reported.
-    """
+    """What the contexts of each file found, in the order of the files. Raises ContextDBError where a file cannot be read, holds
+    facts that the table cannot use, or was not finished; then nothing is reported."""
     from contextdb.telemetry.engines import with_dask
     from contextdb.telemetry.evaluate_file import Question, evaluate_file
 

@@ -127,13 +127,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def setup_of(arguments: argparse.Namespace) -> Setup:
-    """What the arguments mean.
-
-    Raises
-    ------
-    FileError
-        There is no such folder, no git, or the folder is in no repository.
-    """
+    """What the arguments mean. Raises FileError where there is no such folder, no git, or the folder is in no repository."""
     folder = Path(arguments.path)
     if not os.path.isdir(arguments.path):
         raise FileError(Fault("there is no such folder.", "a folder of a git repository", place=Place(arguments.path)))

@@ -69,13 +69,8 @@ def run(arguments: argparse.Namespace) -> ExitCode:
 
 
 def _game(name: str | None, wanted: Wanted) -> Hearing | Sequence[Game]:
-    """The game that is meant, or several of which it may be one.
-
-    Raises
-    ------
-    ContextDBError
-        None runs that is meant; those that run are named.
-    """
+    """The game that is meant, or several of which it may be one. Raises ContextDBError where none runs that is meant; it names
+    those that run."""
     if name is not None:
         path = dict(doors()).get(name)
         if path is None:

@@ -93,7 +93,6 @@ def _merged_tables(path: Path, raws: Raws, arguments: argparse.Namespace) -> Mer
 
 
 def _told(found: Merge[Table], path: Path, is_text: bool, arguments: argparse.Namespace) -> ExitCode:
-    """Tell what came of it."""
     _tell(found, path, is_text)
     if found.conflicts:
         return ExitCode.FOUND
@@ -144,7 +143,6 @@ def _merged_toml(path: Path, raws: Raws, arguments: argparse.Namespace) -> Merge
 
 
 def _merged_notes(path: Path, raws: Raws, arguments: argparse.Namespace) -> Merged:
-    """Merge three versions of the notes by a table."""
     return merge_notes(raws, _names(path, arguments), arguments.take), lambda: ExitCode.OK
 
 

@@ -152,13 +152,7 @@ class MotionProject:
 
     @classmethod
     def load(cls, path: str) -> MotionProject:
-        """Read contextdb.toml and the tables.
-
-        Raises
-        ------
-        ContextDBError
-            With every fault; also when no database is declared.
-        """
+        """Read contextdb.toml and the tables. Raises ContextDBError with every fault; also when no database is declared."""
         project = Project.load(path)
         config = MotionConfig.from_dict(project.schema.motion, tables=project.tables, file=project.schema.file)
         if not config.databases:

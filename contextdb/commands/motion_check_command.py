@@ -58,7 +58,6 @@ class MotionReport(CheckReport):
         return replace(self, findings=tuple(_of_all(findings) for findings in alike.values()))
 
     def to_json(self) -> dict[str, object]:
-        """The JSON document."""
         databases = [{"database": name or None, "clips": n_clips} for name, n_clips in self.n_clips.items()]
         return {"format": 1, "findings": [finding.to_json() for finding in self.findings], "databases": databases}
 
@@ -86,13 +85,8 @@ def run(arguments: argparse.Namespace) -> ExitCode:
 
 
 def check_path(path: str, *, cache: bool = True) -> MotionReport:
-    """Check the motion of a folder; settings that cannot be read are findings too.
-
-    Raises
-    ------
-    FileError
-        There is no such folder.
-    """
+    """Check the motion of a folder; settings that cannot be read are findings too. Raises FileError where there is no
+    such folder."""
     folder = folder_of(Path(path))
     clips = clips_below(folder)
     if clips and not (folder / SCHEMA_FILE).exists():

@@ -23,17 +23,8 @@ SUFFIX = ".html"
 
 @dataclass(frozen=True, eq=False)
 class Played:
-    """A session with the databases and the poses of its project.
-
-    Attributes
-    ----------
-    file : str
-    trace : Trace
-    folder : str
-        Its project.
-    databases : mapping of name to MotionDatabase
-        Those that are what was recorded.
-    """
+    """A session with its project's folder, and the databases and the poses of it; the databases are those that are what was
+    recorded."""
 
     file: str
     trace: Trace

@@ -143,7 +143,6 @@ def _probe(character: Character, scene: Scene, drive: Drive, rate: float, folder
 
 
 def _measured(character: Character, trace: Trace, poses: Sequence[Pose], sticks: Sequence[tuple[float, float]]) -> Measures:
-    """The measures of a drive."""
     assert character.stream is not None, "a character with poses has a stream"
     databases = character.controller.selector.databases
     return measure(trace, character.stream.banks, poses=poses, databases=databases, wanted=sticks)

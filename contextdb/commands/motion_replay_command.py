@@ -33,10 +33,9 @@ from pathlib import Path
 
 import numpy as np
 
-from contextdb.cells.arguments import as_number
 from contextdb.commands.motion_build_command import MotionProject, warn
 from contextdb.commands.motion_page import Played, comment_of, page_file, rerun_file, write_page, write_rerun
-from contextdb.commands.motion_stage import add_view
+from contextdb.commands.motion_stage import add_view, number_of
 from contextdb.commands.motion_what_if import changes_of
 from contextdb.commands.progress import building_bar
 from contextdb.console import ExitCode, output, terminal_width
@@ -196,7 +195,6 @@ def _parts(replay: Replay, other: Trace | None) -> Iterator[Part]:
 
 
 def _write_trace(trace: Trace, path: Path) -> None:
-    """Write the Chrome trace."""
     place = Place(str(path))
     if path.suffix != ".json":
         raise FileError(Fault("a Chrome trace cannot be written to such a file.", "a name that ends in .json", place=place))
@@ -207,13 +205,8 @@ def _write_trace(trace: Trace, path: Path) -> None:
 
 
 def place_of(text: str, trace: Trace, file: str) -> int:
-    """Where the decision is that --at means: of that tick, or the last one at or before that time.
-
-    Raises
-    ------
-    QueryError
-        There is none; with the ticks and times there are.
-    """
+    """Where the decision is that --at means: of that tick, or the last one at or before that time. Raises QueryError, with the
+    ticks and times there are, where there is none."""
     ticks = [decision.tick for decision in trace.brief()]
     times_s = [decision.time_s for decision in trace.brief()]
     place = Place(file)
@@ -221,25 +214,17 @@ def place_of(text: str, trace: Trace, file: str) -> int:
         raise QueryError(Fault("the session has no decision.", "one with at least an update", place=place))
     accepted = f"a tick from {ticks[0]} to {ticks[-1]}, or a time from {times_s[0]:.2f}s to {times_s[-1]:.2f}s"
     if text.endswith("s"):
-        time_s = _number(text[:-1])
+        time_s = number_of(text[:-1])
         if time_s is not None and times_s[0] - 0.005 <= time_s <= times_s[-1] + 0.005:
             return max(0, bisect_right(times_s, time_s + 0.005) - 1)
     elif text.isdecimal() and int(text) in ticks:
         return ticks.index(int(text))
-    seconds = None if text.isdecimal() else _number(text)
+    seconds = None if text.isdecimal() else number_of(text)
     mend = in_quotes(f"{text}s") if seconds is not None and times_s[0] <= seconds <= times_s[-1] else ""
     raise QueryError(Fault(f"there is no decision at {in_quotes(text)}.", accepted, mend, place))
 
 
-def _number(text: str) -> float | None:
-    try:
-        return as_number(float(text))
-    except ValueError:
-        return None
-
-
 def _session(replay: Replay) -> Part:
-    """The whole session."""
     trace, asked = replay.trace, replay.asked
     if asked.json:
         told = [decision for decision in trace.brief() if _is_named(decision.playing, asked.name)]

@@ -90,12 +90,7 @@ class Stage:
 
     def valid(self, names: Collection[str], given: Sequence[str], unknown: Unknown) -> tuple[dict[str, Matches], dict[str, Fact]]:
         """The valid rows for each of some databases by FACT=VALUE arguments, and the facts. Without any, nothing is filtered.
-
-        Raises
-        ------
-        ContextDBError
-            A fact that no table of these databases asks for, or facts that a table misses.
-        """
+        Raises ContextDBError for a fact that no table of these databases asks for, or facts that a table misses."""
         if not given:
             return {}, {}
         for name in names:
@@ -113,13 +108,8 @@ class Stage:
         return {name: matches[table] for name in names if (table := self.config.databases[name].table) is not None}, every
 
     def query(self, text: str, names: Sequence[str], path: argparse.Namespace) -> Features:
-        """A query from CLIP@SECONDS, of one of some databases, and the path that --speed, --turn and --strafe wish for.
-
-        Raises
-        ------
-        ContextDBError
-            There is no such clip (with the nearest), or no such moment of it.
-        """
+        """A query from CLIP@SECONDS, of one of some databases, and the path that --speed, --turn and --strafe wish for. Raises
+        ContextDBError where there is no such clip (with the nearest), or no such moment of it."""
         clip, at_s = clip_at(text)
         schema = self.schema(names[0])
         if clip.casefold().endswith(".bvh"):
@@ -199,7 +189,7 @@ def _is_fact_of(text: str, table: CompiledTable) -> bool:
 def clip_at(text: str) -> tuple[str, float]:
     """Name and seconds of CLIP@SECONDS."""
     clip, _, seconds = text.rpartition("@")
-    at_s = _number(seconds.removesuffix("s").strip())
+    at_s = number_of(seconds.removesuffix("s").strip())
     if not clip or at_s is None or not 0.0 <= at_s <= MOST_SECONDS:
         mend = "" if clip or not text else in_quotes(f"{text}@0")
         raise QueryError(Fault(f"{in_quotes(text)} is not a moment of a clip.", f"{CLIP_AT}, such as walk@1.5", mend))
@@ -239,7 +229,7 @@ def read_tags(text: str) -> TagFilter:
     for word in text.split():
         sign, body = (word[0], word[1:]) if word[0] in "+-" else ("", word)
         name, tilde, cost_text = body.partition("~")
-        cost = _number(cost_text)
+        cost = number_of(cost_text)
         if not name or (tilde and (cost is None or not 0.0 <= cost <= MOST_COST or sign == "+")):
             accepted = 'Move, +Move, -Move, "Move~2.5" or "-Move~2.5"'
             raise argparse.ArgumentTypeError(Fault(f"{in_quotes(word)} is not a tag to filter by.", accepted).message)
@@ -253,7 +243,8 @@ def read_tags(text: str) -> TagFilter:
 # ---- numbers as arguments
 
 
-def _number(text: str) -> float | None:
+def number_of(text: str) -> float | None:
+    """The finite number that a text is, None for any other."""
     try:
         return as_number(float(text))
     except ValueError:
@@ -261,14 +252,14 @@ def _number(text: str) -> float | None:
 
 
 def _speed(text: str) -> float:
-    number = _number(text)
+    number = number_of(text)
     if number is None or not 0.0 <= number <= MOST_SPEED_MPS:
         raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a speed. Accepted: 0 to {MOST_SPEED_MPS:g} m/s, such as 1.3.")
     return number
 
 
 def _degrees(text: str) -> float:
-    number = _number(text)
+    number = number_of(text)
     if number is None or abs(number) > 3600.0:
         raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not an angle. Accepted: -3600 to 3600 degrees, such as 45.")
     return number

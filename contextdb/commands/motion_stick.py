@@ -13,10 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
-from contextdb.cells.arguments import as_number
 from contextdb.cells.facts import Unknown
 from contextdb.columns import TextColumn
 from contextdb.commands import missing_facts_by_option
+from contextdb.commands.motion_stage import number_of
 from contextdb.compiled.table import CompiledTable
 from contextdb.disk import path_in_quotes
 from contextdb.errors import ContextDBError, Fault, Place, TableError, in_quotes, nearest, some
@@ -41,16 +41,8 @@ LONGEST_S = 24 * 3600.0
 
 @dataclass(frozen=True, eq=False)
 class Stick:
-    """What was asked for at some moments.
-
-    Attributes
-    ----------
-    path : Path
-    times_s : float64 array
-        Ascending, from 0.
-    asked : mapping of str to float64 array
-        By the column's name; NaN where it says nothing.
-    """
+    """What was asked for at some moments, `times_s` float64 [T], ascending from 0: `asked` float64 [T] by the column's name, NaN
+    where it says nothing."""
 
     path: Path
     times_s: Floats
@@ -77,13 +69,8 @@ class Stick:
 
     @classmethod
     def read(cls, path: Path, conditions: Sequence[str]) -> Stick:
-        """Read a file; `conditions` are the columns that are facts.
-
-        Raises
-        ------
-        TableError, FileError
-            The file cannot be read; with every column that is neither the stick's nor a fact, and every value that is not a number.
-        """
+        """Read a file; `conditions` are the columns that are facts. Raises TableError or FileError where the file cannot be read;
+        with every column that is neither the stick's nor a fact, and every value that is not a number."""
         source, columns = read_texts(path)
         faults = [_unknown(path, column.name, conditions) for column in columns if column.name not in (*STICK, *conditions)]
         by_name = {column.name: column for column in columns if column.name in STICK}
@@ -107,12 +94,8 @@ class Moments:
     def read(cls, path: Path, tables: Mapping[str, CompiledTable], unknown: Unknown, own: Collection[str] = ()) -> Moments | None:
         """Read the facts for some tables; those named `own` the character computes where the file does not give them.
 
-        None when the file has no facts, and the tables ask for others than the character's own: nothing is filtered.
-
-        Raises
-        ------
-        ContextDBError
-            Facts that a query cannot use; with file, line and fact.
+        None when the file has no facts, and the tables ask for others than the character's own: nothing is filtered. Raises
+        ContextDBError for facts that a query cannot use; with file, line and fact.
         """
         read = {name: read_contexts(path, table) for name, table in tables.items()}
         known = {name: [c for c in each.facts.columns if c in tables[name].asked] for name, each in read.items()}
@@ -184,7 +167,7 @@ def _numbers(path: Path, source: AnySource, column: TextColumn, faults: list[Fau
     least, most = LIMITS[column.name]
     values = np.full(len(column.texts), np.nan)
     for code, text in enumerate(column.texts):
-        number = _number(text)
+        number = number_of(text)
         if number is not None and least <= number <= most:
             values[code] = number
         elif text.strip() or column.name == "time_s":
@@ -192,13 +175,6 @@ def _numbers(path: Path, source: AnySource, column: TextColumn, faults: list[Fau
             place = Place(str(path), source.line(row), column.name, row)
             faults.append(Fault(f"{in_quotes(text)} is not a valid number.", f"{least:g} to {most:g}", place=place))
     return np.asarray(values[column.codes])
-
-
-def _number(text: str) -> float | None:
-    try:
-        return as_number(float(text))
-    except ValueError:
-        return None
 
 
 def _check_times(path: Path, source: AnySource, times_s: Floats, faults: list[Fault]) -> None:

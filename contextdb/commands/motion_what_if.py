@@ -17,13 +17,8 @@ MOST = 1e9
 
 
 def changes_of(texts: Sequence[str], databases: Mapping[str, MotionDatabase]) -> Changes:
-    """The changes that some texts mean.
-
-    Raises
-    ------
-    QueryError
-        A text that is no NAME=VALUE, a name that there is not, with the nearest, or a value that is no number.
-    """
+    """The changes that some texts mean. Raises QueryError for a text that is no NAME=VALUE, a name that there is not, with the
+    nearest, or a value that is no number."""
     channels = list(dict.fromkeys(name for each in databases.values() for name in each.channel_names))
     known = [*channels, *BIASES, *(f"{THRESHOLD}{name}" for name in databases)]
     weights: dict[str, float] = {}

@@ -72,13 +72,8 @@ def run(arguments: argparse.Namespace) -> ExitCode:
 
 
 def read_facts(given: list[str], compiled: CompiledTable) -> dict[str, Fact]:
-    """FACT=VALUE arguments as facts in canonical form.
-
-    Raises
-    ------
-    ContextError
-        For every argument that is not a fact of the table, together.
-    """
+    """FACT=VALUE arguments as facts in canonical form. Raises ContextError for every argument that is not a fact of the table,
+    together."""
     facts: dict[str, Fact] = {}
     faults: list[Fault] = []
     for text in given:
@@ -96,12 +91,7 @@ def read_facts(given: list[str], compiled: CompiledTable) -> dict[str, Fact]:
 
 def read_actors(given: list[str], compiled: CompiledTable) -> tuple[list[str], dict[str, list[dict[str, object]]] | None]:
     """The arguments that are not facts of actors, and the actors of those that are, in the order of their numbers; None without.
-
-    Raises
-    ------
-    ContextError
-        For every fact that an actor cannot have or has twice, together.
-    """
+    Raises ContextError for every fact that an actor cannot have or has twice, together."""
     plain: list[str] = []
     found: dict[str, dict[int, dict[str, object]]] = {}
     faults: list[Fault] = []
@@ -241,13 +231,9 @@ def _matching(compiled: CompiledTable, explanation: Explanation) -> Iterator[tup
     yield tuple(head)
     for r in matches:
         line = [str(r + 1), *(["may" if undecided >> r & 1 else "always"] if undecided else []), compiled.assets[r]]
-        line += [_cast(cast, r)] if cast else []
+        line += [", ".join(f"{role}: {offer.label}" for role, offer in cast.cast(r).items())] if cast else []
         line += [outcome.said_of([r])] if prefers_some else []
         yield tuple(line)
-
-
-def _cast(matches: CastMatches, row: int) -> str:
-    return ", ".join(f"{role}: {offer.label}" for role, offer in matches.cast(row).items())
 
 
 def _nearest_lines(rows: list[RowExplanation], width: int) -> Iterator[str]:

@@ -28,12 +28,7 @@ sleep, clock = time.sleep, time.monotonic
 def watched(path: str, work: Callable[[], ExitCode]) -> ExitCode:
     """Do some work on a folder now, and again when files in it have changed and rested; ends with Ctrl+C.
 
-    Says what is wrong; the next change may mend it.
-
-    Raises
-    ------
-    FileError
-        There is no such folder.
+    Says what is wrong; the next change may mend it. Raises FileError where there is no such folder.
     """
     folder = folder_of(Path(path))
     seen: Stamps = look(_files(folder))

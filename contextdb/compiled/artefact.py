@@ -70,7 +70,8 @@ from contextdb.cells.domains import Domain
 from contextdb.cells.sets import TagMeet, TagSet
 from contextdb.columns import TextColumn
 from contextdb.compiled.classes import ColumnMasks, NumberMasks, TagMasks, ValueMasks, WideMasks
-from contextdb.compiled.data import CompiledData, SoftMasks
+from contextdb.compiled.data import CompiledData
+from contextdb.compiled.mask_bits import SoftMasks
 from contextdb.compiled.outputs_stored import outputs_from, outputs_to_tensors
 from contextdb.compiled.pick_columns import PickColumns
 from contextdb.compiled.programs import programs_to_tensors
@@ -153,15 +154,8 @@ def _kind_of(compiled: CompiledData) -> FileKind:
 
 
 def open_artefact(path: Path) -> CompiledData:
-    """Open a compiled table by memory map, checked.
-
-    Raises
-    ------
-    ArtefactError
-        The file is truncated, altered, of another layout, or no artefact at all; with the reason and the mend.
-    FileError
-        The file cannot be read.
-    """
+    """Open a compiled table by memory map, checked. Raises ArtefactError where the file is truncated, altered, of another layout,
+    or no artefact at all; with the reason and the mend; FileError where the file cannot be read."""
     tensors, metadata = read_tensors(path, WITH_RANKS)
     with COMPILED.reading(path):
         about = metadata["about"]

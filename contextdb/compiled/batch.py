@@ -119,8 +119,6 @@ class BatchMatches(ManyMatches):
 
     @property
     def mirrored(self) -> ManyMatches:
-        """The valid rows of the same contexts with mirrored facts; see `Matches.mirrored`. The same object where no fact of the
-        table changes in a mirror."""
         return self._mirrored if self.compiled.mirroring else self
 
     @cached_property
@@ -133,7 +131,6 @@ class BatchMatches(ManyMatches):
 
     @property
     def codes(self) -> Codes:
-        """The codes of every context, as `CompiledTable.encode` gives them for one: int32 [N, P]."""
         self.compiled.refuse_rules("codes do not keep the facts that they need")
         return read_only(self._codes.view())
 
@@ -175,7 +172,6 @@ class BatchMatches(ManyMatches):
         return matches
 
     def _costs_of_pairs(self) -> CostsOfPairs:
-        """What tells what soft cells cost in some rows of some contexts."""
         kept = self.kept
         assert kept is not None, "a table with soft cells keeps its facts"
         return costs_of_pairs(

@@ -37,12 +37,7 @@ def facts_of(contexts: object) -> dict[str, Any]:
             raise ContextError(
                 Fault(f"{type(column).__name__} is not a column of facts.", "a list, a flat array or a polars series", place=place)
             )
-    return {name: _unmasked(column) for name, column in contexts.items()}
-
-
-def _unmasked(column: Any) -> Any:
-    """A column in which a fact that numpy masks is missing."""
-    return column.tolist() if isinstance(column, np.ma.MaskedArray) else column
+    return {name: column.tolist() if isinstance(column, np.ma.MaskedArray) else column for name, column in contexts.items()}
 
 
 def common_length(columns: Mapping[str, Any]) -> int:

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.bitmask import Rows, Words
-from contextdb.compiled.data import CompiledData, SoftMasks
+from contextdb.compiled.data import CompiledData
+from contextdb.compiled.mask_bits import SoftMasks
 
 CostsOfPairs = Callable[[Rows, Rows], NDArray[np.float64]]
 """Of P contexts and rows what the soft cells of each depth cost: float64 [D, P]."""

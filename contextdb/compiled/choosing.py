@@ -99,13 +99,9 @@ class Choosing:
         return self.ranks[0].tolist(), self.weights[0].tolist()
 
     def may_be_picked(self, contexts: Rows, rows: Rows, costs: Floats | None, is_one: bool = False) -> Rows:
-        """Of P pairs those that the policies may pick: their places. `costs` [D, P] are needed where `is_cheapest` is True.
-
-        Raises
-        ------
-        PolicyError
-                Several rows of a table whose policy is "unique"; with the number of the first such context, if not `is_one`.
-        """
+        """Of P pairs those that the policies may pick: their places. `costs` [D, P] are needed where `is_cheapest` is True. Raises
+        PolicyError for several rows of a table whose policy is "unique"; with the number of the first such context, if not
+        `is_one`."""
         kept = np.flatnonzero(self.pickable[rows])
         for depth in range(len(self.taken)):
             at = rows[kept]

@@ -33,7 +33,7 @@ from contextdb.cells.sets import ANY, Cell
 from contextdb.columns import TextColumn
 from contextdb.compiled.classes import ColumnMasks
 from contextdb.compiled.lookup import UNUSUAL, SingleLookup, StraightAsk, build_ask, ruled_ask, single_lookup
-from contextdb.compiled.mask_bits import bits_of, nbytes
+from contextdb.compiled.mask_bits import SoftMasks, bits_of, costs_of, nbytes
 from contextdb.compiled.matches import Answering, Matches, with_mirrored, with_penalties, with_widened
 from contextdb.compiled.memory import Memory
 from contextdb.compiled.outputs import NO_OUTPUTS, Outputs
@@ -54,9 +54,6 @@ Change = Callable[[Fact, Condition], Fact]
 def as_given(fact: Fact, condition: Condition) -> Fact:
     """A fact as it is."""
     return fact
-
-
-SoftMasks = tuple[ColumnMasks, NDArray[np.float64]]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -468,15 +465,6 @@ class CompiledData(Unchanging):
         """Raise ContextError for a table with rules."""
         if self.when is not None:
             raise ContextError(Fault(f"the table {in_quotes(self.name)} has rules: {why}.", "query, query_many or live"))
-
-
-def costs_of(soft: SoftMasks, fact: Fact) -> NDArray[np.float64]:
-    """What the soft cells of one column cost with a fact in canonical form: float64 [n], n the rows of each depth, one after the
-    other."""
-    masks, penalties = soft
-    n = len(penalties)
-    fails = ~bitmask.unpack(bitmask.from_int(bits_of(masks, fact)[0], n), n)
-    return np.where(fails, penalties, 0.0)
 
 
 def _composed(ask: Callable[[Context], Matches], complete: Callable[[Context], Context]) -> Callable[[Context], Matches]:

@@ -176,14 +176,9 @@ class LiveContext(MutableMapping[str, object]):
         return self._facts[name]
 
     def update(self, facts: Mapping[str, object] | Iterable[tuple[str, object]]) -> None:  # type: ignore[override]
-        """Set several facts, all or none; facts that the table does not use are ignored, as in `query`.
-
-        Raises
-        ------
-        ContextError
-            A name looks like the misspelt name of a condition whose fact is not given; names that the project declares belong to
-            other tables and are not misspelt. Or a value is wrong; the message names the fact. Then none is set.
-        """
+        """Set several facts, all or none; facts that the table does not use are ignored, as in `query`. Raises ContextError for a
+        wrong value, which names the fact, and for a name that looks like the misspelt name of a condition whose fact is not given;
+        names that the project declares belong to other tables and are not misspelt."""
         if type(facts) is not dict:
             facts = as_context(facts)
         if not self._known.issuperset(facts):
@@ -276,13 +271,8 @@ class LiveContext(MutableMapping[str, object]):
 
     def matches(self) -> Matches:
         """The valid rows now; the same object as before while they stay the same, in a table without soft cells and without
-        conditions whose facts change in a mirror or that have a hysteresis.
-
-        Raises
-        ------
-        ContextError
-            Facts are missing and the context was made with unknown="error".
-        """
+        conditions whose facts change in a mirror or that have a hysteresis. Raises ContextError where facts are missing and the
+        context was made with unknown="error"."""
         if self._odd:
             if self._cast is not None:
                 return self._cast.query(self.facts)

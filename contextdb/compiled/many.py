@@ -129,18 +129,9 @@ class ManyMatches(Unchanging, Sequence[Matches]):
         return found
 
     def only(self, rows: SaidRows | NDArray[np.bool_] | Matches | ManyMatches) -> ManyMatches:
-        """The same answers without the rows that are not among some rows.
-
-        Parameters
-        ----------
-        rows
-            For all contexts alike, as `Matches.only` takes them; or for each context: bool [N, n_rows], or as many answers.
-
-        Raises
-        ------
-        ContextError
-            As `Matches.only`; flags or answers for another number of contexts.
-        """
+        """The same answers without the rows that are not among some: for all contexts alike, as `Matches.only` takes them, or for
+        each context, bool [N, n_rows] or as many answers. Raises ContextError as `Matches.only` does, and for flags or answers for
+        another number of contexts."""
         return FewerMatches(self, self._masks_said(rows))
 
     def _masks_said(self, rows: SaidRows | NDArray[np.bool_] | Matches | ManyMatches) -> Words:
@@ -232,11 +223,9 @@ class ListedMatches(ManyMatches):
 
     @cached_property
     def always(self) -> Words:
-        """The rows that hold all values of set-valued facts: uint64 [N, W]."""
         return read_only(self._stacked([m.always for m in self.answers]))
 
     def lists(self) -> list[Rows]:
-        """The row numbers of each context: a list of int64 arrays."""
         return [m.indices for m in self.answers]
 
     def __len__(self) -> int:
@@ -272,7 +261,6 @@ class FewerMatches(ManyMatches):
 
     @cached_property
     def always(self) -> Words:
-        """The rows that hold all values of set-valued facts: uint64 [N, W]."""
         return read_only(self.whole.always & self.others)
 
     def __len__(self) -> int:
@@ -313,7 +301,6 @@ class JoinedMatches(ManyMatches):
 
     @cached_property
     def always(self) -> Words:
-        """The rows that hold all values of set-valued facts: uint64 [N, W]."""
         one, other = self.first.always, self.second.always
         return read_only(self.mask & (one & other if self.join is and_ else one | other))
 

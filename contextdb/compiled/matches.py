@@ -179,12 +179,9 @@ class Matches:
     def mirrored(self) -> Matches:
         """The answer to the same query with mirrored facts: the rows whose assets may be played mirrored.
 
-        Computed on first use, with the facts as they were. The same object where no fact of the table changes in a mirror.
-
-        Raises
-        ------
-        ContextError
-            A derived fact or a rule cannot be computed with mirrored facts, or the answer was asked by codes, which keep no facts.
+        Computed on first use, with the facts as they were. The same object where no fact of the table changes in a mirror. Raises
+        ContextError where a derived fact or a rule cannot be computed with mirrored facts, or the answer was asked by codes, which
+        keep no facts.
         """
         if not self._table.is_mirroring:
             return self
@@ -205,12 +202,7 @@ class Matches:
         conditions.
 
         Computed on first use, with the facts as they were. The same object where no condition of the table has a hysteresis, and
-        for an answer asked by codes, which keep no facts.
-
-        Raises
-        ------
-        ContextError
-            A derived fact or a rule cannot be computed.
+        for an answer asked by codes, which keep no facts. Raises ContextError where a derived fact or a rule cannot be computed.
         """
         known = getattr(self, "_widened", self)
         if not isinstance(known, Matches):
@@ -223,13 +215,8 @@ class Matches:
         return hasattr(self, "_widened")
 
     def casting(self, row: int) -> Mapping[str, Mapping[str, Any]]:
-        """Who fills which role in a valid row, as {role: actor}; for an answer to a query with actors.
-
-        Raises
-        ------
-        ContextError
-            The query had no actors, or the row is not valid.
-        """
+        """Who fills which role in a valid row, as {role: actor}; for an answer to a query with actors. Raises ContextError where
+        the query had no actors, or the row is not valid."""
         raise ContextError(Fault("this query had no actors, so nobody is cast.", "query(facts, actors={...})"))
 
     def castings(self, row: int) -> Sequence[Mapping[str, Mapping[str, Any]]]:
@@ -406,12 +393,10 @@ class SetMatches(Matches):
 
     @property
     def always(self) -> Words:
-        """The rows that hold all values of set-valued facts: uint64 [W]."""
         return bitmask.from_int(self._always, self.n_rows)
 
     @property
     def _always_bits(self) -> int:
-        """The rows that hold all values of set-valued facts, as one integer."""
         return self._always
 
     def _keep(self, bits: int) -> None:

@@ -29,16 +29,8 @@ OutputCells = Column | TextColumn
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Outputs(Unchanging):
-    """The outputs of a compiled table: a table without outputs has none, which is not an error.
-
-    Attributes
-    ----------
-    declared : tuple of Output
-        Name, type, bounds, values, size, unit and description of each.
-    names : tuple of str
-    fallback : dict
-        The value of each output where no row is valid: what `fallback` gives, else the default, else False, 0, NaN or "".
-    """
+    """The outputs of a compiled table: a table without outputs has none, which is not an error. `fallback` is the value of each
+    where no row is valid: what the table's fallback gives, else the default, else False, 0, NaN or ""."""
 
     declared: tuple[Output, ...] = ()
     cells: tuple[OutputCells, ...] = ()
@@ -64,21 +56,9 @@ class Outputs(Unchanging):
         return self._values(name)[:-1]
 
     def of(self, rows: ArrayLike, name: str) -> Column:
-        """The output of some rows, in an array of the shape of `rows`; a row of -1 reads what there is without a row.
-
-        Parameters
-        ----------
-        rows : int array, any shape
-            Row numbers, such as `pick_many` gives.
-        name : str
-
-        Raises
-        ------
-        NoSuchOutput
-            The table has no such output.
-        NoSuchPlace
-            A row that the table does not have.
-        """
+        """The output of some rows, int of any shape, such as `pick_many` gives, in an array of that shape; a row of -1 reads what
+        there is without a row. Raises NoSuchOutput where the table has no such output, NoSuchPlace for a row that the table does
+        not have."""
         values = self._values(name)
         numbers = np.asarray(rows)
         if not numbers.size:

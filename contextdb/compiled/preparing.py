@@ -23,14 +23,10 @@ def prepare(compiled: CompiledData, casting: bool = False, batches: bool = False
         _ = compiled.ways.pickable
     _ = compiled.once(Choosing.of).plain
     if casting and compiled.slots is not None:
-        _prepare_casting(compiled)
+        nobody = Ask({role: [] for role in roles_of_table(compiled).conditions}, None, "any")
+        query_with_actors(compiled, {}, nobody)
     if batches:
         _prepare_batches(compiled)
-
-
-def _prepare_casting(compiled: CompiledData) -> None:
-    nobody = Ask({role: [] for role in roles_of_table(compiled).conditions}, None, "any")
-    query_with_actors(compiled, {}, nobody)
 
 
 def _prepare_batches(compiled: CompiledData) -> None:

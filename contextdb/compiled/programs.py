@@ -238,7 +238,6 @@ def _flags(link: Link) -> int:
 
 
 def _type_of(part: Part) -> Values:
-    """What the values of a part are."""
     if isinstance(part, Select):
         return _type_of(part.then)
     if isinstance(part, Const):

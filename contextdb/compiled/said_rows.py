@@ -18,15 +18,8 @@ ACCEPTED = "one bool for each row, row numbers, assets, or an answer of this tab
 
 
 def bits_said(said: object, n_rows: int, of_assets: Callable[[Sequence[str]], int]) -> int:
-    """The rows that are said, as bits; `of_assets` gives those of assets.
-
-    Raises
-    ------
-    WrongType, ContextError
-        They are said in none of these ways, or there are not as many flags as rows.
-    NoSuchPlace
-        The table has no row of that number.
-    """
+    """The rows that are said, as bits; `of_assets` gives those of assets. Raises WrongType or ContextError where they are said in
+    none of these ways, or there are not as many flags as rows; NoSuchPlace where the table has no row of that number."""
     if isinstance(said, np.ndarray):
         if said.dtype == np.bool_:
             return bits_of_flags(said, n_rows)

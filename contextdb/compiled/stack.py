@@ -62,19 +62,11 @@ class Groups:
 
 @dataclass(frozen=True, eq=False)
 class MaskStack:
-    """The masks, and where each column's begin.
+    """The masks uint64 [n_masks, W], column after column, then the leaves of `groups`, and where each column's begin. Mask 0 holds
+    every row: a fact that is ignored.
 
-    Attributes
-    ----------
-    masks : uint64 array, shape (n_masks, W)
-        Column after column, then the leaves of `groups`; mask 0 holds every row: a fact that is ignored.
-    starts : tuple of int
-        For each condition the number of its first mask.
-    n_slots : tuple of int
-        For each condition how many codes it has.
-    wide : int64 array, shape (n_wide, 6)
-        For each wide column: condition, first mask, layers, G, shift, number of classes K. After its layers one mask for a
-        missing fact.
+    For each condition `starts` is the number of its first mask, `n_slots` how many codes it has. `wide` int64 [n_wide, 6] is for
+    each wide column: condition, first mask, layers, G, shift, number of classes K. After its layers is one mask for a missing fact.
     """
 
     masks: Words

@@ -10,7 +10,7 @@ from __future__ import annotations
 import keyword
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from unicodedata import normalize
 
@@ -18,6 +18,7 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
 from contextdb.cells.outputs import Output
 from contextdb.cells.words import format_number
+from contextdb.compiled.c_header.naming import values_of
 from contextdb.compiled.stub_contexts import NUMBERS, accepted, contexts_of
 from contextdb.compiled.table import CompiledTable
 from contextdb.errors import shown
@@ -46,7 +47,7 @@ def stubs_of(tables: Mapping[str, CompiledTable]) -> str:
         for condition in table.asked.values():
             if condition.domain.values and condition not in literals:
                 literals[condition] = names.of(condition.name)
-                parts.append(_literal(literals[condition], condition))
+                parts.append(_listed(literals[condition], condition.name, values_of(condition)))
         parts.append(_facts(names.of(f"{table.name} facts"), table, literals))
         parts += contexts_of(table.name, {c.name: _type(c, literals.get(c)) for c in table.asked.values()}, names.of)
         if len(table.outputs):
@@ -74,21 +75,9 @@ class _Names:
         return unique
 
 
-def _literal(name: str, condition: Condition) -> str:
-    values = condition.domain.values or ()
-    if condition.domain.type.is_tags:
-        values = tuple(dict.fromkeys(tag for value in values for tag in _with_those_above(value)))
-    return _listed(name, condition.name, values)
-
-
 def _listed(name: str, of: str, values: Iterable[str]) -> str:
     listed = "".join(f"    {value!r},\n" for value in values)
     return f"# {shown(of, 200)}\n{name}: TypeAlias = Literal[\n{listed}]\n"
-
-
-def _with_those_above(tag: str) -> Iterator[str]:
-    parts = tag.split(".")
-    return (".".join(parts[: n + 1]) for n in range(len(parts)))
 
 
 def _facts(name: str, table: CompiledTable, literals: Mapping[Condition, str]) -> str:

@@ -213,13 +213,8 @@ class CompiledTable(Unchanging):
         prefer: Prefer = None,
     ) -> LiveContext:
         """Keep a context between frames: `live["speed"] = 3.2`, then `live.matches()`. Actors are offered from then on, as with
-        `LiveContext.actors`.
-
-        Raises
-        ------
-        ContextError
-            A fact cannot be used, or its name looks misspelt. Facts may be missing until `matches()` is called.
-        """
+        `LiveContext.actors`. Raises ContextError where a fact cannot be used, or its name looks misspelt. Facts may be missing
+        until `matches()` is called."""
         if old:
             return self.live(facts, **by_name("live", old, unknown=unknown, actors=actors, prefer=prefer))
         check_mode(unknown)
@@ -229,17 +224,11 @@ class CompiledTable(Unchanging):
         return live
 
     def prepare(self, casting: bool = False, batches: bool = False) -> None:
-        """Do the work of the first queries now, while the game loads; answers stay the same.
+        """Do the work of the first queries now, while the game loads; answers stay the same, and nothing is raised: it asks without
+        facts.
 
-        Parameters
-        ----------
-        casting : bool
-            Also the work of the first query with actors.
-        batches : bool
-            Also the work of the first batches: numba is loaded, where it is installed, and the kernels are compiled or
-            read from its cache, which takes about a second.
-
-        Raises nothing: it asks without facts.
+        `casting` also does the work of the first query with actors; `batches` that of the first batches: numba is loaded, where it
+        is installed, and the kernels are compiled or read from its cache, which takes about a second.
         """
         prepare(self._data, casting, batches)
 
@@ -328,17 +317,9 @@ class CompiledTable(Unchanging):
     def picker(self, seed: int = 0, memory: int = 1) -> Picker:
         """Picks for one character or for many, which it remembers: see `contextdb.compiled.picker.Picker`.
 
-        Parameters
-        ----------
-        seed : int
-            The same seed gives the same picks, on every system.
-        memory : int
-            So many of the last assets of a character are not picked again while there is another choice.
-
-        Raises
-        ------
-        ContextError
-            The seed or the memory is no whole number, or the memory is out of range.
+        The same `seed` gives the same picks, on every system. So many of the last assets of a character as `memory` says are not
+        picked again while there is another choice. Raises ContextError where either is no whole number, or the memory is out of
+        range.
         """
         return Picker(self.name, seed, memory)
 
@@ -348,15 +329,8 @@ class CompiledTable(Unchanging):
 
     @classmethod
     def open(cls, path: str | Path) -> Self:
-        """Open a compiled file by memory map.
-
-        Raises
-        ------
-        ArtefactError
-            The file is truncated, altered, of another program or of a later version.
-        FileError
-            It is missing, or cannot be read.
-        """
+        """Open a compiled file by memory map. Raises ArtefactError where the file is truncated, altered, of another program or of a
+        later version; FileError where it is missing, or cannot be read."""
         return cls(open_artefact(require_path(path)))
 
 

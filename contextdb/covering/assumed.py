@@ -124,13 +124,8 @@ def _drawn(table: EitherTable, assumed: Assumptions) -> Iterator[Condition]:
 
 
 def assumptions_of(table: EitherTable) -> Assumptions:
-    """The assumptions of a table, as its settings in contextdb.toml say, and what its derived bools imply.
-
-    Raises
-    ------
-    ExpressionError
-        An assumption names what is neither a condition of the table nor declared.
-    """
+    """The assumptions of a table, as its settings in contextdb.toml say, and what its derived bools imply. Raises ExpressionError
+    where an assumption names what is neither a condition of the table nor declared."""
     conditions = [column.condition for column in table.conditions]
     assumed = read_assumptions(table.settings.assume, conditions, table.schema.conditions)
     derived = [_definition(c, table.schema.conditions) for c in conditions if c.expr and c.domain.type.is_truth]

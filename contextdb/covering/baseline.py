@@ -90,13 +90,7 @@ class Change:
 
 
 def read_baseline(text: str, file: str) -> dict[str, Earlier]:
-    """What an earlier report says, by table.
-
-    Raises
-    ------
-    ContextError
-        It is no such report; the place names the file.
-    """
+    """What an earlier report says, by table. Raises ContextError where it is no such report; the place names the file."""
     try:
         document = document_of(text)
         if not isinstance(document, dict) or document.get("format") != FORMAT:

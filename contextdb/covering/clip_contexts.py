@@ -48,22 +48,11 @@ Answers = dict[int, tuple[float, int]]
 
 @dataclass(frozen=True, eq=False)
 class TableContexts:
-    """The contexts of a table by which clips they let play.
+    """The contexts of a table by which clips they let play: those in which some clip is valid, the largest share first.
 
-    Attributes
-    ----------
-    contexts : tuple of ClipContexts
-        Those in which some clip is valid; the largest share first.
-    without : float
-        The share of the contexts in which none is.
-    never_valid : tuple of str
-        Clips whose rows are valid in no context.
-    n_samples : int
-        How many contexts were drawn; 0 where the shares are exact.
-    why : str
-        Why they were drawn; empty where they were not.
-    not_mirrored : tuple of str
-        Conditions that mirrored clips are not held to: they are computed from facts that change in a mirror.
+    `without` is the share of the contexts in which none is; `never_valid` are clips whose rows are valid in no context. `n_samples`
+    contexts were drawn, for the reason `why`; 0 and empty where the shares are exact. Mirrored clips are not held to the conditions
+    `not_mirrored`: they are computed from facts that change in a mirror.
     """
 
     contexts: tuple[ClipContexts, ...]
@@ -90,22 +79,9 @@ def clip_contexts(
 ) -> TableContexts:
     """The contexts of a table that differ in which clips they let play.
 
-    Parameters
-    ----------
-    table : Table
-    clips : collection of str, optional
-        The assets that there are clips of. Default: all of the table.
-    mirrored : collection of str
-        Those that are played mirrored too.
-    axes : mapping of str to str, optional
-        For "speed", "turn" and "direction" the condition that says what is asked for; see `asked_axes`.
-    seed : int
-        Of the contexts that are drawn.
-
-    Raises
-    ------
-    ContextDBError
-        What coverage of a table raises.
+    `clips` are the assets that there are clips of (None: all of the table), `mirrored` those that are played mirrored too. `axes`
+    gives for "speed", "turn" and "direction" the condition that says what is asked for; see `asked_axes`. `seed` is that of the
+    contexts that are drawn. Raises ContextDBError as coverage of a table does.
     """
     require_kind(table, (Table, FlatTable), "table", "a Table")
     ready, flat = opened(table, progress=progress), table.flat()

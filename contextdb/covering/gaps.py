@@ -47,7 +47,7 @@ def find_gaps(space: Space, seeds: Iterable[Point], most: int, steps: int, progr
     """Gaps round the seeds, then by search, until there are no more, `most` are found, or the steps are used up."""
     rows = BoxSet.of(space.full, space.boxes, progress)
     seen = BoxSet.of(space.full, space.boxes + space.impossible, progress)
-    order = _rarest_first(rows)
+    order = sorted(range(len(rows.full)), key=lambda f: (rows.restricts[f].bit_count(), -f))
     found: list[Box] = []
     sides: list[Sides] = []
     for point in seeds:
@@ -88,10 +88,6 @@ def widened(space: Space, rows: BoxSet, point: Point, order: Sequence[int]) -> B
 def _n_free(behind: Sequence[int]) -> int:
     """How many factors, from the first on, may take every class, as no box holds a point's classes of all that come after."""
     return max(0, bisect_left(behind, True, key=bool) - 1)
-
-
-def _rarest_first(rows: BoxSet) -> list[int]:
-    return sorted(range(len(rows.full)), key=lambda f: (rows.restricts[f].bit_count(), -f))
 
 
 def _add(seen: BoxSet, box: Box) -> Box:

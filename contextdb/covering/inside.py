@@ -14,13 +14,8 @@ from contextdb.cells.words import quoted
 
 
 def facts_inside(cells: Mapping[str, str], conditions: Sequence[Condition]) -> dict[str, str]:
-    """A fact for each condition that the cells restrict, so that all of them hold; the others are left out.
-
-    Raises
-    ------
-    CellError
-        A cell cannot be read.
-    """
+    """A fact for each condition that the cells restrict, so that all of them hold; the others are left out. Raises CellError where
+    a cell cannot be read."""
     facts: dict[str, str] = {}
     for condition in conditions:
         if condition.name in cells:

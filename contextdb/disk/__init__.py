@@ -41,13 +41,8 @@ Was = bytes | Literal["any"] | None
 
 
 def read_bytes(path: str | Path) -> bytes:
-    """The bytes of a file.
-
-    Raises
-    ------
-    FileError
-        It is missing (with the nearest name there is), a folder, no plain file, or may not be read.
-    """
+    """The bytes of a file. Raises FileError where it is missing (with the nearest name there is), a folder, no plain file, or may
+    not be read."""
     file = Path(path)
     with _refused(file, _why_unread):
         mode = file.stat().st_mode
@@ -66,28 +61,12 @@ def names_a_table(name: str) -> bool:
 
 
 def write_atomic(path: str | Path, data: Data, was: Was = "any", syncs: bool = True) -> bool:
-    """Replace a file's bytes, given whole or in pieces, in one step, or make the file.
+    """Replace a file's bytes, given whole or in pieces, in one step, or make the file. A link stays a link, and the file it leads
+    to is replaced; mode and, where that is permitted, owner stay. A pipe, a terminal or another device is written into.
 
-    A link stays a link, and the file it leads to is replaced; mode and, where that is permitted, owner stay. A pipe, a terminal or
-    another device is written into.
-
-    Parameters
-    ----------
-    was : bytes or None, optional
-        Only if the file holds these bytes; None: only if it is missing. Default: whatever is there.
-    syncs : bool
-        False does not wait until the bytes are on the disk: for what can be computed again.
-
-    Returns
-    -------
-    bool
-        Whether the file was written: False where it is not as `was` says.
-
-    Raises
-    ------
-    FileError
-        The file is read-only, the folder missing or not permitted, the disk full. The old file is then whole, and no temporary file
-        stays.
+    Gives whether the file was written: False where it is not as `was` says, these bytes or, for None, missing. `syncs=False` does
+    not wait until the bytes are on the disk: for what can be computed again. Raises FileError where the file is read-only, the
+    folder missing or not permitted, or the disk full; the old file is then whole, and no temporary file stays.
     """
     file = Path(path)
     if is_stream(file):
@@ -142,13 +121,8 @@ class Staged:
 
 @contextmanager
 def staged(file: Path, data: Data, syncs: bool = True, folder: Path | None = None) -> Iterator[Staged]:
-    """New bytes next to a file, or in another folder, not yet under its name; gone at the end where they did not take it.
-
-    Raises
-    ------
-    OSError, FileError
-        The file may not be replaced, or the disk refuses.
-    """
+    """New bytes next to a file, or in another folder, not yet under its name; gone at the end where they did not take it. Raises
+    OSError or FileError where the file may not be replaced, or the disk refuses."""
     target = Path(os.path.realpath(file))
     old = target.stat() if target.exists() else None
     if old is not None:
@@ -171,13 +145,7 @@ def staged(file: Path, data: Data, syncs: bool = True, folder: Path | None = Non
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder and those above it, where they are missing yet.
-
-    Raises
-    ------
-    FileError
-        It is a file, or may not be made.
-    """
+    """Make a folder and those above it, where they are missing yet. Raises FileError where it is a file, or may not be made."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -117,14 +117,8 @@ def claim(handle: int) -> None:
 
 @contextmanager
 def temporary_folder(beside: Path) -> Iterator[Path]:
-    """A folder in the folder `beside` for what is not finished. It goes at the end, or with the next save where the
-    process is killed.
-
-    Raises
-    ------
-    OSError
-        The folder cannot be made.
-    """
+    """A folder in the folder `beside` for what is not finished. It goes at the end, or with the next save where the process is
+    killed. Raises OSError where the folder cannot be made."""
     folder = beside / temporary_name()
     with folder_turn(beside):
         folder.mkdir()

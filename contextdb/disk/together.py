@@ -40,19 +40,11 @@ class NewFile:
 
 
 def write_together(folder: Path, files: Sequence[NewFile]) -> bool:
-    """Replace files in or below a folder, or make them, in one step.
+    """Replace files in or below a folder, or make them, in one step. Files that are elsewhere, behind a link say, are replaced one
+    after another.
 
-    Files that are elsewhere, behind a link say, are replaced one after another.
-
-    Returns
-    -------
-    bool
-        Whether they were written: False where one is not as its `was` says; then none is.
-
-    Raises
-    ------
-    FileError
-        The disk refuses one of them. All are then as they were, and no temporary file stays.
+    Gives whether they were written: where one is not as its `was` says, none is. Raises FileError where the disk refuses one of
+    them; all are then as they were, and no temporary file stays.
     """
     root = Path(os.path.realpath(folder))
     targets = [Path(os.path.realpath(new.path)) for new in files]
@@ -171,13 +163,8 @@ def write_record(path: Path, said: object) -> None:
 
 
 def finish(folder: Path) -> None:
-    """Bring to an end what a killed process has begun in a folder; it is reported as an `UnfinishedWarning`.
-
-    Raises
-    ------
-    FileError
-        The disk refuses.
-    """
+    """Bring to an end what a killed process has begun in a folder; it is reported as an `UnfinishedWarning`. Raises FileError where
+    the disk refuses."""
     if not os.path.exists(folder / UNFINISHED):
         return
     root = Path(os.path.realpath(folder))

@@ -139,12 +139,8 @@ def rows_for(
 ) -> ClipRows:
     """Read and describe the clips of a folder: in a project those of the databases of the table that is filled, where it has any.
 
-    `progress` gives, for the name of a part of the work, the function that is called for each of its clips.
-
-    Raises
-    ------
-    ContextDBError
-        There is no such folder, no clip in it that can be read, or all are joint clips of several actors.
+    `progress` gives, for the name of a part of the work, the function that is called for each of its clips. Raises ContextDBError
+    where there is no such folder, no clip in it that can be read, or all are joint clips of several actors.
     """
     notes: list[str] = []
     with progress("reading clips") as tell:
@@ -196,24 +192,9 @@ def _is_mirrored(found: FolderClips) -> bool:
 
 @dataclass(frozen=True)
 class Filling:
-    """What the clips give to a table that is there.
-
-    Attributes
-    ----------
-    table : Table
-        As it is.
-    new_columns : list of str
-    added : list of Described
-        The rows that are missing.
-    empty : list of Difference
-        Cells of rows that are there and say nothing.
-    differences : list of Difference
-        Cells that do not accept what their clips show.
-    without_clip : list of str
-        The assets that no clip has.
-    sections : Sections
-        What contextdb.toml is to say.
-    """
+    """What the clips give to a table that is there: `added` are the rows that are missing, `empty` the cells of rows that are there
+    and say nothing, `differences` those that do not accept what their clips show, `without_clip` the assets that no clip has.
+    `sections` is what contextdb.toml is to say."""
 
     table: Table
     new_columns: list[str]
@@ -224,13 +205,8 @@ class Filling:
     sections: Sections
 
     def edit(self, *, updates: bool = False) -> Edit:
-        """Fill what is missing, as one step; with `updates` replace the cells that differ, too.
-
-        Raises
-        ------
-        ContextDBError
-            The conditions are declared so that the cells cannot be read, or another cell of the table cannot be.
-        """
+        """Fill what is missing, as one step; with `updates` replace the cells that differ, too. Raises ContextDBError where the
+        conditions are declared so that the cells cannot be read, or another cell of the table cannot be."""
         n, changes = self.table.n_rows, list[Change]()
         texts = dict[str, dict[int, str]]()
         for each in [*self.empty, *(self.differences if updates else ())]:
@@ -294,15 +270,8 @@ def _said(table: Table, rows: Sequence[Described]) -> Sections:
 
 
 def empty_table(path: Path) -> Table:
-    """A table without rows that is to be the new file.
-
-    Raises
-    ------
-    FileError
-        The file is there already, or no table can have its name.
-    ContextDBError
-        contextdb.toml cannot be read.
-    """
+    """A table without rows that is to be the new file. Raises FileError where the file is there already, or no table can have its
+    name; ContextDBError where contextdb.toml cannot be read."""
     if path.exists():
         found = "the file is there already."
         raise FileError(Fault(found, "a file that is new", f"--into {path}, which fills what is missing", Place(str(path))))
@@ -313,13 +282,8 @@ def empty_table(path: Path) -> Table:
 
 
 def described_table(fills: Filling, motion: TomlSections, *, updates: bool = False) -> DescribedTable:
-    """A table with what its clips give, and contextdb.toml with what it then means and some motion.
-
-    Raises
-    ------
-    ContextDBError
-        contextdb.toml cannot be read, or as of `Filling.edit`.
-    """
+    """A table with what its clips give, and contextdb.toml with what it then means and some motion. Raises ContextDBError where
+    contextdb.toml cannot be read, or as of `Filling.edit`."""
     before = fills.table
     assert before.path is not None
     after = fills.edit(updates=updates).apply(before)

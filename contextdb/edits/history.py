@@ -47,13 +47,8 @@ class History:
         self._saved: int | None = 0
 
     def do(self, edit: Edit) -> Step:
-        """Make an edit; what was undone before is then gone. One that changes nothing is no step.
-
-        Raises
-        ------
-        TableError, SchemaError
-            The edit does not fit; nothing has changed.
-        """
+        """Make an edit; what was undone before is then gone. One that changes nothing is no step. Raises TableError or SchemaError
+        where the edit does not fit; nothing has changed."""
         if not edit.changes:
             return Step(edit.name, None)
         table = edit.apply(self.table)

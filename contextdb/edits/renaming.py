@@ -91,13 +91,8 @@ class Renaming:
         return Renaming(self.new, self.old, tuple(Rewrite(file.path, file.after, file.before) for file in self.files))
 
     def write(self) -> None:
-        """Replace the files.
-
-        Raises
-        ------
-        FileError
-            A file was changed since it was read, or the disk refuses: then all are as they were.
-        """
+        """Replace the files. Raises FileError where a file was changed since it was read, or the disk refuses: then all are as they
+        were."""
         for file in self.files:
             if read_bytes(file.path) != file.before:
                 fault = Fault("the file was changed since the rename was worked out.", "a file at rest", "to do it again")
@@ -164,13 +159,9 @@ def uses_of(table: Table, condition: str) -> Uses:
 
 
 def renaming(table: Table, old: str, new: str, only_here: bool = False) -> Renaming:
-    """What is to be written so that a condition of a table has another name, in all the project or in this table only.
-
-    Raises
-    ------
-    TableError, SchemaError, FileError
-        The new name is taken or no name; a file cannot be read, or could not say what it should.
-    """
+    """What is to be written so that a condition of a table has another name, in all the project or in this table only. Raises
+    TableError, SchemaError or FileError where the new name is taken or no name; a file cannot be read, or could not say what it
+    should."""
     folder, schema = folder_of(table), table.schema
     assert table.path is not None
     raw = read_bytes(folder / SCHEMA_FILE) if (folder / SCHEMA_FILE).is_file() else b""

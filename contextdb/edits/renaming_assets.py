@@ -77,12 +77,8 @@ def asset_uses(table: Table, asset: str) -> AssetUses:
 
 def asset_renaming(table: Table, old: str, new: str, only_here: bool = False) -> Renaming:
     """What is to be written so that an asset has another name, in all the project, or in this table and its saved contexts only.
-
-    Raises
-    ------
-    TableError, SchemaError, FileError
-        A table names the new asset already; a file cannot be read, or could not say what it should.
-    """
+    Raises TableError, SchemaError or FileError where a table names the new asset already; a file cannot be read, or could not say
+    what it should."""
     folder = folder_of(table)
     assert table.path is not None
     raw = read_bytes(folder / SCHEMA_FILE) if (folder / SCHEMA_FILE).is_file() else b""

@@ -58,13 +58,9 @@ def role_uses(table: Table, role: str) -> tuple[str, tuple[str, ...]]:
 
 
 def role_renaming(table: Table, old: str, new: str, only_here: bool = False) -> Renaming:
-    """What is to be written so that a role has another name, in all the project or in this table only.
-
-    Raises
-    ------
-    TableError, SchemaError, FileError
-        There is such a role already, or it is no name; a file cannot be read, or could not say what it should.
-    """
+    """What is to be written so that a role has another name, in all the project or in this table only. Raises TableError,
+    SchemaError or FileError where there is such a role already, or it is no name; a file cannot be read, or could not say what it
+    should."""
     folder = folder_of(table)
     assert table.path is not None
     raw = read_bytes(folder / SCHEMA_FILE) if (folder / SCHEMA_FILE).is_file() else b""

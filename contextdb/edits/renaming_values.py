@@ -83,13 +83,8 @@ def value_uses(table: Table, condition: str, value: str) -> ValueUses:
 
 
 def value_renaming(table: Table, condition: str, old: str, new: str) -> Renaming:
-    """What is to be written so that a declared value has another name in all the project.
-
-    Raises
-    ------
-    TableError, SchemaError, FileError
-        There is such a value already, an expression could mean another condition's value, or a file cannot be read.
-    """
+    """What is to be written so that a declared value has another name in all the project. Raises TableError, SchemaError or
+    FileError where there is such a value already, an expression could mean another condition's value, or a file cannot be read."""
     folder = folder_of(table)
     raw = read_bytes(folder / SCHEMA_FILE)
     schema = read_folder_schema(folder)

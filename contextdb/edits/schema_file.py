@@ -54,13 +54,8 @@ class SchemaChange:
         return Fault(found, mend="to do the same once more", place=Place(str(self.path)), rule="merge-conflict")
 
     def write(self) -> None:
-        """Replace the file in one step.
-
-        Raises
-        ------
-        FileError
-            The disk refuses, or somebody has changed the file since it was read; the old file is then whole.
-        """
+        """Replace the file in one step. Raises FileError where the disk refuses, or somebody has changed the file since it was
+        read; the old file is then whole."""
         if not write_atomic(self.path, self.raw, self.was):
             raise FileError(self.fault)
 
@@ -68,20 +63,10 @@ class SchemaChange:
 def schema_change(before: Table | None, after: Table) -> SchemaChange | None:
     """What is to be written so that contextdb.toml says what a table says; None when it says so already.
 
-    Parameters
-    ----------
-    before : Table or None
-        The table as it was loaded or saved last; None for a file that is new, or that has another place now: then its settings and
-        the conditions of its columns are declared there.
-    after : Table
-        The table as it is saved; it has a path.
-
-    Raises
-    ------
-    SchemaError
-        The file cannot be read; somebody else changed the same key; it could not say what the table says.
-    FileError
-        The file may not be read.
+    `before` is the table as it was loaded or saved last; None for a file that is new, or that has another place now: then its
+    settings and the conditions of its columns are declared there. `after` is the table as it is saved; it has a path. Raises
+    SchemaError where the file cannot be read, somebody else changed the same key, or it could not say what the table says;
+    FileError where it may not be read.
     """
     path = schema_path(after)
     wanted = _changes({} if before is None else _keys(before, path), _keys(after, path, only_own=before is None))

@@ -26,25 +26,11 @@ _BOM = b"\xef\xbb\xbf"
 def weights_change(
     path: Path, features: str, weights: Mapping[str, float], selector: str = "", thresholds: Mapping[str, float] | None = None
 ) -> SchemaChange | None:
-    """What is to be written so that contextdb.toml says these weights and thresholds; None when it says so already.
+    """What is to be written so that contextdb.toml, at `path`, says these weights and thresholds; None when it says so already.
 
-    Parameters
-    ----------
-    path : Path
-        The contextdb.toml.
-    features : str
-        The `[features.NAME]` whose channels are weighed.
-    weights : mapping of channel to float
-    selector : str
-        The `[selectors.NAME]` whose databases have the thresholds.
-    thresholds : mapping of database to float, optional
-
-    Raises
-    ------
-    SchemaError
-        The file cannot be read, or has no such channel, database or section; with the nearest.
-    FileError
-        The file may not be read.
+    `weights` are those of the channels of `[features.NAME]`, `thresholds` those of the databases of `[selectors.NAME]`. Raises
+    SchemaError where the file cannot be read, or has no such channel, database or section, with the nearest; FileError where it may
+    not be read.
     """
     raw = read_bytes(path)
     bom = _BOM if raw.startswith(_BOM) else b""

@@ -17,13 +17,8 @@ def begins_like_a_mark(text: str) -> bool:
 
 
 def require_no_conflicts(text: str, file: str) -> None:
-    """Refuse a text in which git left a conflict.
-
-    Raises
-    ------
-    TableError
-        With the lines on which conflicts start; a mark that is alone, after a mend that was not finished, is named too.
-    """
+    """Refuse a text in which git left a conflict. Raises TableError with the lines on which conflicts start; a mark that is alone,
+    after a mend that was not finished, is named too."""
     unified = text.replace("\r\n", "\n").replace("\r", "\n")
     marks, line, at = list[tuple[int, str]](), 1, 0
     for found in _MARK.finditer(unified):

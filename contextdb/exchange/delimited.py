@@ -53,24 +53,13 @@ class Dialect:
 def read_delimited(
     text: str, file: str, wanted: str | None = None, block: Block | None = None, is_decimal_comma: bool | None = None
 ) -> Reading:
-    """Read a text with delimiters.
-
-    Parameters
-    ----------
-    wanted : str, optional
-        The delimiter; default: the one that fits best.
-    is_decimal_comma : bool, optional
-        Whether 3,5 is a number with a decimal comma; default: told from the cells.
-
-    Raises
-    ------
-    TableError
-        An unresolved git conflict, quotes that do not close, rows of different length, or no table; with the line.
-    """
+    """Read a text with delimiters: those that are `wanted`, else those that fit best. `is_decimal_comma` says whether 3,5 is a
+    number with a decimal comma; None: the cells tell. Raises TableError, with the line, for an unresolved git conflict, quotes that
+    do not close, rows of different length, or no table."""
     require_no_conflicts(text, file)
     dialect = dialect_of(text, wanted)
     grid, notes = _records(text[dialect.first :], dialect.delimiter, file)
-    columns, more = columns_of(grid, file, block or _whole(grid), "line")
+    columns, more = columns_of(grid, file, block or Block(0, 0, len(grid), len(grid[0]) if grid else 0), "line")
     columns, decimals = with_points(columns, dialect.delimiter, is_decimal_comma)
     name = "tsv" if dialect.delimiter == "\t" else "csv"
     return Reading(tuple(columns), name, (*dialect.remarks, *notes, *more, *decimals), has_whole_names=True)
@@ -119,11 +108,6 @@ def _fitness(counts: Sequence[int]) -> tuple[float, int]:
         return 0.0, 0
     header, agreeing, total = _fit(counts)
     return (1 + agreeing) / (1 + total), header
-
-
-def _whole(grid: Sequence[Sequence[str]]) -> Block:
-    """All of a text is one table, from its first record on; only a sheet has several."""
-    return Block(0, 0, len(grid), len(grid[0]) if grid else 0)
 
 
 def _records(text: str, delimiter: str, file: str) -> tuple[list[list[str]], list[Remark]]:
@@ -204,7 +188,7 @@ def with_points(
     columns = list(columns)
     if is_decimal_comma is False or (delimiter == "," and not is_decimal_comma):
         return columns, []
-    numeric = [_numeric_texts(column) for column in columns]
+    numeric = [[text for text in column.texts if text and _NUMERIC.fullmatch(text)] for column in columns]
     has_comma = [any(_DECIMAL_COMMA.search(text) for text in texts) for texts in numeric]
     if not any(has_comma):
         return columns, []
@@ -221,10 +205,6 @@ def with_points(
     changed = [_pointed(column, texts) if has else column for column, texts, has in zip(columns, numeric, has_comma, strict=True)]
     told = f"decimal commas became points: {in_quotes(example)} is now {in_quotes(_DECIMAL_COMMA.sub('.', example))}."
     return changed, [Remark(told, f"column {where}")]
-
-
-def _numeric_texts(column: TextColumn) -> list[str]:
-    return [text for text in column.texts if text and _NUMERIC.fullmatch(text)]
 
 
 def _pointed(column: TextColumn, numeric: Sequence[str]) -> TextColumn:

@@ -72,18 +72,8 @@ class _Column:
 
 
 def read_dmn(raw: bytes, file: str, decision: str | None = None) -> Reading:
-    """Read a decision table.
-
-    Parameters
-    ----------
-    decision : str, optional
-        The name or the id of the decision; default: the only one with a table.
-
-    Raises
-    ------
-    TableError
-        The file is no DMN, is broken, declares a document type, or has several tables of which none is named.
-    """
+    """Read a decision table: the one whose name or id is `decision`, else the only one there is. Raises TableError where the file
+    is no DMN, is broken, declares a document type, or has several tables of which none is named."""
     root = _parsed(raw, file)
     element, name = _chosen(root, decision, file)
     rules = children_of(element, "rule")
@@ -119,7 +109,7 @@ def read_dmn(raw: bytes, file: str, decision: str | None = None) -> Reading:
         asset=data[0].name,
         outputs=plain,
         policy=policy,
-        priority=_priority_name(columns, policy),
+        priority=PRIORITY if policy == "priority" and columns[-1].name == PRIORITY else None,
         fallback=fallback,
         when=when[0].name if when else None,
         typed=typed,
@@ -435,7 +425,3 @@ def _priority(policy: str, output: _Column, asset: TextColumn) -> list[TextColum
         return []
     rank = {value: len(output.values) - at for at, value in enumerate(output.values)}
     return [TextColumn.of(PRIORITY, (str(rank.get(text, 0)) for text in asset.to_list()))]
-
-
-def _priority_name(columns: Sequence[TextColumn], policy: str) -> str | None:
-    return PRIORITY if policy == "priority" and columns[-1].name == PRIORITY else None

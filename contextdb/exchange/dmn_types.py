@@ -124,13 +124,8 @@ def _plain(name: str) -> str:
 
 
 def domain_of(kind: InputType, cells: list[str], place: str) -> tuple[Domain | None, list[Remark]]:
-    """The domain that a type means, None where the cells must tell; and what of it could not be kept.
-
-    Parameters
-    ----------
-    cells : list of str
-        The unary tests of the column.
-    """
+    """The domain that a type means, None where the cells must tell; and what of it could not be kept. `cells` are the unary tests
+    of the column."""
     if kind.kind == "boolean":
         return BOOL, []
     if kind.kind in _NUMBERS:

@@ -33,13 +33,8 @@ _POLICIES = {"unique": "UNIQUE", "first": "FIRST", "priority": "PRIORITY"}
 
 
 def write_dmn(table: Table) -> tuple[bytes, tuple[Remark, ...]]:
-    """The DMN file of a table, and what could not be said in it.
-
-    Raises
-    ------
-    TableError
-        Cells that cannot be read, or texts that XML cannot hold.
-    """
+    """The DMN file of a table, and what could not be said in it. Raises TableError for cells that cannot be read, or texts that XML
+    cannot hold."""
     require_readable(table)
     _require_xml(table)
     inputs = [column for column in table.conditions if not column.condition.domain.type.is_tags]
@@ -126,13 +121,9 @@ def _output(number: int, name: str, table: Table) -> str:
     allowed = f"<outputValues><text>{_attribute(values)}</text></outputValues>" if values and not output.type.has_size else ""
     default = literal(table.settings.fallback or "") if name == table.asset_column else _fallback(table, output)
     entry = f"<defaultOutputEntry><text>{_attribute(default)}</text></defaultOutputEntry>" if default not in ("", '""') else ""
-    kind = _feel_type(output)
-    return f'<output id="output_{number}" name="{_attribute(name)}" typeRef="{kind}">{allowed}{entry}</output>'
-
-
-def _feel_type(output: Output) -> str:
     is_number = output.type.is_numeric and not output.type.has_size
-    return "number" if is_number else "boolean" if output.type.choices else "string"
+    kind = "number" if is_number else "boolean" if output.type.choices else "string"
+    return f'<output id="output_{number}" name="{_attribute(name)}" typeRef="{kind}">{allowed}{entry}</output>'
 
 
 def _fallback(table: Table, output: Output) -> str:

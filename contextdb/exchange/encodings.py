@@ -19,18 +19,8 @@ _WITHOUT_BOM = (("utf-16-le", 1), ("utf-16-be", 0))
 
 
 def decoded(raw: bytes, file: str, encoding: str | None = None) -> tuple[str, list[Remark]]:
-    """The text of a file, without its byte order mark, and remarks on how it was understood.
-
-    Parameters
-    ----------
-    encoding : str, optional
-        What the text is written in; default: told from the bytes.
-
-    Raises
-    ------
-    TableError
-        The bytes are not text of that encoding, with the line; or no text at all.
-    """
+    """The text of a file in an encoding, else in the one that its bytes tell, without its byte order mark, and remarks on how it
+    was understood. Raises TableError where the bytes are not text of that encoding, with the line, or no text at all."""
     if encoding is not None:
         return _decoded_as(raw, file, _known(encoding, file)), []
     for mark, name, told in BOMS:

@@ -48,13 +48,8 @@ class _NoRuleError(Exception):
 
 
 def rule_of(test: str, fact: str, known: Sequence[str]) -> tuple[str, list[str]] | None:
-    """The rule that unary tests of a fact mean, and the facts that it names beside; None for what no expression says.
-
-    Parameters
-    ----------
-    known : sequence of str
-        The names of facts that the test may use.
-    """
+    """The rule that unary tests of a fact mean, and the facts that it names beside; None for what no expression says. The test may
+    use the facts whose names are `known`."""
     if len(test) > MOST_CHARACTERS:
         return None
     named = list[str]()

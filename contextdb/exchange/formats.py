@@ -67,13 +67,8 @@ class ReadOptions:
 
 
 def format_of(name: str, wanted: str | None = None, raw: bytes = b"", for_writing: bool = False) -> Format:
-    """The format of a file: the one that is wanted, else by its first bytes, else by its suffix.
-
-    Raises
-    ------
-    FileError
-        There is no such format, or the suffix gives none.
-    """
+    """The format of a file: the one that is wanted, else by its first bytes, else by its suffix. Raises FileError where there is no
+    such format, or the suffix gives none."""
     known = {key: one for key, one in FORMATS.items() if (one.is_written if for_writing else one.is_read)}
     if wanted is not None:
         if wanted not in known:
@@ -98,22 +93,8 @@ def format_of(name: str, wanted: str | None = None, raw: bytes = b"", for_writin
 
 
 def read(raw: bytes, name: str, options: ReadOptions = ReadOptions()) -> Reading:
-    """Read a table of any format.
-
-    Parameters
-    ----------
-    raw : bytes
-        The file.
-    name : str
-        Its name: for its suffix, and for messages.
-
-    Raises
-    ------
-    TableError
-        The file cannot be read as what it is, with the place of every fault.
-    FileError
-        It is of no known format.
-    """
+    """Read a table of any format from the bytes of a file; `name` is for its suffix, and for messages. Raises TableError where the
+    file cannot be read as what it is, with the place of every fault; FileError where it is of no known format."""
     kind = format_of(name, options.format, raw)
     if fault := pointer(raw) or (page(raw) if kind.name in ("csv", "tsv", "unreal-csv") else None):
         raise TableError(fault.at(Place(name)))
@@ -132,13 +113,7 @@ def read(raw: bytes, name: str, options: ReadOptions = ReadOptions()) -> Reading
 
 
 def sheet_names(raw: bytes, name: str) -> list[str]:
-    """The sheets of a workbook that may hold a table.
-
-    Raises
-    ------
-    TableError
-        It is not a workbook that can be read.
-    """
+    """The sheets of a workbook that may hold a table. Raises TableError where it is not a workbook that can be read."""
     from contextdb.exchange.xlsx_read import sheets_of
 
     return sheets_of(raw, name)
@@ -212,18 +187,9 @@ def _read_text(kind: str, raw: bytes, name: str, options: ReadOptions) -> Readin
 
 
 def write(table: Table, kind: Format, formulas: Formulas = "tell") -> tuple[bytes, tuple[Remark, ...]]:
-    """The bytes of a table in a format, and what could not be kept.
-
-    Parameters
-    ----------
-    formulas : "tell", "keep" or "quote"
-        What becomes of texts of CSV and TSV that a spreadsheet may compute: see `contextdb.exchange.formulas`.
-
-    Raises
-    ------
-    TableError
-        The table has what the format cannot hold, with its place.
-    """
+    """The bytes of a table in a format, and what could not be kept. `formulas` is "tell", "keep" or "quote": what becomes of texts
+    of CSV and TSV that a spreadsheet may compute, see `contextdb.exchange.formulas`. Raises TableError where the table has what the
+    format cannot hold, with its place."""
     try:
         return _written(table, kind.name, formulas)
     except UnicodeEncodeError:

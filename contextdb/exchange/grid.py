@@ -91,23 +91,12 @@ def columns_of(
     sheet: str | None = None,
     wide: Collection[int] = (),
 ) -> tuple[list[TextColumn], list[Remark]]:
-    """The columns of the table in a grid, or in a block of it.
+    """The columns of the table in a grid, or in a block of it whose first row is the names; None: it is looked for, also below a
+    title.
 
-    Parameters
-    ----------
-    block : Block, optional
-        Where the table is, its first row the names; default: it is looked for, also below a title.
-    row_noun : str
-        What a row of the grid is called in messages: "sheet row" of a workbook, "line" of a text.
-    sheet : str, optional
-        The name of the sheet, for messages.
-    wide : collection of int
-        Rows of the grid, from 0, with a cell that is merged over several columns: no row of names has one.
-
-    Raises
-    ------
-    TableError
-        There is no table, more than one, columns without a name or with one name twice, or a text that is too long.
+    `row_noun` is what messages call a row of the grid, "sheet row" of a workbook or "line" of a text, and `sheet` its name. `wide`
+    are rows, from 0, with a cell that is merged over several columns: no row of names has one. Raises TableError where there is no
+    table, more than one, columns without a name or with one name twice, or a text that is too long.
     """
     if block is None:
         block, remarks = _found(grid, file, wide)
@@ -266,12 +255,8 @@ def _first_text(grid: Grid, block: Block) -> str:
 def blocks_of(grid: Grid) -> list[Block]:
     """The tables of a grid: what blank columns, or blank rows, part from each other.
 
-    Rows below a blank one belong to the same table when they are under its columns, and do not begin with other names.
-
-    Raises
-    ------
-    TableError
-        There are more blocks than can be compared.
+    Rows below a blank one belong to the same table when they are under its columns, and do not begin with other names. Raises
+    TableError where there are more blocks than can be compared.
     """
     if not grid or not grid[0]:
         return []

@@ -78,14 +78,9 @@ class Plan:
         return [column.name for column in self.columns if column.is_new and column.job == "condition"]
 
     def write(self) -> None:
-        """Write the table and contextdb.toml in one step: both or neither.
-
-        Raises
-        ------
-        FileError, TableError
-            The disk refuses, a text cannot be written, or somebody else has changed contextdb.toml since it was read; what stood
-            there before is then whole.
-        """
+        """Write the table and contextdb.toml in one step: both or neither. Raises FileError or TableError where the disk refuses, a
+        text cannot be written, or somebody else has changed contextdb.toml since it was read; what stood there before is then
+        whole."""
         table = self.table
         new = NewFile(self.path, new_source(self.path, table.columns, table.source, table.origin, self.field_of).raw)
         change = self.change
@@ -98,20 +93,9 @@ class Plan:
 def plan_import(
     reading: Reading, path: Path, renames: Mapping[str, str] | None = None, mapped: Sequence[Mapped] | None = None
 ) -> Plan:
-    """Decide what a reading becomes as the table file `path`.
-
-    Parameters
-    ----------
-    renames : mapping of str to str, optional
-        As in `contextdb.exchange.mapping.propose`.
-    mapped : sequence of Mapped, optional
-        What becomes of each column, where a person decided; default: what is proposed.
-
-    Raises
-    ------
-    ContextDBError
-        contextdb.toml cannot be read or could not say this; or the columns do not make a table.
-    """
+    """Decide what a reading becomes as the table file `path`. `renames` is as in `contextdb.exchange.mapping.propose`; `mapped` is
+    what becomes of each column, where a person decided. Raises ContextDBError where contextdb.toml cannot be read or could not say
+    this, or the columns do not make a table."""
     schema, settings = project_of(path)
     columns = tuple(mapped) if mapped is not None else propose(reading, schema, settings, renames)
     table, field_of = table_of(reading, columns, schema, settings, path)
@@ -128,15 +112,9 @@ def project_of(path: Path) -> tuple[Schema, TableSettings]:
 def table_of(
     reading: Reading, mapped: Sequence[Mapped], schema: Schema, settings: TableSettings, path: Path | None = None
 ) -> tuple[Table, tuple[int, ...]]:
-    """The table that columns become, and the column of the reading that each came from.
-
-    Raises
-    ------
-    TableError
-        No column names the assets, or two do; a column has no place under its name.
-    SchemaError
-        A new condition that contextdb.toml could not hold.
-    """
+    """The table that columns become, and the column of the reading that each came from. Raises TableError where no column
+    names the assets, or two do, or a column has no place under its name; SchemaError for a new condition that
+    contextdb.toml could not hold."""
     kept = [(at, column) for at, column in enumerate(mapped) if column.job != "left out"]
     assets = [column for _, column in kept if column.job == "asset"]
     if len(assets) != 1:

@@ -31,12 +31,8 @@ def read_json(text: str, file: str, format_name: str = "json") -> Reading:
     """Read rows from a JSON document or from JSON lines; the text shows which of the two it is.
 
     A key that a row leaves out, and null, is an empty cell. A list is a set of names; an object inside an object becomes columns
-    with a dot: {"Defender": {"speed": 3}} is the column Defender.speed.
-
-    Raises
-    ------
-    TableError
-        The text is not JSON, with its line; or no list of objects; or a git conflict is in it.
+    with a dot: {"Defender": {"speed": 3}} is the column Defender.speed. Raises TableError where the text is not JSON, with its
+    line; or no list of objects; or a git conflict is in it.
     """
     require_no_conflicts(text, file)
     rows, lines = parsed_rows(text, file)
@@ -186,13 +182,8 @@ def _text(value: object, name: str, place: Place) -> str:
 
 
 def columns_of_rows(rows: Sequence[Mapping[str, str]], file: str) -> list[TextColumn]:
-    """Columns of rows, in the order in which their names first appear.
-
-    Raises
-    ------
-    TableError
-        There is no row, or a name that no column can have.
-    """
+    """Columns of rows, in the order in which their names first appear. Raises TableError where there is no row, or a name that no
+    column can have."""
     names = list(dict.fromkeys(name for row in rows for name in row))
     faults = [fault.at(Place(file)) for fault in name_faults(names)]
     if not names:

@@ -68,22 +68,9 @@ class Mapped:
 def propose(
     reading: Reading, schema: Schema, settings: TableSettings, renames: Mapping[str, str] | None = None
 ) -> tuple[Mapped, ...]:
-    """Propose what becomes of each column.
-
-    Parameters
-    ----------
-    schema : Schema
-        What the project declares.
-    settings : TableSettings
-        What it says of the table that is written, if anything.
-    renames : mapping of str to str, optional
-        What a person said: a column of the file to a name in the table, or to "" to leave it out.
-
-    Raises
-    ------
-    ContextDBError
-        `renames` speaks of a column that is missing, or two columns would have one name.
-    """
+    """Propose what becomes of each column, by what the project declares and, if anything, says of the table that is written.
+    `renames` is what a person said: for a column of the file a name in the table, or "" to leave it out. Raises ContextDBError
+    where it speaks of a column that is missing, or two columns would have one name."""
     renames = renames or {}
     _require_known(renames, reading.names)
     kept = next(iter(reading.schema.tables.values()), None)
@@ -115,13 +102,8 @@ def as_condition(mapped: Mapped, column: TextColumn, name: str, schema: Schema) 
 
 
 def as_type(mapped: Mapped, column: TextColumn, kind: str) -> Mapped:
-    """The same column as a new condition of another type; an enum then has the names that its cells have.
-
-    Raises
-    ------
-    ContextDBError
-        An enum is wanted, and no cell holds a name.
-    """
+    """The same column as a new condition of another type; an enum then has the names that its cells have. Raises ContextDBError
+    where an enum is wanted, and no cell holds a name."""
     declared: dict[str, object] = {"type": kind}
     cells = mapped.names if KINDS[kind].is_named else as_numbers(column) if KINDS[kind].is_numeric else None
     column = cells or column

@@ -113,13 +113,8 @@ class _Said:
 
 
 def propose_type(column: TextColumn, names: TextColumn | None = None) -> Proposal:
-    """The type that a column's cells most likely have.
-
-    Parameters
-    ----------
-    names : TextColumn, optional
-        The same column with each text as one whole name: what its cells become when they are names.
-    """
+    """The type that a column's cells most likely have. `names` is the same column with each text as one whole name: what its cells
+    become when they are names."""
     if (numbers := as_numbers(column, _is_measure(column.name))) is not None:
         has_degrees = any(map(_DEGREES.search, column.texts))
         proposal = propose_type(replace(numbers, name=f"{column.name} (°)") if has_degrees else numbers)
@@ -148,12 +143,7 @@ def propose_type(column: TextColumn, names: TextColumn | None = None) -> Proposa
 
 def as_numbers(column: TextColumn, is_measure: bool = True) -> TextColumn | None:
     """A column of numbers with its ranges and degrees as cells of ours: "20 - 60" as 20..60, "30°" as 30. None without any.
-
-    Parameters
-    ----------
-    is_measure : bool
-        Whether the column surely has numbers: then "20-60" without blanks is a range too, and no name.
-    """
+    `is_measure`: the column surely has numbers, then "20-60" without blanks is a range too, and no name."""
     plain = [_DEGREES.sub("", text) for text in column.texts]
     found = [_RANGE.fullmatch(text) for text in plain]
     ranges = [one for one in found if one]

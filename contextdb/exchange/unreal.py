@@ -110,13 +110,8 @@ def _localised(text: str) -> str | None:
 
 
 def write_csv(table: Table) -> tuple[bytes, tuple[Remark, ...]]:
-    """A table as the CSV of an Unreal DataTable: the assets as row names, every cell as text in quotes.
-
-    Raises
-    ------
-    TableError
-        An asset appears twice or is empty: Unreal's row names are unique.
-    """
+    """A table as the CSV of an Unreal DataTable: the assets as row names, every cell as text in quotes. Raises TableError where an
+    asset appears twice or is empty: Unreal's row names are unique."""
     columns, remarks = _unreal_columns(table)
     out = io.StringIO(newline="")
     writer = csv.writer(out, quoting=csv.QUOTE_ALL, lineterminator="\r\n")
@@ -126,13 +121,7 @@ def write_csv(table: Table) -> tuple[bytes, tuple[Remark, ...]]:
 
 
 def write_json(table: Table) -> tuple[bytes, tuple[Remark, ...]]:
-    """A table as the JSON of an Unreal DataTable.
-
-    Raises
-    ------
-    TableError
-        As `write_csv`.
-    """
+    """A table as the JSON of an Unreal DataTable. Raises TableError as `write_csv` does."""
     columns, remarks = _unreal_columns(table)
     names = [JSON_NAME, *(c.name for c in columns[1:])]
     rows = [dict(zip(names, row, strict=True)) for row in zip(*(c.to_list() for c in columns), strict=True)]

@@ -26,20 +26,9 @@ _TEXT = {str}
 
 
 def read_workbook(raw: bytes, file: str, sheet: str | None = None) -> Reading:
-    """Read one sheet of a workbook.
-
-    Parameters
-    ----------
-    sheet : str, optional
-        The name of a sheet, or of cells in one: "Moves", "Moves!A1:F20", "A1:F20". Default: the only one with cells in it.
-
-    Raises
-    ------
-    TableError
-        The workbook is locked or broken, has no such sheet, or the sheet holds no table.
-    SheetWanted
-        Several sheets hold cells, and none is named.
-    """
+    """Read one sheet of a workbook: the one that is named, or cells of one ("Moves", "Moves!A1:F20", "A1:F20"), else the only one
+    with cells in it. Raises TableError where the workbook is locked or broken, has no such sheet, or the sheet holds no table;
+    SheetWanted where several sheets hold cells, and none is named."""
     require_workbook(raw, file)
     book = _opened(raw, file)
     names = [name for name in book.sheet_names if name.casefold() != TYPES_SHEET]
@@ -66,13 +55,7 @@ def read_workbook(raw: bytes, file: str, sheet: str | None = None) -> Reading:
 
 
 def sheets_of(raw: bytes, file: str) -> list[str]:
-    """The sheets of a workbook that may hold a table.
-
-    Raises
-    ------
-    TableError
-        As `read_workbook`.
-    """
+    """The sheets of a workbook that may hold a table. Raises TableError as `read_workbook` does."""
     require_workbook(raw, file)
     return [name for name in _opened(raw, file).sheet_names if name.casefold() != TYPES_SHEET]
 

@@ -49,13 +49,8 @@ _ENTITY = re.compile(rb"<!(?:DOCTYPE|ENTITY)", re.IGNORECASE)
 
 
 def require_workbook(raw: bytes, file: str) -> None:
-    """Refuse what is not a workbook that can be read.
-
-    Raises
-    ------
-    TableError
-        Empty, locked with a password, no archive, broken, a bomb, or with a document type in its XML.
-    """
+    """Refuse what is not a workbook that can be read: raises TableError where it is empty, locked with a password, no archive,
+    broken, a bomb, or has a document type in its XML."""
     fault = _fault(raw)
     if fault:
         raise TableError(fault.at(Place(file)))

@@ -50,13 +50,7 @@ Lists = dict[str, tuple[str, ...]]
 
 
 def write_xlsx(table: Table) -> bytes:
-    """The workbook of a table.
-
-    Raises
-    ------
-    TableError
-        More rows or columns than a sheet has, or texts longer than Excel takes.
-    """
+    """The workbook of a table. Raises TableError for more rows or columns than a sheet has, or texts longer than Excel takes."""
     lines, lists = described(table), _lists(table)
     _require_room(table, lines)
     out = io.BytesIO()

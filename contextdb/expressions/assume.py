@@ -56,12 +56,7 @@ class Assumptions:
 
     def holds(self, columns: Mapping[str, Any], n_contexts: int) -> NDArray[np.bool_]:
         """Whether each of N contexts can happen: bool [N]. One where facts are missing can, unless those it has rule it out.
-
-        Parameters
-        ----------
-        columns : mapping of str to list, flat numpy array or polars Series, each of length N
-            Facts by the name of the condition, such as one value for each class; a column that is absent is missing.
-        """
+        `columns` are lists, flat arrays or Series [N] of facts by the name of the condition; a column that is absent is missing."""
         flags = np.ones(n_contexts, np.bool_)
         for expression in self.expressions:
             flags &= expression.flags(columns, n_contexts, missing=True)
@@ -139,22 +134,9 @@ def _domain_box(conditions: Mapping[str, Condition]) -> Sets:
 def read_assumptions(
     assume: Sequence[str], conditions: Sequence[Condition], declared: Mapping[str, Condition] | None = None
 ) -> Assumptions:
-    """Read the assumptions of a table.
-
-    Parameters
-    ----------
-    assume : sequence of str
-        Bool expressions, as `[tables.NAME] assume` of contextdb.toml holds them.
-    conditions : sequence of Condition
-        The conditions of the table, declared or inferred.
-    declared : mapping of str to Condition, optional
-        Others that the assumptions may name.
-
-    Raises
-    ------
-    ExpressionError
-        With every fault of every assumption.
-    """
+    """Read the assumptions of a table: bool expressions, as `[tables.NAME] assume` of contextdb.toml holds them, over the
+    conditions of the table, declared or inferred, and others that are `declared`. Raises ExpressionError with every fault of every
+    assumption."""
     known = {**(declared or {}), **{condition.name: condition for condition in conditions}}
     if faults := list(assumption_faults(assume, known)):
         raise ExpressionError(*faults)

@@ -52,13 +52,7 @@ class Checker:
 
     @singledispatchmethod
     def check(self, node: Node) -> Checked:
-        """The plan and the type of a node.
-
-        Raises
-        ------
-        Refusal
-            The node does not fit the conditions.
-        """
+        """The plan and the type of a node. Raises Refusal where the node does not fit the conditions."""
         raise AssertionError(node)
 
     @check.register

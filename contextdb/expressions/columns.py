@@ -48,26 +48,17 @@ Column = Doubles | Truths | Coded
 
 
 def read_column(given: Any, condition: Condition, n_contexts: int) -> Column:
-    """One column of facts; None is a column that was not given, all of it missing.
-
-    Raises
-    ------
-    ContextError
-        A fact is of the wrong type, outside the domain, or a set of values; names its row.
-    """
+    """One column of facts; None is a column that was not given, all of it missing. Raises ContextError where a fact is of the wrong
+    type, outside the domain, or a set of values; names its row."""
     kind = condition.domain.type
     if given is None:
-        return _all_missing(kind, n_contexts)
+        if kind.is_numeric:
+            return np.full(n_contexts, np.nan)
+        return np.full(n_contexts, UNKNOWN) if kind.is_truth else Coded(np.full(n_contexts, -1, np.int32), ())
     plain = _plain_numbers(given, kind) if kind.is_numeric else _plain_truths(given) if kind.is_truth else None
     if plain is None and kind.is_named:
         return _texts(given, condition)
     return plain if plain is not None else _column_of(*_read_each(given, condition), kind)
-
-
-def _all_missing(kind: Kind, n_contexts: int) -> Column:
-    if kind.is_numeric:
-        return np.full(n_contexts, np.nan)
-    return np.full(n_contexts, UNKNOWN) if kind.is_truth else Coded(np.full(n_contexts, -1, np.int32), ())
 
 
 def _plain_numbers(given: Any, kind: Kind) -> Doubles | None:

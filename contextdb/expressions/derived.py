@@ -80,13 +80,8 @@ class Derivation:
 
     def compute(self, facts: Mapping[str, object]) -> dict[str, object]:
         """The derived facts of one context: float (int for an int), bool, str, frozenset of tags; None where one is missing, Any
-        where one may be anything.
-
-        Raises
-        ------
-        ContextError
-            A derived fact is given, or a fact that is computed with is of the wrong type or outside the domain.
-        """
+        where one may be anything. Raises ContextError where a derived fact is given, or a fact that is computed with is of the
+        wrong type or outside the domain."""
         for name in self.names:
             if facts.get(name) is not None:
                 self.refuse([name])
@@ -127,12 +122,7 @@ class Derivation:
         """The columns of N contexts with the derived ones next to them, as `query_many` takes them.
 
         Derived numbers are float64 arrays with NaN where missing, bools and texts polars series, sets of tags lists, with null
-        where missing. The same values as `complete` gives.
-
-        Raises
-        ------
-        ContextError
-            As `complete`, and where a column is not N long.
+        where missing. The same values as `complete` gives. Raises ContextError as `complete`, and where a column is not N long.
         """
         self.refuse(name for name in self.names if name in columns)
         read: dict[str, Column] = {}
@@ -208,14 +198,8 @@ def _all_fitted(column: Column, condition: Condition) -> Column:
 
 
 def derive(conditions: Mapping[str, Condition]) -> Derivation:
-    """The derivation of the conditions that have an `expr`.
-
-    Raises
-    ------
-    ExpressionError
-        With every fault: expressions that cannot be read, types that do not fit, and cycles with their path. The place of each
-        names its condition.
-    """
+    """The derivation of the conditions that have an `expr`. Raises ExpressionError with every fault: expressions that cannot be
+    read, types that do not fit, and cycles with their path. The place of each names its condition."""
     faults = list(derivation_faults(conditions))
     if faults:
         raise ExpressionError(*(fault.at(Place(column=name)) for name, fault in faults))

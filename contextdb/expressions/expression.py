@@ -54,35 +54,19 @@ class Expression:
     def evaluate(self, facts: Mapping[str, object]) -> float | bool | str | frozenset[str] | None:
         """The value in one context; None where it is missing.
 
-        `facts` are as a game gives them to a query. One that is absent, None, NaN or a set of values counts as missing.
-
-        Raises
-        ------
-        ContextError
-            A fact is of the wrong type, or outside an enum's or tag's domain.
+        `facts` are as a game gives them to a query. One that is absent, None, NaN or a set of values counts as missing. Raises
+        ContextError where a fact is of the wrong type, or outside an enum's or tag's domain.
         """
         value = self.run({c.name: canonical(facts.get(c.name), c) for c in self.conditions})
         return None if is_missing(value) else value
 
     def evaluate_frame(self, columns: Mapping[str, Any], n_contexts: int) -> NDArray[Any]:
-        """The value in each of many contexts, the same to the last bit as `evaluate` gives.
+        """The value in each of many contexts, the same to the last bit as `evaluate` gives: float64 [n_contexts], NaN where
+        missing, for int, number and angle; else objects, None where missing.
 
-        Parameters
-        ----------
-        columns : mapping of str to list, flat numpy array or polars Series, each of length N
-            Facts by the name of the condition. A column that is absent is missing; other columns are ignored.
-        n_contexts : int
-            N.
-
-        Returns
-        -------
-        array, shape (N,)
-            float64, NaN where missing, for int, number and angle; else objects, None where missing.
-
-        Raises
-        ------
-        ContextError
-            A fact is of the wrong type or outside the domain; a column is not N long.
+        `columns` are lists, flat arrays or Series [n_contexts] of facts by the name of the condition. One that is absent is
+        missing; others are ignored. Raises ContextError where a fact is of the wrong type or outside the domain, or a column has
+        another length.
         """
         return as_array(self.run_frame(columns, n_contexts))
 
@@ -120,22 +104,11 @@ class Expression:
 def read_expression(
     text: str, conditions: Mapping[str, Condition] | Sequence[Condition], wants: Condition | None = None
 ) -> Expression:
-    """Read an expression over some conditions.
+    """Read an expression over some conditions, such as 'not (IsInMidAirAnim and gait in ["Walk", "Run"])'; the language is told in
+    `contextdb.expressions`.
 
-    Parameters
-    ----------
-    text : str
-        Such as "speed - target_speed" or 'not (IsInMidAirAnim and gait in ["Walk", "Run"])'; the language is told in
-        `contextdb.expressions`.
-    conditions : mapping of str to Condition
-        The conditions that it may name.
-    wants : Condition, optional
-        What it computes: its values must fit the type, the declared values and the unit of this condition.
-
-    Raises
-    ------
-    ExpressionError
-        With the character where the fault is, what is accepted and, where one is near, a text that would be read.
+    The values must fit the type, the declared values and the unit of `wants`. Raises ExpressionError with the character where the
+    fault is, what is accepted and, where one is near, a text that would be read.
     """
     known = conditions if isinstance(conditions, Mapping) else {c.name: c for c in conditions}
 

@@ -35,13 +35,7 @@ def require_value(node: Node, other: Type) -> None:
 
 
 def holding(node: Membership, item: tuple[Part, Type], choices: Sequence[Choice], conditions: Mapping[str, Condition]) -> Held:
-    """The plan of `item in choices`.
-
-    Raises
-    ------
-    Refusal
-        What is after `in` does not fit the item.
-    """
+    """The plan of `item in choices`. Raises Refusal where what is after `in` does not fit the item."""
     if isinstance(node.choices, tuple):
         return Held(item[0], Cell(_listed(node, item[1], choices)))
     choice, plan, found = choices[0]

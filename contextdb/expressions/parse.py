@@ -61,13 +61,7 @@ _VALUE = "a fact, a number, a text in quotes, True or False"
 
 
 def parse(text: str) -> Node:
-    """The tree of an expression.
-
-    Raises
-    ------
-    Refusal
-        The text is not in the grammar, too long, or nested too deeply.
-    """
+    """The tree of an expression. Raises Refusal where the text is not in the grammar, too long, or nested too deeply."""
     parser = _Parser(tokens_of(text))
     if len(parser.tokens) == 1:
         raise Refusal(0, len(text), "the expression is empty", "an expression such as speed - target_speed")

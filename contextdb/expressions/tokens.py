@@ -74,13 +74,8 @@ class Token:
 
 
 def tokens_of(text: str) -> list[Token]:
-    """Take an expression apart; the last token is the end.
-
-    Raises
-    ------
-    Refusal
-        The text is too long, or a character has no place in an expression.
-    """
+    """Take an expression apart; the last token is the end. Raises Refusal where the text is too long, or a character has no place
+    in an expression."""
     if len(text) > MOST_CHARACTERS:
         raise Refusal(0, len(text), f"the expression has {len(text):,} characters", f"at most {MOST_CHARACTERS:,}")
     found: list[Token] = []

@@ -54,25 +54,16 @@ class Stray:
 
 
 def find_records(raw: bytes) -> tuple[Records, list[Stray]]:
-    """Find the records of a CSV.
+    """Find the records of a CSV in UTF-8 with at least one line that is not blank, and the fields whose quotes are wrong.
 
-    Parameters
-    ----------
-    raw : bytes
-        UTF-8 with at least one line that is not blank.
-
-    Returns
-    -------
-    Records
-        Every line break outside quotes ends a record. A stray field is taken to end with its line.
-    list of Stray
-        The fields whose quotes are wrong. After `MOST_STRAYS` of them the search ends, and later records are not sound.
+    Every line break outside quotes ends a record. A stray field is taken to end with its line; after `MOST_STRAYS` of them the
+    search ends, and later records are not sound.
     """
     first = len(UTF8_BOM) if raw.startswith(UTF8_BOM) else 0
     octets = np.frombuffer(raw, np.uint8, offset=first)
     quotes, commas, returns = (_bits(octets, mark) for mark in (QUOTE, COMMA, CR))
     ends = _line_end_bits(_bits(octets, LF), returns)
-    ends[-1] |= _bit(len(octets))  # the last line ends as all others do
+    ends[-1] |= np.uint64(1 << (len(octets) & 63))  # the last line ends as all others do
     inside, strays = inside_quotes(quotes), list[Stray]()
     if _has_strays(quotes, inside, quotes | commas | returns | ends):
         settled, strays = _settled_quotes(np.append(octets, np.uint8(LF)), bitmask.rows(quotes), bitmask.rows(ends))
@@ -99,22 +90,9 @@ def inside_quotes(quotes: Words) -> Words:
 
 
 def field_bounds(chunk: bytes, lengths: Positions, n_fields: int) -> tuple[Positions, Positions]:
-    """Where each field of some well-formed records stands.
-
-    Parameters
-    ----------
-    chunk : bytes
-        The records without their line ends, one right after the other.
-    lengths : int64 array, shape (n,)
-        How many bytes each record has.
-    n_fields : int
-        How many fields each has.
-
-    Returns
-    -------
-    starts, stops : int64 arrays, shape (n, n_fields)
-        Field f of record i is `chunk[starts[i, f] : stops[i, f]]`, with its quotes.
-    """
+    """Where each field of n well-formed records stands: int64 [n, n_fields] twice, field f of record i is `chunk[starts[i, f] :
+    stops[i, f]]`, with its quotes. `chunk` is the records without their line ends, one right after the other; `lengths` int64 [n]
+    are their bytes."""
     octets = np.frombuffer(chunk, np.uint8)
     inside = inside_quotes(bitmask.pack(octets == QUOTE))
     commas = bitmask.rows(bitmask.pack(octets == COMMA) & ~inside).reshape(len(lengths), n_fields - 1)
@@ -156,10 +134,6 @@ def _bits(octets: Octets, mark: int) -> Words:
         block = np.packbits(octets[start : start + _BLOCK] == mark, bitorder="little")
         packed[start // 8 : start // 8 + len(block)] = block
     return packed.view("<u8").astype(np.uint64, copy=False)
-
-
-def _bit(position: int) -> np.uint64:
-    return np.uint64(1 << (position & 63))
 
 
 def _line_end_bits(feeds: Words, returns: Words) -> Words:

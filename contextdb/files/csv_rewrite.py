@@ -31,28 +31,12 @@ _SAMPLE = 100
 def rewritten(
     columns: Sequence[TextColumn], source: Source | None, origin: Origin, field_of: Sequence[int] | None = None
 ) -> Source:
-    """Write texts over the source they came from.
+    """Write texts over the source they came from; gives the new bytes as `read_csv` would read them: record r is row r.
 
-    Parameters
-    ----------
-    columns : sequence of TextColumn
-        The columns of the new file, each with n_rows rows.
-    source : Source or None
-        The file they came from. None: a fresh CSV with "\\n", and quotes where they are needed.
-    origin : int64 array, shape (n_rows,)
-        The record of the source that each row came from, or -1 for a new row, which is written in the file's own style.
-    field_of : sequence of int, optional
-        The column of the source that each column came from, or -1 for a new one. Default: the one of the same name.
-
-    Returns
-    -------
-    Source
-        The new bytes, as `read_csv` would read them; record r is row r.
-
-    Raises
-    ------
-    TableError
-        A text or a name that a CSV cannot hold, such as one with a NUL character.
+    `columns` are those of the new file. Without a source it is a fresh CSV with line feeds, and quotes where they are needed.
+    `origin` int64 [n_rows] is the record of the source that each row came from, -1 for a new row, which is written in the file's
+    own style. `field_of` is the column of the source that each column came from, -1 for a new one; None: the one of the same name.
+    Raises TableError for a text or a name that a CSV cannot hold, such as one with a NUL character.
     """
     change = _Change.of(columns, source or NO_SOURCE, origin, field_of)
     faults = [*name_faults([c.name for c in columns]), *_unwritable(change)]

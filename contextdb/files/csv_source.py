@@ -78,26 +78,10 @@ NO_SOURCE = Source(b"", np.zeros(1, np.int64), np.zeros(0, np.int64), ())
 
 
 def read_csv(raw: bytes, file: str) -> tuple[Source, list[TextColumn]]:
-    """Read the texts of a CSV.
+    """Read a strict CSV (RFC 4180) in UTF-8; `file` is its name in messages.
 
-    Parameters
-    ----------
-    raw : bytes
-        Strict CSV (RFC 4180) in UTF-8.
-    file : str
-        Its name, for messages.
-
-    Returns
-    -------
-    Source
-        What is needed to write the same bytes again.
-    list of TextColumn
-        The columns in the order of the file, every text as it is there, without its quotes.
-
-    Raises
-    ------
-    TableError
-        With every fault of the file, each with its line.
+    Gives what is needed to write the same bytes again, and the columns in the order of the file, every text as it is there, without
+    its quotes. Raises TableError with every fault of the file, each with its line.
     """
     records, names = find_rows(raw, file)
     starts, stops = records.starts[1:], records.stops[1:]

@@ -56,26 +56,10 @@ class ParquetSource:
 
 
 def read_parquet(raw: bytes, file: str) -> tuple[ParquetSource, list[TextColumn]]:
-    """Read the texts of a Parquet file.
+    """Read the texts of a Parquet file; `file` is its name in messages.
 
-    Parameters
-    ----------
-    raw : bytes
-        The file.
-    file : str
-        Its name, for messages.
-
-    Returns
-    -------
-    ParquetSource
-        What is needed to write the same bytes again.
-    list of TextColumn
-        The columns in the order of the file.
-
-    Raises
-    ------
-    TableError
-        The file is no Parquet, cut off or damaged; or columns of a type that no cell has, each with what it is.
+    Gives what is needed to write the same bytes again, and the columns in the order of the file. Raises TableError where the file
+    is no Parquet, cut off or damaged, or has columns of a type that no cell has, each with what it is.
     """
     frame = _frame(raw, file)
     if not frame.width:
@@ -98,13 +82,8 @@ def columns_of_frame(frame: pl.DataFrame, file: str | None = None) -> list[TextC
 def rewritten_parquet(
     columns: Sequence[TextColumn], source: ParquetSource | None, origin: Origin, field_of: Sequence[int] | None = None
 ) -> ParquetSource:
-    """Write texts over the Parquet file they came from; parameters as in `contextdb.files.csv_rewrite.rewritten`.
-
-    Raises
-    ------
-    TableError
-        A text or a name that no Parquet file can hold.
-    """
+    """Write texts over the Parquet file they came from; parameters as in `contextdb.files.csv_rewrite.rewritten`. Raises TableError
+    for a text or a name that no Parquet file can hold."""
     before = source.columns if source else ()
     fields = source_fields(columns, before, field_of)
     changed = changed_rows(columns, before, fields, origin)

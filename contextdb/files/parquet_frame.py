@@ -57,20 +57,9 @@ class Frame:
 
 
 def require_whole(raw: bytes | memoryview, most_values: int | None = MOST_VALUES) -> Frame:
-    """Check the frame of a Parquet file, and its digest where it is sealed.
-
-    Parameters
-    ----------
-    raw : bytes or memoryview
-        The whole file, with its magic bytes at both ends.
-    most_values : int, optional
-        How many values the file may hold; None where it is read a batch at a time.
-
-    Raises
-    ------
-    DamagedFrame
-        Counts and sizes do not agree with each other or with the file's length, or the digest is another.
-    """
+    """Check the frame of a whole Parquet file, and its digest where it is sealed. `most_values` is how many values the file may
+    hold; None where it is read a batch at a time. Raises DamagedFrame where counts and sizes do not agree with each other or with
+    the file's length, or the digest is another."""
     frame = _checked(raw, most_values)
     if frame.is_sealed and _digest(raw, frame) != frame.metadata[SEAL]:
         raise DamagedFrame("it was altered after it was saved: its contents do not match its digest")
@@ -78,14 +67,8 @@ def require_whole(raw: bytes | memoryview, most_values: int | None = MOST_VALUES
 
 
 def require_whole_file(path: str | PathLike[str]) -> Frame:
-    """The same for a file that is then read a batch at a time; only its frame is read, and all of a sealed one.
-
-    Raises
-    ------
-    DamagedFrame
-    OSError
-        The file cannot be read.
-    """
+    """The same for a file that is then read a batch at a time; only its frame is read, and all of a sealed one. Raises
+    DamagedFrame, or OSError where the file cannot be read."""
     with open(path, "rb") as file:
         if not file.read(1):
             raise DamagedFrame("it is empty")

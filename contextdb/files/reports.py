@@ -16,13 +16,8 @@ MOST_DIGITS = 300
 
 
 def document_of(text: str) -> Any:
-    """The JSON document of a text.
-
-    Raises
-    ------
-    ValueError
-        It is none, or its digest does not match: why, as the end of a sentence.
-    """
+    """The JSON document of a text. Raises ValueError where it is none, or its digest does not match: why, as the end of a
+    sentence."""
     document = _parsed(text)
     if isinstance(document, dict) and document.get(DIGEST, expected := digest_of(document)) != expected:
         raise ValueError("it was altered after it was written: its contents do not match its digest")

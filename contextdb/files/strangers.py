@@ -71,13 +71,8 @@ def page(raw: bytes) -> Fault | None:
 
 
 def require_text(raw: bytes, file: str) -> None:
-    """Refuse bytes that are not the text of a CSV in UTF-8.
-
-    Raises
-    ------
-    TableError
-        Empty, binary, in another encoding, a Git LFS pointer, HTML or XML, or with another delimiter.
-    """
+    """Refuse bytes that are not the text of a CSV in UTF-8: raises TableError for what is empty, binary, in another encoding, a Git
+    LFS pointer, HTML or XML, or has another delimiter."""
     fault = _empty(raw) or _binary(raw) or _not_utf8(raw) or pointer(raw) or page(raw) or _delimited_otherwise(raw)
     if fault:
         raise TableError(fault.at(Place(file, fault.place.line)))
@@ -100,7 +95,7 @@ def _empty(raw: bytes) -> Fault | None:
 
 def _binary(raw: bytes) -> Fault | None:
     nul = raw.find(b"\0")
-    is_utf16 = raw.startswith(_UTF16) or (nul >= 0 and _looks_utf16(raw))
+    is_utf16 = raw.startswith(_UTF16) or (nul >= 0 and looks_utf16(raw))
     if is_utf16:
         named = "UTF-32" if raw.startswith(_UTF32) else "UTF-16"
         return Fault(f"the file is {named} text.", "UTF-8, with or without BOM", _SAVE_AS_UTF8)
@@ -112,7 +107,7 @@ def _binary(raw: bytes) -> Fault | None:
     return Fault(found, "CSV text in UTF-8", place=Place(line=line_of(raw, nul)))
 
 
-def _looks_utf16(raw: bytes) -> bool:
+def looks_utf16(raw: bytes) -> bool:
     """Whether every other of the first bytes is NUL, as in Latin text in UTF-16 without a BOM."""
     head = raw[: min(len(raw), 200) // 2 * 2]
     return len(head) >= 4 and any(not any(head[i::2]) and all(head[1 - i :: 2]) for i in (0, 1))

@@ -14,7 +14,7 @@ import json
 import math
 import mmap
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,23 +38,9 @@ _BROKEN = (ValueError, KeyError, TypeError, IndexError, UnicodeDecodeError, Attr
 
 @dataclass(frozen=True)
 class FileKind:
-    """A sort of file.
-
-    Attributes
-    ----------
-    key : str
-        The name under which the metadata hold the layout's version.
-    layout : int
-        The version that is written and read.
-    found : str
-        What another file is not: "one that contextdb compiled".
-    accepted, mend : str
-        For messages about a file that cannot be used.
-    also : tuple of int
-        Other versions that are read.
-    since : str
-        What has changed since the version before, for messages about an older file.
-    """
+    """A sort of file. The metadata hold the version of its layout under `key`: `layout` is written and read, those in `also` are
+    read too. Messages about a file that cannot be used name what it is not (`found`, such as "one that contextdb compiled"), what
+    is `accepted`, the mend and, for an older file, what has changed `since`."""
 
     key: str
     layout: int
@@ -84,13 +70,8 @@ class FileKind:
 
 
 def write_tensors(path: Path, kind: FileKind, tensors: Mapping[str, NDArray[Any]], metadata: Mapping[str, str]) -> None:
-    """Write arrays and metadata; the same ones give the same bytes. The old file is whole until the new one is.
-
-    Raises
-    ------
-    FileError
-        The disk refuses.
-    """
+    """Write arrays and metadata; the same ones give the same bytes. The old file is whole until the new one is. Raises FileError
+    where the disk refuses."""
     write_atomic(path, to_bytes(tensors, kind.metadata(metadata)))
 
 
@@ -110,25 +91,14 @@ def to_bytes(tensors: Mapping[str, NDArray[Any]], metadata: Mapping[str, str]) -
 
 
 def read_tensors(path: Path, kind: FileKind, *, writeable: bool = False) -> tuple[Tensors, dict[str, str]]:
-    """Every array as a view of the mapped file, and the metadata.
+    """Every array as a view of the mapped file, and the metadata. The file's frame and its layout are checked, and no array is
+    read: a large file opens as fast as a small one.
 
-    The file's frame and its layout are checked, and no array is read: a large file opens as fast as a small one.
-
-    Parameters
-    ----------
-    path : Path
-    kind : FileKind
-    writeable : bool
-        Whether the arrays may be written; the file stays as it is. A page that is written takes memory of its own.
-
-    Raises
-    ------
-    ArtefactError
-        The file is truncated, of another kind or of another layout.
-    FileError
-        The file cannot be read.
+    `writeable` says whether the arrays may be written; the file stays as it is, and a page that is written takes memory of its own.
+    Raises ArtefactError where the file is truncated, of another kind or of another layout; FileError where it cannot be read.
     """
-    _check_frame(path, kind)
+    if kind.key not in metadata_of(path, kind):
+        raise kind.refused(path, f"a .safetensors file, but not {kind.found}.")
     with path.open("rb") as file:
         mapped = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_COPY if writeable else mmap.ACCESS_READ)
     with kind.reading(path):
@@ -140,6 +110,12 @@ def read_tensors(path: Path, kind: FileKind, *, writeable: bool = False) -> tupl
             since = f" {kind.since}" if kind.since else ""
             raise kind.refused(path, f"layout {metadata[kind.key]}; this version reads layout {' or '.join(known)}.{since}")
         return {name: _view(mapped, start, entry) for name, entry in header.items()}, metadata
+
+
+def divided(tensors: Tensors, names: Collection[str]) -> tuple[Tensors, Tensors]:
+    """All but the arrays of these names, and those of them that are there."""
+    large = {name: tensors[name] for name in names if name in tensors}
+    return {name: array for name, array in tensors.items() if name not in large}, large
 
 
 def digest_of(tensors: Mapping[str, NDArray[Any]], *texts: str) -> str:
@@ -164,15 +140,8 @@ def texts_from_array(octets: NDArray[np.uint8]) -> list[str]:
 
 
 def metadata_of(path: Path, kind: FileKind) -> dict[str, str]:
-    """The metadata of a .safetensors file, whichever kind it is of; `kind` is for the message.
-
-    Raises
-    ------
-    ArtefactError
-        The file is truncated, or no .safetensors file.
-    FileError
-        The file cannot be read.
-    """
+    """The metadata of a .safetensors file, whichever kind it is of; `kind` is for the message. Raises ArtefactError where the file
+    is truncated, or no .safetensors file; FileError where the file cannot be read."""
     if not os.path.isfile(path) or path.stat().st_size < 8:  # Path raises, where this says no, to a name that no file can have
         raise kind.refused(path, f"the file has {len(read_bytes(path))} bytes, too few for any artefact.")
     from safetensors import SafetensorError, safe_open
@@ -192,12 +161,6 @@ def other_layout(path: Path, kind: FileKind) -> str | None:
     except ContextDBError:
         return None
     return None if layout in [str(known) for known in (kind.layout, *kind.also)] else layout
-
-
-def _check_frame(path: Path, kind: FileKind) -> None:
-    """Refuse a file that is not wholly there, or not of this kind."""
-    if kind.key not in metadata_of(path, kind):
-        raise kind.refused(path, f"a .safetensors file, but not {kind.found}.")
 
 
 def _view(mapped: mmap.mmap, start: int, entry: Mapping[str, Any]) -> NDArray[Any]:

@@ -30,22 +30,9 @@ def is_parquet(file: str | Path | bytes) -> bool:
 
 
 def read_texts(path: str | Path) -> tuple[AnySource, list[TextColumn]]:
-    """Read a table's texts, as its suffix says: .csv or .parquet.
-
-    Returns
-    -------
-    Source or ParquetSource
-        What is needed to write the same bytes again.
-    list of TextColumn
-        The columns in the order of the file.
-
-    Raises
-    ------
-    FileError
-        There is no such file, it may not be read, or its suffix is another.
-    TableError
-        The file is not a table, with every fault in it.
-    """
+    """Read a table's texts, as its suffix says, .csv or .parquet: what is needed to write the same bytes again, and the columns in
+    the order of the file. Raises FileError where there is no such file, it may not be read, or its suffix is another; TableError
+    where the file is not a table, with every fault in it."""
     raw = read_bytes(path)
     _require_table(path)
     announce_file(str(path), len(raw))
@@ -59,13 +46,8 @@ def texts_of(raw: bytes, file: str, as_parquet: bool | None = None) -> tuple[Any
 
 @contextmanager
 def scanned_parquet(path: Path) -> Iterator[pl.LazyFrame]:
-    """Scan a Parquet file of contexts, whose frame is checked first.
-
-    Raises
-    ------
-    TableError, FileError
-        The file is missing, no Parquet or damaged, found now or while the scan is collected inside the `with`.
-    """
+    """Scan a Parquet file of contexts, whose frame is checked first. Raises TableError or FileError where the file is missing, no
+    Parquet or damaged, found now or while the scan is collected inside the `with`."""
     try:
         require_whole_file(path)
         yield pl.scan_parquet(path, glob=False, low_memory=True)
@@ -108,21 +90,11 @@ def write_texts(
     origin: Origin,
     field_of: Sequence[int] | None = None,
 ) -> AnySource:
-    """Write a table's texts, as the suffix says, and give what they now come from: record r of it is row r.
+    """Write a table's texts, as the suffix says, .csv or .parquet, and give what they now come from: record r of it is row r.
 
-    Parameters
-    ----------
-    path : str or Path
-        A .csv or .parquet file, there already or not.
-    columns, source, origin, field_of
-        As in `contextdb.files.csv_rewrite.rewritten`. When the source has the other format, the file is written from scratch.
-
-    Raises
-    ------
-    FileError
-        The disk refuses; the old file is then whole.
-    TableError
-        A text or a name that such a file cannot hold.
+    `columns`, `source`, `origin` and `field_of` are as in `contextdb.files.csv_rewrite.rewritten`; where the source has the other
+    format, the file is written from scratch. Raises FileError where the disk refuses, and the old file is then whole; TableError
+    for a text or a name that such a file cannot hold.
     """
     new = new_source(path, columns, source, origin, field_of)
     write_atomic(path, new.raw)

@@ -54,21 +54,9 @@ def render(
 ) -> str:
     """Render the findings of a check, or measured coverage; the same arguments always give the same text.
 
-    Parameters
-    ----------
-    format_name : str
-        One of `formats(report.subject)`.
-    colour, width : bool, int
-        For `text`: whether to colour it, and how many terminal cells a line may have.
-    shows_all : bool
-        Every finding and gap, where people would else see the first few of each kind.
-    failing : collection of str
-        For `junit`: the levels that make a test fail, as they make the command fail.
-
-    Raises
-    ------
-    ContextDBError
-        There is no such format.
+    `format_name` is one of `formats(report.subject)`. `colour` and `width`, in terminal cells, are for `text`; `shows_all` gives
+    every finding and gap, where people would else see the first few of each kind; `failing` are the levels that make a test of
+    `junit` fail, as they make the command fail. Raises ContextDBError where there is no such format.
     """
     known = formats(report.subject)
     if format_name not in known:

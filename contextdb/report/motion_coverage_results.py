@@ -208,13 +208,8 @@ class Earlier:
 
 
 def read_baseline(text: str, file: str) -> dict[str, Earlier]:
-    """What an earlier report says, by the name of each table.
-
-    Raises
-    ------
-    ContextError
-        It is no such report, or its bins are others.
-    """
+    """What an earlier report says, by the name of each table. Raises ContextError where it is no such report, or its bins are
+    others."""
     try:
         document = document_of(text)
         if not isinstance(document, dict) or document.get("format") != 1:

@@ -27,22 +27,9 @@ BAR_STEPS = 127
 
 @dataclass(frozen=True, slots=True)
 class Detail:
-    """How much a page holds.
-
-    Attributes
-    ----------
-    ghosts : int
-        How many poses that could have played are shown at each jump.
-    ghost_s : float
-        For how long.
-    bins : int
-        Into how many bars the frames of an asset are drawn together; 0 for no bars.
-    rows : int
-        Of how many assets.
-    candidates : int
-    searches : bool
-        Whether searches that changed nothing are included.
-    """
+    """How much a page holds: how many `ghosts`, poses that could have played, at each jump and for how long, of how many assets the
+    frames are drawn as bars (`rows`) and in how many (`bins`, 0 for none), how many candidates, and whether searches that changed
+    nothing are included."""
 
     ghosts: int
     ghost_s: float

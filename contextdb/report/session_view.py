@@ -58,23 +58,10 @@ def view_of(
 ) -> SessionView:
     """A session as the page shows it.
 
-    Parameters
-    ----------
-    banks : mapping of database name to PoseBank
-        The poses of its databases.
-    settings : PoseSettings
-        How its poses are made.
-    reasked : Reasked, optional
-        The session asked again: without it the page shows no candidates.
-    measured : mapping of str to (str, str), optional
-        Measures by name: of the session, and of the raw clips.
-    poses : sequence of Pose, optional
-        Those that were shown, one for each decision, such as on ground that is not flat. Default: they are made again.
-
-    Raises
-    ------
-    MotionError
-        The session has no decision, or the banks have no poses of what it plays.
+    `banks` are the poses of its databases, by name, and `settings` how its poses are made; `poses` are those that were shown, one
+    for each decision, such as on ground that is not flat (None: they are made again). `reasked` is the session asked again: without
+    it the page shows no candidates. `measured` are measures by name: of the session, and of the raw clips. Raises MotionError where
+    the session has no decision, or the banks have no poses of what it plays.
     """
     decisions = list(trace.brief())
     if not decisions:

@@ -12,23 +12,10 @@ STEPS = (20, 10, 5, 3, 2, 1)
 
 
 def fitted(sections_at: Callable[[int], Sequence[str]], size: Callable[[str], int], room: int) -> tuple[list[str], int]:
-    """Find the longest form of a report that fits.
+    """The sections of the longest form of a report that fits into `room`, and how many findings of one rule they show.
 
-    Parameters
-    ----------
-    sections_at : function of int
-        The sections with at most so many findings of one rule.
-    size : function of str
-        How much room a section takes.
-    room : int
-        How much there is.
-
-    Returns
-    -------
-    list of str
-        The sections. Where not even one finding of each rule fits, the last sections are left out; the first one never is.
-    int
-        How many findings of one rule they show.
+    `sections_at` gives the sections with at most so many findings of one rule, `size` how much room a section takes. Where not even
+    one finding of each rule fits, the last sections are left out; the first one never is.
     """
     sections: Sequence[str] = ()
     for most in STEPS:

@@ -44,13 +44,7 @@ def fitting_of(section: str, part: Said) -> dict[str, Any]:
 
 
 def number_of(kind: Kind, bound: Any) -> float:
-    """A bound of contextdb.toml as a number.
-
-    Raises
-    ------
-    ValueError
-        It is not written as the type writes its numbers.
-    """
+    """A bound of contextdb.toml as a number. Raises ValueError where it is not written as the type writes its numbers."""
     if kind.is_decimal:
         return float(bound) + 0.0
     if not re.fullmatch(kind.spelling.number, str(bound)):

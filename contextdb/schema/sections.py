@@ -87,13 +87,8 @@ def differences(before: Mapping[str, object], after: Mapping[str, object]) -> di
 
 
 def schema_with(schema: Schema, parts: Mapping[str, Mapping[str, Mapping[str, object] | None]]) -> Schema:
-    """The schema with some parts changed; None removes one.
-
-    Raises
-    ------
-    SchemaError
-        A part that contextdb.toml could not hold, with what is accepted.
-    """
+    """The schema with some parts changed; None removes one. Raises SchemaError for a part that contextdb.toml could not hold, with
+    what is accepted."""
     said: dict[str, Any] = {
         section: _with(getattr(schema, section), parts[section]) for section in EDITED_SECTIONS if section in parts
     }
@@ -111,13 +106,8 @@ def schema_with(schema: Schema, parts: Mapping[str, Mapping[str, Mapping[str, ob
 
 
 def settings_with(settings: TableSettings, said: Mapping[str, Any]) -> TableSettings:
-    """The settings with some keys changed; None removes one.
-
-    Raises
-    ------
-    SchemaError
-        A key or a value that `[tables.NAME]` could not hold, with what is accepted.
-    """
+    """The settings with some keys changed; None removes one. Raises SchemaError for a key or a value that `[tables.NAME]` could not
+    hold, with what is accepted."""
     shapes, plain = SECTIONS["tables"] or {}, TableSettings(settings.name)
     faults = []
     for key, value in said.items():

@@ -166,13 +166,8 @@ class Schema:
 
 
 def derivation_of(schema: Schema, names: Iterable[str]) -> Derivation | None:
-    """What is needed to compute those of some conditions that are derived; None where none is.
-
-    Raises
-    ------
-    SchemaError
-        An expression cannot be used. `read_schema` has checked that already; a schema made in Python has not.
-    """
+    """What is needed to compute those of some conditions that are derived; None where none is. Raises SchemaError where an
+    expression cannot be used. `read_schema` has checked that already; a schema made in Python has not."""
     derived = schema._derivation.only(names) if schema._derivation else None
     return derived if derived and derived.steps else None
 
@@ -183,13 +178,8 @@ EMPTY = Schema()
 
 @lru_cache(maxsize=8)
 def read_schema(text: str, file: str) -> Schema:
-    """What the text of a contextdb.toml says; `file` is its name in messages. The last few are kept: one text is read often.
-
-    Raises
-    ------
-    SchemaError
-        With every fault: its line, what was found, what is accepted and the nearest mend.
-    """
+    """What the text of a contextdb.toml says; `file` is its name in messages. The last few are kept: one text is read often. Raises
+    SchemaError with every fault: its line, what was found, what is accepted and the nearest mend."""
     text = text.removeprefix("\ufeff")
     document = read_toml(text, file)
     found = list(document_faults(document))
@@ -205,12 +195,8 @@ def read_schema(text: str, file: str) -> Schema:
 def conditions_from_dict(mapping: Mapping[str, Mapping[str, object]]) -> dict[str, Condition]:
     """Conditions from what `[conditions.NAME]` of contextdb.toml would hold: `{"speed": {"type": "number"}}`.
 
-    What an `expr` says is not looked at: it may name conditions that are elsewhere.
-
-    Raises
-    ------
-    SchemaError
-        With every fault, as from a file but without a line.
+    What an `expr` says is not looked at: it may name conditions that are elsewhere. Raises SchemaError with every fault, as from a
+    file but without a line.
     """
     if found := list(section_faults("conditions", mapping)):
         raise SchemaError(*(fault for _, fault in found))
@@ -218,13 +204,8 @@ def conditions_from_dict(mapping: Mapping[str, Mapping[str, object]]) -> dict[st
 
 
 def settings_from_dict(name: str, mapping: Mapping[str, object], conditions: Set[str]) -> TableSettings:
-    """Settings of a table from what `[tables.NAME]` of contextdb.toml would hold: `{"priority": "Prio"}`.
-
-    Raises
-    ------
-    SchemaError
-        With every fault, as from a file but without a line; also for a column that is among the declared `conditions`.
-    """
+    """Settings of a table from what `[tables.NAME]` of contextdb.toml would hold: `{"priority": "Prio"}`. Raises SchemaError with
+    every fault, as from a file but without a line; also for a column that is among the declared `conditions`."""
     path, part = ("tables", name), {key: list(value) if isinstance(value, tuple) else value for key, value in mapping.items()}
     if found := [*part_faults(path, part), *column_faults(path, fitting_of("tables", part), conditions)]:
         raise SchemaError(*(fault for _, fault in found))

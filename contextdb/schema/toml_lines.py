@@ -44,13 +44,8 @@ _LINE_MENDS: tuple[tuple[str, str], ...] = (
 
 
 def read_toml(text: str, file: str) -> dict[str, object]:
-    """The values of a TOML document.
-
-    Raises
-    ------
-    SchemaError
-        With the line that cannot be read, the character in it and what would be read in its place.
-    """
+    """The values of a TOML document. Raises SchemaError with the line that cannot be read, the character in it and what would be
+    read in its place."""
     _require_short_keys(text, file)
     try:
         return tomllib.loads(text)

@@ -183,13 +183,8 @@ class Edit:
     changes: tuple[Change, ...]
 
     def apply(self, table: AnyTable) -> AnyTable:
-        """The table after the edit.
-
-        Raises
-        ------
-        TableError, SchemaError
-            The edit does not fit the table: a row or column that is missing, a name that appears twice.
-        """
+        """The table after the edit. Raises TableError or SchemaError where the edit does not fit the table: a row or column that is
+        missing, a name that appears twice."""
         for change in self.changes:
             table = change.apply(table)
         return table

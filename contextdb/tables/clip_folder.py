@@ -39,21 +39,8 @@ MOST_RATE = 1e6
 
 @dataclass
 class FolderClips:
-    """The clips of a folder.
-
-    Attributes
-    ----------
-    folder : Path
-    clips : list of Clip
-        In the order of their paths.
-    paths : list of Path
-    left_out : list of str
-        What is wrong with files that are no clips.
-    notes : list of str
-        What was taken for granted.
-    config : MotionConfig
-        What the project says of motion; nothing of a folder of clips.
-    """
+    """The clips of a folder in the order of their paths; `left_out` says what is wrong with files that are no clips, `notes` what
+    was taken for granted, `config` what the project says of motion (nothing of a folder of clips)."""
 
     folder: Path
     clips: list[Clip] = field(default_factory=list)
@@ -66,13 +53,8 @@ class FolderClips:
 def clips_of(
     path: str | Path, metres_per_unit: float | None, up: Up | None, tell: Tell, wants: Wanted | None = None
 ) -> FolderClips:
-    """Read the clips of a folder; of a project with `wants` those of the databases that it leaves of all.
-
-    Raises
-    ------
-    ContextDBError
-        There is no such folder, no clip in it, or two clips of one name.
-    """
+    """Read the clips of a folder; of a project with `wants` those of the databases that it leaves of all. Raises ContextDBError
+    where there is no such folder, no clip in it, or two clips of one name."""
     folder = _folder(Path(path))
     found = FolderClips(folder)
     if (folder / SCHEMA_FILE).is_file():
@@ -109,13 +91,7 @@ def clips_below(folder: Path) -> list[Path]:
 
 
 def bvh_files(folder: Path) -> list[Path]:
-    """The same, one or more.
-
-    Raises
-    ------
-    FileError
-        There is none.
-    """
+    """The same, one or more. Raises FileError where there is none."""
     files = clips_below(folder)
     if not files:
         raise FileError(Fault("there is no BVH file in this folder or below it.", "*.bvh", place=Place(str(folder))))

@@ -74,12 +74,8 @@ class TableData(Unchanging):
     ) -> Self:
         """A table of texts under a schema; cells that cannot be read are kept and are in its `faults`.
 
-        `before`: the same columns in another version of the table, by name; what is known of them is not worked out again.
-
-        Raises
-        ------
-        TableError
-            A column that the settings name is missing, or two columns have one name.
+        `before`: the same columns in another version of the table, by name; what is known of them is not worked out again. Raises
+        TableError where a column that the settings name is missing, or two columns have one name.
         """
         settings = settings or TableSettings(name=name)
         _require_columns(columns, settings, path)
@@ -162,15 +158,8 @@ class TableData(Unchanging):
         return self.with_cells([(row, column, text)])
 
     def with_cells(self, edits: Iterable[tuple[int, str, str]]) -> Self:
-        """The table with some cells changed, given as (row, column, text).
-
-        Raises
-        ------
-        NoSuchRow, TableError
-            There is no such row, or no such column.
-        ContextError
-            An edit is no row, column and text.
-        """
+        """The table with some cells changed, given as (row, column, text). Raises NoSuchRow or TableError where there is no such
+        row, or no such column; ContextError where an edit is no row, column and text."""
         changed: dict[int, TextColumn] = {}
         accepted = "a row, a column and a text for each cell"
         for edit in require_many(edits, "edits", accepted):
@@ -184,15 +173,8 @@ class TableData(Unchanging):
         return with_columns(self, [changed.get(i, c) for i, c in enumerate(self.columns)], self.origin)
 
     def with_rows(self, at: int, rows: Sequence[Mapping[str, str]]) -> Self:
-        """The table with new rows before row `at`; columns that a row leaves out are empty (Any).
-
-        Raises
-        ------
-        NoSuchRow, TableError
-            There is no such place, or no such column.
-        ContextError
-            A row is no mapping of columns to texts.
-        """
+        """The table with new rows before row `at`; columns that a row leaves out are empty (Any). Raises NoSuchRow or TableError
+        where there is no such place, or no such column; ContextError where a row is no mapping of columns to texts."""
         at, rows = require_whole(at, "at"), list(require_many(rows, "rows", "a list of mappings of columns to texts"))
         for row in rows:
             for name, text in require_mapping(row, "a row of rows", "a mapping of columns to texts").items():
@@ -204,15 +186,8 @@ class TableData(Unchanging):
         return with_columns(self, columns, np.insert(self.origin, at, np.full(len(rows), -1)))
 
     def with_rows_taken(self, rows: Sequence[int] | NDArray[np.int64]) -> Self:
-        """The table of the given rows in the given order: deletes, moves, sorts.
-
-        Raises
-        ------
-        NoSuchRow
-            There is no such row.
-        ContextError
-            `rows` are no whole numbers.
-        """
+        """The table of the given rows in the given order: deletes, moves, sorts. Raises NoSuchRow where there is no such row,
+        ContextError where `rows` are no whole numbers."""
         numbers = rows.tolist() if isinstance(rows, np.ndarray) else require_many(rows, "rows", "a list of row numbers")
         numbers = [require_whole(row, "a row of rows") for row in require_many(numbers, "rows", "a list of row numbers")]
         if wrong := [row for row in numbers if not 0 <= row < self.n_rows]:

@@ -15,15 +15,8 @@ ACCEPTED = 'a mapping: {"Asset Name": [...], "speed": [...]}, a list of such map
 
 
 def columns_given(given: object) -> list[TextColumn]:
-    """The texts of each column; what is None, or left out of a row, is empty.
-
-    Raises
-    ------
-    ContextError
-        What is given, or a part of it, is of another type.
-    TableError
-        Columns of unequal length, or columns of a DataFrame of a type that no cell has.
-    """
+    """The texts of each column; what is None, or left out of a row, is empty. Raises ContextError where what is given, or a part of
+    it, is of another type; TableError for columns of unequal length, or columns of a DataFrame of a type that no cell has."""
     if isinstance(given, pl.DataFrame):
         return columns_of_frame(given)
     columns = given if isinstance(given, Mapping) else _of_rows(require_many(given, "columns", ACCEPTED))

@@ -23,13 +23,8 @@ def open_compiled(text: str) -> CompiledTable:
 
 
 def table_path(text: str) -> Path:
-    """The file of the table that TABLE means.
-
-    Raises
-    ------
-    FileError, TableError, SchemaError
-        There is no such table (with the nearest there is), more than one is meant, or a contextdb.toml cannot be read.
-    """
+    """The file of the table that TABLE means. Raises FileError, TableError or SchemaError where there is no such table (with the
+    nearest there is), more than one is meant, or a contextdb.toml cannot be read."""
     path = Path(text)
     if os.path.isdir(text):  # os.path says no, where Path raises, to a name that no file can have
         return _only_table(path)

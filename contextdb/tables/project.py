@@ -268,7 +268,7 @@ def _declared_files(folder: Path, schema: Schema) -> Iterator[tuple[str, Path]]:
 
 def _undeclared_files(folder: Path, declared: Iterable[tuple[str, Path]]) -> Iterator[Path]:
     taken = {path for _, path in declared}
-    return (path for path in sorted(folder.iterdir()) if path not in taken and _is_table(path))
+    return (path for path in sorted(folder.iterdir()) if path not in taken and names_a_table(path.name) and path.is_file())
 
 
 def _on_disk(path: Path, names: dict[Path, list[str]]) -> Path | None:
@@ -318,10 +318,6 @@ def twice_named(found: Iterable[tuple[str, Path]]) -> list[Fault]:
             stands = f"table {in_quotes(name)} is also defined in {path_in_quotes(first[name])}."
             faults.append(Fault(stands, "one file for each table", place=Place(str(path))))
     return faults
-
-
-def _is_table(path: Path) -> bool:
-    return names_a_table(path.name) and path.is_file()
 
 
 def folder_of(path: Path) -> Path:

@@ -52,13 +52,8 @@ def _bytes_of(file: Path) -> bytes | None:
 
 
 def _joined(table: AnyTable, file: Path, there: bytes) -> AnyTable:
-    """The table with what others wrote into its file since it was read.
-
-    Raises
-    ------
-    FileError
-        Both changed a cell otherwise, or the file is not a table any more.
-    """
+    """The table with what others wrote into its file since it was read. Raises FileError where both changed a cell otherwise, or
+    the file is not a table any more."""
     assert table.source is not None
     if there == table.source.raw:
         return table

@@ -106,15 +106,8 @@ class Table(TableData):
     def compile(self, tables: Mapping[str, Table] | None = None) -> CompiledTable:
         """Compile into masks. Columns that were compiled before, in this table or one it was edited from, are not compiled again.
 
-        Parameters
-        ----------
-        tables : mapping of str to Table, optional
-            The tables that rows `@name` refer to. Default: those of the table's folder.
-
-        Raises
-        ------
-        TableError
-            Cells that cannot be read, all of them; in tables inside the table too.
+        `tables` are those that rows `@name` refer to, by name; None: those of the table's folder. Raises TableError for cells that
+        cannot be read, all of them, in tables inside the table too.
         """
         require_readable(self)
         return CompiledTable(compile_table(self.flat(tables)))

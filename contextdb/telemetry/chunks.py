@@ -48,13 +48,8 @@ class Chunk:
 
 def chunks_of(path: Path, wanted: Collection[str], table: str) -> Iterator[tuple[Sequence[str], Chunk]]:
     """The names of all columns with each chunk of the wanted ones; one empty chunk where the file has no rows. Of a recording of
-    several tables those rows are read that are of this one.
-
-    Raises
-    ------
-    TableError, FileError
-        The file cannot be read, with its faults.
-    """
+    several tables those rows are read that are of this one. Raises TableError or FileError where the file cannot be read, with its
+    faults."""
     if path.suffix.lower() not in CONTEXT_SUFFIXES:
         found = f"a file of contexts does not end in {in_quotes(path.suffix)}."
         raise FileError(Fault(found, " or ".join(CONTEXT_SUFFIXES), place=Place(str(path))))

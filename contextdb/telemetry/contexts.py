@@ -52,13 +52,7 @@ class Contexts:
 
 
 def context_files(pattern: str) -> list[Path]:
-    """The files that a path or a glob means, in the order of their names.
-
-    Raises
-    ------
-    FileError
-        There is none.
-    """
+    """The files that a path or a glob means, in the order of their names. Raises FileError where there is none."""
     if os.path.isfile(pattern):
         return [Path(pattern)]
     found = sorted(Path(p) for p in glob.glob(pattern, recursive=True) if os.path.isfile(p))
@@ -78,13 +72,8 @@ def _near(path: Path) -> str:
 
 
 def read_contexts(path: Path, compiled: CompiledTable) -> Contexts:
-    """Read the contexts of a file for a table.
-
-    Raises
-    ------
-    TableError, ContextError, FileError
-        The file cannot be read, or holds facts that the table cannot use; file, line and fact are named.
-    """
+    """Read the contexts of a file for a table. Raises TableError, ContextError or FileError where the file cannot be read, or holds
+    facts that the table cannot use; file, line and fact are named."""
     read = list(contexts_in(path, compiled))
     facts = pl.concat([one.facts for one in read], how="diagonal_relaxed")  # of lines, each piece has the facts that are in it
     return Contexts(path, facts, [chunk for one in read for chunk in one.chunks])

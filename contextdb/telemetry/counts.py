@@ -16,13 +16,8 @@ MOST_COUNT = 1 << 40
 
 
 def moments_of(count: str | None, names: Sequence[str], chunk: Chunk, file: str) -> Counts:
-    """The number of moments of each row: int64 [N]; 1 without a count column.
-
-    Raises
-    ------
-    TableError
-        There is no such column, or a count is missing or no whole number from 0 up; file and line, else row, are named.
-    """
+    """The number of moments of each row: int64 [N]; 1 without a count column. Raises TableError where there is no such column, or a
+    count is missing or no whole number from 0 up; file and line, else row, are named."""
     if count is None:
         return np.ones(chunk.n_rows, np.int64)
     if count not in names:

@@ -32,12 +32,9 @@ def with_dask(
 ) -> Iterator[tuple[Path, Result]]:
     """Do the work for each file on the workers of a scheduler, or of a cluster of this machine's own; those done first come first.
 
-    `work` is a function of a module, and `what` can be pickled; `mend` says what to do about files that were not finished.
-
-    Raises
-    ------
-    EngineError
-        Dask is not installed, the scheduler does not answer, or files were not finished however often they were tried.
+    `work` is a function of a module, and `what` can be pickled; `mend` says what to do about files that were not finished. Raises
+    EngineError where Dask is not installed, the scheduler does not answer, or files were not finished however often they were
+    tried.
     """
     distributed = _distributed()
     with _client(distributed, scheduler) as client:

@@ -90,13 +90,7 @@ def nothing(plan: Plan, faults: Sequence[Fault] = ()) -> Part:
 
 
 def added(a: Part, b: Part) -> Part:
-    """The sum of two parts.
-
-    Raises
-    ------
-    TableError
-        There are more moments than can be counted.
-    """
+    """The sum of two parts. Raises TableError where there are more moments than can be counted."""
     require_countable(a.moments + b.moments)
     hashes = _distinct(a.hashes, b.hashes)
     return Part(

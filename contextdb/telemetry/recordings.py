@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from polars.selectors import by_name
 
 from contextdb.cells.conditions import Condition
-from contextdb.cells.words import quoted
 from contextdb.disk import read_bytes
 from contextdb.files.csv_source import find_rows, read_rows
 from contextdb.files.texts import is_parquet, scanned_parquet
+from contextdb.telemetry.link.lines import name_text
 from contextdb.telemetry.link.recorded import facts_frame, indexed, is_recording
 
 SEARCHED_AT_ONCE = 1 << 17
@@ -53,13 +53,7 @@ class Recording:
 
 def open_recording(path: Path, conditions: Collection[str], table: str = "") -> Recording:
     """Open recorded contexts; the columns of these conditions are facts, others are left out. Of the lines of a link those of the
-    table are read.
-
-    Raises
-    ------
-    TableError, FileError
-        The file cannot be read; with every fault of it.
-    """
+    table are read. Raises TableError or FileError where the file cannot be read; with every fault of it."""
     if is_recording(path):
         return _open_lines(path, conditions, table)
     return _open_parquet(path, conditions) if is_parquet(path) else _open_csv(path, conditions)
@@ -72,14 +66,9 @@ def fact_text(value: object, condition: Condition) -> str:
     if isinstance(value, float):
         return condition.domain.type.spelling.write(value)
     if isinstance(value, list):
-        return " ".join(_name(str(v)) for v in value) or '""'
+        return " ".join(name_text(str(v)) for v in value) or '""'
     is_name = isinstance(value, str) and condition.domain.type.is_named
-    return _name(str(value)) if is_name and value not in condition.domain.known else str(value)
-
-
-def _name(text: str) -> str:
-    """A name that is read as that name, even first in a fact."""
-    return '"' + text.replace('"', '""') + '"' if text.startswith("-") else quoted(text)
+    return name_text(str(value)) if is_name and value not in condition.domain.known else str(value)
 
 
 def _rows_with(frame: pl.DataFrame, words: list[str]) -> NDArray[np.int64]:

@@ -29,8 +29,9 @@ from contextdb.cells.facts import Fact
 from contextdb.cells.numbers import NumberCells, holding
 from contextdb.cells.sets import Cell
 from contextdb.columns import TextColumn
-from contextdb.compiled.data import CompiledData, costs_of
+from contextdb.compiled.data import CompiledData
 from contextdb.compiled.explain import Explanation, Failure, RowExplanation, describe_fact
+from contextdb.compiled.mask_bits import costs_of
 from contextdb.compiled.matches import layered_penalties, with_penalties
 from contextdb.compiled.pick import Outcome, percent
 from contextdb.compiled.table import CompiledTable

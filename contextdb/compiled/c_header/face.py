@@ -82,13 +82,8 @@ def plain_of(kind: Kind) -> Plain:
 
 
 def c_header_of(tables: Mapping[str, CompiledTable], guard: str = "CDB_TABLES_H") -> str:
-    """The text of the header, ASCII with line feeds; the same tables give the same text.
-
-    Raises
-    ------
-    ContextDBError
-        A name cannot be a text of C.
-    """
+    """The text of the header, ASCII with line feeds; the same tables give the same text. Raises ContextDBError where a name cannot
+    be a text of C."""
     inside = {name: data_of(table) for name, table in tables.items()}
     names = Names.of(inside, guard, reader_names())
     written: set[Condition] = set()

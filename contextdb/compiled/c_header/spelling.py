@@ -81,13 +81,7 @@ def _letters(text: str) -> str:
 
 
 def literal(text: str) -> str:
-    """A text as C has it, in UTF-8.
-
-    Raises
-    ------
-    ContextDBError
-        It is too long, or holds a NUL character.
-    """
+    """A text as C has it, in UTF-8. Raises ContextDBError where it is too long, or holds a NUL character."""
     octets = text.encode("utf-8", "surrogatepass")
     if 0 in octets:
         raise ContextDBError(Fault(f'the name "{shown(text)}" holds a NUL character.', "names that C can hold"))

@@ -37,7 +37,6 @@ class CastExplanation(Explanation):
         self._plain = plain
 
     def row(self, row: int) -> RowExplanation:
-        """Why this row is valid or not; raises NoSuchPlace, also an IndexError, for a row that the table does not have."""
         row = require_row(row, len(self))
         found = super().row(row)
         return RowExplanation(found.row, found.asset, found.is_enabled, (*found.failures, *self._role_failures(row)))

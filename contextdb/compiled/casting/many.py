@@ -15,13 +15,8 @@ from contextdb.errors import ContextError, Fault, plural
 
 
 def query_many_with_actors(compiled: CompiledData, contexts: Contexts, ask: Ask) -> ListedMatches:
-    """Answer every context with its actors: one mapping for all, or a sequence of one for each.
-
-    Raises
-    ------
-    ContextError
-        As `query`, with the number of the context.
-    """
+    """Answer every context with its actors: one mapping for all, or a sequence of one for each. Raises ContextError as `query`,
+    with the number of the context."""
     check_mode(ask.unknown)
     columns = facts_of(contexts)
     actors: Any = ask.actors

@@ -299,13 +299,8 @@ def _as_casting(chosen: Chosen) -> Casting:
 
 
 def query_with_actors(compiled: CompiledData, context: Context, ask: Ask) -> CastMatches:
-    """The rows valid for a context and actors; see `CompiledTable.query`.
-
-    Raises
-    ------
-    ContextError
-        As `query`, and for actors that cannot be read, with the role and the actor.
-    """
+    """The rows valid for a context and actors; see `CompiledTable.query`. Raises ContextError as `query`, and for actors that
+    cannot be read, with the role and the actor."""
     stage, plain = set_stage(compiled, context, ask)
     return stage.matches(plain)
 
@@ -347,13 +342,8 @@ def _ruled_names(compiled: CompiledData, roles: Roles) -> list[str]:
 
 
 def roles_of(compiled: CompiledData, context: Context, actors: Actors) -> Roles:
-    """The roles that are cast: all but those whose facts are in the context, as plain facts.
-
-    Raises
-    ------
-    ContextError
-        Actors for a role that the table does not have, or for one whose facts the context gives.
-    """
+    """The roles that are cast: all but those whose facts are in the context, as plain facts. Raises ContextError for actors for a
+    role that the table does not have, or for one whose facts the context gives."""
     if not isinstance(actors, Mapping):
         raise ContextError(Fault(f"actors are a mapping of roles, not {type(actors).__name__}.", '{"Defender": [{...}, {...}]}'))
     if compiled.slots is None:

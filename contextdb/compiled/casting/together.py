@@ -18,17 +18,8 @@ from contextdb.compiled.casting.facts import Actor, Offer
 
 
 class CastRows(NamedTuple):
-    """A cast of some roles, and where it may be.
-
-    Attributes
-    ----------
-    actors : tuple of Actor
-        In the order of the roles.
-    rows : int
-        The rows, as bits.
-    penalties : float64 array, shape (n_rows,), or None
-        What the soft cells of these rows cost with this cast; None for a table without any.
-    """
+    """A cast of some roles, in their order, and where it may be: the rows as bits, and what their soft cells cost with it, float64
+    [n_rows]; None for a table without any."""
 
     actors: tuple[Actor, ...]
     rows: int

@@ -20,12 +20,7 @@ Lines = Mapping[Spot, Sequence[str]]
 
 def merge_notes(raws: Sequence[bytes], files: Sequence[str], takes: str | None = None) -> bytes:
     """Merge base, ours and theirs; `files` are their names in messages, `takes` the side that holds where both changed a spot.
-
-    Raises
-    ------
-    FileError
-        A file that is none of notes, or a spot that both sides changed.
-    """
+    Raises FileError for a file that is none of notes, or a spot that both sides changed."""
     base, ours, theirs = (_read(raw, file) for raw, file in zip(raws, files, strict=True))
     merged = {spot: [_merged(spot, i, base, ours, theirs, files[1], takes) for i in (0, 1)] for spot in {**base, **ours, **theirs}}
     return written({spot: said for spot, said in merged.items() if any(said)})

@@ -26,13 +26,7 @@ class TomlMerge:
 
 
 def merge_toml(base: str, ours: str, theirs: str, files: tuple[str, str, str] = ("base", "ours", "theirs")) -> TomlMerge:
-    """Merge three texts of a contextdb.toml; `files` are their names in messages.
-
-    Raises
-    ------
-    SchemaError
-        A text that is no TOML.
-    """
+    """Merge three texts of a contextdb.toml; `files` are their names in messages. Raises SchemaError for a text that is no TOML."""
     was, mine, yours = (dict(_leaves(read_toml(text, file), ())) for text, file in zip((base, ours, theirs), files, strict=True))
     text, conflicts = ours, []
     changed = [path for path in {**yours, **was} if _differs(path, was, yours) and _differs(path, mine, yours)]

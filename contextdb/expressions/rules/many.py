@@ -46,13 +46,9 @@ class ManyRules:
         return np.flatnonzero(column.codes < 0)
 
     def exclude(self, masks: Words, start: int = 0) -> None:
-        """Take the rows whose rule does not hold out of the masks uint64 [n, W] of contexts `start` and on, in place.
-
-        Raises
-        ------
-        ContextError
-            A rule of a row that is left has no finite value, and `unknown` is "error"; names the first context of that rule.
-        """
+        """Take the rows whose rule does not hold out of the masks uint64 [n, W] of contexts `start` and on, in place. Raises
+        ContextError where a rule of a row that is left has no finite value, and `unknown` is "error"; names the first context of
+        that rule."""
         left = masks & self._ruled
         if int(np.bitwise_count(left).sum()) <= MANY_ROWS * len(masks):
             self._exclude_places(masks, *bitmask.places(left), start)

@@ -180,13 +180,8 @@ class WhenRules:
         return bits
 
     def left_with_care(self, some: int, every: int, facts: Mapping[str, Fact], unknown: Unknown) -> tuple[int, int]:
-        """The same with facts in canonical form, None where missing, for rows that may and that always match by their cells.
-
-        Raises
-        ------
-        ContextError
-            A rule of one of the rows is open, and `unknown` is "error".
-        """
+        """The same with facts in canonical form, None where missing, for rows that may and that always match by their cells. Raises
+        ContextError where a rule of one of the rows is open, and `unknown` is "error"."""
         values = values_of(facts, self.conditions)
         for number in self.numbers(some):
             rule = self.rules[number]

@@ -23,16 +23,7 @@ SLOW = 0.6
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """A stick over time.
-
-    Attributes
-    ----------
-    name : str
-    seconds : float
-    speed_mps : float
-    at : function
-        The velocity over the ground at a moment, x and z in m/s.
-    """
+    """A stick over time: `at` gives the velocity over the ground at a moment, x and z in m/s."""
 
     name: str
     seconds: float

@@ -40,15 +40,8 @@ class MotionProject:
 
     @classmethod
     def of(cls, project: HasTables) -> MotionProject:
-        """Open or build all databases and poses of a project, such as `cdb.Project.load` reads.
-
-        Raises
-        ------
-        SchemaError
-            The configuration is wrong.
-        MotionError, FileError
-            As `open_or_build`.
-        """
+        """Open or build all databases and poses of a project, such as `cdb.Project.load` reads. Raises SchemaError where the
+        configuration is wrong, MotionError or FileError as `open_or_build`."""
         require_kind(project, HasTables, "project", "a Project, such as cdb.Project.load gives")
         config = MotionConfig.from_dict(project.schema.motion, tables=project.tables, file=project.schema.file)
         compiled = {
@@ -66,15 +59,8 @@ class MotionProject:
         unknown: Unknown = "error",
         ground: HeightOf | None = None,
     ) -> Character:
-        """A character of `[controllers.NAME]`, whose poses may be of any database; the arguments are those of `Character`.
-
-        Raises
-        ------
-        SchemaError
-            There is no controller of that name (with the nearest).
-        MotionError
-            Its databases are empty.
-        """
+        """A character of `[controllers.NAME]`, whose poses may be of any database; the arguments are those of `Character`. Raises
+        SchemaError where there is no controller of that name (with the nearest), MotionError where its databases are empty."""
         controller = self.config.controller(name, self.databases)
         schema = self.config.features[self.config.databases[next(iter(controller.selector.databases))].features]
         stream = PoseStream(self.banks, self.config.output_of(name))

@@ -57,13 +57,8 @@ class OneOff:
         return self.play.is_done
 
     def update(self, dt: float, stick: Ground = (0.0, 0.0), facts: Facts | None = None) -> Updated:
-        """One update: the body and the pose are the one-off's, the decision is the character's.
-
-        Raises
-        ------
-        ContextDBError
-            As `Character.update`; MotionError for a database whose poses the stream does not have.
-        """
+        """One update: the body and the pose are the one-off's, the decision is the character's. Raises ContextDBError as
+        `Character.update`; MotionError for a database whose poses the stream does not have."""
         dt, character = require_real(dt, "dt", 0.0), self.character
         place, before = self._origin.then(self.play.at(self.play.time_s + dt)), character.body
         position = (place.left_m, place.ahead_m)

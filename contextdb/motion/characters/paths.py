@@ -50,23 +50,11 @@ def back_s(schema: FeatureSchema) -> float:
 
 
 def path_from(root: Sequence[float], path: Trajectory, *, halflife_s: float = RETURN_HALFLIFE_S) -> Trajectory:
-    """The path that a character is wished to take which is not where the game has the body: from its root to the body's path.
+    """The path that a character is wished to take which is not where the game has the body: from its root, such as `Pose.root`, to
+    the body's path, such as `steered_path` gives it; its frame `now` is where the body is.
 
     What lies between the two decays as a critically damped spring does, without a step in place or velocity. Headings are at most
-    45 degrees apart.
-
-    Parameters
-    ----------
-    root : (x, z, heading)
-        Where the character is: metres and radians, such as `Pose.root`.
-    path : Trajectory
-        The path of the body over the ground; its frame `now` is where the body is, such as `steered_path` gives it.
-    halflife_s : float
-
-    Raises
-    ------
-    ContextError
-        `root` is no place, `path` is none, or `halflife_s` is no number above 0.
+    45 degrees apart. Raises ContextError where `root` is no place, `path` is none, or `halflife_s` is no number above 0.
     """
     require_kind(path, Trajectory, "path", "a Trajectory, such as steered_path gives")
     require_real(halflife_s, "halflife_s", 0.001, 60.0)
@@ -74,25 +62,12 @@ def path_from(root: Sequence[float], path: Trajectory, *, halflife_s: float = RE
 
 
 def path_ahead(database: MotionDatabase, playing: Playing, root: Sequence[float], seconds: float = 0.5) -> Trajectory:
-    """Where the clip that plays leads by itself from here on, as a path over the ground from its root.
+    """Where the clip that plays leads by itself from here on, as a path over the ground from `root`, where the character is, such
+    as `Pose.root`.
 
-    Parameters
-    ----------
-    database : MotionDatabase
-        With root motion and a schema: built from clips.
-    playing : Playing
-        A frame of it, such as `Pose.playing`.
-    root : (x, z, heading)
-        Where the character is, such as `Pose.root`.
-    seconds : float
-        How far ahead; a clip that ends before gives a shorter path.
-
-    Raises
-    ------
-    ContextError
-        An argument of another type.
-    MotionError
-        A database without root motion, or that has no such frame.
+    `playing` is a frame of the database, such as `Pose.playing`; the database is built from clips, with root motion and a schema.
+    The path reaches `seconds` ahead; a clip that ends before gives a shorter one. Raises ContextError for an argument of another
+    type, MotionError for a database without root motion, or that has no such frame.
     """
     require_kind(database, MotionDatabase, "database", "a MotionDatabase")
     require_kind(playing, Playing, "playing", "a Playing, what Pose.playing gives")

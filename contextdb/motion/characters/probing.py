@@ -41,17 +41,8 @@ Speeds = np.ndarray[tuple[int], np.dtype[np.float64]]
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A context to drive in.
-
-    Attributes
-    ----------
-    facts : mapping of str to object
-        Those that stay.
-    following : tuple of (facts, speeds)
-        Facts that follow the speed, and the speeds in m/s that they serve, ascending.
-    speeds_mps : tuple of float
-        Those to drive at.
-    """
+    """A context to drive in: the facts that stay, and those that follow the speed, each with the speeds in m/s that they serve,
+    ascending; `speeds_mps` are those to drive at."""
 
     facts: Facts
     following: tuple[tuple[Facts, tuple[float, ...]], ...]

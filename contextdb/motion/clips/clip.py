@@ -18,6 +18,7 @@ import numpy as np
 from contextdb.cells.arguments import require_kind, require_many, require_path, require_text, require_whole
 from contextdb.disk import read_bytes, write_atomic
 from contextdb.errors import ClipError, ContextError, Fault, FileError, Place, in_quotes, nearest, some
+from contextdb.files.strangers import line_of
 from contextdb.motion.clips import bvh
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Skeleton
@@ -139,14 +140,8 @@ def write_bvh(clip: Clip, target: str | PathLike[str] | TextIO, *, digits: int =
     """Write a clip as BVH to a path or an open text file.
 
     Reading it again gives the same motion, to so many digits behind the point. The unit and the axis that points up are not in the
-    format: read the file with the same ones.
-
-    Raises
-    ------
-    FileError
-        The disk refuses; the old file is then whole.
-    ContextError
-        `clip` is none, `target` neither a path nor an open file, or `digits` no whole number from 0 to 17.
+    format: read the file with the same ones. Raises FileError where the disk refuses; the old file is then whole; ContextError
+    where `clip` is none, `target` neither a path nor an open file, or `digits` no whole number from 0 to 17.
     """
     require_kind(clip, Clip, "clip", "a Clip")
     digits = require_whole(digits, "digits")
@@ -166,16 +161,11 @@ def text_of(raw: bytes, file: str) -> str:
     if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise _no_text("the file is UTF-16", 1, file)
     if b"\0" in raw:
-        raise _no_text("the file is binary: it holds a zero byte", _line(raw, raw.index(b"\0")), file)
+        raise _no_text("the file is binary: it holds a zero byte", line_of(raw, raw.index(b"\0")), file)
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise _no_text(f"byte 0x{raw[error.start]:02x} is not UTF-8", _line(raw, error.start), file) from error
-
-
-def _line(raw: bytes, position: int) -> int:
-    before = raw[:position]
-    return 1 + before.count(b"\n") + before.count(b"\r") - before.count(b"\r\n")
+        raise _no_text(f"byte 0x{raw[error.start]:02x} is not UTF-8", line_of(raw, error.start), file) from error
 
 
 def _no_text(found: str, line: int, file: str) -> ClipError:

@@ -178,18 +178,8 @@ def measure(clip: Clip) -> Measures:
 
 
 def doubts(clips: Iterable[tuple[str, str | None, Measures]]) -> list[ClipFinding]:
-    """What is doubtful about the clips of one database.
-
-    Parameters
-    ----------
-    clips : iterable of (asset, file, Measures)
-        All of them: the shape of a body is compared with that of the others.
-
-    Returns
-    -------
-    list of ClipFinding
-        In the order of the clips. Of a clip whose unit is doubtful nothing else is reported that is a length.
-    """
+    """What is doubtful about all clips of one database, (asset, file, Measures) each, in their order: the shape of a body is
+    compared with that of the others. Of a clip whose unit is doubtful nothing else is reported that is a length."""
     listed = list(clips)
     usual = _usual_shape([measures for _, _, measures in listed])
     lengths = [_length(measures.bones or {}, usual) for _, _, measures in listed]

@@ -15,15 +15,8 @@ from contextdb.motion.clips.trajectory import Trajectory
 
 
 def three_rounds(poses: Poses, path: Trajectory) -> tuple[Poses, slice]:
-    """The poses of three rounds of a loop, and which frames of them are the middle round.
-
-    Parameters
-    ----------
-    poses : Poses
-        Of at least one frame.
-    path : Trajectory
-        The body's path in these poses.
-    """
+    """The poses of three rounds of a loop of at least one frame, and which frames of them are the middle round; `path` is the
+    body's in these poses."""
     n_steps = poses.n_frames - 1
     turn = path.headings[-1] - path.headings[0]
     start, end = (np.array([x, 0.0, z]) for x, z in (path.positions[0], path.positions[-1]))

@@ -54,7 +54,6 @@ class ManySteered:
         return len(self.headings)
 
     def __iter__(self) -> Iterator[Steered]:
-        """Each body."""
         pairs = (map(tuple, each.tolist()) for each in (self.positions, self.velocities, self.accelerations))
         others = (self.headings, self.turn_rates, self.velocity_halflives_s, self.heading_halflives_s)
         return map(Steered, *pairs, *(each.tolist() for each in others))

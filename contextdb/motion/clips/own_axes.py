@@ -37,16 +37,9 @@ UNEVEN_SHARE = 0.1
 
 @dataclass(frozen=True, eq=False)
 class OwnAxes:
-    """How each bone of a skeleton is turned about itself in a mirror.
-
-    Attributes
-    ----------
-    turns : float64 array, shape (J, 4)
-        D of each bone, as rotations.
-    apart : float64 array, shape (J,)
-        How far each joint lies from where the mirror shows it, seen from its parent, when the skeleton's offsets are kept; in the
-        file's units.
-    """
+    """How each of the J bones of a skeleton is turned about itself in a mirror: `turns` float64 [J, 4] is D of each, as rotations;
+    `apart` float64 [J] how far each joint lies from where the mirror shows it, seen from its parent, when the skeleton's offsets
+    are kept, in the file's units."""
 
     turns: Floats
     apart: Floats

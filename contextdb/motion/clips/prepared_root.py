@@ -38,19 +38,11 @@ FEWEST_FRAMES = 5
 
 
 def prepared_path(poses: Poses, path: Trajectory, smooth_s: float, feet: FootBones, *, is_facing_given: bool = False) -> Trajectory:
-    """A path of the hips as a path of the body.
+    """A path of the hips, as `root_trajectory` gives it, as a path of the body.
 
-    Parameters
-    ----------
-    poses : Poses
-    path : Trajectory
-        Of the hips, as `root_trajectory` gives it.
-    smooth_s : float
-        The standard deviation of the Gaussian in seconds: what goes to and fro within four of them is evened out.
-    feet : FootBones
-        A rig without feet keeps its hips sideways too.
-    is_facing_given : bool
-        The path's headings stay those of the bones that were said, and are not taken from the chest too.
+    `smooth_s` is the standard deviation of the Gaussian in seconds: what goes to and fro within four of them is evened out. A rig
+    without feet keeps its hips sideways too. With `is_facing_given` the path's headings stay those of the bones that were said, and
+    are not taken from the chest too.
     """
     parts = []
     for own in unbroken(path):

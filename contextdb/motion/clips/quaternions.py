@@ -84,12 +84,8 @@ def to_euler(axes: str, rotations: Floats) -> Floats:
 
 
 def blend(first: Floats, second: Floats, shares: Floats) -> Floats:
-    """Rotations on the shorter way from `first` to `second`: share 0 is the first, 1 the second.
-
-    Notes
-    -----
-    Linear blending, made unit again: on the same arc as at constant speed, and between neighbours nearly at the same place.
-    """
+    """Rotations on the shorter way from `first` to `second`: share 0 is the first, 1 the second. Linear blending, made unit again:
+    on the same arc as at constant speed, and between neighbours nearly at the same place."""
     signs = np.where((first * second).sum(axis=-1, keepdims=True) < 0.0, -1.0, 1.0)
     mixed = first * (1.0 - shares) + second * (signs * shares)
     return np.asarray(mixed / np.linalg.norm(mixed, axis=-1, keepdims=True))

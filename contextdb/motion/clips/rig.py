@@ -19,22 +19,9 @@ from contextdb.motion.clips.skeleton import Skeleton, sided_pairs
 
 @dataclass(frozen=True, slots=True)
 class Rig:
-    """What is found of a skeleton.
-
-    Attributes
-    ----------
-    skeleton : Skeleton
-    heights_m : tuple of float
-        Of each bone; empty for a clip without frames.
-    hips, head : str or None
-    spine : tuple of str
-        The bones between hips and head, from below.
-    feet, heels, toes : tuple of str
-        Left and right; empty where there are none.
-    facing : tuple of str
-        The bones across which the body faces, left and right.
-    mirror : tuple of (left, right)
-    """
+    """What is found of a skeleton: heights of its bones (none for a clip without frames), the spine from hips to head from below,
+    feet, heels and toes left and right (empty where there are none), the left and right bone across which the body faces, and the
+    pairs that change places in a mirror."""
 
     skeleton: Skeleton
     heights_m: tuple[float, ...]

@@ -38,7 +38,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, TypeGuard, cast, get_args
 
-from contextdb.errors import in_quotes, shown
+from contextdb.cells.arguments import as_number
+from contextdb.errors import Fault, MotionError, in_quotes, shown
 from contextdb.files.toml_shapes import Section
 from contextdb.files.toml_text import as_toml, what
 
@@ -330,6 +331,14 @@ def _read_weight(part: Section) -> float | None:
 
 def _read_group(part: Section) -> str | None:
     return part.text("group", 'a name, such as "feet"') if "group" in part.part else None
+
+
+def require_weight(weight: object, what: str) -> float:
+    """A weight that Python gives; MotionError for what is none."""
+    number = as_number(weight)
+    if number is None or not 0.0 <= number <= MOST_WEIGHT:
+        raise MotionError(Fault(f"{what} is {weight!r}.", f"a number from 0 to {MOST_WEIGHT:,.0f}"))
+    return number
 
 
 def check_together(section: Section, channels: Sequence[Channel], *, is_whole: bool) -> None:

@@ -105,7 +105,6 @@ class PoseHistory:
         self._planned: tuple[FeatureSchema, _Plan] | None = None
 
     def __len__(self) -> int:
-        """How many poses are known."""
         return self._end - self._begin
 
     def add(self, pose: HasPose) -> None:

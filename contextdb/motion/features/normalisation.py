@@ -48,17 +48,8 @@ FLOORS: dict[str, tuple[float, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class RaisedScale:
-    """A group of channels that varies less than its floor, which is its scale therefore.
-
-    Attributes
-    ----------
-    channels : tuple of str
-        The names of the channels.
-    spread : float
-        The mean of the standard deviations of their features.
-    floor : float
-    unit : str
-    """
+    """A group of channels that varies less than its floor, which is its scale therefore; `spread` is the mean of the standard
+    deviations of their features."""
 
     channels: tuple[str, ...]
     spread: float
@@ -112,7 +103,6 @@ def floor_of(channel: Channel) -> tuple[float, str]:
 
 
 def _groups(schema: FeatureSchema) -> list[list[Channel]]:
-    """The channels of each group."""
     groups: dict[str, list[Channel]] = {}
     for channel in schema.channels:
         key = f"group {channel.group}" if channel.group else f"channel {channel.name}"

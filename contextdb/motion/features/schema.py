@@ -188,12 +188,8 @@ class FeatureSchema:
 
         A function takes `(poses, path)`: the `Poses` of all frames and the `Trajectory` of the body, at the schema's rate. It gives
         a float array [F, size], for each frame what the frame itself and its neighbours tell; it must not change what it is given.
-        It is called on the mirrored poses and path for a mirrored clip, and for a query on those of the query's clip.
-
-        Raises
-        ------
-        SchemaError
-            No channel asks for a name; the nearest that one does ask for is reported.
+        It is called on the mirrored poses and path for a mirrored clip, and for a query on those of the query's clip. Raises
+        SchemaError where no channel asks for a name; the nearest that one does ask for is reported.
         """
         asked = [channel.function for channel in self.channels if channel.function is not None]
         faults = [_unasked(name, asked, self.name) for name in functions if name not in asked]
@@ -203,14 +199,9 @@ class FeatureSchema:
 
     @classmethod
     def from_dict(cls, name: str, mapping: Mapped, *, file: str | None = None) -> FeatureSchema:
-        """Read what `[features.NAME]` of contextdb.toml holds; `file` is its name in messages.
-
-        Raises
-        ------
-        SchemaError
-            With every fault: an unknown key, type or word with the nearest known one, a value of the wrong kind, a channel named
-            twice, or weights that are all zero.
-        """
+        """Read what `[features.NAME]` of contextdb.toml holds; `file` is its name in messages. Raises SchemaError with every fault:
+        an unknown key, type or word with the nearest known one, a value of the wrong kind, a channel named twice, or weights that
+        are all zero."""
         faults: list[Fault] = []
         require_text(name, "name")
         require_mapping(mapping, "mapping", 'a mapping such as {"rate": 30, "channels": [...]}')
@@ -231,7 +222,8 @@ def _read_schema(
     cls: type[FeatureSchema], name: str, mapping: Mapped, faults: list[Fault], file: str | None
 ) -> FeatureSchema | None:
     section = Section(f"[features.{name}]", mapping, SCHEMA_KEYS, faults, file)
-    rate = _read_rate(section)
+    accepted = f"frames a second, from 1 to {MOST_RATE:g}, such as 30.0"
+    rate = section.number("rate", accepted, 1.0, MOST_RATE) if section.has("rate", accepted) else None
     channels = _read_channels(section)
     root = section.text("root", 'a bone, such as "Hips"') if "root" in mapping else None
     facing = read_pair(section, "facing", A_FACING) if "facing" in mapping else None
@@ -254,11 +246,6 @@ def _check_permuted(section: Section, channels: list[Channel], permutations: Per
         section.add(
             f"{section.where} has permutations, but no channel looks ahead by them.", "permuted = true in a channel of a bone"
         )
-
-
-def _read_rate(section: Section) -> float | None:
-    accepted = f"frames a second, from 1 to {MOST_RATE:g}, such as 30.0"
-    return section.number("rate", accepted, 1.0, MOST_RATE) if section.has("rate", accepted) else None
 
 
 def _read_smooth(section: Section, key: str) -> float | None:

@@ -17,17 +17,10 @@ from contextdb.motion.search.layout import LANES, Features
 
 
 class JointBoxes(NamedTuple):
-    """Attributes
-    ----------
-    boxes : int64 array, shape (B, K)
-        The box of each role in the motion database.
-    ranges, firsts, sizes : int64 array, shape (B,)
-        The joint range, the first joint frame, and how many frames there are.
-    relative : float32 array, shape (B, P, 4, 16)
-        What roles see of each other; a box of fewer frames repeats its last one.
-    lows, highs : float32 array, shape (P, 4, B)
-        The bounds of that.
-    """
+    """The joint boxes of a database, B of K roles: `boxes` int64 [B, K], that of each role in the motion database; `ranges`,
+    `firsts` and `sizes` int64 [B], the joint range, the first joint frame, and how many frames there are; `relative` float32 [B, P,
+    4, 16], what roles see of each other, where a box of fewer frames repeats its last one; `lows` and `highs` float32 [P, 4, B],
+    the bounds of that."""
 
     boxes: Ints
     ranges: Ints

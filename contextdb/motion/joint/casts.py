@@ -26,18 +26,11 @@ Cast = tuple[Hashable, ...]
 
 @dataclass(frozen=True, eq=False)
 class Casts:
-    """The casts of one search of one database.
+    """The C casts of one search of one database.
 
-    Attributes
-    ----------
-    listed : list of Cast, length C
-    biases : float64 array, shape (C, J)
-        What the soft cells of a table cost with each cast in each joint range, the cheapest row of its asset; inf where it may not
-        play.
-    sides : (as it is, in a mirror)
-        What each row costs with each cast, float64 [C, n_rows]; None for an answer without rows.
-    table_assets : sequence of str
-        The assets of the rows.
+    `biases` float64 [C, J] is what the soft cells of a table cost with each cast in each joint range, the cheapest row of its
+    asset; inf where it may not play. `sides`, as it is and in a mirror, is what each row costs with each cast, float64 [C, n_rows];
+    None for an answer without rows, whose assets are `table_assets`.
     """
 
     listed: list[Cast]

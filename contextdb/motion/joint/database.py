@@ -24,13 +24,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contextdb.cells.arguments import as_number, require_kind, require_many, require_text
+from contextdb.cells.arguments import require_kind, require_many, require_text
 from contextdb.errors import Fault, MotionError, in_quotes, nearest, plural, some
 from contextdb.motion.arguments import Flags
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.clips.trajectory import to_own_frame
-from contextdb.motion.features.channels import MOST_WEIGHT
+from contextdb.motion.features.channels import require_weight
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.layout import Features
 
@@ -80,14 +80,9 @@ class JointDatabase:
     def of(
         cls, database: MotionDatabase, roles: Sequence[str], *, place_weight: float = 1.0, facing_weight: float = 1.0
     ) -> JointDatabase:
-        """The joint clips of a database whose assets are named ASSET.ROLE.
-
-        Raises
-        ------
-        MotionError
-            An asset that lacks the clip of a role, or whose clips differ in length; a clip of no role; a database without root
-            motion; a weight not from 0 to a million. All faults together.
-        """
+        """The joint clips of a database whose assets are named ASSET.ROLE. Raises MotionError for an asset that lacks the clip of a
+        role, or whose clips differ in length; a clip of no role; a database without root motion; a weight not from 0 to a million.
+        All faults together."""
         require_kind(database, MotionDatabase, "database", "a MotionDatabase")
         names = tuple(require_text(role, "one of roles") for role in require_many(roles, "roles", "a list of roles"))
         lengths = (database.stops - database.starts).tolist()
@@ -112,8 +107,8 @@ class JointDatabase:
             tuple(asset for asset, _, _ in found),
             np.array([mirrored for _, mirrored, _ in found], np.bool_),
             ranges,
-            _weight(place_weight, "place_weight"),
-            _weight(facing_weight, "facing_weight"),
+            require_weight(place_weight, "place_weight"),
+            require_weight(facing_weight, "facing_weight"),
         )
 
     @property
@@ -190,8 +185,8 @@ class JointDatabase:
         return replace(
             self,
             database=self.database if weights is None else self.database.with_weights(weights),
-            place_weight=self.place_weight if place_weight is None else _weight(place_weight, "place_weight"),
-            facing_weight=self.facing_weight if facing_weight is None else _weight(facing_weight, "facing_weight"),
+            place_weight=self.place_weight if place_weight is None else require_weight(place_weight, "place_weight"),
+            facing_weight=self.facing_weight if facing_weight is None else require_weight(facing_weight, "facing_weight"),
         )
 
     def __repr__(self) -> str:
@@ -243,10 +238,3 @@ def joint_faults(names: Sequence[str], lengths: Sequence[int], roles: Sequence[s
                 "clips that were recorded together, cut at the same frames",
                 rule="roles",
             )
-
-
-def _weight(weight: object, what: str) -> float:
-    number = as_number(weight)
-    if number is None or not 0.0 <= number <= MOST_WEIGHT:
-        raise MotionError(Fault(f"{what} is {weight!r}.", f"a number from 0 to {MOST_WEIGHT:,.0f}"))
-    return number

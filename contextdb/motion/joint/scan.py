@@ -21,18 +21,9 @@ from contextdb.motion.search import cost
 class Asked:
     """What one joint search of one database compares.
 
-    Attributes
-    ----------
-    queries : float64 array, shape (A, F)
-        Of each actor, normalised.
-    seen : float64 array, shape (A, A, 4)
-        What each actor sees of each other, in the units of costs.
-    casts : int64 array, shape (C, K)
-        The actor of each role.
-    range_biases : float64 array, shape (C, J)
-        What the table's soft cells cost with each cast in each joint range; inf where it may not play.
-    frame_biases : float64 array, shape (M,)
-        inf where a frame may not be chosen.
+    `queries` float64 [A, F] are of each actor, normalised; `seen` float64 [A, A, 4] is what each sees of each other, in the units
+    of costs; `casts` int64 [C, K] the actor of each role; `range_biases` float64 [C, J] what the soft cells of the table cost with
+    each cast in each joint range, inf where it may not play; `frame_biases` float64 [M] is inf where a frame may not be chosen.
     """
 
     queries: Floats

@@ -151,12 +151,7 @@ class JointSearcher:
         """The best frame of each clip with each cast, the k cheapest of all databases, cheapest first.
 
         The first costs what `search` finds where no threshold stops it; the parameters are those of `search`. Every frame is
-        scored, so it takes longer.
-
-        Raises
-        ------
-        QueryError
-            As `search`; `k` is no whole number from 0 up.
+        scored, so it takes longer. Raises QueryError as `search` does, and where `k` is no whole number from 0 up.
         """
         if require_whole(k, "k") < 0:
             raise QueryError(Fault(f"k is {k}.", "a whole number from 0 up"))

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 from contextdb.errors import Fault, MotionError, Place, in_quotes, nearest, plural, some
+from contextdb.files.strangers import line_of, looks_utf16
 
 REQUIRED = ("asset", "tag", "from", "to")
 COLUMNS = (*REQUIRED, "value")
@@ -39,23 +40,17 @@ class Rows:
 
 
 def text_of(raw: bytes, file: str) -> str:
-    """The text of a file's bytes.
-
-    Raises
-    ------
-    MotionError
-        UTF-16, another encoding, or no text at all.
-    """
+    """The text of a file's bytes. Raises MotionError for UTF-16, another encoding, or no text at all."""
     nul = raw.find(b"\0")
-    if raw.startswith((b"\xff\xfe", b"\xfe\xff")) or _looks_utf16(raw):
+    if raw.startswith((b"\xff\xfe", b"\xfe\xff")) or looks_utf16(raw):
         raise MotionError(Fault("the file is UTF-16 text.", _ACCEPTED, "to save it as UTF-8", Place(file)))
     if nul >= 0:
-        raise MotionError(Fault("not a text file: it contains a NUL byte.", _ACCEPTED, place=Place(file, _line_of(raw, nul))))
+        raise MotionError(Fault("not a text file: it contains a NUL byte.", _ACCEPTED, place=Place(file, line_of(raw, nul))))
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         found = f"byte 0x{raw[error.start]:02X} on this line is not UTF-8."
-        place = Place(file, _line_of(raw, error.start))
+        place = Place(file, line_of(raw, error.start))
         raise MotionError(Fault(found, _ACCEPTED, "to save it as UTF-8", place)) from None
 
 
@@ -76,17 +71,6 @@ def rows_of(text: str, file: str | None) -> Rows:
     if names is not None:
         _read_rows(lines[1:], names, file, found)
     return found
-
-
-def _looks_utf16(raw: bytes) -> bool:
-    """Whether every other of the first bytes is NUL, as in Latin text in UTF-16 without a BOM."""
-    head = raw[: min(len(raw), 200) // 2 * 2]
-    return len(head) >= 4 and any(not any(head[i::2]) and all(head[1 - i :: 2]) for i in (0, 1))
-
-
-def _line_of(raw: bytes, position: int) -> int:
-    before = raw[:position]
-    return 1 + before.count(b"\n") + before.count(b"\r") - before.count(b"\r\n")
 
 
 # ---- the header

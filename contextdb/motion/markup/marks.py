@@ -16,11 +16,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from enum import IntFlag
 from functools import cached_property, lru_cache
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from contextdb.bitmask import read_only
 from contextdb.errors import Fault, QueryError, in_quotes, nearest, some
 from contextdb.motion.arguments import Flags, frame_of
 from contextdb.motion.clips.quaternions import Floats
@@ -30,7 +31,6 @@ from contextdb.motion.markup.tag_filter import ANY_TAGS, TagFilter, covers, tags
 
 __all__ = ["ANY_TAGS", "Mark", "Marks", "TagFilter", "covers", "tags_of"]
 
-Array = TypeVar("Array", bound=NDArray[Any])
 
 KEPT_FILTERS = 64
 """The answers to so many filters are kept; a game asks with a few, again and again."""
@@ -89,7 +89,7 @@ class Marks:
         for field in fields(self):
             value = getattr(self, field.name)
             if isinstance(value, np.ndarray):
-                object.__setattr__(self, field.name, _read_only(value.view()))
+                object.__setattr__(self, field.name, read_only(value.view()))
 
     @classmethod
     def none(cls, n_frames: int, n_ranges: int) -> Marks:
@@ -138,12 +138,12 @@ class Marks:
     @cached_property
     def _left_out(self) -> Callable[[TagFilter, bool], NDArray[np.uint8]]:
         known, marks = _Tags(self.tags, self.kind_tags), self.kind_marks
-        return lru_cache(KEPT_FILTERS)(lambda tags, in_match_range: _read_only(_left_out(known, marks, tags, in_match_range)))
+        return lru_cache(KEPT_FILTERS)(lambda tags, in_match_range: read_only(_left_out(known, marks, tags, in_match_range)))
 
     @cached_property
     def _tag_biases(self) -> Callable[[TagFilter], Floats]:
         known = _Tags(self.tags, self.kind_tags)
-        return lru_cache(KEPT_FILTERS)(lambda tags: _read_only(_tag_biases(known, tags)))
+        return lru_cache(KEPT_FILTERS)(lambda tags: read_only(_tag_biases(known, tags)))
 
     @cached_property
     def _has_next_natural(self) -> bool:
@@ -155,7 +155,7 @@ class Marks:
 
     @cached_property
     def _playable(self) -> Flags:
-        return _read_only(np.asarray((self.kind_marks & Mark.EXCLUDED) == 0))
+        return read_only(np.asarray((self.kind_marks & Mark.EXCLUDED) == 0))
 
     def __getstate__(self) -> dict[str, Any]:
         return {field.name: getattr(self, field.name) for field in fields(self)}  # without the answers that are kept
@@ -261,8 +261,3 @@ def _tag_biases(known: _Tags, tags: TagFilter) -> Floats:
     for tag, cost in tags.avoid:
         added[known.has(tag)] += cost
     return added
-
-
-def _read_only(array: Array) -> Array:
-    array.flags.writeable = False
-    return array

@@ -69,15 +69,8 @@ class Markup:
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Markup:
-        """Read a markup file.
-
-        Raises
-        ------
-        MotionError
-            With every fault of the file: file, line, column, what was found, what is accepted and the nearest mend.
-        FileError
-            The file is missing, or cannot be read.
-        """
+        """Read a markup file. Raises MotionError with every fault of the file: file, line, column, what was found, what is accepted
+        and the nearest mend; FileError where the file is missing, or cannot be read."""
         file = str(require_path(path))
         return cls.parse(markup_file.text_of(disk.read_bytes(Path(path)), file), file)
 

@@ -50,12 +50,7 @@ class TagFilter:
         avoid: Penalties = (),
     ) -> None:
         """Take tags as one name or several, penalties as a mapping from tag to cost: `TagFilter("Move", prefer={"HipFire": 5.0})`.
-
-        Raises
-        ------
-        QueryError
-            A tag that is not text, or a penalty that is not a number from 0 to 1e30; all faults together.
-        """
+        Raises QueryError for a tag that is not text, or a penalty that is not a number from 0 to 1e30; all faults together."""
         faults: list[Fault] = []
         for field, names in (("include", include), ("every", every), ("exclude", exclude)):
             object.__setattr__(self, field, _names(field, names, faults))

@@ -47,18 +47,11 @@ NEAR_MPS, NEAR_RAD = 0.1, math.radians(5.0)
 
 @dataclass(frozen=True, eq=False)
 class Slides:
-    """How feet move over steps of about 1/30 s, n of them; at a higher rate they overlap.
+    """How feet move over n steps of about 1/30 s; at a higher rate they overlap.
 
-    Attributes
-    ----------
-    seconds : float64 array, shape (n,)
-        For how long each counts.
-    speeds, mean_speeds : float64 arrays, shape (n, K)
-        Over the ground, m/s: in the step, and in 1/6 s about it.
-    heights : float64 array, shape (n, K)
-        Of the higher end of the step, above the foot's own floor, m.
-    planted : bool array, shape (n, K)
-        Whether the clip has the foot down all the time.
+    `seconds` float64 [n] is for how long each counts. Of K feet, float64 [n, K]: `speeds` and `mean_speeds` over the ground in m/s,
+    in the step and in 1/6 s about it; `heights` of the higher end of the step above the foot's own floor, in m. `planted` bool [n,
+    K]: the clip has the foot down all the time.
     """
 
     seconds: Floats

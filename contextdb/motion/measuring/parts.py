@@ -46,7 +46,6 @@ def jumps(it: Shown) -> dict[str, object]:
 
 
 def _playing_s(it: Shown) -> float:
-    """For how long something plays."""
     plays = np.array([at is not None for at in it.playing[:-1]], np.bool_)
     return float(np.diff(it.times_s)[plays].sum())
 

@@ -41,13 +41,8 @@ class TransitionCoverage:
 
 def transitions_of(names: Iterable[str], pattern: str = PATTERN) -> TransitionCoverage:
     """The transitions among some clips. What is before `{from}`, between and behind `{to}` is compared to the letter; a name that
-    fits in several ways is divided where the pattern fits first.
-
-    Raises
-    ------
-    MotionError
-        The pattern has not both places, each once, with text between.
-    """
+    fits in several ways is divided where the pattern fits first. Raises MotionError where the pattern has not both places, each
+    once, with text between."""
     fits = re.compile(_expression(pattern), re.DOTALL)
     pairs = {(found["a"], found["b"]): None for name in names if (found := fits.fullmatch(name))}
     present = [pair for pair in pairs if pair[0] != pair[1]]

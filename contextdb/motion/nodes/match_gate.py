@@ -113,15 +113,9 @@ class MatchGate:
         valid: Valid | None = None,
         **options: Unpack[MatchOptions],
     ) -> GateLook:
-        """Look what the best asset costs now, and open or close.
-
-        The parameters are those of `MatchNode.enter`; a database has no target.
-
-        Raises
-        ------
-        QueryError
-            As from a search; a gate over a match node without a target, or one over a database with one.
-        """
+        """Look what the best asset costs now, and open or close. The parameters are those of `MatchNode.enter`; a database has no
+        target. Raises QueryError as a search does, and for a gate over a match node without a target, or one over a database with
+        one."""
         hit = self._search(query, target, valid, **options)
         was_open = self.is_open
         bar = self.close_above if was_open else self.threshold

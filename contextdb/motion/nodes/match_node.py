@@ -29,7 +29,7 @@ from contextdb.motion.arguments import Valid
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.clips.trajectory import to_own_frame
-from contextdb.motion.features.channels import MOST_WEIGHT
+from contextdb.motion.features.channels import require_weight
 from contextdb.motion.markup.spans import TOLERANCE_S
 from contextdb.motion.nodes.warping import Target, WarpedPath, WarpShare, Window, warped, wrapped
 from contextdb.motion.search.candidates import Candidates
@@ -183,8 +183,8 @@ class MatchNode:
         require_kind(database, MotionDatabase, "database", "a MotionDatabase")
         self.database = database
         self.rate = _rate_of(database, rate)
-        self.position_weight = _weight(position_weight, "position_weight")
-        self.rotation_weight = _weight(rotation_weight, "rotation_weight")
+        self.position_weight = require_weight(position_weight, "position_weight")
+        self.rotation_weight = require_weight(rotation_weight, "rotation_weight")
         self._root = _checked_root(database)
 
     def enter(
@@ -352,13 +352,6 @@ def _rate_of(database: MotionDatabase, rate: float | None) -> float:
     if number is None or number <= 0.0 or (known is not None and number != known):
         found = "a match node's database has no schema that gives its rate." if rate is None else f"the rate is {rate!r}."
         raise MotionError(Fault(found, "frames a second, more than 0" if known is None else f"{known:g}, the schema's"))
-    return number
-
-
-def _weight(weight: object, what: str) -> float:
-    number = as_number(weight)
-    if number is None or not 0.0 <= number <= MOST_WEIGHT:
-        raise MotionError(Fault(f"{what} is {weight!r}.", f"a number from 0 to {MOST_WEIGHT:,.0f}"))
     return number
 
 

@@ -19,7 +19,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from contextdb.cells.arguments import as_number, require_kind, require_many, require_text
 from contextdb.errors import Fault, MotionError, QueryError, in_quotes, nearest, some
@@ -141,22 +141,16 @@ def best_start(
     if assets is None or hasattr(assets, "assets"):
         valid = cast("Valid | None", assets)
     else:
-        valid = _ranges_of(
-            database, [assets] if isinstance(assets, str) else list(require_many(assets, "assets", "names of assets"))
-        )
+        names = [assets] if isinstance(assets, str) else list(require_many(assets, "assets", "names of assets"))
+        _check_names(database, names)
+        wanted = set(names)
+        valid = np.array([asset in wanted for asset in database.assets], np.bool_)
     bias = None if within is None else _outside(database, within)
     return database.search(query, valid, tags, bias=bias, in_match_range=True, penalties=penalties)
 
 
 def _texts(names: object, what: str) -> list[str]:
     return [require_text(name, f"one of {what}") for name in require_many(names, what, "a list of names")]
-
-
-def _ranges_of(database: MotionDatabase, names: list[str]) -> NDArray[np.bool_]:
-    """Which ranges are of assets of these names: bool [R]."""
-    _check_names(database, names)
-    wanted = set(names)
-    return np.array([asset in wanted for asset in database.assets], np.bool_)
 
 
 def _outside(database: MotionDatabase, within: Span | Mapping[str, Span]) -> Floats:

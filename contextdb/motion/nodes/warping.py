@@ -117,18 +117,12 @@ class WarpShare(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class WarpedPath:
-    """A path from entry to its end, straight from knot to knot. Make it with `warped`.
+    """A path from entry to its end, straight from knot to knot, K of them. Make it with `warped`.
 
-    Attributes
-    ----------
-    times_s : float64 array, shape (K,)
-        Seconds since the entry, from 0 on.
-    placements : float64 array, shape (K, 3)
-        Metres to the left and ahead, and radians turned; the turn is not wrapped.
-    shares : float64 array, shape (K, 2)
-        Of position and rotation: how much of the warp is blended in.
-    position_s, rotation_s : float or None
-        When the body is at the target, and when it faces as it shall; None where there is no time to warp, or nothing is asked.
+    `times_s` float64 [K] are seconds since the entry, from 0 on; `placements` float64 [K, 3] metres to the left and ahead, and
+    radians turned, not wrapped; `shares` float64 [K, 2] how much of the warp of position and rotation is blended in. `position_s`
+    and `rotation_s` say when the body is at the target, and when it faces as it shall; None where there is no time to warp, or
+    nothing is asked.
     """
 
     times_s: Floats

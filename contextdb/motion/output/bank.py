@@ -187,14 +187,7 @@ class PoseBank:
 
     def sample(self, asset: str, time_s: float, mirrored: bool = False) -> Sample:
         """A moment of an asset, between frames too: before its beginning its first pose, behind its end its last; a loop goes on.
-
-        Raises
-        ------
-        MotionError
-            There is no such asset, or not mirrored.
-        ContextError
-            `time_s` is no finite number.
-        """
+        Raises MotionError where there is no such asset, or not mirrored; ContextError where `time_s` is no finite number."""
         require_text(asset, "asset")
         return self.sample_of(self.range_of(asset, mirrored), require_real(time_s, "time_s"))
 

@@ -131,15 +131,8 @@ class PoseSettings:
 
     @classmethod
     def from_dict(cls, mapping: Mapped, *, name: str = "player", file: str | None = None) -> PoseSettings:
-        """Read the keys of one `[output.NAME]`; what is not there is as by default.
-
-        Raises
-        ------
-        SchemaError
-            With every fault; `file` is the name of the file in messages.
-        ContextError
-            `mapping` is none.
-        """
+        """Read the keys of one `[output.NAME]`; what is not there is as by default. Raises SchemaError with every fault; `file` is
+        the name of the file in messages; ContextError where `mapping` is none."""
         faults: list[Fault] = []
         part: Mapping[str, object] = require_mapping(mapping, "mapping", "what [output.NAME] says")
         section = Section(f"[output.{name}]", part, KEYS, faults, file)

@@ -51,16 +51,9 @@ Interval = tuple[float | None, float | None]
 
 
 def cells_of(facts: Sequence[ClipFacts], rigs: Sequence[Hashable], mirrored: bool = False) -> list[dict[str, str]]:
-    """For each clip the cells of its row, conditions and outputs.
-
-    Parameters
-    ----------
-    facts : sequence of ClipFacts
-    rigs : sequence
-        Of each clip what its rig is called: clips of different rigs are not told apart.
-    mirrored : bool
-        Whether every clip plays mirrored too, so that a turn to the left serves one to the right.
-    """
+    """For each clip the cells of its row, conditions and outputs. `rigs` says of each clip what its rig is called: clips of
+    different rigs are not told apart. `mirrored`: every clip plays mirrored too, so that a turn to the left serves one to the
+    right."""
     found = [{**dict.fromkeys(CONDITIONS, ANY), "gait": " ".join(each.gaits), **_outputs(each)} for each in facts]
     groups = _grouped(range(len(facts)), lambda i: (rigs[i], facts[i].gait, facts[i].style))
     for members in groups.values():

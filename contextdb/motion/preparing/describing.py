@@ -180,13 +180,7 @@ class RigClips:
 
 def by_rig(clips: Sequence[Clip], paths: Sequence[str]) -> list[RigClips]:
     """The clips of each rig, unit and axis, those of which there are most first; joint clips by their roles behind the others.
-
-    Parameters
-    ----------
-    clips : sequence of Clip
-    paths : sequence of str
-        Their files, below the folder of contextdb.toml, with "/" between names.
-    """
+    `paths` are their files, below the folder of contextdb.toml, with "/" between names."""
     groups = defaultdict[object, list[int]](list)
     roles_of = {i: tuple(roles) for roles in joint_clips(clips).values() for i in roles.values()}
     for i, clip in enumerate(clips):

@@ -228,14 +228,9 @@ def _cuts(look: Look) -> Iterator[Proposal]:
 def _apart(look: Look, i: int, j: int) -> tuple[float, float]:
     """How far two poses are apart, and their speeds: root mean squares over joints."""
     metres = np.linalg.norm(look.own[i] - look.own[j], axis=-1)
-    root = _root_speeds(look)
+    root = look.speeds[:, None]
     mps = np.concatenate((np.linalg.norm(look.own_speeds[i] - look.own_speeds[j], axis=-1), [np.linalg.norm(root[i] - root[j])]))
     return float(np.sqrt(np.mean(metres**2))), float(np.sqrt(np.mean(mps**2)))
-
-
-def _root_speeds(look: Look) -> Floats:
-    """How fast the body goes about each frame, as one column: [F, 1]."""
-    return look.speeds[:, None]
 
 
 def _one_sided(look: Look, at: NDArray[np.int64], side: int) -> Floats:

@@ -13,15 +13,8 @@ from contextdb.motion.search.filters import Filter
 
 
 def continuing_cost(database: MotionDatabase, query: Floats, chosen: Filter) -> float | None:
-    """The cost of a filter's current frame, the continuing bias in it; None when there is none or it may not play on.
-
-    Parameters
-    ----------
-    query : float64 array, shape (F,)
-        In the schema's units, checked.
-    chosen : Filter
-        Made by `database.filter` with the current frame.
-    """
+    """The cost of the current frame of a filter that `database.filter` made with it, the continuing bias in it; None when there is
+    none or it may not play on. `query` float64 [F] is checked, and in the schema's units."""
     frame = chosen.current
     at = database.range_of(frame) if frame >= 0 else -1
     if at < 0 or not chosen.ranges[at] or (len(chosen.frames) and not chosen.frames[frame]):

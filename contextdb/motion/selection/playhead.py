@@ -24,22 +24,11 @@ TOLERANCE_S = 1e-6
 @quickly_made
 @dataclass(frozen=True, slots=True)
 class Move:
-    """A playhead moved on.
+    """A playhead moved on, to `time_s` since the start of its range and a frame counted over the whole database.
 
-    Attributes
-    ----------
-    time_s : float
-        Where it is now, since the start of the range.
-    frame : int
-        Counted over the whole database.
-    spans : tuple of (start, stop)
-        The frames that were passed, the one arrived at among them.
-    n_loops : int
-        How often it went over the end of a looping range.
-    is_ended : bool
-        It could not move on all the way: what follows is the end of the range or an excluded frame.
-    motion : RootMotion
-        How the range moved the body meanwhile.
+    `spans` are the frames (start, stop) that were passed, the one arrived at among them; `n_loops` says how often it went over the
+    end of a looping range, `motion` how the range moved the body meanwhile. `is_ended`: it could not move on all the way, as what
+    follows is the end of the range or an excluded frame.
     """
 
     time_s: float
@@ -52,15 +41,7 @@ class Move:
 
 @dataclass(frozen=True)
 class Playhead:
-    """A range of a database, and how its frames follow each other.
-
-    Attributes
-    ----------
-    database : MotionDatabase
-    range : int
-    rate : float
-        Frames a second.
-    """
+    """A range of a database, and how its frames follow each other, `rate` a second."""
 
     database: MotionDatabase
     range: int

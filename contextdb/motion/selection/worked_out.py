@@ -20,18 +20,8 @@ Named = tuple[str, Candidates]
 
 
 class WorkedOut(Sequence[Named]):
-    """For each database that was searched its name and its candidates: the best frames, and those left out that cost as little.
-
-    Parameters
-    ----------
-    databases : mapping of name to MotionDatabase
-    query : float64 array, shape (F,)
-    filters : sequence of (database name, Filter)
-    choice : Choice
-        Says which databases were searched.
-    k : int
-        How many candidates of each.
-    """
+    """For each database that was searched, as the choice says, its name and its k candidates: the best frames, and those left out
+    that cost as little. `query` float64 [F]; the filters are by the names of databases."""
 
     def __init__(
         self,

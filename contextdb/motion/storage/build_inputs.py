@@ -34,20 +34,8 @@ Keys = Mapping[str, list[list[str]]]
 
 @dataclass(frozen=True, eq=False)
 class Inputs:
-    """What some databases are made of.
-
-    Attributes
-    ----------
-    config : MotionConfig
-    root : Path
-        The folder of contextdb.toml.
-    wanted : list of str
-        The names of the databases, in the order of the configuration.
-    files : dict of str to list of ClipFile
-        The clips of these and of all other databases of their schemas.
-    markups : dict of str to Markup
-        Of those that have some.
-    """
+    """What some databases are made of: `root` is the folder of contextdb.toml, `wanted` are their names in the order of the
+    configuration, `files` the clips of these and of all other databases of their schemas, `markups` those that have some."""
 
     config: MotionConfig
     root: Path

@@ -88,15 +88,8 @@ def clip_files(
     markup: Markup | None = None,
 ) -> list[ClipFile]:
     """The clips of a database in the order of their paths; with `assets` those of these names alone. The markup says which loop,
-    and when feet are down.
-
-    Raises
-    ------
-    MotionError
-        No file fits the pattern, or two of the files have one name; `file` is that of the settings in messages.
-    FileError, MotionError
-        The rig cannot be read; see `Rig.of`.
-    """
+    and when feet are down. Raises MotionError where no file fits the pattern, or two of the files have one name; `file` is that of
+    the settings in messages; FileError or MotionError where the rig cannot be read; see `Rig.of`."""
     paths = paths_of(settings, folder, file)
     if not paths:
         found = f"[databases.{settings.name}] no file matches clips = {as_toml(settings.clips)}."
@@ -143,12 +136,8 @@ def unmatched(
 def extract(file: ClipFile, cache: FeatureCache | None = None) -> Extracted:
     """The features of a clip's ranges: from the cache, or computed and then kept in it.
 
-    Nothing is kept of a schema with functions: whether they still are what they were cannot be reported.
-
-    Raises
-    ------
-    MotionError, FileError
-        The clip cannot be read, has no frame, or lacks a bone of the schema.
+    Nothing is kept of a schema with functions: whether they still are what they were cannot be reported. Raises MotionError or
+    FileError where the clip cannot be read, has no frame, or lacks a bone of the schema.
     """
     content = read_bytes(file.path)
     keys = file.keys(content)

@@ -76,20 +76,10 @@ class MotionConfig:
     def from_dict(cls, mapping: Mapped, *, tables: Collection[str] | None = None, file: str | None = None) -> MotionConfig:
         """Read the five sections; other keys of `mapping` are passed over.
 
-        Parameters
-        ----------
-        mapping : mapping
-            `{"features": {...}, "databases": {...}, "selectors": {...}, "controllers": {...}, "output": {...}}`, as contextdb.toml
-            holds them; each may be absent. `Schema.motion` is one.
-        tables : collection of str, optional
-            The names of the tables there are. Default: any name is accepted.
-        file : str, optional
-            The name of the file in messages.
-
-        Raises
-        ------
-        SchemaError
-            With every fault of all sections.
+        The sections are those of contextdb.toml, `{"features": {...}, "databases": {...}, "selectors": {...}, "controllers": {...},
+        "output": {...}}`; each may be absent. `Schema.motion` is such a mapping. `tables` are the names of the tables there are
+        (None: any name is accepted), `file` is the name of the file in messages. Raises SchemaError with every fault of all
+        sections.
         """
         faults: list[Fault] = []
         require_mapping(mapping, "mapping", 'a mapping such as {"features": {...}, "databases": {...}}')
@@ -131,13 +121,8 @@ class MotionConfig:
         return found
 
     def with_functions(self, functions: Mapping[str, CustomFunction]) -> MotionConfig:
-        """The same with functions for custom channels, by the names that the channels of any schema give.
-
-        Raises
-        ------
-        SchemaError
-            No channel asks for a name.
-        """
+        """The same with functions for custom channels, by the names that the channels of any schema give. Raises SchemaError where
+        no channel asks for a name."""
         asked = {name: {channel.function for channel in schema.channels} for name, schema in self.features.items()}
         every = {function for names in asked.values() for function in names if function is not None}
         for unknown in (function for function in functions if function not in every):

@@ -27,7 +27,16 @@ from typing import Any
 
 from contextdb.cells.arguments import require_kind, require_path, require_text
 from contextdb.errors import ArtefactError, ContextDBError, FileError
-from contextdb.files.tensors import FileKind, Tensors, digest_of, read_tensors, texts_from_array, texts_to_array, write_tensors
+from contextdb.files.tensors import (
+    FileKind,
+    Tensors,
+    digest_of,
+    divided,
+    read_tensors,
+    texts_from_array,
+    texts_to_array,
+    write_tensors,
+)
 from contextdb.motion.clips.skeleton import Skeleton
 from contextdb.motion.output.bank import PoseBank, moving_alike
 from contextdb.motion.search.database import MotionDatabase
@@ -51,22 +60,11 @@ SAVED_SUFFIX = ".poses.safetensors"
 
 
 def save_poses(bank: PoseBank, path: str | PathLike[str], *, inputs: str = "") -> None:
-    """Write a bank; the old file is whole until the new one is. The same bank gives the same bytes.
+    """Write a bank to a path whose name ends in .safetensors, as a rule in .poses.safetensors; the old file is whole until the new
+    one is. The same bank gives the same bytes.
 
-    Parameters
-    ----------
-    bank : PoseBank
-    path : path
-        Whose name ends in .safetensors, as a rule in .poses.safetensors.
-    inputs : str
-        The digest of what the bank was built of; see `inputs_of`.
-
-    Raises
-    ------
-    FileError
-        The disk refuses.
-    ContextError
-        `bank` is none, or `path` is none.
+    `inputs` is the digest of what the bank was built of; see `inputs_of`. Raises FileError where the disk refuses, ContextError
+    where `bank` or `path` is none.
     """
     require_kind(bank, PoseBank, "bank", "a PoseBank")
     target = require_path(path)
@@ -76,7 +74,7 @@ def save_poses(bank: PoseBank, path: str | PathLike[str], *, inputs: str = "") -
     about = json.dumps(
         {"rate": bank.rate, "feet": bank.feet, "names": rig.names, "channels": rig.channels, "end_sites": rig.end_sites}
     )
-    small, large = _divided(tensors)
+    small, large = divided(tensors, LARGE)
     digests = {"digest": digest_of(small, about, inputs), "large_digest": digest_of(large)}
     write_tensors(target, STORED_POSES, tensors, {"about": about, "inputs": inputs, **digests})
 
@@ -84,27 +82,24 @@ def save_poses(bank: PoseBank, path: str | PathLike[str], *, inputs: str = "") -
 def open_poses(path: str | PathLike[str], *, verify: bool = False) -> PoseBank:
     """Open a saved bank by memory map: poses are read from the disk when they are first shown.
 
-    Parameters
-    ----------
-    path : path
-    verify : bool
-        Read all poses and compare with their digest too. Default: all but the poses is checked.
-
-    Raises
-    ------
-    ArtefactError
-        The file is truncated, altered, of another layout, or no pose bank; with the reason and the mend.
-    FileError
-        The file cannot be read.
+    All but the poses is checked; `verify` reads all of them and compares with their digest too. Raises ArtefactError, with the
+    reason and the mend, where the file is truncated, altered, of another layout, or no pose bank; FileError where it cannot be
+    read.
     """
     file = require_path(path)
     tensors, metadata = read_tensors(file, STORED_POSES, writeable=True)  # as built ones are: compiled loops tell the two apart
     with STORED_POSES.reading(file):
-        small, large = _divided(tensors)
+        small, large = divided(tensors, LARGE)
         is_whole = digest_of(small, metadata["about"], metadata["inputs"]) == metadata["digest"]
         if not is_whole or (verify and digest_of(large) != metadata["large_digest"]):
             raise STORED_POSES.refused(file, "the file was altered: its contents do not match its digest.")
-        return _bank(json.loads(metadata["about"]), tensors)
+        about = json.loads(metadata["about"])
+        channels = tuple(map(tuple, about["channels"]))
+        ends = tuple((joint, tuple(offset)) for joint, offset in about["end_sites"])
+        rig = Skeleton(tuple(about["names"]), tensors["parents"], tensors["offsets"], channels, ends)
+        arrays: dict[str, Any] = {name: tensors[name] for name in ARRAYS}
+        assets = tuple(texts_from_array(tensors["assets"]))
+        return PoseBank(skeleton=rig, rate=about["rate"], feet=tuple(about["feet"]), assets=assets, **arrays)
 
 
 def poses_path(folder: str | PathLike[str], name: str) -> Path:
@@ -136,17 +131,9 @@ def open_or_build_poses(
 ) -> dict[str, PoseBank]:
     """The pose banks of the databases of a project: those that are saved and up to date opened, the others built in memory.
 
-    Parameters
-    ----------
-    config, folder, assets, names
-        As for `build`.
-    saved : path, optional
-        Where `contextdb motion build --poses` has put them; a relative one lies in `folder`. Default: `folder`.
-
-    Raises
-    ------
-    MotionError, FileError
-        As `build`. A saved bank that cannot be used is built anew.
+    `config`, `folder`, `assets` and `names` are as for `build`. `saved` is where `contextdb motion build --poses` has put them; a
+    relative path lies in `folder`, which is the default. Raises what `build` raises. A saved bank that cannot be used is built
+    anew.
     """
     return moving_alike(poses_alone(config, folder, assets, names=names, saved=saved))
 
@@ -179,18 +166,3 @@ def _open(path: Path, digest: str) -> PoseBank | None:
         return open_poses(path) if digest and read_tensors(path, STORED_POSES)[1].get("inputs") == digest else None
     except (ArtefactError, FileError):
         return None
-
-
-def _divided(tensors: Tensors) -> tuple[Tensors, Tensors]:
-    """All but the large arrays, and the large ones."""
-    large = {name: tensors[name] for name in LARGE}
-    return {name: array for name, array in tensors.items() if name not in large}, large
-
-
-def _bank(about: dict[str, Any], tensors: Tensors) -> PoseBank:
-    channels = tuple(map(tuple, about["channels"]))
-    ends = tuple((joint, tuple(offset)) for joint, offset in about["end_sites"])
-    rig = Skeleton(tuple(about["names"]), tensors["parents"], tensors["offsets"], channels, ends)
-    arrays: dict[str, Any] = {name: tensors[name] for name in ARRAYS}
-    assets = tuple(texts_from_array(tensors["assets"]))
-    return PoseBank(skeleton=rig, rate=about["rate"], feet=tuple(about["feet"]), assets=assets, **arrays)

@@ -28,18 +28,8 @@ SAME_M = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Rig:
-    """What clips are put on.
-
-    Attributes
-    ----------
-    skeleton : Skeleton
-    metres_per_unit : float
-        Of its offsets.
-    bones : mapping of str to str
-        For bones of the rig those of clips that name them otherwise.
-    digest : str
-        Of all that.
-    """
+    """What clips are put on: a skeleton, the unit of its offsets, for bones of it those of clips that name them otherwise, and a
+    digest of all that."""
 
     skeleton: Skeleton
     metres_per_unit: float
@@ -48,15 +38,8 @@ class Rig:
 
     @classmethod
     def of(cls, settings: DatabaseSettings, folder: Path, file: str | None = None) -> Rig | None:
-        """The rig of a database; None where it has none. `file` is that of the settings in messages.
-
-        Raises
-        ------
-        FileError, ClipError
-            The rig's file cannot be read.
-        MotionError
-            It has no such bone as one of `rig_bones`.
-        """
+        """The rig of a database; None where it has none. `file` is that of the settings in messages. Raises FileError or ClipError
+        where the rig's file cannot be read, MotionError where it has no such bone as one of `rig_bones`."""
         if settings.rig is None:
             return None
         path = folder / settings.rig
@@ -72,13 +55,7 @@ class Rig:
         return cls(skeleton, unit, settings.rig_bones, digest.hexdigest())
 
     def clip(self, clip: Clip) -> Clip:
-        """A clip on this rig.
-
-        Raises
-        ------
-        MotionError
-            It has no counterpart of a bone of hips or legs; with the nearest.
-        """
+        """A clip on this rig. Raises MotionError where it has no counterpart of a bone of hips or legs; with the nearest."""
         if self._is_of(clip):
             return clip
         missing = [

@@ -31,7 +31,16 @@ import numpy as np
 
 from contextdb.cells.arguments import require_kind, require_path
 from contextdb.errors import Fault, MotionError, SchemaError, in_quotes
-from contextdb.files.tensors import FileKind, Tensors, digest_of, read_tensors, texts_from_array, texts_to_array, write_tensors
+from contextdb.files.tensors import (
+    FileKind,
+    Tensors,
+    digest_of,
+    divided,
+    read_tensors,
+    texts_from_array,
+    texts_to_array,
+    write_tensors,
+)
 from contextdb.motion.features.normalisation import Normalisation
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.features.schema_dict import schema_to_dict
@@ -55,24 +64,11 @@ Part = TypeVar("Part", Layout, Marks)
 
 
 def save_database(database: MotionDatabase, path: str | PathLike[str], *, inputs: str = "") -> None:
-    """Write a database; the old file is whole until the new one is. The same database gives the same bytes.
+    """Write a database to a path whose name ends in .safetensors, as a rule in .motion.safetensors; the old file is whole until the
+    new one is. The same database gives the same bytes.
 
-    Parameters
-    ----------
-    database : MotionDatabase
-    path : path
-        Whose name ends in .safetensors, as a rule in .motion.safetensors.
-    inputs : str
-        The digest of what the database was built of; see `inputs_of`.
-
-    Raises
-    ------
-    MotionError
-        The schema was made in Python and could not be read back.
-    FileError
-        The disk refuses.
-    ContextError
-        `database` is none, or `path` is none.
+    `inputs` is the digest of what the database was built of; see `inputs_of`. Raises MotionError where the schema was made in
+    Python and could not be read back, FileError where the disk refuses, ContextError where `database` or `path` is none.
     """
     require_kind(database, MotionDatabase, "database", "a MotionDatabase")
     path = require_path(path)
@@ -98,7 +94,7 @@ def save_database(database: MotionDatabase, path: str | PathLike[str], *, inputs
             "marks": _others(database.marks),
         }
     )
-    small, large = _divided(tensors)
+    small, large = divided(tensors, LARGE)
     shapes = _shapes(large)
     metadata = {
         "about": about,
@@ -133,7 +129,7 @@ def open_database(path: str | PathLike[str], *, verify: bool = False) -> MotionD
     file = require_path(path)
     tensors, metadata = read_tensors(file, STORED, writeable=True)  # as built ones are: the compiled search tells the two apart
     with STORED.reading(file):
-        small, large = _divided(tensors)
+        small, large = divided(tensors, LARGE)
         expected = digest_of(small, metadata["about"], metadata["inputs"], _shapes(large))
         if expected != metadata["digest"] or (verify and digest_of(large) != metadata["large_digest"]):
             raise STORED.refused(file, "the file was altered: its contents do not match its digest.")
@@ -144,13 +140,8 @@ def open_database(path: str | PathLike[str], *, verify: bool = False) -> MotionD
 
 
 def inputs_of(path: str | PathLike[str]) -> str:
-    """The digest of what a saved database was built of, without opening it.
-
-    Raises
-    ------
-    ArtefactError, FileError
-        As `open_database` does for a file that is no motion database of this layout.
-    """
+    """The digest of what a saved database was built of, without opening it. Raises ArtefactError or FileError as `open_database`
+    does for a file that is no motion database of this layout."""
     file = require_path(path)
     metadata = read_tensors(file, STORED)[1]
     with STORED.reading(file):
@@ -186,12 +177,6 @@ def _schema_to_json(schema: FeatureSchema) -> dict[str, object]:
         found = f"the schema {in_quotes(schema.name)} cannot be saved: {error.faults[0].found}"
         raise MotionError(Fault(found, "a schema that contextdb.toml could hold")) from error
     return {"name": schema.name, "keys": keys}
-
-
-def _divided(tensors: Tensors) -> tuple[Tensors, Tensors]:
-    """All but the large arrays, and the large ones."""
-    large = {name: tensors[name] for name in LARGE if name in tensors}
-    return {name: array for name, array in tensors.items() if name not in large}, large
 
 
 def _shapes(tensors: Tensors) -> str:

@@ -29,16 +29,8 @@ def write_poses(poses: Sequence[Pose], bank: PoseBank, path: str | PathLike[str]
     """Write poses by the ending of the name: BVH, the arrays of `pose_arrays`, or glTF. The same poses give the same bytes.
 
     A `.bvh` has the rig in centimetres and angles in degrees; a `.glb` has a node for each joint and one animation of them, in
-    metres, and needs pygltflib.
-
-    Raises
-    ------
-    FileError
-        The name has another ending, or the disk refuses; the old file is then whole.
-    MotionError
-        A `.glb` of no pose, or without pygltflib.
-    ContextError
-        An argument of another type.
+    metres, and needs pygltflib. Raises FileError where the name has another ending, or the disk refuses; the old file is then
+    whole; MotionError for a `.glb` of no pose, or without pygltflib; ContextError for an argument of another type.
     """
     target = pose_file(path)
     if target.suffix == BVH:
@@ -51,15 +43,9 @@ def write_poses(poses: Sequence[Pose], bank: PoseBank, path: str | PathLike[str]
 
 
 def write_arrays(arrays: Mapping[str, NDArray[Any]], path: str | PathLike[str]) -> None:
-    """Write arrays by their names into a `.npz` file, as `numpy.load` reads it. The same arrays give the same bytes.
-
-    Raises
-    ------
-    FileError
-        The name has another ending, or the disk refuses; the old file is then whole.
-    ContextError
-        An argument of another type.
-    """
+    """Write arrays by their names into a `.npz` file, as `numpy.load` reads it. The same arrays give the same bytes. Raises
+    FileError where the name has another ending, or the disk refuses; the old file is then whole; ContextError for an argument of
+    another type."""
     target, whole = require_path(path), io.BytesIO()
     given = require_mapping(arrays, "arrays", "a mapping of names to arrays")
     wrong = [name for name, array in given.items() if not isinstance(name, str) or np.asanyarray(array).dtype.hasobject]
@@ -78,15 +64,8 @@ def write_arrays(arrays: Mapping[str, NDArray[Any]], path: str | PathLike[str]) 
 
 
 def glb_of_poses(poses: Sequence[Pose], bank: PoseBank, rate: float, name: str = "poses") -> bytes:
-    """Poses as the bytes of a `.glb` file.
-
-    Raises
-    ------
-    MotionError
-        No pose, or pygltflib is not installed.
-    ContextError
-        An argument of another type.
-    """
+    """Poses as the bytes of a `.glb` file. Raises MotionError where there is no pose, or pygltflib is not installed; ContextError
+    for an argument of another type."""
     listed = checked_poses(poses, bank, rate)
     if not listed:
         raise MotionError(Fault("there is no pose to write as glTF.", "at least one"))
@@ -120,15 +99,8 @@ TEXTS = ("bones", "asset")
 
 
 def read_pose_arrays(path: str | PathLike[str]) -> dict[str, NDArray[Any]]:
-    """Read the arrays of a `.npz` file of poses.
-
-    Raises
-    ------
-    ArtefactError
-        The file is none, damaged, or its arrays do not fit together; with the reason.
-    FileError
-        The file cannot be read.
-    """
+    """Read the arrays of a `.npz` file of poses. Raises ArtefactError where the file is none, damaged, or its arrays do not fit
+    together; with the reason; FileError where the file cannot be read."""
     file = require_path(path)
     raw = read_bytes(file)
     try:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Iterable, Iterator, Mapping
 
-from contextdb.console import printable
 from contextdb.errors import plural
 from contextdb.motion.trace.cost_views import cost_text, seconds
 from contextdb.motion.trace.session_diff import SessionDiff
 from contextdb.motion.trace.stats import GAINS, SessionStats
 from contextdb.motion.trace.text_table import WIDTH, Column, table_lines
+from contextdb.motion.trace.views import wrapped
 from contextdb.motion.trace.what_if import WhatIf
 from contextdb.motion.trace.why_not import WhyNot
 from contextdb.motion.trace.winning_changes import Change, ChangePart
@@ -25,13 +24,13 @@ def why_lines(told: WhyNot, width: int = WIDTH) -> Iterator[str]:
     at = "" if told.time_s is None else f" at {told.time_s:.2f} s"
     place = f"{told.asset}{at}, frame {told.frame:,} of {told.database}"
     if told.winner == told.asset:
-        yield from _wrapped(f"{told.asset} was chosen: cost {cost_text(told.cost)}.", width)
+        yield from wrapped(f"{told.asset} was chosen: cost {cost_text(told.cost)}.", width)
         return
     beaten = "nothing was chosen" if told.winner is None else f"{told.winner} was chosen at cost {cost_text(told.winner_cost)}"
-    yield from _wrapped(f"{place}: cost {cost_text(told.cost)}, rank {told.rank:,}; {beaten}.", width)
+    yield from wrapped(f"{place}: cost {cost_text(told.cost)}, rank {told.rank:,}; {beaten}.", width)
     yield from ("", "why not", "")
     for reason in told.reasons:
-        yield from _wrapped(reason, width)
+        yield from wrapped(reason, width)
     yield from ("", "what would have to change", "")
     if not told.changes:
         yield "no single change of a cell, a mark, a bias or a weight"
@@ -75,7 +74,7 @@ def stats_lines(told: SessionStats, width: int = WIDTH) -> Iterator[str]:
 def _labelled(rows: Iterable[tuple[str, str]], width: int) -> Iterator[str]:
     """Texts in lines, each behind its label."""
     for label, text in rows:
-        lines = _wrapped(text, width - LABEL)
+        lines = wrapped(text, width - LABEL)
         yield from (f"{label if i == 0 else '':<{LABEL}}{line}" for i, line in enumerate(lines))
 
 
@@ -104,9 +103,7 @@ def what_if_lines(told: WhatIf, width: int = WIDTH) -> Iterator[str]:
             yield f"and {n - len(shown):,} more"
     yield from ("", "the session run again in closed loop", "")
     if not told.is_reproduced:
-        yield from _wrapped(
-            "(run again unchanged it does not play what was recorded: before is that run, not the recording)", width
-        )
+        yield from wrapped("(run again unchanged it does not play what was recorded: before is that run, not the recording)", width)
     yield from _measure_lines(("before", told.before), ("after", told.after), width)
 
 
@@ -117,8 +114,8 @@ def diff_lines(told: SessionDiff, width: int = WIDTH) -> Iterator[str]:
         yield f"both play the same in all {plural(told.updates, 'update')}"
     else:
         yield f"they part at tick {parting.tick:,}, {parting.time_s:.2f} s"
-        yield from _wrapped(f"first:  {parting.one or 'nothing'}. {parting.why_one}", width)
-        yield from _wrapped(f"second: {parting.other or 'nothing'}. {parting.why_other}", width)
+        yield from wrapped(f"first:  {parting.one or 'nothing'}. {parting.why_one}", width)
+        yield from wrapped(f"second: {parting.other or 'nothing'}. {parting.why_other}", width)
         yield f"of {plural(told.updates, 'update')}, {told.other_frames:,} play another frame, {told.other_assets:,} another asset"
     if told.longer:
         yield f"the {'first' if told.longer > 0 else 'second'} session is longer by {plural(abs(told.longer), 'update')}"
@@ -135,7 +132,3 @@ def _measure_lines(one: Measured, other: Measured, width: int) -> Iterator[str]:
     for heading, values in (one, other):
         columns.append(Column(heading, ["" if (v := values[name]) is None else f"{v:.4g}" for name in names], is_number=True))
     yield from table_lines(columns, width)
-
-
-def _wrapped(text: str, width: int) -> list[str]:
-    return textwrap.wrap(printable(text), width, break_long_words=False, break_on_hyphens=False)

@@ -56,13 +56,7 @@ def candidate_lines(
     events: Mapping[tuple[str, int], Sequence[str]] | None = None,
     width: int = WIDTH,
 ) -> Iterator[str]:
-    """Candidates as a table.
-
-    Parameters
-    ----------
-    events : mapping of (database, frame) to sequence of str, optional
-        What the markup says of frames, for the view of events.
-    """
+    """Candidates as a table; `events` is what the markup says of frames, by (database, frame), for the view of events."""
     yield from table_lines([*_base_columns(rows), *_cost_columns(rows, view), *_event_columns(rows, view, events or {})], width)
 
 

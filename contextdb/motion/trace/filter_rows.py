@@ -80,13 +80,7 @@ def _unrolled(values: list[Any], runs: list[int] | None, dtype: type[np.generic]
 
 
 def filter_of(row: Row) -> Filter:
-    """The filter that a row was made of.
-
-    Raises
-    ------
-    ValueError, TypeError, KeyError
-        The row was made of none.
-    """
+    """The filter that a row was made of. Raises ValueError, TypeError or KeyError where the row was made of none."""
     ranges, biases = np.array(row["ranges"], np.bool_), np.array(row["range_biases"], np.float64)
     kinds = row["kinds"]
     return Filter(

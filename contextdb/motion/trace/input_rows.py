@@ -38,13 +38,8 @@ def inputs_json(inputs: Inputs) -> str:
 
 @lru_cache(64)
 def inputs_of(text: str) -> Inputs:
-    """The inputs that a text was made of; those of one text are one.
-
-    Raises
-    ------
-    ValueError, TypeError, KeyError, AttributeError
-        The text was made of none.
-    """
+    """The inputs that a text was made of; those of one text are one. Raises ValueError, TypeError, KeyError or AttributeError where
+    the text was made of none."""
     row = json.loads(text)
     tags = None if row["tags"] is None else _tags(row["tags"])
     of_each = None if row["tags_of"] is None else {name: _tags(each) for name, each in row["tags_of"].items()}

@@ -18,13 +18,7 @@ MOST_ROWS = 7200
 
 
 class LastMinute(Trace):
-    """A session that grows at its end and is forgotten at its start.
-
-    Parameters
-    ----------
-    databases : mapping of name to MotionDatabase
-        Those that whoever watches has.
-    """
+    """A session that grows at its end and is forgotten at its start; `databases` are those that whoever watches has, by name."""
 
     def __init__(self, databases: Mapping[str, MotionDatabase]) -> None:
         super().__init__(databases=databases)

@@ -103,13 +103,8 @@ class Reasked(Sequence[ReaskedDecision]):
         return f"<Reasked: {plural(len(self), 'decision')}>"
 
     def why_not(self, index: int, asset: str) -> WhyNot:
-        """Why an asset was not chosen by one decision, and what would have to change for it to be; see `WhyNot`.
-
-        Raises
-        ------
-        MotionError
-            No database has the asset, with the nearest; or nothing was searched.
-        """
+        """Why an asset was not chosen by one decision, and what would have to change for it to be; see `WhyNot`. Raises MotionError
+        where no database has the asset, with the nearest; or nothing was searched."""
         asked = self[index]
         if asked.choice is None:
             raise MotionError(self._unsearched(asked.decision.tick))

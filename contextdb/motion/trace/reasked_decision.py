@@ -90,7 +90,7 @@ class ReaskedDecision:
     @property
     def is_other_asset(self) -> bool:
         """Whether another asset is chosen than the recorded choice."""
-        return self.is_changed and _asset(self.choice) != _asset(self.decision.choice)
+        return self.is_changed and asset_of(self.choice) != asset_of(self.decision.choice)
 
     def best_of_assets(self, text: str = "") -> list[Ranked]:
         """Of each range whose asset's name holds a text, in any case, the best frame, cheapest first, chosen or not.
@@ -148,5 +148,6 @@ def chosen_of(choice: Choice | None, starts: Mapping[str, Sequence[int]]) -> Cho
     return choice.database, hit.asset, hit.frame - starts[choice.database][hit.range]
 
 
-def _asset(choice: Choice | None) -> str | None:
+def asset_of(choice: Choice | None) -> str | None:
+    """The asset that was chosen, if one was."""
     return None if choice is None else choice.hit.asset

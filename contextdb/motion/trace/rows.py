@@ -236,13 +236,7 @@ def _candidate_row(row: Candidate, events: list[str]) -> Row:
 
 
 def decision_of(row: Row) -> Decision:
-    """The decision that a row was made of.
-
-    Raises
-    ------
-    ValueError, TypeError, KeyError
-        The row was made of none.
-    """
+    """The decision that a row was made of. Raises ValueError, TypeError or KeyError where the row was made of none."""
     return Decision(
         tick=int(row["tick"]),
         time_s=float(row["time_s"]),

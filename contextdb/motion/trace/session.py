@@ -242,18 +242,8 @@ class Trace(Sequence[Decision]):
         return diff_sessions(self.brief(), other.brief(), self.about, other.about)
 
     def save(self, path: str | PathLike[str], *, timings: bool = True) -> None:
-        """Write the session to a Parquet file, in one step.
-
-        Parameters
-        ----------
-        timings : bool
-            Whether to write how long searches took, which no two sessions have alike.
-
-        Raises
-        ------
-        FileError
-            The disk refuses; the old file is then whole.
-        """
+        """Write the session to a Parquet file, in one step; with `timings` also how long searches took, which no two sessions have
+        alike. Raises FileError where the disk refuses; the old file is then whole."""
         write_atomic(require_path(path), self.to_bytes(timings=timings))
 
     def to_bytes(self, *, timings: bool = True) -> bytes:
@@ -273,16 +263,8 @@ class Trace(Sequence[Decision]):
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Trace:
-        """Read a saved session.
-
-        Raises
-        ------
-        ArtefactError
-            The file is no session, cut off, damaged or of another version; with the reason. A row that holds no decision is told
-            when it is asked for.
-        FileError
-            The file cannot be read.
-        """
+        """Read a saved session. Raises ArtefactError where the file is no session, cut off, damaged or of another version; with the
+        reason. A row that holds no decision is told when it is asked for. FileError where the file cannot be read."""
         return cls.from_bytes(read_bytes(require_path(path)), str(path))
 
     @classmethod

@@ -75,20 +75,10 @@ class Compared:
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """How it stands at an update.
+    """How it stands at an update: speeds in m/s, angles in degrees, seconds of the clip that pass in a second (`time_scale`).
 
-    Attributes
-    ----------
-    speed : Compared
-        In m/s.
-    move, facing : Compared
-        In degrees.
-    frames_evaluated : int or None
-        How many frames could be chosen in the databases that were searched; None without a search.
-    time_scale : float
-        Seconds of the clip that pass in a second.
-    stride, warp_deg : float or None
-        How many times as long the steps became, and by how much hips and legs were turned; None without the poses that were shown.
+    `frames_evaluated` could be chosen in the databases that were searched; None without a search. The steps became `stride` times
+    as long, and hips and legs were turned by `warp_deg`; None without the poses that were shown.
     """
 
     speed: Compared
@@ -130,18 +120,8 @@ def status_of(
     databases: Mapping[str, MotionDatabase],
     warp: tuple[float, float] | None = None,
 ) -> Status:
-    """The status of an update.
-
-    Parameters
-    ----------
-    decision : Decision
-    last : Decision or None
-        The one before; None for the first.
-    databases : mapping of name to MotionDatabase
-        Those that it was made with; what is not among them is not known.
-    warp : (stride, radians), optional
-        Those of the pose that was shown.
-    """
+    """The status of an update after the `last` decision, None for the first. `databases` are those that it was made with, by name;
+    what is not among them is not known. `warp` is (stride, radians) of the pose that was shown."""
     playing = decision.playing
     database = None if playing is None else databases.get(playing.database)
     schema = None if database is None else database.schema

@@ -75,14 +75,7 @@ class Described(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Stock:
-    """Databases, and the tables that say which of their assets are valid.
-
-    Attributes
-    ----------
-    databases : mapping of name to MotionDatabase
-    tables : mapping of name to Table
-    table_of : mapping of database name to table name
-    """
+    """Databases, and the tables that say which of their assets are valid; `table_of` names the table of a database."""
 
     databases: Mapping[str, MotionDatabase]
     tables: Mapping[str, Edited] = field(default_factory=dict)

@@ -21,18 +21,8 @@ GAP = 2
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table.
-
-    Attributes
-    ----------
-    header : str
-    texts : sequence of str
-        One for each row; a column of empty texts is left out.
-    is_number : bool
-        Stands to the right, and is never shortened.
-    is_key : bool
-        Stands in each part of a table that is too wide for one.
-    """
+    """A column of a table: a text for each row; one of empty texts is left out. Numbers stand to the right, and are never
+    shortened; a key stands in each part of a table that is too wide for one."""
 
     header: str
     texts: Sequence[str]

@@ -53,16 +53,8 @@ def summary_line(decisions: Iterable[Decision]) -> str:
 
 
 def session_lines(decisions: Iterable[Decision], *, name: str = "", width: int = WIDTH) -> Iterator[str]:
-    """One row for each decision that changed something, with how long it then went on.
-
-    Parameters
-    ----------
-    decisions : iterable of Decision
-    name : str
-        Only where an asset whose name contains this text plays or is left.
-    width : int
-        Cells of a line; the names of assets are shortened to fit.
-    """
+    """One row for each decision that changed something, with how long it then went on; only where an asset whose name contains
+    `name` plays or is left. `width` is in cells; the names of assets are shortened to fit."""
     spells = [spell for spell in _spells(decisions) if _plays(spell[0], name)]
     assets = Column("asset", [_asset(first.playing) for first, _ in spells])
     columns = list(_session_columns(spells, assets))
@@ -144,25 +136,16 @@ def decision_lines(
 ) -> Iterator[str]:
     """One decision in full: what came of it, what was searched, and what the best candidates cost.
 
-    Parameters
-    ----------
-    decision : Decision
-    view : View
-        Which costs of the candidates are shown.
-    name : str
-        Only candidates whose asset's name holds this text.
-    events : mapping of (database, frame) to sequence of str, optional
-        What the markup says of frames.
-    width : int
-        Cells of a line.
-    asked : sequence of Ranked, optional
-        The frames to show instead of the candidates that were kept.
+    Only candidates whose asset's name holds `name` are shown, with the costs of a view, or instead of them the frames `asked`.
+    `events` is what the markup says of frames, by (database, frame); `width` is in cells of a line.
     """
     told = {} if events is None else events
     yield f"tick {decision.tick:,} at {decision.time_s:.2f} s: {decision.action}"
-    yield from _wrapped(decision.why, width)
+    yield from wrapped(decision.why, width)
     yield ""
-    yield from _status_lines(decision, told, width)
+    for label, text in _status(decision, told):
+        lines = wrapped(text, width - LABEL) or [""]
+        yield from (f"{label if i == 0 else '':<{LABEL}}{line}" for i, line in enumerate(lines))
     if decision.choice is not None:
         yield from ("", "searches", "", *search_lines(decision, width))
     if asked is not None:
@@ -170,12 +153,6 @@ def decision_lines(
         yield from candidate_lines(asked, view, told, width)
     elif decision.candidates:
         yield from ("", f"top candidates ({view})", "", *_top_lines(decision, view, name, told, width))
-
-
-def _status_lines(decision: Decision, events: EventTexts, width: int) -> Iterator[str]:
-    for label, text in _status(decision, events):
-        lines = _wrapped(text, width - LABEL) or [""]
-        yield from (f"{label if i == 0 else '':<{LABEL}}{line}" for i, line in enumerate(lines))
 
 
 def _status(decision: Decision, events: EventTexts) -> Iterator[tuple[str, str]]:
@@ -279,10 +256,10 @@ def _top_lines(decision: Decision, view: View, name: str, events: EventTexts, wi
     yield ""
     for database, found in decision.candidates:
         if found.counts:
-            yield from _wrapped(f"left out{f' of {database}' if several else ''}: {left_out_text(found)}", width)
+            yield from wrapped(f"left out{f' of {database}' if several else ''}: {left_out_text(found)}", width)
 
 
-def _wrapped(text: str, width: int) -> list[str]:
+def wrapped(text: str, width: int) -> list[str]:
     """A text in lines; no name is broken, however long."""
     return textwrap.wrap(printable(text), width, break_long_words=False, break_on_hyphens=False)
 

@@ -30,6 +30,7 @@ from contextdb.motion.selection.selector import Entry, Selector
 from contextdb.motion.trace.cost_views import PATH
 from contextdb.motion.trace.other_filters import asked_of_table
 from contextdb.motion.trace.reasked import Reasked
+from contextdb.motion.trace.reasked_decision import asset_of
 from contextdb.motion.trace.stats import measures_of
 
 ALIKE = 1e-4
@@ -92,7 +93,7 @@ def what_if(recorded: Reasked, changed: Reasked) -> WhatIf:
     recorded, changed = recorded.over(kept), changed.over(kept if is_of_one else list(changed.decisions))
     asked = [each for each in progress(changed, "asking again") if each.choice is not None]
     others = tuple(
-        ChangedChoice(each.decision.tick, each.decision.time_s, _asset(each.decision.choice), _asset(each.choice))
+        ChangedChoice(each.decision.tick, each.decision.time_s, asset_of(each.decision.choice), asset_of(each.choice))
         for each in asked
         if each.is_other_asset
     )
@@ -108,13 +109,8 @@ def what_if(recorded: Reasked, changed: Reasked) -> WhatIf:
 
 
 def run_again(asked: Reasked, on_step: Callable[[], None] | None = None) -> list[Decision]:
-    """The decisions of a session run again in closed loop, with what is asked otherwise; `on_step` is called after each.
-
-    Raises
-    ------
-    MotionError
-        The session does not say how its updates were made.
-    """
+    """The decisions of a session run again in closed loop, with what is asked otherwise; `on_step` is called after each. Raises
+    MotionError where the session does not say how its updates were made."""
     decisions = list(asked.decisions)
     if any(each.inputs is None or each.query is None for each in decisions):
         raise MotionError(
@@ -246,7 +242,3 @@ def _tags_of(inputs: Inputs) -> set[str]:
     each = list(tags.values()) if isinstance(tags, Mapping) else [] if tags is None else [tags]
     hard = {tag for one in each for tag in (*one.include, *one.every, *one.exclude)}
     return hard | {tag for one in each for tag, _ in (*one.prefer, *one.avoid)}
-
-
-def _asset(choice: Any) -> str | None:
-    return None if choice is None else choice.hit.asset

@@ -73,13 +73,8 @@ class WhyNot:
 
 
 def why_not(asked: ReaskedDecision, asset: str) -> WhyNot:
-    """Why an asset was not chosen, and what would have to change for it to be.
-
-    Raises
-    ------
-    MotionError
-        No database has the asset, with the nearest; or nothing was searched.
-    """
+    """Why an asset was not chosen, and what would have to change for it to be. Raises MotionError where no database has the asset,
+    with the nearest; or nothing was searched."""
     require_text(asset, "asset")
     if asked.choice is None:
         raise MotionError(Fault(f"nothing was searched at tick {asked.decision.tick:,}: what played, played on."))

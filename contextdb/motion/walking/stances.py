@@ -57,15 +57,8 @@ class Stances:
     @classmethod
     def of_curves(cls, curves: object) -> Stances:
         """Of an attribute that an artist has drawn: a foot is down where its curve is within 5 % of its highest value, which is how
-        much the foot is held.
-
-        Raises
-        ------
-        MotionError
-            The numbers are no such curves, or a foot is never up, never down, or down more than once.
-        ContextError
-            They are no numbers.
-        """
+        much the foot is held. Raises MotionError where the numbers are no such curves, or a foot is never up, never down, or down
+        more than once; ContextError where they are no numbers."""
         values = require_numbers(curves, "curves")
         if values.ndim != 2 or values.shape[1] != 2 or len(values) < 2 or not ((values >= 0.0) & (values <= 1.0)).all():
             raise MotionError(Fault(f"the curves have shape {values.shape}, or are not from 0 to 1.", A_CURVE))

@@ -254,7 +254,6 @@ class Walker:
         return replace(state, phase=(state.phase + step) % 1.0, gait=gait)
 
     def _mix(self, state: WalkState) -> Mix:
-        """The blend of a state."""
         gait, seen = state.gait or GaitState(0, 0), state.seen or STILL
         parts: list[Floats] = []
         for i, own in enumerate(self.gaits):

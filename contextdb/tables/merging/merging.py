@@ -70,20 +70,8 @@ class Merge(Generic[AnyTable]):
 
 
 def merge(base: AnyTable, ours: AnyTable, theirs: AnyTable, decided: Decided | None = None) -> Merge[AnyTable]:
-    """Join what two sides made of a table.
-
-    Parameters
-    ----------
-    base, ours, theirs : Table
-        Cells may be unreadable; such a text means itself.
-    decided : mapping, optional
-        Conflicts that are decided already, by their `key`; use `Merge.resolved`.
-
-    Returns
-    -------
-    Merge
-        Merging a table with itself gives it byte for byte.
-    """
+    """Join what two sides made of a table. Cells may be unreadable; such a text means itself. Merging a table with itself gives it
+    byte for byte. `decided` are conflicts that are decided already, by their `key`; use `Merge.resolved`."""
     decided = decided or {}
     of_ours, of_theirs = align(base, ours), align(base, theirs)
     fields, names, about_columns = merge_columns(base, ours, theirs, of_ours, of_theirs, decided)
@@ -95,14 +83,10 @@ def merge(base: AnyTable, ours: AnyTable, theirs: AnyTable, decided: Decided | N
     columns = tuple(column for column, _ in merged)
     schema = _schema(base.schema, ours.schema, theirs.schema)
     settings = _settings(base, ours, theirs, fields, names, schema)
-    asset = _asset_texts(columns, settings)
+    asset = next((c for c in columns if c.name == settings.asset), columns[0])
     cells = sorted((one for _, found in merged for one in found), key=lambda one: one.row or 0)
     named = tuple(replace(one, asset=asset[one.row] if one.row is not None else "") for one in cells)
     return Merge(base, ours, theirs, rows, fields, columns, settings, schema, (*about_columns, *about_rows, *named), decided)
-
-
-def _asset_texts(columns: Sequence[TextColumn], settings: TableSettings) -> TextColumn:
-    return next((c for c in columns if c.name == settings.asset), columns[0])
 
 
 # ---- what is said of the columns

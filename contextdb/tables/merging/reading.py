@@ -15,12 +15,8 @@ def table_of(
 ) -> AnyTable:
     """A table from bytes, CSV or Parquet as they are; `file` is its name in messages, `kind` the class to make.
 
-    Jobs of columns that this version of the table does not have yet are left out.
-
-    Raises
-    ------
-    TableError
-        The bytes are not a table.
+    Jobs of columns that this version of the table does not have yet are left out. Raises TableError where the bytes are not a
+    table.
     """
     source, columns = texts_of(raw, file, is_parquet(raw))
     settings = settings_renamed(settings or TableSettings(Path(file).stem), {c.name: c.name for c in columns}.get)

@@ -54,13 +54,8 @@ NO_ROWS = Expansion((), (), np.empty((1, 0), np.int32), np.empty((1, 0), np.int3
 
 
 def expand(tables: Mapping[str, TableData]) -> Expansion:
-    """The flat rows of the first of some sound tables; the others are those that are in it.
-
-    Raises
-    ------
-    TableError
-        There are more than `MOST_ROWS`.
-    """
+    """The flat rows of the first of some sound tables; the others are those that are in it. Raises TableError where there are more
+    than `MOST_ROWS`."""
     name, outer = next(iter(tables.items()))
     if (n_rows := _count(name, tables, {})) > MOST_ROWS:
         file = str(outer.path) if outer.path else None

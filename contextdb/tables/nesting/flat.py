@@ -102,13 +102,8 @@ def _way_table(name: str, table: TableData) -> WayTable:
 
 
 def flatten(table: TableData, tables: Mapping[str, TableData]) -> FlatTable:
-    """The flat table of a table whose inner tables are among some others.
-
-    Raises
-    ------
-    TableError
-        Inner tables that are missing or cannot be read, cycles, conditions of unlike types, or too many rows; with every fault.
-    """
+    """The flat table of a table whose inner tables are among some others. Raises TableError for inner tables that are missing or
+    cannot be read, cycles, conditions of unlike types, or too many rows; with every fault."""
     last = tables.last if isinstance(tables, Neighbours) and isinstance(tables.last, FlatTable) else None
     expansion = _expansion(require_sound(table, tables), last)
     sources = _sources(expansion)

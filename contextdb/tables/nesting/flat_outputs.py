@@ -14,13 +14,8 @@ from contextdb.tables.output_columns import layered
 
 
 def declared_of(expansion: Expansion) -> tuple[Output, ...]:
-    """The outputs of all tables, as the first that has one declares it.
-
-    Raises
-    ------
-    TableError
-        Tables declare an output with different types, values or sizes.
-    """
+    """The outputs of all tables, as the first that has one declares it. Raises TableError where tables declare an output with
+    different types, values or sizes."""
     found: dict[str, tuple[int, Output]] = {}
     faults: list[Fault] = []
     for number, table in enumerate(expansion.tables):

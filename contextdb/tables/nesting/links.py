@@ -87,13 +87,8 @@ def nesting_faults(table: TableData, tables: Tables, name: str | None = None) ->
 
 
 def require_sound(table: TableData, tables: Tables) -> dict[str, TableData]:
-    """The tables that are in a table, as `reached`.
-
-    Raises
-    ------
-    TableError
-        With what is wrong in any of them: files and cells that cannot be read, tables that are missing, cycles.
-    """
+    """The tables that are in a table, as `reached`. Raises TableError with what is wrong in any of them: files and cells that
+    cannot be read, tables that are missing, cycles."""
     found = reached(table, tables)
     faults = dict.fromkeys(_unread(found.values(), tables))
     for name, inner in found.items():

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from contextdb.tables.watching.stamps import Stamp, Stamps
+from contextdb.tables.watching.stamps import Stamps
 
 PATIENCE_S = 1.0
 
@@ -32,7 +32,7 @@ class Rest:
         for path in sorted(seen.keys() | self._seen.keys()):
             before, after = self._seen.get(path), seen.get(path)
             if before != after or (path in seen) != (path in self._seen):
-                self._moved[path] = now, _was_replaced(before, after)
+                self._moved[path] = now, before is not None and after is not None and before[0] != after[0]
                 self.moved_s = now
         self._seen = dict(seen)
         if not was_restless:
@@ -59,7 +59,3 @@ class Rest:
     def _restless(self, now: float) -> list[tuple[float, bool]]:
         self._moved = {path: move for path, move in self._moved.items() if now - move[0] < self._settle_s}
         return list(self._moved.values())
-
-
-def _was_replaced(before: Stamp, after: Stamp) -> bool:
-    return before is not None and after is not None and before[0] != after[0]

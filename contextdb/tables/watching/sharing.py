@@ -20,13 +20,8 @@ from contextdb.tables.table import Table
 def table_like(
     old: Table | None, columns: Sequence[TextColumn], schema: Schema, settings: TableSettings, path: Path, source: AnySource
 ) -> Table:
-    """The table that `Table.build` gives; equal columns of `old` are shared.
-
-    Raises
-    ------
-    TableError
-        As `Table.build`. Cells that cannot be read are in the table's `faults`.
-    """
+    """The table that `Table.build` gives, and its errors; equal columns of `old` are shared. Cells that cannot be read are in the
+    table's `faults`."""
     texts = [_shared_texts(c, old) for c in columns] if old else columns
     known = {c.condition.name: c for c in old.conditions} if old else {}
     return Table.build(settings.name, texts, schema, settings, path, source, known)

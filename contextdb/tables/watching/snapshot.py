@@ -60,15 +60,8 @@ class Snapshot(Unchanging, ByName[CompiledTable]):
 
 
 def schema_from(folder: Path, contents: Contents, last: Snapshot | None) -> Schema:
-    """What the folder's contextdb.toml says; the same object as before when its bytes are the same.
-
-    Raises
-    ------
-    FileError
-        It was there and is not, or may not be read.
-    SchemaError
-        It has an invalid setting.
-    """
+    """What the folder's contextdb.toml says; the same object as before when its bytes are the same. Raises FileError where it was
+    there and is not, or may not be read; SchemaError where it has an invalid setting."""
     path = folder / SCHEMA_FILE
     raw = contents.get(path)
     if raw is None:
@@ -84,13 +77,8 @@ def schema_from(folder: Path, contents: Contents, last: Snapshot | None) -> Sche
 
 
 def next_snapshot(folder: Path, schema: Schema, found: Found, contents: Contents, last: Snapshot | None = None) -> Snapshot:
-    """The version that the files now are; `found` are the names and files of the tables.
-
-    Raises
-    ------
-    ContextDBError
-        With every fault of every table.
-    """
+    """The version that the files now are; `found` are the names and files of the tables. Raises ContextDBError with every fault of
+    every table."""
     digests = digests_of(contents)
     tables: dict[str, Table] = {}
     faults: list[Fault] = []

@@ -132,13 +132,8 @@ class Watch(ByName[CompiledTable]):
         return self._told
 
     def poll(self) -> bool:
-        """Look at the files, and swap in what is on the disk when it is new, rested and good.
-
-        Returns
-        -------
-        bool
-            Whether a new version was swapped in; `on_change` has then been called, in this thread.
-        """
+        """Look at the files, and swap in what is on the disk when it is new, rested and good. Gives whether a new version was
+        swapped in; `on_change` has then been called, in this thread."""
         with self._polling:
             now, stamps = self._clock(), look(self._paths())
             if not self._rest.is_due(stamps, now) or not self._may_be_new(stamps):

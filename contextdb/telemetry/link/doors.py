@@ -51,13 +51,8 @@ class Door:
 
 
 def opened(name: str) -> Door:
-    """Listen under a name, or under it with a number, "game-2", where another game has it.
-
-    Raises
-    ------
-    FileError
-        The folder is not this user's alone, or the system refuses.
-    """
+    """Listen under a name, or under it with a number, "game-2", where another game has it. Raises FileError where the folder is not
+    this user's alone, or the system refuses."""
     folder = runtime_folder()
     try:
         with turn(folder):
@@ -127,13 +122,8 @@ def doors() -> Iterator[tuple[str, Path]]:
 
 
 def connected(path: Path) -> socket.socket:
-    """A connection to a game, which may wait for `PATIENCE_S`.
-
-    Raises
-    ------
-    OSError
-        Nobody listens there: ConnectionRefusedError, FileNotFoundError; or the system refuses.
-    """
+    """A connection to a game, which may wait for `PATIENCE_S`. Raises OSError where nobody listens there: ConnectionRefusedError,
+    FileNotFoundError; or the system refuses."""
     connection = socket.socket(socket.AF_INET if path.suffix == PORT else socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         connection.settimeout(PATIENCE_S)

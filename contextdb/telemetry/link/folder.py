@@ -25,13 +25,7 @@ NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 
 
 def require_name(name: object) -> str:
-    """The name of a game.
-
-    Raises
-    ------
-    ContextError
-        It is none: what could be a path, or part of one, is refused.
-    """
+    """The name of a game. Raises ContextError where it is none: what could be a path, or part of one, is refused."""
     text = require_text(name, "name")
     if NAME.fullmatch(text) and len(text) <= MOST_NAME and not text.endswith("."):
         return text
@@ -41,13 +35,7 @@ def require_name(name: object) -> str:
 
 
 def runtime_folder() -> Path:
-    """The folder, made where it is missing.
-
-    Raises
-    ------
-    FileError
-        It cannot be made, or is not this user's alone.
-    """
+    """The folder, made where it is missing. Raises FileError where it cannot be made, or is not this user's alone."""
     folder = _place()
     try:
         if HAS_OWNERS:

@@ -58,13 +58,7 @@ def link(name: str = "game", *, record: str | Path | None = None, per_second: fl
 
 
 def new_recording(path: Path) -> FileListener:
-    """A new file for lines.
-
-    Raises
-    ------
-    FileError
-        It does not end in .jsonl, is there already, or cannot be written.
-    """
+    """A new file for lines. Raises FileError where it does not end in .jsonl, is there already, or cannot be written."""
     place = Place(str(path))
     if path.suffix != RECORDING:
         raise FileError(Fault("a recording does not end so.", f"a name that ends in {RECORDING}", place=place))
@@ -127,13 +121,8 @@ class Link:
             self._taps.watch(what, who)
 
     def tell(self, who: str | None, decision: object) -> None:
-        """Publish the decision of a controller that is not watched, or the choice of a selector.
-
-        Raises
-        ------
-        ContextError
-            It is neither.
-        """
+        """Publish the decision of a controller that is not watched, or the choice of a selector. Raises ContextError where it is
+        neither."""
         if not self._knows_decisions:
             self._load_decisions()
         from contextdb.telemetry.link.decisions import require_decision

@@ -37,15 +37,8 @@ class Wanted:
 
 
 def hear(path: Path, wanted: Wanted = Wanted()) -> Hearing:
-    """Listen to a game.
-
-    Raises
-    ------
-    OSError
-        It is not there, or does not answer.
-    ContextDBError
-        What it sends is not the lines of a link, or of another format.
-    """
+    """Listen to a game. Raises OSError where it is not there, or does not answer; ContextDBError where what it sends is not the
+    lines of a link, or of another format."""
     return Hearing(path, connected(path), wanted)
 
 

@@ -41,13 +41,7 @@ def dumped(line: Mapping[str, object]) -> bytes:
 
 
 def read_line(raw: bytes) -> Line:
-    """A line that was sent.
-
-    Raises
-    ------
-    ValueError
-        It is none; the message says why.
-    """
+    """A line that was sent. Raises ValueError where it is none; the message says why."""
     try:
         read = json.loads(raw)
     except (ValueError, RecursionError):
@@ -154,13 +148,7 @@ def _sent_whole(value: float, condition: Condition) -> object:
 
 
 def given_fact(sent: object) -> object:
-    """A fact that was sent, as a query takes it.
-
-    Raises
-    ------
-    ValueError
-        It is none.
-    """
+    """A fact that was sent, as a query takes it. Raises ValueError where it is none."""
     if sent is None or isinstance(sent, (bool, int, float, str)):
         return sent
     if isinstance(sent, list) and all(isinstance(tag, str) for tag in sent):
@@ -179,13 +167,7 @@ def given_facts(sent: Mapping[str, object]) -> dict[str, object]:
 
 
 def fact_text(sent: object) -> str | None:
-    """A fact that was sent as it is written on the command line; None where it is missing.
-
-    Raises
-    ------
-    ValueError
-        It is none.
-    """
+    """A fact that was sent as it is written on the command line; None where it is missing. Raises ValueError where it is none."""
     if sent is None:
         return None
     if isinstance(sent, (bool, int)):
@@ -193,13 +175,13 @@ def fact_text(sent: object) -> str | None:
     if isinstance(sent, float):
         return format_number(sent) if math.isfinite(sent) else ("inf" if sent > 0 else "-inf") if sent == sent else None
     if isinstance(sent, str):
-        return _name(sent)
+        return name_text(sent)
     given = given_fact(sent)
     if isinstance(given, frozenset):
-        return " ".join(map(_name, sent)) or '""'  # type: ignore[call-overload]
+        return " ".join(map(name_text, sent)) or '""'  # type: ignore[call-overload]
     return given.text if isinstance(given, FactSet) else format_number(given)  # type: ignore[arg-type]
 
 
-def _name(text: str) -> str:
+def name_text(text: str) -> str:
     """A name that is read as that name, even first in a fact."""
     return '"' + text.replace('"', '""') + '"' if text.startswith("-") else quoted(text)

@@ -55,13 +55,8 @@ def facts_frame(facts: Sequence[Texts], names: Sequence[str]) -> pl.DataFrame:
 
 
 def pieces_of(path: Path, table: str) -> Iterator[Piece]:
-    """A recording, some lines at a time; one empty piece where it holds no line.
-
-    Raises
-    ------
-    TableError, FileError
-        It cannot be read, lines of it are damaged (each with its number), or none is about the table.
-    """
+    """A recording, some lines at a time; one empty piece where it holds no line. Raises TableError or FileError where it cannot be
+    read, lines of it are damaged (each with its number), or none is about the table."""
     reader = _Reader(path, table)
     size = max(1, path.stat().st_size) if path.exists() else 1
     n_bytes = n_lines = n_rows = 0

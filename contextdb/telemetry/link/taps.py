@@ -256,13 +256,8 @@ class Taps:
         return len(self._of)
 
     def watch(self, what: object, who: Who) -> None:
-        """Put a tap on a table, a live context, a controller, or a mapping of tables.
-
-        Raises
-        ------
-        ContextError
-            It is none of these, or another link watches it.
-        """
+        """Put a tap on a table, a live context, a controller, or a mapping of tables. Raises ContextError where it is none of
+        these, or another link watches it."""
         if isinstance(what, CompiledTable):
             self._watch_table(data_of(what), who, True)
         elif isinstance(what, LiveContext):

@@ -69,6 +69,19 @@ def test_every_text_of_a_tab_or_a_dialog_has_it_too(path, keys):
     assert with_editor(path, script, (120, 36) if keys == ["alt+5"] else (80, 24)) == set()
 
 
+@pytest.mark.parametrize("theme", ["ansi-dark", "ansi-light"])
+def test_selected_cells_have_a_colour_of_text_for_their_ground_in_the_colours_of_the_terminal(path, theme):
+    async def script(app, pilot):
+        app.theme = theme
+        await press(pilot, "down", "right", "shift+down", "shift+right")
+        segments = [segment for strip in app.screen._compositor.render_strips() for segment in strip]
+        return {
+            s.style.color.number for s in segments if s.style and s.style.bgcolor and s.style.bgcolor.number == 4 and s.text.strip()
+        }
+
+    assert with_editor(path, script) == {15}
+
+
 def test_what_lies_behind_the_palette_is_as_dim_as_behind_a_dialog(path):
     async def script(app, pilot):
         feet = []

@@ -23,6 +23,7 @@ from contextdb.schema.sections import has_place
 from contextdb.tables.table import Table
 from tui.model.column_choices import JOB_WORDS, Choice, Insertion, NewColumnForm, choices, places
 from tui.model.condition_form import ConditionForm
+from tui.model.layout import cut_middle
 from tui.screens.dialog import Dialog
 from tui.widgets.field import Field
 from tui.widgets.pick import Pick
@@ -204,5 +205,5 @@ def _line(choice: Choice | None, text: str, width: int) -> Content:
     """A line of the list."""
     if choice is None:
         return Content(f'+ New column "{shown(text)}"' if text else "+ New column: type its name")
-    name = f"{shown(choice.name, width):<{width}}"
+    name = cut_middle(shown(choice.name), width)
     return Content.assemble((name, "bold"), f"  {'blueprint, ' if choice.is_blueprint else ''}{choice.about}")

@@ -7,8 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from textwrap import wrap
 from typing import ClassVar
 
+from rich.cells import cell_len
 from rich.segment import Segment
 from rich.style import Style
 from textual import events
@@ -18,6 +20,7 @@ from textual.message import Message
 from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
+from tui.model.layout import cut_middle
 from tui.widgets.fitted import fitted
 
 ListCell = str | tuple[str, str] | Callable[[int], str]
@@ -27,12 +30,13 @@ MARK = "▸ "
 
 @dataclass(frozen=True, slots=True)
 class ListColumn:
-    """A column: so wide at least, and which part of the rest of the line it gets."""
+    """A column: so wide at least, and which part of the rest of the line it gets. Names are cut in their middle."""
 
     title: str
     width: int
     grow: int = 0
     to_right: bool = False
+    is_name: bool = False
 
 
 class LineList(ScrollView, can_focus=True):
@@ -113,8 +117,8 @@ class LineList(ScrollView, can_focus=True):
         self.refresh(layout=has_grown and self.styles.is_auto_height)
 
     def get_content_height(self, container: Size, viewport: Size, width: int) -> int:
-        """The titles and every line, or the line that says that there is none."""
-        return 1 + max(self.n_lines, 1)
+        """The titles and every line, or those that say that there is none."""
+        return 1 + (self.n_lines or len(self._empty_lines(width)))
 
     def say_empty(self, text: str) -> None:
         """Say something else where there is no line."""
@@ -183,11 +187,14 @@ class LineList(ScrollView, can_focus=True):
             titles = [fitted(c.title, w, c.to_right) for c, w in zip(self.columns, self._widths(width), strict=True)]
             return _strip([Segment("  ", base), *_spaced(titles, style, base)], width, base)
         index = y - 1 + self.scroll_offset.y
-        if not self.n_lines and y == 1:
-            return _strip([Segment(fitted(f"  {self.empty}", width), base + self._tone("muted"))], width, base)
+        if not self.n_lines and y <= len(said := self._empty_lines(width)):
+            return _strip([Segment(fitted(f"  {said[y - 1]}", width), base + self._tone("muted"))], width, base)
         if index >= self.n_lines:
             return Strip.blank(width, base)
         return self._line_strip(index, width, base)
+
+    def _empty_lines(self, width: int) -> list[str]:
+        return wrap(self.empty, max(8, width - 4)) or [""]
 
     def _line_strip(self, index: int, width: int, base: Style) -> Strip:
         is_here = index == self.index
@@ -196,6 +203,7 @@ class LineList(ScrollView, can_focus=True):
         segments = [Segment(MARK if is_here else "  ", style + cursor)]
         for cell, column, w in zip(self._line(index), self.columns, self._widths(width), strict=True):
             text, tone = cell if isinstance(cell, tuple) else (cell if isinstance(cell, str) else cell(w), "")
+            text = cut_middle(text, w) if column.is_name and 0 < w < cell_len(text) else text
             segments.append(Segment(fitted(text, w, column.to_right), style + self._tone(tone) + cursor))
             segments.append(Segment("  ", style + cursor))
         return _strip(segments, width, style + cursor)

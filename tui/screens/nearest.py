@@ -64,7 +64,7 @@ class NearestDialog(Dialog[CellAnswer]):
         & #nearest-keys { height: 1; margin: 1 0 0 0; padding: 0 1; }
     }
     """
-    title_text = "Why not"
+    title_text = "Why"
     keys_text = "Tab turns the page · Esc close"
 
     def __init__(self, query: QueryRow, table: Table, row: int | None = None) -> None:

@@ -184,7 +184,7 @@ class LineList(ScrollView, can_focus=True):
         base = self.rich_style
         if y == 0:
             style = base + self._tone("header")
-            titles = [fitted(c.title, w, c.to_right) for c, w in zip(self.columns, self._widths(width), strict=True)]
+            titles = [_titled(c.title, w, c.to_right) for c, w in zip(self.columns, self._widths(width), strict=True)]
             return _strip([Segment("  ", base), *_spaced(titles, style, base)], width, base)
         index = y - 1 + self.scroll_offset.y
         if not self.n_lines and y <= len(said := self._empty_lines(width)):
@@ -232,6 +232,11 @@ class LineList(ScrollView, can_focus=True):
                 cut = min(-left, max(0, widths[at] - 6))
                 widths[at], left = widths[at] - cut, left + cut
         return widths
+
+
+def _titled(title: str, width: int, to_right: bool) -> str:
+    """A title, which may be the name of a condition, in so many cells."""
+    return cut_middle(title, width) if 0 < width < cell_len(title) else fitted(title, width, to_right)
 
 
 def _spaced(texts: Sequence[str], style: Style, base: Style) -> list[Segment]:

@@ -8,6 +8,7 @@ from typing import Any, ClassVar, cast
 
 from textual.app import App, SystemCommand
 from textual.binding import BindingType
+from textual.color import Color
 from textual.command import CommandPalette
 from textual.filter import LineFilter
 from textual.message import Message
@@ -62,6 +63,7 @@ class EditorApp(Editor):
     Button.-textual-compact {
         width: auto; min-width: 0; padding: 0; margin: 0 1 0 0; background: $panel; text-style: bold;
         &:focus, &:hover { background: $primary 40%; text-style: bold underline; }
+        &:ansi:focus, &:ansi:hover { background: ansi_blue; color: ansi_bright_white; }
     }
     SheetBar Button.-textual-compact { background: $surface; }
     Dialog OptionList, Dialog OptionList:focus { background: $surface; }
@@ -97,6 +99,13 @@ class EditorApp(Editor):
     def theme_names() -> list[str]:
         """Every theme there is."""
         return sorted([*(theme.name for theme in THEMES), *BUILTIN_THEMES])
+
+    def get_css_variables(self) -> dict[str, str]:
+        """The colours of the theme; fields and buttons stand out from the page in those, too, that have one colour for both."""
+        found = super().get_css_variables()
+        if found["panel"] == found["surface"] and not found["panel"].startswith(("ansi", "transparent")):
+            found["panel"] = Color.parse(found["surface"]).blend(Color.parse(found["foreground"]), 0.12).hex
+        return found
 
     def get_line_filters(self) -> Sequence[LineFilter]:
         """What is done to all that is painted: every text can be read."""

@@ -48,6 +48,8 @@ def _number_mends(spelling: Spelling) -> _Mends:
         (r"!=\s*|<>\s*|≠\s*", "not "),
         (r"°|\b(?:deg|degrees|m/s|m|s|cm|km/h)\b", ""),
         (rf"(?<!\d)({number})\s*(?:-|to|:)\s*({number})", r"\1..\2"),
+        (r"(?<=\d),(?=\d)", "."),
+        (r"^\s*±\s*", "0 ± "),
         (r"^\*$|^(?i:all|every|none|null|n/a)$", "Any"),
         (r"[\[\](){}\"']", ""),
     )

@@ -1,4 +1,4 @@
-"""Of one column's masks: the rows for a fact, sets of values and missing facts too, what soft cells cost, and what the masks weigh."""
+"""Of one column's masks: the rows for a fact, sets of values and missing facts too, what soft cells cost, what the masks weigh."""
 
 from __future__ import annotations
 

@@ -146,6 +146,14 @@ class CoverageReport:
         how = "certain bounds" if self.method == "bounds" else f"99 % interval, {self.n_samples:,} samples, seed {self.seed}"
         return f"Between {ends} of the contexts have a valid row ({how})."
 
+    def at_once(self, n_rows: int) -> str:
+        """The share of the contexts with so many valid rows; that of none is as exact as `covered`, and a sample never says all."""
+        share = self.overlap.histogram[n_rows]
+        if n_rows == 0 and self.method == "exact":
+            return format_percent(1.0 - self.covered)
+        is_certain = self.overlap.method == "exact" or share < 1.0
+        return format_percent(share) if is_certain else f"at least {format_percent(1.0 - self.upper)}"
+
     def __repr__(self) -> str:
         return one_line("CoverageReport", self.table, f"{self.headline.rstrip('.')}, {plural(len(self.gaps), 'gap')}")
 

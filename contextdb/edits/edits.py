@@ -29,7 +29,7 @@ from contextdb.tables.merging.building import edit_to
 from contextdb.tables.plain_columns import plain_fault
 from contextdb.tables.table import Table
 
-Job = Literal["condition", "output", PlainJob]
+Job = Literal["condition", "output", "when", PlainJob]
 
 
 # ---- what a person typed

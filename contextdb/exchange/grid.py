@@ -7,8 +7,10 @@ names its columns.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,8 +97,9 @@ def columns_of(
     title.
 
     `row_noun` is what messages call a row of the grid, "sheet row" of a workbook or "line" of a text, and `sheet` its name. `wide`
-    are rows, from 0, with a cell that is merged over several columns: no row of names has one. Raises TableError where there is no
-    table, more than one, columns without a name or with one name twice, or a text that is too long.
+    are rows, from 0, with a cell that is merged over several columns: no row of names has one, and one right above the names groups
+    the columns: names that appear twice have their group and a point in front. Raises TableError where there is no table, more than
+    one, columns without a name or with one name twice, or a text that is too long.
     """
     if block is None:
         block, remarks = _found(grid, file, wide)
@@ -112,7 +115,11 @@ def columns_of(
     if len(kept) < len(rows) - 1:
         first = next(at for at, row in enumerate(rows[1:], block.top + 2) if not any(row))
         remarks.append(Remark(f"{plural(len(rows) - 1 - len(kept), f'blank {row_noun}')} left out.", f"{row_noun} {first}"))
-    names = [name.strip() for name in rows[0]]
+    above = grid[block.top - 1][block.left : block.right] if block.top - 1 in wide else ()
+    names = _with_groups(above, rows[0])
+    told = next(((old.strip(), new) for old, new in zip(rows[0], names, strict=True) if old.strip() != new), None)
+    if told:
+        remarks.append(Remark("names that appear twice have their group in front: {} is now {}.".format(*map(in_quotes, told))))
     _require_names(names, kept, block, Place(file, block.top + 1), _mend(rows, block, sheet))
     columns = [TextColumn.of(n, t) for n, t in zip(names, zip(*kept, strict=True) if kept else [()] * len(names), strict=True)]
     _require_short(columns, file)
@@ -173,6 +180,16 @@ def _is_groups(rows: Grid) -> bool:
     """Whether the first of two rows groups the columns of the second: its first cell is blank, or merged with the next one."""
     first, *_ = rows
     return first[0] in ("", first[1], rows[-1][0]) and len(rows) > 1
+
+
+def _with_groups(groups: Sequence[str], row: Sequence[str]) -> list[str]:
+    """The names of a row; those that appear twice with the text above them in front."""
+    names = [name.strip() for name in row]
+    n_times = Counter(names)
+    return [
+        f"{group}.{name}" if group and name and n_times[name] > 1 else name
+        for group, name in zip_longest(groups, names, fillvalue="")
+    ]
 
 
 def doubts(columns: Sequence[TextColumn]) -> list[Remark]:
@@ -237,7 +254,7 @@ def _without_titles(blocks: Sequence[Block], grid: Grid, wide: Collection[int]) 
         n_titles = above.index(False) if False in above else len(above)
         if n_titles == len(rows):  # a title of several lines
             found.append(Block(block.top, block.left, block.top + 1, block.right))
-        elif n_titles and is_header(rows[n_titles]):
+        elif n_titles and is_header(_with_groups(rows[n_titles - 1] if block.top + n_titles - 1 in wide else (), rows[n_titles])):
             found.append(Block(block.top + n_titles, block.left, block.bottom, block.right))
         else:
             found.append(block)

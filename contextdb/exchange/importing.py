@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from contextdb.cells.conditions import Condition
+from contextdb.cells.words import quoted
 from contextdb.columns import TextColumn
 from contextdb.disk import TABLE_SUFFIXES, write_atomic
 from contextdb.disk.together import NewFile, write_together
@@ -51,9 +52,9 @@ def whole_names_told(columns: Sequence[Mapped], reading: Reading, other_way: str
 
     `other_way` says how to read each word as a name; the sentence is empty where there is no such text.
     """
-    changed = [(column, reading.column(column.source)) for column in columns if column.cells is not None]
-    names = [column.source for column, _ in changed]
-    example = next((text for _, column in changed for text in column.texts if " " in text.strip()), None)
+    changed = [(column.source, text) for column in columns for text in _whole(column, reading.column(column.source))]
+    names = list(dict.fromkeys(name for name, _ in changed))
+    example = next((text for _, text in changed), None)
     if example is None:
         return ""
     where = "column" if len(names) == 1 else "columns"
@@ -171,3 +172,11 @@ def declared_differently(reading: Reading, schema: Schema) -> list[str]:
     """Conditions that the file itself declares differently from the project, which goes first."""
     ours, theirs = schema.conditions, reading.schema.conditions
     return [name for name in theirs if name in ours and condition_to_dict(ours[name]) != condition_to_dict(theirs[name])]
+
+
+def _whole(column: Mapped, read: TextColumn) -> list[str]:
+    """The texts with blanks of a column that became one name each."""
+    if column.cells is None or column.names is None:
+        return []
+    whole = set(column.cells.texts) & set(column.names.texts)
+    return [text for text in read.texts if " " in text.strip() and quoted(text.strip()) in whole]

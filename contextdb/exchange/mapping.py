@@ -16,7 +16,7 @@ from contextdb.cells.kinds import KINDS
 from contextdb.columns import TextColumn
 from contextdb.edits.edits import check_cell
 from contextdb.errors import ContextDBError, Fault, in_quotes, nearest, plural, some
-from contextdb.exchange.proposals import as_numbers, n_unreadable, names_of, pair_in, propose_type, rewritten
+from contextdb.exchange.proposals import as_lists, as_numbers, n_unreadable, names_of, pair_in, propose_type, rewritten
 from contextdb.exchange.reading import Reading
 from contextdb.schema.jobs import PlainJob
 from contextdb.schema.sections import condition_to_dict
@@ -105,7 +105,7 @@ def as_type(mapped: Mapped, column: TextColumn, kind: str) -> Mapped:
     """The same column as a new condition of another type; an enum then has the names that its cells have. Raises ContextDBError
     where an enum is wanted, and no cell holds a name."""
     declared: dict[str, object] = {"type": kind}
-    cells = mapped.names if KINDS[kind].is_named else as_numbers(column) if KINDS[kind].is_numeric else None
+    cells = as_lists(column) or mapped.names if KINDS[kind].is_named else as_numbers(column) if KINDS[kind].is_numeric else None
     column = cells or column
     if KINDS[kind].needs_values:
         declared["values"] = names_of(column)
@@ -256,7 +256,8 @@ def _condition(column: TextColumn, name: str, reading: Reading, known: _Known) -
 
 
 def _as_declared(column: TextColumn, condition: Condition, why: str, names: TextColumn | None) -> Mapped:
-    cells = _fitting(column, names, condition.domain) if names and condition.domain.type.is_named else None
+    whole = (as_lists(column) or names) if condition.domain.type.is_named else None
+    cells = _fitting(column, whole, condition.domain) if whole else None
     if condition.domain.type.is_numeric and (cells := as_numbers(column)) is not None:
         why += rewritten(column, cells)
     n_wrong, example = n_unreadable(cells or column, condition.domain)

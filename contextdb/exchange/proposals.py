@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -13,7 +14,7 @@ from contextdb.cells.grammar import parse_cell, reads
 from contextdb.cells.kinds import KINDS
 from contextdb.cells.numbers import doubtful
 from contextdb.cells.sets import Cell, TagSet, ValueSet
-from contextdb.cells.words import says_any
+from contextdb.cells.words import quoted, says_any
 from contextdb.columns import TextColumn
 from contextdb.errors import CellError, in_quotes, plural
 from contextdb.exchange.reading import ERRORS, listed
@@ -41,6 +42,13 @@ _MEASURE = re.compile(
 _RANGE = re.compile(r"\s*([+-]?\d+(?:\.\d+)?)(\s*)(?:[-–—]|to)\2([+-]?\d+(?:\.\d+)?)\s*")
 """Two ends as people write them: "20 - 60", "20 to 60"; a cell of ours has ".." between them."""
 _DEGREES = re.compile(r"(?<=\d)\s*°(?!\s*[CF])")
+_NUMBER = r"[+-]?\d+(?:[.,]\d+)?"
+_SURE = re.compile(rf"\s*(?:(?:[<>]=?|[≤≥])\s*{_NUMBER}|{_NUMBER}\s*(?:\.\.|[-–—]|to)\s*{_NUMBER})\s*")
+"""A comparison or a range: a comma in one of its numbers can only be a decimal one."""
+_DECIMAL_COMMA = re.compile(r"(?<=\d),(?=\d)")
+_TICKS = {"x": "True", "✓": "True", "✔": "True"}
+_BETWEEN_NAMES = re.compile(r"\s*[,;/|]\s*")
+_AROUND = re.compile(r"^\s*±\s*(?=[\d.])")
 _FRACTION = re.compile(r"\d\.\d|(?<!\.)\.\d|\de-?\d", re.IGNORECASE)
 
 
@@ -127,6 +135,9 @@ def propose_type(column: TextColumn, names: TextColumn | None = None) -> Proposa
         if _is_measure(column.name):
             return _number(column.name, said)
         return _with_unread("the cells are 0 and 1; bool, if they mean False and True", said, INT)
+    if (truths := _as_truths(column)) is not None:
+        why = f"{plural(said.n_rows, 'cell')} of True and False{rewritten(column, truths)}"
+        return replace(_with_unread(why, _Said.by(truths), BOOL), cells=truths)
     if said.mostly(BOOL):
         return _with_unread(f"{plural(said.n_rows, 'cell')} of True and False", said, BOOL)
     if said.mostly(NUMBER) or said.is_numeric:
@@ -135,6 +146,9 @@ def propose_type(column: TextColumn, names: TextColumn | None = None) -> Proposa
         return _with_unread(f"{plural(said.n_rows, 'cell')} of dates", said, DATE)
     if said.mostly(TAGS):
         return _with_unread("every word has a + or a - before it", said, _tags(said))
+    if (lists := as_lists(column)) is not None:
+        proposal = _names(_Said.by(lists), True)
+        return replace(proposal, why=proposal.why + rewritten(column, lists), cells=lists)
     if names is None:
         return _names(said, said.mostly(TEXT))
     proposal = _names(_Said.by(names), said.are_mostly(_is_short))
@@ -142,15 +156,40 @@ def propose_type(column: TextColumn, names: TextColumn | None = None) -> Proposa
 
 
 def as_numbers(column: TextColumn, is_measure: bool = True) -> TextColumn | None:
-    """A column of numbers with its ranges and degrees as cells of ours: "20 - 60" as 20..60, "30°" as 30. None without any.
-    `is_measure`: the column surely has numbers, then "20-60" without blanks is a range too, and no name."""
-    plain = [_DEGREES.sub("", text) for text in column.texts]
+    """A column of numbers as cells of ours: "20 - 60" as 20..60, "±30" as 0 ± 30, "30°" as 30, beside "> 1,5" also "0,5" as 0.5.
+    None where every text stays as it is. `is_measure`: the column surely has numbers, then "20-60" without blanks is a range too,
+    and no name."""
+    plain = [_AROUND.sub("0 ± ", _DEGREES.sub("", text)) for text in column.texts]
+    if any("," in text and _SURE.fullmatch(text) for text in plain):
+        plain = [_DECIMAL_COMMA.sub(".", text) for text in plain]
     found = [_RANGE.fullmatch(text) for text in plain]
     ranges = [one for one in found if one]
     if any(float(one[1]) > float(one[3]) or not (one[2] or is_measure) for one in ranges):
         return None
     texts = [f"{one[1]}..{one[3]}" if one else text for one, text in zip(found, plain, strict=True)]
     return None if texts == list(column.texts) else TextColumn.of(column.name, (texts[code] for code in column.codes.tolist()))
+
+
+def _as_truths(column: TextColumn) -> TextColumn | None:
+    """A column of True and False in which people tick: "x" as True. None where nobody ticks, or it holds something else."""
+    texts = [_TICKS.get(text.strip().casefold(), text) for text in column.texts]
+    if texts == list(column.texts) or not all(says_any(text) or reads(text, BOOL) for text in texts):
+        return None
+    return TextColumn.of(column.name, (texts[code] for code in column.codes.tolist()))
+
+
+def as_lists(column: TextColumn) -> TextColumn | None:
+    """A column of lists of names as cells of ours: "Low / Mid" as Low Mid. None where the parts do not come back in other texts."""
+    parts = {text: _BETWEEN_NAMES.split(text.strip()) for text in column.texts if not says_any(text)}
+    n_times = Counter(part for each in parts.values() for part in set(each))
+    alone = {each[0] for each in parts.values() if len(each) == 1}
+    lists = [each for each in parts.values() if len(each) > 1]
+    if not lists or not all((part in alone or n_times[part] > 1) and _is_short(part) for each in lists for part in each):
+        return None
+    if not any(part in alone for each in lists for part in each):
+        return None
+    texts = [" ".join(map(quoted, parts[text])) if text in parts else text for text in column.texts]
+    return TextColumn.of(column.name, (texts[code] for code in column.codes.tolist()))
 
 
 def rewritten(column: TextColumn, cells: TextColumn) -> str:

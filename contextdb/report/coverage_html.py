@@ -168,7 +168,7 @@ def _overlap(measured: Measured) -> Iterator[str]:
     yield paragraph(f"{overlap_sentence(report)}.")
     most = max(report.overlap.histogram, default=0.0)
     bars = "".join(
-        f'<tr><td class="n">{n}</td><td class="n">{escape(format_percent(share))}</td>'
+        f'<tr><td class="n">{n}</td><td class="n">{escape(report.at_once(n))}</td>'
         f'<td><i style="width:{_width(share / most)}"></i></td></tr>'
         for n, share in enumerate(report.overlap.histogram)
         if share > 0.0

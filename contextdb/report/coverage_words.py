@@ -73,7 +73,7 @@ def nearest_sentence(measured: Measured, gap: Gap) -> str:
 def overlap_sentence(report: CoverageReport) -> str:
     """How many rows are valid at once."""
     histogram = report.overlap.histogram
-    told = [f"{n or 'none'}: {format_percent(share)}" for n, share in enumerate(histogram[:MOST_COUNTS]) if share > 0.0]
+    told = [f"{n or 'none'}: {report.at_once(n)}" for n, share in enumerate(histogram[:MOST_COUNTS]) if share > 0.0]
     rest = sum(histogram[MOST_COUNTS:])
     told += [f"{MOST_COUNTS} or more: {format_percent(rest)}"] if rest > 0.0 else []
     about = "" if report.overlap.method == "exact" else f" (estimated from {report.n_samples:,} samples)"

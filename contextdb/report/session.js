@@ -3,7 +3,7 @@
 // session are set as text, never as markup. `data` is what contextdb.report.session_data makes.
 const COLOURS = ["#4a86d8", "#e08214", "#2f9e62", "#a05fc7", "#c9a227", "#3aa6b9", "#c7527a", "#7a8b3a", "#8d6e63", "#6b7fd7"];
 const STRIPS = [
-  ["cost", "cost", ""], ["skate", "skate", "cm/s"], ["accel", "acceleration", "m/s²"], ["error", "off the path", "m"], ["valid", "rows valid", ""],
+  ["cost", "cost", ""], ["skate", "skate", "cm/s", 1], ["accel", "acceleration", "m/s²", 1], ["error", "off the path", "m", 0.01], ["valid", "rows valid", ""],
 ];
 const data = JSON.parse(document.getElementById("session").textContent);
 const $ = (id) => document.getElementById(id);
@@ -208,7 +208,7 @@ function drawTimeline(lane) {
   const [first, last] = [frameOf(session, from), frameOf(session, to)];
   pen.font = "12px system-ui, sans-serif";
   band(pen, session, x, first, last);
-  stripsOf(session).forEach(([name, label, unit], k) => strip(pen, session, name, label, unit, x, first, last, BAND + 14 + k * STRIP, width));
+  stripsOf(session).forEach((one, k) => strip(pen, session, one, x, first, last, BAND + 14 + k * STRIP, width));
   pen.fillStyle = colour("text");
   pen.fillRect(x(view.at) - 1, 0, 2, timeline.getBoundingClientRect().height);
 }
@@ -245,9 +245,9 @@ function band(pen, session, x, first, last) {
   }
 }
 
-function strip(pen, session, name, label, unit, x, first, last, top, width) {
+function strip(pen, session, [name, label, unit, least = 0], x, first, last, top, width) { // what is below `least` is not drawn large
   const values = session.columns[name];
-  let most = 0;
+  let most = least;
   for (let i = first; i <= last; i++) if (values[i] > most) most = values[i];
   pen.strokeStyle = colour("line");
   pen.lineWidth = 1;

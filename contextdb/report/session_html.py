@@ -120,7 +120,7 @@ def _changes(session: SessionView, name: str) -> str:
     lines = [[_link(change.time_s), *map(escape, change.texts)] for change in session.changes]
     if not lines:
         return f"<h2>What changed in {escape(name)}</h2>\n<p>Nothing: one animation plays on.</p>\n"
-    body = _table(["time", "what", "asset", "cost", "why"], lines, numbers=(3,), is_markup=True)
+    body = _table(["time", "what", "asset", "cost", "why"], lines, numbers=(0, 3), is_markup=True)
     return f"<h2>What changed in {escape(name)}</h2>\n{body}"
 
 

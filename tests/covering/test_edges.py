@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -163,6 +164,15 @@ def test_little_covered_is_estimated_out_of_the_rows():
     assert report.method == "estimate"
     assert report.lower <= exact.covered <= report.upper
     assert report.upper - report.lower < 0.1 * exact.covered
+
+
+def test_a_sample_without_a_valid_row_never_says_that_no_context_has_one():
+    names = [f"n{i}" for i in range(12)]
+    schema = {name: {"type": "number", "min": 0, "max": 100} for name in names}
+    exact = report_of({name: ["0..10"] for name in names}, schema)
+    sampled = replace(exact, overlap=replace(exact.overlap, histogram=(1.0,), method="estimate"))
+    assert sampled.at_once(0) == format_percent(1.0 - exact.covered) == "99.9999999999 %"
+    assert replace(sampled, method="estimate", upper=0.25).at_once(0) == "at least 75.00 %"
 
 
 def test_an_estimate_holds_the_exact_share_and_depends_on_the_seed_alone():

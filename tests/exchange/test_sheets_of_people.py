@@ -10,7 +10,8 @@ import xlsxwriter
 
 from contextdb.errors import TableError
 from contextdb.exchange.formats import ReadOptions, read
-from contextdb.exchange.mapping import propose
+from contextdb.exchange.importing import whole_names_told
+from contextdb.exchange.mapping import Mapped, propose
 from contextdb.exchange.reading import Reading
 from contextdb.schema.settings import EMPTY, TableSettings
 
@@ -69,6 +70,50 @@ def test_an_error_in_text_is_kept_unreadable_too():
     assert found.cells.to_list() == ["#N/A", '"Mid Air"', '"Mid Air"']
 
 
+# ---- how people write cells
+
+
+def of_column(name: str, *cells: str) -> Mapped:
+    text = "\n".join([f"Asset;{name}", *(f"row{at};{cell}" for at, cell in enumerate(cells))])
+    return propose(read(text.encode(), "x.csv"), EMPTY, TableSettings("t"))[1]
+
+
+@pytest.mark.parametrize(
+    ("name", "cells", "kind", "become"),
+    [
+        ("Reach (m)", ["> 1,5", "0,5", "1,2 - 3,4", "0.5..2"], "number", ["> 1.5", "0.5", "1.2..3.4", "0.5..2"]),
+        ("Angle (°)", ["±30", "90 ± 20", "-120,5 - 30"], "angle", ["0 ± 30", "90 ± 20", "-120.5..30"]),
+        ("Is blocking", ["x", "no", "X", "any"], "bool", ["True", "no", "True", "any"]),
+        (
+            "Stance",
+            ["Low", "Low / Mid", "Mid,Very High", "Very High"],
+            "enum",
+            ["Low", "Low Mid", 'Mid "Very High"', '"Very High"'],
+        ),
+    ],
+)
+def test_cells_as_people_write_them_become_cells_of_ours(name: str, cells: list[str], kind: str, become: list[str]):
+    found = of_column(name, *cells)
+    assert (found.kind, found.n_unreadable) == (kind, 0)
+    assert found.cells is not None
+    assert found.cells.to_list() == become
+    assert "is read as" in found.why
+
+
+@pytest.mark.parametrize(
+    ("name", "cells"), [("axis", ["x", "y", "z"]), ("path", ["a/b", "a/c", "d"]), ("offset (m)", ["20,5", "30,5"])]
+)
+def test_texts_that_may_mean_something_else_stay_as_they_are(name: str, cells: list[str]):
+    text = "\n".join([f"Asset,{name}", *(f'row{at},"{cell}"' for at, cell in enumerate(cells))])
+    found = propose(read(text.encode(), "x.csv"), EMPTY, TableSettings("t"))[1]
+    assert found.cells is None or found.cells.to_list() == cells
+
+
+def test_lists_of_names_are_not_told_as_one_name_each():
+    reading = read(b"Asset;stance\na;Low\nb;Low / Mid\nc;Mid\nd;Low\n", "x.csv")
+    assert whole_names_told(propose(reading, EMPTY, TableSettings("t")), reading, "words") == ""
+
+
 # ---- titles
 
 
@@ -115,6 +160,16 @@ def test_groups_merged_over_the_header_are_left_out_and_said(has_title: bool, fi
     assert texts(reading) == {"Clip": ["stir"], "tool": ["Spoon"], "grip": ["5"], "heat": ["20"], "fill": ["1"]}
     said = f"{first}, Hands, Pan" if first else "Hands, Pan"
     assert f'sheet row {n + 1}: left out above the header: "{said}".' in told(reading)
+
+
+def test_names_that_appear_twice_have_the_group_that_is_merged_over_them_in_front():
+    out, book, (sheet,) = workbook([["Fights, version 3"], [""], ["Clip", "Stance", "Reach", "Stance", "Size"], ["a", 1, 2, 3, 4]])
+    sheet.merge_range(0, 0, 0, 4, "Fights, version 3")
+    sheet.merge_range(1, 1, 1, 2, "Player")
+    sheet.merge_range(1, 3, 1, 4, "Opponent")
+    reading = reading_of(out, book)
+    assert reading.names == ["Clip", "Player.Stance", "Reach", "Opponent.Stance", "Size"]
+    assert 'names that appear twice have their group in front: "Stance" is now "Player.Stance".' in told(reading)
 
 
 def test_a_header_with_a_merged_name_is_no_row_of_groups():

@@ -306,3 +306,11 @@ def test_a_blueprint_needs_a_name_of_its_own_and_a_condition(table: Table):
     assert blueprint_fault(table, "air", [])
     assert blueprint_fault(table, "air", ["a"]) == ""
     assert next(b.missing for b in blueprints(table)) == ()
+
+
+def test_a_rule_is_a_column_to_add_too(table: Table):
+    column, wrong = NewColumnForm("only if", "when").read(table)
+    assert not wrong
+    after = Insertion(1, (column,)).edit(table).apply(table)
+    assert after.settings.when == "only if"
+    assert NewColumnForm("another", "when").read(after)[1] == {"job": 'The table has one already: "only if".'}

@@ -260,3 +260,8 @@ def test_numbers_are_written_as_people_write_them(table, folder):
     toml = (folder / "contextdb.toml").read_text()
     assert {"min = 0.0", "max = 7", "weight = 2", "weight = 0.5"} <= set(toml.splitlines())  # min was so, and is not touched
     assert 'Slots = { type = "number", min = 1 }' in toml
+
+
+def test_the_step_says_what_is_declared_and_what_becomes_a_column(table):
+    rows = [(6, "Column", "closing"), (6, "Is", "declared"), (6, "Type", "number"), (7, "Column", "new"), (7, "Type", "int")]
+    assert typed(table, *rows).edit().name == "Add the column new, declare closing"

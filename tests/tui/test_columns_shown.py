@@ -128,6 +128,14 @@ def test_the_list_of_columns_hides_freezes_and_goes(path):
     assert cursor == (0, 3)
 
 
+def test_the_list_of_columns_counts_the_texts_that_are_in_rows_now(path):
+    async def script(app, pilot):
+        await press(pilot, "right", "X", "enter", "alt+j")
+        return next(line.split()[-3:] for line in screen_text(app).splitlines() if " Defender.Depth " in line and "│" in line[:4])
+
+    assert with_editor(path, script, (80, 24))[1] == "2"
+
+
 def test_frozen_columns_stay_where_the_others_scroll(path):
     async def script(app, pilot):
         await press(pilot, "right")

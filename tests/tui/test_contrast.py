@@ -69,6 +69,34 @@ def test_every_text_of_a_tab_or_a_dialog_has_it_too(path, keys):
     assert with_editor(path, script, (120, 36) if keys == ["alt+5"] else (80, 24)) == set()
 
 
+def test_fields_stand_out_from_the_page_where_a_theme_has_one_colour_for_both(path):
+    async def script(app, pilot):
+        await press(pilot, "alt+2", "tab")
+        found = {}
+        for theme in ("solarized-light", "solarized-dark"):
+            app.theme = theme
+            await pilot.pause()
+            strips = app.screen._compositor.render_strips()
+            field = next(s for strip in strips for s in strip if s.text.strip().startswith("collect"))
+            found[theme] = (field.style.bgcolor, app.main.query_one("OptionsPane").rich_style.bgcolor)
+        return {theme for theme, (field, page) in found.items() if field == page}
+
+    assert with_editor(path, script) == set()
+
+
+@pytest.mark.parametrize("theme", ["ansi-dark", "ansi-light"])
+def test_selected_cells_have_a_colour_of_text_for_their_ground_in_the_colours_of_the_terminal(path, theme):
+    async def script(app, pilot):
+        app.theme = theme
+        await press(pilot, "down", "right", "shift+down", "shift+right")
+        segments = [segment for strip in app.screen._compositor.render_strips() for segment in strip]
+        return {
+            s.style.color.number for s in segments if s.style and s.style.bgcolor and s.style.bgcolor.number == 4 and s.text.strip()
+        }
+
+    assert with_editor(path, script) == {15}
+
+
 def test_what_lies_behind_the_palette_is_as_dim_as_behind_a_dialog(path):
     async def script(app, pilot):
         feet = []

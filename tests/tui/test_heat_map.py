@@ -98,6 +98,11 @@ def test_a_short_percentage_is_0_or_100_only_where_the_share_is(share):
     assert len(text) <= 3
 
 
+def test_the_legend_is_whole_beside_long_labels():
+    screen = played(MapApp(["a_label_of_many_letters" * 3], NUMBERS[:3]), size=(60, 8))
+    assert "100  % covered" in screen
+
+
 def test_arrows_stay_on_the_map_and_tell_each_square():
     app = MapApp(NAMES, NUMBERS)
     played(app, "up", "left", "down", "right", "end", "pagedown", "pagedown", "pagedown", "home")

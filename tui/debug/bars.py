@@ -60,6 +60,7 @@ class Bars(Widget, can_focus=True):
         & .bars--chosen { color: $background; background: $success; text-style: bold; }
         & .bars--playing { color: $background; background: $warning; text-style: bold; }
         &:focus .bars--cursor { background: $primary 35%; }
+        &:ansi .bars--cursor { background: ansi_blue; color: ansi_bright_white; }
     }
     """
 

@@ -66,6 +66,7 @@ class Channels(Widget, can_focus=True):
         & .channels--playing { color: $foreground 60%; }
         & .channels--asset { color: $warning; }
         &:focus .channels--cursor { background: $primary 35%; }
+        &:ansi .channels--cursor { background: ansi_blue; color: ansi_bright_white; }
     }
     """
 
@@ -126,12 +127,12 @@ class Channels(Widget, can_focus=True):
 
     @property
     def _n_costs(self) -> int:
-        return min(3, max(0, (self.size.width - 1 - LEAST_NAME - NUMBER) // (COST + 1)))
+        return min(3, max(0, (self.size.width - 2 - LEAST_NAME - NUMBER) // (COST + 1)))
 
     @property
     def _name_width(self) -> int:
         longest = max((len(dial.label) for dial in self.dials), default=LEAST_NAME)
-        room = self.size.width - 1 - NUMBER - self._n_costs * (COST + 1)
+        room = self.size.width - 2 - NUMBER - self._n_costs * (COST + 1)
         return max(LEAST_NAME, min(longest, room))
 
     def render_line(self, y: int) -> Strip:

@@ -37,6 +37,8 @@ TITLES = {
     "error": "path err",
 }
 """The strips, by the name of what is measured."""
+LEAST = {"accel": 1.0, "skate": 1.0, "error": 0.01}
+"""A strip is as high as so much at least: what is less is noise, and is not drawn large."""
 UNITS = {"cost": "", "valid": "assets", "accel": "m/s²", "skate": "cm/s", "error": "m"}
 
 
@@ -265,7 +267,7 @@ class Timeline(Widget):
         top = float(np.quantile(values, 0.995)) if len(values) else 0.0
         is_chosen = name == self.measure
         style = self.get_component_rich_style("timeline--chosen" if is_chosen else "timeline--strip")
-        cells = [(BARS[level], style) for level in _levels(peaks, 0.0, top or 1.0)]
+        cells = [(BARS[level], style) for level in _levels(peaks, 0.0, max(top, LEAST.get(name, 0.0)) or 1.0)]
         return self._label(f"{'▸' if is_chosen else ' '}{TITLES[name]}", is_chosen), cells
 
     # ---- mouse

@@ -17,8 +17,9 @@ from contextdb.tables.table import Table
 from tui.model.condition_form import ConditionForm, plain
 
 JOB_WORDS: dict[Job, str] = {
-    "condition": "excludes rows that do not accept the fact",
+    "condition": "excludes rows that refuse the fact",
     "output": "data for the game",
+    "when": "an expression that must hold in each row",
     "enabled": "a row that says False never matches",
     "priority": "higher rows are picked first",
     "weight": "how often a row is picked among equals",
@@ -27,6 +28,8 @@ JOB_WORDS: dict[Job, str] = {
     "cooldown_turns": "picks until a row is picked again",
 }
 """What a column can be, in a few words."""
+JOB_NAMES = {"when": "rule"}
+"""What a job is called, where it is not called as in contextdb.toml."""
 assert tuple(JOB_WORDS) == get_args(Job)
 
 
@@ -142,7 +145,7 @@ def _wrong_name(table: Table, name: str) -> str:
 
 
 def _wrong_job(table: Table, job: Job, name: str) -> str:
-    if job in get_args(PlainJob) and (column := getattr(table.settings, job)):
+    if job in ("when", *get_args(PlainJob)) and (column := getattr(table.settings, job)):
         return f"The table has one already: {in_quotes(column)}."
     is_declared = job != "condition" and name in table.schema.conditions
     return f"{in_quotes(name)} is declared as a condition." if is_declared else ""

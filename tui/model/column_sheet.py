@@ -355,10 +355,12 @@ def _name(rows: Sequence[ColumnRow], table: Table) -> str:
     """The name of the step."""
     done = {
         "change": [row.name for row in rows if row.before is not None and dict(row.texts) != dict(row.first)],
-        "add": [row.name for row in rows if row.before is None],
+        "add": [row.name for row in rows if row.before is None and row.job != DECLARED],
         "take away": sorted({c.name for c in table.columns} - {row.before for row in rows}),
     }
     said = [f"{verb} {_named_or_counted(names)}" for verb, names in done.items() if names]
+    declared = [row.name for row in rows if row.before is None and row.job == DECLARED]
+    said += [f"declare {shown(declared[0]) if len(declared) == 1 else plural(len(declared), 'condition')}"] if declared else []
     return f"{said[0][:1].upper()}{said[0][1:]}{''.join(f', {one}' for one in said[1:])}" if said else "Move columns"
 
 

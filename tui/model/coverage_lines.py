@@ -217,7 +217,7 @@ def about_text(result: Result) -> str:
     lines.append("")
     lines.append(f"Rows valid at once: {report.overlap.mean:.3g} on average ({report.overlap.method}).")
     histogram = report.overlap.histogram
-    lines += [f"  {n:>3}   {format_percent(s):>9}  {'█' * round(40 * s)}".rstrip() for n, s in enumerate(histogram) if s > 0.0]
+    lines += [f"  {n:>3}   {report.at_once(n):>9}  {'█' * round(40 * s)}".rstrip() for n, s in enumerate(histogram) if s > 0.0]
     lines.append("")
     if pairs is None:
         lines.append(result.left_out)

@@ -102,8 +102,8 @@ class Draft:
         if self._is_here(mapped):
             return f"{mark}{mapped.name}" if mapped.job == "condition" else f"{self._name(mapped)} ({mapped.job})"
         declared = self._schema.conditions.get(mapped.name)
-        kind = f"new, {mapped.kind}" if mapped.is_new else declared.domain.kind if declared else mapped.job
-        return f"{mark}+ {mapped.name} ({kind})"
+        kind = f"new {mapped.kind}" if mapped.is_new else declared.domain.kind if declared else mapped.job
+        return f"{mark}+ {kind}" if mapped.name == mapped.source else f"{mark}+ {mapped.name} ({kind})"
 
     def why(self, at: int) -> str:
         """Why a column becomes what it does, as a sentence."""

@@ -133,7 +133,7 @@ class CoveragePane(Pane):
                 id="crowded",
             )
             yield RowList(
-                [ListColumn("Row", 6, 0, True), ListColumn("Asset", 16, 2), ListColumn("Details", 22, 2)],
+                [ListColumn("Row", 6, 0, True), ListColumn("Asset", 16, 2, is_name=True), ListColumn("Details", 22, 2)],
                 empty=EMPTY["rows"],
                 id="rows",
             )
@@ -142,7 +142,7 @@ class CoveragePane(Pane):
                 empty=NO_PLAY,
                 id="played",
             )
-            yield RowList([ListColumn("Row", 6, 0, True), ListColumn("Asset", 16, 2)], empty=NO_PLAY, id="unused")
+            yield RowList([ListColumn("Row", 6, 0, True), ListColumn("Asset", 16, 2, is_name=True)], empty=NO_PLAY, id="unused")
             with VerticalScroll(id="about"):
                 yield Static(id="about-text", markup=False)
         with VerticalScroll(id="coverage-detail"):

@@ -77,7 +77,7 @@ class MotionPane(Pane):
     def compose(self) -> ComposeResult:
         """The parts."""
         yield Static(id="motion-summary", markup=False)
-        columns = [ListColumn("Session", 18, 3), ListColumn("When", 12), ListColumn("Lasts", 9, 0, True)]
+        columns = [ListColumn("Session", 18, 3, is_name=True), ListColumn("When", 12), ListColumn("Lasts", 9, 0, True)]
         columns += [ListColumn("Jumps/s", 8, 0, True), ListColumn("Forced", 7, 0, True)]
         yield SessionList([*columns, ListColumn("In a clip", 10, 0, True)], empty=NONE, id="sessions")
 

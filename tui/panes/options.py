@@ -174,6 +174,7 @@ class OptionsPane(Pane):
         outputs.clear_options()
         outputs.add_options([Selection(Content(name), name, name in settings.outputs) for name in columns_for(table, "outputs")])
         outputs.highlighted = highlighted
+        outputs.display = outputs.option_count > 0
         self._field("outputs").say(meaning=self._outputs_meaning(outputs.option_count))
         fallback = self.query_one("#option-fallback", Input)
         fallback.value = settings.fallback or ""

@@ -63,7 +63,8 @@ class PrioritiesPane(Pane):
         & #priorities-list { height: auto; max-height: 50vh; border: none; padding: 0 1; background: transparent; margin: 1 0 0 0; }
         & #priorities-list > .option-list--option-disabled { color: $text; }
         & #priorities-list > .option-list--option-highlighted { text-style: bold; }
-        & #priorities-list:focus > .option-list--option-highlighted { text-style: bold; }
+        & #priorities-list:focus > .option-list--option-highlighted { background: $primary 40%; color: $text; text-style: bold; }
+        & #priorities-list:focus:ansi > .option-list--option-highlighted { background: ansi_blue; color: ansi_bright_white; }
         & #priorities-detail { height: auto; max-height: 8; padding: 0 1; color: $text-muted; overflow-y: auto; }
         & #priorities-empty { height: auto; padding: 0 1; }
         & #priorities-foot { height: auto; dock: bottom; padding: 0 1; background: $surface; }

@@ -90,7 +90,12 @@ class ProblemsPane(Pane):
         """The parts."""
         yield Static(id="problems-summary", markup=False)
         yield ChoiceLine(NAMES, id="problems-levels")
-        columns = [ListColumn("Level", 11), ListColumn("Row", 8, 0, True), ListColumn("Asset", 10, 2), ListColumn("Column", 9, 1)]
+        columns = [
+            ListColumn("Level", 11),
+            ListColumn("Row", 8, 0, True),
+            ListColumn("Asset", 10, 2, is_name=True),
+            ListColumn("Column", 9, 1, is_name=True),
+        ]
         yield ProblemList([*columns, ListColumn("What is wrong", 20, 5)], empty="Nothing.", id="problems")
         with VerticalScroll(id="problems-detail"):
             yield Static(id="problems-detail-text", markup=False)

@@ -21,8 +21,9 @@ from contextdb.edits.edits import Job
 from contextdb.errors import shown
 from contextdb.schema.sections import has_place
 from contextdb.tables.table import Table
-from tui.model.column_choices import JOB_WORDS, Choice, Insertion, NewColumnForm, choices, places
+from tui.model.column_choices import JOB_NAMES, JOB_WORDS, Choice, Insertion, NewColumnForm, choices, places
 from tui.model.condition_form import ConditionForm
+from tui.model.layout import cut_middle
 from tui.screens.dialog import Dialog
 from tui.widgets.field import Field
 from tui.widgets.pick import Pick
@@ -75,7 +76,7 @@ class AddColumn(Dialog[Insertion]):
         yield Static(id="column-about")
         with Vertical(id="column-form"):
             width = max(map(len, JOB_WORDS)) + 2
-            jobs = [(f"{job:<{width}}{words}", job) for job, words in JOB_WORDS.items()]
+            jobs = [(f"{JOB_NAMES.get(job, job):<{width}}{words}", job) for job, words in JOB_WORDS.items()]
             yield Field("What it is", Pick(jobs, compact=True, allow_blank=False, id="column-job"), key="job")
             kinds = [(f"{name:<8}{kind.words}", name) for name, kind in KINDS.items()]
             yield Field("Type", Pick(kinds, compact=True, allow_blank=False, id="column-type"), key="type")
@@ -204,5 +205,5 @@ def _line(choice: Choice | None, text: str, width: int) -> Content:
     """A line of the list."""
     if choice is None:
         return Content(f'+ New column "{shown(text)}"' if text else "+ New column: type its name")
-    name = f"{shown(choice.name, width):<{width}}"
+    name = cut_middle(shown(choice.name), width)
     return Content.assemble((name, "bold"), f"  {'blueprint, ' if choice.is_blueprint else ''}{choice.about}")

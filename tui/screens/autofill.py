@@ -85,13 +85,14 @@ class AutofillDialog(Dialog[Autofill]):
     AutofillDialog {
         & > #dialog { width: 110; height: 92%; }
         & > #dialog > #dialog-body { height: 1fr; }
+        &.-refused > #dialog, &.-refused > #dialog > #dialog-body { height: auto; }
         & #autofill-about { height: auto; max-height: 4; }
         & #autofill-lines { height: 1fr; margin: 1 0; }
         & #autofill-detail { height: auto; max-height: 4; color: $text-muted; }
     }
     """
     title_text = "Autofill from clips"
-    keys_text = "Enter only empty cells · A replace what differs, too · ↑↓ · Esc"
+    keys_text = "↑↓ · Enter only empty cells · A what differs, too · Esc cancel"
 
     def __init__(self, table: Table, folder: Path) -> None:
         """`folder` is that of contextdb.toml."""
@@ -103,8 +104,13 @@ class AutofillDialog(Dialog[Autofill]):
     def compose_body(self) -> ComposeResult:
         """What is done by column, then cell by cell."""
         yield Static("Reading the clips …", id="autofill-about", markup=False)
-        columns = [ListColumn("", 8), ListColumn("Row", 6, 0, True), ListColumn("Asset", 20, 2), ListColumn("Column", 12, 1)]
-        columns += [ListColumn("Now", 12, 1), ListColumn("Clip", 14, 1)]
+        columns = [
+            ListColumn("", 8),
+            ListColumn("Row", 6, 0, True),
+            ListColumn("Asset", 20, 2, is_name=True),
+            ListColumn("Column", 12, 1, is_name=True),
+        ]
+        columns += [ListColumn("Now", 12, 1), ListColumn("Clip", 14, 1, is_name=True)]
         yield LineList(columns, empty="", id="autofill-lines")
         yield Static(id="autofill-detail", markup=False)
 
@@ -147,6 +153,9 @@ class AutofillDialog(Dialog[Autofill]):
     def _take(self, found: ClipRows | ContextDBError) -> None:
         if isinstance(found, ContextDBError):
             self.query_one("#autofill-about", Static).update(Content.styled(f"✗ {found}", "$text-error"))
+            self.query_one(LineList).display = False
+            self.query_one("#dialog").border_subtitle = "Esc close"
+            self.add_class("-refused")
             return
         self.clips = found
         fills = filling(self.table, found.rows)

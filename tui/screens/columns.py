@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
+import numpy as np
 from rich.cells import cell_len
 from textual import on
 from textual.app import ComposeResult
@@ -70,13 +71,14 @@ class ColumnsDialog(Dialog[ColumnsAnswer]):
         header, condition, texts = self.sheet.header(at), self.sheet.condition(at), self.sheet.table.columns[at]
         is_hidden = self.shown.are_hidden(self.names, self.sheet.table.asset_column)[at]
         is_frozen = at < self.shown.n_frozen(self.names, self.sheet.table.asset_column)
-        n_wrong = len(condition.faults) if condition is not None else 0
+        counts = np.bincount(texts.codes, minlength=len(texts.texts))  # texts that were mended stay among them, in no row
+        n_wrong = sum(int(counts[code]) for code in condition.faults) if condition is not None else 0
         tone = "muted" if is_hidden else ""
         kind = f"{header.kind} · {header.unit}" if header.unit else header.kind
         sign = "–" if is_hidden else "▐" if is_frozen else ""
         about = condition.condition.description if condition is not None else ""
         wrong: ListCell = (f"{n_wrong:,}", "error") if n_wrong else ""
-        return sign, (header.name, tone), (kind, "muted"), f"{len(texts.texts):,}", wrong, (about, "muted")
+        return sign, (header.name, tone), (kind, "muted"), f"{np.count_nonzero(counts):,}", wrong, (about, "muted")
 
     @property
     def _here(self) -> str:

@@ -87,7 +87,7 @@ class ConflictsDialog(Dialog[Mapping[int, Side]]):
         """How many there are, the list, the texts of the chosen one in full, and what can be clicked."""
         where = f" in {shown(self._file)}" if self._file else ""
         yield Static(Content(f"{plural(len(self.conflicts), 'place')}{where} changed {self._both}. Everything else is merged."))
-        columns = [ListColumn("Asset", WHERE_WIDTH, 2), ListColumn("Column", WHERE_WIDTH, 1)]
+        columns = [ListColumn("Asset", WHERE_WIDTH, 2, is_name=True), ListColumn("Column", WHERE_WIDTH, 1, is_name=True)]
         texts = [ListColumn(title, TEXT_WIDTH, 2) for title in ("Before", *self.names)]
         yield ConflictLines([*columns, *texts])
         yield Static(id="conflict-texts")

@@ -55,7 +55,7 @@ class FindEverywhere(Dialog[FoundCell]):
     }
     """
     title_text = "Find in all tables"
-    keys_text = "↑↓ choose · Enter go there · Esc"
+    keys_text = "↑↓ choose · Enter go there · Esc close"
 
     def __init__(self, workspace: Workspace, first: str) -> None:
         """`first`: the table that is looked through first."""
@@ -68,7 +68,12 @@ class FindEverywhere(Dialog[FoundCell]):
     def compose_body(self) -> ComposeResult:
         """The text, its places, how many there are."""
         yield Input(compact=True, placeholder="a text; upper and lower case are the same")
-        columns = [ListColumn("Table", 14), ListColumn("Row", 5, 0, True), ListColumn("Column", 12, 1), ListColumn("Text", 20, 3)]
+        columns = [
+            ListColumn("Table", 14, is_name=True),
+            ListColumn("Row", 5, 0, True),
+            ListColumn("Column", 12, 1, is_name=True),
+            ListColumn("Text", 20, 3),
+        ]
         yield LineList(columns, empty="Nothing is found.")
         yield Static(id="found-said")
 

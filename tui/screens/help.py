@@ -27,8 +27,13 @@ MARKS = (
     ("=", "in the test row: this fact is computed from others"),
     ("×", "this cell does not accept its fact"),
     ("▸", "the row refers to another table: Alt+O opens it"),
+    ("×2", "the row is not valid: two cells fail"),
+    ("«  »", "cells that fail, outside the window"),
+    ("leaves 7  → 7", "so many rows are left by the fact of this column"),
+    ("33 %", "the chance that the row is picked"),
     ("!", "this cell cannot be read"),
     ("–", "the row is disabled"),
+    ("*", "the table has edits that are not saved"),
 )
 
 
@@ -48,4 +53,4 @@ class HelpDialog(HelpPage):
             yield group, [(self._keys_of(command), command.about) for command in COMMANDS if command.group == group]
 
     def _keys_of(self, command: Command) -> str:
-        return "  ".join(key_names(self._keys.get(command.id, command.keys)))
+        return "  ".join(key_names(self._keys.get(command.id, command.keys))) or f"Ctrl+P {command.label}"

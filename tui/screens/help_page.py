@@ -22,7 +22,7 @@ class HelpPage(Dialog[None]):
 
     DEFAULT_CSS = """
     HelpPage VerticalScroll { height: 1fr; scrollbar-size-vertical: 1; }
-    HelpPage Static { height: auto; }
+    HelpPage Static { height: auto; margin: 0 0 1 0; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [Binding("f1,q", "cancel", "Close", show=False)]
     title_text = "Help"
@@ -46,7 +46,7 @@ class HelpPage(Dialog[None]):
         self.query_one(VerticalScroll).focus()
 
     def _section(self, title: str, lines: Lines) -> Table:
-        heading = Text(title, style="bold")
+        heading = Text(title, style="bold underline")
         table = Table(title=heading, title_justify="left", box=None, show_header=False, pad_edge=False, padding=(0, 2, 0, 0))
         table.add_column(no_wrap=self.widest is None, min_width=22, max_width=self.widest)
         table.add_column()

@@ -33,7 +33,7 @@ from tui.widgets.pick import Pick
 BY_ITSELF = "by its content"
 THE_ONLY = "the filled sheet"
 THE_USUAL = "each text is one name, but in our own files"
-COLUMNS = (ListColumn("Column", 18, 2), ListColumn("First cells", 12, 3), ListColumn("Becomes", 20, 3))
+COLUMNS = (ListColumn("Column", 18, 2, is_name=True), ListColumn("First cells", 12, 3), ListColumn("Becomes", 20, 3))
 
 
 class ChoiceDialog(Dialog[Choice]):

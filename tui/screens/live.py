@@ -55,8 +55,8 @@ class LiveDialog(Dialog[Followed]):
     def compose_body(self) -> ComposeResult:
         """What is known, and the list."""
         yield Static(id="live-state")
-        columns = [ListColumn("Game", 12, 1), ListColumn("Character", 14, 2), ListColumn("Asked", 8, 0, True)]
-        yield LineList([*columns, ListColumn("Plays", 14, 2)], empty="", id="live-lines")
+        columns = [ListColumn("Game", 12, 1), ListColumn("Character", 14, 2, is_name=True), ListColumn("Asked", 8, 0, True)]
+        yield LineList([*columns, ListColumn("Plays", 14, 2, is_name=True)], empty="", id="live-lines")
 
     def on_mount(self) -> None:
         """Look for games, and show what they say as it comes."""

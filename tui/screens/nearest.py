@@ -64,7 +64,7 @@ class NearestDialog(Dialog[CellAnswer]):
         & #nearest-keys { height: 1; margin: 1 0 0 0; padding: 0 1; }
     }
     """
-    title_text = "Why not"
+    title_text = "Why"
     keys_text = "Tab turns the page · Esc close"
 
     def __init__(self, query: QueryRow, table: Table, row: int | None = None) -> None:
@@ -122,10 +122,15 @@ class NearestDialog(Dialog[CellAnswer]):
         self.is_narrow = self.size.width < NARROW
         told = [ListColumn(name, 10, 1) for name in ("Fact", "Cell", "Change to")]
         if not self.is_nearest:
-            self.lines.columns = (ListColumn("", 11), ListColumn("Condition", 14, 2), *told)
+            self.lines.columns = (ListColumn("", 11), ListColumn("Condition", 14, 2, is_name=True), *told)
         else:
             told = [ListColumn("Change to", 14)] if self.is_narrow else told
-            self.lines.columns = (ListColumn("Row", 5, 0, True), ListColumn("Asset", 16, 2), ListColumn("Condition", 12, 1), *told)
+            self.lines.columns = (
+                ListColumn("Row", 5, 0, True),
+                ListColumn("Asset", 16, 2, is_name=True),
+                ListColumn("Condition", 12, 1, is_name=True),
+                *told,
+            )
         self.lines.refresh()
 
     def on_resize(self) -> None:

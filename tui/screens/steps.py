@@ -15,7 +15,7 @@ class StepsDialog(ChooseDialog):
     def __init__(self, names: Sequence[str], position: int) -> None:
         texts = ["the table as it was opened", *names]
         lines = [f"{_sign(i, position)} {i:>4}  {text}" for i, text in enumerate(texts)]
-        super().__init__("Undo history", lines, position)
+        super().__init__("Undo history", lines, position, about="▶ where the table is · ↷ undone")
 
 
 def _sign(step: int, position: int) -> str:

@@ -28,6 +28,8 @@ class Field(Vertical):
         & SelectCurrent { background: $panel; padding: 0 1; }
         & Select:focus > SelectCurrent { background: $primary 30%; text-style: bold; }
         & Select.-textual-compact > SelectCurrent { padding: 0 1; }
+        & Input:ansi:focus, & Select:focus > SelectCurrent:ansi { background: ansi_blue; color: ansi_bright_white; }
+        & Select:focus > SelectCurrent:ansi #label { color: ansi_bright_white; }
         & SelectionList { background: $panel; height: auto; max-height: 5; padding: 0 1; }
         & SelectionList:focus { background: $primary 20%; }
     }

@@ -78,6 +78,9 @@ class GridView(ScrollView, inherit_bindings=False):
         .grid--valid { color: $text-success; text-style: bold; }
         .grid--line { color: $foreground 18%; }
         .grid--on-cursor { color: $block-cursor-foreground; text-style: bold; }
+        &:ansi .grid--selected, &:ansi .grid--header-chosen, &:ansi .grid--cursor-away {
+            background: ansi_blue; color: ansi_bright_white;
+        }
         &:ansi .grid--row-valid { background: ansi_default; }
         &:ansi .grid--row-picked { background: ansi_default; text-style: bold; }
     }
@@ -376,7 +379,9 @@ class GridView(ScrollView, inherit_bindings=False):
             under = self.get_component_rich_style(f"grid--{ground}")
             over = self.get_component_rich_style(f"grid--{meant}")
             plain = Style(bgcolor=under.bgcolor, bold=under.bold, underline=under.underline)
-            said = Style(color=over.color, bold=over.bold or None, underline=over.underline or None, strike=over.strike or None)
+            is_terminals = under.bgcolor is not None and under.bgcolor.number is not None
+            colour = under.color if is_terminals else over.color  # no other is sure to be read on the terminal's own
+            said = Style(color=colour, bold=over.bold or None, underline=over.underline or None, strike=over.strike or None)
             whole = plain + said
             self._styles[ground, meant] = self._filtered(whole if meant == "line" else readable(whole), is_read=meant != "line")
         return self._styles[ground, meant]

@@ -31,6 +31,7 @@ UNDER = 3
 """Lines for the labels of the columns, and for the legend below the squares."""
 STEPS = ("<20", "<40", "<60", "<80", "<100")
 LEGEND = (("empty", "0"), *((f"step-{at}", text) for at, text in enumerate(STEPS)), ("full", "100"))
+COVERED = "% covered"
 NARROW = 5
 """A square takes so many cells at least: "[100]"."""
 
@@ -106,12 +107,12 @@ class HeatMap(ScrollView, can_focus=True):
         & .heat-map--here { color: $foreground; text-style: bold; }
         & .heat-map--none { color: $text-muted; }
         & .heat-map--empty { background: $error 55%; color: $foreground; }
-        & .heat-map--step-0 { background: $error 36%; color: $foreground; }
+        & .heat-map--step-0 { background: $error 38%; color: $foreground; }
         & .heat-map--step-1 { background: $error 22%; color: $foreground; }
-        & .heat-map--step-2 { background: $warning 34%; color: $foreground; }
-        & .heat-map--step-3 { background: $warning 18%; color: $foreground; }
-        & .heat-map--step-4 { background: $success 22%; color: $foreground; }
-        & .heat-map--full { background: $success 50%; color: $foreground; }
+        & .heat-map--step-2 { background: $warning 18%; color: $foreground; }
+        & .heat-map--step-3 { background: $success 16%; color: $foreground; }
+        & .heat-map--step-4 { background: $success 32%; color: $foreground; }
+        & .heat-map--full { background: $success 55%; color: $foreground; }
         &:ansi {
             & .heat-map--empty { background: ansi_default; color: ansi_red; text-style: bold; }
             & .heat-map--step-0, & .heat-map--step-1 { background: ansi_default; color: ansi_red; }
@@ -282,10 +283,11 @@ class HeatMap(ScrollView, can_focus=True):
 
     def _legend(self, width: int, base: Style) -> Strip:
         """What the colours mean, two lines below the squares where there is room."""
-        parts = [Segment(" " * self.label_width, base)]
+        needed = sum(len(text) + 3 for _, text in LEGEND) + len(COVERED)
+        parts = [Segment(" " * max(0, min(self.label_width, width - needed)), base)]
         for level, text in LEGEND:
             parts += [Segment(f" {text} ", self.get_component_rich_style(f"heat-map--{level}")), Segment(" ", base)]
-        parts.append(Segment("% covered", self.get_component_rich_style("heat-map--label")))
+        parts.append(Segment(COVERED, self.get_component_rich_style("heat-map--label")))
         return Strip(parts).adjust_cell_length(width, base)
 
     def _label(self, text: str, width: int, is_here: bool) -> Segment:

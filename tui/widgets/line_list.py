@@ -7,8 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from textwrap import wrap
 from typing import ClassVar
 
+from rich.cells import cell_len
 from rich.segment import Segment
 from rich.style import Style
 from textual import events
@@ -18,6 +20,7 @@ from textual.message import Message
 from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
+from tui.model.layout import cut_middle
 from tui.widgets.fitted import fitted
 
 ListCell = str | tuple[str, str] | Callable[[int], str]
@@ -27,12 +30,13 @@ MARK = "▸ "
 
 @dataclass(frozen=True, slots=True)
 class ListColumn:
-    """A column: so wide at least, and which part of the rest of the line it gets."""
+    """A column: so wide at least, and which part of the rest of the line it gets. Names are cut in their middle."""
 
     title: str
     width: int
     grow: int = 0
     to_right: bool = False
+    is_name: bool = False
 
 
 class LineList(ScrollView, can_focus=True):
@@ -113,8 +117,8 @@ class LineList(ScrollView, can_focus=True):
         self.refresh(layout=has_grown and self.styles.is_auto_height)
 
     def get_content_height(self, container: Size, viewport: Size, width: int) -> int:
-        """The titles and every line, or the line that says that there is none. It never shrinks: nothing jumps while one types."""
-        self._most_lines = max(self._most_lines, self.n_lines, 1)
+        """The titles and every line, or those that say that there is none. It never shrinks: nothing jumps while one types."""
+        self._most_lines = max(self._most_lines, self.n_lines or len(self._empty_lines(width)))
         return 1 + self._most_lines
 
     def say_empty(self, text: str) -> None:
@@ -181,14 +185,17 @@ class LineList(ScrollView, can_focus=True):
         base = self.rich_style
         if y == 0:
             style = base + self._tone("header")
-            titles = [fitted(c.title, w, c.to_right) for c, w in zip(self.columns, self._widths(width), strict=True)]
+            titles = [_titled(c.title, w, c.to_right) for c, w in zip(self.columns, self._widths(width), strict=True)]
             return _strip([Segment("  ", base), *_spaced(titles, style, base)], width, base)
         index = y - 1 + self.scroll_offset.y
-        if not self.n_lines and y == 1:
-            return _strip([Segment(fitted(f"  {self.empty}", width), base + self._tone("muted"))], width, base)
+        if not self.n_lines and y <= len(said := self._empty_lines(width)):
+            return _strip([Segment(fitted(f"  {said[y - 1]}", width), base + self._tone("muted"))], width, base)
         if index >= self.n_lines:
             return Strip.blank(width, base)
         return self._line_strip(index, width, base)
+
+    def _empty_lines(self, width: int) -> list[str]:
+        return wrap(self.empty, max(8, width - 4)) or [""]
 
     def _line_strip(self, index: int, width: int, base: Style) -> Strip:
         is_here = index == self.index
@@ -197,6 +204,7 @@ class LineList(ScrollView, can_focus=True):
         segments = [Segment(MARK if is_here else "  ", style + cursor)]
         for cell, column, w in zip(self._line(index), self.columns, self._widths(width), strict=True):
             text, tone = cell if isinstance(cell, tuple) else (cell if isinstance(cell, str) else cell(w), "")
+            text = cut_middle(text, w) if column.is_name and 0 < w < cell_len(text) else text
             segments.append(Segment(fitted(text, w, column.to_right), style + self._tone(tone) + cursor))
             segments.append(Segment("  ", style + cursor))
         return _strip(segments, width, style + cursor)
@@ -225,6 +233,11 @@ class LineList(ScrollView, can_focus=True):
                 cut = min(-left, max(0, widths[at] - 6))
                 widths[at], left = widths[at] - cut, left + cut
         return widths
+
+
+def _titled(title: str, width: int, to_right: bool) -> str:
+    """A title, which may be the name of a condition, in so many cells."""
+    return cut_middle(title, width) if 0 < width < cell_len(title) else fitted(title, width, to_right)
 
 
 def _spaced(texts: Sequence[str], style: Style, base: Style) -> list[Segment]:

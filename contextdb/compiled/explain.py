@@ -6,6 +6,7 @@ row are worked out when they are asked for.
 
 from __future__ import annotations
 
+import decimal
 import math
 import re
 import sys
@@ -355,8 +356,8 @@ def _rounded_outwards(fact: float, accepts: NumberSet, domain: Domain) -> float:
     if len(repr(fact)) <= FEW_DIGITS or fact == 0.0 or not math.isfinite(fact) or not accepts.spans:
         return fact
     low, high = _stretch(accepts, fact)
-    unit = 10.0 ** (math.floor(math.log10(abs(fact))) - ROUNDED_DIGITS + 1)
-    outer = float(f"{(math.floor if fact == low else math.ceil)(fact / unit) * unit:.{ROUNDED_DIGITS}g}")
+    away = decimal.Context(ROUNDED_DIGITS, decimal.ROUND_FLOOR if fact == low else decimal.ROUND_CEILING)
+    outer = float(away.create_decimal_from_float(fact))
     is_near = abs(outer - fact) <= _gap(high if fact == low else low, fact, accepts.is_circular)
     is_fact = domain.minimum <= outer <= domain.maximum and not (accepts.is_circular and abs(outer) >= 180.0)
     return outer if is_near and is_fact else fact

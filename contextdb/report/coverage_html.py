@@ -11,6 +11,7 @@ from importlib.resources import files
 
 from contextdb.console import __version__, printable
 from contextdb.covering import CoverageReport, format_percent
+from contextdb.covering.report import share_at_once
 from contextdb.report.coverage_heat import heat_map
 from contextdb.report.coverage_results import CoverageResults, Gate, Measured, gap_moments, gap_size, has_moments
 from contextdb.report.coverage_text import by_rule
@@ -168,7 +169,7 @@ def _overlap(measured: Measured) -> Iterator[str]:
     yield paragraph(f"{overlap_sentence(report)}.")
     most = max(report.overlap.histogram, default=0.0)
     bars = "".join(
-        f'<tr><td class="n">{n}</td><td class="n">{escape(report.at_once(n))}</td>'
+        f'<tr><td class="n">{n}</td><td class="n">{escape(share_at_once(report, n))}</td>'
         f'<td><i style="width:{_width(share / most)}"></i></td></tr>'
         for n, share in enumerate(report.overlap.histogram)
         if share > 0.0

@@ -44,6 +44,14 @@ FEW_DIGITS = 12
 
 ROUNDED_DIGITS = 4
 
+EVERY_VALUE = (
+    ValueSet(frozenset(), True),
+    ValueSet(frozenset((False, True))),
+    NumberSet(intervals.EVERYTHING),
+    NumberSet((intervals.CIRCLE,), is_circular=True),
+)
+"""What a cell says as Any."""
+
 ONE_BOUND = 1e-12
 """Bounds that are closer than this share of their size are those of one number: it and the double after it."""
 
@@ -358,7 +366,7 @@ def _rounded_outwards(fact: float, accepts: NumberSet, domain: Domain) -> float:
     low, high = _stretch(accepts, fact)
     away = decimal.Context(ROUNDED_DIGITS, decimal.ROUND_FLOOR if fact == low else decimal.ROUND_CEILING)
     outer = float(away.create_decimal_from_float(fact))
-    is_near = abs(outer - fact) <= _gap(high if fact == low else low, fact, accepts.is_circular)
+    is_near = abs(outer - fact) < _gap(high if fact == low else low, fact, accepts.is_circular)
     is_fact = domain.minimum <= outer <= domain.maximum and not (accepts.is_circular and abs(outer) >= 180.0)
     return outer if is_near and is_fact else fact
 
@@ -385,7 +393,7 @@ def _joined(one: Accepted | None, other: Accepted | None) -> Accepted | None:
     if one is None or other is None or isinstance(one, TagSet) or isinstance(other, TagSet):
         return None
     both = union(one, other)
-    return None if both in (ValueSet(frozenset(), True), ValueSet(frozenset((False, True)))) else both
+    return None if both in EVERY_VALUE else both
 
 
 def _stretch(accepts: NumberSet, fact: float) -> intervals.Span:

@@ -243,7 +243,7 @@ def test_the_table_of_captured_clips_checks_and_drives(tmp_path: Path, monkeypat
     monkeypatch.chdir(tmp_path)
     folder = tmp_path / "game" / "clips"
     folder.mkdir(parents=True)
-    clips = some(sorted(MOCAP.rglob("*.bvh"), reverse=True), 4)
+    clips = some(sorted(MOCAP.rglob("*.bvh"), reverse=True), 8)
     for clip in clips:
         (folder / clip.name).symlink_to(clip)
     described = describe("game/clips", "--out", "game/moves.csv")

@@ -86,6 +86,7 @@ def _tell(
 ) -> None:
     """Say on standard error what was taken for granted or left out."""
     lines = [*found.notes, *(f"left out: {message}" for message in found.left_out)]
+    lines += [] if fills is None else fills.notes
     if fills is not None and fills.without_clip:
         lines.append(f"no clip for {plural(len(fills.without_clip), 'row')}: {some(fills.without_clip)}")
     if not is_playable:

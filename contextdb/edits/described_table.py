@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from contextdb.cells.grammar import parse_cell
+from contextdb.cells.kinds import Family
 from contextdb.columns import TextColumn
 from contextdb.disk.together import NewFile, write_together
 from contextdb.edits.schema_file import schema_change
@@ -22,6 +23,7 @@ from contextdb.errors import ContextDBError, Fault, FileError, Place, TableError
 from contextdb.files.file_names import require_new_table_name
 from contextdb.files.texts import new_source
 from contextdb.files.toml_text import Path as KeyPath
+from contextdb.motion.characters.facts import UNITS
 from contextdb.motion.clips.clip import Up
 from contextdb.motion.clips.doubts import doubts_of, grouped
 from contextdb.motion.preparing.cells_of_clips import CONDITIONS, OUTPUTS
@@ -49,6 +51,14 @@ ASSET = "Asset Name"
 BOM = "\ufeff"
 NEAR_S = 0.01
 """Durations that differ by less are the same."""
+SHOWN = {
+    "gait": "enum",
+    "speed": "number in m/s",
+    "direction": "angle in degrees",
+    "turn": "number in degrees a second",
+    "style": "enum",
+}
+"""What clips show in each column of a condition, for messages."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,7 +204,7 @@ def _is_mirrored(found: FolderClips) -> bool:
 class Filling:
     """What the clips give to a table that is there: `added` are the rows that are missing, `empty` the cells of rows that are there
     and say nothing, `differences` those that do not accept what their clips show, `without_clip` the assets that no clip has.
-    `sections` is what contextdb.toml is to say."""
+    `notes` say which columns are not filled, as contextdb.toml declares them otherwise; `sections` is what it is to say."""
 
     table: Table
     new_columns: list[str]
@@ -202,6 +212,7 @@ class Filling:
     empty: list[Difference]
     differences: list[Difference]
     without_clip: list[str]
+    notes: list[str]
     sections: Sections
 
     def edit(self, *, updates: bool = False) -> Edit:
@@ -231,10 +242,13 @@ class Filling:
 
 def filling(table: Table, rows: Sequence[Described]) -> Filling:
     """What the clips give to a table that is there."""
+    other = {name: text for name in CONDITIONS if (text := _declared_otherwise(table, name))}
+    sections = _said(table, rows)
+    rows = [replace(row, cells={name: cell for name, cell in row.cells.items() if name not in other}) for row in rows]
     known = {row.asset: row for row in rows}
     assets = [asset_name(cell) for cell in table.assets]
     names = [column.name for column in table.columns]
-    new = [name for name in (*CONDITIONS, *OUTPUTS) if name not in names]
+    new = [name for name in (*CONDITIONS, *OUTPUTS) if name not in names and name not in other]
     empty, differences = [], []
     for name in (*names, *new):
         if name == table.asset_column:
@@ -251,7 +265,21 @@ def filling(table: Table, rows: Sequence[Described]) -> Filling:
                 differences.append(each)
     added = [row for row in rows if row.asset not in set(assets)]
     without = [asset for asset in dict.fromkeys(assets) if asset not in known]
-    return Filling(table, new, added, empty, differences, without, _said(table, rows))
+    return Filling(table, new, added, empty, differences, without, list(other.values()), sections)
+
+
+def _declared_otherwise(table: Table, column: str) -> str:
+    """Why the cells of clips are none of a condition: it has that name, and another type or unit. Empty where they are."""
+    condition = table.schema.conditions.get(column)
+    if condition is None:
+        return ""
+    kind, unit = condition.domain.type, condition.unit.strip()
+    if column not in UNITS:
+        fits = kind.family is Family.VALUES and kind.python is not bool
+    else:
+        fits = kind.is_decimal and kind.is_circular == (column == "direction") and unit in UNITS[column]
+    declared = f"{kind.name} in {unit}" if unit else kind.name
+    return "" if fits else f'"{column}" is not filled: clips show {SHOWN[column]}, contextdb.toml declares {declared}.'
 
 
 def _said(table: Table, rows: Sequence[Described]) -> Sections:

@@ -208,5 +208,6 @@ def _notes(clips: ClipRows, fills: Filling) -> Iterator[str]:
     """What was taken for granted or left out."""
     if fills.without_clip:
         yield f"No clip for {plural(len(fills.without_clip), 'row')}: {some(fills.without_clip)}"
+    yield from fills.notes
     yield from clips.found.notes
     yield from (f"left out: {message}" for message in clips.found.left_out)

@@ -48,7 +48,7 @@ from contextdb.tables.table import Table
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The arguments of the command."""
-    parser.add_argument("path", metavar="PATH", help="a folder of tables, one table, or its cases")
+    parser.add_argument("path", metavar="PATH", help="a folder of tables, one table or its name, or its cases")
     add_format_arguments(parser, report.formats("check"))
     parser.add_argument(
         "--fail-on", choices=("error", "warning", "none"), default="error", help="the lowest level that fails (default: error)"

@@ -207,6 +207,17 @@ def test_a_row_deleted_here_and_changed_there_is_a_conflict_and_either_can_be_ta
     assert found.resolved({0: "theirs"}).table.assets == ["walk", "jump", "dive"]
 
 
+@pytest.mark.parametrize(("text", "expected"), [("X", [("row", "run", "run", None, "mood: X")]), ("Any", []), ("", [])])
+def test_a_row_deleted_here_is_a_conflict_where_a_new_column_there_says_something_of_it(base, text, expected):
+    gone = after(base, edits.delete_rows(base, [1]))
+    filled = after(base, edits.insert_columns(base, 2, [edits.NewColumn("mood")])).with_cell(1, "mood", text)
+    found = merge(base, gone, filled)
+    assert told(found) == expected
+    back = found.resolved({0: "theirs"}) if expected else merge(base, filled, filled)
+    assert (back.conflicts, back.table.assets, back.table.text(1, "mood")) == ((), base.assets, text)
+    assert len(told(merge(base, filled, gone))) == len(expected)
+
+
 def test_both_insert_the_same_asset_differently(base):
     ours = after(base, edits.insert_rows(base, 4, [{"Asset": "new", "speed": "1", "hit": "True"}]))
     theirs = after(base, edits.insert_rows(base, 0, [{"Asset": "new", "speed": "2", "hit": "True"}]))

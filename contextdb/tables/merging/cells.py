@@ -96,7 +96,7 @@ def _judged(
 
 
 def changed_in(tables: tuple[TableData, TableData], columns: Places, rows: tuple[Places, Places]) -> Flags:
-    """Whether any cell of some rows of a side differs from base's: bool [rows].
+    """Whether any cell of some rows of a side differs from base's, or says something in a new column: bool [rows].
 
     `tables` are base and the side, `columns` says for each column of the side which one of base it was, and `rows` are places in
     both.
@@ -105,7 +105,7 @@ def changed_in(tables: tuple[TableData, TableData], columns: Places, rows: tuple
     if not len(found):
         return found
     for at, was in enumerate(columns.tolist()):
-        if was >= 0:
-            shared = Shared.of((tables[0].columns[was], tables[1].columns[at]))
-            found |= shared.at(0, rows[0]) != shared.at(1, rows[1])
+        shared = Shared.of((tables[0].columns[was] if was >= 0 else None, tables[1].columns[at]))
+        now = shared.at(1, rows[1])
+        found |= shared.at(0, rows[0]) != now if was >= 0 else ~shared.is_any[now]
     return found

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from contextdb.cells.words import says_any
 from contextdb.errors import shown
 from contextdb.tables.changes import CameFrom
 from contextdb.tables.data import TableData
@@ -51,7 +52,11 @@ def _row_conflict(base: TableData, side: TableData, aligned: Alignment, row: int
 
 
 def _changes(base: TableData, side: TableData, columns: CameFrom, was: int, row: int) -> Iterator[str]:
-    changed = [at for at, b in enumerate(columns.tolist()) if b >= 0 and base.columns[b][was] != side.columns[at][row]]
+    changed = [
+        at
+        for at, b in enumerate(columns.tolist())
+        if (base.columns[b][was] != side.columns[at][row] if b >= 0 else not says_any(side.columns[at][row]))
+    ]
     yield from (f"{shown(side.columns[at].name)}: {shown(side.columns[at][row])}" for at in changed[:MOST_CHANGES])
     if len(changed) > MOST_CHANGES:
         yield f"{len(changed) - MOST_CHANGES} more"

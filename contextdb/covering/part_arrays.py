@@ -143,14 +143,14 @@ def _mixed(x: Array) -> Array:
     return np.asarray(x ^ (x >> shift))
 
 
-def first_holders(part: Part, alike: Array, found: Array) -> None:
-    """Write for each box the first one that holds it whole and is not like it; see `search_kernels`."""
+def first_holders(part: Part, alike: Array, found: Array, start: int, stop: int) -> None:
+    """Write for boxes from `start` to `stop` the first one that holds each whole and is not like it; see `search_kernels`."""
     limits, sides, wider, n_boxes = part[1], part[5], part[6], len(part[9])
-    around = np.repeat(bitmask.full(n_boxes)[None], n_boxes, axis=0)
+    around = np.repeat(bitmask.full(n_boxes)[None], stop - start, axis=0)
     for factor in range(len(limits)):
-        side = sides[factor]
+        side = sides[factor, start:stop]
         around &= np.where((side < 0)[:, None], ~limits[factor], wider[side])
-    for box, others in enumerate(around):
+    for box, others in enumerate(around, start):
         holders = bitmask.rows(others)
         unlike = holders[alike[holders] != alike[box]]
         found[box] = unlike[0] if len(unlike) else -1

@@ -16,11 +16,14 @@ from numpy.typing import NDArray
 from contextdb import bitmask
 from contextdb.console import was_compiled
 from contextdb.covering.count import depth_of, scratch_of, table_of
+from contextdb.covering.progress import SILENT, Progress
 from contextdb.covering.space import Box, runs_of
 
 Arrays = tuple[NDArray[Any], ...]
 MANY = 1000
 """From so many boxes on the loops are worth loading."""
+AT_ONCE = 10_000_000
+"""So many words of boxes are compared between two looks at whether to stop."""
 
 
 def is_prepared() -> bool:
@@ -90,7 +93,7 @@ class Questions:
                     inside[edges[f] + first : edges[f] + stop] = 1.0
         return inside
 
-    def holders(self, n: int) -> NDArray[np.int64]:
+    def holders(self, n: int, progress: Progress = SILENT) -> NDArray[np.int64]:
         """For each of the first n boxes the first of them that holds it whole and is not equal to it; -1: there is none."""
         from contextdb.covering.part_kernels import part_of
         from contextdb.covering.search_kernels import first_holders
@@ -102,5 +105,8 @@ class Questions:
         found = np.full(n, -1, np.int64)
         with np.errstate(over="ignore"):
             part = part_of(np.arange(n), np.arange(n_factors), everything, np.zeros(n_factors, np.uint64), self._table)
-            first_holders(part, alike, found)
+            step = max(1, AT_ONCE // part[1].shape[1])
+            for start in range(0, n, step):
+                progress.at(start / n)
+                first_holders(part, alike, found, start, min(n, start + step))
         return found

@@ -48,6 +48,8 @@ def test_the_first_box_around_each_by_numpy_is_that_of_the_loops(n_boxes: int):
     part = part_kernels.part_of(boxes, factors, weights, np.zeros(len(space.full), np.uint64), table)
     alike = rng.integers(0, 4, len(boxes))
     found = np.zeros((2, len(boxes)), np.int64)
-    search_kernels.first_holders(part, alike, found[0])
-    part_arrays.first_holders(part, alike, found[1])
+    half = len(boxes) // 2
+    for start, stop in ((0, half), (half, len(boxes))):
+        search_kernels.first_holders(part, alike, found[0], start, stop)
+        part_arrays.first_holders(part, alike, found[1], start, stop)
     assert found[0].tolist() == found[1].tolist()

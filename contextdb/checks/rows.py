@@ -20,7 +20,7 @@ from contextdb.checks.run import capped
 from contextdb.covering.assumed import assumptions_of, opened
 from contextdb.covering.engine import finding_steps
 from contextdb.covering.judge import Judge
-from contextdb.covering.progress import Progress, Tell
+from contextdb.covering.progress import Progress, Stops, Tell
 from contextdb.errors import ContextDBError, plural
 from contextdb.expressions import ExpressionError, names_in
 from contextdb.findings import Finding
@@ -33,11 +33,14 @@ WORK = 4_000_000
 """A tenth of what coverage may spend."""
 
 
-def check_rows(table: EitherTable, work: int = WORK, progress: Tell | None = None) -> list[Finding]:
+def check_rows(
+    table: EitherTable, work: int = WORK, progress: Tell | None = None, should_stop: Stops | None = None
+) -> list[Finding]:
     """What is wrong with the rows of a table that can be read, those of the whole table first; nothing where cells cannot be read.
 
     The same table and work give the same findings. Rows that could not be decided within the work have none, and one
-    finding counts them; of a rule that many rows break the first are named, and how many more there are.
+    finding counts them; of a rule that many rows break the first are named, and how many more there are. Raises Cancelled
+    when `should_stop` says so.
     """
     if table.faults:
         return []
@@ -47,7 +50,7 @@ def check_rows(table: EitherTable, work: int = WORK, progress: Tell | None = Non
         return [_of_schema(table, "bad-assumption", fault.message) for fault in error.faults]
     if contradictions:
         return [_of_schema(table, "no-context", f"no context is possible: {fault.message}") for fault in contradictions]
-    found = capped([*_always_any(table), *_judged(table, work, Progress(progress))])
+    found = capped([*_always_any(table), *_judged(table, work, Progress(progress, should_stop))])
     return sorted(found, key=lambda f: (f.row is not None, f.row or 0))
 
 

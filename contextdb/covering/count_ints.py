@@ -110,6 +110,15 @@ class Factor(dict[int, tuple[int, int, float, int]]):
         return Factor(base, self.number, renumbered, self.salt)
 
 
+def factors_of(part: tuple[Array, ...], cells: list[list[int]], hashes: list[list[int]]) -> tuple[int, list[Factor]]:
+    """All boxes of a part, and its factors; `cells` are those of each factor, and `hashes` those of cells."""
+    numbers, _, groups, masses, starts, _, _, _, _, boxes = part
+    base = Base(boxes.tolist(), cells, hashes)
+    own = list(zip(map(bitmask.to_int, groups), masses.tolist(), strict=True))
+    first = starts.tolist()
+    return base.all, [Factor(base, f, own[first[x] : first[x + 1]], 0) for x, f in enumerate(numbers.tolist())]
+
+
 class Part:
     """Some boxes of a base, in so many words each where numba counts."""
 
@@ -130,12 +139,8 @@ class Count:
     """A count of the contexts that none of some boxes holds; `work` steps are done, and some parts may be `cut` short."""
 
     def __init__(self, part: tuple[Array, ...], table: tuple[Array, ...], n_known: int, depth: int, progress: Progress) -> None:
-        numbers, _, groups, masses, starts, _, _, _, _, boxes = part
-        base = Base(boxes.tolist(), table[0].T.tolist(), table[3].tolist())
-        own = list(zip(map(bitmask.to_int, groups), masses.tolist(), strict=True))
-        first = starts.tolist()
-        self.factors = [Factor(base, f, own[first[x] : first[x + 1]], 0) for x, f in enumerate(numbers.tolist())]
-        self.boxes, self.depth, self.progress = base.all, depth, progress
+        self.boxes, self.factors = factors_of(part, table[0].T.tolist(), table[3].tolist())
+        self.depth, self.progress = depth, progress
         self.deepest_alone = max(LEAST_DEPTH, depth - 4 * len(self.factors))
         self.keys: list[Any] = [np.zeros(n_known, np.uint64).data for _ in range(2)]
         self.bounds: list[Any] = [np.zeros(n_known).data for _ in range(2)]
@@ -164,7 +169,7 @@ class Count:
             return 1.0, 1.0
         boxes = numbers_of(opened)
         if len(boxes) > 1:
-            left = _without_inner(opened, boxes, own)
+            left = without_inner(opened, boxes, own)
             if left != opened:
                 opened, boxes = left, numbers_of(left)
                 own = [factor for factor in own if factor.limits & left]
@@ -206,7 +211,7 @@ class Count:
         if self.work >= self.limit or depth >= self.depth - ROOM:
             self.cut += 1
             return low, high
-        kept = _hanging_together(limits)
+        kept = hanging_together(limits)
         if kept != opened:
             return self._product(part, depth + 1, kept, opened ^ kept, boxes, own, limits)
         self.work += PER_NODE + (m >> 1)
@@ -306,7 +311,7 @@ class Count:
 
     def _fixed(self, part: Part, depth: int, opened: int, own: list[Factor], limits: list[int]) -> Shares:
         """What is left when one factor is fixed, to each group of classes in turn."""
-        best, chosen = _chosen(part, opened, own, limits)
+        best, chosen = chosen_groups(part, opened, own, limits)
         listed = [*own[:best], *own[best + 1 :]]
         self.work += len(chosen) * part.n_words >> 2
         low, high = 0.0, 0.0
@@ -323,16 +328,20 @@ class Count:
         return low, high
 
 
-def _chosen(part: Part, opened: int, own: list[Factor], limits: list[int]) -> tuple[int, list[tuple[int, float]]]:
+def chosen_groups(
+    part: Part, opened: int, own: list[Factor], limits: list[int], first: float = 0.0
+) -> tuple[int, list[tuple[int, float]]]:
     """The place of the factor that most boxes restrict, fewer where it has more groups; and its groups as the open boxes tell them
-    apart with what they weigh, those that fewest accept first, but for those that leave nothing open."""
+    apart with what they weigh, those that fewest accept first, but for those that leave nothing open. A factor that is the last of
+    a box counts `first` more."""
     once, twice, best, most = 0, 0, 0, -1.0
-    for x, limited in enumerate(limits):
+    for limited in limits:
         twice |= once & limited
         once |= limited
+    for x, limited in enumerate(limits):
         n_limited = limited.bit_count()
         n_groups = n_limited + 1 if n_limited == 1 else min(part.n_groups(own[x]), n_limited + 1)
-        score = n_limited / log2(1.0 + n_groups)
+        score = n_limited / log2(1.0 + n_groups) + (first if limited & ~twice else 0.0)
         if score > most:
             best, most = x, score
     alone = limits[best] & ~twice
@@ -344,7 +353,7 @@ def _chosen(part: Part, opened: int, own: list[Factor], limits: list[int]) -> tu
     return best, sorted(found.items(), key=lambda item: item[0].bit_count())
 
 
-def _without_inner(opened: int, boxes: list[int], own: list[Factor]) -> int:
+def without_inner(opened: int, boxes: list[int], own: list[Factor]) -> int:
     """The open boxes without those that lie within others; of equal ones the last stays open."""
     for box in boxes:
         bit = 1 << box
@@ -358,7 +367,7 @@ def _without_inner(opened: int, boxes: list[int], own: list[Factor]) -> int:
     return opened
 
 
-def _hanging_together(limits: list[int]) -> int:
+def hanging_together(limits: list[int]) -> int:
     """The boxes that hang together with those which the first factor limits."""
     kept, grows = limits[0], True
     while grows:

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contextdb.covering.kernels import ALL, IS_COMPILED, NONE, ONE, lowest_bit, mixed, n_bits, njit, options
+from contextdb.covering.kernels import ALL, NONE, ONE, lowest_bit, mixed, n_bits, njit, options
 from contextdb.covering.part_kernels import part_of
 
 WORK, LIMIT, CUT, STOP, SHARED = 0, 1, 2, 3, 4
@@ -431,7 +431,3 @@ def holds_one_of(groups, group, others, open_boxes):
         if missing == NONE:
             return True
     return False
-
-
-if not IS_COMPILED:
-    from contextdb.covering.part_arrays import drop_inner as drop_inner

@@ -353,7 +353,9 @@ class Judge:
     @cached_property
     def _first_holders(self) -> NDArray[np.int64]:
         assert self._questions is not None
-        return self._questions.holders(len(self.space.boxes))
+        told, size = self.progress, self.progress.stop - self.progress.start
+        ahead = told.within(told.part, told.start + size * AHEAD / 2, told.start + size * AHEAD)
+        return self._questions.holders(len(self.space.boxes), ahead)
 
     def _named(self, i: int, of: int) -> str:
         return self._row_named(self.space.rows[i], self.space.rows[of])

@@ -143,33 +143,14 @@ def _mixed(x: Array) -> Array:
     return np.asarray(x ^ (x >> shift))
 
 
-def drop_inner(part: Part, depth: int, n: int, scratch: Part) -> bool:
-    """Close the boxes that lie within others; see `count_kernels`."""
-    limits, sides, wider = part[1], part[5], part[6]
-    opened, listed = scratch[0][depth, : limits.shape[1]], scratch[2]  # there is room for larger parts
-    boxes = bitmask.rows(opened)
-    around = np.full((len(boxes), len(opened)), ALL, np.uint64)
-    for factor in listed[depth + 1, :n].tolist():
-        side = sides[factor, boxes]
-        around &= np.where((side < 0)[:, None], ~limits[factor], wider[side])
-    left = was = bitmask.to_int(opened)
-    for box, others in zip(boxes.tolist(), around, strict=True):
-        own = 1 << box
-        if (left & ~own) & bitmask.to_int(others):
-            left &= ~own
-    if left != was:
-        opened[:] = bitmask.from_int(left, 64 * len(opened))
-    return left != was
-
-
-def first_holders(part: Part, alike: Array, found: Array) -> None:
-    """Write for each box the first one that holds it whole and is not like it; see `search_kernels`."""
+def first_holders(part: Part, alike: Array, found: Array, start: int, stop: int) -> None:
+    """Write for boxes from `start` to `stop` the first one that holds each whole and is not like it; see `search_kernels`."""
     limits, sides, wider, n_boxes = part[1], part[5], part[6], len(part[9])
-    around = np.repeat(bitmask.full(n_boxes)[None], n_boxes, axis=0)
+    around = np.repeat(bitmask.full(n_boxes)[None], stop - start, axis=0)
     for factor in range(len(limits)):
-        side = sides[factor]
+        side = sides[factor, start:stop]
         around &= np.where((side < 0)[:, None], ~limits[factor], wider[side])
-    for box, others in enumerate(around):
+    for box, others in enumerate(around, start):
         holders = bitmask.rows(others)
         unlike = holders[alike[holders] != alike[box]]
         found[box] = unlike[0] if len(unlike) else -1

@@ -79,12 +79,13 @@ def leaves_open(part, depth, n_listed, weights, salts, table, scratch, state):
 
 
 @njit(**options)
-def first_holders(part, alike, found):
-    """Write for each box the first one that holds it whole and is not like it, else -1; `alike` names the first box like each."""
+def first_holders(part, alike, found, start, stop):
+    """Write for boxes from `start` to `stop` the first one that holds each whole and is not like it, else -1; `alike` names the
+    first box like each."""
     _, limits, _, _, _, sides, wider, _, _, boxes = part
     n_words, m = limits.shape[1], boxes.shape[0]
     over = np.empty(n_words, np.uint64)
-    for i in range(m):
+    for i in range(start, stop):
         found[i] = -1
         over[:] = ALL
         if m & 63:

@@ -261,10 +261,14 @@ class TableData(Unchanging):
 
     def _column_at(self, name: str) -> int:
         require_text(name, "column")
-        for at, column in enumerate(self.columns):
-            if column.name == name:
-                return at
+        if name in self._places:
+            return self._places[name]
         raise TableError(_no_such("column", name, [c.name for c in self.columns]))
+
+    @cached_property
+    def _places(self) -> dict[str, int]:
+        """Where each column is, by its name; of several of one name the first."""
+        return {column.name: at for at, column in reversed([*enumerate(self.columns)])}
 
 
 def known_conditions(table: TableData) -> dict[str, Condition]:

@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from contextdb.covering import kernels
 from contextdb.covering.count import Bounds, _count
 from contextdb.covering.progress import SILENT, Cancelled, Progress
+from contextdb.covering.questions import Questions
 from contextdb.covering.space import Box
+from contextdb.covering.witness import BoxSet
 
 Made = tuple[list[Box], Box, list[NDArray[np.float64]]]
 
@@ -41,6 +43,26 @@ def test_without_numba_the_bounds_and_the_steps_are_the_same(
     for seed in range(2):
         space = made(n_boxes, n_factors, seed)
         assert counted(space, work, True, monkeypatch) == counted(space, work, False, monkeypatch)
+
+
+def test_without_numba_questions_have_the_same_answers_in_the_same_steps(monkeypatch: pytest.MonkeyPatch):
+    answers = set()
+    for (n_boxes, n_factors), seed in itertools.product([(5, 6), (64, 18), (150, 18), (150, 24), (400, 8), (400, 24)], range(4)):
+        boxes, full, _ = made(n_boxes, n_factors, seed)
+        rng = random.Random(seed)
+        asked = tuple(rng.randrange(1, side + 1) if rng.random() < 0.2 else side for side in full)
+        rows = BoxSet.of(full, boxes)
+        by = rows.all
+        for f, side in enumerate(asked):
+            by &= rows.meeting(f, side)
+        for most in (500, 1_000_000):
+            found = []
+            for is_compiled in (True, False):
+                monkeypatch.setattr(kernels, "IS_COMPILED", is_compiled)
+                found.append(Questions(boxes, full).are_held(asked, by, most))
+            assert found[0] == found[1]
+            answers.add(found[0][:2])
+    assert answers == {(True, True), (False, True), (False, False)}
 
 
 def test_some_of_these_counts_are_cut_short_and_some_are_not(monkeypatch: pytest.MonkeyPatch):

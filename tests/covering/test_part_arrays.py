@@ -8,8 +8,8 @@ from numpy.random import default_rng
 
 import contextdb as cdb
 from contextdb.compiled.table import data_of
-from contextdb.covering import count_kernels, part_arrays, part_kernels, search_kernels
-from contextdb.covering.count import scratch_of, table_of
+from contextdb.covering import part_arrays, part_kernels, search_kernels
+from contextdb.covering.count import table_of
 from contextdb.covering.space import Space
 
 
@@ -39,25 +39,6 @@ def test_a_part_by_numpy_is_that_of_the_loops(n_boxes: int, kept: float):
 
 
 @pytest.mark.parametrize("n_boxes", [1, 3, 64, 65, 200])
-@pytest.mark.parametrize("n_listed", [1, 4, 12])
-def test_the_boxes_within_others_by_numpy_are_those_of_the_loops(n_boxes: int, n_listed: int):
-    space, rng = Space.of(data_of(made_table().compile())), default_rng(n_boxes)
-    table = table_of(space.boxes, space.full, [len(f.weights) for f in space.factors])
-    weights = np.concatenate([f.weights for f in space.factors])
-    boxes = np.sort(rng.choice(len(space.boxes), min(n_boxes, len(space.boxes)), replace=False))
-    salts = np.zeros(len(space.full), np.uint64)
-    part = part_kernels.part_of(boxes, np.arange(len(space.full)), weights, salts, table)
-    n_listed = min(n_listed, len(part[0]))
-    found = []
-    for drop_inner in (count_kernels.drop_inner, part_arrays.drop_inner):
-        scratch = scratch_of(part, int(np.diff(table[4]).max()))
-        scratch = (np.pad(scratch[0], ((0, 0), (0, 2))), *scratch[1:])  # room for larger parts
-        scratch[2][1, :n_listed] = default_rng(1).permutation(len(part[0]))[:n_listed]
-        found.append((drop_inner(part, 0, n_listed, scratch), scratch[0][0].tolist()))
-    assert found[0] == found[1]
-
-
-@pytest.mark.parametrize("n_boxes", [1, 3, 64, 65, 200])
 def test_the_first_box_around_each_by_numpy_is_that_of_the_loops(n_boxes: int):
     space, rng = Space.of(data_of(made_table().compile())), default_rng(n_boxes)
     table = table_of(space.boxes, space.full, [len(f.weights) for f in space.factors])
@@ -67,6 +48,8 @@ def test_the_first_box_around_each_by_numpy_is_that_of_the_loops(n_boxes: int):
     part = part_kernels.part_of(boxes, factors, weights, np.zeros(len(space.full), np.uint64), table)
     alike = rng.integers(0, 4, len(boxes))
     found = np.zeros((2, len(boxes)), np.int64)
-    search_kernels.first_holders(part, alike, found[0])
-    part_arrays.first_holders(part, alike, found[1])
+    half = len(boxes) // 2
+    for start, stop in ((0, half), (half, len(boxes))):
+        search_kernels.first_holders(part, alike, found[0], start, stop)
+        part_arrays.first_holders(part, alike, found[1], start, stop)
     assert found[0].tolist() == found[1].tolist()

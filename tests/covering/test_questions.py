@@ -15,6 +15,7 @@ from contextdb.checks.rows import check_rows
 from contextdb.covering.count import uncovered_share
 from contextdb.covering.factors import ValueFactor
 from contextdb.covering.judge import AHEAD
+from contextdb.covering.progress import Cancelled, Progress
 from contextdb.covering.questions import MANY, Questions
 from contextdb.covering.space import Box, Space
 from contextdb.covering.witness import BoxSet, Steps
@@ -80,6 +81,16 @@ def test_the_first_holder_of_each_box_is_that_of_comparing_all_pairs(boxes):
         return next(holders, -1)
 
     assert Questions(boxes, FULL).holders(len(boxes)).tolist() == [first(i) for i in range(len(boxes))]
+
+
+def test_the_first_holders_are_told_of_and_can_be_stopped(monkeypatch: pytest.MonkeyPatch):
+    boxes = [(1, 3, 7, 15, 3, 7), (3, 3, 7, 15, 3, 7), (2, 2, 7, 15, 3, 7)]
+    monkeypatch.setattr("contextdb.covering.questions.AT_ONCE", 1)
+    told: list[float] = []
+    assert Questions(boxes, FULL).holders(3, Progress(lambda _, share: told.append(share))).tolist() == [1, -1, 1]
+    assert told == [0.0, 1 / 3, 2 / 3]
+    with pytest.raises(Cancelled):
+        Questions(boxes, FULL).holders(3, Progress(None, lambda: len(told) == 3))
 
 
 def test_a_question_without_steps_is_not_certain():

@@ -12,6 +12,7 @@ from terminal import press, said, screen_text, with_editor
 from textual.events import Key, Paste
 
 import tui.doing
+from tui.messages import Told
 from tui.model.find import Search
 from tui.model.long_work import told
 from tui.model.sheet import Done, Sheet
@@ -70,6 +71,20 @@ def test_keys_wait_for_a_long_paste_which_is_one_step(file, is_long):
         return said(app), app.main.session.sheet.table.assets, app.main.session.sheet.history.names
 
     assert with_editor(file, script) == ("Redo: Paste 2 × 2.", ["hop", "skip", "jump"], ["Paste 2 × 2"])
+
+
+def test_a_long_copy_says_its_share_and_then_what_was_copied(file, is_long, monkeypatch):
+    shares: list[str] = []
+    monkeypatch.setattr(tui.doing, "Told", lambda *told: shares.append(told[0]) or Told(*told))
+
+    async def script(app, pilot):
+        await press(pilot, "ctrl+a", "ctrl+c")
+        await ended(app, pilot)
+        await press(pilot)
+        return said(app), app.main.assets.clipboard.text
+
+    assert with_editor(file, script) == ("Copied 3 × 3.", TABLE.partition("\n")[2].replace(",", "\t"))
+    assert shares == ["░░░░░░░░░░░░░░░░░░░░ 0% · Esc stops it"]
 
 
 def replace_all(app) -> None:

@@ -135,6 +135,20 @@ def test_the_names_that_are_no_values_are_found(text, names):
     assert undeclared(text, ["Walk", "Run"]) == names
 
 
+def test_names_are_not_compared_with_every_declared_value():
+    class Name(str):
+        n_compared = 0
+        __hash__ = str.__hash__
+
+        def __eq__(self, other):
+            Name.n_compared += 1
+            return str.__eq__(self, other)
+
+    values = [Name(f"tag_{at}") for at in range(300)]
+    assert undeclared(" ".join(f"+tag_{at}" for at in range(301)), values) == ["tag_300"]
+    assert Name.n_compared < 2_000
+
+
 async def right_click(app, pilot, x: int, y: int) -> None:
     grid = app.main.assets.grid
     await pilot.mouse_down(grid, offset=(x, y), button=3)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
 from pathlib import Path
+from threading import Event
 from typing import Any
 
 import pytest
@@ -13,6 +14,7 @@ from textual.pilot import Pilot
 
 import contextdb as cdb
 from contextdb.commands.check_command import check_path
+from contextdb.covering import Cancelled
 from tui.messages import GoToCell, Told
 from tui.model.coverage_lines import in_rows
 from tui.model.problems import Problem, Problems, cell_findings, row_findings
@@ -198,6 +200,28 @@ def test_a_large_table_is_checked_beside_the_keys():
     n_found = len(cell_findings(large)) + len(row_findings(large))
     assert screen.splitlines()[0].strip() == "1 warning, 1 for information."
     assert len(app.pane.lines) == n_found
+
+
+def test_a_check_ends_when_its_table_is_no_longer_wanted(monkeypatch):
+    n_rows, ended = 20_001, Event()
+    columns = {"Asset": [f"A{r}" for r in range(n_rows)], **{f"b{i}": ["True"] * n_rows for i in range(9)}}
+    large = cdb.Table.from_columns(columns, {f"b{i}": {"type": "bool"} for i in range(9)})
+    with pytest.raises(Cancelled):
+        row_findings(large, lambda: True)
+
+    def for_ever(table, should_stop):
+        while not should_stop():
+            pass
+        ended.set()
+        raise Cancelled("the computation was stopped.")
+
+    monkeypatch.setattr("tui.panes.problems.row_findings", for_ever)
+
+    async def leave(pilot: Pilot[None]) -> None:
+        await pilot.pause()
+
+    shown(large, script=leave)
+    assert ended.wait(10)
 
 
 def test_the_tab_shows_what_the_command_check_finds(tmp_path):

@@ -11,7 +11,7 @@ from terminal import press, screen_text, with_editor
 import contextdb as cdb
 from contextdb.covering import coverage
 from tui.model.rows_near import is_near_at_once, rows_near
-from tui.panes.rows_below import RowsBelow
+from tui.panes.rows_below import RowsBelow, _columns
 from tui.widgets.heat_map import HeatMap
 
 TABLES = Path(__file__).parents[2] / "tables"
@@ -123,3 +123,20 @@ def test_all_lines_of_the_chosen_square_of_a_map_have_one_ground(path):
     styles = with_editor(path, script, ROOMY)
     assert len(styles) == 3
     assert len({style.color if style.reverse else style.bgcolor for style in styles}) == 1
+
+
+def test_of_very_many_columns_only_those_are_read_that_have_room(monkeypatch: pytest.MonkeyPatch):
+    names, n_read = [f"c{at}" for at in range(3000)], 0
+    table = cdb.Table.from_columns({"Asset": ["a", "b"], **{name: ["True", "Any"] for name in names}})
+    text = type(table).text
+
+    def counted(self, row, column):
+        nonlocal n_read
+        n_read += 1
+        return text(self, row, column)
+
+    monkeypatch.setattr(type(table), "text", counted)
+    shown, widths = _columns(table, range(2), 60, "c2000")
+    assert shown == ["Asset", "c1994", "c1995", "c1996", "c1997", "c1998", "c1999", "c2000"]
+    assert sum(widths) + 2 * len(widths) <= 60
+    assert n_read < 50

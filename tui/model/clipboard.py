@@ -7,7 +7,7 @@ A cell with a tab, a line end or a double quote at its start is in double quotes
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from contextdb.tables.table import Table
@@ -49,7 +49,7 @@ def _as_wide(rows: Texts) -> Texts:
     return [row if len(row) == width else row + [""] * (width - len(row)) for row in rows]
 
 
-def format_tsv(rows: Sequence[Sequence[str]]) -> str:
+def format_tsv(rows: Iterable[Sequence[str]]) -> str:
     """Cells as a text for the clipboard, each row closed by "\\n"."""
     return "".join("\t".join(map(_field, row)) + "\n" for row in rows)
 

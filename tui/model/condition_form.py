@@ -77,8 +77,8 @@ def names_in(text: str) -> Iterable[str]:
 
 def undeclared(text: str, values: Sequence[str]) -> list[str]:
     """The names in a cell that are no declared values: without signs, a penalty, and the words of the grammar."""
-    names = (name.lstrip("+-") for name in names_in(text.partition("~")[0]))
-    return [name for name in dict.fromkeys(names) if name and name not in values and name.casefold() not in ("not", "any")]
+    names, known = (name.lstrip("+-") for name in names_in(text.partition("~")[0])), frozenset(values)
+    return [name for name in dict.fromkeys(names) if name and name not in known and name.casefold() not in ("not", "any")]
 
 
 def _mirror_text(mirror: Mirror | None) -> str:

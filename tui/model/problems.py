@@ -13,6 +13,7 @@ from contextdb.checks.cases import check_cases, read_cases
 from contextdb.checks.rows import check_rows
 from contextdb.checks.rules import RULES
 from contextdb.checks.run import check
+from contextdb.covering.progress import Stops
 from contextdb.errors import ContextDBError, Fault, plural
 from contextdb.findings import LEVELS, Finding, Level
 from contextdb.tables.other_files import cases_path
@@ -113,10 +114,11 @@ def _in_rows(findings: Sequence[Finding], table: Table) -> list[Finding]:
     return [replace(one, message=in_rows(one, table)) if one.by else one for one in findings]
 
 
-def row_findings(table: Table) -> list[Finding]:
-    """What it says beside: rows that others make redundant, that are dead or never chosen, and saved contexts that fail."""
+def row_findings(table: Table, should_stop: Stops | None = None) -> list[Finding]:
+    """What it says beside: rows that others make redundant, that are dead or never chosen, and saved contexts that fail. Raises
+    Cancelled when `should_stop` says so."""
     try:
-        rows = check_rows(table)
+        rows = check_rows(table, should_stop=should_stop)
     except MemoryError:
         rows = []
     return [*_in_rows(rows, table), *_of_cases(table)]

@@ -146,7 +146,7 @@ class Sheet(ShownTable):
         block = self.block
         rows, columns = self.view.rows[block.top : block.bottom], self.table.columns[block.left : block.right]
         texts = [[c.texts[code] for code in c.codes[rows].tolist()] for c in columns]
-        return format_tsv(list(zip(*texts, strict=True)))
+        return format_tsv(told(zip(*texts, strict=True), len(rows)))
 
     def cut(self) -> tuple[str, Done]:
         """The selected cells as text; they are empty then."""

@@ -16,7 +16,9 @@ from textual.containers import VerticalScroll
 from textual.content import Content
 from textual.message import Message
 from textual.widgets import Static
+from textual.worker import get_current_worker
 
+from contextdb.covering import Cancelled
 from contextdb.errors import Fault
 from contextdb.findings import LEVELS, Finding, Level
 from contextdb.tables.table import Table
@@ -128,7 +130,12 @@ class ProblemsPane(Pane):
         if not is_checked_at_once(table):
             found = cell_findings(table)
             self.post_message(self.Checked(table, found, False))
-        self.post_message(self.Checked(table, [*found, *row_findings(table)], True))
+        worker = get_current_worker()
+        try:
+            rows = row_findings(table, lambda: worker.is_cancelled)
+        except Cancelled:  # the table was changed, or the editor is left
+            return
+        self.post_message(self.Checked(table, [*found, *rows], True))
 
     @on(Checked)
     def _checked(self, event: Checked) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cache
 from typing import ClassVar
 
 from rich.cells import cell_len
@@ -100,19 +101,29 @@ def _columns(table: Table, rows: Sequence[int], room: int, column: str | None) -
     """The columns that there is room for, with their widths: that of the assets, then those from the left, others instead where
     `column` is not among them. Long names are whole where all columns have room so."""
     names = [table.asset_column, *(one.name for one in table.columns if one.name != table.asset_column)]
-    cells = [max((cell_len(table.text(row, name)) for row in rows), default=0) + 1 for name in names]
-    whole = [max(n, cell_len(name), LEAST) for n, name in zip(cells, names, strict=True)]
-    if sum(whole) + 2 * len(whole) <= room:
-        return names, whole
-    widths = [min(max(n, cell_len(short_name(name)), LEAST), WIDEST) for n, name in zip(cells, names, strict=True)]
-    widths[0] = min(max(cells[0], LEAST), WIDEST_ASSET)
-    start, end = 1, max(names.index(column) + 1 if column in names else 2, 2)
-    room -= widths[0] + 2
-    while start < end - 1 and sum(widths[start:end]) + 2 * (end - start) > room:
+    most = room // (LEAST + 2)
+
+    @cache
+    def of_cells(at: int) -> int:
+        return max((cell_len(table.text(row, names[at])) for row in rows), default=0) + 1
+
+    if len(names) <= most:
+        whole = [max(of_cells(at), cell_len(name), LEAST) for at, name in enumerate(names)]
+        if sum(whole) + 2 * len(whole) <= room:
+            return names, whole
+
+    def width(at: int) -> int:
+        return min(max(of_cells(at), cell_len(short_name(names[at])), LEAST), WIDEST)
+
+    first = min(max(of_cells(0), LEAST), WIDEST_ASSET)
+    end = max(names.index(column) + 1 if column in names else 2, 2)
+    room -= first + 2
+    start = max(1, end - 1 - most)
+    while start < end - 1 and sum(map(width, range(start, end))) + 2 * (end - start) > room:
         start += 1
-    while end < len(names) and sum(widths[start : end + 1]) + 2 * (end + 1 - start) <= room:
+    while end < len(names) and sum(map(width, range(start, end + 1))) + 2 * (end + 1 - start) <= room:
         end += 1
-    return [names[0], *names[start:end]], [widths[0], *widths[start:end]]
+    return [names[0], *names[start:end]], [first, *map(width, range(start, min(end, len(names))))]
 
 
 def _cell(text: str, tone: str) -> ListCell:

@@ -288,7 +288,7 @@ class CellEditor(Widget):
             "nudge": self.is_numeric,
             "tick": is_open and self._chooser.has_ticks and self._offer.word is None,
             "sign": is_open and self._chooser.has_signs and not self.is_fact and self._offer.word is None,
-            "declare": self._is_declarable(),
+            "declare": action == "declare" and self._is_declarable(),
             "take": bool(self._mend or self._meaning.fault or self._completes),
         }
         return can.get(action, True)

@@ -382,7 +382,20 @@ class Grid(GridView, can_focus=True):
         if self.is_in_new_row:
             self._say_new_row()
             return
-        self.post_message(self.CopyWanted(self.cell_text() if self.is_in_test_row else self.sheet.copy()))
+        if self.is_in_test_row:
+            self.post_message(self.CopyWanted(self.cell_text()))
+            return
+        sheet, copied = self.sheet, list[str]()
+
+        def copy() -> Done:
+            copied.append(sheet.copy())
+            return Done()
+
+        def hand_over() -> None:
+            for text in copied:  # none where it was stopped
+                self.post_message(self.CopyWanted(text))
+
+        self._do(copy, sheet.block.n_cells, hand_over)
 
     def action_cut(self) -> None:
         self.again = self.action_cut

@@ -93,11 +93,6 @@ class Groups:
         return self.n_places // SIZE
 
     @cached_property
-    def firsts(self) -> Ints:
-        """The first group of each range."""
-        return np.asarray(np.cumsum(self.n_groups) - self.n_groups)
-
-    @cached_property
     def ranges(self) -> Ints:
         """Which of these ranges each group is of."""
         return np.arange(len(self.n_groups)).repeat(self.n_groups)
@@ -109,6 +104,11 @@ class Groups:
     def frames_of(self, groups: Ints | None) -> Ints:
         """The frames at the places of some groups, None for all."""
         return self.frames if groups is None else self.frames.reshape(-1, SIZE).take(groups, 0).ravel()
+
+    def product(self, group: int, point: Features) -> Features:
+        """A point times those of one group: [SIZE]."""
+        found: Features = self._points_of_groups[group].reshape(SIZE, -1) @ point
+        return found
 
     def products(self, groups: Ints, point: Features) -> Features:
         """A point times those of some groups, as they are kept: [len(groups), SIZE]."""

@@ -137,15 +137,13 @@ class Scan:
         far = (narrow[None] @ every.centres).ravel()[: len(every.radii)]
         far += added.to_groups
         parts = [slice(start // SIZE, -(-stop // SIZE)) for start, stop in _spans(every.frames, skips, plays)]
+        biased = far + biases.astype(np.float32).repeat(every.n_groups)
         for part in parts:
-            far[part] = np.inf  # a frame of it may be forbidden
-        least = np.minimum.reduceat(far, every.firsts) + biases
-        at, best = int(least.argmin()), math.inf
-        if least[at] < math.inf:
-            first, n = int(every.firsts[at]), int(every.n_groups[at])
-            seed = first + int(far[first : first + n].argmin())
-            row = every.products(np.array([seed]), narrow)[0] + added.to_places[seed * SIZE : (seed + 1) * SIZE]
-            best = float(row.min()) + float(biases[at])
+            biased[part] = np.inf  # a frame of it may be forbidden
+        seed, best = int(biased.argmin()), math.inf
+        if biased[seed] < math.inf:
+            row = every.product(seed, narrow) + added.to_places[seed * SIZE : (seed + 1) * SIZE]
+            best = float(row.min()) + float(biases[every.ranges[seed]])
         for part in parts:
             far[part] = -np.inf
         left = best + size + error - added.least - biases if best < math.inf else np.where(biases < np.inf, MOST, 0.0)

@@ -21,7 +21,7 @@ from typing import IO, Any, NoReturn
 from contextdb.console import ExitCode, drop_output, printable
 from contextdb.disk import unnameable
 from contextdb.disk.together import UnfinishedWarning
-from contextdb.errors import ContextDBError, Fault, Place, in_quotes, nearest, some
+from contextdb.errors import ContextDBError, Fault, Place, in_quotes, mend_for, nearest, some
 
 COMMANDS = {
     "edit": "the terminal editor",
@@ -63,8 +63,8 @@ class Parser(argparse.ArgumentParser):
         for text in rest:
             if not text.startswith("-"):
                 self.error(f"{in_quotes(text.removeprefix(_PLAIN))} is one argument too many.")
-            near = nearest(text.partition("=")[0], self._option_string_actions)
-            self.error(Fault(f"there is no option {in_quotes(text)}.", mend=in_quotes(near) if near else "").message)
+            mend = mend_for(text.partition("=")[0], self._option_string_actions)
+            self.error(Fault(f"there is no option {in_quotes(text)}.", mend=mend).message)
         return arguments
 
     def _get_values(self, action: argparse.Action, arg_strings: list[str]) -> Any:
@@ -77,8 +77,7 @@ class Parser(argparse.ArgumentParser):
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is not None and value not in action.choices:
             known = [str(c) for c in action.choices]
-            near = nearest(str(value), known)
-            fault = Fault(f"there is no {in_quotes(str(value))}.", some(known, len(known)), in_quotes(near) if near else "")
+            fault = Fault(f"there is no {in_quotes(str(value))}.", some(known, len(known)), mend_for(str(value), known))
             raise argparse.ArgumentError(action, fault.message)
 
     def error(self, message: str) -> NoReturn:

@@ -218,6 +218,20 @@ def nearest(word: str, known: Iterable[str]) -> str | None:
     return known_as[found[0]] if found else None
 
 
+def mend_for(word: str, known: Iterable[str]) -> str:
+    """The known name most like `word`, in quotes, as a fault suggests it; "" when none is near."""
+    near = nearest(word, known)
+    return in_quotes(near) if near else ""
+
+
+def no_such(
+    what: str, name: object, known: Iterable[str], accepted: str = "", place: Place = Place(), rule: str = "unreadable"
+) -> Fault:
+    """The fault of a name that there is not, with the names that there are, unless `accepted` says more, and the nearest one."""
+    names = list(known)
+    return Fault(f"there is no {what} {in_quotes(str(name))}.", accepted or some(names), mend_for(str(name), names), place, rule)
+
+
 def folded(name: str) -> str:
     """A name apart from its case, and from whether an accented letter is one character or two."""
     return unicodedata.normalize("NFC", name).casefold()

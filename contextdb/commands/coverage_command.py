@@ -30,7 +30,7 @@ from contextdb.covering.engine import MOST_GAPS, SAMPLES, WORK
 from contextdb.covering.pairs import PairTable
 from contextdb.covering.progress import Tell
 from contextdb.disk import read_bytes, write_atomic
-from contextdb.errors import ContextDBError, ContextError, Fault, FileError, Place, TableError, in_quotes, nearest, plural
+from contextdb.errors import ContextDBError, ContextError, Fault, FileError, Place, TableError, in_quotes, no_such, plural
 from contextdb.files.reports import has_digest
 from contextdb.report import formats, render
 from contextdb.report.coverage_results import CoverageResults, Measured
@@ -246,9 +246,8 @@ def _row(text: str, table: EitherTable) -> int:
         numbers = ", ".join(str(row + 1) for row in rows[:6])
         found = f"the asset {in_quotes(text)} is in {plural(len(rows), 'row')}."
         raise ContextError(Fault(found, f"one of the rows {numbers}"))
-    near = nearest(text, table.assets)
     accepted = f"a row from 1 to {table.n_rows:,}, or an asset" if table.n_rows else "none: the table has no rows"
-    raise ContextError(Fault(f"there is no row {in_quotes(text)}.", accepted, in_quotes(near) if near else ""))
+    raise ContextError(no_such("row", text, table.assets, accepted))
 
 
 def _only(tables: Sequence[EitherTable]) -> EitherTable:

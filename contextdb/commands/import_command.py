@@ -20,7 +20,7 @@ from pathlib import Path
 from contextdb.cells.kinds import KINDS
 from contextdb.console import ExitCode, aligned, output, printable
 from contextdb.disk import TABLE_SUFFIXES, path_in_quotes, read_bytes
-from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, nearest, plural, row_name
+from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, mend_for, nearest, plural, row_name
 from contextdb.exchange.formats import FORMATS, ReadOptions, read
 from contextdb.exchange.importing import (
     NAMES,
@@ -163,10 +163,7 @@ def _typed(mapped: Sequence[Mapped], reading: Reading, types: dict[str, str]) ->
             wanted[column.source] = as_job(column, kind)
         else:
             words = [*KINDS, *JOBS]
-            near = nearest(kind, words)
-            raise ContextDBError(
-                Fault(f"--type: there is no type {in_quotes(given)}.", ", ".join(words), in_quotes(near) if near else "")
-            )
+            raise ContextDBError(Fault(f"--type: there is no type {in_quotes(given)}.", ", ".join(words), mend_for(kind, words)))
     return [wanted.get(column.source, column) for column in mapped]
 
 

@@ -25,7 +25,7 @@ from contextdb.commands.progress import building_bar
 from contextdb.console import ExitCode, output, terminal_width, wants_colour
 from contextdb.covering.motion import motion_coverage
 from contextdb.disk import write_atomic
-from contextdb.errors import ContextError, Fault, in_quotes, nearest, some
+from contextdb.errors import ContextError, Fault, in_quotes, mend_for, some
 from contextdb.motion.measuring.near_clips import NEAR_COST
 from contextdb.motion.measuring.transition_names import PATTERN
 from contextdb.motion.storage.building import open_or_build
@@ -113,9 +113,8 @@ def _results(arguments: argparse.Namespace, earlier: Mapping[str, Earlier] | Non
 def _context(results: MotionCoverageResults, wanted: str, colour: bool, width: int) -> str:
     known = {each.contexts.id: (measured, each) for measured in results.tables for each in measured.motion.coverage.contexts}
     if wanted not in known:
-        near = nearest(wanted, known)
         accepted = f"an id of the report, such as {some(list(known))}" if known else "none: no context has a valid clip"
-        raise ContextError(Fault(f"there are no contexts {in_quotes(wanted)}.", accepted, in_quotes(near) if near else ""))
+        raise ContextError(Fault(f"there are no contexts {in_quotes(wanted)}.", accepted, mend_for(wanted, known)))
     return render_context(*known[wanted], colour=colour, width=width)
 
 

@@ -19,7 +19,7 @@ from contextdb.commands import missing_facts_by_option
 from contextdb.commands.motion_stage import number_of
 from contextdb.compiled.table import CompiledTable
 from contextdb.disk import path_in_quotes
-from contextdb.errors import ContextDBError, Fault, Place, TableError, in_quotes, nearest, some
+from contextdb.errors import ContextDBError, Fault, Place, TableError, in_quotes, mend_for, some
 from contextdb.files.texts import AnySource, read_texts
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.telemetry.contexts import Contexts, read_contexts
@@ -139,9 +139,8 @@ def conditions_of(tables: Mapping[str, CompiledTable]) -> list[str]:
 
 def _unknown(path: Path, name: str, conditions: Sequence[str]) -> Fault:
     known = [*STICK, *conditions]
-    near = nearest(name, known)
     found = f"the column {in_quotes(name)} is neither the stick's nor a fact of the tables."
-    return Fault(found, some(known, len(known)), in_quotes(near) if near else "", Place(str(path)))
+    return Fault(found, some(known, len(known)), mend_for(name, known), Place(str(path)))
 
 
 def _missing(path: Path, columns: Mapping[str, TextColumn]) -> list[Fault]:

@@ -11,7 +11,7 @@ import numpy as np
 from contextdb import bitmask
 from contextdb.bitmask import Rows, read_only
 from contextdb.compiled.outputs import NO_OUTPUTS, Outputs
-from contextdb.errors import ContextError, Fault, in_quotes, nearest, plural, some
+from contextdb.errors import ContextError, Fault, in_quotes, mend_for, plural, some
 
 _OWN_ANSWER = "an answer of this compiled table"
 _ASK_AGAIN = "to query this table again: query(facts)"
@@ -98,9 +98,8 @@ class AnsweredTable:
     def no_asset(self, asset: str) -> ContextError:
         """The error for an asset that no row has, with the nearest that one has."""
         known = dict.fromkeys((*self.assets, *self.leaves))
-        near = nearest(asset, known)
         found = f"the table {in_quotes(self.name)} has no asset {in_quotes(asset)}."
-        return ContextError(Fault(found, some(known) or "none: the table has no rows", in_quotes(near) if near else ""))
+        return ContextError(Fault(found, some(known) or "none: the table has no rows", mend_for(asset, known)))
 
 
 def rows_of(bits: int, numbers: Rows) -> Rows:

@@ -13,7 +13,7 @@ from typing import Any
 from contextdb.cells.arguments import require_kind, require_mapping
 from contextdb.covering.clip_contexts import TableContexts, asked_axes, clip_contexts, is_axis
 from contextdb.covering.space import require_counts
-from contextdb.errors import ContextError, Fault, MotionError, in_quotes, nearest, some
+from contextdb.errors import ContextError, Fault, MotionError, in_quotes, mend_for, some
 from contextdb.motion.measuring.coverage import ContextCoverage, MotionCoverage, coverage
 from contextdb.motion.measuring.moves import DIRECTION, MAPS, SPEED, TURN
 from contextdb.motion.measuring.near_clips import NEAR_COST
@@ -227,10 +227,9 @@ def _axes(tables: Mapping[str, Table], axes: Mapping[str, str] | None) -> dict[s
         has = set(_having(tables, condition))
         if not has:
             known = sorted({c.condition.name for t in tables.values() for c in t.flat().conditions if is_axis(c.condition)})
-            near = nearest(str(condition), known)
             found = f"no table with clips has a condition {in_quotes(str(condition))} of numbers with min and max."
             accepted = some(known) or "none: no condition is an angle, or a number with min and max"
-            raise ContextError(Fault(found, accepted, in_quotes(near) if near else ""))
+            raise ContextError(Fault(found, accepted, mend_for(str(condition), known)))
         for name in has:
             named[name][axis] = condition
     return named

@@ -28,7 +28,7 @@ from contextdb.cells.sets import Accepted, Cell, NumberSet, TagMeet, TagSet
 from contextdb.compiled.data import CompiledData
 from contextdb.covering.factors import Factor, NumberFactor, TagFactor, ValueFactor, tag_factors, weighted
 from contextdb.covering.progress import SILENT, Progress
-from contextdb.errors import ContextError, Fault, Place, TableError, in_quotes, nearest, plural, some
+from contextdb.errors import ContextError, Fault, Place, TableError, in_quotes, no_such, plural
 
 _WEIGHTS = "a mapping of conditions to mappings of cells to numbers"
 
@@ -328,8 +328,7 @@ def _condition(name: str, conditions: Sequence[Condition]) -> Condition:
         if condition.name == name:
             return condition
     known = [c.name for c in conditions]
-    near = nearest(require_text(name, "the name of a condition"), known)
-    raise ContextError(Fault(f"there is no condition {in_quotes(name)}.", some(known), in_quotes(near) if near else ""))
+    raise ContextError(no_such("condition", require_text(name, "the name of a condition"), known))
 
 
 def _read_box(box: CellBox, conditions: Sequence[Condition]) -> dict[str, Cell]:

@@ -14,7 +14,7 @@ from typing import Any
 import python_calamine as calamine
 
 from contextdb.columns import TextColumn
-from contextdb.errors import ContextDBError, Fault, Place, TableError, in_quotes, nearest, plural, shown, some
+from contextdb.errors import ContextDBError, Fault, Place, TableError, in_quotes, mend_for, plural, shown, some
 from contextdb.exchange.described import FIRST_LINE, TYPES_SHEET
 from contextdb.exchange.grid import Block, column_letters, columns_of, parse_block
 from contextdb.exchange.reading import ERRORS, Reading, Remark, SheetWanted, capped, listed
@@ -92,8 +92,8 @@ def _wanted(sheet: str | None, names: Sequence[str], file: str) -> tuple[str | N
     name = name.strip("'") or names[0]
     if block is not None and name in names and (mark or len(names) == 1):
         return name, block
-    near = nearest(sheet.partition("!")[0], names)
-    raise TableError(Fault(f"there is no sheet {in_quotes(sheet)}.", some(names), in_quotes(near) if near else "", Place(file)))
+    mend = mend_for(sheet.partition("!")[0], names)
+    raise TableError(Fault(f"there is no sheet {in_quotes(sheet)}.", some(names), mend, Place(file)))
 
 
 def _hidden_sheets(book: calamine.CalamineWorkbook) -> frozenset[str]:

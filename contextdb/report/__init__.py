@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from importlib import import_module
 
-from contextdb.errors import ContextDBError, Fault, in_quotes, nearest, some
+from contextdb.errors import ContextDBError, no_such
 from contextdb.findings import Level
 from contextdb.report.results import Report, Subject
 
@@ -60,9 +60,7 @@ def render(
     """
     known = formats(report.subject)
     if format_name not in known:
-        near = nearest(format_name, known)
-        found = f"there is no format {in_quotes(format_name)}."
-        raise ContextDBError(Fault(found, some(known), in_quotes(near) if near else ""))
+        raise ContextDBError(no_such("format", format_name, known))
     module, taken = RENDERERS[report.subject, format_name]
     options = {"colour": colour, "width": width, "shows_all": shows_all, "failing": failing}
     text: str = import_module(f"contextdb.report.{module}").render(report, **{name: options[name] for name in taken})

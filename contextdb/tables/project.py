@@ -25,6 +25,7 @@ from contextdb.errors import (
     TableError,
     in_quotes,
     nearest,
+    no_such,
     plural,
     some,
 )
@@ -98,9 +99,7 @@ class Project(Unchanging, ByName[Table]):
     def __getitem__(self, name: str) -> Table:
         """One table by its name; a name that is missing raises NoSuchTable, which is a KeyError too, and names the nearest."""
         if name not in self.tables:
-            near = nearest(str(name), self.tables)
-            found = f"there is no table {in_quotes(str(name))}."
-            raise NoSuchTable(Fault(found, some(self.tables) or "none: the folder has no table", in_quotes(near) if near else ""))
+            raise NoSuchTable(no_such("table", name, self.tables, some(self.tables) or "none: the folder has no table"))
         return self.tables[name]
 
     def __iter__(self) -> Iterator[str]:

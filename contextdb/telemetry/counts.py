@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import polars as pl
 
-from contextdb.errors import Fault, Place, TableError, in_quotes, nearest, plural
+from contextdb.errors import Fault, Place, TableError, in_quotes, no_such, plural
 from contextdb.telemetry.chunks import Chunk
 from contextdb.telemetry.keys import Counts
 
@@ -21,9 +21,7 @@ def moments_of(count: str | None, names: Sequence[str], chunk: Chunk, file: str)
     if count is None:
         return np.ones(chunk.n_rows, np.int64)
     if count not in names:
-        near = nearest(count, names)
-        found = f"there is no count column {in_quotes(count)}."
-        raise TableError(Fault(found, f"one of {plural(len(names), 'column')}", in_quotes(near) if near else "", Place(file)))
+        raise TableError(no_such("count column", count, names, f"one of {plural(len(names), 'column')}", Place(file)))
     if not chunk.n_rows:
         return np.zeros(0, np.int64)
     given = chunk.frame[count]

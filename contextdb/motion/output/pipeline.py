@@ -12,7 +12,7 @@ import numpy as np
 
 from contextdb.cells.arguments import require_kind, require_mapping
 from contextdb.console import announce
-from contextdb.errors import Fault, MotionError, in_quotes, nearest, some
+from contextdb.errors import Fault, MotionError, in_quotes, no_such
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.output.bank import RIG_MEND, PoseBank, tops_of
 from contextdb.motion.output.feet import OnGround, hinges_of, legs_of
@@ -146,9 +146,7 @@ class Pipeline:
         """The number of the bank of what plays, and its range there."""
         number = 0 if self.only is not None else self._numbers.get(playing.database, -1)
         if number < 0:
-            near = nearest(playing.database, self.banks)
-            found = f"there is no pose bank of the database {in_quotes(playing.database)}."
-            raise MotionError(Fault(found, some(self.banks), in_quotes(near) if near else ""))
+            raise MotionError(no_such("pose bank of the database", playing.database, self.banks))
         return number, self.all[number].range_of(playing.asset, playing.mirrored)
 
     def _given(

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.cells.arguments import require_callable, require_kind, require_many, require_many_of
-from contextdb.errors import ContextError, Fault, MotionError, in_quotes, nearest, some
+from contextdb.errors import ContextError, Fault, MotionError, in_quotes, no_such, some
 from contextdb.motion.clips.clip import Clip
 from contextdb.motion.clips.contacts import spans_of
 from contextdb.motion.clips.foot_bones import UNDECLARED
@@ -140,9 +140,7 @@ def _wanted(kinds: Sequence[str] | None) -> set[str]:
     wanted = list(require_many(kinds, "kinds", "a list of kinds"))
     for kind in wanted:
         if not isinstance(kind, str) or kind not in KINDS:
-            near = nearest(str(kind), KINDS)
-            found = f"there is no kind {in_quotes(str(kind))}."
-            raise ContextError(Fault(found, some(KINDS, len(KINDS)), in_quotes(near) if near else ""))
+            raise ContextError(no_such("kind", kind, KINDS, some(KINDS, len(KINDS))))
     return set(wanted)
 
 

@@ -35,7 +35,7 @@ from contextdb.cells.arguments import (
     require_text,
     require_whole,
 )
-from contextdb.errors import Fault, MotionError, QueryError, in_quotes, nearest, plural, some
+from contextdb.errors import Fault, MotionError, QueryError, in_quotes, no_such, plural
 from contextdb.motion import arguments
 from contextdb.motion.arguments import Currents, Flags, Valid, ValidForMany, ValidRanges
 from contextdb.motion.clips.clip import Clip
@@ -444,9 +444,7 @@ class MotionDatabase(Searched):
         for name, weight in require_mapping(weights, "weights", "a mapping of channels to weights").items():
             require_kind(weight, Real, "one of weights", "a number, 0 or more")
             if require_text(name, "one of weights") not in self.channel_names:
-                near = nearest(name, self.channel_names)
-                found = f"there is no channel {in_quotes(name)}."
-                raise MotionError(Fault(found, some(self.channel_names), in_quotes(near) if near else ""))
+                raise MotionError(no_such("channel", name, self.channel_names))
             if not math.isfinite(weight) or weight < 0.0:
                 raise MotionError(Fault(f"the weight of channel {in_quotes(name)} is {weight!r}.", "a finite number, 0 or more"))
             changed[self.channel_names.index(name)] = weight

@@ -24,7 +24,7 @@ from typing import Any, Unpack
 from numpy.typing import ArrayLike
 
 from contextdb.cells.arguments import require_kind, require_many_of, require_text
-from contextdb.errors import Fault, MotionError, QueryError, in_quotes, nearest, some
+from contextdb.errors import Fault, MotionError, QueryError, in_quotes, mend_for, some
 from contextdb.motion import arguments
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.markup.left_out import Skip
@@ -250,9 +250,8 @@ class Selector:
     def _check_names(self, names: Iterable[str]) -> None:
         for name in names:
             if not isinstance(name, str) or name not in self.names:
-                near = nearest(str(name), self.names)
                 found = f"the selector has no database {in_quotes(str(name))}."
-                raise QueryError(Fault(found, some(self.names), in_quotes(near) if near else ""))
+                raise QueryError(Fault(found, some(self.names), mend_for(str(name), self.names)))
 
 
 def choice_of(entries: Sequence[Entry], hits: Mapping[str, Hit], among: frozenset[str], stopped: str | None) -> Choice:

@@ -17,7 +17,7 @@ from functools import cached_property
 from typing import Any, TypedDict, overload
 
 from contextdb.cells.arguments import require_kind, require_mapping, require_place
-from contextdb.errors import Fault, MotionError, Place, in_quotes, nearest, plural, some
+from contextdb.errors import Fault, MotionError, Place, in_quotes, mend_for, plural, some
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.filters import Biases, Filter
 from contextdb.motion.selection.decision import Decision
@@ -182,9 +182,8 @@ def require_known(name: str, databases: Mapping[str, MotionDatabase], file: str)
     """Raise MotionError when no asset's name contains a text, with the nearest."""
     known = list(dict.fromkeys(asset for database in databases.values() for asset in database.assets))
     if not any(name.casefold() in asset.casefold() for asset in known):
-        near = nearest(name, known)
         found = f"no asset's name contains {in_quotes(name)}."
-        raise MotionError(Fault(found, some(known), in_quotes(near) if near else "", Place(file)))
+        raise MotionError(Fault(found, some(known), mend_for(name, known), Place(file)))
 
 
 def _mapping(given: object, what: str) -> Mapping[str, Any]:

@@ -12,7 +12,7 @@ from typing import Any, Protocol, runtime_checkable
 
 from contextdb.cells.arguments import require_kind, require_mapping
 from contextdb.cells.conditions import Condition
-from contextdb.errors import Fault, MotionError, in_quotes, nearest, some
+from contextdb.errors import Fault, MotionError, in_quotes, mend_for, some
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.storage.building import open_or_build
 from contextdb.motion.storage.config import MotionConfig
@@ -111,6 +111,5 @@ def require_name(name: object, what: str, known: Iterable[str]) -> None:
     """Raise MotionError for a name that is not among some, with the nearest."""
     names = list(known)
     if name not in names:
-        near = nearest(str(name), names)
         found = f"there is no {what} {in_quotes(str(name))}."
-        raise MotionError(Fault(found, some(names) or "none", in_quotes(near) if near else ""))
+        raise MotionError(Fault(found, some(names) or "none", mend_for(str(name), names)))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
-from contextdb.errors import ContextDBError, Fault, Place, in_quotes, nearest, some
+from contextdb.errors import ContextDBError, Fault, Place, in_quotes, mend_for, some
 from contextdb.telemetry.link.doors import connected, doors, token_of
 from contextdb.telemetry.link.lines import FORMAT, HEADER, MOST_BYTES, Line, dumped, read_line
 
@@ -169,7 +169,6 @@ def no_game(name: str | None, running: Sequence[Game]) -> ContextDBError:
     names = [game.name for game in running]
     if name is None:
         return ContextDBError(Fault("no game is running.", 'a game that calls contextdb.link("game")'))
-    near = nearest(name, names)
     found = f"no game {in_quotes(name)} is running{'' if names else ', nor any other'}."
-    fault = Fault(found, some(names) if names else "", in_quotes(near) if near else "")
+    fault = Fault(found, some(names) if names else "", mend_for(name, names))
     return ContextDBError(fault)

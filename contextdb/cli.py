@@ -18,7 +18,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import IO, Any, NoReturn
 
-from contextdb.console import ExitCode, drop_output, printable
+from contextdb.console import ExitCode, drop_output, note, printable
 from contextdb.disk import unnameable
 from contextdb.disk.together import UnfinishedWarning
 from contextdb.errors import ContextDBError, Fault, Place, in_quotes, mend_for, nearest, some
@@ -143,7 +143,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         code = _main(given)
     for warning in told:
         if issubclass(warning.category, UnfinishedWarning):
-            print(printable(f"contextdb: {warning.message}"), file=sys.stderr)
+            note(warning.message)
         else:
             warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
     return code
@@ -168,13 +168,12 @@ def _main(given: Sequence[str]) -> int:
             raise
         return _failed(unnameable(error, Path(error.object)))
     except KeyboardInterrupt:
-        print("contextdb: interrupted", file=sys.stderr)
+        note("interrupted")
         return ExitCode.INTERRUPTED
 
 
 def _failed(*faults: Fault) -> ExitCode:
-    for fault in faults:
-        print(printable(f"contextdb: {fault}"), file=sys.stderr)
+    note(*faults)
     return ExitCode.BAD_USE
 
 

@@ -23,8 +23,9 @@ from pathlib import Path
 from typing import TypeVar
 
 from contextdb.commands import add_format_arguments, coverage_telemetry
+from contextdb.commands.numbers import number_of
 from contextdb.commands.progress import Bar, bar, has_many_cells
-from contextdb.console import ExitCode, output, printable, terminal_width, wants_colour
+from contextdb.console import ExitCode, note, output, printable, terminal_width, wants_colour
 from contextdb.covering.baseline import ACCEPTED, Earlier, read_baseline
 from contextdb.covering.engine import MOST_GAPS, SAMPLES, WORK
 from contextdb.covering.pairs import PairTable
@@ -219,7 +220,7 @@ def _placed(table: EitherTable) -> Iterator[None]:
 
 
 def _details(arguments: argparse.Namespace, table: EitherTable) -> str:
-    from contextdb.report.coverage_details import gap_details, row_details
+    from contextdb.report.coverage_text import gap_details, row_details
 
     width = terminal_width()
     if arguments.explain is not None:
@@ -266,17 +267,14 @@ def earlier_report(file: str, read: Callable[[str, str], AnyReport], accepted: s
     earlier = read(text, file)
     if not has_digest(text):
         found = "the baseline has no digest, as an older version wrote it, so an altered number would not be noticed"
-        print(f"contextdb: {printable(file)}: {found}. Write the report again to have one.", file=sys.stderr)
+        note(f"{file}: {found}. Write the report again to have one.")
     return earlier
 
 
 def percent(text: str) -> float:
     """A percentage as a share."""
-    try:
-        percent = float(text.removesuffix("%"))
-    except ValueError:
-        percent = -1.0
-    if not 0.0 <= percent <= 100.0:
+    percent = number_of(text.removesuffix("%"))
+    if percent is None or not 0.0 <= percent <= 100.0:
         raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a percentage. Accepted: a number from 0 to 100.")
     return percent / 100.0
 

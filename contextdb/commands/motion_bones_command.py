@@ -15,7 +15,7 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
-from contextdb.commands.motion_clips import unit_of
+from contextdb.commands.numbers import unit_of
 from contextdb.console import ExitCode, aligned, output, printable
 from contextdb.errors import plural
 from contextdb.motion.clips.clip import CENTIMETRE, UPS, Clip, load_clips

@@ -6,6 +6,7 @@ import argparse
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from contextdb.commands.numbers import unit_of
 from contextdb.commands.progress import MANY_CLIPS, bar
 from contextdb.console import printable
 from contextdb.motion.clips.clip import UPS
@@ -22,17 +23,6 @@ def add_clip_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--up", choices=UPS, help="the axis that points up (default: as the project says, else in which bodies stand)"
     )
-
-
-def unit_of(text: str) -> float:
-    """A unit in metres."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 1e-9 <= value <= 1e9:
-        raise argparse.ArgumentTypeError(f'"{text}" is not a unit. Accepted: metres, such as 0.01 for centimetres.')
-    return value
 
 
 @contextmanager

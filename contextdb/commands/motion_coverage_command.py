@@ -21,8 +21,9 @@ from pathlib import Path
 from contextdb.commands import add_format_arguments
 from contextdb.commands.coverage_command import earlier_report, percent
 from contextdb.commands.motion_build_command import MotionProject
+from contextdb.commands.numbers import number_type
 from contextdb.commands.progress import building_bar
-from contextdb.console import ExitCode, output, terminal_width, wants_colour
+from contextdb.console import ExitCode, note, output, terminal_width, wants_colour
 from contextdb.covering.motion import motion_coverage
 from contextdb.disk import write_atomic
 from contextdb.errors import ContextError, Fault, in_quotes, mend_for, some
@@ -60,7 +61,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     told = f"names of transitions, such as {PATTERN} (default: as the project says, else that)"
     parser.add_argument("--transitions", metavar="PATTERN", help=told)
     told = f"the cost under which a clip is near another (default: {NEAR_COST})"
-    parser.add_argument("--near", metavar="COST", type=_cost, default=NEAR_COST, help=told)
+    cost = number_type(f"a cost. Accepted: a number from 0 up, such as {NEAR_COST}.")
+    parser.add_argument("--near", metavar="COST", type=cost, default=NEAR_COST, help=told)
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
@@ -98,7 +100,7 @@ def _results(arguments: argparse.Namespace, earlier: Mapping[str, Earlier] | Non
             progress=progress,
         )
     if joint := [name for name, settings in project.config.databases.items() if settings.roles]:
-        print(f"contextdb: left out: the joint clips of {some(joint)}: they follow no stick.", file=sys.stderr)
+        note(f"left out: the joint clips of {some(joint)}: they follow no stick.")
     measured = []
     for motion in found.tables:
         gates = [] if arguments.fail_under is None else [fail_under(motion, arguments.fail_under)]
@@ -128,13 +130,3 @@ def _axes(given: list[str]) -> dict[str, str]:
             )
         found[axis.strip()] = condition.strip()
     return found
-
-
-def _cost(text: str) -> float:
-    try:
-        cost = float(text)
-    except ValueError:
-        cost = -1.0
-    if not 0.0 <= cost < float("inf"):
-        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a cost. Accepted: a number from 0 up, such as {NEAR_COST}.")
-    return cost

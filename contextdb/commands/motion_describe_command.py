@@ -17,12 +17,11 @@ from __future__ import annotations
 import argparse
 import csv
 import io
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from contextdb.commands.motion_clips import add_clip_arguments, progress_of
-from contextdb.console import ExitCode, output, printable
+from contextdb.console import ExitCode, note, output, printable
 from contextdb.edits.described_table import (
     ASSET,
     ClipRows,
@@ -97,8 +96,7 @@ def _tell(
         lines.append(
             f"no database of {made.toml_path} holds the rows of this table: table = {as_toml(made.table.name)} makes one do so."
         )
-    for line in lines:
-        print(printable(f"contextdb: {line}"), file=sys.stderr)
+    note(*lines)
 
 
 def _lines(made: DescribedTable, fills: Filling, arguments: argparse.Namespace) -> Sequence[str]:

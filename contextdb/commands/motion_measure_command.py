@@ -14,7 +14,6 @@ Exits with 1 if a measure is over its bar, or more than 1 % worse than in the ba
 from __future__ import annotations
 
 import argparse
-import math
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -26,6 +25,7 @@ from contextdb.commands import add_format_arguments
 from contextdb.commands.coverage_command import earlier_report
 from contextdb.commands.motion_build_command import MotionProject, warn
 from contextdb.commands.motion_replay_command import project_of
+from contextdb.commands.numbers import number_type
 from contextdb.console import ExitCode, output, terminal_width, wants_colour
 from contextdb.errors import ContextDBError, ContextError, Fault, Place, in_quotes, plural
 from contextdb.motion import Measures, MotionDatabase, PoseBank, PoseSettings, measure, open_or_build, open_or_build_poses
@@ -141,7 +141,7 @@ def _measured(
 def add_bars(parser: argparse.ArgumentParser) -> None:
     """An option for each bar."""
     for name, (_, unit, told) in BARS.items():
-        parser.add_argument(f"--max-{name}", metavar=unit, type=_number, help=told)
+        parser.add_argument(f"--max-{name}", metavar=unit, type=number_type("a bar. Accepted: a number from 0 up."), help=told)
 
 
 def gates_of(arguments: argparse.Namespace, measures: Measures, file: str) -> list[Gate]:
@@ -172,13 +172,3 @@ def _settings(arguments: argparse.Namespace, clips: Clips | None, trace: Trace |
     if arguments.controller:
         clips.project.config.selector_of(name)
     return clips.project.config.output_of(name)
-
-
-def _number(text: str) -> float:
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
-    if not 0.0 <= number < math.inf:
-        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a bar. Accepted: a number from 0 up.")
-    return number

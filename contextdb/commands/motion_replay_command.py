@@ -35,8 +35,9 @@ import numpy as np
 
 from contextdb.commands.motion_build_command import MotionProject, warn
 from contextdb.commands.motion_page import Played, comment_of, page_file, rerun_file, write_page, write_rerun
-from contextdb.commands.motion_stage import add_view, number_of
+from contextdb.commands.motion_stage import add_view
 from contextdb.commands.motion_what_if import changes_of
+from contextdb.commands.numbers import number_of
 from contextdb.commands.progress import building_bar
 from contextdb.console import ExitCode, output, terminal_width
 from contextdb.disk import path_in_quotes, write_atomic

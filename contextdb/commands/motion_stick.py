@@ -16,7 +16,7 @@ import numpy as np
 from contextdb.cells.facts import Unknown
 from contextdb.columns import TextColumn
 from contextdb.commands import missing_facts_by_option
-from contextdb.commands.motion_stage import number_of
+from contextdb.commands.numbers import number_of
 from contextdb.compiled.table import CompiledTable
 from contextdb.disk import path_in_quotes
 from contextdb.errors import ContextDBError, Fault, Place, TableError, in_quotes, mend_for, some

@@ -20,6 +20,7 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import UNKNOWN_MODES, Fact, no_condition, read_fact_text
 from contextdb.cells.output_types import OutputValue
 from contextdb.commands import missing_facts_by_option
+from contextdb.commands.numbers import whole_type
 from contextdb.compiled.casting.stage import CastMatches
 from contextdb.compiled.explain import Explanation, RowExplanation, describe_fact
 from contextdb.compiled.pick import Outcome
@@ -47,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--explain", action="store_true", help="show the nearest rows that are not valid, their failing cells, and what to change"
     )
     told = f"explain so many rows (default: {N_EXPLAINED})"
-    parser.add_argument("--most", type=_count, default=N_EXPLAINED, metavar="N", help=told)
+    parser.add_argument("--most", type=whole_type("a number of rows, such as 10."), default=N_EXPLAINED, metavar="N", help=told)
     parser.add_argument(
         "--prefer", metavar="FACT", help="cast the actors with the lowest FACT first; -FACT, as in --prefer=-speed: the highest"
     )
@@ -133,13 +134,6 @@ def _split(text: str, compiled: CompiledTable) -> tuple[str, str]:
     if ends:
         raise no_condition(text[: ends[0]], compiled.asked)
     raise ContextError(Fault(f"{in_quotes(text)} is not a fact.", "FACT=VALUE, without spaces round the =", in_quotes(f"{text}=…")))
-
-
-def _count(text: str) -> int:
-    """A number of rows."""
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a number of rows, such as 10.")
-    return int(text)
 
 
 def _document(compiled: CompiledTable, explanation: Explanation, explains: bool, most: int) -> dict[str, object]:

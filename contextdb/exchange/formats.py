@@ -212,7 +212,7 @@ def _written(table: Table, kind: str, formulas: Formulas) -> tuple[bytes, tuple[
 
         return written_over(table.source, columns, table.origin, as_parquet=kind == "parquet").raw, told
     if kind == "tsv":
-        from contextdb.exchange.tab_text import write_tab_text
+        from contextdb.exchange.delimited import write_tab_text
 
         return write_tab_text(columns), told
     if kind in ("json", "jsonl"):

@@ -20,21 +20,21 @@ RENDERERS: Mapping[tuple[Subject, str], tuple[str, tuple[str, ...]]] = {
     ("coverage", "text"): ("coverage_text", ("colour", "width", "shows_all")),
     ("coverage", "json"): ("render_json", ()),
     ("coverage", "github"): ("render_github", ()),
-    ("coverage", "junit"): ("coverage_junit", ()),
+    ("coverage", "junit"): ("bars_junit:coverage", ()),
     ("coverage", "sarif"): ("render_sarif", ("shows_all",)),
     ("coverage", "markdown"): ("coverage_markdown", ("shows_all",)),
     ("coverage", "html"): ("coverage_html", ()),
     ("measures", "text"): ("measure_text", ("colour", "width", "shows_all")),
     ("measures", "json"): ("render_json", ()),
-    ("measures", "junit"): ("measure_junit", ()),
+    ("measures", "junit"): ("bars_junit:measures", ()),
     ("measures", "markdown"): ("measure_markdown", ()),
     ("motion coverage", "text"): ("motion_coverage_text", ("colour", "width", "shows_all")),
     ("motion coverage", "json"): ("render_json", ()),
     ("motion coverage", "markdown"): ("motion_coverage_markdown", ()),
     ("motion coverage", "html"): ("motion_coverage_html", ()),
-    ("motion coverage", "junit"): ("motion_coverage_junit", ()),
+    ("motion coverage", "junit"): ("bars_junit:motion_coverage", ()),
 }
-"""For each subject and format the module that renders it and the options that it takes."""
+"""For each subject and format the module that renders it, by `render` or as said, and the options that it takes."""
 ERRORS: tuple[Level, ...] = ("error",)
 
 
@@ -63,5 +63,7 @@ def render(
         raise ContextDBError(no_such("format", format_name, known))
     module, taken = RENDERERS[report.subject, format_name]
     options = {"colour": colour, "width": width, "shows_all": shows_all, "failing": failing}
-    text: str = import_module(f"contextdb.report.{module}").render(report, **{name: options[name] for name in taken})
+    module, _, function = module.partition(":")
+    rendered = getattr(import_module(f"contextdb.report.{module}"), function or "render")
+    text: str = rendered(report, **{name: options[name] for name in taken})
     return text

@@ -11,18 +11,10 @@ from importlib.resources import files
 
 from contextdb.console import __version__, printable
 from contextdb.covering import CoverageReport, format_percent
+from contextdb.report import coverage_words as words
 from contextdb.report.coverage_heat import heat_map
 from contextdb.report.coverage_results import CoverageResults, Gate, Measured, gap_moments, gap_size, has_moments
 from contextdb.report.coverage_text import by_rule
-from contextdb.report.coverage_words import (
-    assumed_sentences,
-    cells_text,
-    change_sentence,
-    facts_sentences,
-    gaps_sentence,
-    nearest_sentence,
-    overlap_sentence,
-)
 from contextdb.report.html_parts import POLICY, escaped, paragraph, table_of
 from contextdb.report.results import as_path
 from contextdb.tables.variety import VARIETY
@@ -99,7 +91,7 @@ def _head(measured: Measured) -> Iterator[str]:
     report = measured.report
     yield paragraph(report.headline, "headline")
     yield f"{_bar(report)}\n"
-    yield from (paragraph(sentence, "muted") for sentence in assumed_sentences(report))
+    yield from (paragraph(sentence, "muted") for sentence in words.assumed_sentences(report))
     if measured.gates:
         yield _gates(measured.gates)
 
@@ -118,7 +110,7 @@ def _change(measured: Measured) -> Iterator[str]:
     if change is None:
         return
     yield "<h3>Since the baseline</h3>\n"
-    yield paragraph(f"{change_sentence(measured, change)}.")
+    yield paragraph(f"{words.change_sentence(measured, change)}.")
     rows = [("new gap", gap.text, gap.share) for gap in change.opened] + [
         ("closed gap", gap.text, gap.share) for gap in change.closed
     ]
@@ -137,13 +129,13 @@ def _telemetry(measured: Measured) -> Iterator[str]:
     lines = [[_cell(format_percent(gap.share), gap.share), _cell(gap.text)] for gap in measured.seen_elsewhere]
     if lines:
         yield table_of("Moments without a valid row", [("share of the moments", True), ("contexts", False)], lines)
-    yield from (paragraph(f"{sentence}.", "muted") for sentence in facts_sentences(seen))
+    yield from (paragraph(f"{sentence}.", "muted") for sentence in words.facts_sentences(seen))
 
 
 def _gaps(measured: Measured) -> Iterator[str]:
     report = measured.report
     yield "<h3>Gaps</h3>\n"
-    yield paragraph(f"{gaps_sentence(report)}.")
+    yield paragraph(f"{words.gaps_sentence(report)}.")
     if not report.gaps:
         return
     columns = [("", True), ("share", True), ("in no gap above", True), ("contexts without a valid row", False), ("nearest", False)]
@@ -155,7 +147,7 @@ def _gaps(measured: Measured) -> Iterator[str]:
             *([_cell(gap_moments(gap), gap.telemetry or 0.0)] if has_moments(report) else []),
             _cell(format_percent(gap.new_share), gap.new_share),
             _cell(gap.text),
-            _cell(nearest_sentence(measured, gap).removeprefix("nearest: ")),
+            _cell(words.nearest_sentence(measured, gap).removeprefix("nearest: ")),
         ]
         for i, gap in enumerate(report.gaps, 1)
     ]
@@ -165,7 +157,7 @@ def _gaps(measured: Measured) -> Iterator[str]:
 def _overlap(measured: Measured) -> Iterator[str]:
     report = measured.report
     yield "<h3>Rows valid at once</h3>\n"
-    yield paragraph(f"{overlap_sentence(report)}.")
+    yield paragraph(f"{words.overlap_sentence(report)}.")
     most = max(report.overlap.histogram, default=0.0)
     bars = "".join(
         f'<tr><td class="n">{n}</td><td class="n">{escape(report.at_once(n))}</td>'
@@ -178,7 +170,7 @@ def _overlap(measured: Measured) -> Iterator[str]:
         table = f'<table class="hist">{head}<tbody>{bars}</tbody></table>'
         yield f'<div class="scroll" tabindex="0" role="region" aria-label="Overlap">{table}</div>\n'
     for crowd in report.crowded[:5]:
-        yield paragraph(f"{crowd.n_rows} rows where {cells_text(crowd.cells, len(crowd.cells))}", "muted")
+        yield paragraph(f"{crowd.n_rows} rows where {words.cells_text(crowd.cells, len(crowd.cells))}", "muted")
 
 
 def _findings(measured: Measured) -> Iterator[str]:

@@ -6,9 +6,9 @@ A renderer is a pure function of a `Report` that gives text: the same report giv
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain, count
+from itertools import accumulate, chain, count
 from pathlib import PurePath
 from typing import ClassVar, Literal, Protocol
 
@@ -165,3 +165,31 @@ def _with_labels(groups: list[Group]) -> Iterator[Group]:
         label = next(text for text in chain([label], (f"{label} #{n}" for n in count(2))) if text not in taken)
         taken.add(label)
         yield replace(group, label=label)
+
+
+# ---- how a report for people is kept short: the first findings of each rule, then how many more there are
+
+
+FINDING_STEPS = (20, 10, 5, 3, 2, 1)
+"""How many findings of one rule are shown; the first that fits."""
+
+
+def fitted(sections_at: Callable[[int], Sequence[str]], size: Callable[[str], int], room: int) -> tuple[list[str], int]:
+    """The sections of the longest form of a report that fits into `room`, and how many findings of one rule they show.
+
+    `sections_at` gives the sections with at most so many findings of one rule, `size` how much room a section takes. Where not even
+    one finding of each rule fits, the last sections are left out; the first one never is.
+    """
+    sections: Sequence[str] = ()
+    for most in FINDING_STEPS:
+        sections = sections_at(most)
+        if sum(map(size, sections)) <= room:
+            return list(sections), most
+    n_fitting = sum(total <= room for total in accumulate(map(size, sections)))
+    return list(sections[: max(1, n_fitting)]), FINDING_STEPS[-1]
+
+
+def n_hidden(groups: Sequence[Group], n_shown: int, most: int) -> int:
+    """How many findings are not shown, with the first `n_shown` groups and at most so many findings of each rule."""
+    cut = sum(max(0, len(findings) - most) for group in groups[:n_shown] for _, _, findings in group.blocks())
+    return cut + sum(len(group.findings) for group in groups[n_shown:])

@@ -22,16 +22,7 @@ from numpy.typing import NDArray
 from contextdb.columns import TextColumn
 from contextdb.errors import Fault, SchemaError, TableError
 from contextdb.files.csv_source import name_faults
-from contextdb.schema.sections import (
-    EDITED_SECTIONS,
-    blueprint_faults,
-    differences,
-    job_faults,
-    schema_to_dict,
-    schema_with,
-    settings_to_dict,
-    settings_with,
-)
+from contextdb.schema import sections
 from contextdb.schema.settings import expression_faults, settings_renamed
 from contextdb.tables.data import AnyTable, TableData, conditions_of, with_columns
 
@@ -132,9 +123,9 @@ class Sections:
     @classmethod
     def between(cls, before: TableData, after: TableData) -> Sections:
         """What leads from what one table says to what another says."""
-        settings = differences(settings_to_dict(before.settings), settings_to_dict(after.settings))
-        old, new = schema_to_dict(before.schema), schema_to_dict(after.schema)
-        parts = {section: cast(Any, differences(old[section], new[section])) for section in EDITED_SECTIONS}
+        settings = sections.differences(sections.settings_to_dict(before.settings), sections.settings_to_dict(after.settings))
+        old, new = sections.schema_to_dict(before.schema), sections.schema_to_dict(after.schema)
+        parts = {section: cast(Any, sections.differences(old[section], new[section])) for section in sections.EDITED_SECTIONS}
         return cls(settings, {section: part for section, part in parts.items() if part})
 
     @property
@@ -144,10 +135,10 @@ class Sections:
 
     def apply(self, table: AnyTable) -> AnyTable:
         """The table under these settings and this schema; columns whose meaning stays are not read again."""
-        schema = schema_with(table.schema, self.parts)
-        settings = settings_with(table.settings, self.settings)
+        schema = sections.schema_with(table.schema, self.parts)
+        settings = sections.settings_with(table.settings, self.settings)
         names = [c.name for c in table.columns]
-        faults = [*job_faults(settings, names, schema), *blueprint_faults(schema)]
+        faults = [*sections.job_faults(settings, names, schema), *sections.blueprint_faults(schema)]
         if "conditions" in self.parts or "assume" in self.settings:
             faults += expression_faults(replace(schema, tables={**schema.tables, settings.name: settings}))
         if faults:

@@ -19,8 +19,7 @@ from contextdb.motion.clips.ground_place import GroundPlace, OfBody, place_of
 from contextdb.motion.clips.many_steered import ManySteered
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.records import collector_at_rest
-from contextdb.motion.selection.asked import Among, Asked, OfPenalties, OfTags
-from contextdb.motion.selection.asked_of_many import OfValidForMany, each_of, valid_of_each
+from contextdb.motion.selection.asked import Among, Asked, OfPenalties, OfTags, OfValidForMany, each_of, valid_of_each
 from contextdb.motion.selection.choice import Choice
 from contextdb.motion.selection.controller import Asking, Controller
 from contextdb.motion.selection.controller_state import ControllerState

@@ -31,8 +31,18 @@ from contextdb.motion.markup.left_out import Skip
 from contextdb.motion.search.candidates import Candidates
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.hit import NOTHING, Hit
-from contextdb.motion.selection.asked import Among, Asked, Current, OfPenalties, OfTags, OfValid, Options
-from contextdb.motion.selection.asked_of_many import OfValidForMany, each_of, valid_of_each
+from contextdb.motion.selection.asked import (
+    Among,
+    Asked,
+    Current,
+    OfPenalties,
+    OfTags,
+    OfValid,
+    OfValidForMany,
+    Options,
+    each_of,
+    valid_of_each,
+)
 from contextdb.motion.selection.choice import Choice, Reason, Search, Status
 from contextdb.motion.selection.known_tags import with_tags
 

@@ -32,8 +32,8 @@ from contextdb.motion import Measures, MotionDatabase, PoseBank, PoseSettings, m
 from contextdb.motion.storage.written_poses import NPZ
 from contextdb.motion.trace.filter_rows import fingerprint
 from contextdb.motion.trace.session import Trace
-from contextdb.report.measure_results import BASELINE, Bar, Gate, MeasureResults, SessionMeasures, compared, held_to, read_baseline
-from contextdb.report.results import as_path
+from contextdb.report.measure_results import BASELINE, Bar, MeasureResults, SessionMeasures, compared, held_to, read_baseline
+from contextdb.report.results import Gate, as_path
 
 BARS = {
     "skate": ("skate_cm_s", "CM_S", "the most that planted feet may slide, cm/s"),

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from operator import and_, or_, xor
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from contextdb import bitmask
 from contextdb.bitmask import Rows, Words, read_only
 from contextdb.cells.arguments import require_place
 from contextdb.cells.notebook import one_line
+from contextdb.cells.sequences import Made
 from contextdb.compiled.batch_costs import CostsOfPairs
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.matches import Join, Matches, layered_penalties, minus
@@ -32,7 +33,7 @@ MOST_PAIRS = 2**18
 """Pairs of a context and a row whose costs are worked out together."""
 
 
-class ManyMatches(Unchanging, Sequence[Matches]):
+class ManyMatches(Unchanging, Made[Matches]):
     """The valid rows of many contexts: a sequence of `Matches`, each as `query` gives it, with or without actors. Results are
     computed on first use and kept; arrays are read-only. As with `Matches`, `&`, `|`, `-` and `^` join the answers for as many
     contexts, each with its own; `&` and `-` also take what `only` takes.
@@ -176,16 +177,7 @@ class ManyMatches(Unchanging, Sequence[Matches]):
             raise ContextError(Fault(found, "an answer for each context"))
         return other
 
-    @overload
-    def __getitem__(self, context: int) -> Matches: ...
-
-    @overload
-    def __getitem__(self, context: slice) -> list[Matches]: ...
-
-    def __getitem__(self, context: int | slice) -> Matches | list[Matches]:
-        """The answer of one context, as `query` gives it, or those of a slice; NoSuchPlace, an IndexError too, where none is."""
-        if isinstance(context, slice):
-            return [self._answer(i) for i in range(*context.indices(len(self)))]
+    def _at(self, context: int) -> Matches:
         return self._answer(require_place(context, len(self), "context"))
 
     def __iter__(self) -> Iterator[Matches]:

@@ -23,7 +23,8 @@ from contextdb.covering.judge import Judge
 from contextdb.covering.progress import Progress, Stops, Tell
 from contextdb.covering.report import CoverageReport, Crowd, Method, Overlap
 from contextdb.covering.sample import LITTLE, Counts, Sampler, samples_of
-from contextdb.covering.shares import SampledShares, wilson
+from contextdb.covering.sampled_shares import SampledShares
+from contextdb.covering.shares import wilson
 from contextdb.covering.space import CellBox, Space, WeightsOf, comparable_rows, require_counts
 from contextdb.tables.table import EitherTable
 

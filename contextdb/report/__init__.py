@@ -20,19 +20,19 @@ RENDERERS: Mapping[tuple[Subject, str], tuple[str, tuple[str, ...]]] = {
     ("coverage", "text"): ("coverage_text", ("colour", "width", "shows_all")),
     ("coverage", "json"): ("render_json", ()),
     ("coverage", "github"): ("render_github", ()),
-    ("coverage", "junit"): ("bars_junit:coverage", ()),
+    ("coverage", "junit"): ("coverage_junit", ()),
     ("coverage", "sarif"): ("render_sarif", ("shows_all",)),
     ("coverage", "markdown"): ("coverage_markdown", ("shows_all",)),
     ("coverage", "html"): ("coverage_html", ()),
     ("measures", "text"): ("measure_text", ("colour", "width", "shows_all")),
     ("measures", "json"): ("render_json", ()),
-    ("measures", "junit"): ("bars_junit:measures", ()),
+    ("measures", "junit"): ("motion_junit:measures", ()),
     ("measures", "markdown"): ("measure_markdown", ()),
     ("motion coverage", "text"): ("motion_coverage_text", ("colour", "width", "shows_all")),
     ("motion coverage", "json"): ("render_json", ()),
     ("motion coverage", "markdown"): ("motion_coverage_markdown", ()),
     ("motion coverage", "html"): ("motion_coverage_html", ()),
-    ("motion coverage", "junit"): ("bars_junit:motion_coverage", ()),
+    ("motion coverage", "junit"): ("motion_junit:motion_coverage", ()),
 }
 """For each subject and format the module that renders it, by `render` or as said, and the options that it takes."""
 ERRORS: tuple[Level, ...] = ("error",)

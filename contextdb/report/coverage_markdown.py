@@ -8,9 +8,10 @@ from contextdb.covering import Gap, format_percent
 from contextdb.covering.baseline import EarlierGap
 from contextdb.errors import plural
 from contextdb.report import coverage_words as words
-from contextdb.report.coverage_results import CoverageResults, Gate, Measured, gap_moments, gap_size, has_moments
+from contextdb.report.coverage_results import CoverageResults, Measured, gap_moments, gap_size, has_moments
 from contextdb.report.coverage_text import by_rule
 from contextdb.report.render_markdown import MOST_BYTES, escaped
+from contextdb.report.results import Gate
 from contextdb.tables.variety import VARIETY
 
 STEPS = (10, 5, 3, 1, 0)

@@ -15,30 +15,12 @@ from contextdb.covering.shares import told_apart
 from contextdb.errors import in_quotes, plural, row_name, some
 from contextdb.files.reports import sealed
 from contextdb.findings import Finding
-from contextdb.report.results import CheckReport, Subject, TableSummary
+from contextdb.report.results import CheckReport, Gate, Subject, TableSummary
 from contextdb.telemetry.observed import Observed, SeenGap
 
 ROUNDING = 1e-12
 """Shares are as exact as this; a bar of 100 % takes nothing less all the same."""
 MOST_GAP_FINDINGS = 10
-
-
-@dataclass(frozen=True)
-class Gate:
-    """A bar that a table is held to."""
-
-    name: str
-    """The option: fail-under, max-drop, fail-under-telemetry."""
-    limit: float
-    value: float
-    passed: bool
-    message: str
-    rule: str
-    """The rule that a table breaks which misses the bar."""
-
-    def to_json(self) -> dict[str, object]:
-        """As plain data."""
-        return {"name": self.name, "limit": self.limit, "value": self.value, "passed": self.passed, "message": self.message}
 
 
 @dataclass(frozen=True)
@@ -158,7 +140,7 @@ def reaches(value: float, limit: float) -> bool:
 def fail_under(report: CoverageReport, limit: float) -> Gate:
     """Hold the lower bound of the covered share to a bar."""
     at_least = "" if report.method == "exact" else "at least "
-    return _bar("fail-under", report.lower, limit, f"{at_least}{{}} of the contexts are covered", rule="coverage-below")
+    return bar("fail-under", report.lower, limit, f"{at_least}{{}} of the contexts are covered", rule="coverage-below")
 
 
 def max_drop(change: Change, limit: float) -> Gate:
@@ -199,13 +181,14 @@ def _still_there(name: str, found: str, is_intended: bool, more: str = "") -> Ga
 
 def fail_under_telemetry(telemetry: Observed, limit: float) -> Gate:
     """Hold the covered share of recorded moments to a bar."""
-    return _bar("fail-under-telemetry", telemetry.covered, limit, "{} of the recorded moments are covered", rule="telemetry-below")
+    return bar("fail-under-telemetry", telemetry.covered, limit, "{} of the recorded moments are covered", rule="telemetry-below")
 
 
-def _bar(name: str, value: float, limit: float, said: str, rule: str) -> Gate:
+def bar(name: str, value: float, limit: float, said: str, rule: str = "") -> Gate:
+    """The gate of a share that is to reach a bar; `said` is what it is, with {} for it."""
     passed = reaches(value, limit)
-    found, bar = told_apart(value, limit) if not passed else (format_percent(value), format_percent(limit))
-    message = f"{said.format(found)}, which {'reaches' if passed else 'is below'} the threshold of {bar}."
+    found, wanted = told_apart(value, limit) if not passed else (format_percent(value), format_percent(limit))
+    message = f"{said.format(found)}, which {'reaches' if passed else 'is below'} the threshold of {wanted}."
     return Gate(name, limit, value, passed, message, rule)
 
 

@@ -12,9 +12,10 @@ from contextdb.covering.inside import facts_inside
 from contextdb.errors import plural, row_name
 from contextdb.findings import LEVELS, Finding
 from contextdb.report import coverage_words as words
-from contextdb.report.coverage_results import CoverageResults, Gate, Measured, gap_moments, gap_size, has_moments
+from contextdb.report.coverage_results import CoverageResults, Measured, gap_moments, gap_size, has_moments
 from contextdb.report.coverage_words import nearest_sentence
 from contextdb.report.render_text import STYLES, wrapped
+from contextdb.report.results import Gate
 from contextdb.tables.table import EitherTable
 from contextdb.tables.variety import VARIETY
 

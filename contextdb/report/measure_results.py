@@ -16,7 +16,7 @@ from contextdb.files.reports import document_of, sealed
 from contextdb.findings import Finding
 from contextdb.motion.measuring.measures import Measures
 from contextdb.motion.measuring.parts import NO_CHANGE, NO_FORCED, NO_JUMP
-from contextdb.report.results import CheckReport, Subject, as_path
+from contextdb.report.results import CheckReport, Gate, Subject, as_path
 
 NOTHING_TO_EXCEED = (NO_FORCED, NO_JUMP, NO_CHANGE)
 """A measure that is missing for such a reason keeps every bar."""
@@ -82,21 +82,6 @@ class Bar:
     option: str
     key: str
     most: float
-
-
-@dataclass(frozen=True, slots=True)
-class Gate:
-    """A bar that a session is held to, or a comparison with the baseline."""
-
-    name: str
-    limit: float
-    value: float | None
-    passed: bool
-    message: str
-
-    def to_json(self) -> dict[str, object]:
-        """As plain data."""
-        return {"name": self.name, "limit": self.limit, "value": self.value, "passed": self.passed, "message": self.message}
 
 
 @dataclass(frozen=True)

@@ -61,6 +61,24 @@ class Group:
         return [(level, rule, tuple(found[level, rule])) for level, rule in ordered]
 
 
+@dataclass(frozen=True, slots=True)
+class Gate:
+    """A bar that a table or a session is held to, or a comparison with the baseline."""
+
+    name: str
+    """The option, such as fail-under."""
+    limit: float
+    value: float | None
+    passed: bool
+    message: str
+    rule: str = ""
+    """The rule that a table breaks which misses the bar."""
+
+    def to_json(self) -> dict[str, object]:
+        """As plain data."""
+        return {"name": self.name, "limit": self.limit, "value": self.value, "passed": self.passed, "message": self.message}
+
+
 class Report(Protocol):
     """What can be rendered: what a check found, or what coverage measured."""
 

@@ -15,7 +15,7 @@ from contextdb.covering.engine import SAMPLES
 from contextdb.covering.gaps import SHARE_WORK, Measure, share_of
 from contextdb.covering.report import CoverageReport, Gap
 from contextdb.covering.sample import Sampler, samples_of
-from contextdb.covering.shares import SampledShares
+from contextdb.covering.sampled_shares import SampledShares
 from contextdb.covering.space import Box, Sides, Space
 from contextdb.telemetry.observed import Observed
 

@@ -14,9 +14,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import cached_property
-from typing import Any, TypedDict, overload
+from typing import Any, TypedDict
 
 from contextdb.cells.arguments import require_kind, require_mapping, require_place
+from contextdb.cells.sequences import Made
 from contextdb.errors import Fault, MotionError, Place, in_quotes, mend_for, plural, some
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.filters import Biases, Filter
@@ -41,7 +42,7 @@ class Changes(TypedDict, total=False):
     tables: Mapping[str, Edited] | None
 
 
-class Reasked(Sequence[ReaskedDecision]):
+class Reasked(Made[ReaskedDecision]):
     """A session asked again: one `ReaskedDecision` for each decision, worked out when it is asked for.
 
     Parameters
@@ -84,13 +85,7 @@ class Reasked(Sequence[ReaskedDecision]):
         found.decisions = decisions
         return found
 
-    @overload
-    def __getitem__(self, index: int) -> ReaskedDecision: ...
-    @overload
-    def __getitem__(self, index: slice) -> list[ReaskedDecision]: ...
-    def __getitem__(self, index: int | slice) -> ReaskedDecision | list[ReaskedDecision]:
-        if isinstance(index, slice):
-            return [self.of(decision) for decision in self.decisions[index]]
+    def _at(self, index: int) -> ReaskedDecision:
         return self.of(self.decisions[require_place(index, len(self), "decision")])
 
     def __iter__(self) -> Iterator[ReaskedDecision]:

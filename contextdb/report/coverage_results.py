@@ -128,7 +128,7 @@ class CoverageResults:
 
     def as_check(self) -> CheckReport:
         """Missed bars, findings and the largest gaps as findings, for formats that know nothing else."""
-        gone = [Finding(gate.rule, "error", gate.message, name) for name, gate in self.gone.items() if not gate.passed]
+        gone = [Finding(gate.rule or gate.name, "error", gate.message, name) for name, gate in self.gone.items() if not gate.passed]
         return CheckReport(tuple(m.summary for m in self.tables), (*gone, *(f for m in self.tables for f in _findings(m))))
 
 
@@ -184,7 +184,7 @@ def fail_under_telemetry(telemetry: Observed, limit: float) -> Gate:
     return bar("fail-under-telemetry", telemetry.covered, limit, "{} of the recorded moments are covered", rule="telemetry-below")
 
 
-def bar(name: str, value: float, limit: float, said: str, rule: str = "") -> Gate:
+def bar(name: str, value: float, limit: float, said: str, rule: str | None = None) -> Gate:
     """The gate of a share that is to reach a bar; `said` is what it is, with {} for it."""
     passed = reaches(value, limit)
     found, wanted = told_apart(value, limit) if not passed else (format_percent(value), format_percent(limit))
@@ -211,7 +211,7 @@ def _findings(measured: Measured) -> Iterator[Finding]:
     report = measured.report
     for gate in measured.gates:
         if not gate.passed:
-            yield Finding(gate.rule, "error", gate.message, report.table, measured.file)
+            yield Finding(gate.rule or gate.name, "error", gate.message, report.table, measured.file)
     yield from report.findings
     if measured.change is not None:
         for gap in measured.change.opened[:MOST_GAP_FINDINGS]:

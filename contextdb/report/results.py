@@ -71,8 +71,8 @@ class Gate:
     value: float | None
     passed: bool
     message: str
-    rule: str = ""
-    """The rule that a table breaks which misses the bar."""
+    rule: str | None = None
+    """The rule that a table breaks which misses the bar, where it has a name of its own."""
 
     def to_json(self) -> dict[str, object]:
         """As plain data."""

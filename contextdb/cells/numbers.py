@@ -83,7 +83,6 @@ class NumberCells(Sequence[Cell]):
 
     @cached_property
     def ends(self) -> Ends:
-        """The ends of all cells."""
         lows, highs, rest = _plain_ends(pl.Series(self.texts, dtype=pl.String), self.domain)
         others = {i: self.read[i] if i in self.read else parse_cell(self.texts[i], self.domain) for i in rest.tolist()}
         return Ends(lows, highs, others)

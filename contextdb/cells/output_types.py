@@ -85,7 +85,6 @@ class OutputType:
 
 
 def names_where(is_meant: Callable[[OutputType], bool]) -> tuple[str, ...]:
-    """The names of some types."""
     return tuple(name for name, kind in OUTPUT_TYPES.items() if is_meant(kind))
 
 

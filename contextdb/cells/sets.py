@@ -147,7 +147,6 @@ class TagMeet(TagSet):
 
     @classmethod
     def of(cls, parts: Sequence[TagSet]) -> TagMeet:
-        """The meet of some sets."""
         needs, bans = (frozenset[str]().union(*sets) for sets in ([p.needs for p in parts], [p.bans for p in parts]))
         return cls(needs, bans, True, tuple(parts))
 

@@ -60,7 +60,6 @@ class Box:
         return ", ".join(f"{name}: {cell}" for name, cell in self.cells.items()) or "every context"
 
     def to_json(self) -> dict[str, object]:
-        """As plain data."""
         return {"share": self.share, "cells": self.cells}
 
 
@@ -78,7 +77,6 @@ class Reach:
     share_lost: float
 
     def to_json(self) -> dict[str, object]:
-        """As plain data."""
         return {
             "asset": self.asset,
             "before": self.before,
@@ -111,7 +109,6 @@ class Effects:
         return bool(self.assets or self.n_left_out or self.opened or self.closed or self.dead or self.overlaps)
 
     def to_json(self) -> dict[str, object]:
-        """As plain data."""
         return {
             "covered": {"before": _covered(self.before), "after": _covered(self.after)},
             "assets": [reach.to_json() for reach in self.assets],

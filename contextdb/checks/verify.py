@@ -32,7 +32,6 @@ class Verdict:
     message: str
 
     def to_json(self) -> dict[str, str]:
-        """As plain data."""
         return {"file": self.file, "kind": self.kind, "state": self.state, "message": self.message}
 
 

@@ -38,7 +38,6 @@ from contextdb.tables.table import Table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("path", metavar="PATH", help="a folder of tables, one table, or its cases")
     add_format_arguments(parser, report.formats("check"))
     parser.add_argument(

@@ -45,7 +45,6 @@ AnyReport = TypeVar("AnyReport")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("path", metavar="PATH", help="a folder of tables, one table, or the name of a table")
     add_format_arguments(parser, formats("coverage"))
     parser.add_argument("-o", "--output", metavar="FILE", help="write the report to a file")

@@ -59,7 +59,6 @@ N_NEAREST = 2
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("--tables", metavar="FOLDER", help="the sample tables (default: those that came with contextdb)")
     parser.add_argument(
         "--keep", metavar="FOLDER", help="a new folder for the tables, the synthetic clips and the poses, to experiment with"

@@ -26,7 +26,6 @@ FORMATS = ("text", "markdown", "json")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("before", metavar="A", help="the table as it was: a .csv or .parquet file, or the name of a table")
     parser.add_argument("after", metavar="B", help="the table as it is")
     add_format_arguments(parser, FORMATS)

@@ -21,7 +21,6 @@ class TerminalError(ContextDBError):
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("path", metavar="PATH", nargs="?", help="a table, or a folder of tables (default: tables/, or here)")
     parser.add_argument("--theme", metavar="NAME", help="the colours (default: from the settings)")
 

@@ -24,7 +24,6 @@ from contextdb.tables.project import load_table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("source", metavar="SRC", help="a table file, or the name of a table")
     parser.add_argument("target", metavar="DST", help="the file to write; - for standard output")
     names = [name for name, one in FORMATS.items() if one.is_written]

@@ -17,7 +17,6 @@ from contextdb.errors import plural
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     git_setup.add_arguments(parser)
     told = "how git calls contextdb (default: contextdb, or the Python that runs now)"
     parser.add_argument("--command", metavar="TEXT", dest="command_line", help=told)

@@ -19,7 +19,6 @@ from contextdb.tables.table import Table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("file", metavar="FILE", help="a .csv or .parquet file, under any name that git gives it")
 
 

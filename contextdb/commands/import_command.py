@@ -35,7 +35,6 @@ LARGE_BYTES, LARGE_CELLS, LARGE_COLUMNS = 10_000_000, 1_000_000, 2_000
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("source", metavar="SRC", help="the file to import; - for standard input")
     parser.add_argument("target", metavar="DST", help="the table file to write: .csv or .parquet, in a folder of tables")
     names = [name for name, one in FORMATS.items() if one.is_read]

@@ -27,15 +27,13 @@ from contextdb.compiled.table import CompiledTable
 from contextdb.console import ExitCode, aligned, note, output
 from contextdb.errors import ContextDBError, ContextError, Fault, in_quotes
 from contextdb.tables.project import Project
-from contextdb.telemetry.link.doors import doors
 from contextdb.telemetry.link.game import new_recording
-from contextdb.telemetry.link.hearing import Game, Hearing, Wanted, games, hear, no_game
+from contextdb.telemetry.link.hearing import Game, Hearing, Wanted, games, hear, the_game
 from contextdb.telemetry.link.lines import END
 from contextdb.telemetry.link.listeners import FileListener
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("name", metavar="NAME", nargs="?", help="the name of a running game")
     parser.add_argument("--who", action="append", metavar="WHO", help="only what this character asks; may be repeated")
     parser.add_argument("--table", action="append", metavar="TABLE", help="only what this table is asked; may be repeated")
@@ -71,17 +69,10 @@ def run(arguments: argparse.Namespace) -> ExitCode:
 def _game(name: str | None, wanted: Wanted) -> Hearing | Sequence[Game]:
     """The game that is meant, or several of which it may be one. Raises ContextDBError where none runs that is meant; it names
     those that run."""
-    if name is not None:
-        path = dict(doors()).get(name)
-        if path is None:
-            raise no_game(name, games())
-    else:
-        running = games()
-        if not running:
-            raise no_game(None, running)
-        if len(running) > 1:
-            return running
-        path = running[0].path
+    running = games() if name is None else []
+    if len(running) > 1:
+        return running
+    path = running[0].path if running else the_game(name)[1]
     try:
         return hear(path, wanted)
     except OSError:

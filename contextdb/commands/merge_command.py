@@ -52,7 +52,6 @@ Merged = tuple[bytes | None, Callable[[], ExitCode]]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("base", metavar="BASE", help="the table before both sides changed it")
     parser.add_argument("ours", metavar="OURS", help="our version; the result is written over it")
     parser.add_argument("theirs", metavar="THEIRS", help="the other version")

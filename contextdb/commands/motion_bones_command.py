@@ -27,7 +27,6 @@ HEADER = ("bone", "channels", "height m", "found as", "mirrored to")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("files", metavar="FILE", nargs="+", help="BVH files, or folders of them")
     parser.add_argument(
         "--metres-per-unit", metavar="M", type=unit_of, default=CENTIMETRE, help="the unit of the files in metres (default: 0.01)"

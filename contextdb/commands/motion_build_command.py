@@ -43,7 +43,6 @@ HEADER = ("database", "assets", "clips", "frames", "features", "MB", "computed",
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("path", metavar="PATH", help=f"a folder of tables, or its {SCHEMA_FILE}")
     parser.add_argument("--out", metavar="FOLDER", help=f"where the databases are saved (default: next to {SCHEMA_FILE})")
     parser.add_argument("--database", metavar="NAME", action="append", help="only this database; may be repeated")

@@ -63,7 +63,6 @@ class MotionReport(CheckReport):
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("path", metavar="PATH", help=f"a folder of tables, or its {SCHEMA_FILE}")
     add_format_arguments(parser, FORMATS)
     parser.add_argument(

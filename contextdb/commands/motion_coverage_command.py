@@ -47,7 +47,6 @@ from contextdb.tables.project import Project
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("path", metavar="FOLDER", help="a folder of tables with motion databases")
     add_format_arguments(parser, formats("motion coverage"))
     parser.add_argument("-o", "--output", metavar="FILE", help="write the report to a file")

@@ -42,7 +42,6 @@ from contextdb.tables.project import load_table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     add_clip_arguments(parser)
     parser.add_argument("--out", metavar="TABLE", help="write the table to this new file, with its contextdb.toml beside it")
     parser.add_argument(

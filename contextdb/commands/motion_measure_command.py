@@ -48,7 +48,6 @@ BARS = {
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("sessions", metavar="SESSION", nargs="+", help="a recorded session, .parquet; or its poses, .npz")
     parser.add_argument("--poses", metavar="FILE", action="append", help="the poses of the session, .npz; once for each")
     parser.add_argument("--project", metavar="FOLDER", help="the project with the clips (default: as recorded)")
@@ -104,12 +103,10 @@ class Clips:
 
     @cached_property
     def banks(self) -> dict[str, PoseBank]:
-        """All pose banks."""
         return open_or_build_poses(self.project.config, self.project.folder, self.project.assets)
 
     @cached_property
     def databases(self) -> dict[str, MotionDatabase]:
-        """All databases."""
         return open_or_build(self.project.config, self.project.folder, self.project.assets)
 
 

@@ -52,7 +52,6 @@ class Played:
 
     @cached_property
     def measured(self) -> SessionMeasures:
-        """Its measures."""
         found = measure(self.trace, self.banks, databases=self.databases or None, settings=self.settings)
         return SessionMeasures(self.file, found, {}, ())
 

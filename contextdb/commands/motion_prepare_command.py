@@ -51,7 +51,6 @@ JOINT_KINDS = ("roots", "contacts", "noise")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     add_clip_arguments(parser)
     told = f"propose only this: {', '.join(KINDS)}; may be repeated"
     parser.add_argument("--only", metavar="KIND", choices=KINDS, action="append", help=told)

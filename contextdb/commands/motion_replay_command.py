@@ -66,7 +66,6 @@ WARP_S = 10.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("file", metavar="FILE", help="a recorded session, a .parquet file")
     parser.add_argument("--at", metavar="N|TIME", help="show one decision in full: its tick, or a time such as 2.5s")
     add_view(parser, "with --at: which costs are shown")

@@ -48,7 +48,6 @@ K_HELP = "candidates of each search that replay shows; with 0, none, and no sear
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("path", metavar="PATH", help="a folder of tables, or its contextdb.toml")
     parser.add_argument("controller", metavar="CONTROLLER", help="the name of a [controllers.NAME]")
     parser.add_argument("stick", metavar="STICK", help="a CSV or Parquet file of what the player requests, moment by moment")

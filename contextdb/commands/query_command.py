@@ -38,7 +38,6 @@ N_EXPLAINED = 10
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("table", metavar="TABLE", help="a .csv, .parquet or .safetensors file, or the name of a table")
     parser.add_argument(
         "facts", metavar="FACT=VALUE", nargs="*", default=[], help="a value, or a set of values written like a cell: speed=3..5"

@@ -53,7 +53,6 @@ class ValueMasks:
 
     @cached_property
     def class_of(self) -> dict[Value, int]:
-        """The class of each value."""
         return {v: i for i, v in enumerate(self.values)}
 
     @cached_property

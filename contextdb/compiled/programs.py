@@ -128,7 +128,6 @@ class Programs:
         self._number_of = {name: number for number, name in enumerate(self.facts)}
 
     def add(self, plan: Part) -> None:
-        """Add the program of a plan."""
         self.put(plan)
         self.starts.append(len(self.code))
 

@@ -45,7 +45,6 @@ class EarlierGap:
         return ", ".join(f"{name}: {cell}" for name, cell in self.cells.items()) or "every context"
 
     def to_json(self) -> dict[str, object]:
-        """As plain data."""
         return {"id": self.id, "share": self.share, "cells": self.cells}
 
 
@@ -78,7 +77,6 @@ class Change:
     names a rule that was rewritten."""
 
     def to_json(self) -> dict[str, object]:
-        """As plain data."""
         return {
             "before": self.before,
             "drop": self.drop,

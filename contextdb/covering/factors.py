@@ -70,7 +70,6 @@ class ValueFactor:
         return {value: k for k, value in enumerate(self.values)}
 
     def accepts(self, classes: int) -> Accepted:
-        """The values of some classes."""
         flags = bitmask.flags_of(classes, len(self.weights))
         is_complement = self.has_others and bool(flags[-1])
         return ValueSet(frozenset(compress(self.values, (flags != is_complement).tolist())), is_complement)
@@ -114,7 +113,6 @@ class NumberFactor:
         return held
 
     def accepts(self, classes: int) -> Accepted:
-        """The numbers of some classes."""
         spans = list(compress(self.spans, bitmask.flags_of(classes, len(self.spans)).tolist()))
         return NumberSet(self.kind.fitted(intervals.union(spans)), self.kind.is_circular)
 

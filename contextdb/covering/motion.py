@@ -62,7 +62,6 @@ class TableMotion:
         return self.contexts is None or self.contexts.method == "exact"
 
     def to_json(self) -> dict[str, Any]:
-        """As plain data."""
         found, contexts = self.coverage, self.contexts
         return {
             "table": found.table,

@@ -64,7 +64,6 @@ class Difference:
     """The cell that the clip would have."""
 
     def to_json(self) -> dict[str, Any]:
-        """As plain data."""
         return {name: getattr(self, name) for name in self.__slots__}
 
     def __str__(self) -> str:

@@ -116,7 +116,6 @@ def insert_rows(table: Table, at: int, rows: Sequence[Mapping[str, str]], name: 
 
 
 def delete_rows(table: Table, rows: Sequence[int]) -> Edit:
-    """Delete rows."""
     gone = _rows_of(table, rows)
     return Edit(f"Delete {_named(table, gone)}", (Rows(np.delete(np.arange(table.n_rows), gone)),))
 

@@ -127,7 +127,6 @@ class TableFile:
 
     @property
     def rules(self) -> TextColumn | None:
-        """The column of rules."""
         return next((c for c in self.columns if c.name == self.settings.when), None)
 
 

@@ -108,7 +108,6 @@ def clamped(value: float, low: float, high: float) -> float:
 
 
 def all_clamped(value: Doubles, low: Doubles, high: Doubles) -> Doubles:
-    """Each value clamped."""
     return np.minimum(np.maximum(value, low), high)
 
 

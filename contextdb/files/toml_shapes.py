@@ -52,7 +52,6 @@ class Shape:
 
 
 def said_of(key: str, value: object, most: int = SHOWN_CHARACTERS) -> str:
-    """A key with its value."""
     return shown(f"{key} = {as_toml(value)}", most)
 
 

@@ -115,7 +115,6 @@ class CoverageResults:
         return f"{plural(len(gates), 'threshold')} met." if gates else ""
 
     def to_json(self) -> dict[str, object]:
-        """The JSON document."""
         return sealed(
             {
                 "format": 1,

@@ -133,7 +133,6 @@ class MeasureResults:
         return all(gate.passed for session in self.sessions for gate in session.gates)
 
     def to_json(self) -> dict[str, object]:
-        """The JSON document."""
         return sealed({"format": 1, "sessions": [session.to_json() for session in self.sessions]})
 
     def as_check(self) -> CheckReport:

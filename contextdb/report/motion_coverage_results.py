@@ -45,7 +45,6 @@ class Lost:
         return MAPS[self.map].words(self.row, self.column)
 
     def to_json(self) -> dict[str, object]:
-        """As plain data."""
         where = {"map": self.map, "row": self.row, "column": self.column, "what": self.words}
         return {**where, "before": self.before, "now": self.now}
 
@@ -138,7 +137,6 @@ class MotionCoverageResults:
         return f"{plural(len(self.gates), 'bar')} kept." if self.gates else ""
 
     def to_json(self) -> dict[str, object]:
-        """The JSON document."""
         return sealed(
             {
                 "format": 1,
@@ -270,7 +268,6 @@ def worst_contexts(measured: MotionMeasured) -> list[ContextCoverage]:
 
 
 def context_words(each: ContextCoverage) -> str:
-    """Which contexts they are."""
     return ", ".join(f"{name}: {cell}" for name, cell in each.contexts.cells.items()) or "every context"
 
 

@@ -75,7 +75,6 @@ class Gate:
     """The rule that a table breaks which misses the bar, where it has a name of its own."""
 
     def to_json(self) -> dict[str, object]:
-        """As plain data."""
         return {"name": self.name, "limit": self.limit, "value": self.value, "passed": self.passed, "message": self.message}
 
 
@@ -107,7 +106,6 @@ class CheckReport:
         return f"{plural(len(self.tables), 'table')} checked: {said or 'nothing found'}."
 
     def to_json(self) -> dict[str, object]:
-        """The JSON document."""
         findings = [finding.to_json() for finding in self.findings]
         return {"format": 1, "findings": findings, "tables": [table.to_json() for table in self.tables]}
 

@@ -319,7 +319,7 @@ def twice_named(found: Iterable[tuple[str, Path]]) -> list[Fault]:
     return faults
 
 
-def folder_of(path: Path) -> Path:
+def folder_of(path: Path, accepted: str = f"a folder of tables, or its {SCHEMA_FILE}") -> Path:
     """The folder that a path to a folder, or to a contextdb.toml, means."""
     if os.path.isdir(path):  # os.path says no, where Path raises, to a name that no file can have
         return path
@@ -330,7 +330,7 @@ def folder_of(path: Path) -> Path:
     siblings = [p.name for p in path.parent.iterdir() if p.is_dir()] if os.path.isdir(path.parent) else []
     near = nearest(path.name, siblings)
     mend = path_in_quotes(path.parent / near) if near else ""
-    raise FileError(Fault(found, f"a folder of tables, or its {SCHEMA_FILE}", mend, Place(str(path)), "no-such-path"))
+    raise FileError(Fault(found, accepted, mend, Place(str(path)), "no-such-path"))
 
 
 def _read_table(path: Path, schema: Schema, folder: Path, strict: bool, around: Mapping[str, Table] | None = None) -> Table:

@@ -51,7 +51,6 @@ class WhenColumn:
 
     @property
     def name(self) -> str:
-        """The name of the column."""
         return self.texts.name
 
     def rule(self, row: int) -> Expression | None:

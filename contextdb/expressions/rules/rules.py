@@ -138,7 +138,6 @@ class WhenRules:
 
     @cached_property
     def rows(self) -> int:
-        """The rows that have a rule."""
         return reduce(or_, (rule.rows for rule in self.rules))
 
     def numbers(self, left: int) -> Iterator[int]:

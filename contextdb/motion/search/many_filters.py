@@ -51,7 +51,6 @@ class ManyFilters(NamedTuple):
 
     @classmethod
     def alone(cls, chosen: Filter) -> ManyFilters:
-        """One filter."""
         skips = (chosen.skips,) if chosen.skips else ()
         return cls(chosen, chosen.ranges[None], chosen.range_biases[None], np.array([chosen.current]), skips)
 

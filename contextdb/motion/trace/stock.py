@@ -103,7 +103,6 @@ class Stock:
         return cls(databases, project.tables, table_of)
 
     def table(self, database: str) -> Edited | None:
-        """The table of a database."""
         return self.tables.get(self.table_of.get(database, ""))
 
 

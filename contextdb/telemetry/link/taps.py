@@ -73,7 +73,6 @@ class TableTap:
 
     @property
     def target(self) -> CompiledData | None:
-        """The table."""
         return self._compiled()
 
     def open(self) -> None:
@@ -148,7 +147,6 @@ class LiveTap:
 
     @property
     def target(self) -> LiveContext | None:
-        """The context."""
         return self._live()
 
     def open(self) -> None:
@@ -183,7 +181,6 @@ class ControllerTap:
 
     @property
     def target(self) -> object | None:
-        """The controller."""
         return self._controller()
 
     def open(self) -> None:

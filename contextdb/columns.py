@@ -35,7 +35,6 @@ class TextColumn:
 
     @property
     def n_rows(self) -> int:
-        """How many rows the column has."""
         return len(self.codes)
 
     def __getitem__(self, row: int) -> str:

@@ -149,7 +149,6 @@ ColumnCells = tuple[Cell, ...] | NumberCells
 
 
 def has_soft(cells: ColumnCells) -> bool:
-    """Whether a cell is soft."""
     return any(c.is_soft for c in (cells.read.values() if isinstance(cells, NumberCells) else cells))
 
 

@@ -19,7 +19,6 @@ ENGINES = ("local", "dask")
 
 
 def add_arguments(parser: argparse.ArgumentParser, percent: Callable[[str], float]) -> None:
-    """The arguments about telemetry."""
     told = parser.add_argument_group("recorded contexts")
     told.add_argument(
         "--telemetry",

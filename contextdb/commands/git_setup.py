@@ -119,7 +119,6 @@ class Setup:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments that say where."""
     parser.add_argument("path", metavar="PATH", nargs="?", default=".", help=f"the folder that contains {ATTRIBUTES} (default: .)")
     scope = parser.add_mutually_exclusive_group()
     scope.add_argument("--local", action="store_false", dest="is_global", default=False, help="configure this clone (default)")

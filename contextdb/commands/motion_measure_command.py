@@ -59,7 +59,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
-    """Measure sessions."""
     poses = arguments.poses or []
     if poses and len(poses) != len(arguments.sessions):
         found = f"{plural(len(poses), 'file')} of poses for {plural(len(arguments.sessions), 'session')}."
@@ -136,7 +135,6 @@ def _measured(
 
 
 def add_bars(parser: argparse.ArgumentParser) -> None:
-    """An option for each bar."""
     for name, (_, unit, told) in BARS.items():
         parser.add_argument(f"--max-{name}", metavar=unit, type=number_type("a bar. Accepted: a number from 0 up."), help=told)
 

@@ -33,12 +33,10 @@ class Played:
 
     @cached_property
     def project(self) -> MotionProject:
-        """What the project says of motion."""
         return MotionProject.load(self.folder)
 
     @cached_property
     def banks(self) -> dict[str, PoseBank]:
-        """The poses of the databases."""
         names = [name for name in self.trace.about if name in self.project.config.databases]
         if not names:
             found = "its poses cannot be made: the project has none of its databases."
@@ -85,7 +83,6 @@ def rerun_file(name: str) -> Path:
 
 
 def write_rerun(out: Path, session: Played) -> None:
-    """Write a session for the Rerun viewer."""
     times_s = [decision.time_s for decision in session.trace.brief()]
     write_atomic(out, session_rerun.render(session.view(is_asked=False), times_s))
 

@@ -37,7 +37,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
-    """Search one database."""
     stage = Stage.of(arguments.path, lambda config: [config.database(arguments.database).name])
     name = stage.config.database(arguments.database).name
     valid, facts = stage.valid([name], arguments.facts, arguments.unknown)

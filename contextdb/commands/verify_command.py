@@ -32,7 +32,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
-    """Verify files."""
     paths = _paths(arguments.files)
     verdicts = [verified(path) for path in progress(paths, "verifying")]
     with output():

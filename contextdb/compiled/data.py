@@ -52,7 +52,6 @@ Change = Callable[[Fact, Condition], Fact]
 
 
 def as_given(fact: Fact, condition: Condition) -> Fact:
-    """A fact as it is."""
     return fact
 
 
@@ -103,7 +102,6 @@ class CompiledData(Unchanging):
 
     @property
     def n_rows(self) -> int:
-        """The number of rows."""
         return len(self.assets)
 
     def __repr__(self) -> str:

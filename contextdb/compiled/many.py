@@ -243,7 +243,6 @@ class FewerMatches(ManyMatches):
 
     @property
     def compiled(self) -> CompiledData:  # type: ignore[override]
-        """The table."""
         return self.whole.compiled
 
     @cached_property
@@ -283,7 +282,6 @@ class JoinedMatches(ManyMatches):
 
     @property
     def compiled(self) -> CompiledData:  # type: ignore[override]
-        """The table."""
         return self.first.compiled
 
     @cached_property

@@ -112,7 +112,6 @@ def _number(value: Any) -> Any:
 
 
 def ways_to_tensors(ways: Ways) -> Tensors:
-    """The arrays of ways."""
     tensors: Tensors = {"ways.numbers": ways.numbers, "ways.rows": ways.rows, "ways.leaves": texts_to_array(list(ways.leaves))}
     for at, table in enumerate(ways.tables):
         lines = [-1 if (line := table.place(row).line) is None else line for row in range(len(table.priorities))]

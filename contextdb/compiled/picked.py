@@ -118,7 +118,6 @@ class Picked:
         return found
 
     def rests(self, limits: Limits, columns: Rows, slots: Rows, rows: Rows, time_s: float) -> NDArray[np.bool_]:
-        """Whether each row rests for its character."""
         found = np.zeros(len(rows), np.bool_)
         for of_row in limits.of_row:
             of = of_row[rows]

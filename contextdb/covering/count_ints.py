@@ -75,7 +75,6 @@ class Factor(dict[int, tuple[int, int, float, int]]):
         return found
 
     def inside(self, box: int) -> Factor:
-        """The factor within a box."""
         base = self.base
         cell = base.cells[self.number][base.boxes[box]]
         known = base.within.get((self.number, self.salt, cell))

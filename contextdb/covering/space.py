@@ -199,7 +199,6 @@ class Space:
 
     @cached_property
     def condition_of(self) -> tuple[int, ...]:
-        """For each factor the number of its condition."""
         return tuple(at for at, numbers in enumerate(self.of_condition) for _ in numbers)
 
     def cells(self, sides: Sides, is_label: bool = False) -> dict[str, str]:
@@ -367,5 +366,4 @@ def runs_of(side: int) -> list[tuple[int, int]]:
 
 
 def used_factors(boxes: Iterable[Box], full: Box) -> list[int]:
-    """The factors that some box restricts."""
     return sorted({f for box in boxes for f, side in enumerate(box) if side != full[f]})

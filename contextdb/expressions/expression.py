@@ -50,7 +50,6 @@ class Expression:
 
     @property
     def kind(self) -> str:
-        """The name of the type of its values."""
         return self.type.kind.name
 
     def evaluate(self, facts: Mapping[str, object]) -> float | bool | str | frozenset[str] | None:

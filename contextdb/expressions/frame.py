@@ -45,7 +45,6 @@ def _cut(column: Column, start: int, stop: int) -> Column:
 
 
 def _spread(value: Any, n_contexts: int) -> Column:
-    """A constant as a column."""
     if isinstance(value, Coded):
         return Coded(np.broadcast_to(value.codes, n_contexts), value.values)
     spread: Doubles | Truths = np.broadcast_to(value, n_contexts)

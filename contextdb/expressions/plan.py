@@ -29,7 +29,6 @@ class Type:
 
     @property
     def is_text(self) -> bool:
-        """Whether it is an enum or a text."""
         return self.kind.is_named
 
 

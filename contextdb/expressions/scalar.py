@@ -166,7 +166,6 @@ def _(plan: Select) -> Run:
 
 
 def is_number(plan: Part) -> bool:
-    """Whether a plan gives numbers."""
     if isinstance(plan, Select):
         return is_number(plan.then)
     if isinstance(plan, Const):

@@ -23,7 +23,6 @@ MOST_ROWS = 5_000
 
 
 def render(results: CoverageResults) -> str:
-    """The page."""
     sections = "".join(_section(measured, number) for number, measured in enumerate(results.tables))
     names = [printable(m.report.table) for m in results.tables]
     title = f"Coverage of {names[0]}" if len(names) == 1 else f"Coverage of {len(names)} tables"

@@ -19,7 +19,6 @@ STEPS = (10, 5, 3, 1, 0)
 
 
 def render(results: CoverageResults, shows_all: bool = False) -> str:
-    """The coverage of each table as Markdown."""
     if shows_all:
         return _document(results, 1 << 30, len(results.tables))
     texts = (_document(results, most, len(results.tables)) for most in STEPS)

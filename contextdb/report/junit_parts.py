@@ -24,7 +24,6 @@ def document(name: str, suites: Iterable[ET.Element]) -> str:
 
 
 def case_in(suite: ET.Element, name: str, file: str | None = None) -> ET.Element:
-    """A new case of a suite."""
     case = ET.SubElement(suite, "testcase", classname=suite.get("name", ""), name=name, time="0")
     if file:
         case.set("file", as_path(file))

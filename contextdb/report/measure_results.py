@@ -116,7 +116,6 @@ class SessionMeasures:
         return (f"not measured, as {why}: {'; '.join(labels)}" for why, labels in of.items())
 
     def to_json(self) -> dict[str, object]:
-        """The session in the JSON document."""
         return {"file": as_path(self.file), **self.measures.to_json(), "bars": [gate.to_json() for gate in self.gates]}
 
 

@@ -43,7 +43,6 @@ LEGEND = (("c0", "0", "wanted, never filled"), ("c3", "12", "filled in part of t
 
 
 def render(results: MotionCoverageResults) -> str:
-    """The page."""
     names = [printable(measured.motion.name) for measured in results.tables]
     title = f"Motion coverage of {names[0]}" if len(names) == 1 else f"Motion coverage of {len(names)} tables"
     verdict = f"{verdict_of(results.passed, results.verdict)}\n" if results.verdict else ""

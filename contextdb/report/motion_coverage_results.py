@@ -120,7 +120,6 @@ class MotionCoverageResults:
 
     @property
     def gates(self) -> list[Gate]:
-        """All bars."""
         return [*self.gone.values(), *(gate for measured in self.tables for gate in measured.gates)]
 
     @property

@@ -38,7 +38,6 @@ LEGEND = f"Numbers are frames; a bin is filled from {LEAST_FRAMES} on. ! wanted 
 
 
 def render(results: MotionCoverageResults, colour: bool = False, width: int = 100, shows_all: bool = False) -> str:
-    """All tables."""
     blocks = ["\n".join(_section(measured, colour, width, shows_all)) for measured in results.tables]
     tail = [f"clips without a row in their table: {_listed(results.unlisted, shows_all)}"] if results.unlisted else []
     lines = [line for sentence in tail for line in wrapped(printable(sentence), width)]

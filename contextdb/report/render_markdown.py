@@ -31,7 +31,6 @@ DEAD = "<!-- -->"
 
 
 def render(report: CheckReport, shows_all: bool = False) -> str:
-    """The findings as Markdown."""
     groups = report.groups()
     faulty, clean = [g for g in groups if g.findings], [g for g in groups if not g.findings]
 

@@ -34,11 +34,9 @@ class TableSummary:
 
     @property
     def size(self) -> str:
-        """The size in words."""
         return f"{plural(self.n_rows, 'row')}, {plural(self.n_conditions, 'condition')}"
 
     def to_json(self) -> dict[str, object]:
-        """The table in the JSON document."""
         return {"table": self.name, "file": self.file, "rows": self.n_rows, "conditions": self.n_conditions}
 
 
@@ -110,7 +108,6 @@ class CheckReport:
         return {"format": 1, "findings": findings, "tables": [table.to_json() for table in self.tables]}
 
     def as_check(self) -> CheckReport:
-        """The report itself."""
         return self
 
     def groups(self) -> list[Group]:

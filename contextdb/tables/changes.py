@@ -130,7 +130,6 @@ class Sections:
 
     @property
     def is_empty(self) -> bool:
-        """Whether nothing changes."""
         return not self.settings and not any(self.parts.values())
 
     def apply(self, table: AnyTable) -> AnyTable:
@@ -155,7 +154,6 @@ Change = Rows | Cells | Columns | Sections
 
 
 def change_from_json(data: Mapping[str, Any]) -> Change:
-    """The change that `to_json` wrote."""
     if data["change"] == "cells":
         return Cells({name: dict(zip(rows, texts, strict=True)) for name, rows, texts in data["cells"]})
     if data["change"] == "columns":
@@ -199,7 +197,6 @@ class Edit:
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Edit:
-        """The edit that `to_json` wrote."""
         return cls(data["name"], tuple(change_from_json(change) for change in data["changes"]))
 
 

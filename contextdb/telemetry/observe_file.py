@@ -146,7 +146,6 @@ class _Sums:
         self.open = SmallestKeys(parts.MOST_OPEN, plan.fields.n_words)
 
     def add(self, found: _Found) -> None:
-        """Add a chunk."""
         require_countable(self.moments + found.moments)
         self.rows += found.rows
         self.moments += found.moments
@@ -161,7 +160,6 @@ class _Sums:
         self.open.add(found.hashes[at], found.words, found.first[at], found.sums[at])
 
     def part(self) -> Part:
-        """The sums as they are kept."""
         hashes, is_full = self.distinct.found()
         open_hashes, words, moments, has_all = self.open.found()
         return Part(

@@ -53,7 +53,6 @@ class CastRules:
 
     @cached_property
     def rows(self) -> int:
-        """The rows that have one of these rules."""
         return reduce(or_, (self.when.rules[number].rows for number in self.roles))
 
     def holds(self, row: int, cast: Cast) -> bool:

@@ -104,7 +104,6 @@ class _Known:
 
     @cached_property
     def names(self) -> frozenset[str]:
-        """Their names."""
         return frozenset(c.name for c in self.conditions)
 
     @cached_property

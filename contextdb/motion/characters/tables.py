@@ -85,7 +85,6 @@ def checked(tables: object) -> Tables:
 
 
 def each_of(tables: Tables) -> list[Table]:
-    """Each table once."""
     if tables is None:
         return []
     if is_one(tables):

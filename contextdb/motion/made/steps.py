@@ -80,7 +80,6 @@ class Timeline:
         return np.stack([np.interp(times, self.times, column) for column in values.T], axis=-1)
 
     def when(self, phases: Floats) -> Floats:
-        """The moments of some phases."""
         return np.interp(phases, self.phases, self.times)
 
 

@@ -48,7 +48,6 @@ class Rows:
         return len(self.playing)
 
     def row(self, i: int) -> Rows:
-        """One of them alone."""
         return self if len(self) == 1 else Rows(self.numbers[i : i + 1], self.playing[i : i + 1])
 
 

@@ -96,7 +96,6 @@ class Look:
 
     @property
     def usual_mps(self) -> float:
-        """The middle speed."""
         return float(np.median(self.moments.speeds))
 
     def said(self, kind: Kind, tag: str | None, first: int | None, last: int | None, reason: str, measure: float) -> Proposal:

@@ -94,7 +94,6 @@ class Groups:
 
     @cached_property
     def firsts(self) -> Ints:
-        """The first group of each range."""
         return np.asarray(np.cumsum(self.n_groups) - self.n_groups)
 
     @cached_property

@@ -109,7 +109,6 @@ class Layout:
 
     @property
     def n_bytes(self) -> int:
-        """The memory of all arrays."""
         return sum(array.nbytes for array in vars(self).values() if isinstance(array, np.ndarray))
 
     def take(self, frames: Ints) -> Features:

@@ -68,7 +68,6 @@ class ManyFilters(NamedTuple):
         return np.array(spans, np.int64), np.cumsum([0, *map(len, self.skips)])
 
     def one(self, i: int) -> Filter:
-        """The filter of one search."""
         biases = self.range_biases[i if len(self.range_biases) > 1 else 0]
         return self.shared._replace(
             ranges=self.ranges[i if len(self.ranges) > 1 else 0],

@@ -48,7 +48,6 @@ class Ongoing:
 
     @property
     def database(self) -> str:
-        """The name of the database."""
         return self.playing.database
 
     def cheapest(self, query: Floats, chosen: Filter) -> Ongoing:

@@ -74,12 +74,10 @@ class Playhead:
 
     @cached_property
     def asset(self) -> str:
-        """What plays."""
         return self.database.assets[self.range]
 
     @cached_property
     def mirrored(self) -> bool:
-        """Whether it plays mirrored."""
         return bool(self.database.mirrored[self.range])
 
     @cached_property

@@ -48,7 +48,6 @@ def _part_text(part: ChangePart) -> str:
 
 
 def stats_lines(told: SessionStats, width: int = WIDTH) -> Iterator[str]:
-    """The figures of a session."""
     gain = (
         ""
         if told.gain_median is None

@@ -70,7 +70,6 @@ def rows_of(asked: ReaskedDecision, at: Place) -> list[Row]:
 
 
 def is_mirrored(at: Place) -> bool:
-    """Whether a place plays its asset mirrored."""
     return bool(at.search.database.mirrored[at.range])
 
 

@@ -26,7 +26,6 @@ RUNS = ("frame_runs", "bias_runs")
 
 
 def filter_type() -> PolarsType:
-    """The type of the column `filters`."""
     import polars as pl
 
     flags, numbers = pl.List(pl.Boolean()), pl.List(pl.Float64())

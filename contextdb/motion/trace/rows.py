@@ -50,7 +50,6 @@ OPTIONAL = (TIMINGS, FILTERS, INPUTS, *BODY, HELD, PLAY_RATE, TOGETHER)
 
 
 def columns() -> dict[str, PolarsType]:
-    """Every column with its type."""
     import polars as pl
 
     text, whole, number, flag = pl.String(), pl.Int64(), pl.Float64(), pl.Boolean()
@@ -110,7 +109,6 @@ def columns() -> dict[str, PolarsType]:
 
 
 def row_of(decision: Decision, events_of: EventsOf) -> Row:
-    """A decision as a row of `columns`."""
     move = decision.root_motion
     return {
         "tick": int(decision.tick),

@@ -56,11 +56,9 @@ class Merge(Generic[AnyTable]):
         return self.edit_of_ours().apply(self.ours)
 
     def edit_of_ours(self, name: str = "Merge") -> Edit:
-        """The edit that makes ours the merge."""
         return self._edit(self.ours, self.rows.ours, self.fields.ours, name)
 
     def edit_of_theirs(self, name: str = "Merge") -> Edit:
-        """The edit that makes theirs the merge."""
         return self._edit(self.theirs, self.rows.theirs, self.fields.theirs, name)
 
     def resolved(self, sides: Mapping[int, Side]) -> Merge[AnyTable]:

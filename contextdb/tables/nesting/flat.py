@@ -85,7 +85,6 @@ class FlatTable(TableData):
         return [(self.expansion.tables[n], r) for n, r in zip(numbers, rows, strict=True) if n >= 0]
 
     def flat(self) -> FlatTable:
-        """The table itself."""
         return self
 
     def compile(self) -> CompiledTable:

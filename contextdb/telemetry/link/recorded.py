@@ -50,7 +50,6 @@ class Piece:
 
 
 def facts_frame(facts: Sequence[Texts], names: Sequence[str]) -> pl.DataFrame:
-    """Facts as columns of texts."""
     return pl.DataFrame([pl.Series(name, [each.get(name) for each in facts], dtype=pl.String) for name in names])
 
 

@@ -207,7 +207,6 @@ class ControllerTap:
         return max(wanted, 1) if self._ring.keeps_filters else wanted
 
     def record(self, decision: object) -> None:
-        """Take one decision."""
         self._ring.put(self, time.monotonic(), self._who(), None, decision, None)
         if self._other is not None:
             self._other.record(decision)

@@ -254,5 +254,4 @@ def warn_of_old(old: str, new: str, levels: int = 3) -> None:
 
     `levels`: how many calls the caller of the old way is above, this one counted.
     """
-    text = f"{old} goes away in contextdb {GONE_IN}. Use {new}."
-    warnings.warn(text, DeprecationWarning, stacklevel=levels)
+    warnings.warn(f"{old} goes away in contextdb {GONE_IN}. Use {new}.", DeprecationWarning, stacklevel=levels)

@@ -311,8 +311,7 @@ def _doubtful(table: TableData, cases: Sequence[Case], file: str | None) -> Iter
             yield replace(place, level="warning", message=f"{about} is also {where}: each case needs its own name.", column=NAME)
         first_of.setdefault(case.name, case)
         for asset in _banned(case).difference(assets):
-            message = f"{about} always holds: {_no_asset(asset, assets)}"
-            yield replace(place, level="warning", message=message, column=EXPECTED)
+            yield replace(place, level="warning", message=f"{about} always holds: {_no_asset(asset, assets)}", column=EXPECTED)
 
 
 def _asked(table: TableData) -> set[str]:

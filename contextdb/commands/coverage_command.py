@@ -244,8 +244,7 @@ def _row(text: str, table: EitherTable) -> int:
         return int(text) - 1
     if rows:
         numbers = ", ".join(str(row + 1) for row in rows[:6])
-        found = f"the asset {in_quotes(text)} is in {plural(len(rows), 'row')}."
-        raise ContextError(Fault(found, f"one of the rows {numbers}"))
+        raise ContextError(Fault(f"the asset {in_quotes(text)} is in {plural(len(rows), 'row')}.", f"one of the rows {numbers}"))
     accepted = f"a row from 1 to {table.n_rows:,}, or an asset" if table.n_rows else "none: the table has no rows"
     raise ContextError(no_such("row", text, table.assets, accepted))
 

@@ -202,8 +202,7 @@ def clip_at(text: str) -> tuple[str, float]:
 def frame_at(clip: str, at_s: float, length_s: float, rate: float) -> int:
     """The frame nearest to a moment of a clip; one behind its end is refused."""
     if at_s > length_s + 0.5 / rate:
-        found = f"there is no moment {at_s:g} s of {in_quotes(clip)}."
-        raise QueryError(Fault(found, f"seconds from 0 to {length_s:.2f}"))
+        raise QueryError(Fault(f"there is no moment {at_s:g} s of {in_quotes(clip)}.", f"seconds from 0 to {length_s:.2f}"))
     return min(round(at_s * rate), round(length_s * rate))
 
 

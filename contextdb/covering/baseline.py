@@ -96,8 +96,7 @@ def read_baseline(text: str, file: str) -> dict[str, Earlier]:
         return {_text(entry["table"]): _earlier(entry) for entry in document["tables"]}
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         why = f"{error} is missing" if isinstance(error, KeyError) else str(error)
-        fault = Fault(f"the baseline cannot be read: {why}.", ACCEPTED, place=Place(file))
-        raise ContextError(fault) from None
+        raise ContextError(Fault(f"the baseline cannot be read: {why}.", ACCEPTED, place=Place(file))) from None
 
 
 def _earlier(entry: Mapping[str, Any]) -> Earlier:

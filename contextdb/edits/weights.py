@@ -60,8 +60,7 @@ def weights_change(
 
 def _known(section: str, name: str, parts: Mapping[str, Any], path: Path) -> Any:
     if name not in parts:
-        found = f"there is no [{section}.{name}]."
-        raise SchemaError(Fault(found, some(parts) or "none", mend_for(name, parts), Place(str(path))))
+        raise SchemaError(Fault(f"there is no [{section}.{name}].", some(parts) or "none", mend_for(name, parts), Place(str(path))))
     return parts[name]
 
 

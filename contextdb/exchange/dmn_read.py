@@ -150,8 +150,7 @@ def _chosen(root: Element, wanted: str | None, file: str) -> tuple[Element, str]
         for (one, table), name in zip(found, names, strict=True):
             if wanted in (name, one.get("id")):
                 return table, name
-        fault = no_such("decision table", wanted, names, some(names) or "none", Place(file))
-        raise TableError(fault)
+        raise TableError(no_such("decision table", wanted, names, some(names) or "none", Place(file)))
     if not found:
         raise TableError(Fault("the file has no decision table.", _ACCEPTED, place=Place(file)))
     if len(found) > 1:

@@ -67,8 +67,7 @@ def _known(encoding: str, file: str) -> str:
         codecs.lookup(encoding)
         "".encode(encoding)
     except (LookupError, UnicodeError):
-        fault = no_such("encoding", encoding, COMMON, ", ".join(COMMON), Place(file))
-        raise TableError(fault) from None
+        raise TableError(no_such("encoding", encoding, COMMON, ", ".join(COMMON), Place(file))) from None
     return encoding
 
 

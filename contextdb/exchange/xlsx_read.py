@@ -178,8 +178,7 @@ def _fill_merged(grid: list[list[str]], merged: Sequence[tuple[tuple[int, int], 
         block, text = Block(top, left, min(bottom + 1, len(grid)), min(right + 1, len(grid[0]))), grid[top][left]
         n_left -= (block.bottom - block.top) * (block.right - block.left)
         if n_left < 0:
-            fault = Fault("the workbook is broken: merged areas overlap.", "a workbook as Excel saves it")
-            raise TableError(fault.at(Place(file)))
+            raise TableError(Fault("the workbook is broken: merged areas overlap.", "a workbook as Excel saves it").at(Place(file)))
         for row in grid[block.top : block.bottom]:
             row[block.left : block.right] = [text] * (block.right - block.left)
         remarks.append(Remark(f"merged cells; each now holds {in_quotes(text)}.", f"cells {block}"))

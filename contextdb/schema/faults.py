@@ -277,8 +277,7 @@ def column_faults(path: Path, table: Said, conditions: Set[str]) -> Iterator[Fou
             yield (*path, key), replace(twice, found=f"{header(path)} {twice.found}")
         if column in conditions:
             found = f"{header(path)} {key} names {in_quotes(column)}, which is declared as a condition."
-            mend = f"to leave out {header(('conditions', column))}"
-            yield (*path, key), Fault(found, "a column that is not a condition", mend)
+            yield (*path, key), Fault(found, "a column that is not a condition", f"to leave out {header(('conditions', column))}")
 
 
 def _file_faults(tables: Mapping[str, Said]) -> Iterator[Found]:

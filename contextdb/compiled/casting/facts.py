@@ -285,5 +285,4 @@ def _text(value: object) -> str:
 def _in_actor(fault: Fault, where: str) -> Fault:
     """A fault of an actor's fact, with the actor before it."""
     column = fault.place.column if fault.place else None
-    place = Place(column=f"{where}: {column}" if column else where)
-    return Fault(fault.found, fault.accepted, fault.mend, place, fault.rule)
+    return Fault(fault.found, fault.accepted, fault.mend, Place(column=f"{where}: {column}" if column else where), fault.rule)

@@ -234,5 +234,4 @@ def _is_writing_only(
 
 
 def _row(table: EitherTable, row: int) -> dict[str, object]:
-    place = table.place(row)
-    return {"row": row, "asset": table.assets[row], "line": place.line}
+    return {"row": row, "asset": table.assets[row], "line": table.place(row).line}

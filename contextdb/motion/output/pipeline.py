@@ -294,8 +294,7 @@ def _checked(banks: object) -> dict[str, PoseBank]:
     for name, other in others:
         if apart := _apart(rig, other):
             both = " and ".join(f"{in_quotes(at)} (with {in_quotes(bank.assets[0])})" for at, bank in ((first, rig), (name, other)))
-            found = f"the banks {both} are of different rigs: {apart}."
-            raise MotionError(Fault(found, "banks of one rig", RIG_MEND))
+            raise MotionError(Fault(f"the banks {both} are of different rigs: {apart}.", "banks of one rig", RIG_MEND))
     return named
 
 

@@ -100,8 +100,7 @@ class PoseStreams(Kept[PoseStream]):
         decided = require_many_of(decisions, Decision, "decisions", "a list of Decision")
         dt = require_real(dt, "dt", 0.0)
         if len(decided) != len(self):
-            found = f"{plural(len(decided), 'decision')} for {plural(len(self), 'character')}."
-            raise ContextError(Fault(found, "one for each"))
+            raise ContextError(Fault(f"{plural(len(decided), 'decision')} for {plural(len(self), 'character')}.", "one for each"))
         poses, rows = self.updated(decided, dt, self._places(bodies), self._grounds(ground))
         self.go_on(rows)
         return poses

@@ -163,8 +163,7 @@ class MotionConfig:
         settings = self.database(name)
         weights = {"place_weight": settings.place_weight, "facing_weight": settings.facing_weight}
         if not settings.roles:
-            found = f"[databases.{name}] has no roles."
-            raise SchemaError(Fault(found, 'roles = ["Tackler", "Carrier"]', place=Place(self.file)))
+            raise SchemaError(Fault(f"[databases.{name}] has no roles.", 'roles = ["Tackler", "Carrier"]', place=Place(self.file)))
         return JointDatabase.of(database, settings.roles, **weights)
 
     def joint_searcher(self, name: str, databases: Mapping[str, MotionDatabase]) -> JointSearcher:
@@ -206,8 +205,7 @@ class ControllerOptions(TypedDict, total=False):
 def _known(section: str, name: str, parts: Mapping[str, Part], file: str | None) -> Part:
     """The part of a name, or a SchemaError with the nearest name."""
     if require_text(name, "name") not in parts:
-        found = f"there is no [{section}.{name}]."
-        raise SchemaError(Fault(found, some(parts), mend_for(name, parts), Place(file)))
+        raise SchemaError(Fault(f"there is no [{section}.{name}].", some(parts), mend_for(name, parts), Place(file)))
     return parts[name]
 
 

@@ -177,8 +177,7 @@ def require_known(name: str, databases: Mapping[str, MotionDatabase], file: str)
     """Raise MotionError when no asset's name contains a text, with the nearest."""
     known = list(dict.fromkeys(asset for database in databases.values() for asset in database.assets))
     if not any(name.casefold() in asset.casefold() for asset in known):
-        found = f"no asset's name contains {in_quotes(name)}."
-        raise MotionError(Fault(found, some(known), mend_for(name, known), Place(file)))
+        raise MotionError(Fault(f"no asset's name contains {in_quotes(name)}.", some(known), mend_for(name, known), Place(file)))
 
 
 def _mapping(given: object, what: str) -> Mapping[str, Any]:

@@ -110,5 +110,4 @@ def require_name(name: object, what: str, known: Iterable[str]) -> None:
     """Raise MotionError for a name that is not among some, with the nearest."""
     names = list(known)
     if name not in names:
-        found = f"there is no {what} {in_quotes(str(name))}."
-        raise MotionError(Fault(found, some(names) or "none", mend_for(str(name), names)))
+        raise MotionError(Fault(f"there is no {what} {in_quotes(str(name))}.", some(names) or "none", mend_for(str(name), names)))

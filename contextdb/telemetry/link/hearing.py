@@ -170,5 +170,4 @@ def no_game(name: str | None, running: Sequence[Game]) -> ContextDBError:
     if name is None:
         return ContextDBError(Fault("no game is running.", 'a game that calls contextdb.link("game")'))
     found = f"no game {in_quotes(name)} is running{'' if names else ', nor any other'}."
-    fault = Fault(found, some(names) if names else "", mend_for(name, names))
-    return ContextDBError(fault)
+    return ContextDBError(Fault(found, some(names) if names else "", mend_for(name, names)))

@@ -54,6 +54,7 @@ from contextdb.tables.project import Project
 from contextdb.tables.table import Table
 
 ROOT = Path(__file__).parent.parent
+N_DAMAGED = 3_000 if IS_FULL else 900
 
 
 @pytest.fixture(scope="session")
@@ -156,20 +157,20 @@ def test_options_that_take_nan_and_infinity_for_granted_change_no_answer(tmp_pat
 @pytest.mark.parametrize(
     ("flat_bytes", "make"), [(2 << 20, random_table), (0, random_table), (0, random_nest)], ids=["flat", "wide", "nested"]
 )
-def test_thousands_of_damaged_files_are_refused_or_answered_and_never_crash_it(
+def test_very_many_damaged_files_are_refused_or_answered_and_never_crash_it(
     ask: Path, tmp_path: Path, flat_bytes: int, make: Callable[[random.Random, int], CompiledTable]
 ):
     rng = random.Random(flat_bytes)
     with mock.patch("contextdb.compiled.classes.FLAT_BYTES", flat_bytes):
         compiled = make(rng, 70)
     whole = artefact(compiled, tmp_path)
-    damaged = [mutated(rng, whole) for _ in range(3_000)]
+    damaged = [mutated(rng, whole) for _ in range(N_DAMAGED)]
     moments = [random_moment(rng, SCHEMA) for _ in range(6)]
     found = asked(ask, tmp_path, compiled.conditions, [whole, *damaged], moments)
     assert found[0] == (OK, [python_says(compiled, *moment) for moment in moments])
     statuses = [status for status, _ in found]
     assert set(statuses) == {OK, BAD_FILE, OTHER_TABLE}
-    assert statuses.count(BAD_FILE) > 1_000 < len(statuses) - statuses.count(OK)
+    assert statuses.count(BAD_FILE) > N_DAMAGED // 3 < len(statuses) - statuses.count(OK)
     assert all(answer in (OK, MISSING_FACT) for _, answers in found for answer, _ in answers)
 
 

@@ -6,6 +6,7 @@ import ast
 import re
 import subprocess
 import sys
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -38,10 +39,16 @@ def module_of(path: Path) -> str:
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
+@cache
+def tree_of(path: Path) -> ast.Module:
+    """What a module says."""
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
 def imports_of(path: Path, modules: set[str]) -> set[str]:
     """The modules that a file imports, wherever in the file, for types too."""
     found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(tree_of(path)):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module is not None:
@@ -60,7 +67,7 @@ def test_what_is_imported_for_types_alone_is_of_others_and_heavy():
     ours = set()
     for package in ("contextdb", "tui"):
         for path in (ROOT / package).rglob("*.py"):
-            for block in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            for block in ast.walk(tree_of(path)):
                 if isinstance(block, ast.If) and ast.unparse(block.test) == "TYPE_CHECKING":
                     ours |= {
                         (module_of(path), ast.unparse(node))

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from motion_project import session_folder, work_in_copy
 from running import Result, run
+from strategies import some
 
 from contextdb.errors import ContextError
 from contextdb.files.reports import sealed
@@ -122,7 +123,7 @@ def test_the_text_has_the_raw_clips_beside_and_says_what_is_never_played():
     assert any(line.startswith("not measured, as the session does not say where") for line in measured("poses.npz").lines)
 
 
-@pytest.mark.parametrize("name", ["skate", "jumps", "accel", "path", "heading", "reach", "forced", "forced-cost"])
+@pytest.mark.parametrize("name", some(["skate", "jumps", "accel", "path", "heading", "reach", "forced", "forced-cost"], 3))
 def test_a_broken_bar_fails_and_is_told(name: str):
     session = session_of("session.parquet", f"--max-{name}", "0.0001", code=1)
     (gate,) = session["bars"]

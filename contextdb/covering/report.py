@@ -142,14 +142,6 @@ class CoverageReport:
         how = "certain bounds" if self.method == "bounds" else f"99 % interval, {self.n_samples:,} samples, seed {self.seed}"
         return f"Between {ends} of the contexts have a valid row ({how})."
 
-    def at_once(self, n_rows: int) -> str:
-        """The share of the contexts with so many valid rows; that of none is as exact as `covered`, and a sample never says all."""
-        share = self.overlap.histogram[n_rows]
-        if n_rows == 0 and self.method == "exact":
-            return format_percent(1.0 - self.covered)
-        is_certain = self.overlap.method == "exact" or share < 1.0
-        return format_percent(share) if is_certain else f"at least {format_percent(1.0 - self.upper)}"
-
     def __repr__(self) -> str:
         return one_line("CoverageReport", self.table, f"{self.headline.rstrip('.')}, {plural(len(self.gaps), 'gap')}")
 
@@ -183,3 +175,12 @@ class CoverageReport:
             "overlap": self.overlap.to_json(),
             "crowded": [crowd.to_json() for crowd in self.crowded],
         }
+
+
+def share_at_once(report: CoverageReport, n_rows: int) -> str:
+    """The share of the contexts with so many valid rows; that of none is as exact as `covered`, and a sample never says all."""
+    share = report.overlap.histogram[n_rows]
+    if n_rows == 0 and report.method == "exact":
+        return format_percent(1.0 - report.covered)
+    is_certain = report.overlap.method == "exact" or share < 1.0
+    return format_percent(share) if is_certain else f"at least {format_percent(1.0 - report.upper)}"

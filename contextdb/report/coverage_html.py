@@ -10,6 +10,7 @@ from html import escape
 
 from contextdb.console import __version__, printable
 from contextdb.covering import CoverageReport, format_percent
+from contextdb.covering.report import share_at_once
 from contextdb.report import coverage_words as words
 from contextdb.report.coverage_heat import heat_map
 from contextdb.report.coverage_results import CoverageResults, Measured, gap_moments, gap_size, has_moments
@@ -138,7 +139,7 @@ def _overlap(measured: Measured) -> Iterator[str]:
     yield paragraph(f"{words.overlap_sentence(report)}.")
     most = max(report.overlap.histogram, default=0.0)
     bars = "".join(
-        f'<tr><td class="n">{n}</td><td class="n">{escape(report.at_once(n))}</td>'
+        f'<tr><td class="n">{n}</td><td class="n">{escape(share_at_once(report, n))}</td>'
         f'<td><i style="width:{_width(share / most)}"></i></td></tr>'
         for n, share in enumerate(report.overlap.histogram)
         if share > 0.0

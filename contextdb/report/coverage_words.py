@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 
 from contextdb.covering import CoverageReport, Gap, Slice, format_percent
 from contextdb.covering.baseline import Change
+from contextdb.covering.report import share_at_once
 from contextdb.covering.shares import told_apart
 from contextdb.errors import in_quotes, nearest, plural
 from contextdb.findings import Finding
@@ -73,7 +74,7 @@ def nearest_sentence(measured: Measured, gap: Gap) -> str:
 def overlap_sentence(report: CoverageReport) -> str:
     """How many rows are valid at once."""
     histogram = report.overlap.histogram
-    told = [f"{n or 'none'}: {report.at_once(n)}" for n, share in enumerate(histogram[:MOST_COUNTS]) if share > 0.0]
+    told = [f"{n or 'none'}: {share_at_once(report, n)}" for n, share in enumerate(histogram[:MOST_COUNTS]) if share > 0.0]
     rest = sum(histogram[MOST_COUNTS:])
     told += [f"{MOST_COUNTS} or more: {format_percent(rest)}"] if rest > 0.0 else []
     about = "" if report.overlap.method == "exact" else f" (estimated from {report.n_samples:,} samples)"

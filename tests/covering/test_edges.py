@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 import contextdb as cdb
 from contextdb.covering import count_kernels, coverage, format_percent
+from contextdb.covering.report import share_at_once
 from contextdb.covering.shares import told_apart, wilson
 from contextdb.schema.settings import TableSettings
 
@@ -171,8 +172,8 @@ def test_a_sample_without_a_valid_row_never_says_that_no_context_has_one():
     schema = {name: {"type": "number", "min": 0, "max": 100} for name in names}
     exact = report_of({name: ["0..10"] for name in names}, schema)
     sampled = replace(exact, overlap=replace(exact.overlap, histogram=(1.0,), method="estimate"))
-    assert sampled.at_once(0) == format_percent(1.0 - exact.covered) == "99.9999999999 %"
-    assert replace(sampled, method="estimate", upper=0.25).at_once(0) == "at least 75.00 %"
+    assert share_at_once(sampled, 0) == format_percent(1.0 - exact.covered) == "99.9999999999 %"
+    assert share_at_once(replace(sampled, method="estimate", upper=0.25), 0) == "at least 75.00 %"
 
 
 def test_an_estimate_holds_the_exact_share_and_depends_on_the_seed_alone():

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from strategies import examples
+from strategies import examples, some
 
 from contextdb.cells.grammar import reads
 from contextdb.columns import TextColumn
@@ -140,7 +140,7 @@ def test_a_proposed_type_reads_the_cells_that_decided_it_and_counts_all_others(p
     assert 2 * n_unread <= column.n_rows
 
 
-@pytest.mark.parametrize("n_rows", [1_999, 2_001, 9_999, 10_001, 10_002, 20_000])
+@pytest.mark.parametrize("n_rows", some([2_001, 1_999, 20_000, 10_001, 9_999, 10_002], 3))
 def test_columns_of_very_many_different_cells_get_the_type_that_few_of_them_would(n_rows: int):
     kinds = {"{}.5": "number", "{}": "int", "2026-{}": "output", "+T{}": "tags", "id{}": "output"}
     for form, kind in kinds.items():

@@ -71,12 +71,14 @@ def with_editor(
     script: Callable[[EditorApp, Pilot[Any]], Awaitable[T]],
     size: tuple[int, int] = (80, 24),
     settings: EditorSettings | None = None,
+    paints: bool = IS_FULL,
 ) -> T:
-    """Open a table in the whole editor, as `contextdb edit` does, while `script` presses keys; gives what the script gives."""
+    """Open a table in the whole editor, as `contextdb edit` does, while `script` presses keys; gives what the script gives.
+    `paints` as in `drive`."""
     with alone(path.parent):
         app = EditorApp(Workspace(path), settings)
         try:
-            return drive(app, lambda pilot: script(app, pilot), size)
+            return drive(app, lambda pilot: script(app, pilot), size, paints)
         finally:
             app.workspace.close()
 

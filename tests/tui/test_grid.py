@@ -156,7 +156,7 @@ def test_the_test_row_stands_in_the_last_line_and_counts():
     sheet = sheet_of()
     assert lines(sheet)[-1].split() == ["?", "test", "row", "│", "│", "│", "│", "│"]
     sheet.set_fact("hit", "True")
-    assert lines(sheet, width=120)[-1].startswith("?    2 of 3 v…")
+    assert lines(sheet, width=120)[-1].startswith("?    2 of 3   │")
 
 
 def test_an_empty_table_and_a_filter_that_hides_all_say_so():

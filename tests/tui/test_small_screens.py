@@ -55,7 +55,7 @@ def test_a_screen_that_is_made_smaller_and_larger_stays_what_it_is(path, scene):
             await settled(pilot)
         return before, screen_text(app).splitlines(), is_of, (type(app.screen), type(app.focused))
 
-    before, after, was, now = with_editor(path, script)
+    before, after, was, now = with_editor(path, script, paints=True)
     assert (after[0], after[-1], len(after)) == (before[0], before[-1], len(before))
     assert now == was
 

@@ -141,9 +141,14 @@ SCREENS = (
         leaves=ESC + ESC,
         before=((named("import"), "Enter read"), ("../cells.csv\r", "Becomes")),
     ),
-    Screen(xterm("shift+f4"), "A replace what differs", "AutofillDialog LineList Dialog"),
+    Screen(xterm("shift+f4"), "A what differs, too", "AutofillDialog LineList Dialog"),
     Screen(
-        "\r", "it has decided nothing yet", "WaitingScreen", leaves="q", before=((named("motion"), "1 game running"),), of_game=True
+        xterm("home") + "\r",
+        "it has decided nothing yet",
+        "WaitingScreen",
+        leaves="q",
+        before=((named("motion"), "1 game running"),),
+        of_game=True,
     ),
     Screen(table("marks"), "Enter merge", "ConflictsDialog Dialog", is_marked=True),
     Screen(table("held"), "open elsewhere", "HeldDialog Dialog"),

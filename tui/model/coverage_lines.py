@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from contextdb.cells.words import NUMBER_TEXT
 from contextdb.checks.rules import RULES
 from contextdb.covering import CoverageReport, Gap, Nearest, PairTable, Slice, format_percent
-from contextdb.covering.report import Crowd
+from contextdb.covering.report import Crowd, share_at_once
 from contextdb.covering.shares import told_apart
 from contextdb.errors import plural
 from contextdb.findings import Finding
@@ -217,7 +217,9 @@ def about_text(result: Result) -> str:
     lines.append("")
     lines.append(f"Rows valid at once: {report.overlap.mean:.3g} on average ({report.overlap.method}).")
     histogram = report.overlap.histogram
-    lines += [f"  {n:>3}   {report.at_once(n):>9}  {'█' * round(40 * s)}".rstrip() for n, s in enumerate(histogram) if s > 0.0]
+    lines += [
+        f"  {n:>3}   {share_at_once(report, n):>9}  {'█' * round(40 * s)}".rstrip() for n, s in enumerate(histogram) if s > 0.0
+    ]
     lines.append("")
     if pairs is None:
         lines.append(result.left_out)

@@ -118,8 +118,8 @@ class LineList(ScrollView, can_focus=True):
 
     def get_content_height(self, container: Size, viewport: Size, width: int) -> int:
         """The titles and every line, or those that say that there is none. It never shrinks: nothing jumps while one types."""
-        self._most_lines = max(self._most_lines, self.n_lines or len(self._empty_lines(width)))
-        return 1 + self._most_lines
+        self._most_lines = max(self._most_lines, self.n_lines)
+        return 1 + (self._most_lines or len(self._empty_lines(width)))
 
     def say_empty(self, text: str) -> None:
         """Say something else where there is no line."""

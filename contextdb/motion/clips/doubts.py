@@ -182,14 +182,12 @@ def doubts(clips: Iterable[tuple[str, str | None, Measures]]) -> list[ClipFindin
     compared with that of the others. Of a clip whose unit is doubtful nothing else is reported that is a length."""
     listed = list(clips)
     usual = _usual_shape([measures for _, _, measures in listed])
-    lengths = [_length(measures.bones or {}, usual) for _, _, measures in listed]
-    known = [length for length in lengths if length]
-    usual_m = float(np.median(known)) if len(known) >= FEWEST_TO_COMPARE else 0.0
-    found = []
-    for (asset, file, measures), length in zip(listed, lengths, strict=True):
-        for rule, at in _rules(measures, usual, length / usual_m if usual_m and length else 1.0):
-            found.append(ClipFinding(rule, asset, **at, file=file))
-    return found
+    lengths = _usual_lengths([measures.bones for _, _, measures in listed if measures.bones], usual or {})
+    return [
+        ClipFinding(rule, asset, **told, file=file)
+        for asset, file, measures in listed
+        for rule, told in _rules(measures, usual, _times(measures.bones or {}, lengths))
+    ]
 
 
 def doubts_of(clips: Iterable[Clip]) -> list[ClipFinding]:
@@ -440,9 +438,16 @@ def _usual_shape(all_measures: Sequence[Measures]) -> Shape | None:
     return {bone: share / total for bone, share in median.items()} if total else None
 
 
-def _length(bones: Mapping[str, float], usual: Shape | None) -> float:
-    """The length of the bones that most clips have, together; 0 for a body that lacks one."""
-    return math.fsum(bones[bone] for bone in usual) if usual and all(bone in bones for bone in usual) else 0.0
+def _usual_lengths(all_bones: Sequence[Mapping[str, float]], names: Iterable[str]) -> dict[str, float]:
+    """The median length of each bone of these names; empty for fewer clips than are compared."""
+    having = {name: [bones[name] for bones in all_bones if name in bones] for name in names}
+    return {name: float(np.median(those)) for name, those in having.items()} if len(all_bones) >= FEWEST_TO_COMPARE else {}
+
+
+def _times(bones: Mapping[str, float], usual: Mapping[str, float]) -> float:
+    """How many times as long as usual the middle bone of a body is: long arms alone make it no larger. 1 where none is known."""
+    ratios = [bones[bone] / length for bone, length in usual.items() if length and bone in bones]
+    return float(np.median(ratios)) if ratios else 1.0
 
 
 def _difference(shape: Shape, usual: Shape) -> float:

@@ -314,7 +314,6 @@ class Measure:
         return [Box(cells, share) for cells, share in parts if cells is not None], report.gaps_complete
 
     def common(self, one: Box, other: Box) -> Box | None:
-        """What two boxes have in common."""
         cells = meet(one.cells, other.cells, self.space.conditions)
         return None if cells is None else Box(cells, self._report([[cells]]).covered)
 

@@ -162,7 +162,6 @@ def effects_text(effect: Effects | Fault | None, colour: bool, shows_all: bool =
 
 
 def effects_markdown(effect: Effects | Fault | None, shows_all: bool = False) -> str:
-    """Effects as nested lists of Markdown."""
     if effect is None:
         return ""
     lines = ["", f"#### {TITLE.capitalize()}", ""]

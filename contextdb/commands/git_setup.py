@@ -102,11 +102,9 @@ class Setup:
             raise
 
     def set(self, key: str, value: str) -> None:
-        """Write one key."""
         self.git("config", self.scope, "--replace-all", key, value)
 
     def unset(self, key: str) -> None:
-        """Take one key back."""
         self.git("config", self.scope, "--unset-all", key, accepts=(0, 5))
 
     def write(self, raw: bytes) -> None:

@@ -23,7 +23,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
-    """Print the table."""
     raw = read_bytes(arguments.file)
     try:
         table = table_of(Table, raw, arguments.file)

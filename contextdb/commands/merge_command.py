@@ -64,7 +64,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
-    """Merge three files."""
     path = Path(arguments.path or arguments.ours)
     raws = [read_bytes(file) for file in (arguments.base, arguments.ours, arguments.theirs)]
     merged = _merged_toml if path.suffix.lower() == ".toml" else _merged_tables

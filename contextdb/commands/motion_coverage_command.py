@@ -65,7 +65,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
-    """Measure a project."""
     if arguments.context is not None and (arguments.format != "text" or arguments.baseline or arguments.fail_under is not None):
         raise ContextError(Fault("--context is text about some contexts; other formats and bars do not go with it."))
     earlier = earlier_report(arguments.baseline, read_baseline, BASELINE) if arguments.baseline else None

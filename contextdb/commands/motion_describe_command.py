@@ -52,7 +52,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
-    """Describe the clips of a folder."""
     if arguments.out and arguments.into:
         raise ContextDBError(Fault("--out makes a table, --into fills one.", "one of the two"))
     if arguments.update and not arguments.into:

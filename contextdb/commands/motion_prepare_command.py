@@ -70,7 +70,6 @@ class Change:
 
     @property
     def data(self) -> bytes:
-        """What is written."""
         return self.new.encode()
 
 

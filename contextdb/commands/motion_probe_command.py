@@ -185,7 +185,6 @@ def _cells(measures: Measures) -> Iterator[str]:
 
 
 def _folder(folder: Path) -> Path:
-    """A folder to write into."""
     if folder.is_file():
         raise FileError(Fault("this is a file.", "a folder", place=Place(str(folder))))
     make_folder(folder)

@@ -138,7 +138,6 @@ class Replay:
 
     @property
     def file(self) -> str:
-        """The session's file."""
         return self.of_file or str(self.asked.file)
 
     @cached_property
@@ -169,7 +168,6 @@ class Replay:
 
 
 def _played(replay: Replay) -> Played:
-    """A session with its poses."""
     folder, why = project_of(replay.trace, replay.asked.project, replay.file)
     if why:
         raise MotionError(Fault(f"its poses cannot be made: {why}", place=Place(replay.file)))

@@ -59,7 +59,6 @@ class Stick:
         return float(self.times_s[-1])
 
     def at(self, time_s: float) -> int:
-        """The moment that holds at a time."""
         return max(0, int(np.searchsorted(self.times_s, time_s + 1e-9, side="right")) - 1)
 
     def value(self, name: str, moment: int, otherwise: float = 0.0) -> float:

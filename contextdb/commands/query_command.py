@@ -55,7 +55,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
-    """Answer one context."""
     compiled = open_compiled(arguments.table)
     plain, actors = read_actors(arguments.facts, compiled)
     if arguments.prefer is not None and actors is None:

@@ -356,7 +356,6 @@ class CompiledData(Unchanging):
 
     @cached_property
     def places(self) -> dict[str, int]:
-        """Where each condition is among `conditions`."""
         return {c.name: at for at, c in enumerate(self.conditions)}
 
     @cached_property
@@ -366,7 +365,6 @@ class CompiledData(Unchanging):
 
     @property
     def nbytes(self) -> int:
-        """Bytes that the masks take."""
         return sum(nbytes(m) for m in self.masks)
 
     def once(self, make: Callable[[Self], Made]) -> Made:

@@ -67,7 +67,6 @@ class Picked:
         return found
 
     def slots_of(self, who: NDArray[np.int64]) -> Rows:
-        """Where characters are in the arrays."""
         n = len(who)
         if n and who[0] == 0 and who[-1] == n - 1 and np.array_equal(who, np.arange(n)):
             if self._n_ordered == self.n < n:

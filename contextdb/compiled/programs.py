@@ -132,7 +132,6 @@ class Programs:
         self.starts.append(len(self.code))
 
     def emit(self, op: Op, a: int = 0, b: int = 0, c: int = 0) -> None:
-        """Add one instruction."""
         self.code.append((op, a, b, c))
 
     @singledispatchmethod

@@ -41,7 +41,6 @@ class EarlierGap:
 
     @property
     def text(self) -> str:
-        """The cells on one line."""
         return ", ".join(f"{name}: {cell}" for name, cell in self.cells.items()) or "every context"
 
     def to_json(self) -> dict[str, object]:

@@ -60,7 +60,6 @@ class ValueFactor:
         return cls(values, has_others, np.full(n_classes, 1.0 / n_classes), assumed)
 
     def classes(self, accepts: Accepted) -> int:
-        """The classes that a set holds."""
         assert isinstance(accepts, ValueSet)
         held = bitmask.int_of(sorted(self._class_of[value] for value in accepts.values if value in self._class_of))
         return ((1 << len(self.values) + self.has_others) - 1) ^ held if accepts.is_complement else held
@@ -95,7 +94,6 @@ class NumberFactor:
 
     @property
     def cuts(self) -> list[float]:
-        """The first number of each class."""
         return self._ends[0]
 
     @cached_property

@@ -149,7 +149,6 @@ class Space:
 
     @cached_property
     def full(self) -> Box:
-        """The box of every context."""
         return tuple((1 << len(f.weights)) - 1 for f in self.factors)
 
     def sides(self, at: int, accepts: Accepted | None) -> tuple[int, ...]:

@@ -83,7 +83,6 @@ class DescribedTable:
 
     @property
     def toml_path(self) -> Path:
-        """The contextdb.toml."""
         return self.folder / SCHEMA_FILE
 
     @property

@@ -87,7 +87,6 @@ class Renaming:
 
     @property
     def reversed(self) -> Renaming:
-        """What takes it back."""
         return Renaming(self.new, self.old, tuple(Rewrite(file.path, file.after, file.before) for file in self.files))
 
     def write(self) -> None:

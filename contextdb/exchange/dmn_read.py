@@ -283,7 +283,6 @@ class Rules:
         return [TextColumn.of(name, texts)]
 
     def remarks(self) -> Iterator[Remark]:
-        """What is said of the rules."""
         if self.n_tests:
             named = f"; the game supplies the other facts that they name: {listed(list(self.facts))}" if self.facts else ""
             yield Remark(f"{plural(self.n_tests, 'test')} that no cell can say became rules of their rows{named}.")

@@ -164,7 +164,6 @@ def unary_tests(cell: Cell, domain: Domain) -> str | None:
 
 
 def feel_number(number: float, kind: Kind) -> str:
-    """A number as FEEL writes it."""
     return _written(kind.spelling.write(number), kind)
 
 

@@ -45,7 +45,6 @@ def _parts(plan: Part) -> tuple[Part, ...]:
 
 @singledispatch
 def runner(plan: Part) -> Run:
-    """The function that computes a plan."""
     raise AssertionError(plan)
 
 

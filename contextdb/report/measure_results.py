@@ -95,7 +95,6 @@ class SessionMeasures:
 
     @property
     def headline(self) -> str:
-        """How long it is."""
         return f"{self.measures.seconds:.2f} s, {plural(self.measures.updates, 'update')}, {plural(self.measures.jumps, 'jump')}"
 
     def rows(self) -> Iterator[tuple[str, str, str, str]]:

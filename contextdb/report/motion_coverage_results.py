@@ -41,7 +41,6 @@ class Lost:
 
     @property
     def words(self) -> str:
-        """Which bin it is."""
         return MAPS[self.map].words(self.row, self.column)
 
     def to_json(self) -> dict[str, object]:

@@ -12,7 +12,6 @@ MOST_CAPTURES = 5
 
 
 def measures(results: MeasureResults) -> str:
-    """The bars of sessions."""
     suites = (bars_of(each.file, each.gates, _measured(each), "measures", each.file) for each in results.sessions)
     return document("contextdb motion measure", suites)
 
@@ -22,7 +21,6 @@ def _measured(session: SessionMeasures) -> str:
 
 
 def motion_coverage(results: MotionCoverageResults) -> str:
-    """The bars of tables."""
     gone = (bars_of(name, [gate], "", "motion coverage") for name, gate in results.gone.items())
     measured = (bars_of(each.motion.name, each.gates, _captures(each), "motion coverage") for each in results.tables)
     return document("contextdb motion coverage", [*gone, *measured])

@@ -98,7 +98,6 @@ def outputs_to_toml(names: Sequence[str], declared: Iterable[Output]) -> list[st
 
 
 def fallback_to_toml(asset: str | None, outputs: Iterable[tuple[str, OutputValue]]) -> str | dict[str, object] | None:
-    """What `fallback` says."""
     values = {name: _plain(value) for name, value in outputs}
     return {"asset": asset, "outputs": values} if values and asset is not None else asset
 

@@ -70,7 +70,6 @@ class Cells:
     texts: Mapping[str, Mapping[int, str]]
 
     def apply(self, table: AnyTable) -> AnyTable:
-        """The table with these texts."""
         changed = {name: _with_texts(table.text_column(name), texts) for name, texts in self.texts.items()}
         return with_columns(table, [changed.get(c.name, c) for c in table.columns], table.origin)
 
@@ -104,7 +103,6 @@ class Columns:
         return replace(table, columns=tuple(columns), conditions=found, settings=settings, schema=schema)
 
     def to_json(self) -> dict[str, object]:
-        """The change as plain data."""
         return {"change": "columns", "layout": self.layout}
 
 
@@ -146,7 +144,6 @@ class Sections:
         return replace(table, conditions=conditions, settings=settings, schema=schema)
 
     def to_json(self) -> dict[str, object]:
-        """The change as plain data."""
         return {"change": "sections", "settings": dict(self.settings), "parts": {k: dict(v) for k, v in self.parts.items()}}
 
 

@@ -70,7 +70,6 @@ class Timeline:
 
     @property
     def frame_times(self) -> Floats:
-        """The moments of the clip's frames."""
         return np.arange(round(self.duration_s * RATE) + 1) / RATE
 
     def at(self, values: Floats, times: Floats) -> Floats:

@@ -73,7 +73,6 @@ class Pipeline:
 
     @property
     def width(self) -> int:
-        """Numbers in a row."""
         return self._columns.width
 
     def begun(self) -> Rows:

@@ -170,7 +170,6 @@ def _roots(look: Look) -> Iterator[Proposal]:
 
 
 def _contacts(look: Look) -> Iterator[Proposal]:
-    """When the feet are down."""
     if look.falls is None:
         return
     for foot, tag in zip(look.falls.feet, CONTACTS, strict=True):

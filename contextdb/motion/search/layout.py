@@ -104,7 +104,6 @@ class Layout:
 
     @property
     def n_features(self) -> int:
-        """How many features a frame has."""
         return int(self.blocks.shape[1])
 
     @property

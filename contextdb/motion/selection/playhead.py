@@ -54,7 +54,6 @@ class Playhead:
 
     @cached_property
     def start(self) -> int:
-        """The first frame."""
         return int(self.database.starts[self.range])
 
     @cached_property

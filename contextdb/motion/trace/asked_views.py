@@ -107,7 +107,6 @@ def what_if_lines(told: WhatIf, width: int = WIDTH) -> Iterator[str]:
 
 
 def diff_lines(told: SessionDiff, width: int = WIDTH) -> Iterator[str]:
-    """Where two sessions part."""
     parting = told.parting
     if parting is None:
         yield f"both play the same in all {plural(told.updates, 'update')}"

@@ -117,7 +117,6 @@ class SocketListener:
                 self.offer(line)
 
     def lose(self, n_lines: int) -> None:
-        """Learn that lines are lost."""
         self._n_lost += n_lines
         self._knows.clear()
 
@@ -172,7 +171,6 @@ class SocketListener:
                 del self._pending[:sent]
 
     def close(self) -> None:
-        """Hang up."""
         self.is_gone = True
         self.connection.close()
 

@@ -160,8 +160,7 @@ def _about_turns() -> Iterable[Recipe]:
     """About, on the way, to either side: at a walk and at a jog."""
     for pace in ("walk", "jog"):
         for side, sign in (("left", 1.0), ("right", -1.0)):
-            name = f"{pace}_about_{side}"
-            turn = _recipe(name, pace, change="turn")
+            turn = _recipe(f"{pace}_about_{side}", pace, change="turn")
             yield replace(turn, n_cycles=turn.n_cycles + 1, turned_deg=sign * 180.0)
 
 

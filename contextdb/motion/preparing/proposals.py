@@ -313,8 +313,7 @@ def _targets(look: Look) -> Iterator[Proposal]:
     begin = first or None
     reason = f"from {slows / look.rate:.2f} s on it slows down to a stand"
     yield look.said("targets", ReservedTag.MATCH_RANGE, begin, slows, reason, slows / look.rate)
-    reason = f"comes {metres:.2f} m far and then stands"
-    yield look.said("targets", ReservedTag.WARP_POSITION, begin, last, reason, metres)
+    yield look.said("targets", ReservedTag.WARP_POSITION, begin, last, f"comes {metres:.2f} m far and then stands", metres)
 
 
 # ---- noise

@@ -20,7 +20,7 @@ import argparse
 import math
 import os
 import random
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -29,7 +29,7 @@ import numpy as np
 from contextdb import motion
 from contextdb.cells.facts import UNKNOWN_MODES, Unknown
 from contextdb.commands.motion_stage import Stage, reach_s
-from contextdb.commands.motion_stick import Moments, Stick, conditions_of
+from contextdb.commands.motion_stick import Stick, conditions_of, read_moments
 from contextdb.commands.numbers import rate_of, whole_type
 from contextdb.console import ExitCode, output, progress
 from contextdb.disk import path_in_quotes
@@ -71,7 +71,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     tables = stage.tables(character.controller.selector.names)
     path = Path(arguments.stick)
     stick = Stick.read(path, conditions_of(tables))
-    moments = Moments.read(path, tables, arguments.unknown, character.asked_facts)
+    moments = read_moments(path, tables, arguments.unknown, character.asked_facts)
     if moments is None:
         character.tables = None
     rate = character.schema.rate if arguments.rate is None else arguments.rate
@@ -115,13 +115,13 @@ def character_of(stage: Stage, name: str, seed: int = 0, unknown: Unknown = "err
     return motion.Character(controller, stage.schema(names[0]), table_of or None, stream, unknown=unknown)
 
 
-def steer(character: motion.Character, stick: Stick, moments: Moments | None, per_s: float) -> Iterator[motion.Updated]:
+def steer(character: motion.Character, stick: Stick, moments: Sequence[Facts] | None, per_s: float) -> Iterator[motion.Updated]:
     """Update a character from the stick's first moment to its last, so many times a second."""
     n_updates = math.floor(stick.duration_s * per_s + 1e-6) + 1
     update = _over_ground if stick.is_velocity else _from_body
     for i in progress(range(n_updates), "steering"):
         moment, dt_s = stick.at(i / per_s), 1.0 / per_s if i else 0.0
-        yield update(character, stick, moment, dt_s, None if moments is None else moments.contexts[moment])
+        yield update(character, stick, moment, dt_s, None if moments is None else moments[moment])
 
 
 def _over_ground(character: motion.Character, stick: Stick, moment: int, dt_s: float, facts: Facts | None) -> motion.Updated:

@@ -83,30 +83,25 @@ class Stick:
         return cls(path, times_s - times_s[0], asked)
 
 
-@dataclass(frozen=True, eq=False)
-class Moments:
-    """The facts of each moment of a stick."""
+def read_moments(
+    path: Path, tables: Mapping[str, CompiledTable], unknown: Unknown, own: Collection[str] = ()
+) -> list[dict[str, object]] | None:
+    """Read the facts of each moment of a stick; those named `own` the character computes where the file does not give them.
 
-    contexts: Sequence[Mapping[str, object]]
-
-    @classmethod
-    def read(cls, path: Path, tables: Mapping[str, CompiledTable], unknown: Unknown, own: Collection[str] = ()) -> Moments | None:
-        """Read the facts for some tables; those named `own` the character computes where the file does not give them.
-
-        None when the file has no facts, and the tables ask for others than the character's own: nothing is filtered. Raises
-        ContextDBError for facts that a query cannot use; with file, line and fact.
-        """
-        read = {name: read_contexts(path, table) for name, table in tables.items()}
-        known = {name: [c for c in each.facts.columns if c in tables[name].asked] for name, each in read.items()}
-        is_own = bool(tables) and all(set(own).issuperset(table.asked) for table in tables.values())
-        if not any(known.values()) and not is_own:
-            return None
-        for name, each in read.items():
-            with missing_facts_by_option():
-                _with_own(each, tables[name], own).ask(tables[name], unknown)  # tells all that is wrong, with its line
-        facts = [each.facts.select(known[name]).to_dicts() for name, each in read.items() if known[name]]
-        n_moments = max((len(each.facts) for each in read.values()), default=0)
-        return cls([_given([each[i] for each in facts]) for i in range(n_moments)])
+    None when the file has no facts, and the tables ask for others than the character's own: nothing is filtered. Raises
+    ContextDBError for facts that a query cannot use; with file, line and fact.
+    """
+    read = {name: read_contexts(path, table) for name, table in tables.items()}
+    known = {name: [c for c in each.facts.columns if c in tables[name].asked] for name, each in read.items()}
+    is_own = bool(tables) and all(set(own).issuperset(table.asked) for table in tables.values())
+    if not any(known.values()) and not is_own:
+        return None
+    for name, each in read.items():
+        with missing_facts_by_option():
+            _with_own(each, tables[name], own).ask(tables[name], unknown)  # tells all that is wrong, with its line
+    facts = [each.facts.select(known[name]).to_dicts() for name, each in read.items() if known[name]]
+    n_moments = max((len(each.facts) for each in read.values()), default=0)
+    return [_given([each[i] for each in facts]) for i in range(n_moments)]
 
 
 def _with_own(contexts: Contexts, table: CompiledTable, own: Collection[str]) -> Contexts:

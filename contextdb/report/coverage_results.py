@@ -98,17 +98,18 @@ class CoverageResults:
     """For each table of the baseline that no longer exist the bar that this misses, or keeps where it is intended."""
 
     @property
+    def gates(self) -> list[Gate]:
+        return [*self.gone.values(), *(gate for measured in self.tables for gate in measured.gates)]
+
+    @property
     def passed(self) -> bool:
         """Whether every bar is kept."""
-        return all(gate.passed for gate in self._gates())
-
-    def _gates(self) -> list[Gate]:
-        return [*self.gone.values(), *(gate for measured in self.tables for gate in measured.gates)]
+        return all(gate.passed for gate in self.gates)
 
     @property
     def verdict(self) -> str:
         """Whether the bars are kept, in one sentence; "" where there are none."""
-        gates = self._gates()
+        gates = self.gates
         n_failed = sum(not gate.passed for gate in gates)
         if n_failed:
             return f"{n_failed} of {plural(len(gates), 'threshold')} missed."

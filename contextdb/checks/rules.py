@@ -37,7 +37,6 @@ RULES: dict[str, Rule] = {
             "commands.motion_replay_command",
             "commands.motion_run_command",
             "disk",
-            "tables.clip_folder",
             "tables.places",
             "tables.project",
             "tables.watching.snapshot",

@@ -42,9 +42,10 @@ T = TypeVar("T")
 
 
 class ByName(Mapping[str, T]):
-    """A mapping by names that is equal to itself alone, and true though it may be empty."""
+    """A mapping by names that is equal to itself alone, and true though it may be empty: `tables`."""
 
     __slots__ = ()
+    tables: Mapping[str, T]
 
     def __eq__(self, other: object) -> bool:
         return self is other
@@ -54,6 +55,12 @@ class ByName(Mapping[str, T]):
 
     def __bool__(self) -> bool:
         return True
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.tables)
+
+    def __len__(self) -> int:
+        return len(self.tables)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -101,12 +108,6 @@ class Project(Unchanging, ByName[Table]):
         if name not in self.tables:
             raise NoSuchTable(no_such("table", name, self.tables, some(self.tables) or "none: the folder has no table"))
         return self.tables[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.tables)
-
-    def __len__(self) -> int:
-        return len(self.tables)
 
     def with_table(self, table: Table) -> Project:
         """The project with one table in another version, for those too whose rows refer to it; raises ContextError for no table."""
@@ -232,7 +233,11 @@ def read_folder_schema(folder: Path) -> Schema:
     path = folder / SCHEMA_FILE
     if not path.is_file():
         return EMPTY
-    raw = read_bytes(path)
+    return schema_of(read_bytes(path), path)
+
+
+def schema_of(raw: bytes, path: Path) -> Schema:
+    """What the bytes of a contextdb.toml say. Raises SchemaError where they are no UTF-8, or have an invalid setting."""
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -20,10 +20,10 @@ from contextdb.bitmask import Rows, Words, read_only
 from contextdb.cells.arguments import require_place
 from contextdb.cells.notebook import one_line
 from contextdb.cells.sequences import Made
+from contextdb.compiled.answered_table import SaidRows
 from contextdb.compiled.batch_costs import CostsOfPairs
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.matches import Join, Matches, layered_penalties, minus
-from contextdb.compiled.said_rows import SaidRows
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.errors import ContextError, Fault, Place, WrongType, plural
 

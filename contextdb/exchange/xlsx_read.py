@@ -17,8 +17,7 @@ from contextdb.columns import TextColumn
 from contextdb.errors import ContextDBError, Fault, Place, TableError, in_quotes, mend_for, plural, shown, some
 from contextdb.exchange.described import FIRST_LINE, TYPES_SHEET
 from contextdb.exchange.grid import Block, column_letters, columns_of, parse_block
-from contextdb.exchange.reading import ERRORS, Reading, Remark, SheetWanted, capped, listed
-from contextdb.exchange.values import DATES, text_of_value
+from contextdb.exchange.reading import DATES, ERRORS, Reading, Remark, SheetWanted, capped, listed, text_of_value
 from contextdb.exchange.xlsx_scan import Marks, is_old, marks_of, require_workbook
 from contextdb.schema.settings import EMPTY, Schema, read_schema
 

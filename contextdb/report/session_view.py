@@ -13,7 +13,7 @@ from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.measuring import measure, shown
 from contextdb.motion.measuring.raw_clips import Clips, toe_of
-from contextdb.motion.measuring.strips import strips_of
+from contextdb.motion.measuring.shown import strips_of
 from contextdb.motion.output.bank import PoseBank, loops
 from contextdb.motion.output.settings import PoseSettings
 from contextdb.motion.output.stream import Pose

@@ -14,6 +14,7 @@ from contextdb.cells.arguments import require_kind, require_mapping
 from contextdb.console import announce
 from contextdb.errors import Fault, MotionError, in_quotes, no_such
 from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.clips.skeleton import Ints, Skeleton
 from contextdb.motion.output import stages
 from contextdb.motion.output.bank import RIG_MEND, PoseBank, tops_of
 from contextdb.motion.output.feet import OnGround, hinges_of, legs_of
@@ -21,7 +22,6 @@ from contextdb.motion.output.ground import ManyGround, Triple, below, below_many
 from contextdb.motion.output.pose import CrowdPoses
 from contextdb.motion.output.samples import Flags
 from contextdb.motion.output.settings import PoseSettings
-from contextdb.motion.output.spine import spine_of
 from contextdb.motion.selection.decision import Action, Decision, Playing
 
 ADDED_SHARE = 0.75
@@ -307,3 +307,48 @@ def _apart(rig: PoseBank, other: PoseBank) -> str:
         return "their joints have another order or other parents"
     alone = np.setxor1d(rig.moving, other.moving).tolist()
     return f"the joint {in_quotes(rig.skeleton.names[alone[0]])} has positions of its own in one of them alone" if alone else ""
+
+
+# ---- the spine: the joints that turn back what `contextdb.motion.output.alignment` turns the hips by
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Spine:
+    """The joints that hang on the root, where they are in positions [M, 3], and the joints from the hips to the chest, which turn
+    back: after each so much of the turn is left."""
+
+    tops: Ints
+    places: Ints
+    joints: Ints
+    left: Floats
+
+
+def spine_of(bank: PoseBank) -> Spine | None:
+    """The spine of a rig: from where the legs part up to where the arms do; None where there are no feet or nothing above them."""
+    rig = bank.skeleton
+    if not bank.feet:
+        return None
+    legs = [{rig.index(foot), *rig.ancestors(rig.index(foot))} for foot in bank.feet]
+    shared = set.intersection(*legs)
+    hips = max(shared, key=lambda joint: int(rig.depths[joint]), default=0)
+    above = [joint for joint in _below(rig, hips) if not any(joint in leg for leg in legs)]
+    joints: list[int] = []
+    while above:
+        joints.append(max(above, key=lambda joint: _size(rig, joint)))
+        above = [joint for joint in _below(rig, joints[-1]) if _below(rig, joint)]
+        if len(above) > 1:
+            break
+    if not joints:
+        return None
+    tops = np.array(tops_of(rig), np.int64)
+    left = 1.0 - np.arange(1, len(joints) + 1) / len(joints)
+    return Spine(tops, np.searchsorted(bank.moving, tops), np.array(joints, np.int64), left)
+
+
+def _below(rig: Skeleton, joint: int) -> list[int]:
+    return [other for other in range(rig.n_joints) if rig.parents[other] == joint]
+
+
+def _size(rig: Skeleton, joint: int) -> int:
+    """How many joints hang on a joint, itself among them."""
+    return 1 + sum(_size(rig, other) for other in _below(rig, joint))

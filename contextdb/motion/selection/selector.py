@@ -17,10 +17,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Real
 from typing import Any, Unpack
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from contextdb.cells.arguments import require_kind, require_many_of, require_text
@@ -44,7 +45,6 @@ from contextdb.motion.selection.asked import (
     valid_of_each,
 )
 from contextdb.motion.selection.choice import Choice, Reason, Search, Status
-from contextdb.motion.selection.known_tags import with_tags
 
 __all__ = ["Choice", "Entry", "Reason", "Search", "Selector", "Status"]
 
@@ -306,3 +306,16 @@ def _check_entries(entries: Sequence[Entry]) -> None:
                 f"the databases {in_quotes(first)} and {in_quotes(name)} have different channels: their costs cannot be compared."
             )
             raise MotionError(Fault(found, "databases of one schema"))
+
+
+# ---- databases that know each other's tags, so that one tag filter can be asked of all
+
+
+def with_tags(database: MotionDatabase, tags: Iterable[str]) -> MotionDatabase:
+    """The same database, its markup knowing some tags more; the same object if it knows them already. The features are shared."""
+    marks = database.marks
+    new = tuple(tag for tag in tags if tag not in marks.tags)
+    if not new:
+        return database
+    wider = np.pad(marks.kind_tags, ((0, 0), (0, len(new))))
+    return replace(database, marks=replace(marks, tags=marks.tags + new, kind_tags=wider))

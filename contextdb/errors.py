@@ -27,7 +27,7 @@ from __future__ import annotations
 import difflib
 import unicodedata
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 SHOWN_CHARACTERS = 60
@@ -242,6 +242,11 @@ def some(names: Iterable[str], most: int = 6) -> str:
     listed = list(names)
     head = ", ".join(f'"{shown(n)}"' for n in listed[:most])
     return head if len(listed) <= most else f"{head} and {len(listed) - most} more"
+
+
+def joined(texts: Sequence[str], most: int, between: str = ", ") -> str:
+    """The first texts in one, and how many more there are."""
+    return between.join(texts[:most]) + (f" and {len(texts) - most:,} more" if len(texts) > most else "")
 
 
 def plural(count: int, noun: str) -> str:

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextdb.console import aligned, printable, styled, width_of
 from contextdb.covering import Gap, format_percent
 from contextdb.covering.inside import facts_inside
-from contextdb.errors import plural, row_name
+from contextdb.errors import joined, plural, row_name
 from contextdb.findings import LEVELS, Finding
 from contextdb.report import coverage_words as words
 from contextdb.report.coverage_results import CoverageResults, Measured, gap_moments, gap_size, has_moments
@@ -146,10 +146,8 @@ def _findings(findings: Sequence[Finding], measured: Measured, colour: bool, wid
     for rule, found in blocks.items():
         room = f"{rule} {len(found):>{max(1, widest - len(rule) - 1)},}"
         head = f"{INDENT}{styled(room, STYLES[found[0].level], colour)}  "
-        shown = found[:most]
-        named = ", ".join(words.rows_words(measured, f) for f in shown)
-        more = f" and {len(found) - len(shown):,} more" if len(shown) < len(found) else ""
-        lines = list(hanging(" " * (len(INDENT) + widest + 2), named + more, width))
+        named = joined([words.rows_words(measured, f) for f in found], most)
+        lines = list(hanging(" " * (len(INDENT) + widest + 2), named, width))
         yield head + lines[0].lstrip() if lines[0].strip() else head.rstrip()
         yield from lines[1:]
 
@@ -180,9 +178,8 @@ def _telemetry(measured: Measured, colour: bool, width: int) -> Iterator[str]:
         )
     never = seen.never_used
     if never:
-        named = ", ".join(measured.named(row) for row in never[:MOST_ITEMS])
-        more = f" and {len(never) - MOST_ITEMS:,} more" if len(never) > MOST_ITEMS else ""
-        yield from hanging(INDENT, f"{plural(len(never), 'row')} never valid in them: {named}{more}", width)
+        named = joined([measured.named(row) for row in never], MOST_ITEMS)
+        yield from hanging(INDENT, f"{plural(len(never), 'row')} never valid in them: {named}", width)
     for sentence in words.facts_sentences(seen):
         yield from hanging(INDENT, sentence, width)
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from contextdb.console import printable, styled
 from contextdb.covering import format_percent
-from contextdb.errors import plural
+from contextdb.errors import joined, plural
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.measuring.coverage import ContextCoverage
 from contextdb.motion.measuring.moves import LEAST_FRAMES, MAPS, Counts, Map
@@ -165,5 +165,4 @@ def _contexts(measured: MotionMeasured, width: int, shows_all: bool) -> Iterator
 
 
 def _listed(items: Sequence[str], shows_all: bool, few: int = FEW_ITEMS, between: str = ", ") -> str:
-    shown = items if shows_all else items[:few]
-    return between.join(shown) + (f" and {len(items) - len(shown):,} more" if len(items) > len(shown) else "")
+    return joined(items, len(items) if shows_all else few, between)

@@ -31,9 +31,8 @@ from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints, Skeleton
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.markup.markup import Markup
-from contextdb.motion.output.legs import leg_of, steps_of
+from contextdb.motion.output.legs import leg_of, steps_of, travels
 from contextdb.motion.output.samples import Flags, Frames, Moment, Place3, Sample, Singles
-from contextdb.motion.output.travel import travels
 
 SAME_M = 1e-6
 """A joint that is never farther from its offset keeps it."""

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 
 from contextdb.errors import ContextDBError, Fault, Place, in_quotes, mend_for, some
 from contextdb.telemetry.link.doors import connected, doors, token_of
@@ -83,7 +82,7 @@ class Hearing:
     def __enter__(self) -> Hearing:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _first(self) -> tuple[Line, bytes]:

@@ -21,7 +21,7 @@ from typing import IO, Any, NoReturn
 from contextdb.console import ExitCode, drop_output, note, printable
 from contextdb.disk import unnameable
 from contextdb.disk.together import UnfinishedWarning
-from contextdb.errors import ContextDBError, Fault, Place, in_quotes, mend_for, nearest, some
+from contextdb.errors import ContextDBError, Fault, Place, in_quotes, joined, mend_for, nearest, some
 
 COMMANDS = {
     "edit": "the terminal editor",
@@ -105,7 +105,6 @@ class Group:
 
     @property
     def overview(self) -> str:
-        """The commands, each with what it does."""
         return _overview(self.commands) if self.about is None else self._help()
 
     def command(self, name: str) -> ModuleType:
@@ -115,7 +114,7 @@ class Group:
         near = nearest(name, self.commands)
         mend = in_quotes(" ".join((*self.words, near))) if near else ""
         found = f"there is no command {in_quotes(' '.join((*self.words, name)))}."
-        raise ContextDBError(Fault(found, _some(list(self.commands)), mend))
+        raise ContextDBError(Fault(found, joined(list(self.commands), 6), mend))
 
     def parser(self, name: str, command: ModuleType) -> Parser:
         """What reads the arguments of a command."""
@@ -206,12 +205,6 @@ def _run(group: Group, given: Sequence[str]) -> int:
 def _new_parser(words: Sequence[str], about: str | None) -> Parser:
     prog = " ".join(("contextdb", *words))
     return Parser(prog=prog, description=about, formatter_class=Help, allow_abbrev=False)
-
-
-def _some(commands: Sequence[str], most: int = 6) -> str:
-    """The first commands, and how many more there are."""
-    n_more = len(commands) - most
-    return ", ".join(commands[:most]) + (f" and {n_more} more" if n_more > 0 else "")
 
 
 def _overview(commands: Mapping[str, str]) -> str:

@@ -27,7 +27,6 @@ def add_clip_arguments(parser: argparse.ArgumentParser) -> None:
 
 @contextmanager
 def progress_of(label: str) -> Iterator[Tell]:
-    """The progress of work on clips, one by one."""
     with bar(label, is_long=True) as shown:
 
         def tell(done: int, total: int, clip: str) -> None:

@@ -45,7 +45,6 @@ class Played:
 
     @property
     def settings(self) -> PoseSettings:
-        """How its poses are made."""
         return self.project.config.output_of(self.trace.controller)
 
     @cached_property
@@ -88,7 +87,6 @@ def write_rerun(out: Path, session: Played) -> None:
 
 
 def comment_of(sessions: Sequence[Played], page: str | None) -> str:
-    """The comment on a session, or on two."""
     lists = [list(each.trace.brief()) for each in sessions]
     return session_markdown.render([each.measured for each in sessions], lists, parting_of(sessions), page)
 

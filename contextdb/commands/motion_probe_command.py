@@ -71,7 +71,6 @@ class Probe:
 
     @property
     def name(self) -> str:
-        """The scene, the drive and the speed, in words."""
         return f"{self.scene.name} {self.drive.name} at {self.drive.speed_mps:g} m/s".strip()
 
 

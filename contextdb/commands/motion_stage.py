@@ -80,7 +80,6 @@ class Stage:
         return {}
 
     def tables(self, names: Collection[str]) -> dict[str, CompiledTable]:
-        """The compiled tables of some databases, by the tables' names."""
         wanted = dict.fromkeys(self.config.databases[name].table for name in names)
         for table in wanted:
             if table is not None and table not in self._compiled:

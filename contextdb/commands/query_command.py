@@ -179,7 +179,6 @@ def _json_fact(fact: Fact, name: str, compiled: CompiledTable) -> object:
 
 
 def _condition(name: str, compiled: CompiledTable) -> Condition:
-    """A condition of the table or of its rules."""
     return next(c for c in (*compiled.conditions, *data_of(compiled).ruled) if c.name == name)
 
 

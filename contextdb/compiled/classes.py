@@ -236,7 +236,6 @@ def _some_and_all(ints: list[int], held: Sequence[int]) -> tuple[int, int]:
 
 
 def _classes_in(accepts: sets.NumberSet, bounds: list[float]) -> list[int]:
-    """The classes that share a number with the set."""
     held = {k for low, high in accepts.spans for k in range(bisect_right(bounds, low), bisect_right(bounds, high) + 1)}
     return sorted(held)
 

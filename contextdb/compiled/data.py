@@ -182,7 +182,6 @@ class CompiledData(Unchanging):
 
     @property
     def policies(self) -> frozenset[str]:
-        """The policies of the table and of those that are in it."""
         return frozenset((self.policy,) if self.ways is None else (table.policy for table in self.ways.tables))
 
     def plain_penalties(self, context: Context, unknown: Unknown = "error") -> NDArray[np.float64]:

@@ -258,7 +258,6 @@ class FewerMatches(ManyMatches):
         return len(self.whole)
 
     def _costs_of_pairs(self) -> CostsOfPairs:
-        """Those of the whole."""
         return self.whole._costs_of_pairs()
 
     def __iter__(self) -> Iterator[Matches]:

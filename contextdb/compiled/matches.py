@@ -404,7 +404,6 @@ class SetMatches(Matches):
 
 
 def answering_of(answer: Matches) -> Answering:
-    """What all answers of the table of an answer share."""
     return answer._table
 
 

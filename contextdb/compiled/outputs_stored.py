@@ -141,7 +141,6 @@ def ways_to_json(ways: Ways) -> list[dict[str, object]]:
 
 
 def ways_from(about: list[dict[str, Any]], tensors: Tensors, n_conditions: int) -> Ways:
-    """The ways of a compiled file with so many conditions."""
     tables = []
     for at, table in enumerate(about):
         priorities, weights, lines = (tensors[f"ways.{at:03d}.{part}"] for part in ("priorities", "row_weights", "lines"))

@@ -79,7 +79,6 @@ def pick(compiled: CompiledData, matches: Matches, rng: Rng | int | None = None,
 
 
 def pick_row(compiled: CompiledData, matches: Matches, rng: Rng | int | None = None, last: str | None = None) -> int | None:
-    """The row that `pick` picks, or None."""
     compiled.answering.require_own(matches)
     source = compiled.memory.rng(rng)
     if last is not None and not isinstance(last, str):

@@ -235,7 +235,6 @@ def _axes(tables: Mapping[str, Table], axes: Mapping[str, str] | None) -> dict[s
 
 
 def _having(tables: Mapping[str, Table], condition: str) -> Iterator[str]:
-    """The tables that have such a condition of a name."""
     for name, table in tables.items():
         if any(c.condition.name == condition and is_axis(c.condition) for c in table.flat().conditions):
             yield name

@@ -282,7 +282,6 @@ def _codes_of(compiled: CompiledData, at: int, most_rows: int | None) -> Sequenc
 
 
 def tags_of(accepts: TagSet) -> frozenset[str]:
-    """The tags that a set of tag sets names."""
     parts = accepts.parts if isinstance(accepts, TagMeet) else (accepts,)
     return frozenset(tag for part in parts for tag in (*part.needs, *part.bans))
 

@@ -50,7 +50,6 @@ MOST_NOTS = 8
 
 
 def strings_of(text: str) -> list[str]:
-    """The texts of the strings in a text, in order."""
     return [string_of(part) for part in _PART.findall(text) if len(part) > 1 and STRING.fullmatch(part)]
 
 
@@ -145,7 +144,6 @@ def value_of(expression: str) -> str | None:
 
 
 def feel_type(kind: Kind) -> str:
-    """The type of FEEL that facts of a type have."""
     return kind.name if kind.is_spelt else "number" if kind.is_numeric else "boolean" if kind.is_truth else "string"
 
 
@@ -191,6 +189,5 @@ def _values_test(accepts: ValueSet) -> str | None:
 
 
 def literal(text: str) -> str:
-    """A text as a string of FEEL."""
     plain = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n").replace("\r", "\\r").replace("\t", "\\t")
     return f'"{plain}"'

@@ -28,7 +28,6 @@ _COMPARE = {
 
 
 def run_frame(plan: Part, columns: Columns, n_contexts: int) -> Column:
-    """The values of a plan for each of N contexts."""
     blocks: list[Column] = []
     with np.errstate(all="ignore"):
         for start in range(0, max(n_contexts, 1), BLOCK):

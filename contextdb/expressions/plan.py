@@ -24,7 +24,6 @@ class Type:
 
     @property
     def is_number(self) -> bool:
-        """Whether it is a number of some type."""
         return self.kind.is_numeric
 
     @property

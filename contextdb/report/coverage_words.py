@@ -43,7 +43,6 @@ def rows_words(measured: Measured, finding: Finding) -> str:
 
 
 def gaps_sentence(report: CoverageReport) -> str:
-    """How many gaps there are, and whether these are all."""
     if not report.gaps:
         if report.gaps_complete:
             return "No gap: every context has a valid row"

@@ -182,7 +182,6 @@ def no_loss(lost: tuple[Lost, ...]) -> Gate:
 
 
 def table_gone(name: str) -> Gate:
-    """A table of the baseline that has no clips any more."""
     return Gate("gone", 0.0, 1.0, False, f"{in_quotes(name)} of the baseline has no clips any more.")
 
 

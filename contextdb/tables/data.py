@@ -226,7 +226,6 @@ class TableData(Unchanging):
 
     @cached_property
     def _output_columns(self) -> tuple[OutputColumn, ...]:
-        """The outputs' columns, in the order of the settings."""
         return output_columns(self.columns, self.settings)
 
     @cached_property

@@ -121,7 +121,6 @@ class CastRules:
 
 
 def _by_needs(rows: int, roles: Sequence[str], required: Mapping[str, int]) -> Iterator[tuple[tuple[str, ...], int]]:
-    """Some rows by which of these roles they need."""
     groups: list[tuple[tuple[str, ...], int]] = [((), rows)]
     for role in roles:
         needing = [((*needed, role), own & required[role]) for needed, own in groups]

@@ -220,7 +220,6 @@ class Stage:
         return costs
 
     def best(self, row: int) -> Casting:
-        """The best casting of a row that can be cast."""
         return _as_casting(self.cast(row))
 
     def cast(self, row: int) -> Chosen:

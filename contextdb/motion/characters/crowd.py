@@ -221,7 +221,6 @@ def _answers(table: Table, facts: Sequence[Facts], unknown: Any) -> Iterable[Has
 
 
 def _facts_of_each(facts: object, n: int) -> list[Facts]:
-    """The facts of each of n characters, as mappings."""
     if facts is None:
         return [{}] * n
     if isinstance(facts, (list, tuple)):

@@ -157,7 +157,6 @@ def write_bvh(clip: Clip, target: str | PathLike[str] | TextIO, *, digits: int =
 
 
 def text_of(raw: bytes, file: str) -> str:
-    """The text of a file's bytes."""
     if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise _no_text("the file is UTF-16", 1, file)
     if b"\0" in raw:

@@ -148,7 +148,6 @@ def _held(marked: Floats, rests: Floats, flat: Floats) -> Floats:
 
 
 def _with_marks(feet: tuple[Foot, Foot], found: tuple[Floats, Floats], marks: ContactMarks, duration_s: float) -> Footfalls:
-    """The footfalls that are found, or marked."""
     down = {
         foot.bone: intervals if mark is None else marked(mark, duration_s)
         for foot, intervals, mark in zip(feet, found, marks, strict=True)

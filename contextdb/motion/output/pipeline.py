@@ -232,7 +232,6 @@ def _goes_on(decision: Decision, shown: Playing, passed_s: float) -> bool:
 
 
 def _gives(grounds: Grounds, n: int) -> Sequence[bool]:
-    """Which of n characters have a ground."""
     if isinstance(grounds, Sequence):
         return [each is not None for each in grounds]
     return [grounds is not None] * n

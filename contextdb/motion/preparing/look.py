@@ -76,7 +76,6 @@ class Look:
 
     @cached_property
     def moments(self) -> Moments:
-        """The clip step by step."""
         return Moments.of(self.path, step_of(self.falls))
 
     @property

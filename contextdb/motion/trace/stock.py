@@ -97,7 +97,6 @@ class Stock:
 
     @classmethod
     def with_tables(cls, databases: Mapping[str, MotionDatabase], project: Described) -> Stock:
-        """Some databases, and the tables of a project."""
         config = MotionConfig.from_dict(project.schema.motion, tables=project.tables)
         table_of = {name: table for name in databases if name in config.databases and (table := config.databases[name].table)}
         return cls(databases, project.tables, table_of)

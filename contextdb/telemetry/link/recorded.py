@@ -24,7 +24,6 @@ Texts = Mapping[str, str | None]
 
 
 def is_recording(path: Path) -> bool:
-    """Whether a file is a recording: by its suffix."""
     return path.suffix.lower() == SUFFIX
 
 

@@ -68,7 +68,6 @@ class OutputType:
     choices: tuple[str, ...] = ()
     """The texts of all values, where they are always the same."""
     is_text: bool = False
-    """Whether values are texts."""
     is_free: bool = False
     """Whether any text is a value, an empty one too."""
     is_numeric: bool = False

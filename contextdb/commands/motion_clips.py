@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
-from contextlib import contextmanager
+from functools import partial
 
 from contextdb.commands.numbers import unit_of
-from contextdb.commands.progress import MANY_CLIPS, bar
-from contextdb.console import printable
+from contextdb.commands.progress import building_bar
 from contextdb.motion.clips.clip import UPS
-from contextdb.tables.clip_folder import Tell
 from contextdb.tables.project import SCHEMA_FILE
 
 
@@ -25,12 +22,5 @@ def add_clip_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-@contextmanager
-def progress_of(label: str) -> Iterator[Tell]:
-    with bar(label, is_long=True) as shown:
-
-        def tell(done: int, total: int, clip: str) -> None:
-            if shown is not None and total >= MANY_CLIPS:
-                shown(done, total, f"{done}/{total} {printable(clip)}")
-
-        yield tell
+progress_of = partial(building_bar, tells_few=False)
+"""The progress of work on clips, one by one."""

@@ -211,7 +211,6 @@ class Outcome:
         self.compiled = compiled
         self._matches = matches
         self.rows = matches.indices
-        """The valid rows."""
         self.refusal: PolicyError | None = None
         """Why `pick` refuses: the policy is "unique", here or in a table inside, and several rows are valid."""
         self.candidates: Rows = self.rows[:0]

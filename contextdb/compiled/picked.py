@@ -37,7 +37,6 @@ class Picked:
         self.last_s = np.zeros((0, 0), np.float64)
         """The time at which it was, in seconds: [C, L]."""
         self.assets: dict[str, int] = {}
-        """The number of each asset."""
         self.limits: dict[Key, int] = {}
         """The column of each row that rests."""
         self._n_ordered = 0

@@ -29,7 +29,6 @@ from contextdb.cells.words import NUMBER_TEXT, quoted
 _PART = re.compile(r'"(?:[^"\\]|\\.)*"?|[^,"]+|,', re.DOTALL)
 """A string, also one that is not closed, so that no part of a text is looked at twice; a comma; or what is between."""
 STRING = re.compile(r'"(?:[^"\\]|\\.)*"', re.DOTALL)
-"""A string of FEEL."""
 STRINGS = re.compile(rf"\s*{STRING.pattern}\s*(?:,\s*{STRING.pattern}\s*)*", re.DOTALL)
 """Strings with commas between."""
 _ESCAPE = re.compile(r"\\(u[0-9A-Fa-f]{4}|U(?:0[0-9A-Fa-f]|10)[0-9A-Fa-f]{4}|.)", re.DOTALL)

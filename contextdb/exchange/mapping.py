@@ -42,7 +42,6 @@ class Mapped:
     source: str
     """Its name in the file."""
     name: str
-    """Its name in the table."""
     job: Job
     why: str
     """Why, in a few words for a person."""

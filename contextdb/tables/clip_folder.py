@@ -21,7 +21,6 @@ from contextdb.motion.storage.rigs import Rig
 from contextdb.tables.project import SCHEMA_FILE, folder_of, read_folder_schema
 
 MARKUP = "marks.csv"
-"""The markup of a folder of clips."""
 Databases = Mapping[str, DatabaseSettings]
 Tell = Callable[[int, int, str], None]
 """Takes how many clips are done of how many, and the name of the next."""

@@ -4,7 +4,7 @@ One row a decision. What a decision may lack is null. Times of searching are in 
 may leave out: all other columns are the same whenever the same session is recorded.
 
 A context becomes JSON: tags a sorted list, a NaN fact null, and what JSON has no word for its text. What else an update was given
-is JSON too, see `contextdb.motion.trace.input_rows`.
+is JSON too.
 
 Candidates are not kept: they are worked out again from the query, the filters and the databases. The column `candidates` holds
 those that sessions of format 1 kept; of their frames `Candidates.why` comes back empty, its sums are in `counts`.

@@ -43,7 +43,6 @@ class Merge(Generic[AnyTable]):
     fields: Origins
     """The same for columns."""
     columns: tuple[TextColumn, ...]
-    """The merged texts."""
     settings: TableSettings
     schema: Schema
     conflicts: tuple[Conflict, ...]

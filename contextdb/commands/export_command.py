@@ -15,7 +15,7 @@ import os
 import sys
 from pathlib import Path
 
-from contextdb.console import ExitCode, drop_output, printable
+from contextdb.console import ExitCode, output, printable
 from contextdb.disk import is_stream, write_atomic
 from contextdb.errors import Fault, FileError, Place, plural
 from contextdb.exchange.formats import FORMATS, format_of, write
@@ -48,19 +48,12 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     for remark in remarks:
         print(printable(f"{table.name}: {remark}"), file=sys.stderr)
     if is_standard:
-        _print(raw)
+        with output():
+            sys.stdout.flush()
+            sys.stdout.buffer.write(raw)
         return ExitCode.OK
     write_atomic(Path(arguments.target), raw)
     print(printable(arguments.target))
     said = f"{table.name}: {plural(table.n_rows, 'row')} as {kind.about.split(';')[0]}, {len(raw):,} bytes"
     print(printable(said), file=sys.stderr)
     return ExitCode.OK
-
-
-def _print(raw: bytes) -> None:
-    try:
-        sys.stdout.flush()
-        sys.stdout.buffer.write(raw)
-        sys.stdout.buffer.flush()
-    except BrokenPipeError:
-        drop_output()

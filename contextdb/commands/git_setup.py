@@ -8,11 +8,12 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from contextdb.console import ExitCode, output, printable
 from contextdb.disk import read_bytes, write_atomic
 from contextdb.errors import ContextDBError, Fault, FileError, Place
 
@@ -162,3 +163,13 @@ def _placed(path: Path) -> Iterator[None]:
     except OSError as error:
         fault = Fault(f"the file cannot be written: {error.strerror}.", place=Place(str(path)))
         raise FileError(fault, errno=error.errno) from None
+
+
+def changed(arguments: argparse.Namespace, steps: Sequence[Callable[[Setup], list[str]]], nothing: str) -> ExitCode:
+    """Do some steps, all or none, and print what each did; `nothing` says why where none did anything."""
+    setup = setup_of(arguments)
+    with setup.all_or_nothing():
+        said = [line for step in steps for line in step(setup)] or [f"nothing to do: {nothing}"]
+    with output():
+        print(*map(printable, said), sep="\n")
+    return ExitCode.OK

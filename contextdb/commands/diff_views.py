@@ -35,7 +35,7 @@ def as_text(found: Diff, colour: bool, shows_all: bool = False) -> str:
     for title, parts in (("columns", _columns(found)), ("rows", _rows(found))):
         if parts:
             told = [styled(f"  {MARKS[verb][0]} {printable(text)}", MARKS[verb][1], colour) for verb, text in parts]
-            lines += ["", title, *_first(told, shows_all)]
+            lines += ["", title, *_first(told, sys.maxsize if shows_all else MOST)]
     lines += _cell_lines(found, colour, shows_all)
     return "".join(f"{line}\n" for line in lines)
 
@@ -124,10 +124,8 @@ def _asset(name: str) -> str:
     return shown(name) if name.strip() else "(no name)"
 
 
-def _first(lines: list[str], shows_all: bool) -> list[str]:
-    if shows_all or len(lines) <= MOST:
-        return lines
-    return [*lines[:MOST], f"  … and {len(lines) - MOST:,} more; --all shows every one"]
+def _first(lines: Sequence[str], most: int, more: str = "  … and {:,} more; --all shows every one") -> list[str]:
+    return [*lines[:most], *([more.format(len(lines) - most)] if len(lines) > most else [])]
 
 
 # ---- what a change does: below the differences
@@ -185,10 +183,10 @@ def _told(effect: Effects | Fault, shows_all: bool) -> Iterator[Heading]:
         yield f"… and {plural(left, 'asset')} more; --all shows every one", []
     if effect.n_left_out:
         yield f"{plural(effect.n_left_out, 'more changed asset')} not looked at", []
-    yield from _boxes("gaps opened", effect.opened, most)
-    yield from _boxes("gaps closed", effect.closed, most)
-    yield from _findings("rows that can no longer be chosen", effect.dead, most)
-    yield from _findings("rows that may not be valid together", effect.overlaps, most)
+    yield from _listed("gaps opened", [_line(box) for box in effect.opened], most)
+    yield from _listed("gaps closed", [_line(box) for box in effect.closed], most)
+    yield from _listed("rows that can no longer be chosen", [_finding(each) for each in effect.dead], most)
+    yield from _listed("rows that may not be valid together", [_finding(each) for each in effect.overlaps], most)
     if not effect:
         yield "no context gains or loses an asset", []
     elif not effect.is_complete:
@@ -208,20 +206,12 @@ def _reach(reach: Reach, shows_all: bool) -> Iterator[Heading]:
     for verb, boxes, share in (("gains", reach.gained, reach.share_gained), ("loses", reach.lost, reach.share_lost)):
         if boxes:
             most = len(boxes) if shows_all else MOST_BOXES
-            more = [f"… and {len(boxes) - most:,} more"] if len(boxes) > most else []
-            yield f"{shown(reach.asset)} {verb} {_percent(share)}", [*(_line(box) for box in boxes[:most]), *more]
+            yield f"{shown(reach.asset)} {verb} {_percent(share)}", _first(list(map(_line, boxes)), most, "… and {:,} more")
 
 
-def _boxes(title: str, boxes: Sequence[Box], most: int) -> Iterator[Heading]:
-    if boxes:
-        more = [f"… and {len(boxes) - most:,} more; --all shows every one"] if len(boxes) > most else []
-        yield title, [*(_line(box) for box in boxes[:most]), *more]
-
-
-def _findings(title: str, findings: Sequence[Finding], most: int) -> Iterator[Heading]:
-    if findings:
-        more = [f"… and {len(findings) - most:,} more; --all shows every one"] if len(findings) > most else []
-        yield title, [*(_finding(finding) for finding in findings[:most]), *more]
+def _listed(title: str, lines: Sequence[str], most: int) -> Iterator[Heading]:
+    if lines:
+        yield title, _first(lines, most, "… and {:,} more; --all shows every one")
 
 
 def _finding(finding: Finding) -> str:

@@ -90,6 +90,13 @@ class Parser(argparse.ArgumentParser):
 class Help(argparse.HelpFormatter):
     """Help whose paragraphs are wrapped to the terminal, and whose indented lines stay as they are."""
 
+    def _format_action_invocation(self, action: argparse.Action) -> str:
+        """`-o, --output FILE`, as from Python 3.13 on; before, `-o FILE, --output FILE`."""
+        if sys.version_info >= (3, 13) or not action.option_strings or action.nargs == 0:
+            return super()._format_action_invocation(action)
+        values = self._format_args(action, self._get_default_metavar_for_optional(action))
+        return f"{', '.join(action.option_strings)} {values}"
+
     def _fill_text(self, text: str, width: int, indent: str) -> str:
         paragraphs = text.strip().split("\n\n")
         return "\n\n".join(p if p.startswith(" ") else textwrap.fill(" ".join(p.split()), width) for p in paragraphs)

@@ -214,6 +214,17 @@ def test_a_file_of_cases_that_cannot_be_read_is_an_error(here: Path, path: str):
     assert finding["message"].endswith('Try to rename "case".')
 
 
+def test_notes_with_a_git_conflict_are_an_error_and_others_are_not(here: Path):
+    notes = "Asset,Column,Note,Colour\nrun,speed,why?,\n"
+    write(here, notes, "jog.notes.csv")
+    assert found() == []
+    write(here, f"{notes}<<<<<<< ours\nrun,,,red\n=======\nrun,,,blue\n>>>>>>> theirs\n", "jog.notes.csv")
+    for path in ("game", "game/jog.csv"):
+        assert found(path) == [("error", "unreadable", "jog")]
+    (finding,) = run("check", "game", "--json").json["findings"]
+    assert (Path(finding["file"]).name, finding["line"]) == ("jog.notes.csv", 3)
+
+
 def test_a_file_of_cases_that_is_not_there_is_no_such_path():
     result = run("check", "game/jog.cases.csv")
     assert (result.code, result.out) == (2, "")

@@ -61,7 +61,7 @@ def test_what_is_no_day_is_refused(given: object):
 
 
 def test_what_means_nothing_is_a_missing_date():
-    assert [read_fact(value, DAY) for value in (None, float("nan"), np.datetime64("NaT"), "")] == [None] * 4
+    assert [read_fact(value, DAY) for value in (None, float("nan"), np.datetime64("NaT", "D"), "")] == [None] * 4
 
 
 def test_the_first_and_the_last_day_of_the_calendar_are_facts():

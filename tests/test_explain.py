@@ -177,6 +177,8 @@ def test_a_changed_number_cell_accepts_no_more_than_what_lies_between_the_old_on
         ("number", "0..5 | 10..15", -math.inf, "..5 | 10..15"),
         ("number", "not 1..2", 1.25, "..1.25 | (2.."),
         ("number", "5..3", 4.0, "4"),
+        ("number", "not 5", 5.0, "Any"),
+        ("angle", "not 5", 5.0, "Any"),
         ("int", "1..3", 5, "1..5"),
         ("angle", "170, 20", 140.0, "140..-170"),
         ("angle", "10..30", -5.0, "-5..30"),
@@ -216,6 +218,9 @@ def test_a_fact_of_many_digits_is_rounded_away_from_the_cell_where_it_stays_near
     assert mend_of("angle", "0..10", 59.65371234567891) == "0..59.66"
     assert mend_of("number", "0..1", 1.0000000000000002) == "0..1.0000000000000002"
     assert mend_of("number", "0..5", 1234567.8901234567) == "0..1235000"
+    assert mend_of("number", "0..5", 56 * 0.1) == "0..5.601"  # 5.6000000000000005, which 5.6 leaves out
+    assert mend_of("number", "not 0.30000000000000004", 3 * 0.1) == "Any"  # 0.3 is the cell's already
+    assert mend_of("number", "0..5", -3 * 0.1) == "-0.3001..5"  # -0.30000000000000004
 
 
 def test_a_number_with_many_digits_is_left_in_the_old_words_of_the_cell():

@@ -33,6 +33,14 @@ def test_the_suffix_says_the_format_and_the_path_is_printed():
     assert json.loads(Path("out.json").read_bytes())[0] == {"Asset Name": "jog", "speed": "20, 9.99"}
 
 
+def test_rows_that_the_format_leaves_out_are_not_counted_as_written():
+    rows = "".join(f"never {i},5..3\r\n" for i in range(30))
+    Path("game/jog.csv").write_bytes(CSV + rows.encode())
+    result = run("export", "game/jog.csv", "out.dmn")
+    assert result.err.splitlines()[-1].startswith("jog: 1 of 32 rows as a DMN decision table, ")
+    assert Path("out.dmn").read_text(encoding="utf-8").count("<rule>") == 1
+
+
 def test_every_format_is_written():
     for suffix in ("csv", "tsv", "xlsx", "parquet", "json", "jsonl"):
         assert run("export", "game/jog.csv", f"out.{suffix}").code == 0

@@ -185,6 +185,7 @@ def test_a_text_with_signs_is_a_set_of_tag_sets():
         (2, BOOL, 'int "2" is not a fact of type bool. Accepted: True or False.'),
         (0.5, BOOL, 'float "0.5" is not a fact of type bool. Accepted: True or False.'),
         ([True], BOOL, "is not a fact of type bool. Accepted: True or False."),
+        (np.timedelta64(1, "D"), BOOL, 'timedelta64 "1 days" is not a fact of type bool. Accepted: True or False.'),
         (4.6, INT, 'float "4.6" is not a fact of type int. Accepted: a whole number. Did you mean 5?'),
         (np.float32(4.5), INT, "is not a fact of type int. Accepted: a whole number."),
         ("many", INT, 'column "x": cannot read "many" as an int.'),

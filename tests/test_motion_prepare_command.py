@@ -267,6 +267,16 @@ def test_markup_that_cannot_be_read_stops_it(game: Path):
     assert "DoNotChoose" in prepare("game/clips", "--write", code=2).err
 
 
+def test_a_fault_of_the_markup_has_its_line_when_lines_above_are_taken_back(game: Path):
+    prepare("game/clips", "--write", "--only", "starts", "--only", "tails")
+    file = game / "clips" / "marks.csv"
+    lines = [*file.read_text(encoding="utf-8").splitlines(), "walk,NextNaturalOnly,0.5,0.6,0.2"]
+    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    slower(game)
+    told = prepare("game/clips", "--write", "--only", "starts", "--only", "tails", code=2)
+    assert f'marks.csv, line {len(lines)}, column "value"' in told.err
+
+
 @pytest.mark.parametrize("arguments", [("nowhere",), ("game", "--only", "lops"), ("empty",)])
 def test_wrong_uses_are_refused(game: Path, arguments: tuple[str, ...]):
     (game.parent / "empty").mkdir()

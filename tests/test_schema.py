@@ -442,6 +442,19 @@ def test_a_line_that_is_no_toml_is_said_with_its_line(text: str, message: str):
     assert fault(text) == f"contextdb.toml, {message}"
 
 
+def test_a_git_conflict_is_named_with_its_lines_and_not_as_wrong_toml():
+    text = '[a]\n<<<<<<< ours\nx = ["B"]\n||||||| base\nx = []\n=======\nx = ["C"]\n>>>>>>> theirs\n'
+    mend = 'Try to keep one side and delete the lines "<<<<<<<", "=======" and ">>>>>>>".'
+    said = "line 2: an unresolved git conflict starts here and ends on line 8. Accepted: one version of each key."
+    assert fault(text) == f"contextdb.toml, {said} {mend}"
+    assert fault("x = [\n<<<<<<< ours\n'A']") == (
+        f"contextdb.toml, line 2: an unresolved git conflict starts here. Accepted: one version of each key. {mend}"
+    )
+    for mark in ("||||||| base", "=======", ">>>>>>> theirs"):
+        said = "line 2: this line is a conflict mark of git. Accepted: one version of each key. Try to delete the line."
+        assert fault(f"x = ['A']\n{mark}\n") == f"contextdb.toml, {said}"
+
+
 def test_hostile_sizes_are_refused_without_a_traceback():
     assert fault("a = " + "[" * 5000) == ("contextdb.toml: lists are nested too deeply to be read. Accepted: lists of names.")
     assert fault("a = " + "9" * 5000) == (

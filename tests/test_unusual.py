@@ -69,7 +69,7 @@ ODD: list[object] = [
     ["Move"], ["Ground"], {1}, {}, (1,), Decimal("NaN"), Decimal("sNaN"), Decimal("1e999"), Fraction(10**400), Fraction(1, 3),
     np.float32(2), np.float64("nan"), np.int64(2), np.bool_(True), np.str_("Ground"), np.array([1.0, 2.0]), np.array("abc"),
     np.array(2.0), np.array(2), np.array("2.0"), np.array(np.nan), np.array(True), np.array("Ground"), Number(),
-    np.void(b"abc"), np.datetime64("2020-01-01"), np.timedelta64(1), np.longdouble("1e4000"), date(2020, 1, 1),
+    np.void(b"abc"), np.datetime64("2020-01-01"), np.timedelta64(1, "D"), np.longdouble("1e4000"), date(2020, 1, 1),
     pl.Series([1.0]), pl.DataFrame({"a": [1]}), pl.col("a"), range(3), print, int, re.compile("x"), cell("Any"), cell("1..2"),
 ]  # fmt: skip
 WIDTHS = pytest.mark.parametrize("flat_bytes", [FLAT_BYTES, 0], ids=["flat", "wide"])

@@ -146,6 +146,14 @@ def test_what_is_no_file_of_ours_exits_with_2(name: str, said: str):
     assert (result.code, said in result.err) == (2, True)
 
 
+@pytest.mark.parametrize("name", ["coverage.json", "motion.json", "measures.json"])
+def test_an_altered_report_is_not_taken_for_that_of_another_command(name: str, made: Path, tmp_path: Path):
+    text = (made / name).read_text(encoding="utf-8")
+    (tmp_path / name).write_text(text.replace('"format": 1', '"format": 1, "more": 2', 1), encoding="utf-8")
+    said = run("verify", str(tmp_path / name)).out
+    assert "its contents do not match its digest. Accepted: a document as it was written." in said
+
+
 def test_a_document_of_another_program_is_neither_whole_nor_damaged(tmp_path: Path):
     (tmp_path / "package.json").write_text('{"name": "x"}', encoding="utf-8")
     result = run("verify", str(tmp_path / "package.json"), "--json")

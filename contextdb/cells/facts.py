@@ -237,7 +237,8 @@ def _read_number(value: object, condition: Condition) -> Fact:
 
 
 def _read_bool(value: object, condition: Condition) -> bool:
-    if isinstance(value, (bool, np.bool_)) or (isinstance(value, (int, float, np.number)) and value in (0, 1)):
+    is_number = isinstance(value, (int, float, np.number)) and not isinstance(value, np.timedelta64)
+    if isinstance(value, (bool, np.bool_)) or (is_number and value in (0, 1)):
         return bool(value)
     truth = truth_of(value) if isinstance(value, str) else None
     raise _fault(value, condition, mend="" if truth is None else str(truth))

@@ -15,7 +15,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from itertools import product
+from operator import add
 
 from contextdb.cells import intervals
 from contextdb.cells.angles import wrap_angle
@@ -200,7 +202,8 @@ def meet(cells: Sequence[Cell]) -> Cell:
     found = None
     for cell in hard or said:
         found = cell.accepts if found is None or cell.accepts is None else meet_exactly(found, cell.accepts)
-    return Cell(found, None if hard else sum(c.penalty or 0.0 for c in said))
+    penalty = reduce(add, (c.penalty or 0.0 for c in said))  # one after the other: `sum` rounds otherwise from Python 3.12 on
+    return Cell(found, None if hard else penalty)
 
 
 def meet_exactly(one: Accepted, other: Accepted) -> Accepted:

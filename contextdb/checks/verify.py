@@ -155,7 +155,7 @@ def _toml(path: Path) -> Told:
 
 
 def _json(path: Path) -> Told:
-    from contextdb.covering.baseline import ACCEPTED, FORMAT, read_baseline
+    from contextdb.covering.baseline import FORMAT, read_baseline
     from contextdb.files.reports import DIGEST, document_of
 
     yield "JSON", None
@@ -163,7 +163,7 @@ def _json(path: Path) -> Told:
     try:
         document = document_of(text)
     except ValueError as error:
-        raise ArtefactError(Fault(f"{error}.", ACCEPTED)) from None
+        raise ArtefactError(Fault(f"{error}.", "a document as it was written")) from None
     kind = _report(document)
     if not kind:
         yield "JSON", "a document of another program, or of another command; nothing to compare"

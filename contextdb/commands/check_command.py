@@ -27,18 +27,19 @@ from contextdb.console import ExitCode, output, printable, progress, terminal_wi
 from contextdb.disk import CASES_SUFFIX, TABLE_SUFFIXES, path_in_quotes, read_bytes
 from contextdb.errors import ContextDBError, Fault, in_quotes, nearest
 from contextdb.files.file_names import alike, composed, confusable, why_unportable
+from contextdb.files.texts import read_texts
 from contextdb.findings import LEVELS, Finding
 from contextdb.report.results import CheckReport, TableSummary
 from contextdb.schema.settings import Schema
 from contextdb.schema.toml_lines import key_lines
 from contextdb.tables import project
-from contextdb.tables.other_files import cases_path
+from contextdb.tables.other_files import cases_path, notes_path
 from contextdb.tables.places import table_path
 from contextdb.tables.table import Table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("path", metavar="PATH", help="a folder of tables, one table, or its cases")
+    parser.add_argument("path", metavar="PATH", help="a folder of tables, one table or its name, or its cases")
     add_format_arguments(parser, report.formats("check"))
     parser.add_argument(
         "--fail-on", choices=("error", "warning", "none"), default="error", help="the lowest level that fails (default: error)"
@@ -127,6 +128,7 @@ def _check_files(files: Sequence[tuple[str | None, Path]], schema: Schema | None
         findings += check(table)
         findings += check_rows(table, progress=None if log is None else partial(_tell, log))
         findings += _check_cases(table, cases_path(path))
+        findings += _check_notes(table, notes_path(path))
     if schema is not None and len(read) == len(files):
         lines = key_lines(read_bytes(Path(schema.file)).decode("utf-8-sig")) if schema.file else {}
         findings += [*unused_conditions(schema, read, lines), *check_costs(schema, lines)]
@@ -142,6 +144,16 @@ def _check_cases(table: Table, path: Path) -> list[Finding]:
         return check_cases(table, read_cases(path), str(path))
     except ContextDBError as error:
         return _as_findings(error, table.name)
+
+
+def _check_notes(table: Table, path: Path) -> list[Finding]:
+    """A finding for notes that cannot be read, such as those between git's marks: the editor would show none of them."""
+    try:
+        if path.is_file():
+            read_texts(path)
+    except ContextDBError as error:
+        return _as_findings(error, table.name)
+    return []
 
 
 def _strays(folder: Path, tables: Sequence[Path]) -> Iterator[Finding]:

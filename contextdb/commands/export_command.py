@@ -54,6 +54,8 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         return ExitCode.OK
     write_atomic(Path(arguments.target), raw)
     print(printable(arguments.target))
-    said = f"{table.name}: {plural(table.n_rows, 'row')} as {kind.about.split(';')[0]}, {len(raw):,} bytes"
+    n_left_out = sum(remark.n_left_out for remark in remarks)
+    written = f"{table.n_rows - n_left_out:,} of " if n_left_out else ""
+    said = f"{table.name}: {written}{plural(table.n_rows, 'row')} as {kind.about.split(';')[0]}, {len(raw):,} bytes"
     print(printable(said), file=sys.stderr)
     return ExitCode.OK

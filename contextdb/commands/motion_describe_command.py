@@ -4,7 +4,8 @@ Cells are ranges from the clips' own movement; neighbours overlap a little, so t
 the table with the contextdb.toml that it needs: conditions, outputs, features, databases, a selector and a controller. --into adds
 missing columns and rows to a table, fills its empty cells, and reports each cell that does not accept what its clip shows.
 
-Exits with 1 if a cell disagrees with its clip, or a clip could not be read.
+Exits with 1 if a cell disagrees with its clip, a clip could not be read, or the clips are not in the folder of
+contextdb.toml or below it.
 
   contextdb motion describe game/clips
   contextdb motion describe game/clips --out game/moves.csv
@@ -83,6 +84,7 @@ def _tell(
 ) -> None:
     """Say on standard error what was taken for granted or left out."""
     lines = [*found.notes, *(f"left out: {message}" for message in found.left_out)]
+    lines += [] if fills is None else fills.notes
     if fills is not None and fills.without_clip:
         lines.append(f"no clip for {plural(len(fills.without_clip), 'row')}: {some(fills.without_clip)}")
     if not is_playable:

@@ -108,6 +108,8 @@ def _prepare(arguments: argparse.Namespace) -> ExitCode:
                 tell(before + i, len(found.clips), name)
 
             old, was = _text(file.path)
+            if old:
+                Markup.parse(old, str(file.path))  # a fault is told with its line in the file as it is
             kinds = _kinds(arguments.only, file)
             wanted = [(file.clips, kinds), (file.joint, [kind for kind in kinds if kind in JOINT_KINDS])]
             outdated = {mark: name for clips, each in wanted for mark, name in prepared.outdated(clips, each, old).items()}

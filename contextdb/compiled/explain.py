@@ -6,6 +6,7 @@ row are worked out when they are asked for.
 
 from __future__ import annotations
 
+import decimal
 import math
 import re
 import sys
@@ -42,6 +43,14 @@ FEW_DIGITS = 12
 """A number of more characters than this is the work of rounding, not of a person: 29.990000000000002."""
 
 ROUNDED_DIGITS = 4
+
+EVERY_VALUE = (
+    ValueSet(frozenset(), True),
+    ValueSet(frozenset((False, True))),
+    NumberSet(intervals.EVERYTHING),
+    NumberSet((intervals.CIRCLE,), is_circular=True),
+)
+"""What a cell says as Any."""
 
 ONE_BOUND = 1e-12
 """Bounds that are closer than this share of their size are those of one number: it and the double after it."""
@@ -355,9 +364,9 @@ def _rounded_outwards(fact: float, accepts: NumberSet, domain: Domain) -> float:
     if len(repr(fact)) <= FEW_DIGITS or fact == 0.0 or not math.isfinite(fact) or not accepts.spans:
         return fact
     low, high = _stretch(accepts, fact)
-    unit = 10.0 ** (math.floor(math.log10(abs(fact))) - ROUNDED_DIGITS + 1)
-    outer = float(f"{(math.floor if fact == low else math.ceil)(fact / unit) * unit:.{ROUNDED_DIGITS}g}")
-    is_near = abs(outer - fact) <= _gap(high if fact == low else low, fact, accepts.is_circular)
+    away = decimal.Context(ROUNDED_DIGITS, decimal.ROUND_FLOOR if fact == low else decimal.ROUND_CEILING)
+    outer = float(away.create_decimal_from_float(fact))
+    is_near = abs(outer - fact) < _gap(high if fact == low else low, fact, accepts.is_circular)
     is_fact = domain.minimum <= outer <= domain.maximum and not (accepts.is_circular and abs(outer) >= 180.0)
     return outer if is_near and is_fact else fact
 
@@ -384,7 +393,7 @@ def _joined(one: Accepted | None, other: Accepted | None) -> Accepted | None:
     if one is None or other is None or isinstance(one, TagSet) or isinstance(other, TagSet):
         return None
     both = union(one, other)
-    return None if both in (ValueSet(frozenset(), True), ValueSet(frozenset((False, True)))) else both
+    return None if both in EVERY_VALUE else both
 
 
 def _stretch(accepts: NumberSet, fact: float) -> intervals.Span:

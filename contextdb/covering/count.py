@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import compress
 from operator import and_
 from threading import Thread
 from typing import Any
@@ -205,7 +204,8 @@ def prepare(progress: Progress) -> None:
 
 
 def _share(side: int, weights: NDArray[np.float64]) -> float:
-    return float(sum(compress(weights.tolist(), bitmask.flags_of(side, len(weights)).tolist())))
+    inside = weights[bitmask.flags_of(side, len(weights))]
+    return float(np.cumsum(inside)[-1]) if len(inside) else 0.0  # one after the other: `sum` rounds otherwise from Python 3.12 on
 
 
 def table_of(boxes: Sequence[Box], full: Box, n_classes: Sequence[int]) -> tuple[NDArray[Any], ...]:

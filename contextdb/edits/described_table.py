@@ -6,15 +6,17 @@ The command `motion describe` and Autofill in the editor are made of the same fu
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from contextdb.cells.conditions import Condition
 from contextdb.cells.grammar import parse_cell
+from contextdb.cells.kinds import Family
 from contextdb.columns import TextColumn
 from contextdb.disk.together import NewFile, write_together
 from contextdb.edits.schema_file import schema_change
@@ -22,6 +24,7 @@ from contextdb.errors import ContextDBError, Fault, FileError, Place, TableError
 from contextdb.files.file_names import require_new_table_name
 from contextdb.files.texts import new_source
 from contextdb.files.toml_text import Path as KeyPath
+from contextdb.motion.characters.facts import UNITS
 from contextdb.motion.clips.clip import Up
 from contextdb.motion.clips.doubts import doubts_of, grouped
 from contextdb.motion.preparing.cells_of_clips import CONDITIONS, OUTPUTS
@@ -49,6 +52,17 @@ ASSET = "Asset Name"
 BOM = "\ufeff"
 NEAR_S = 0.01
 """Durations that differ by less are the same."""
+SHOWN = {
+    "gait": "enum",
+    "speed": "number in m/s",
+    "direction": "angle in degrees",
+    "turn": "number in degrees a second",
+    "style": "enum",
+    "duration_s": "number",
+    "start": "text",
+    "end": "text",
+}
+"""What clips show in each column, for messages."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,7 +206,8 @@ def _is_mirrored(found: FolderClips) -> bool:
 class Filling:
     """What the clips give to a table that is there: `added` are the rows that are missing, `empty` the cells of rows that are there
     and say nothing, `differences` those that do not accept what their clips show, `without_clip` the assets that no clip has.
-    `sections` is what contextdb.toml is to say."""
+    `cells` are those that the clip of each asset gives; `notes` say which columns are not filled, as contextdb.toml declares them
+    otherwise; `sections` is what it is to say."""
 
     table: Table
     new_columns: list[str]
@@ -200,6 +215,8 @@ class Filling:
     empty: list[Difference]
     differences: list[Difference]
     without_clip: list[str]
+    cells: Mapping[str, Mapping[str, str]]
+    notes: list[str]
     sections: Sections
 
     def edit(self, *, updates: bool = False) -> Edit:
@@ -229,10 +246,13 @@ class Filling:
 
 def filling(table: Table, rows: Sequence[Described]) -> Filling:
     """What the clips give to a table that is there."""
+    other = {name: text for name in (*CONDITIONS, *OUTPUTS) if (text := _declared_otherwise(table, name))}
+    sections = _said(table, rows, other)
+    rows = [replace(row, cells={name: cell for name, cell in row.cells.items() if name not in other}) for row in rows]
     known = {row.asset: row for row in rows}
     assets = [asset_name(cell) for cell in table.assets]
     names = [column.name for column in table.columns]
-    new = [name for name in (*CONDITIONS, *OUTPUTS) if name not in names]
+    new = [name for name in (*CONDITIONS, *OUTPUTS) if name not in names and name not in other]
     empty, differences = [], []
     for name in (*names, *new):
         if name == table.asset_column:
@@ -248,20 +268,48 @@ def filling(table: Table, rows: Sequence[Described]) -> Filling:
             elif not _accepts(table, name, text, known[asset]):
                 differences.append(each)
     added = [row for row in rows if row.asset not in set(assets)]
+    cells = {row.asset: row.cells for row in rows}
     without = [asset for asset in dict.fromkeys(assets) if asset not in known]
-    return Filling(table, new, added, empty, differences, without, _said(table, rows))
+    return Filling(table, new, added, empty, differences, without, cells, list(other.values()), sections)
 
 
-def _said(table: Table, rows: Sequence[Described]) -> Sections:
-    """What contextdb.toml is to say of a table that is there: conditions and outputs that it does not declare yet."""
-    conditions = {name: part for (_, name), part in condition_sections(rows).items() if name not in table.schema.conditions}
+def _declared_otherwise(table: Table, column: str) -> str:
+    """Why the cells of clips are none of a column of that name: contextdb.toml gives it another job, type or unit. Empty where they
+    are."""
+    condition, output = table.schema.conditions.get(column), table.settings.output(column)
+    job = next((job for job, name in table.settings.jobs if name == column), "")
+    declared = ""
+    if job and (column in CONDITIONS or job != "outputs"):
+        declared = "an output" if job == "outputs" else f"a column for {job}"
+    elif output is not None and output.kind not in ("text", "number" if SHOWN[column] == "number" else "enum"):
+        declared = f"an output of type {output.kind}"
+    elif condition is not None and not _is_shown(condition, column):
+        unit = condition.unit.strip()
+        declared = f"{condition.domain.type.name} in {unit}" if unit else condition.domain.type.name
+    return f'"{column}" is not filled: clips show {SHOWN[column]}, contextdb.toml declares {declared}.' if declared else ""
+
+
+def _is_shown(condition: Condition, column: str) -> bool:
+    """Whether clips show what a condition asks for."""
+    kind = condition.domain.type
+    if column in UNITS:
+        fits = kind.is_decimal and kind.is_circular == (column == "direction")
+        return fits and condition.unit.strip() in UNITS[column]
+    return column in CONDITIONS and kind.family is Family.VALUES and kind.python is not bool
+
+
+def _said(table: Table, rows: Sequence[Described], other: Collection[str]) -> Sections:
+    """What contextdb.toml is to say of a table that is there: conditions and outputs that it does not declare yet, without those of
+    `other` names."""
+    declared = {*table.schema.conditions, *other}
+    conditions = {name: part for (_, name), part in condition_sections(rows).items() if name not in declared}
     wanted = table_section(rows, table.asset_column)
     if table.settings.name in table.schema.tables:
         wanted = {"outputs": wanted["outputs"]}
     typed: Any = wanted["outputs"]
     said: Any = settings_to_dict(table.settings).get("outputs") or {}
     outputs: dict[str, Any] = dict(said) if isinstance(said, Mapping) else {name: {"type": "text"} for name in said}
-    more = {name: each for name, each in typed.items() if name not in outputs}
+    more = {name: each for name, each in typed.items() if name not in outputs and name not in other}
     wanted |= {"outputs": {**outputs, **more}}
     settings = wanted if more or len(wanted) > 1 else {}
     return Sections(settings, {"conditions": conditions} if conditions else {})

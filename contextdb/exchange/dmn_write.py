@@ -82,7 +82,7 @@ def _rows(table: Table, inputs: Sequence[ConditionColumn]) -> tuple[list[int], t
         empty = next((c.condition.name for c in inputs if c.cell(row).is_empty and not c.cell(row).is_soft), None)
         if not table.enabled[row] or empty is not None:
             why = "it is disabled" if empty is None else f"its cell of {in_quotes(empty)} accepts nothing"
-            remarks.append(Remark(f"left out: {why}.", place, True))
+            remarks.append(Remark(f"left out: {why}.", place, True, n_left_out=1))
             continue
         rows.append(row)
         remarks += [

@@ -22,6 +22,7 @@ from collections.abc import Iterator
 
 from contextdb.cells.domains import NUMBER, Domain
 from contextdb.cells.grammar import format_cell
+from contextdb.cells.intervals import CIRCLE, Spans
 from contextdb.cells.kinds import KINDS, Kind
 from contextdb.cells.sets import Cell, NumberSet, ValueSet
 from contextdb.cells.words import NUMBER_TEXT, quoted
@@ -154,10 +155,19 @@ def unary_tests(cell: Cell, domain: Domain) -> str | None:
         return None
     if isinstance(cell.accepts, NumberSet):
         line = NUMBER if domain.type.is_circular else domain
-        written = format_cell(Cell(NumberSet(cell.accepts.spans)), line).split(" | ")
+        spans = _with_half_turn(cell.accepts.spans) if domain.type.is_circular else cell.accepts.spans
+        written = format_cell(Cell(NumberSet(spans)), line).split(" | ")
         parts = [_number_test(part, line.type) for part in written]
         return None if None in parts else ",".join(part for part in parts if part is not None)
     return _values_test(cell.accepts) if isinstance(cell.accepts, ValueSet) else None
+
+
+def _with_half_turn(spans: Spans) -> Spans:
+    """The spans of a set of angles for who does not wrap them: 180 is in them where -180 is."""
+    *others, (low, high) = spans
+    if spans[0][0] > CIRCLE[0]:
+        return spans
+    return (*others, (low, 180.0)) if high == CIRCLE[1] else (*spans, (180.0, 180.0))
 
 
 def feel_number(number: float, kind: Kind) -> str:

@@ -51,6 +51,8 @@ class Remark:
     """Where: "line 3", "cell B7"; empty where it is about the whole file."""
     is_loss: bool = False
     """Whether something of the file is not in the table, or reads otherwise there."""
+    n_left_out: int = 0
+    """The rows that were not written."""
 
     def __str__(self) -> str:
         return f"{self.place}: {self.text}" if self.place else self.text
@@ -114,7 +116,8 @@ def capped(remarks: Sequence[Remark], what: str) -> tuple[Remark, ...]:
     """The first remarks of one kind, and one that says how many more there are: "12 more formulas"."""
     if len(remarks) <= MOST_REMARKS:
         return tuple(remarks)
-    rest = Remark(f"{len(remarks) - MOST_REMARKS:,} more {what}.", is_loss=remarks[0].is_loss)
+    n_left_out = sum(remark.n_left_out for remark in remarks[MOST_REMARKS:])
+    rest = Remark(f"{len(remarks) - MOST_REMARKS:,} more {what}.", is_loss=remarks[0].is_loss, n_left_out=n_left_out)
     return (*remarks[:MOST_REMARKS], rest)
 
 

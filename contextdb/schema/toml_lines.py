@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from contextdb.errors import Fault, Place, SchemaError, in_quotes, shown
 from contextdb.files.toml_text import Path as Path
 from contextdb.schema.toml_edit import statements
 
+CONFLICT_MARKS = ("<<<<<<<", "|||||||", "=======", ">>>>>>>")
 MOST_PARTS = 256
 """A key of more parts, a.b.c, is refused: reading it would cost the square of them."""
 MOST_KEYS = 8
@@ -94,12 +95,26 @@ def _syntax_fault(error: str, text: str, file: str) -> Fault:
     if not found:
         return Fault("a whole number has too many digits to be read.", "a number, such as -1.5", place=Place(file))
     number = int(found[2]) if found[2] else text.rstrip().count("\n") + 1
-    line, place = text.split("\n")[number - 1].strip(), Place(file, number)
+    lines, place = text.split("\n"), Place(file, number)
+    line = lines[number - 1].strip()
+    if line.startswith(CONFLICT_MARKS):
+        return _conflict_fault(lines[number - 1 :], place)
     if _TWICE.fullmatch(found[1]):
         return Fault(f"{in_quotes(line)} appears twice.", "each section once, and each key once in it", place=place)
     character = f"at character {found[3]}" if found[2] else "the file ends here"
     why = f"{found[1][:1].lower()}{found[1][1:]}, {character}"
     return Fault(f"cannot read {in_quotes(line)} as TOML: {why}.", _ACCEPTED, _line_mend(line[:1000]), place)
+
+
+def _conflict_fault(lines: Sequence[str], place: Place) -> Fault:
+    """The fault of a file that git left between its marks; the lines from the first that is a mark on."""
+    start, *_, end = CONFLICT_MARKS
+    accepted = "one version of each key"
+    if not lines[0].startswith(start):
+        return Fault("this line is a conflict mark of git.", accepted, "to delete the line", place)
+    last = next((f" and ends on line {n}" for n, line in enumerate(lines, place.line or 1) if line.startswith(end)), "")
+    mend = 'to keep one side and delete the lines "<<<<<<<", "=======" and ">>>>>>>"'
+    return Fault(f"an unresolved git conflict starts here{last}.", accepted, mend, place)
 
 
 def _line_mend(line: str) -> str:

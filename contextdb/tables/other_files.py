@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from contextdb.disk import CASES_SUFFIX
+from contextdb.disk import CASES_SUFFIX, NOTES_SUFFIX
 from contextdb.errors import in_quotes
 from contextdb.files.texts import is_parquet
 
@@ -46,6 +46,11 @@ def other_form(path: Path, conditions: Collection[str]) -> str | None:
 
 def cases_path(table: Path) -> Path:
     return table.with_name(table.stem + CASES_SUFFIX)
+
+
+def notes_path(table: Path) -> Path:
+    """The file of the notes on a table's file."""
+    return table.with_name(table.stem + NOTES_SUFFIX)
 
 
 def stray_sentence(path: Path, form: str) -> str:

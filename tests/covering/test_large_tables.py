@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 from functools import reduce
-from operator import or_
+from operator import add, or_
 
 import numpy as np
 import pytest
@@ -21,6 +21,7 @@ from contextdb.checks.rows import check_rows
 from contextdb.compiled.table import data_of
 from contextdb.covering import coverage, pairs
 from contextdb.covering.assumed import opened
+from contextdb.covering.count import _share
 from contextdb.covering.factors import ValueFactor
 from contextdb.covering.gaps import NearRows, find_gaps
 from contextdb.covering.sample import samples_of
@@ -94,7 +95,8 @@ def test_the_classes_of_a_set_are_those_of_the_values_it_holds(values: set[str],
 def test_a_weight_is_the_sum_of_its_classes_to_the_last_bit(weights: list[float], data: st.DataObject):
     factor = ValueFactor(tuple(map(str, range(len(weights)))), False, np.array(weights))
     side = data.draw(st.integers(0, (1 << len(weights)) - 1))
-    assert weight_of(factor, side) == sum(w for k, w in enumerate(weights) if side >> k & 1)
+    one_by_one = reduce(add, (w for k, w in enumerate(weights) if side >> k & 1), 0.0)
+    assert weight_of(factor, side) == _share(side, np.array(weights)) == one_by_one
 
 
 @given(st.integers(0, 300), st.data())

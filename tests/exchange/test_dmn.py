@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from strategies import tables
 
-from contextdb.cells.domains import BOOL, NUMBER, TEXT
+from contextdb.cells.domains import ANGLE, BOOL, NUMBER, TEXT
 from contextdb.cells.grammar import parse_cell
 from contextdb.cells.kinds import KINDS
 from contextdb.errors import TableError
@@ -165,6 +165,11 @@ def test_a_unary_test_becomes_the_cell_that_means_the_same_or_none(test: str, ce
         ("5..3", NUMBER, None),
         ("5 ~2", NUMBER, None),
         ("inf", NUMBER, None),
+        ("90..-66", ANGLE, "[-180..-66],[90..180]"),  # a game may give the angle behind as either half turn
+        ("180", ANGLE, "-180,180"),
+        ("-180..20", ANGLE, "[-180..20],180"),
+        ("20..180)", ANGLE, "[20..180)"),
+        ("-180..180", ANGLE, "[-180..180]"),
     ],
 )
 def test_a_cell_becomes_the_unary_test_that_means_the_same_or_none(cell: str, domain, test: str | None):  # type: ignore[no-untyped-def]

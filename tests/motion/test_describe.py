@@ -119,6 +119,9 @@ def test_a_clip_of_one_frame_is_described():
         ("RunInjuredLeft", "injured"),
         ("02_10_wash_self", "wash_self"),
         ("Walk_Neutral_Fwd", "normal"),
+        ("Müde gehen #1", "müde_gehen"),
+        ("Mu\u0308deWALKÉlan", "müde_élan"),
+        ("走るWalk_ΓΩΛ2", "走る_γωλ"),
         ("", "normal"),
     ],
 )

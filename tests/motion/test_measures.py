@@ -222,6 +222,17 @@ def test_a_jump_is_as_long_as_its_joints_are_apart():
     assert found.stay_s == pytest.approx(1.0)
 
 
+def test_a_session_has_one_figure_for_how_long_a_clip_stays_and_one_for_the_frames_that_play():
+    decided = decisions([("walk", 0.0, 30), ("walk", 0.4, 20), ("jog", 0.2, 140)], 1.0 / 20.0)
+    trace = Trace(0, databases={"loco": database()})
+    for decision in decided:
+        trace.record(decision)
+    found, stats = measure(trace, databases={"loco": database()}), trace.stats()
+    assert (found.jumps, found.stay_s) == (2, pytest.approx(189 / 20 / 3))
+    assert stats.stay_s == pytest.approx(found.stay_s)
+    assert stats.frames_used_share == pytest.approx(found.frames_used_share)
+
+
 def test_the_frame_that_would_have_played_on_is_no_jump():
     decided = session(("low", 20), ("low", 20))
     at = replace(decided[20].before, frame=20)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from functools import reduce
+from operator import add
 from types import SimpleNamespace
 
 import numpy as np
@@ -191,7 +193,7 @@ def test_channel_costs_add_up_to_the_cost_that_the_choice_was_made_by():
         hit = LOCO.search(query, valid)
         parts = LOCO.channel_costs(hit, query)
         assert list(parts) == list(SCHEMA.slices)
-        assert sum(parts.values()) == hit.cost
+        assert reduce(add, parts.values()) == hit.cost
         assert LOCO.channel_costs(hit.frame, query) == parts
 
 

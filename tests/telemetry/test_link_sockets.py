@@ -53,7 +53,7 @@ def test_a_folder_of_another_user_is_refused(meeting: Path, monkeypatch: pytest.
     meeting.mkdir(mode=0o700)
     found = os.lstat(meeting)
     stranger = os.stat_result((found.st_mode, *found[1:4], found.st_uid + 1, *found[5:]))
-    monkeypatch.setattr(folder.os, "lstat", lambda path: stranger)
+    monkeypatch.setattr(folder.os, "lstat", lambda path, **options: stranger)
     with pytest.raises(cdb.FileError, match="belongs to another user"):
         cdb.link("game")
 

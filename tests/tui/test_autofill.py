@@ -89,6 +89,77 @@ def test_the_preview_shows_what_would_be_filled_or_changed_by_asset_and_column(g
     assert 'No clip for 1 row: "swim"' in screen
 
 
+OTHERWISE = """
+[conditions]
+speed = { type = "number", unit = "cm/s" }
+direction = { type = "number" }
+turn = { type = "int", unit = "deg/s" }
+gait = { type = "tags", values = ["Walk"] }
+"""
+
+
+def test_a_column_whose_condition_has_another_unit_or_type_is_not_filled_and_told(game: Path):
+    (game / "contextdb.toml").write_text(OTHERWISE, encoding="utf-8")
+    (game / "moves.csv").write_text("Asset Name,speed,direction,turn,gait\nwalk,120,,,\n", encoding="utf-8")
+    notes = [
+        '"gait" is not filled: clips show enum, contextdb.toml declares tags.',
+        '"speed" is not filled: clips show number in m/s, contextdb.toml declares number in cm/s.',
+        '"direction" is not filled: clips show angle in degrees, contextdb.toml declares number.',
+    ]
+
+    async def then(app: EditorApp, pilot: Pilot[Any]) -> tuple[list[tuple[str, ...]], str]:
+        dialog = app.screen
+        assert isinstance(dialog, AutofillDialog)
+        lines, screen = [(line.what, line.column) for line in dialog.lines], screen_text(app)
+        await press(pilot, "enter")
+        assert app.main.session.sheet.clips.cells["walk"].keys() == {"turn", "style", "duration_s", "start", "end"}
+        return lines, screen
+
+    lines, screen = in_dialog(game, then)
+    assert {column for _, column in lines if column} == {"turn", "style", "duration_s", "start", "end"}
+    assert notes[0] in screen
+    described = run("motion", "describe", str(game), "--into", str(game / "moves.csv"))
+    assert described.code == 0
+    assert [line.removeprefix("contextdb: ") for line in described.err.splitlines()][: len(notes)] == notes
+    header, *rows = (game / "moves.csv").read_text(encoding="utf-8").splitlines()
+    assert header.startswith("Asset Name,speed,direction,turn,gait,style")
+    assert rows[0].startswith("walk,120,,-55..55,,")
+    assert all(row.split(",")[1:3] == ["", ""] for row in rows[1:])
+
+
+JOBS = """
+[tables.moves]
+priority = "turn"
+[tables.moves.outputs]
+speed = { type = "number", default = 0 }
+start = { type = "enum", values = ["Idle", "Walk.Left"], default = "Idle" }
+duration_s = { type = "int", default = 0 }
+[conditions]
+end = { type = "enum", values = ["Idle"] }
+"""
+
+
+def test_a_column_with_another_job_is_not_filled_and_told(game: Path):
+    (game / "contextdb.toml").write_text(JOBS, encoding="utf-8")
+    (game / "moves.csv").write_text("Asset Name,speed,turn,start,end,duration_s\nwalk,1,2,,,\n", encoding="utf-8")
+    for name in ("jog", "walk_turn_left_90"):
+        (game / "clips" / f"{name}.bvh").unlink()
+    described = run("motion", "describe", str(game), "--into", str(game / "moves.csv"))
+    assert described.code == 0
+    assert [line.removeprefix("contextdb: ") for line in described.err.splitlines()] == [
+        '"speed" is not filled: clips show number in m/s, contextdb.toml declares an output.',
+        '"turn" is not filled: clips show number in degrees a second, contextdb.toml declares a column for priority.',
+        '"duration_s" is not filled: clips show number, contextdb.toml declares an output of type int.',
+        '"end" is not filled: clips show text, contextdb.toml declares enum.',
+    ]
+    assert (game / "moves.csv").read_text(encoding="utf-8").splitlines() == [
+        "Asset Name,speed,turn,start,end,duration_s,gait,direction,style",
+        "walk,1,2,Walk.Left,,,Walk,Any,Any",
+        "idle,,,Idle,,,Idle,Any,Any",
+    ]
+    assert run("check", str(game), "--fail-on", "warning").code == 0
+
+
 def test_escape_changes_nothing(game: Path):
     async def then(app: EditorApp, pilot: Pilot[Any]) -> bool:
         await press(pilot, "escape")

@@ -6,7 +6,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from strategies import IS_FULL
+from strategies import IS_FULL, some
 from terminal import press, screen_text, settled, with_editor
 
 TABLES = Path(__file__).parent.parent.parent / "tables"
@@ -42,7 +42,7 @@ def path(tmp_path: Path) -> Path:
     return Path(shutil.copytree(TABLES, tmp_path / "tables", ignore=shutil.ignore_patterns("clips", ".*"))) / "hit_mid_air.csv"
 
 
-@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("scene", some(SCENES))
 def test_a_screen_that_is_made_smaller_and_larger_stays_what_it_is(path, scene):
     async def script(app, pilot):
         await press(pilot, *SCENES[scene])

@@ -74,15 +74,14 @@ class Figures:
         n, n_forced = int(is_jump.sum()), int(line.forced.sum())
         known = is_jump & ~line.forced & np.isfinite(line.continuing)
         gains = gains_of(line.continuing[known], line.costs[known])
-        begins = np.flatnonzero((line.playing >= 0) & (np.diff(line.playing, prepend=-1) != 0))
-        stays = np.diff(np.append(line.times_s[begins], line.times_s[-1])) if len(begins) else np.empty(0)
+        plays_s, n_entered = float(np.diff(line.times_s)[line.playing[:-1] >= 0].sum()), int(line.jumped.sum())
         return cls(
             n,
             n_forced,
             n / line.seconds if line.seconds > 0.0 else 0.0,
             float(np.median(gains)) if len(gains) else None,
             float((gains < SMALL_GAIN).mean()) if len(gains) else None,
-            float(stays.mean()) if len(stays) else None,
+            plays_s / n_entered if n_entered else None,
         )
 
     @property

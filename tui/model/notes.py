@@ -15,10 +15,11 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
-from contextdb.disk import NOTES_SUFFIX, write_atomic
+from contextdb.disk import write_atomic
 from contextdb.edits.diffing.notes_merging import FIELDS, Spot, written
 from contextdb.errors import ContextDBError, Fault, FileError, Place
 from contextdb.files.texts import read_texts
+from contextdb.tables.other_files import notes_path
 
 COLOURS = ("red", "amber", "green", "blue", "violet")
 
@@ -77,8 +78,3 @@ class Notes:
         """Write the file; raises FileError where the disk refuses."""
         spots = {**self.texts, **self.words}
         write_atomic(notes_path(table), written({spot: (self.texts.get(spot, ""), self.words.get(spot, "")) for spot in spots}))
-
-
-def notes_path(table: Path) -> Path:
-    """The file of the notes on a table's file."""
-    return table.with_name(table.stem + NOTES_SUFFIX)

@@ -51,7 +51,7 @@ class Autofill:
         fills = filling(sheet.table, self.clips.rows)
         edit = fills.edit(updates=self.updates)
         refused = frozenset((each.asset, each.column, each.cell) for each in fills.differences)
-        sheet.clips = ClipCells({row.asset: row.cells for row in self.clips.rows}, refused)
+        sheet.clips = ClipCells(fills.cells, refused)
         done = sheet.apply(edit) if edit.changes else Done(notes=("Nothing is empty.",))
         notes = list(done.warnings)
         if fills.differences and not self.updates:
@@ -208,5 +208,6 @@ def _notes(clips: ClipRows, fills: Filling) -> Iterator[str]:
     """What was taken for granted or left out."""
     if fills.without_clip:
         yield f"No clip for {plural(len(fills.without_clip), 'row')}: {some(fills.without_clip)}"
+    yield from fills.notes
     yield from clips.found.notes
     yield from (f"left out: {message}" for message in clips.found.left_out)

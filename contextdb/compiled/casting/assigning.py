@@ -6,7 +6,9 @@ Pure combinatorics over offers; which rows take whom, and which rules must hold,
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import reduce
 from itertools import combinations
+from operator import add
 
 from contextdb.compiled.casting.facts import Offer
 
@@ -98,4 +100,4 @@ def _key(chosen: Chosen, order: Sequence[str], least: Mapping[str, tuple[int, fl
         least = {}
     costs = [offers[n].cost if n in offers else least[n] for n in order if n in offers or n in least]
     places = tuple(offers[n].place if n in offers else -1 if n in least else EMPTY for n in order)
-    return sum(c[0] for c in costs), sum(c[1] for c in costs), places
+    return sum(c[0] for c in costs), reduce(add, (c[1] for c in costs), 0.0), places  # `sum` rounds otherwise from Python 3.12 on

@@ -304,8 +304,8 @@ def _apart(rig: PoseBank, other: PoseBank) -> str:
         return f"the first has no joint {in_quotes(more[0])}"
     if rig.skeleton.names != other.skeleton.names or not np.array_equal(rig.skeleton.parents, other.skeleton.parents):
         return "their joints have another order or other parents"
-    alone = np.setxor1d(rig.moving, other.moving).tolist()
-    return f"the joint {in_quotes(rig.skeleton.names[alone[0]])} has positions of its own in one of them alone" if alone else ""
+    apart = np.setxor1d(rig.moving, other.moving).tolist()
+    return f"the joint {in_quotes(rig.skeleton.names[apart[0]])} has positions of its own in one of them alone" if apart else ""
 
 
 # ---- the spine: the joints that turn back what `contextdb.motion.output.alignment` turns the hips by

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 import re
+import unicodedata
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -56,7 +57,8 @@ bvh cw ccw deg degrees"""
 _OTHER_WORDS = frozenset(_OTHER.split())
 """Words of a name that say what the columns say, or nothing of how the body is carried."""
 _NORMAL_WORDS = frozenset(("normal", "neutral", "default", "basic", "plain", "regular"))
-_WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[^\W\d_A-Za-z]+")
+_WORD = re.compile("U+(?!l)|U?l+|o+")
+"""A word by its letters: U for a large one, l for a small one, o for one of a script without the two."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,7 +209,9 @@ def step_of(falls: Footfalls | None) -> float:
 
 def words_of(name: str) -> list[str]:
     """The words of a clip's name, in lower case, without numbers."""
-    return [word.casefold() for word in _WORD.findall(name)]
+    name = unicodedata.normalize("NFC", name)  # an accented letter is two characters in the names that macOS gives to files
+    sizes = "".join("U" if c.isupper() else "l" if c.islower() else "o" if c.isalpha() else " " for c in name)
+    return [name[found.start() : found.end()].lower() for found in _WORD.finditer(sizes)]
 
 
 def style_of(name: str, common: Iterable[str] = ()) -> str:

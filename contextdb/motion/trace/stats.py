@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from statistics import fmean, median
+from itertools import pairwise
+from statistics import median
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,8 @@ SMALL_GAIN = 0.2
 GAINS = (0.05, 0.1, 0.2, 0.5, 1.0)
 """The histogram of gains has a bar up to each."""
 
+ENTERED = (Action.START, Action.JUMP)
+"""Actions with which something begins to play."""
 About = Mapping[str, Mapping[str, Any]]
 
 
@@ -42,11 +45,12 @@ class SessionStats:
     gains : tuple of int
         How many spare up to 5, 10, 20, 50 and 100 %.
     stay_s : float or None
-        Seconds from one change of asset to the next, in the mean.
+        How long an animation plays until a jump, in the mean.
     assets_used : int
     assets_never_used : tuple of str, or None
         None where the session does not say what its databases hold.
     frames_used_share : float or None
+        How much of the databases is played: at each moment a frame, and those passed since the moment before.
     """
 
     seconds: float
@@ -85,7 +89,6 @@ def stats_of(decisions: Iterable[Decision], about: About) -> SessionStats:
         if each.searched:
             cause = cause_of(each) or "other"
             causes[cause] = causes.get(cause, 0) + 1
-    stays = _stays(found)
     used = {each.playing.asset for each in found if each.playing is not None}
     known = [asset for each in about.values() for asset in each.get("assets", ())]
     return SessionStats(
@@ -100,7 +103,7 @@ def stats_of(decisions: Iterable[Decision], about: About) -> SessionStats:
         gain_median=median(gains) if gains else None,
         gain_small_share=sum(gain < SMALL_GAIN for gain in gains) / len(gains) if gains else None,
         gains=tuple(int(n) for n in np.bincount(np.searchsorted(GAINS, gains), minlength=len(GAINS))[: len(GAINS)]),
-        stay_s=fmean(stays) if stays else None,
+        stay_s=_stay_s(found),
         assets_used=len(used),
         assets_never_used=tuple(asset for asset in dict.fromkeys(known) if asset not in used) if known else None,
         frames_used_share=_frames_used(found, about),
@@ -130,27 +133,37 @@ def gains_of(continuing: Floats, costs: Floats) -> Floats:
     return np.clip((continuing - costs) / np.where(larger > 0.0, larger, 1.0), -1.0, 1.0)
 
 
-def _stays(decisions: Sequence[Decision]) -> list[float]:
-    """How long each asset played, the last one until the end."""
-    changes = [
-        each.time_s
-        for last, each in zip([None, *decisions], decisions, strict=False)
-        if each.playing is not None and (last is None or last.playing is None or last.playing.asset != each.playing.asset)
-    ]
-    ends = [*changes[1:], decisions[-1].time_s] if changes else []
-    return [end - start for start, end in zip(changes, ends, strict=True)]
+def _stay_s(decisions: Sequence[Decision]) -> float | None:
+    plays_s = sum(after.time_s - each.time_s for each, after in pairwise(decisions) if each.playing is not None)
+    n_entered = sum(each.action in ENTERED for each in decisions)
+    return plays_s / n_entered if n_entered else None
 
 
-def _frame(playing: Playing, about: About) -> int:
-    """What plays, in the first permutation of its clip: all show the same."""
+def _place(playing: Playing, about: About) -> tuple[str, int, int]:
+    """The database, range and frame of what plays, in the first permutation of its clip: all show the same."""
     each = about.get(playing.database, {})
     at = playing.range % len(each.get(PERMUTATION_S, [0]))
-    return playing.frame - at * (each["stops"][playing.range] - each["starts"][playing.range]) if at else playing.frame
+    length = each["stops"][playing.range] - each["starts"][playing.range] if at else 0
+    return playing.database, playing.range - at, playing.frame - at * length
 
 
 def _frames_used(decisions: Sequence[Decision], about: About) -> float | None:
     if not about or not all("stops" in each for each in about.values()):
         return None
     every = sum((sum(each["stops"]) - sum(each["starts"])) // len(each.get(PERMUTATION_S, [0])) for each in about.values())
-    used = {(each.playing.database, _frame(each.playing, about)) for each in decisions if each.playing is not None}
+    used, last = set[tuple[str, int]](), None
+    for each in decisions:
+        if each.playing is None:
+            last = None
+            continue
+        place = database, number, frame = _place(each.playing, about)
+        goes_on = each.action not in ENTERED and database in about
+        first = last[2] if goes_on and last is not None and last[:2] == place[:2] else frame
+        if first <= frame:
+            passed = [*range(first, frame + 1)]
+        else:
+            start, stop = (about[database][end][number] for end in ("starts", "stops"))
+            passed = [*range(first, stop), *range(start, frame + 1)]
+        used.update((database, at) for at in passed)
+        last = place
     return len(used) / every if every else None

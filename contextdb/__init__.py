@@ -80,57 +80,12 @@ _HOME_OF = {name: module for module, names in _HOMES.items() for name in names.s
 _OLD = {name: f"contextdb.motion.{name}" for name in ("ClipError", "MotionError", "QueryError")}
 """Names that go away, and the new ones."""
 
-__all__ = [  # noqa: RUF022
-    "load",
-    "Project",
-    "Schema",
-    "watch",
-    "Watch",
-    "Snapshot",
-    "link",
-    "Link",
-    "Table",
-    "TableSettings",
-    "CompiledTable",
-    "Context",
-    "Unknown",
-    "Actors",
-    "Prefer",
-    "Rng",
-    "Matches",
-    "ManyMatches",
-    "Picker",
-    "Pick",
-    "LiveContext",
-    "cell",
-    "FactSet",
-    "coverage",
-    "CoverageReport",
-    "Gap",
-    "motion_coverage",
-    "ProjectMotion",
-    "TableMotion",
-    "Explanation",
-    "RowExplanation",
-    "Failure",
-    "Finding",
-    "ContextDBError",
-    "CellError",
-    "SchemaError",
-    "TableError",
-    "NoSuchTable",
-    "NoSuchRow",
-    "FileError",
-    "ContextError",
-    "NoSuchFact",
-    "NoSuchOutput",
-    "NoSuchPlace",
-    "WrongType",
-    "PolicyError",
-    "ArtefactError",
-    "Fault",
-    "Place",
-]
+__all__ = ["Link", "Project", "Schema", "Snapshot", "Table", "TableSettings", "Watch", "link", "load", "watch"]
+__all__ += ["CompiledTable", "Context", "FactSet", "LiveContext", "ManyMatches", "Matches", "Unknown", "cell"]
+__all__ += ["Actors", "Explanation", "Failure", "Pick", "Picker", "Prefer", "Rng", "RowExplanation"]
+__all__ += ["CoverageReport", "Fault", "Finding", "Gap", "Place", "ProjectMotion", "TableMotion", "coverage", "motion_coverage"]
+__all__ += ["ArtefactError", "CellError", "ContextDBError", "ContextError", "FileError", "PolicyError", "SchemaError", "TableError"]
+__all__ += ["NoSuchFact", "NoSuchOutput", "NoSuchPlace", "NoSuchRow", "NoSuchTable", "WrongType"]
 
 if not TYPE_CHECKING:  # a type checker takes every name for one that exists where it sees this
 

@@ -52,7 +52,6 @@ def from_rows(row_numbers: Rows, n_rows: int) -> Words:
 
 
 def full(n_rows: int) -> Words:
-    """The mask of every row."""
     return pack(np.ones(n_rows, np.bool_))
 
 

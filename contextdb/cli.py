@@ -18,10 +18,10 @@ from pathlib import Path
 from types import ModuleType
 from typing import IO, Any, NoReturn
 
-from contextdb.console import ExitCode, drop_output, printable
+from contextdb.console import ExitCode, drop_output, note, printable
 from contextdb.disk import unnameable
 from contextdb.disk.together import UnfinishedWarning
-from contextdb.errors import ContextDBError, Fault, Place, in_quotes, nearest, some
+from contextdb.errors import ContextDBError, Fault, Place, in_quotes, joined, mend_for, nearest, some
 
 COMMANDS = {
     "edit": "the terminal editor",
@@ -63,8 +63,8 @@ class Parser(argparse.ArgumentParser):
         for text in rest:
             if not text.startswith("-"):
                 self.error(f"{in_quotes(text.removeprefix(_PLAIN))} is one argument too many.")
-            near = nearest(text.partition("=")[0], self._option_string_actions)
-            self.error(Fault(f"there is no option {in_quotes(text)}.", mend=in_quotes(near) if near else "").message)
+            mend = mend_for(text.partition("=")[0], self._option_string_actions)
+            self.error(Fault(f"there is no option {in_quotes(text)}.", mend=mend).message)
         return arguments
 
     def _get_values(self, action: argparse.Action, arg_strings: list[str]) -> Any:
@@ -77,8 +77,7 @@ class Parser(argparse.ArgumentParser):
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is not None and value not in action.choices:
             known = [str(c) for c in action.choices]
-            near = nearest(str(value), known)
-            fault = Fault(f"there is no {in_quotes(str(value))}.", some(known, len(known)), in_quotes(near) if near else "")
+            fault = Fault(f"there is no {in_quotes(str(value))}.", some(known, len(known)), mend_for(str(value), known))
             raise argparse.ArgumentError(action, fault.message)
 
     def error(self, message: str) -> NoReturn:
@@ -113,7 +112,6 @@ class Group:
 
     @property
     def overview(self) -> str:
-        """The commands, each with what it does."""
         return _overview(self.commands) if self.about is None else self._help()
 
     def command(self, name: str) -> ModuleType:
@@ -123,7 +121,7 @@ class Group:
         near = nearest(name, self.commands)
         mend = in_quotes(" ".join((*self.words, near))) if near else ""
         found = f"there is no command {in_quotes(' '.join((*self.words, name)))}."
-        raise ContextDBError(Fault(found, _some(list(self.commands)), mend))
+        raise ContextDBError(Fault(found, joined(list(self.commands), 6), mend))
 
     def parser(self, name: str, command: ModuleType) -> Parser:
         """What reads the arguments of a command."""
@@ -151,7 +149,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         code = _main(given)
     for warning in told:
         if issubclass(warning.category, UnfinishedWarning):
-            print(printable(f"contextdb: {warning.message}"), file=sys.stderr)
+            note(warning.message)
         else:
             warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
     return code
@@ -176,13 +174,12 @@ def _main(given: Sequence[str]) -> int:
             raise
         return _failed(unnameable(error, Path(error.object)))
     except KeyboardInterrupt:
-        print("contextdb: interrupted", file=sys.stderr)
+        note("interrupted")
         return ExitCode.INTERRUPTED
 
 
 def _failed(*faults: Fault) -> ExitCode:
-    for fault in faults:
-        print(printable(f"contextdb: {fault}"), file=sys.stderr)
+    note(*faults)
     return ExitCode.BAD_USE
 
 
@@ -215,12 +212,6 @@ def _run(group: Group, given: Sequence[str]) -> int:
 def _new_parser(words: Sequence[str], about: str | None) -> Parser:
     prog = " ".join(("contextdb", *words))
     return Parser(prog=prog, description=about, formatter_class=Help, allow_abbrev=False)
-
-
-def _some(commands: Sequence[str], most: int = 6) -> str:
-    """The first commands, and how many more there are."""
-    n_more = len(commands) - most
-    return ", ".join(commands[:most]) + (f" and {n_more} more" if n_more > 0 else "")
 
 
 def _overview(commands: Mapping[str, str]) -> str:

@@ -35,19 +35,16 @@ class TextColumn:
 
     @property
     def n_rows(self) -> int:
-        """How many rows the column has."""
         return len(self.codes)
 
     def __getitem__(self, row: int) -> str:
         return self.texts[int(self.codes[row])]
 
     def to_list(self) -> list[str]:
-        """The text of every row."""
         texts = self.texts
         return [texts[c] for c in self.codes.tolist()]
 
     def with_text(self, row: int, text: str) -> TextColumn:
-        """The column with one row's text changed."""
         texts, code = self._with_code(text)
         codes = self.codes.copy()
         codes[row] = code
@@ -58,7 +55,6 @@ class TextColumn:
         return TextColumn(self.name, self.texts, self.codes[rows])
 
     def with_inserted(self, row: int, texts: Sequence[str]) -> TextColumn:
-        """The column with new rows before `row`."""
         column, codes = self, []
         for text in texts:
             known, code = column._with_code(text)
@@ -67,7 +63,6 @@ class TextColumn:
         return TextColumn(self.name, column.texts, np.insert(self.codes, row, codes).astype(np.int32))
 
     def renamed(self, name: str) -> TextColumn:
-        """The column under another name."""
         return TextColumn(name, self.texts, self.codes)
 
     def _with_code(self, text: str) -> tuple[tuple[str, ...], int]:

@@ -82,6 +82,12 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
 
 
+def note(*texts: object) -> None:
+    """Print lines that are no part of the answer on standard error."""
+    for text in texts:
+        print(printable(f"contextdb: {text}"), file=sys.stderr, flush=True)
+
+
 def width_of(text: str) -> int:
     """How many terminal cells the text takes; wide characters take two, combining ones none."""
     return sum(0 if unicodedata.combining(c) else 2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text)
@@ -153,7 +159,7 @@ def announce_file(file: str, n_bytes: int) -> None:
 
 class _OnStandardError(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
-        print(f"contextdb: {record.getMessage()}", file=sys.stderr, flush=True)
+        note(record.getMessage())
 
 
 @contextmanager

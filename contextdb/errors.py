@@ -27,7 +27,7 @@ from __future__ import annotations
 import difflib
 import unicodedata
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 SHOWN_CHARACTERS = 60
@@ -218,6 +218,20 @@ def nearest(word: str, known: Iterable[str]) -> str | None:
     return known_as[found[0]] if found else None
 
 
+def mend_for(word: str, known: Iterable[str]) -> str:
+    """The known name most like `word`, in quotes, as a fault suggests it; "" when none is near."""
+    near = nearest(word, known)
+    return in_quotes(near) if near else ""
+
+
+def no_such(
+    what: str, name: object, known: Iterable[str], accepted: str = "", place: Place = Place(), rule: str = "unreadable"
+) -> Fault:
+    """The fault of a name that there is not, with the names that there are, unless `accepted` says more, and the nearest one."""
+    names = list(known)
+    return Fault(f"there is no {what} {in_quotes(str(name))}.", accepted or some(names), mend_for(str(name), names), place, rule)
+
+
 def folded(name: str) -> str:
     """A name apart from its case, and from whether an accented letter is one character or two."""
     return unicodedata.normalize("NFC", name).casefold()
@@ -230,6 +244,11 @@ def some(names: Iterable[str], most: int = 6) -> str:
     return head if len(listed) <= most else f"{head} and {len(listed) - most} more"
 
 
+def joined(texts: Sequence[str], most: int, between: str = ", ") -> str:
+    """The first texts in one, and how many more there are."""
+    return between.join(texts[:most]) + (f" and {len(texts) - most:,} more" if len(texts) > most else "")
+
+
 def plural(count: int, noun: str) -> str:
     """ "1 row", "2 rows": a count with its noun."""
     return f"{count:,} {noun}" if count == 1 else f"{count:,} {noun}s"
@@ -240,5 +259,4 @@ def warn_of_old(old: str, new: str, levels: int = 3) -> None:
 
     `levels`: how many calls the caller of the old way is above, this one counted.
     """
-    text = f"{old} goes away in contextdb {GONE_IN}. Use {new}."
-    warnings.warn(text, DeprecationWarning, stacklevel=levels)
+    warnings.warn(f"{old} goes away in contextdb {GONE_IN}. Use {new}.", DeprecationWarning, stacklevel=levels)

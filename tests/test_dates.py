@@ -21,7 +21,7 @@ from contextdb.compiled.stubs import stubs_of
 from contextdb.errors import ContextDBError
 from contextdb.exchange.formats import FORMATS, write
 from contextdb.exchange.proposals import propose_type
-from contextdb.exchange.values import text_of_value
+from contextdb.exchange.reading import text_of_value
 from contextdb.tables.table import Table
 from contextdb.telemetry.contexts import read_contexts
 from tui.model.interval_picture import framed_line, number_words

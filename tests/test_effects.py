@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from strategies import examples
 
 from contextdb.cells.grammar import parse_cell
-from contextdb.checks.effects import effects, merge_effects
-from contextdb.checks.effects_boxes import meet
+from contextdb.checks.effects import effects, meet, merge_effects
 from contextdb.errors import TableError
 from contextdb.tables.table import Table
 

@@ -152,12 +152,12 @@ def test_a_large_import_says_what_it_is_at_also_where_no_terminal_is(monkeypatch
     ]
 
 
-@pytest.mark.parametrize("where", ["read", "propose", "plan_import"])
+@pytest.mark.parametrize("where", ["read", "propose", "importing.plan_import"])
 def test_an_import_that_is_interrupted_ends_with_130_and_writes_nothing(where: str, here: Path, monkeypatch: pytest.MonkeyPatch):
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(import_command, where, interrupted)
+    monkeypatch.setattr(f"contextdb.commands.import_command.{where}", interrupted)
     assert run("import", "moves.csv", "game/moves.csv").code == 130
     assert [p.name for p in (here / "game").iterdir()] == ["contextdb.toml"]
     assert (here / "game" / "contextdb.toml").read_text(encoding="utf-8") == TOML

@@ -24,7 +24,7 @@ from pathlib import Path
 from textual.keys import KEY_TO_UNICODE_NAME, Keys
 
 from contextdb.disk import read_bytes
-from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, nearest
+from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, nearest, no_such
 from tui.commands import BY_ID, COMMANDS
 
 VARIABLE = "CONTEXTDB_EDITOR"
@@ -81,8 +81,7 @@ def _faults(said: Mapping[str, object], themes: Collection[str]) -> Iterator[Fau
         yield Fault(f"there is no setting {in_quotes(key)}.", "theme, [keys]")
     theme, keys = said.get("theme"), said.get("keys", {})
     if theme is not None and theme not in themes:
-        near = nearest(str(theme), themes)
-        yield Fault(f"there is no theme {in_quotes(str(theme))}.", ", ".join(sorted(themes)), in_quotes(near) if near else "")
+        yield no_such("theme", theme, themes, ", ".join(sorted(themes)))
     if not isinstance(keys, dict):
         yield Fault("[keys] is not a table.", 'lines such as duplicate = "ctrl+w"')
         return

@@ -5,7 +5,7 @@ from __future__ import annotations
 import gc
 import os
 
-from contextdb.errors import ContextDBError, Fault, in_quotes, nearest
+from contextdb.errors import ContextDBError, Fault, in_quotes, mend_for
 from tui.app import EditorApp
 from tui.editor_settings import EditorSettings, SettingsError, read_settings, settings_path
 from tui.keyboard import read_whole_keys
@@ -28,9 +28,8 @@ def edit(path: str | None, theme: str | None = None) -> None:
     themes = EditorApp.theme_names()
     settings = read_settings(settings_path(), themes)
     if theme is not None and theme not in themes:
-        near = nearest(theme, themes)
         found = f"there is no theme {in_quotes(theme)}."
-        raise SettingsError(Fault(found, ", ".join(themes), in_quotes(near) if near else ""))
+        raise SettingsError(Fault(found, ", ".join(themes), mend_for(theme, themes)))
     _require_readable(workspace)
     forget_exported_size()
     read_whole_keys()

@@ -46,7 +46,6 @@ def require_place(place: object, length: int, what: str) -> int:
 
 
 def require_text(value: object, what: str) -> str:
-    """A text."""
     if not isinstance(value, str):
         raise _wrong(value, what, "a text")
     return value
@@ -125,7 +124,6 @@ def by_name(call: str, given: Sequence[object], **named: Any) -> dict[str, Any]:
 
 
 def require_mapping(value: object, what: str, accepted: str) -> Mapping[Any, Any]:
-    """A mapping."""
     if not isinstance(value, Mapping):
         raise _wrong(value, what, accepted)
     return value

@@ -50,7 +50,6 @@ def write_date(day: float) -> str:
 
 
 def date_of(day: float) -> datetime.date:
-    """A day as a date."""
     low, high = LIMITS
     return datetime.date.fromordinal(int(min(max(day, low), high)) + _EPOCH)
 

@@ -23,7 +23,21 @@ from contextdb.cells.grammar import parse_cell, parse_tags
 from contextdb.cells.intervals import EVERYTHING
 from contextdb.cells.sets import SET_OF, Cell, NumberSet, ValueSet, covers
 from contextdb.cells.words import truth_of
-from contextdb.errors import CellError, ContextError, Fault, NoSuchFact, Place, folded, in_quotes, nearest, plural, shown, some
+from contextdb.errors import (
+    CellError,
+    ContextError,
+    Fault,
+    NoSuchFact,
+    Place,
+    folded,
+    in_quotes,
+    mend_for,
+    nearest,
+    no_such,
+    plural,
+    shown,
+    some,
+)
 
 Unknown = Literal["error", "any", "never"]
 Fact = bool | float | str | frozenset[str] | Cell | None
@@ -51,16 +65,13 @@ def cell(text: str) -> FactSet:
 def check_mode(unknown: str) -> None:
     """Raise ContextError unless `unknown` is a treatment of missing facts."""
     if not isinstance(unknown, str) or unknown not in UNKNOWN_MODES:
-        near = nearest(str(unknown), UNKNOWN_MODES)
         found = f"there is no treatment {in_quotes(str(unknown))} of missing facts."
-        raise ContextError(Fault(found, some(UNKNOWN_MODES), in_quotes(near) if near else ""))
+        raise ContextError(Fault(found, some(UNKNOWN_MODES), mend_for(str(unknown), UNKNOWN_MODES)))
 
 
 def no_condition(name: str, known: Iterable[str]) -> NoSuchFact:
     """The error for a fact that no condition of the table is about."""
-    near = nearest(str(name), known)
-    found = f"there is no condition {in_quotes(str(name))}."
-    return NoSuchFact(Fault(found, some(known), in_quotes(near) if near else "", rule="unknown-fact"))
+    return NoSuchFact(no_such("condition", name, known, rule="unknown-fact"))
 
 
 def require_context(context: object) -> None:
@@ -250,10 +261,9 @@ def _read_one_value(value: object, condition: Condition) -> str:
 
 def _unknown(value: str, condition: Condition) -> ContextError:
     known = condition.domain.values or ()
-    near = nearest(value, known)
     place = Place(column=condition.name)
     found = f"{in_quotes(value)} is not a declared value."
-    return ContextError(Fault(found, some(known), in_quotes(near) if near else "", place, "wrong-fact"))
+    return ContextError(Fault(found, some(known), mend_for(value, known), place, "wrong-fact"))
 
 
 def _read_tags(value: object, condition: Condition) -> Fact:

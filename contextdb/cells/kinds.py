@@ -336,10 +336,8 @@ assert all(re.compile(kind.spelling.number).groups == 0 for kind in KINDS.values
 
 
 def names_where(is_meant: Callable[[Kind], bool]) -> tuple[str, ...]:
-    """The names of some types."""
     return tuple(name for name, kind in KINDS.items() if is_meant(kind))
 
 
 def kind_named(name: str) -> Kind:
-    """The type of a name."""
     return KINDS[name]

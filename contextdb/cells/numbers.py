@@ -83,7 +83,6 @@ class NumberCells(Sequence[Cell]):
 
     @cached_property
     def ends(self) -> Ends:
-        """The ends of all cells."""
         lows, highs, rest = _plain_ends(pl.Series(self.texts, dtype=pl.String), self.domain)
         others = {i: self.read[i] if i in self.read else parse_cell(self.texts[i], self.domain) for i in rest.tolist()}
         return Ends(lows, highs, others)
@@ -150,7 +149,6 @@ ColumnCells = tuple[Cell, ...] | NumberCells
 
 
 def has_soft(cells: ColumnCells) -> bool:
-    """Whether a cell is soft."""
     return any(c.is_soft for c in (cells.read.values() if isinstance(cells, NumberCells) else cells))
 
 

@@ -68,7 +68,6 @@ class OutputType:
     choices: tuple[str, ...] = ()
     """The texts of all values, where they are always the same."""
     is_text: bool = False
-    """Whether values are texts."""
     is_free: bool = False
     """Whether any text is a value, an empty one too."""
     is_numeric: bool = False
@@ -85,7 +84,6 @@ class OutputType:
 
 
 def names_where(is_meant: Callable[[OutputType], bool]) -> tuple[str, ...]:
-    """The names of some types."""
     return tuple(name for name, kind in OUTPUT_TYPES.items() if is_meant(kind))
 
 

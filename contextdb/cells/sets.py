@@ -34,12 +34,10 @@ class NumberSet:
     is_circular: bool = False
 
     def holds(self, value: float) -> bool:
-        """Whether the number is in the set."""
         return intervals.holds(self.spans, wrap_angle(value) if self.is_circular else value)
 
     @property
     def is_empty(self) -> bool:
-        """Whether no number is in the set."""
         return not self.spans
 
 
@@ -51,12 +49,10 @@ class ValueSet:
     is_complement: bool = False
 
     def holds(self, value: bool | str) -> bool:
-        """Whether the value is in the set."""
         return (value in self.values) is not self.is_complement
 
     @property
     def is_empty(self) -> bool:
-        """Whether no value is in the set."""
         return not self.values and not self.is_complement
 
 
@@ -98,7 +94,6 @@ class Cell:
 
     @property
     def is_any(self) -> bool:
-        """Whether the cell says Any."""
         return self.accepts is None
 
     @property
@@ -149,7 +144,6 @@ class TagMeet(TagSet):
 
     @classmethod
     def of(cls, parts: Sequence[TagSet]) -> TagMeet:
-        """The meet of some sets."""
         needs, bans = (frozenset[str]().union(*sets) for sets in ([p.needs for p in parts], [p.bans for p in parts]))
         return cls(needs, bans, True, tuple(parts))
 

@@ -29,7 +29,7 @@ from contextdb.columns import TextColumn
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.table import data_of
 from contextdb.disk import write_atomic
-from contextdb.errors import CellError, ContextError, Fault, Place, TableError, in_quotes, nearest, some
+from contextdb.errors import CellError, ContextError, Fault, Place, TableError, in_quotes, mend_for, nearest, some
 from contextdb.files.csv_rewrite import Origin
 from contextdb.files.texts import AnySource, new_source, read_texts
 from contextdb.findings import Finding
@@ -199,9 +199,8 @@ def _row_of(case: Case, source: AnySource | None, columns: Sequence[TextColumn])
 def _find(path: Path, case: Case, source: AnySource | None, columns: Columns) -> int:
     row = _row_of(case, source, columns)
     if row is None:
-        near = nearest(case.name, _names(columns))
         found = f"there is no case {in_quotes(case.name)} any more."
-        raise TableError(Fault(found, "a case of the file", in_quotes(near) if near else "", Place(str(path))))
+        raise TableError(Fault(found, "a case of the file", mend_for(case.name, _names(columns)), Place(str(path))))
     return row
 
 
@@ -312,8 +311,7 @@ def _doubtful(table: TableData, cases: Sequence[Case], file: str | None) -> Iter
             yield replace(place, level="warning", message=f"{about} is also {where}: each case needs its own name.", column=NAME)
         first_of.setdefault(case.name, case)
         for asset in _banned(case).difference(assets):
-            message = f"{about} always holds: {_no_asset(asset, assets)}"
-            yield replace(place, level="warning", message=message, column=EXPECTED)
+            yield replace(place, level="warning", message=f"{about} always holds: {_no_asset(asset, assets)}", column=EXPECTED)
 
 
 def _asked(table: TableData) -> set[str]:

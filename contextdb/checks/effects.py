@@ -9,12 +9,15 @@ out is said. Cells name contexts as in `contextdb.coverage`, whose engines do th
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contextdb.checks.effects_boxes import meet
+from contextdb.cells.conditions import Condition
+from contextdb.cells.grammar import format_cell, parse_cell
+from contextdb.cells.plain_ends import cuts_of, plain
+from contextdb.cells.sets import Cell, meet_in_a_cell
 from contextdb.checks.effects_space import Cells, Rows, Shared, shared_space
 from contextdb.covering import CoverageReport, coverage, format_percent
 from contextdb.covering.ruled import without_rules
@@ -53,11 +56,9 @@ class Box:
 
     @property
     def text(self) -> str:
-        """The cells on one line."""
         return ", ".join(f"{name}: {cell}" for name, cell in self.cells.items()) or "every context"
 
     def to_json(self) -> dict[str, object]:
-        """As plain data."""
         return {"share": self.share, "cells": self.cells}
 
 
@@ -75,7 +76,6 @@ class Reach:
     share_lost: float
 
     def to_json(self) -> dict[str, object]:
-        """As plain data."""
         return {
             "asset": self.asset,
             "before": self.before,
@@ -108,7 +108,6 @@ class Effects:
         return bool(self.assets or self.n_left_out or self.opened or self.closed or self.dead or self.overlaps)
 
     def to_json(self) -> dict[str, object]:
-        """As plain data."""
         return {
             "covered": {"before": _covered(self.before), "after": _covered(self.after)},
             "assets": [reach.to_json() for reach in self.assets],
@@ -315,7 +314,6 @@ class Measure:
         return [Box(cells, share) for cells, share in parts if cells is not None], report.gaps_complete
 
     def common(self, one: Box, other: Box) -> Box | None:
-        """What two boxes have in common."""
         cells = meet(one.cells, other.cells, self.space.conditions)
         return None if cells is None else Box(cells, self._report([[cells]]).covered)
 
@@ -365,3 +363,22 @@ def _key(table: EitherTable, finding: Finding) -> Key:
 def _placed(table: EitherTable, finding: Finding) -> Finding:
     place = table.place(finding.row or 0)
     return replace(finding, table=table.name, file=place.file, line=place.line, asset=table.assets[finding.row or 0])
+
+
+# ---- what two boxes of cells have in common
+
+
+def meet(one: Mapping[str, str], other: Mapping[str, str], conditions: Mapping[str, Condition]) -> dict[str, str] | None:
+    """A box that holds what both hold, as cells; None where that is nothing. Cells are not soft."""
+    found: dict[str, str] = {}
+    for name in (name for name in conditions if name in one or name in other):
+        if not (name in one and name in other):
+            found[name] = one[name] if name in one else other[name]  # as somebody wrote it
+            continue
+        domain = conditions[name].domain
+        mine, yours = (parse_cell(box[name], domain).accepts for box in (one, other))
+        both = mine if yours is None else yours if mine is None else meet_in_a_cell(mine, yours)
+        if both is not None and both.is_empty:
+            return None
+        found[name] = format_cell(Cell(both and plain(both, cuts_of(mine, yours))), domain)
+    return found

@@ -37,7 +37,6 @@ RULES: dict[str, Rule] = {
             "commands.motion_replay_command",
             "commands.motion_run_command",
             "disk",
-            "tables.clip_folder",
             "tables.places",
             "tables.project",
             "tables.watching.snapshot",
@@ -133,7 +132,7 @@ RULES: dict[str, Rule] = {
         "error",
         "An output has different types in a table and in a table inside it.",
         "Declare the output in the same way in both tables.",
-        ("tables.nesting.flat_outputs",),
+        ("tables.nesting.flat_texts",),
     ),
     "too-many-rows": Rule(
         "error",

@@ -32,7 +32,6 @@ class Verdict:
     message: str
 
     def to_json(self) -> dict[str, str]:
-        """As plain data."""
         return {"file": self.file, "kind": self.kind, "state": self.state, "message": self.message}
 
 
@@ -49,8 +48,7 @@ def verified(path: Path) -> Verdict:
     check = CHECKS.get(path.suffix.lower())
     if check is None:
         accepted = f"a file that contextdb writes: {', '.join(CHECKS)}"
-        found = f"{in_quotes(path.name)} is not a file of contextdb."
-        raise FileError(Fault(found, accepted, place=Place(str(path))))
+        raise FileError(Fault(f"{in_quotes(path.name)} is not a file of contextdb.", accepted, place=Place(str(path))))
     kind = "file"
     try:
         for kind, message in check(path):

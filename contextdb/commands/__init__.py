@@ -12,8 +12,7 @@ from contextdb.errors import ContextError
 
 def add_format_arguments(parser: argparse.ArgumentParser, formats: Sequence[str]) -> None:
     """The format of what is printed: --format, and --json for short."""
-    told = f"{', '.join(formats)} (default: text)"
-    parser.add_argument("--format", choices=formats, default="text", metavar="FORMAT", help=told)
+    parser.add_argument("--format", choices=formats, default="text", metavar="FORMAT", help=f"{', '.join(formats)} (default: text)")
     same = "the same as --format json"
     parser.add_argument("--json", action="store_const", const="json", dest="format", default=argparse.SUPPRESS, help=same)
 

@@ -32,22 +32,13 @@ from contextdb.findings import LEVELS, Finding
 from contextdb.report.results import CheckReport, TableSummary
 from contextdb.schema.settings import Schema
 from contextdb.schema.toml_lines import key_lines
+from contextdb.tables import project
 from contextdb.tables.other_files import cases_path, notes_path
 from contextdb.tables.places import table_path
-from contextdb.tables.project import (
-    SCHEMA_FILE,
-    folder_of,
-    load_table,
-    read_folder_schema,
-    stray_files,
-    table_files,
-    twice_named,
-)
 from contextdb.tables.table import Table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("path", metavar="PATH", help="a folder of tables, one table or its name, or its cases")
     add_format_arguments(parser, report.formats("check"))
     parser.add_argument(
@@ -80,23 +71,23 @@ def printed(found: CheckReport, arguments: argparse.Namespace) -> ExitCode:
 def check_path(text: str) -> CheckReport:
     """Check everything under a path, saved contexts too; what cannot be read at all is a finding."""
     path = Path(text)
-    if not os.path.isdir(text) and path.name != SCHEMA_FILE:
+    if not os.path.isdir(text) and path.name != project.SCHEMA_FILE:
         file = table_path(text)
         table = _table_of(file) if _is_cases(file) else file
         return CheckReport((), (_stray(file),)) if table is None else _check_files([(None, table)])
-    folder = folder_of(path)
+    folder = project.folder_of(path)
     try:
-        schema = read_folder_schema(folder)
-        files = list(table_files(folder, schema))
+        schema = project.read_folder_schema(folder)
+        files = list(project.table_files(folder, schema))
     except ContextDBError as error:
         return CheckReport((), tuple(_as_findings(error, None)))
     if not files:
-        accepted = f"a folder with {SCHEMA_FILE} and a .csv or .parquet file for each table"
+        accepted = f"a folder with {project.SCHEMA_FILE} and a .csv or .parquet file for each table"
         return CheckReport(
             (), (Finding("no-tables", "error", f"the folder holds no table. Accepted: {accepted}.", file=str(folder)),)
         )
     found = _check_files(files, schema)
-    others = (Finding("not-a-table", "info", sentence, file=str(path)) for path, sentence in stray_files(folder, schema))
+    others = (Finding("not-a-table", "info", sentence, file=str(path)) for path, sentence in project.stray_files(folder, schema))
     strays = _strays(folder, [file for _, file in files])
     return CheckReport(found.tables, (*found.findings, *_unportable(files, schema), *others, *strays))
 
@@ -112,7 +103,9 @@ def _unportable(files: Sequence[tuple[str, Path]], schema: Schema) -> Iterator[F
             ignored = "the Unicode form of names" if composed(other) == composed(str(path)) else "case"
             told.append(f"this and {path_in_quotes(other)} are one file on disks that ignore {ignored}.")
         if composed(declared) != composed(path.name):
-            told.append(f"{SCHEMA_FILE} calls it {in_quotes(declared)}: there is no such file on disks that distinguish case.")
+            told.append(
+                f"{project.SCHEMA_FILE} calls it {in_quotes(declared)}: there is no such file on disks that distinguish case."
+            )
         yield from (Finding("unportable-name", "warning", message, name, str(path)) for message in told)
 
 
@@ -120,10 +113,10 @@ def _check_files(files: Sequence[tuple[str | None, Path]], schema: Schema | None
     """Check some tables; `schema` is given when they are all of its folder."""
     tables: list[TableSummary] = []
     read: list[Table] = []
-    findings = [Finding.of(fault) for fault in twice_named((name, path) for name, path in files if name is not None)]
+    findings = [Finding.of(fault) for fault in project.twice_named((name, path) for name, path in files if name is not None)]
     for name, path in progress(files, "checking"):
         try:
-            table = load_table(path, strict=False)
+            table = project.load_table(path, strict=False)
         except ContextDBError as error:
             findings += _as_findings(error, name)
             continue

@@ -35,7 +35,6 @@ HEADERS = (".h", ".hpp", ".hh", ".hxx")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("path", metavar="PATH", help="a folder of tables, or one table or its name")
     parser.add_argument(
         "-o", "--out", metavar="FILE", help="the compiled file, or a folder for several (default: next to each table)"

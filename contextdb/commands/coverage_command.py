@@ -23,14 +23,15 @@ from pathlib import Path
 from typing import TypeVar
 
 from contextdb.commands import add_format_arguments, coverage_telemetry
+from contextdb.commands.numbers import number_of
 from contextdb.commands.progress import Bar, bar, has_many_cells
-from contextdb.console import ExitCode, output, printable, terminal_width, wants_colour
+from contextdb.console import ExitCode, note, output, printable, terminal_width, wants_colour
 from contextdb.covering.baseline import ACCEPTED, Earlier, read_baseline
 from contextdb.covering.engine import MOST_GAPS, SAMPLES, WORK
 from contextdb.covering.pairs import PairTable
 from contextdb.covering.progress import Tell
 from contextdb.disk import read_bytes, write_atomic
-from contextdb.errors import ContextDBError, ContextError, Fault, FileError, Place, TableError, in_quotes, nearest, plural
+from contextdb.errors import ContextDBError, ContextError, Fault, FileError, Place, TableError, in_quotes, no_such, plural
 from contextdb.files.reports import has_digest
 from contextdb.report import formats, render
 from contextdb.report.coverage_results import CoverageResults, Measured
@@ -44,7 +45,6 @@ AnyReport = TypeVar("AnyReport")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("path", metavar="PATH", help="a folder of tables, one table, or the name of a table")
     add_format_arguments(parser, formats("coverage"))
     parser.add_argument("-o", "--output", metavar="FILE", help="write the report to a file")
@@ -219,7 +219,7 @@ def _placed(table: EitherTable) -> Iterator[None]:
 
 
 def _details(arguments: argparse.Namespace, table: EitherTable) -> str:
-    from contextdb.report.coverage_details import gap_details, row_details
+    from contextdb.report.coverage_text import gap_details, row_details
 
     width = terminal_width()
     if arguments.explain is not None:
@@ -244,11 +244,9 @@ def _row(text: str, table: EitherTable) -> int:
         return int(text) - 1
     if rows:
         numbers = ", ".join(str(row + 1) for row in rows[:6])
-        found = f"the asset {in_quotes(text)} is in {plural(len(rows), 'row')}."
-        raise ContextError(Fault(found, f"one of the rows {numbers}"))
-    near = nearest(text, table.assets)
+        raise ContextError(Fault(f"the asset {in_quotes(text)} is in {plural(len(rows), 'row')}.", f"one of the rows {numbers}"))
     accepted = f"a row from 1 to {table.n_rows:,}, or an asset" if table.n_rows else "none: the table has no rows"
-    raise ContextError(Fault(f"there is no row {in_quotes(text)}.", accepted, in_quotes(near) if near else ""))
+    raise ContextError(no_such("row", text, table.assets, accepted))
 
 
 def _only(tables: Sequence[EitherTable]) -> EitherTable:
@@ -267,17 +265,14 @@ def earlier_report(file: str, read: Callable[[str, str], AnyReport], accepted: s
     earlier = read(text, file)
     if not has_digest(text):
         found = "the baseline has no digest, as an older version wrote it, so an altered number would not be noticed"
-        print(f"contextdb: {printable(file)}: {found}. Write the report again to have one.", file=sys.stderr)
+        note(f"{file}: {found}. Write the report again to have one.")
     return earlier
 
 
 def percent(text: str) -> float:
     """A percentage as a share."""
-    try:
-        percent = float(text.removesuffix("%"))
-    except ValueError:
-        percent = -1.0
-    if not 0.0 <= percent <= 100.0:
+    percent = number_of(text.removesuffix("%"))
+    if percent is None or not 0.0 <= percent <= 100.0:
         raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a percentage. Accepted: a number from 0 to 100.")
     return percent / 100.0
 

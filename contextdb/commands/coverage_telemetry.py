@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from contextdb.commands.progress import bar, has_many_bytes
-from contextdb.console import printable
+from contextdb.console import note, printable
 from contextdb.covering import Gap
 from contextdb.errors import ContextError, Fault
 from contextdb.report.coverage_results import Measured
@@ -20,7 +19,6 @@ ENGINES = ("local", "dask")
 
 
 def add_arguments(parser: argparse.ArgumentParser, percent: Callable[[str], float]) -> None:
-    """The arguments about telemetry."""
     told = parser.add_argument_group("recorded contexts")
     told.add_argument(
         "--telemetry",
@@ -76,8 +74,7 @@ def observed(arguments: argparse.Namespace, table: EitherTable, known: Sequence[
             known=known,
         )
     for file in found.unread:
-        for fault in file.faults:
-            print(printable(f"contextdb: {fault}"), file=sys.stderr)
+        note(*file.faults)
     return found
 
 

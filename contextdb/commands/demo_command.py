@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import contextdb
+from contextdb import motion
 from contextdb.cells.facts import Context
 from contextdb.commands.demo_teams import cast_lines
 from contextdb.commands.demo_world import world
@@ -27,21 +28,6 @@ from contextdb.console import ExitCode, aligned, output, styled, wants_colour
 from contextdb.disk import make_folder, refused_writing, write_atomic
 from contextdb.disk.folder_lock import temporary_folder
 from contextdb.errors import Fault, FileError, Place, plural
-from contextdb.motion import (
-    Character,
-    FeatureSchema,
-    MotionConfig,
-    MotionDatabase,
-    PoseStream,
-    Selector,
-    load_bvh,
-    measure,
-    open_or_build_poses,
-    query_from,
-    steady_path,
-    write_made_clips,
-    write_poses,
-)
 from contextdb.motion.features.extraction import Features
 from contextdb.motion.storage.building import build
 from contextdb.tables.project import SCHEMA_FILE, Project
@@ -73,7 +59,6 @@ N_NEAREST = 2
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("--tables", metavar="FOLDER", help="the sample tables (default: those that came with contextdb)")
     parser.add_argument(
         "--keep", metavar="FOLDER", help="a new folder for the tables, the synthetic clips and the poses, to experiment with"
@@ -107,7 +92,7 @@ def make_sample(source: Path, folder: Path) -> None:
         growing = temporary / "growing"
         _copy(source, growing)
         (growing / "clips").mkdir(exist_ok=True)
-        write_made_clips(growing / "clips")
+        motion.write_made_clips(growing / "clips")
         os.rename(growing, folder)
 
 
@@ -206,17 +191,17 @@ class Stage:
     """What the motion part of the demo plays with: the compiled table, its clips' databases and the selector over them."""
 
     table: CompiledTable
-    databases: Mapping[str, MotionDatabase]
-    selector: Selector
-    features: FeatureSchema
+    databases: Mapping[str, motion.MotionDatabase]
+    selector: motion.Selector
+    features: motion.FeatureSchema
     folder: Path
     n_clips: int
-    player: Character
+    player: motion.Character
 
     @classmethod
     def of(cls, project: Project, folder: Path) -> Stage:
         """Read the clips of a folder, and build what contextdb.toml says."""
-        config = MotionConfig.from_dict(project.schema.motion, tables=project.tables, file=project.schema.file)
+        config = motion.MotionConfig.from_dict(project.schema.motion, tables=project.tables, file=project.schema.file)
         clips = folder / "clips"
         table = project["locomotion"].compile()
         databases = build(config, folder, {"locomotion": table.assets}, cache=None)
@@ -231,14 +216,20 @@ class Stage:
         )
 
     @staticmethod
-    def _player(config: MotionConfig, folder: Path, table: CompiledTable, databases: Mapping[str, MotionDatabase]) -> Character:
+    def _player(
+        config: motion.MotionConfig, folder: Path, table: CompiledTable, databases: Mapping[str, motion.MotionDatabase]
+    ) -> motion.Character:
         """The character of the sample, as `Character.of` makes it of a project."""
-        stream = PoseStream(open_or_build_poses(config, folder, {"locomotion": table.assets}), config.output_of("player"))
-        return Character(config.controller("player", databases), config.features["loco"], table, stream)
+        stream = motion.PoseStream(
+            motion.open_or_build_poses(config, folder, {"locomotion": table.assets}), config.output_of("player")
+        )
+        return motion.Character(config.controller("player", databases), config.features["loco"], table, stream)
 
     def query(self, clip: str, frame: int, turn_dps: float = 0.0) -> Features:
         """The pose of a clip's frame, and the wish to go on at walking speed."""
-        return query_from(self.features, load_bvh(self.folder / f"{clip}.bvh"), frame, steady_path(SPEED_MPS, turn_dps))
+        return motion.query_from(
+            self.features, motion.load_bvh(self.folder / f"{clip}.bvh"), frame, motion.steady_path(SPEED_MPS, turn_dps)
+        )
 
 
 def _steered(stage: Stage, folder: Path) -> Iterator[str]:
@@ -248,9 +239,9 @@ def _steered(stage: Stage, folder: Path) -> Iterator[str]:
     trace, moments = player.record(0), [(stick, gait) for seconds, stick, gait in STEERED for _ in range(round(seconds * RATE))]
     updated = [player.update(1.0 / RATE, stick, {"gait": gait, "style": "normal"}) for stick, gait in moments]
     poses = [each.pose for each in updated if each.pose is not None]
-    write_poses(poses, player.stream.rig, folder / POSES, RATE)
+    motion.write_poses(poses, player.stream.rig, folder / POSES, RATE)
     played = dict.fromkeys(pose.playing.asset for pose in poses if pose.playing is not None)
-    measures = measure(trace, player.stream.banks, poses=poses, wanted=[stick for stick, _ in moments])
+    measures = motion.measure(trace, player.stream.banks, poses=poses, wanted=[stick for stick, _ in moments])
     yield f"   {len(poses) / RATE:g} s, {plural(len(poses), 'pose')} of {player.stream.rig.n_joints} joints: {POSES}"
     yield f"   plays {', '.join(played)}"
     yield (
@@ -264,7 +255,7 @@ def _context(context: Context) -> Iterator[str]:
     yield from aligned([(name, "=", str(value)) for name, value in context.items()], indent="   ")
 
 
-def _hit(what: str, database: MotionDatabase, query: Features, valid: Matches | None = None) -> tuple[str, str]:
+def _hit(what: str, database: motion.MotionDatabase, query: Features, valid: Matches | None = None) -> tuple[str, str]:
     hit = database.search(query, valid)
     return f"{what}:", f"{hit.asset} at {database.time_s(hit):.2f} s, cost {hit.cost:.2f}"
 

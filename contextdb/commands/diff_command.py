@@ -13,8 +13,7 @@ import sys
 
 from contextdb.checks.effects import Effects
 from contextdb.commands import add_format_arguments
-from contextdb.commands.diff_views import as_markdown, as_text
-from contextdb.commands.effects_views import effects_json, effects_markdown, effects_text
+from contextdb.commands.diff_views import as_markdown, as_text, effects_json, effects_markdown, effects_text
 from contextdb.console import ExitCode, output, wants_colour
 from contextdb.edits.diffing import Diff, diff
 from contextdb.errors import ContextDBError, Fault
@@ -27,7 +26,6 @@ FORMATS = ("text", "markdown", "json")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("before", metavar="A", help="the table as it was: a .csv or .parquet file, or the name of a table")
     parser.add_argument("after", metavar="B", help="the table as it is")
     add_format_arguments(parser, FORMATS)

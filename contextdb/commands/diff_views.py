@@ -10,9 +10,11 @@ from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from itertools import accumulate, groupby
 
+from contextdb.checks.effects import Box, Effects, Reach
 from contextdb.console import aligned, printable, styled
 from contextdb.edits.diffing import CellChange, Diff
-from contextdb.errors import row_name, shown
+from contextdb.errors import Fault, plural, row_name, shown
+from contextdb.findings import Finding
 from contextdb.report.render_markdown import MOST_BYTES, escaped
 from contextdb.tables.table import EitherTable
 
@@ -33,7 +35,7 @@ def as_text(found: Diff, colour: bool, shows_all: bool = False) -> str:
     for title, parts in (("columns", _columns(found)), ("rows", _rows(found))):
         if parts:
             told = [styled(f"  {MARKS[verb][0]} {printable(text)}", MARKS[verb][1], colour) for verb, text in parts]
-            lines += ["", title, *_first(told, shows_all)]
+            lines += ["", title, *_first(told, sys.maxsize if shows_all else MOST)]
     lines += _cell_lines(found, colour, shows_all)
     return "".join(f"{line}\n" for line in lines)
 
@@ -122,7 +124,106 @@ def _asset(name: str) -> str:
     return shown(name) if name.strip() else "(no name)"
 
 
-def _first(lines: list[str], shows_all: bool) -> list[str]:
-    if shows_all or len(lines) <= MOST:
-        return lines
-    return [*lines[:MOST], f"  … and {len(lines) - MOST:,} more; --all shows every one"]
+def _first(lines: Sequence[str], most: int, more: str = "  … and {:,} more; --all shows every one") -> list[str]:
+    return [*lines[:most], *([more.format(len(lines) - most)] if len(lines) > most else [])]
+
+
+# ---- what a change does: below the differences
+
+
+TITLE = "what it does"
+MOST_EFFECTS = 10
+"""Assets and gaps that are shown, unless all are asked for."""
+MOST_BOXES = 2
+"""Boxes of one asset that are shown, the largest."""
+
+Heading = tuple[str, list[str]]
+"""A heading and the lines below it."""
+
+
+def effects_json(effect: Effects | Fault | None) -> dict[str, object] | None:
+    """Effects as plain data; None where they were not asked for or nothing could change."""
+    if effect is None:
+        return None
+    return {"unknown": str(effect)} if isinstance(effect, Fault) else effect.to_json()
+
+
+def effects_text(effect: Effects | Fault | None, colour: bool, shows_all: bool = False) -> str:
+    """Effects as lines under a heading; nothing where there is nothing to tell."""
+    if effect is None:
+        return ""
+    lines = ["", TITLE]
+    for heading, told in _told(effect, shows_all):
+        lines.append(styled(f"  {printable(heading)}", "bold" if told else "dim", colour))
+        lines += [f"    {printable(line)}" for line in told]
+    return "".join(f"{line}\n" for line in lines)
+
+
+def effects_markdown(effect: Effects | Fault | None, shows_all: bool = False) -> str:
+    if effect is None:
+        return ""
+    lines = ["", f"#### {TITLE.capitalize()}", ""]
+    for heading, told in _told(effect, shows_all):
+        lines.append(f"- {escaped(heading)}")
+        lines += [f"  - {escaped(line)}" for line in told]
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _told(effect: Effects | Fault, shows_all: bool) -> Iterator[Heading]:
+    if isinstance(effect, Fault):
+        yield f"That cannot be determined: {effect}", []
+        return
+    most = sys.maxsize if shows_all else MOST_EFFECTS
+    if effect.before is not None and effect.after is not None:
+        yield _covered(effect), []
+    for reach in effect.assets[:most]:
+        yield from _reach(reach, shows_all)
+    left = max(0, len(effect.assets) - most)
+    if left:
+        yield f"… and {plural(left, 'asset')} more; --all shows every one", []
+    if effect.n_left_out:
+        yield f"{plural(effect.n_left_out, 'more changed asset')} not looked at", []
+    yield from _listed("gaps opened", [_line(box) for box in effect.opened], most)
+    yield from _listed("gaps closed", [_line(box) for box in effect.closed], most)
+    yield from _listed("rows that can no longer be chosen", [_finding(each) for each in effect.dead], most)
+    yield from _listed("rows that may not be valid together", [_finding(each) for each in effect.overlaps], most)
+    if not effect:
+        yield "no context gains or loses an asset", []
+    elif not effect.is_complete:
+        yield "gaps may be missing here: the change is large", []
+
+
+def _covered(effect: Effects) -> str:
+    from contextdb.checks.effects import covered_text
+
+    assert effect.before is not None
+    assert effect.after is not None
+    before, after = covered_text(effect.before), covered_text(effect.after)
+    return f"covered: {after}, as before" if before == after else f"covered: {before} → {after}"
+
+
+def _reach(reach: Reach, shows_all: bool) -> Iterator[Heading]:
+    for verb, boxes, share in (("gains", reach.gained, reach.share_gained), ("loses", reach.lost, reach.share_lost)):
+        if boxes:
+            most = len(boxes) if shows_all else MOST_BOXES
+            yield f"{shown(reach.asset)} {verb} {_percent(share)}", _first(list(map(_line, boxes)), most, "… and {:,} more")
+
+
+def _listed(title: str, lines: Sequence[str], most: int) -> Iterator[Heading]:
+    if lines:
+        yield title, _first(lines, most, "… and {:,} more; --all shows every one")
+
+
+def _finding(finding: Finding) -> str:
+    line = "" if finding.line is None else f", line {finding.line}"
+    return f"{shown(finding.asset or '(no name)')}{line}: {shown(finding.message, 300)}"
+
+
+def _line(box: Box) -> str:
+    return f"{_percent(box.share)}  {shown(box.text, 400)}"
+
+
+def _percent(share: float) -> str:
+    from contextdb.covering import format_percent
+
+    return "single points" if share <= 0.0 else format_percent(share)

@@ -21,7 +21,6 @@ class TerminalError(ContextDBError):
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("path", metavar="PATH", nargs="?", help="a table, or a folder of tables (default: tables/, or here)")
     parser.add_argument("--theme", metavar="NAME", help="the colours (default: from the settings)")
 
@@ -39,8 +38,7 @@ def require_terminal(instead: str = 'to use "contextdb query" and "contextdb che
     """Raise TerminalError where there is no terminal to show a screen on."""
     term = os.environ.get("TERM", "" if os.name != "nt" else "windows")
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
-        found = "standard input and output are not a terminal."
-        raise TerminalError(Fault(found, "a terminal", instead))
+        raise TerminalError(Fault("standard input and output are not a terminal.", "a terminal", instead))
     if term in ("", "dumb", "unknown"):
         found = f"the terminal cannot move its cursor (TERM is {term or 'not set'})."
         raise TerminalError(Fault(found, "a terminal such as xterm", "to set TERM=xterm-256color where the terminal is one"))

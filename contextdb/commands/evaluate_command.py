@@ -46,7 +46,6 @@ PIECE_BYTES = 1 << 22
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("table", metavar="TABLE", help="a .csv, .parquet or .safetensors file, or the name of a table")
     parser.add_argument(
         "contexts", metavar="CONTEXTS", help="a CSV or Parquet file with a column for each fact, a recording (.jsonl), or a glob"

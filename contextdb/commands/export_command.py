@@ -15,7 +15,7 @@ import os
 import sys
 from pathlib import Path
 
-from contextdb.console import ExitCode, drop_output, printable
+from contextdb.console import ExitCode, output, printable
 from contextdb.disk import is_stream, write_atomic
 from contextdb.errors import Fault, FileError, Place, plural
 from contextdb.exchange.formats import FORMATS, format_of, write
@@ -24,7 +24,6 @@ from contextdb.tables.project import load_table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("source", metavar="SRC", help="a table file, or the name of a table")
     parser.add_argument("target", metavar="DST", help="the file to write; - for standard output")
     names = [name for name, one in FORMATS.items() if one.is_written]
@@ -49,7 +48,9 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     for remark in remarks:
         print(printable(f"{table.name}: {remark}"), file=sys.stderr)
     if is_standard:
-        _print(raw)
+        with output():
+            sys.stdout.flush()
+            sys.stdout.buffer.write(raw)
         return ExitCode.OK
     write_atomic(Path(arguments.target), raw)
     print(printable(arguments.target))
@@ -58,12 +59,3 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     said = f"{table.name}: {written}{plural(table.n_rows, 'row')} as {kind.about.split(';')[0]}, {len(raw):,} bytes"
     print(printable(said), file=sys.stderr)
     return ExitCode.OK
-
-
-def _print(raw: bytes) -> None:
-    try:
-        sys.stdout.flush()
-        sys.stdout.buffer.write(raw)
-        sys.stdout.buffer.flush()
-    except BrokenPipeError:
-        drop_output()

@@ -11,13 +11,12 @@ from __future__ import annotations
 import argparse
 
 from contextdb.commands import git_setup
-from contextdb.commands.git_setup import Setup, setup_of
-from contextdb.console import ExitCode, output, printable
+from contextdb.commands.git_setup import Setup, changed
+from contextdb.console import ExitCode
 from contextdb.errors import plural
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     git_setup.add_arguments(parser)
     told = "how git calls contextdb (default: contextdb, or the Python that runs now)"
     parser.add_argument("--command", metavar="TEXT", dest="command_line", help=told)
@@ -25,12 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Write what is missing, and say so."""
-    setup = setup_of(arguments)
-    with setup.all_or_nothing():
-        said = [*_attributes(setup), *_configuration(setup)] or ["nothing to do: all is set"]
-    with output():
-        print(*map(printable, said), sep="\n")
-    return ExitCode.OK
+    return changed(arguments, (_attributes, _configuration), "all is set")
 
 
 def _attributes(setup: Setup) -> list[str]:

@@ -8,11 +8,12 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from contextdb.console import ExitCode, output, printable
 from contextdb.disk import read_bytes, write_atomic
 from contextdb.errors import ContextDBError, Fault, FileError, Place
 
@@ -102,11 +103,9 @@ class Setup:
             raise
 
     def set(self, key: str, value: str) -> None:
-        """Write one key."""
         self.git("config", self.scope, "--replace-all", key, value)
 
     def unset(self, key: str) -> None:
-        """Take one key back."""
         self.git("config", self.scope, "--unset-all", key, accepts=(0, 5))
 
     def write(self, raw: bytes) -> None:
@@ -119,7 +118,6 @@ class Setup:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments that say where."""
     parser.add_argument("path", metavar="PATH", nargs="?", default=".", help=f"the folder that contains {ATTRIBUTES} (default: .)")
     scope = parser.add_mutually_exclusive_group()
     scope.add_argument("--local", action="store_false", dest="is_global", default=False, help="configure this clone (default)")
@@ -165,3 +163,13 @@ def _placed(path: Path) -> Iterator[None]:
     except OSError as error:
         fault = Fault(f"the file cannot be written: {error.strerror}.", place=Place(str(path)))
         raise FileError(fault, errno=error.errno) from None
+
+
+def changed(arguments: argparse.Namespace, steps: Sequence[Callable[[Setup], list[str]]], nothing: str) -> ExitCode:
+    """Do some steps, all or none, and print what each did; `nothing` says why where none did anything."""
+    setup = setup_of(arguments)
+    with setup.all_or_nothing():
+        said = [line for step in steps for line in step(setup)] or [f"nothing to do: {nothing}"]
+    with output():
+        print(*map(printable, said), sep="\n")
+    return ExitCode.OK

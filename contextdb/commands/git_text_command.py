@@ -19,12 +19,10 @@ from contextdb.tables.table import Table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("file", metavar="FILE", help="a .csv or .parquet file, under any name that git gives it")
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
-    """Print the table."""
     raw = read_bytes(arguments.file)
     try:
         table = table_of(Table, raw, arguments.file)

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import argparse
 
-from contextdb.commands.git_setup import LINES, Setup, add_arguments, setup_of
-from contextdb.console import ExitCode, output, printable
+from contextdb.commands.git_setup import LINES, Setup, add_arguments, changed
+from contextdb.console import ExitCode
 from contextdb.errors import plural
 
 __all__ = ["add_arguments", "run"]
@@ -16,12 +16,7 @@ __all__ = ["add_arguments", "run"]
 
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Remove what is there, and say so."""
-    setup = setup_of(arguments)
-    with setup.all_or_nothing():
-        said = [*_attributes(setup), *_configuration(setup)] or ["nothing to do: nothing is set"]
-    with output():
-        print(*map(printable, said), sep="\n")
-    return ExitCode.OK
+    return changed(arguments, (_attributes, _configuration), "nothing is set")
 
 
 def _attributes(setup: Setup) -> list[str]:

@@ -20,17 +20,9 @@ from pathlib import Path
 from contextdb.cells.kinds import KINDS
 from contextdb.console import ExitCode, aligned, output, printable
 from contextdb.disk import TABLE_SUFFIXES, path_in_quotes, read_bytes
-from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, nearest, plural, row_name
+from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, mend_for, nearest, plural, row_name
+from contextdb.exchange import importing
 from contextdb.exchange.formats import FORMATS, ReadOptions, read
-from contextdb.exchange.importing import (
-    NAMES,
-    Plan,
-    declared_differently,
-    has_whole_names,
-    plan_import,
-    project_of,
-    whole_names_told,
-)
 from contextdb.exchange.mapping import JOBS, Mapped, as_job, as_type, propose
 from contextdb.exchange.reading import Reading, listed
 from contextdb.files.file_names import require_new_table_name
@@ -43,7 +35,6 @@ LARGE_BYTES, LARGE_CELLS, LARGE_COLUMNS = 10_000_000, 1_000_000, 2_000
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("source", metavar="SRC", help="the file to import; - for standard input")
     parser.add_argument("target", metavar="DST", help="the table file to write: .csv or .parquet, in a folder of tables")
     names = [name for name, one in FORMATS.items() if one.is_read]
@@ -64,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--decimal", choices=("comma", "point"), help="the decimal sign of the file (default: detected from its cells)"
     )
     whole = "whether Mid Air is one name (whole) or two (words), in new columns (default: whole, except in our own workbooks)"
-    parser.add_argument("--names", choices=NAMES, help=whole)
+    parser.add_argument("--names", choices=importing.NAMES, help=whole)
     parser.add_argument("--dry-run", action="store_true", help="write nothing")
     parser.add_argument("--force", action="store_true", help="overwrite an existing table")
 
@@ -83,7 +74,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     for remark in reading.remarks:
         print(printable(f"{name}: {remark}"), file=sys.stderr)
     plan = _plan(reading, target, arguments)
-    if arguments.names is None and (told := whole_names_told(plan.columns, reading, "--names words")):
+    if arguments.names is None and (told := importing.whole_names_told(plan.columns, reading, "--names words")):
         print(printable(f"{name}: {told}"), file=sys.stderr)
     if not arguments.dry_run:
         if is_large:
@@ -121,17 +112,17 @@ def _bytes(source: str) -> tuple[bytes, str]:
 def _options(arguments: argparse.Namespace) -> ReadOptions:
     is_comma = None if arguments.decimal is None else arguments.decimal == "comma"
     delimiter = None if arguments.delimiter is None else DELIMITERS[arguments.delimiter]
-    is_whole = has_whole_names(arguments.names, None if arguments.source == "-" else Path(arguments.source))
+    is_whole = importing.has_whole_names(arguments.names, None if arguments.source == "-" else Path(arguments.source))
     return ReadOptions(arguments.format, arguments.sheet, arguments.encoding, delimiter, is_comma, is_whole)
 
 
-def _plan(reading: Reading, target: Path, arguments: argparse.Namespace) -> Plan:
-    schema, settings = project_of(target)
+def _plan(reading: Reading, target: Path, arguments: argparse.Namespace) -> importing.Plan:
+    schema, settings = importing.project_of(target)
     mapped = propose(reading, schema, settings, _pairs(arguments.map, "--map", "COLUMN=NAME"))
-    for name in declared_differently(reading, schema):
+    for name in importing.declared_differently(reading, schema):
         told = f"the file declares {in_quotes(name)} differently from contextdb.toml, which takes precedence."
         print(printable(told), file=sys.stderr)
-    return plan_import(reading, target, mapped=_typed(mapped, reading, _pairs(arguments.type, "--type", "NAME=TYPE")))
+    return importing.plan_import(reading, target, mapped=_typed(mapped, reading, _pairs(arguments.type, "--type", "NAME=TYPE")))
 
 
 def _pairs(given: Sequence[str], option: str, form: str) -> dict[str, str]:
@@ -163,17 +154,14 @@ def _typed(mapped: Sequence[Mapped], reading: Reading, types: dict[str, str]) ->
             wanted[column.source] = as_job(column, kind)
         else:
             words = [*KINDS, *JOBS]
-            near = nearest(kind, words)
-            raise ContextDBError(
-                Fault(f"--type: there is no type {in_quotes(given)}.", ", ".join(words), in_quotes(near) if near else "")
-            )
+            raise ContextDBError(Fault(f"--type: there is no type {in_quotes(given)}.", ", ".join(words), mend_for(kind, words)))
     return [wanted.get(column.source, column) for column in mapped]
 
 
 # ---- what is said
 
 
-def _lines(plan: Plan, reading: Reading, name: str, is_dry: bool) -> list[str]:
+def _lines(plan: importing.Plan, reading: Reading, name: str, is_dry: bool) -> list[str]:
     table = plan.table
     done = "would become" if is_dry else "became"
     head = f"{name} ({FORMATS[reading.format].about.split(';')[0]}) {done} {plan.path}: {plural(table.n_rows, 'row')}."
@@ -192,7 +180,7 @@ def _row(column: Mapped) -> tuple[str, str, str]:
     return column.source, kind, f"{column.why}{meant}"
 
 
-def _toml_lines(plan: Plan, is_dry: bool) -> list[str]:
+def _toml_lines(plan: importing.Plan, is_dry: bool) -> list[str]:
     if plan.change is None:
         return [f"{SCHEMA_FILE} says all of it already."]
     new = plan.new_conditions
@@ -202,7 +190,7 @@ def _toml_lines(plan: Plan, is_dry: bool) -> list[str]:
     ]
 
 
-def _fault_lines(plan: Plan) -> list[str]:
+def _fault_lines(plan: importing.Plan) -> list[str]:
     faults = plan.table.faults
     if not faults:
         return []

@@ -17,32 +17,30 @@ newest; the commands `evaluate` and `coverage --telemetry` read FILE, even while
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
 from contextdb.commands.live_views import Changes
+from contextdb.commands.numbers import whole_type
 from contextdb.compiled.table import CompiledTable
-from contextdb.console import ExitCode, aligned, output, printable
+from contextdb.console import ExitCode, aligned, note, output
 from contextdb.errors import ContextDBError, ContextError, Fault, in_quotes
 from contextdb.tables.project import Project
-from contextdb.telemetry.link.doors import doors
 from contextdb.telemetry.link.game import new_recording
-from contextdb.telemetry.link.hearing import Game, Hearing, Wanted, games, hear, no_game
+from contextdb.telemetry.link.hearing import Game, Hearing, Wanted, games, hear, the_game
 from contextdb.telemetry.link.lines import END
 from contextdb.telemetry.link.listeners import FileListener
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("name", metavar="NAME", nargs="?", help="the name of a running game")
     parser.add_argument("--who", action="append", metavar="WHO", help="only what this character asks; may be repeated")
     parser.add_argument("--table", action="append", metavar="TABLE", help="only what this table is asked; may be repeated")
     parser.add_argument("--record", metavar="FILE", help="also write every line to a new file: .jsonl")
     parser.add_argument("--tables", metavar="FOLDER", help="a folder of tables to ask too; shows where their answers differ")
     parser.add_argument("--explain", action="store_true", help="with --tables: show the nearest rows, and which cells fail")
-    parser.add_argument("--most", type=_count, metavar="N", help="end after so many lines")
+    parser.add_argument("--most", type=whole_type("a number of lines, such as 10.", 1), metavar="N", help="end after so many lines")
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
@@ -71,17 +69,10 @@ def run(arguments: argparse.Namespace) -> ExitCode:
 def _game(name: str | None, wanted: Wanted) -> Hearing | Sequence[Game]:
     """The game that is meant, or several of which it may be one. Raises ContextDBError where none runs that is meant; it names
     those that run."""
-    if name is not None:
-        path = dict(doors()).get(name)
-        if path is None:
-            raise no_game(name, games())
-    else:
-        running = games()
-        if not running:
-            raise no_game(None, running)
-        if len(running) > 1:
-            return running
-        path = running[0].path
+    running = games() if name is None else []
+    if len(running) > 1:
+        return running
+    path = running[0].path if running else the_game(name)[1]
     try:
         return hear(path, wanted)
     except OSError:
@@ -104,7 +95,7 @@ def _record(path: Path, hearing: Hearing, stack: ExitStack) -> FileListener:
 
 def _show(hearing: Hearing, changes: Changes, file: FileListener | None, most: int | None) -> None:
     """Print lines as they come."""
-    _tell(changes.versions(hearing.header))
+    note(*changes.versions(hearing.header))
     n_lines, has_ended = 0, False
     for batch in hearing.batches():
         for raw, line in batch:
@@ -112,7 +103,7 @@ def _show(hearing: Hearing, changes: Changes, file: FileListener | None, most: i
             if file is not None:
                 file.offer(raw)
             said = changes.of(line)
-            _tell(said.notes)
+            note(*said.notes)
             if said.lines:
                 print(*said.lines, sep="\n", flush=True)
                 n_lines += 1
@@ -121,16 +112,4 @@ def _show(hearing: Hearing, changes: Changes, file: FileListener | None, most: i
         if file is not None:
             file.send()
     name = in_quotes(str(hearing.header["game"]))
-    _tell([f"the game {name} has ended." if has_ended else f"the game {name} is gone."])
-
-
-def _tell(notes: Sequence[str]) -> None:
-    for note in notes:
-        print(printable(f"contextdb: {note}"), file=sys.stderr, flush=True)
-
-
-def _count(text: str) -> int:
-    """A number of lines."""
-    if not text.isdecimal() or not int(text):
-        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a number of lines, such as 10.")
-    return int(text)
+    note(f"the game {name} has ended." if has_ended else f"the game {name} is gone.")

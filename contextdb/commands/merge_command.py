@@ -22,12 +22,11 @@ As a merge driver of git, with the lines "*.csv merge=contextdb" and "contextdb.
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from contextdb.console import ExitCode, printable
+from contextdb.console import ExitCode, note
 from contextdb.disk import NOTES_SUFFIX, names_a_table, read_bytes, write_atomic
 from contextdb.edits.diffing import diff
 from contextdb.edits.diffing.lines import merged_lines
@@ -53,7 +52,6 @@ Merged = tuple[bytes | None, Callable[[], ExitCode]]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("base", metavar="BASE", help="the table before both sides changed it")
     parser.add_argument("ours", metavar="OURS", help="our version; the result is written over it")
     parser.add_argument("theirs", metavar="THEIRS", help="the other version")
@@ -66,7 +64,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
-    """Merge three files."""
     path = Path(arguments.path or arguments.ours)
     raws = [read_bytes(file) for file in (arguments.base, arguments.ours, arguments.theirs)]
     merged = _merged_toml if path.suffix.lower() == ".toml" else _merged_tables
@@ -111,16 +108,13 @@ def _tell_meaning(found: Merge[Table], path: Path) -> bool:
         sides = (found.ours, found.theirs, found.table)
         effects = merge_effects(*(replace(table, around=around, path=path) for table in sides))
     except ContextDBError as error:
-        print(printable(f"contextdb: the meaning of the merge was not looked at: {error.faults[0]}"), file=sys.stderr)
+        note(f"the meaning of the merge was not looked at: {error.faults[0]}")
         return False
     said = [
         f"a gap that neither side had: {shown(b.text, 400)} ({format_percent(b.share)} of the contexts)." for b in effects.opened
     ]
     said += [f"{shown(f.asset or '')}, as on neither side: {f.message}" for f in effects.findings]
-    for text in said[:MOST_TOLD]:
-        print(printable(f"contextdb: {Place(str(path))}: {text}"), file=sys.stderr)
-    if len(said) > MOST_TOLD:
-        print(f"contextdb: … and {len(said) - MOST_TOLD:,} more.", file=sys.stderr)
+    _note_some([f"{Place(str(path))}: {text}" for text in said])
     return bool(said)
 
 
@@ -135,8 +129,7 @@ def _merged_toml(path: Path, raws: Raws, arguments: argparse.Namespace) -> Merge
     def tell() -> ExitCode:
         for key in found.conflicts:
             said = f"{in_quotes('.'.join(key))} changed on both sides."
-            fault = Fault(said, mend="to keep one of the versions between the marks", place=Place(str(path)))
-            print(printable(f"contextdb: {fault}"), file=sys.stderr)
+            note(Fault(said, mend="to keep one of the versions between the marks", place=Place(str(path))))
         return ExitCode.FOUND if found.conflicts else ExitCode.OK
 
     return found.with_markers.encode(), tell
@@ -151,10 +144,7 @@ def _merge_lines(path: Path, raws: Raws, arguments: argparse.Namespace, error: E
     place = Place(str(path))
     unforeseen = Fault(f"the tables cannot be merged ({type(error).__name__}: {error}).", place=place)
     faults = error.faults if isinstance(error, ContextDBError) else (unforeseen,)
-    for fault in faults[:MOST_TOLD]:
-        print(printable(f"contextdb: {fault}"), file=sys.stderr)
-    if len(faults) > MOST_TOLD:
-        print(f"contextdb: … and {len(faults) - MOST_TOLD:,} more.", file=sys.stderr)
+    _note_some(faults)
     if any(map(is_parquet, raws)):
         said, mend = "the file stays as ours has it.", "to take one side with git checkout --ours or --theirs"
     else:
@@ -162,7 +152,7 @@ def _merge_lines(path: Path, raws: Raws, arguments: argparse.Namespace, error: E
         write_atomic(Path(arguments.out or arguments.ours), raw)
         said = f"lines were merged instead of cells, with {plural(n_conflicts, 'place')} between marks."
         mend = "to look at the file, and to correct what cannot be read"
-    print(printable(f"contextdb: {Fault(said, mend=mend, place=place)}"), file=sys.stderr)
+    note(Fault(said, mend=mend, place=place))
     return ExitCode.FOUND
 
 
@@ -200,7 +190,7 @@ def _schema(path: Path) -> tuple[Schema, TableSettings]:
         folder, schema = schema_for(path)
         return schema, settings_of(path, folder, schema)
     except ContextDBError as error:
-        print(printable(f"contextdb: {error.faults[0]} Merging without it."), file=sys.stderr)
+        note(f"{error.faults[0]} Merging without it.")
         return EMPTY, TableSettings(path.stem)
 
 
@@ -211,21 +201,22 @@ def _decided(found: Merge[Table], side: Side) -> Merge[Table]:
 
 
 def _tell(found: Merge[Table], path: Path, is_text: bool) -> None:
-    for one in found.conflicts[:MOST_TOLD]:
-        texts = ", ".join(
-            f"{name} {_said(text)}" for name, text in (("ours", one.ours), ("theirs", one.theirs), ("before", one.base))
-        )
-        print(printable(f"contextdb: {Place(str(path))}: {one.place}: {texts}."), file=sys.stderr)
-    if len(found.conflicts) > MOST_TOLD:
-        print(f"contextdb: … and {len(found.conflicts) - MOST_TOLD:,} more.", file=sys.stderr)
+    place = Place(str(path))
+    sides = [(one.place, {"ours": one.ours, "theirs": one.theirs, "before": one.base}) for one in found.conflicts]
+    _note_some([f"{place}: {at}: {', '.join(f'{name} {_said(text)}' for name, text in texts.items())}." for at, texts in sides])
     if found.conflicts:
-        mend = (
-            "to open the file with contextdb edit, or to keep one of each"
-            if is_text
-            else "to decide with --take ours or --take theirs"
+        by_hand, by_option = (
+            "to open the file with contextdb edit, or to keep one of each",
+            "to decide with --take ours or --take theirs",
         )
         said = f"{plural(len(found.conflicts), 'place')} changed on both sides."
-        print(printable(f"contextdb: {Fault(said, mend=mend, place=Place(str(path)))}"), file=sys.stderr)
+        note(Fault(said, mend=by_hand if is_text else by_option, place=place))
+
+
+def _note_some(lines: Sequence[object]) -> None:
+    note(*lines[:MOST_TOLD])
+    if len(lines) > MOST_TOLD:
+        note(f"… and {len(lines) - MOST_TOLD:,} more.")
 
 
 def _said(text: str | None) -> str:

@@ -15,7 +15,7 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
-from contextdb.commands.motion_clips import unit_of
+from contextdb.commands.numbers import unit_of
 from contextdb.console import ExitCode, aligned, output, printable
 from contextdb.errors import plural
 from contextdb.motion.clips.clip import CENTIMETRE, UPS, Clip, load_clips
@@ -27,7 +27,6 @@ HEADER = ("bone", "channels", "height m", "found as", "mirrored to")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("files", metavar="FILE", nargs="+", help="BVH files, or folders of them")
     parser.add_argument(
         "--metres-per-unit", metavar="M", type=unit_of, default=CENTIMETRE, help="the unit of the files in metres (default: 0.01)"

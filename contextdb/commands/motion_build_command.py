@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -25,7 +24,7 @@ from pathlib import Path
 
 from contextdb.commands.progress import building_bar
 from contextdb.commands.watched_work import watched
-from contextdb.console import ExitCode, aligned, output, printable
+from contextdb.console import ExitCode, aligned, note, output
 from contextdb.disk import make_folder
 from contextdb.errors import ContextDBError, Fault, FileError, Place, plural, some
 from contextdb.files.tensors import other_layout
@@ -44,7 +43,6 @@ HEADER = ("database", "assets", "clips", "frames", "features", "MB", "computed",
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("path", metavar="PATH", help=f"a folder of tables, or its {SCHEMA_FILE}")
     parser.add_argument("--out", metavar="FOLDER", help=f"where the databases are saved (default: next to {SCHEMA_FILE})")
     parser.add_argument("--database", metavar="NAME", action="append", help="only this database; may be repeated")
@@ -115,8 +113,7 @@ def _save_poses(project: MotionProject, built: Mapping[str, Built], targets: Map
 
 def warn(sentences: Iterable[str]) -> None:
     """Print warnings on standard error."""
-    for sentence in sentences:
-        print(printable(f"contextdb: warning: {sentence}"), file=sys.stderr)
+    note(*(f"warning: {sentence}" for sentence in sentences))
 
 
 @dataclass

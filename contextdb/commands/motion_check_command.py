@@ -63,7 +63,6 @@ class MotionReport(CheckReport):
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("path", metavar="PATH", help=f"a folder of tables, or its {SCHEMA_FILE}")
     add_format_arguments(parser, FORMATS)
     parser.add_argument(
@@ -78,7 +77,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
-    """Check the motion of a folder."""
     found = check_path(arguments.path, cache=not arguments.no_cache)
     is_for_people = arguments.format in ("text", "markdown") and not arguments.all
     return printed(found.condensed() if is_for_people else found, arguments)

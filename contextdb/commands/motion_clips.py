@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
-from contextlib import contextmanager
+from functools import partial
 
-from contextdb.commands.progress import MANY_CLIPS, bar
-from contextdb.console import printable
+from contextdb.commands.numbers import unit_of
+from contextdb.commands.progress import building_bar
 from contextdb.motion.clips.clip import UPS
-from contextdb.tables.clip_folder import Tell
 from contextdb.tables.project import SCHEMA_FILE
 
 
@@ -24,24 +22,5 @@ def add_clip_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def unit_of(text: str) -> float:
-    """A unit in metres."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 1e-9 <= value <= 1e9:
-        raise argparse.ArgumentTypeError(f'"{text}" is not a unit. Accepted: metres, such as 0.01 for centimetres.')
-    return value
-
-
-@contextmanager
-def progress_of(label: str) -> Iterator[Tell]:
-    """The progress of work on clips, one by one."""
-    with bar(label, is_long=True) as shown:
-
-        def tell(done: int, total: int, clip: str) -> None:
-            if shown is not None and total >= MANY_CLIPS:
-                shown(done, total, f"{done}/{total} {printable(clip)}")
-
-        yield tell
+progress_of = partial(building_bar, tells_few=False)
+"""The progress of work on clips, one by one."""

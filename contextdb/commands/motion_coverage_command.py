@@ -21,11 +21,12 @@ from pathlib import Path
 from contextdb.commands import add_format_arguments
 from contextdb.commands.coverage_command import earlier_report, percent
 from contextdb.commands.motion_build_command import MotionProject
+from contextdb.commands.numbers import number_type
 from contextdb.commands.progress import building_bar
-from contextdb.console import ExitCode, output, terminal_width, wants_colour
+from contextdb.console import ExitCode, note, output, terminal_width, wants_colour
 from contextdb.covering.motion import motion_coverage
 from contextdb.disk import write_atomic
-from contextdb.errors import ContextError, Fault, in_quotes, nearest, some
+from contextdb.errors import ContextError, Fault, in_quotes, mend_for, some
 from contextdb.motion.measuring.near_clips import NEAR_COST
 from contextdb.motion.measuring.transition_names import PATTERN
 from contextdb.motion.storage.building import open_or_build
@@ -46,7 +47,6 @@ from contextdb.tables.project import Project
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("path", metavar="FOLDER", help="a folder of tables with motion databases")
     add_format_arguments(parser, formats("motion coverage"))
     parser.add_argument("-o", "--output", metavar="FILE", help="write the report to a file")
@@ -60,11 +60,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     told = f"names of transitions, such as {PATTERN} (default: as the project says, else that)"
     parser.add_argument("--transitions", metavar="PATTERN", help=told)
     told = f"the cost under which a clip is near another (default: {NEAR_COST})"
-    parser.add_argument("--near", metavar="COST", type=_cost, default=NEAR_COST, help=told)
+    cost = number_type(f"a cost. Accepted: a number from 0 up, such as {NEAR_COST}.")
+    parser.add_argument("--near", metavar="COST", type=cost, default=NEAR_COST, help=told)
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
-    """Measure a project."""
     if arguments.context is not None and (arguments.format != "text" or arguments.baseline or arguments.fail_under is not None):
         raise ContextError(Fault("--context is text about some contexts; other formats and bars do not go with it."))
     earlier = earlier_report(arguments.baseline, read_baseline, BASELINE) if arguments.baseline else None
@@ -98,7 +98,7 @@ def _results(arguments: argparse.Namespace, earlier: Mapping[str, Earlier] | Non
             progress=progress,
         )
     if joint := [name for name, settings in project.config.databases.items() if settings.roles]:
-        print(f"contextdb: left out: the joint clips of {some(joint)}: they follow no stick.", file=sys.stderr)
+        note(f"left out: the joint clips of {some(joint)}: they follow no stick.")
     measured = []
     for motion in found.tables:
         gates = [] if arguments.fail_under is None else [fail_under(motion, arguments.fail_under)]
@@ -113,9 +113,8 @@ def _results(arguments: argparse.Namespace, earlier: Mapping[str, Earlier] | Non
 def _context(results: MotionCoverageResults, wanted: str, colour: bool, width: int) -> str:
     known = {each.contexts.id: (measured, each) for measured in results.tables for each in measured.motion.coverage.contexts}
     if wanted not in known:
-        near = nearest(wanted, known)
         accepted = f"an id of the report, such as {some(list(known))}" if known else "none: no context has a valid clip"
-        raise ContextError(Fault(f"there are no contexts {in_quotes(wanted)}.", accepted, in_quotes(near) if near else ""))
+        raise ContextError(Fault(f"there are no contexts {in_quotes(wanted)}.", accepted, mend_for(wanted, known)))
     return render_context(*known[wanted], colour=colour, width=width)
 
 
@@ -129,13 +128,3 @@ def _axes(given: list[str]) -> dict[str, str]:
             )
         found[axis.strip()] = condition.strip()
     return found
-
-
-def _cost(text: str) -> float:
-    try:
-        cost = float(text)
-    except ValueError:
-        cost = -1.0
-    if not 0.0 <= cost < float("inf"):
-        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a cost. Accepted: a number from 0 up, such as {NEAR_COST}.")
-    return cost

@@ -34,7 +34,6 @@ INSTEAD = 'to use "contextdb motion replay" in scripts'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("file", metavar="SESSION", nargs="?", help="a recorded session, a .parquet file; with --live a game")
     parser.add_argument("folder", metavar="FOLDER", nargs="?", help="the project with the databases (default: as recorded)")
     parser.add_argument("--live", action="store_true", help="follow a running game")

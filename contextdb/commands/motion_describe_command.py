@@ -18,12 +18,11 @@ from __future__ import annotations
 import argparse
 import csv
 import io
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from contextdb.commands.motion_clips import add_clip_arguments, progress_of
-from contextdb.console import ExitCode, output, printable
+from contextdb.console import ExitCode, note, output, printable
 from contextdb.edits.described_table import (
     ASSET,
     ClipRows,
@@ -44,7 +43,6 @@ from contextdb.tables.project import load_table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     add_clip_arguments(parser)
     parser.add_argument("--out", metavar="TABLE", help="write the table to this new file, with its contextdb.toml beside it")
     parser.add_argument(
@@ -55,7 +53,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
-    """Describe the clips of a folder."""
     if arguments.out and arguments.into:
         raise ContextDBError(Fault("--out makes a table, --into fills one.", "one of the two"))
     if arguments.update and not arguments.into:
@@ -99,8 +96,7 @@ def _tell(
         lines.append(
             f"no database of {made.toml_path} holds the rows of this table: table = {as_toml(made.table.name)} makes one do so."
         )
-    for line in lines:
-        print(printable(f"contextdb: {line}"), file=sys.stderr)
+    note(*lines)
 
 
 def _lines(made: DescribedTable, fills: Filling, arguments: argparse.Namespace) -> Sequence[str]:

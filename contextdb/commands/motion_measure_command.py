@@ -14,7 +14,6 @@ Exits with 1 if a measure is over its bar, or more than 1 % worse than in the ba
 from __future__ import annotations
 
 import argparse
-import math
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -26,14 +25,15 @@ from contextdb.commands import add_format_arguments
 from contextdb.commands.coverage_command import earlier_report
 from contextdb.commands.motion_build_command import MotionProject, warn
 from contextdb.commands.motion_replay_command import project_of
+from contextdb.commands.numbers import number_type
 from contextdb.console import ExitCode, output, terminal_width, wants_colour
 from contextdb.errors import ContextDBError, ContextError, Fault, Place, in_quotes, plural
 from contextdb.motion import Measures, MotionDatabase, PoseBank, PoseSettings, measure, open_or_build, open_or_build_poses
 from contextdb.motion.storage.written_poses import NPZ
 from contextdb.motion.trace.filter_rows import fingerprint
 from contextdb.motion.trace.session import Trace
-from contextdb.report.measure_results import BASELINE, Bar, Gate, MeasureResults, SessionMeasures, compared, held_to, read_baseline
-from contextdb.report.results import as_path
+from contextdb.report.measure_results import BASELINE, Bar, MeasureResults, SessionMeasures, compared, held_to, read_baseline
+from contextdb.report.results import Gate, as_path
 
 BARS = {
     "skate": ("skate_cm_s", "CM_S", "the most that planted feet may slide, cm/s"),
@@ -48,7 +48,6 @@ BARS = {
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("sessions", metavar="SESSION", nargs="+", help="a recorded session, .parquet; or its poses, .npz")
     parser.add_argument("--poses", metavar="FILE", action="append", help="the poses of the session, .npz; once for each")
     parser.add_argument("--project", metavar="FOLDER", help="the project with the clips (default: as recorded)")
@@ -60,7 +59,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
-    """Measure sessions."""
     poses = arguments.poses or []
     if poses and len(poses) != len(arguments.sessions):
         found = f"{plural(len(poses), 'file')} of poses for {plural(len(arguments.sessions), 'session')}."
@@ -104,12 +102,10 @@ class Clips:
 
     @cached_property
     def banks(self) -> dict[str, PoseBank]:
-        """All pose banks."""
         return open_or_build_poses(self.project.config, self.project.folder, self.project.assets)
 
     @cached_property
     def databases(self) -> dict[str, MotionDatabase]:
-        """All databases."""
         return open_or_build(self.project.config, self.project.folder, self.project.assets)
 
 
@@ -139,9 +135,8 @@ def _measured(
 
 
 def add_bars(parser: argparse.ArgumentParser) -> None:
-    """An option for each bar."""
     for name, (_, unit, told) in BARS.items():
-        parser.add_argument(f"--max-{name}", metavar=unit, type=_number, help=told)
+        parser.add_argument(f"--max-{name}", metavar=unit, type=number_type("a bar. Accepted: a number from 0 up."), help=told)
 
 
 def gates_of(arguments: argparse.Namespace, measures: Measures, file: str) -> list[Gate]:
@@ -172,13 +167,3 @@ def _settings(arguments: argparse.Namespace, clips: Clips | None, trace: Trace |
     if arguments.controller:
         clips.project.config.selector_of(name)
     return clips.project.config.output_of(name)
-
-
-def _number(text: str) -> float:
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
-    if not 0.0 <= number < math.inf:
-        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a bar. Accepted: a number from 0 up.")
-    return number

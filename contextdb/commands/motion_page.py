@@ -33,12 +33,10 @@ class Played:
 
     @cached_property
     def project(self) -> MotionProject:
-        """What the project says of motion."""
         return MotionProject.load(self.folder)
 
     @cached_property
     def banks(self) -> dict[str, PoseBank]:
-        """The poses of the databases."""
         names = [name for name in self.trace.about if name in self.project.config.databases]
         if not names:
             found = "its poses cannot be made: the project has none of its databases."
@@ -47,12 +45,10 @@ class Played:
 
     @property
     def settings(self) -> PoseSettings:
-        """How its poses are made."""
         return self.project.config.output_of(self.trace.controller)
 
     @cached_property
     def measured(self) -> SessionMeasures:
-        """Its measures."""
         found = measure(self.trace, self.banks, databases=self.databases or None, settings=self.settings)
         return SessionMeasures(self.file, found, {}, ())
 
@@ -86,13 +82,11 @@ def rerun_file(name: str) -> Path:
 
 
 def write_rerun(out: Path, session: Played) -> None:
-    """Write a session for the Rerun viewer."""
     times_s = [decision.time_s for decision in session.trace.brief()]
     write_atomic(out, session_rerun.render(session.view(is_asked=False), times_s))
 
 
 def comment_of(sessions: Sequence[Played], page: str | None) -> str:
-    """The comment on a session, or on two."""
     lists = [list(each.trace.brief()) for each in sessions]
     return session_markdown.render([each.measured for each in sessions], lists, parting_of(sessions), page)
 

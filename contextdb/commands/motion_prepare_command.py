@@ -20,7 +20,6 @@ from __future__ import annotations
 import argparse
 import difflib
 import os
-import sys
 import tomllib
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -31,7 +30,7 @@ from pathlib import Path
 from contextdb.commands.motion_clips import add_clip_arguments, progress_of
 from contextdb.commands.motion_prepared import BOM, Line, Prepared, line_of, with_marks, without
 from contextdb.commands.watched_work import watched
-from contextdb.console import ExitCode, output, printable
+from contextdb.console import ExitCode, note, output, printable
 from contextdb.disk import read_bytes
 from contextdb.disk.together import NewFile, write_together
 from contextdb.errors import Fault, FileError, Place, plural
@@ -52,7 +51,6 @@ JOINT_KINDS = ("roots", "contacts", "noise")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     add_clip_arguments(parser)
     told = f"propose only this: {', '.join(KINDS)}; may be repeated"
     parser.add_argument("--only", metavar="KIND", choices=KINDS, action="append", help=told)
@@ -72,7 +70,6 @@ class Change:
 
     @property
     def data(self) -> bytes:
-        """What is written."""
         return self.new.encode()
 
 
@@ -214,8 +211,7 @@ def _settings(folder: Path, settings: dict[tuple[str, str, str], str | float]) -
 
 
 def _report(found: FolderClips, proposals: Sequence[Proposal], changes: Sequence[Change], arguments: argparse.Namespace) -> None:
-    for line in [*found.notes, *(f"left out: {message}" for message in found.left_out)]:
-        print(printable(f"contextdb: {line}"), file=sys.stderr)
+    note(*found.notes, *(f"left out: {message}" for message in found.left_out))
     n_marks = sum(each.tag is not None for each in proposals)
     with output():
         if arguments.json:
@@ -226,10 +222,10 @@ def _report(found: FolderClips, proposals: Sequence[Proposal], changes: Sequence
     where = " and ".join(str(change.path) for change in changes)
     if arguments.write and changes:
         what = plural(n_marks, "mark") if n_marks else ROOT_KEY
-        print(printable(f"contextdb: {what} written to {where}."), file=sys.stderr)
+        note(f"{what} written to {where}.")
     elif not changes:
         nothing = "nothing to write: only you can cut the files of clips." if proposals else "nothing to propose."
-        print(f"contextdb: {nothing}", file=sys.stderr)
+        note(nothing)
 
 
 def _reasons(proposals: Sequence[Proposal]) -> Iterator[str]:

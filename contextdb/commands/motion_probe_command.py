@@ -14,25 +14,24 @@ Exits with 1 if a drive is over a bar; with 2 if a bar cannot be judged.
 from __future__ import annotations
 
 import argparse
-import math
-import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from contextdb.cells.arguments import as_number
 from contextdb.commands.motion_measure_command import add_bars, gates_of
-from contextdb.commands.motion_run_command import character_of, rate_of, say_where
+from contextdb.commands.motion_run_command import character_of, say_where
 from contextdb.commands.motion_stage import Stage, context_text
-from contextdb.console import ExitCode, aligned, output, printable, progress
+from contextdb.commands.numbers import number_type, rate_of
+from contextdb.console import ExitCode, aligned, note, output, progress
 from contextdb.disk import make_folder
-from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, plural, some
+from contextdb.errors import ContextDBError, Fault, FileError, Place, plural, some
 from contextdb.motion import Character, Measures, Pose, Trace, measure
 from contextdb.motion.characters.drives import Drive, drives, steered
 from contextdb.motion.characters.probing import Plan, Scene, plan_of
 from contextdb.report.render_json import as_json
 
+_SPEED = number_type("a speed to drive at. Accepted: 0.1 to 100 m/s, such as 1.3.", 0.1, 100.0)
 KINDS = ("straight", "turns", "circle", "eight", "speeds", "stops")
 COLUMNS = {
     "jumps_per_s": ("jumps/s", 2),
@@ -49,13 +48,12 @@ COLUMNS = {
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("path", metavar="PATH", help="a folder of tables, or its contextdb.toml")
     parser.add_argument("controller", metavar="CONTROLLER", help="the name of a [controllers.NAME]")
     parser.add_argument(
         "--drive", metavar="KIND", choices=KINDS, action="append", help=f"only this: {', '.join(KINDS)}; repeatable"
     )
-    parser.add_argument("--speed", metavar="M/S", type=_speed, action="append", help="drive at this speed; may be repeated")
+    parser.add_argument("--speed", metavar="M/S", type=_SPEED, action="append", help="drive at this speed; may be repeated")
     parser.add_argument("--rate", metavar="HZ", type=rate_of, help="updates per second (default: the rate of the features)")
     parser.add_argument("--out", metavar="FOLDER", help="save the session of each drive in this folder")
     add_bars(parser)
@@ -73,7 +71,6 @@ class Probe:
 
     @property
     def name(self) -> str:
-        """The scene, the drive and the speed, in words."""
         return f"{self.scene.name} {self.drive.name} at {self.drive.speed_mps:g} m/s".strip()
 
 
@@ -84,8 +81,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     if character.stream is None:
         raise ContextDBError(Fault("there is no clip that the character could play.", "a database with a clip"))
     plan = plan_of(character, arguments.speed or ())
-    for line in _chosen(plan):
-        print(printable(f"contextdb: {line}"), file=sys.stderr)
+    note(*_chosen(plan))
     wanted = [(scene, drive) for scene in plan.scenes for drive in _drives(scene, arguments.drive)]
     if not wanted:
         found = "no context of the tables lets the character move: nothing can be driven."
@@ -105,8 +101,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
             print(as_json(_document(plan, probes)), end="")
         else:
             print("\n".join(_lines(probes)))
-    for line in over:
-        print(printable(f"contextdb: {line}"), file=sys.stderr)
+    note(*over)
     return ExitCode.FOUND if over else ExitCode.OK
 
 
@@ -189,23 +184,7 @@ def _cells(measures: Measures) -> Iterator[str]:
 
 
 def _folder(folder: Path) -> Path:
-    """A folder to write into."""
     if folder.is_file():
         raise FileError(Fault("this is a file.", "a folder", place=Place(str(folder))))
     make_folder(folder)
     return folder
-
-
-def _speed(text: str) -> float:
-    number = _number(text)
-    if number is None or not 0.1 <= number <= 100.0:
-        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a speed to drive at. Accepted: 0.1 to 100 m/s, such as 1.3.")
-    return number
-
-
-def _number(text: str) -> float | None:
-    try:
-        number = as_number(float(text))
-    except ValueError:
-        return None
-    return number if number is not None and math.isfinite(number) else None

@@ -35,8 +35,9 @@ import numpy as np
 
 from contextdb.commands.motion_build_command import MotionProject, warn
 from contextdb.commands.motion_page import Played, comment_of, page_file, rerun_file, write_page, write_rerun
-from contextdb.commands.motion_stage import add_view, number_of
+from contextdb.commands.motion_stage import add_view
 from contextdb.commands.motion_what_if import changes_of
+from contextdb.commands.numbers import number_of
 from contextdb.commands.progress import building_bar
 from contextdb.console import ExitCode, output, terminal_width
 from contextdb.disk import path_in_quotes, write_atomic
@@ -65,7 +66,6 @@ WARP_S = 10.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("file", metavar="FILE", help="a recorded session, a .parquet file")
     parser.add_argument("--at", metavar="N|TIME", help="show one decision in full: its tick, or a time such as 2.5s")
     add_view(parser, "with --at: which costs are shown")
@@ -138,7 +138,6 @@ class Replay:
 
     @property
     def file(self) -> str:
-        """The session's file."""
         return self.of_file or str(self.asked.file)
 
     @cached_property
@@ -169,7 +168,6 @@ class Replay:
 
 
 def _played(replay: Replay) -> Played:
-    """A session with its poses."""
     folder, why = project_of(replay.trace, replay.asked.project, replay.file)
     if why:
         raise MotionError(Fault(f"its poses cannot be made: {why}", place=Place(replay.file)))

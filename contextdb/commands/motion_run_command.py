@@ -20,28 +20,20 @@ import argparse
 import math
 import os
 import random
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from contextdb import motion
 from contextdb.cells.facts import UNKNOWN_MODES, Unknown
 from contextdb.commands.motion_stage import Stage, reach_s
-from contextdb.commands.motion_stick import Moments, Stick, conditions_of
+from contextdb.commands.motion_stick import Stick, conditions_of, read_moments
+from contextdb.commands.numbers import rate_of, whole_type
 from contextdb.console import ExitCode, output, progress
 from contextdb.disk import path_in_quotes
-from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes
-from contextdb.motion import (
-    Character,
-    PoseStream,
-    Steered,
-    Trace,
-    Trajectory,
-    Updated,
-    steady_path,
-    write_poses,
-)
+from contextdb.errors import ContextDBError, Fault, FileError, Place
 from contextdb.motion.characters.project import banks_of
 from contextdb.motion.characters.tables import Facts
 from contextdb.motion.storage.written_poses import pose_file
@@ -50,19 +42,20 @@ from contextdb.report.render_json import as_json
 from contextdb.tables.table import leaf_assets
 
 SUFFIX = ".parquet"
+_COUNT = whole_type("a number of candidates. Accepted: 0 to 1000, such as 12.", 0, 1000)
+_SEED = whole_type("a seed. Accepted: a whole number, such as 7.")
 K_HELP = "candidates of each search that replay shows; with 0, none, and no search can be asked again (default: 12)"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("path", metavar="PATH", help="a folder of tables, or its contextdb.toml")
     parser.add_argument("controller", metavar="CONTROLLER", help="the name of a [controllers.NAME]")
     parser.add_argument("stick", metavar="STICK", help="a CSV or Parquet file of what the player requests, moment by moment")
     parser.add_argument("--out", metavar="FILE", required=True, help=f"the session to write: a {SUFFIX} file")
     parser.add_argument("--poses", metavar="FILE", help="write the poses to this file too: .bvh, .npz or .glb")
     parser.add_argument("--rate", metavar="HZ", type=rate_of, help="updates per second (default: the rate of the features)")
-    parser.add_argument("--k", metavar="N", type=_count, default=12, help=K_HELP)
-    parser.add_argument("--seed", metavar="N", type=_seed, default=0, help="seed of the controller's variation (default: 0)")
+    parser.add_argument("--k", metavar="N", type=_COUNT, default=12, help=K_HELP)
+    parser.add_argument("--seed", metavar="N", type=_SEED, default=0, help="seed of the controller's variation (default: 0)")
     parser.add_argument("--unknown", choices=UNKNOWN_MODES, default="error", help="how to treat a missing fact (default: error)")
     parser.add_argument("--json", action="store_true", help="a JSON document instead of text")
 
@@ -78,7 +71,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     tables = stage.tables(character.controller.selector.names)
     path = Path(arguments.stick)
     stick = Stick.read(path, conditions_of(tables))
-    moments = Moments.read(path, tables, arguments.unknown, character.asked_facts)
+    moments = read_moments(path, tables, arguments.unknown, character.asked_facts)
     if moments is None:
         character.tables = None
     rate = character.schema.rate if arguments.rate is None else arguments.rate
@@ -87,7 +80,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     poses = [updated.pose for updated in steer(character, stick, moments, rate)]
     trace.save(out, timings=False)
     if poses_out is not None and character.stream is not None:
-        write_poses([pose for pose in poses if pose is not None], character.stream.rig, poses_out, rate)
+        motion.write_poses([pose for pose in poses if pose is not None], character.stream.rig, poses_out, rate)
     with output():
         if arguments.json:
             print(as_json({"format": 1, "file": str(out), "updates": len(trace), "bytes": out.stat().st_size}), end="")
@@ -96,7 +89,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     return ExitCode.OK if any(decision.playing is not None for decision in trace.brief()) else ExitCode.FOUND
 
 
-def say_where(trace: Trace, stage: Stage, controller: str, out: Path) -> None:
+def say_where(trace: motion.Trace, stage: Stage, controller: str, out: Path) -> None:
     """Keep in a session what it is of, for what reads it later."""
     where = {**_project(stage.folder, out), "controller": controller}
     trace.about = {name: {**about, **where} for name, about in trace.about.items()}
@@ -110,7 +103,7 @@ def _project(folder: Path, out: Path) -> dict[str, str]:
         return {}
 
 
-def character_of(stage: Stage, name: str, seed: int = 0, unknown: Unknown = "error") -> Character:
+def character_of(stage: Stage, name: str, seed: int = 0, unknown: Unknown = "error") -> motion.Character:
     """The character of a controller, with its poses; without where its databases have no clips."""
     controller = stage.config.controller(name, stage.databases, rng=random.Random(seed))
     names = list(controller.selector.names)
@@ -118,27 +111,27 @@ def character_of(stage: Stage, name: str, seed: int = 0, unknown: Unknown = "err
     banks = banks_of(stage.config, stage.folder, assets, controller.selector.databases)
     tables = stage.tables(names)
     table_of = {each: tables[table] for each in names if (table := stage.config.databases[each].table) is not None}
-    stream = None if banks is None else PoseStream(banks, stage.config.output_of(name))
-    return Character(controller, stage.schema(names[0]), table_of or None, stream, unknown=unknown)
+    stream = None if banks is None else motion.PoseStream(banks, stage.config.output_of(name))
+    return motion.Character(controller, stage.schema(names[0]), table_of or None, stream, unknown=unknown)
 
 
-def steer(character: Character, stick: Stick, moments: Moments | None, per_s: float) -> Iterator[Updated]:
+def steer(character: motion.Character, stick: Stick, moments: Sequence[Facts] | None, per_s: float) -> Iterator[motion.Updated]:
     """Update a character from the stick's first moment to its last, so many times a second."""
     n_updates = math.floor(stick.duration_s * per_s + 1e-6) + 1
     update = _over_ground if stick.is_velocity else _from_body
     for i in progress(range(n_updates), "steering"):
         moment, dt_s = stick.at(i / per_s), 1.0 / per_s if i else 0.0
-        yield update(character, stick, moment, dt_s, None if moments is None else moments.contexts[moment])
+        yield update(character, stick, moment, dt_s, None if moments is None else moments[moment])
 
 
-def _over_ground(character: Character, stick: Stick, moment: int, dt_s: float, facts: Facts | None) -> Updated:
+def _over_ground(character: motion.Character, stick: Stick, moment: int, dt_s: float, facts: Facts | None) -> motion.Updated:
     """A body that follows the stick smoothly, as `contextdb.motion.clips.steering` has it."""
     degrees = stick.value("facing_deg", moment, math.nan)
     facing = None if math.isnan(degrees) else math.radians(degrees)
     return character.update(dt_s, (stick.value("x_mps", moment), stick.value("z_mps", moment)), facts, facing)
 
 
-def _from_body(character: Character, stick: Stick, moment: int, dt_s: float, facts: Facts | None) -> Updated:
+def _from_body(character: motion.Character, stick: Stick, moment: int, dt_s: float, facts: Facts | None) -> motion.Updated:
     """A body that goes at once at a speed, turns evenly, and keeps both.
 
     The stick that would make a body turn so points ahead of its facing, by what it turns while it follows.
@@ -146,13 +139,13 @@ def _from_body(character: Character, stick: Stick, moment: int, dt_s: float, fac
     speed, turn, strafe = (stick.value(name, moment) for name in ("speed_mps", "turn_dps", "strafe_deg"))
     body = _after(character.body, speed, math.radians(turn), math.radians(strafe), dt_s)
     schema = character.schema
-    path = steady_path(speed, turn, strafe_deg=strafe, reach_s=reach_s(schema, speed), rate=schema.rate)
+    path = motion.steady_path(speed, turn, strafe_deg=strafe, reach_s=reach_s(schema, speed), rate=schema.rate)
     points = body.heading + math.radians(strafe + turn * body.heading_halflife_s / math.log(2.0))
     wanted = (speed * math.sin(points), speed * math.cos(points))
     return character.update(dt_s, wanted, facts, body=body, path=_placed(path, body))
 
 
-def _after(body: Steered, speed_mps: float, turn: float, strafe: float, dt_s: float) -> Steered:
+def _after(body: motion.Steered, speed_mps: float, turn: float, strafe: float, dt_s: float) -> motion.Steered:
     """A body that goes at one speed and turns evenly, some time later: on an arc, whose chord points half the turn ahead."""
     half = turn * dt_s / 2.0
     chord = speed_mps * dt_s * (math.sin(half) / half if abs(half) > 1e-9 else 1.0)
@@ -167,12 +160,12 @@ def _after(body: Steered, speed_mps: float, turn: float, strafe: float, dt_s: fl
     )
 
 
-def _placed(path: Trajectory, body: Steered) -> Trajectory:
+def _placed(path: motion.Trajectory, body: motion.Steered) -> motion.Trajectory:
     """A path in the body's own frame, over the ground."""
     sin, cos = math.sin(body.heading), math.cos(body.heading)
     left, ahead = path.positions.T
     positions = np.stack((cos * left + sin * ahead, cos * ahead - sin * left), axis=1) + np.array(body.position)
-    return Trajectory(path.rate, positions, path.headings + body.heading, path.now)
+    return motion.Trajectory(path.rate, positions, path.headings + body.heading, path.now)
 
 
 def _out_file(out: Path, stick: Path) -> Path:
@@ -192,26 +185,3 @@ def _checked_file(out: Path, stick: Path, what: str) -> Path:
     if out.resolve() == stick.resolve():
         raise FileError(Fault(f"{what} would be written over the stick.", "another file", place=place))
     return out
-
-
-def rate_of(text: str) -> float:
-    """Updates a second, as an option gives them."""
-    try:
-        rate = float(text)
-    except ValueError:
-        rate = math.nan
-    if not 1.0 <= rate <= 1000.0:
-        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a rate. Accepted: 1 to 1000 updates a second, such as 30.")
-    return rate
-
-
-def _count(text: str) -> int:
-    if not text.isdecimal() or int(text) > 1000:
-        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a number of candidates. Accepted: 0 to 1000, such as 12.")
-    return int(text)
-
-
-def _seed(text: str) -> int:
-    if not text.isdecimal() or len(text) > 18:
-        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a seed. Accepted: a whole number, such as 7.")
-    return int(text)

@@ -29,7 +29,6 @@ from contextdb.report.render_json import as_json
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("path", metavar="PATH", help="a folder of tables, or its contextdb.toml")
     parser.add_argument("database", metavar="DATABASE", help="the name of a [databases.NAME]")
     add_asked(parser)
@@ -38,7 +37,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
-    """Search one database."""
     stage = Stage.of(arguments.path, lambda config: [config.database(arguments.database).name])
     name = stage.config.database(arguments.database).name
     valid, facts = stage.valid([name], arguments.facts, arguments.unknown)

@@ -24,7 +24,6 @@ from contextdb.report.render_json import as_json
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("path", metavar="PATH", help="a folder of tables, or its contextdb.toml")
     parser.add_argument("selector", metavar="SELECTOR", help="the name of a [selectors.NAME]")
     add_asked(parser)

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from contextdb.cells.arguments import as_number
 from contextdb.cells.facts import UNKNOWN_MODES, Fact, Unknown
 from contextdb.commands import missing_facts_by_option
 from contextdb.commands.motion_build_command import LeftOut, MotionProject, warn
+from contextdb.commands.numbers import number_of, number_type, whole_type
 from contextdb.commands.progress import building_bar
 from contextdb.commands.query_command import read_facts
 from contextdb.compiled.matches import Matches
@@ -39,6 +39,9 @@ from contextdb.tables.project import SCHEMA_FILE, Project
 MOST_SPEED_MPS, MOST_SECONDS = 100.0, 1e6
 LEAST_REACH_S, MOST_REACH_S = 2.0, 60.0
 CLIP_AT = "CLIP@SECONDS"
+_SPEED = number_type(f"a speed. Accepted: 0 to {MOST_SPEED_MPS:g} m/s, such as 1.3.", 0.0, MOST_SPEED_MPS)
+_DEGREES = number_type("an angle. Accepted: -3600 to 3600 degrees, such as 45.", -3600.0, 3600.0)
+_COUNT = whole_type("a number of candidates. Accepted: 1 to 10000, such as 10.", 1, 10_000)
 
 
 @dataclass(frozen=True)
@@ -77,7 +80,6 @@ class Stage:
         return {}
 
     def tables(self, names: Collection[str]) -> dict[str, CompiledTable]:
-        """The compiled tables of some databases, by the tables' names."""
         wanted = dict.fromkeys(self.config.databases[name].table for name in names)
         for table in wanted:
             if table is not None and table not in self._compiled:
@@ -150,17 +152,17 @@ def add_asked(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("facts", metavar="FACT=VALUE", nargs="*", default=[], help="facts: only assets that are valid may play")
     parser.add_argument("--query", metavar=CLIP_AT, required=True, help="the pose: a moment of a clip, such as walk@1.5")
     parser.add_argument(
-        "--speed", metavar="M/S", type=_speed, help="the desired path: metres per second (default: the clip's own path)"
+        "--speed", metavar="M/S", type=_SPEED, help="the desired path: metres per second (default: the clip's own path)"
     )
-    parser.add_argument("--turn", metavar="DEG/S", type=_degrees, help="with --speed: degrees per second, positive to the left")
+    parser.add_argument("--turn", metavar="DEG/S", type=_DEGREES, help="with --speed: degrees per second, positive to the left")
     parser.add_argument(
-        "--strafe", metavar="DEG", type=_degrees, help="with --speed: the direction of movement relative to the facing"
+        "--strafe", metavar="DEG", type=_DEGREES, help="with --speed: the direction of movement relative to the facing"
     )
     parser.add_argument(
         "--tags", metavar="TAGS", type=read_tags, help='"Move": must have it; "-Stun": must not; "Move~2": costs 2 without it'
     )
     parser.add_argument("--unknown", choices=UNKNOWN_MODES, default="error", help="how to treat a missing fact (default: error)")
-    parser.add_argument("--k", metavar="N", type=_count, default=10, help="the number of candidates (default: 10)")
+    parser.add_argument("--k", metavar="N", type=_COUNT, default=10, help="the number of candidates (default: 10)")
     parser.add_argument("--left-out", action="store_true", help="also list frames that may not be chosen, with the reasons")
     parser.add_argument("--json", action="store_true", help="a JSON document instead of text")
 
@@ -199,8 +201,7 @@ def clip_at(text: str) -> tuple[str, float]:
 def frame_at(clip: str, at_s: float, length_s: float, rate: float) -> int:
     """The frame nearest to a moment of a clip; one behind its end is refused."""
     if at_s > length_s + 0.5 / rate:
-        found = f"there is no moment {at_s:g} s of {in_quotes(clip)}."
-        raise QueryError(Fault(found, f"seconds from 0 to {length_s:.2f}"))
+        raise QueryError(Fault(f"there is no moment {at_s:g} s of {in_quotes(clip)}.", f"seconds from 0 to {length_s:.2f}"))
     return min(round(at_s * rate), round(length_s * rate))
 
 
@@ -238,37 +239,6 @@ def read_tags(text: str) -> TagFilter:
         else:
             hard[sign].append(name)
     return TagFilter(hard[""], hard["+"], hard["-"], prefer=soft[""], avoid=soft["-"])
-
-
-# ---- numbers as arguments
-
-
-def number_of(text: str) -> float | None:
-    """The finite number that a text is, None for any other."""
-    try:
-        return as_number(float(text))
-    except ValueError:
-        return None
-
-
-def _speed(text: str) -> float:
-    number = number_of(text)
-    if number is None or not 0.0 <= number <= MOST_SPEED_MPS:
-        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a speed. Accepted: 0 to {MOST_SPEED_MPS:g} m/s, such as 1.3.")
-    return number
-
-
-def _degrees(text: str) -> float:
-    number = number_of(text)
-    if number is None or abs(number) > 3600.0:
-        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not an angle. Accepted: -3600 to 3600 degrees, such as 45.")
-    return number
-
-
-def _count(text: str) -> int:
-    if not text.isdecimal() or not 1 <= int(text) <= 10_000:
-        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a number of candidates. Accepted: 1 to 10000, such as 10.")
-    return int(text)
 
 
 def context_text(facts: Mapping[str, object]) -> dict[str, object]:

@@ -16,10 +16,10 @@ import numpy as np
 from contextdb.cells.facts import Unknown
 from contextdb.columns import TextColumn
 from contextdb.commands import missing_facts_by_option
-from contextdb.commands.motion_stage import number_of
+from contextdb.commands.numbers import number_of
 from contextdb.compiled.table import CompiledTable
 from contextdb.disk import path_in_quotes
-from contextdb.errors import ContextDBError, Fault, Place, TableError, in_quotes, nearest, some
+from contextdb.errors import ContextDBError, Fault, Place, TableError, in_quotes, mend_for, some
 from contextdb.files.texts import AnySource, read_texts
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.telemetry.contexts import Contexts, read_contexts
@@ -59,7 +59,6 @@ class Stick:
         return float(self.times_s[-1])
 
     def at(self, time_s: float) -> int:
-        """The moment that holds at a time."""
         return max(0, int(np.searchsorted(self.times_s, time_s + 1e-9, side="right")) - 1)
 
     def value(self, name: str, moment: int, otherwise: float = 0.0) -> float:
@@ -84,30 +83,25 @@ class Stick:
         return cls(path, times_s - times_s[0], asked)
 
 
-@dataclass(frozen=True, eq=False)
-class Moments:
-    """The facts of each moment of a stick."""
+def read_moments(
+    path: Path, tables: Mapping[str, CompiledTable], unknown: Unknown, own: Collection[str] = ()
+) -> list[dict[str, object]] | None:
+    """Read the facts of each moment of a stick; those named `own` the character computes where the file does not give them.
 
-    contexts: Sequence[Mapping[str, object]]
-
-    @classmethod
-    def read(cls, path: Path, tables: Mapping[str, CompiledTable], unknown: Unknown, own: Collection[str] = ()) -> Moments | None:
-        """Read the facts for some tables; those named `own` the character computes where the file does not give them.
-
-        None when the file has no facts, and the tables ask for others than the character's own: nothing is filtered. Raises
-        ContextDBError for facts that a query cannot use; with file, line and fact.
-        """
-        read = {name: read_contexts(path, table) for name, table in tables.items()}
-        known = {name: [c for c in each.facts.columns if c in tables[name].asked] for name, each in read.items()}
-        is_own = bool(tables) and all(set(own).issuperset(table.asked) for table in tables.values())
-        if not any(known.values()) and not is_own:
-            return None
-        for name, each in read.items():
-            with missing_facts_by_option():
-                _with_own(each, tables[name], own).ask(tables[name], unknown)  # tells all that is wrong, with its line
-        facts = [each.facts.select(known[name]).to_dicts() for name, each in read.items() if known[name]]
-        n_moments = max((len(each.facts) for each in read.values()), default=0)
-        return cls([_given([each[i] for each in facts]) for i in range(n_moments)])
+    None when the file has no facts, and the tables ask for others than the character's own: nothing is filtered. Raises
+    ContextDBError for facts that a query cannot use; with file, line and fact.
+    """
+    read = {name: read_contexts(path, table) for name, table in tables.items()}
+    known = {name: [c for c in each.facts.columns if c in tables[name].asked] for name, each in read.items()}
+    is_own = bool(tables) and all(set(own).issuperset(table.asked) for table in tables.values())
+    if not any(known.values()) and not is_own:
+        return None
+    for name, each in read.items():
+        with missing_facts_by_option():
+            _with_own(each, tables[name], own).ask(tables[name], unknown)  # tells all that is wrong, with its line
+    facts = [each.facts.select(known[name]).to_dicts() for name, each in read.items() if known[name]]
+    n_moments = max((len(each.facts) for each in read.values()), default=0)
+    return [_given([each[i] for each in facts]) for i in range(n_moments)]
 
 
 def _with_own(contexts: Contexts, table: CompiledTable, own: Collection[str]) -> Contexts:
@@ -139,9 +133,8 @@ def conditions_of(tables: Mapping[str, CompiledTable]) -> list[str]:
 
 def _unknown(path: Path, name: str, conditions: Sequence[str]) -> Fault:
     known = [*STICK, *conditions]
-    near = nearest(name, known)
     found = f"the column {in_quotes(name)} is neither the stick's nor a fact of the tables."
-    return Fault(found, some(known, len(known)), in_quotes(near) if near else "", Place(str(path)))
+    return Fault(found, some(known, len(known)), mend_for(name, known), Place(str(path)))
 
 
 def _missing(path: Path, columns: Mapping[str, TextColumn]) -> list[Fault]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from contextdb.cells.arguments import as_number
+from contextdb.commands.numbers import number_of
 from contextdb.errors import Fault, QueryError, in_quotes, nearest, some
 from contextdb.motion import Biases, MotionDatabase
 from contextdb.motion.trace.reasked import Changes
@@ -46,10 +46,7 @@ def _read(text: str, known: Sequence[str]) -> tuple[str, float]:
         near = nearest(name, known)
         found = f"there is no channel, bias or threshold {in_quotes(name)}."
         raise QueryError(Fault(found, some(known), in_quotes(f"{near}={number}") if near else ""))
-    try:
-        value = as_number(float(number))
-    except ValueError:
-        value = None
+    value = number_of(number)
     if value is None or abs(value) > MOST:
         raise QueryError(Fault(f"{in_quotes(number)} is not a number.", ACCEPTED))
     return name, value

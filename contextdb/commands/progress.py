@@ -74,10 +74,10 @@ def log_of(label: str, is_long: bool) -> Bar | None:
 
 
 @contextmanager
-def building_bar(label: str = "building") -> Iterator[Callable[[int, int, str], None]]:
-    """The progress of building motion databases, or of other work on them, by clips."""
+def building_bar(label: str = "building", *, tells_few: bool = True) -> Iterator[Callable[[int, int, str], None]]:
+    """The progress of building motion databases, or of other work, by clips; on a terminal of few clips too where `tells_few`."""
     with bar(label, is_long=True) as tell:
-        is_terminal = sys.stderr.isatty()
+        is_terminal = tells_few and sys.stderr.isatty()
 
         def tell_clip(done: int, total: int, clip: str) -> None:
             if tell is not None and (is_terminal or total >= MANY_CLIPS):

@@ -20,6 +20,7 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import UNKNOWN_MODES, Fact, no_condition, read_fact_text
 from contextdb.cells.output_types import OutputValue
 from contextdb.commands import missing_facts_by_option
+from contextdb.commands.numbers import whole_type
 from contextdb.compiled.casting.stage import CastMatches
 from contextdb.compiled.explain import Explanation, RowExplanation, describe_fact
 from contextdb.compiled.pick import Outcome
@@ -37,7 +38,6 @@ N_EXPLAINED = 10
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("table", metavar="TABLE", help="a .csv, .parquet or .safetensors file, or the name of a table")
     parser.add_argument(
         "facts", metavar="FACT=VALUE", nargs="*", default=[], help="a value, or a set of values written like a cell: speed=3..5"
@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--explain", action="store_true", help="show the nearest rows that are not valid, their failing cells, and what to change"
     )
     told = f"explain so many rows (default: {N_EXPLAINED})"
-    parser.add_argument("--most", type=_count, default=N_EXPLAINED, metavar="N", help=told)
+    parser.add_argument("--most", type=whole_type("a number of rows, such as 10."), default=N_EXPLAINED, metavar="N", help=told)
     parser.add_argument(
         "--prefer", metavar="FACT", help="cast the actors with the lowest FACT first; -FACT, as in --prefer=-speed: the highest"
     )
@@ -55,7 +55,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
-    """Answer one context."""
     compiled = open_compiled(arguments.table)
     plain, actors = read_actors(arguments.facts, compiled)
     if arguments.prefer is not None and actors is None:
@@ -135,13 +134,6 @@ def _split(text: str, compiled: CompiledTable) -> tuple[str, str]:
     raise ContextError(Fault(f"{in_quotes(text)} is not a fact.", "FACT=VALUE, without spaces round the =", in_quotes(f"{text}=…")))
 
 
-def _count(text: str) -> int:
-    """A number of rows."""
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a number of rows, such as 10.")
-    return int(text)
-
-
 def _document(compiled: CompiledTable, explanation: Explanation, explains: bool, most: int) -> dict[str, object]:
     matches = explanation.matches
     always = set(bitmask.rows(matches.always).tolist())
@@ -187,7 +179,6 @@ def _json_fact(fact: Fact, name: str, compiled: CompiledTable) -> object:
 
 
 def _condition(name: str, compiled: CompiledTable) -> Condition:
-    """A condition of the table or of its rules."""
     return next(c for c in (*compiled.conditions, *data_of(compiled).ruled) if c.name == name)
 
 

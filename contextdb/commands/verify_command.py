@@ -27,13 +27,11 @@ from contextdb.report.render_json import as_json
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument("files", nargs="+", metavar="FILE", help="a file, or a folder of them")
     parser.add_argument("--json", action="store_true", help="print one JSON document")
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
-    """Verify files."""
     paths = _paths(arguments.files)
     verdicts = [verified(path) for path in progress(paths, "verifying")]
     with output():

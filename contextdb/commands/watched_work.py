@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from contextdb.console import ExitCode, printable
+from contextdb.console import ExitCode, note
 from contextdb.disk import TABLE_SUFFIXES
 from contextdb.errors import ContextDBError
 from contextdb.tables.project import SCHEMA_FILE, folder_of
@@ -36,7 +36,7 @@ def watched(path: str, work: Callable[[], ExitCode]) -> ExitCode:
     try:
         while True:
             _done(work)
-            print(printable(f"contextdb: watching {folder}. Ctrl+C ends it."), file=sys.stderr, flush=True)
+            note(f"watching {folder}. Ctrl+C ends it.")
             seen = _next(folder, seen, rest)
     except KeyboardInterrupt:  # how it ends
         return ExitCode.OK
@@ -57,8 +57,7 @@ def _done(work: Callable[[], ExitCode]) -> None:
     try:
         work()
     except ContextDBError as error:
-        for fault in error.faults:
-            print(printable(f"contextdb: {fault}"), file=sys.stderr, flush=True)
+        note(*error.faults)
     sys.stdout.flush()
 
 

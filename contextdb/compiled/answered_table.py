@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.bitmask import Rows, read_only
+from contextdb.cells.arguments import require_many, require_row
 from contextdb.compiled.outputs import NO_OUTPUTS, Outputs
-from contextdb.errors import ContextError, Fault, in_quotes, nearest, plural, some
+from contextdb.errors import ContextError, Fault, WrongType, in_quotes, mend_for, plural, some
 
 _OWN_ANSWER = "an answer of this compiled table"
 _ASK_AGAIN = "to query this table again: query(facts)"
@@ -98,9 +100,8 @@ class AnsweredTable:
     def no_asset(self, asset: str) -> ContextError:
         """The error for an asset that no row has, with the nearest that one has."""
         known = dict.fromkeys((*self.assets, *self.leaves))
-        near = nearest(asset, known)
         found = f"the table {in_quotes(self.name)} has no asset {in_quotes(asset)}."
-        return ContextError(Fault(found, some(known) or "none: the table has no rows", in_quotes(near) if near else ""))
+        return ContextError(Fault(found, some(known) or "none: the table has no rows", mend_for(asset, known)))
 
 
 def rows_of(bits: int, numbers: Rows) -> Rows:
@@ -125,3 +126,46 @@ def rows_of(bits: int, numbers: Rows) -> Rows:
         rest ^= 1 << top
     found.reverse()
     return np.frombuffer(_PACK[len(found)](*found), _INT64)
+
+
+# ---- rows as a caller says them, read into bits
+
+
+SaidRows = NDArray[np.bool_] | NDArray[np.integer] | Iterable[int] | Iterable[bool] | Iterable[str] | str
+"""One bool for each row, row numbers, or assets with their paths or without."""
+
+ACCEPTED = "one bool for each row, row numbers, assets, or an answer of this table"
+
+
+def bits_said(said: object, n_rows: int, of_assets: Callable[[Sequence[str]], int]) -> int:
+    """The rows that are said, as bits; `of_assets` gives those of assets. Raises WrongType or ContextError where they are said in
+    none of these ways, or there are not as many flags as rows; NoSuchPlace where the table has no row of that number."""
+    if isinstance(said, np.ndarray):
+        if said.dtype == np.bool_:
+            return bits_of_flags(said, n_rows)
+        if said.ndim != 1:
+            raise ContextError(Fault(f"rows has shape {said.shape}.", ACCEPTED))
+        said = said.tolist()
+    items = [said] if isinstance(said, str) else list(require_many(said, "rows", ACCEPTED))
+    if items and all(isinstance(item, (bool, np.bool_)) for item in items):
+        return bits_of_flags(np.array(items, np.bool_), n_rows)
+    names = [item for item in items if isinstance(item, str)]
+    bits = of_assets(names) if names else 0
+    return bits | _bits_of_numbers([item for item in items if not isinstance(item, str)], n_rows)
+
+
+def bits_of_flags(flags: NDArray[np.bool_], n_rows: int) -> int:
+    """The rows of a flag for each row, as bits; raises ContextError for another number of flags."""
+    if flags.shape != (n_rows,):
+        found = f"there are flags of shape {flags.shape}, and {plural(n_rows, 'row')}."
+        raise ContextError(Fault(found, f"one bool for each row of the table: ({n_rows},)"))
+    return bitmask.to_int(bitmask.pack(flags))
+
+
+def _bits_of_numbers(numbers: Sequence[object], n_rows: int) -> int:
+    flags = np.zeros(n_rows, np.bool_)
+    for number in numbers:
+        if isinstance(number, (bool, np.bool_)):
+            raise WrongType(Fault("rows holds flags beside row numbers or assets.", ACCEPTED))
+        flags[require_row(number, n_rows)] = True
+    return bitmask.to_int(bitmask.pack(flags)) if numbers else 0

@@ -72,10 +72,9 @@ from contextdb.columns import TextColumn
 from contextdb.compiled.classes import ColumnMasks, NumberMasks, TagMasks, ValueMasks, WideMasks
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.mask_bits import SoftMasks
-from contextdb.compiled.outputs_stored import outputs_from, outputs_to_tensors
+from contextdb.compiled.outputs_stored import outputs_from, outputs_to_tensors, ways_from, ways_to_json, ways_to_tensors
 from contextdb.compiled.pick_columns import PickColumns
 from contextdb.compiled.programs import programs_to_tensors
-from contextdb.compiled.ways_stored import ways_from, ways_to_json, ways_to_tensors
 from contextdb.expressions import Derivation
 from contextdb.expressions.rules import WhenColumn, WhenRules
 from contextdb.files.tensors import (

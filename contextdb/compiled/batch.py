@@ -87,7 +87,6 @@ class KeptFacts:
     unknown: Unknown
 
     def of_context(self, context: int) -> dict[str, object]:
-        """The facts of one context."""
         return {name: column[context] for name, column in self.columns.items()}
 
 

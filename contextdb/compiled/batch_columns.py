@@ -24,7 +24,6 @@ Codes = NDArray[np.int32]
 
 
 def facts_of(contexts: object) -> dict[str, Any]:
-    """The columns of some contexts by name."""
     if isinstance(contexts, pl.DataFrame):
         return {name: contexts[name] for name in contexts.columns}
     if not isinstance(contexts, Mapping):

@@ -28,19 +28,9 @@ from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.bitmask import Words
+from contextdb.cells import sets
 from contextdb.cells.domains import Domain
 from contextdb.cells.numbers import CellSpans, spans_of
-from contextdb.cells.sets import (
-    Accepted,
-    Cell,
-    NumberSet,
-    TagMeet,
-    TagSet,
-    ValueSet,
-    covered_by,
-    is_banned,
-    plain_parts,
-)
 from contextdb.columns import Codes
 from contextdb.compiled.ruler import Ruler
 
@@ -63,7 +53,6 @@ class ValueMasks:
 
     @cached_property
     def class_of(self) -> dict[Value, int]:
-        """The class of each value."""
         return {v: i for i, v in enumerate(self.values)}
 
     @cached_property
@@ -77,9 +66,9 @@ class ValueMasks:
             return (len(self.masks) - 1,)
         return (self.class_of.get(fact, len(self.values)),)
 
-    def set_bits(self, accepts: Accepted) -> tuple[int, int]:
+    def set_bits(self, accepts: sets.Accepted) -> tuple[int, int]:
         """Rows that accept some, and rows that accept all, of a set of values."""
-        assert isinstance(accepts, ValueSet)
+        assert isinstance(accepts, sets.ValueSet)
         held = [i for i, v in enumerate(self.values) if accepts.holds(v)]
         if self.has_others and (accepts.is_complement or accepts.values - self.class_of.keys()):
             held.append(len(self.values))
@@ -113,9 +102,9 @@ class NumberMasks:
         """The number of the fact's mask; None is a missing fact."""
         return (len(self.masks) - 1 if fact is None else bisect_right(self.bound_list, fact),)
 
-    def set_bits(self, accepts: Accepted) -> tuple[int, int]:
+    def set_bits(self, accepts: sets.Accepted) -> tuple[int, int]:
         """Rows that accept some, and rows that accept all, of a set of numbers."""
-        assert isinstance(accepts, NumberSet)
+        assert isinstance(accepts, sets.NumberSet)
         return _some_and_all(self.ints, _classes_in(accepts, self.bound_list))
 
 
@@ -169,9 +158,9 @@ class WideMasks:
             found |= (low[g] | low[n + g] & low[2 * n + f]) & (high[g] | high[n + g] & high[2 * n + f])
         return found
 
-    def set_bits(self, accepts: Accepted) -> tuple[int, int]:
+    def set_bits(self, accepts: sets.Accepted) -> tuple[int, int]:
         """Rows that accept some, and rows that accept all, of a set of numbers."""
-        assert isinstance(accepts, NumberSet)
+        assert isinstance(accepts, sets.NumberSet)
         held = [self.bits(k) for k in _classes_in(accepts, self.bound_list)]
         return reduce(or_, held), reduce(and_, held)
 
@@ -185,7 +174,7 @@ class TagMasks:
 
     n_rows: int
     tags: tuple[str, ...]
-    negated: tuple[TagSet, ...]
+    negated: tuple[sets.TagSet, ...]
     masks: Words
 
     @cached_property
@@ -198,17 +187,17 @@ class TagMasks:
         n_slots = len(self.tags) + len(self.negated)
         if fact is None:
             return tuple(range(2, 3 * n_slots, 3))
-        has = covered_by(fact)
+        has = sets.covered_by(fact)
         answers = [tag in has for tag in self.tags] + [cell.holds(fact) for cell in self.negated]
         return tuple(3 * slot + answer for slot, answer in enumerate(answers))
 
-    def set_bits(self, accepts: Accepted) -> tuple[int, int]:
+    def set_bits(self, accepts: sets.Accepted) -> tuple[int, int]:
         """Rows that accept some, and rows that accept all, of a set of tag sets."""
-        assert isinstance(accepts, TagSet)
-        pairs = [self._conjunction_bits(part) for part in plain_parts(accepts)]
+        assert isinstance(accepts, sets.TagSet)
+        pairs = [self._conjunction_bits(part) for part in sets.plain_parts(accepts)]
         return reduce(or_, (some for some, _ in pairs)), reduce(and_, (all_ for _, all_ in pairs))
 
-    def _conjunction_bits(self, part: TagSet) -> tuple[int, int]:
+    def _conjunction_bits(self, part: sets.TagSet) -> tuple[int, int]:
         some = every = bitmask.to_int(bitmask.full(self.n_rows))
         for slot, (may_not, may) in enumerate(self._possible(part)):
             no, yes = self.ints[3 * slot], self.ints[3 * slot + 1]
@@ -216,24 +205,24 @@ class TagMasks:
             every &= (no if may_not else -1) & (yes if may else -1)
         return some, every
 
-    def _possible(self, part: TagSet) -> Iterable[tuple[bool, bool]]:
+    def _possible(self, part: sets.TagSet) -> Iterable[tuple[bool, bool]]:
         """For each slot, whether some fact of the part answers no, and whether one answers yes."""
-        needed = covered_by(part.needs)
+        needed = sets.covered_by(part.needs)
         for tag in self.tags:
-            yield tag not in needed, not is_banned(tag, part)
+            yield tag not in needed, not sets.is_banned(tag, part)
         for cell in self.negated:
-            if isinstance(cell, TagMeet):
+            if isinstance(cell, sets.TagMeet):
                 yield not cell.holds_all_of(part), cell.meets(part)
                 continue
-            entails = cell.needs <= needed and all(is_banned(t, part) for t in cell.bans)
-            joint = TagSet(part.needs | cell.needs, part.bans | cell.bans)
+            entails = cell.needs <= needed and all(sets.is_banned(t, part) for t in cell.bans)
+            joint = sets.TagSet(part.needs | cell.needs, part.bans | cell.bans)
             yield not joint.is_contradiction, not entails
 
 
 ColumnMasks = ValueMasks | NumberMasks | WideMasks | TagMasks
 
 
-def column_masks(cells: Sequence[Cell], codes: Codes, domain: Domain) -> ColumnMasks:
+def column_masks(cells: Sequence[sets.Cell], codes: Codes, domain: Domain) -> ColumnMasks:
     """Compile one column: row r holds `cells[codes[r]]`. Soft cells accept every value."""
     if domain.type.is_numeric:
         return _number_masks(cells, codes, domain)
@@ -246,13 +235,12 @@ def _some_and_all(ints: list[int], held: Sequence[int]) -> tuple[int, int]:
     return reduce(or_, masks, 0), reduce(and_, masks) if masks else 0
 
 
-def _classes_in(accepts: NumberSet, bounds: list[float]) -> list[int]:
-    """The classes that share a number with the set."""
+def _classes_in(accepts: sets.NumberSet, bounds: list[float]) -> list[int]:
     held = {k for low, high in accepts.spans for k in range(bisect_right(bounds, low), bisect_right(bounds, high) + 1)}
     return sorted(held)
 
 
-def _any_rows(cells: Sequence[Accepted | None], codes: Codes) -> Words:
+def _any_rows(cells: Sequence[sets.Accepted | None], codes: Codes) -> Words:
     return bitmask.pack(_flags([c is None for c in cells])[codes])
 
 
@@ -285,25 +273,25 @@ def _scatter(mask_numbers: Pairs, rows: Pairs, n_masks: int, n_rows: int) -> Wor
     return masks.reshape(n_masks, width)
 
 
-def _value_masks(cells: Sequence[Accepted | None], codes: Codes, domain: Domain) -> ValueMasks:
+def _value_masks(cells: Sequence[sets.Accepted | None], codes: Codes, domain: Domain) -> ValueMasks:
     has_others = domain.type.is_open
     values: tuple[Value, ...] = domain.everything or tuple(_named(cells))
     class_of = {v: i for i, v in enumerate(values)}
     n_classes = len(values) + has_others
-    pairs = [(i, class_of[v]) for i, c in enumerate(cells) if isinstance(c, ValueSet) for v in c.values if v in class_of]
+    pairs = [(i, class_of[v]) for i, c in enumerate(cells) if isinstance(c, sets.ValueSet) for v in c.values if v in class_of]
     masks = _scatter(*_spread_pairs(pairs, codes), n_classes + 1, len(codes))
-    accepts_rest = _flags([c is None or (isinstance(c, ValueSet) and c.is_complement) for c in cells])
+    accepts_rest = _flags([c is None or (isinstance(c, sets.ValueSet) and c.is_complement) for c in cells])
     masks ^= bitmask.pack(accepts_rest[codes])
     masks[-1] = _any_rows(cells, codes)
     return ValueMasks(len(codes), values, has_others, masks)
 
 
-def _named(cells: Sequence[Accepted | None]) -> list[Value]:
+def _named(cells: Sequence[sets.Accepted | None]) -> list[Value]:
     """The values that the cells name, in order of appearance."""
-    return list(dict.fromkeys(v for c in cells if isinstance(c, ValueSet) for v in sorted(c.values)))
+    return list(dict.fromkeys(v for c in cells if isinstance(c, sets.ValueSet) for v in sorted(c.values)))
 
 
-def _number_masks(cells: Sequence[Cell], codes: Codes, domain: Domain) -> NumberMasks | WideMasks:
+def _number_masks(cells: Sequence[sets.Cell], codes: Codes, domain: Domain) -> NumberMasks | WideMasks:
     spans = spans_of(cells)
     ends = _ends(spans.highs, 1.0 if domain.type.is_whole else 0.0)
     bottom = -180.0 if domain.type.is_circular else -np.inf
@@ -368,12 +356,12 @@ def _digit_masks(cell: Pairs, number: Pairs, codes: Codes, n_classes: int, shift
     return np.concatenate([upto ^ at, at, fine_upto])
 
 
-_EVERY_SET = TagSet(frozenset(("",)), frozenset(("",)), True)
+_EVERY_SET = sets.TagSet(frozenset(("",)), frozenset(("",)), True)
 
 
-def _tag_masks(cells: Sequence[Accepted | None], codes: Codes) -> TagMasks:
-    plain = [(i, c) for i, c in enumerate(cells) if isinstance(c, TagSet) and not c.is_complement]
-    negated = [(i, c) for i, c in enumerate(cells) if isinstance(c, TagSet) and c.is_complement]
+def _tag_masks(cells: Sequence[sets.Accepted | None], codes: Codes) -> TagMasks:
+    plain = [(i, c) for i, c in enumerate(cells) if isinstance(c, sets.TagSet) and not c.is_complement]
+    negated = [(i, c) for i, c in enumerate(cells) if isinstance(c, sets.TagSet) and c.is_complement]
     # "not not Any" accepts every set of tags and yet is not Any: as a negated contradiction it has a slot to say so.
     negated += [(i, _EVERY_SET) for i, c in plain if not c.needs | c.bans]
     tags = tuple(sorted({t for _, c in plain for t in c.needs | c.bans}))

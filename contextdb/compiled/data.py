@@ -40,7 +40,7 @@ from contextdb.compiled.outputs import NO_OUTPUTS, Outputs
 from contextdb.compiled.pick_columns import NOTHING, PickColumns, ranks_of
 from contextdb.compiled.stack import MaskStack
 from contextdb.compiled.unchanging import Unchanging
-from contextdb.compiled.versions import version_of
+from contextdb.compiled.versions import said_by, version_of
 from contextdb.compiled.ways import Step, Ways
 from contextdb.errors import ContextError, Fault, Place, in_quotes, plural
 from contextdb.expressions.derived import Derivation
@@ -52,7 +52,6 @@ Change = Callable[[Fact, Condition], Fact]
 
 
 def as_given(fact: Fact, condition: Condition) -> Fact:
-    """A fact as it is."""
     return fact
 
 
@@ -103,7 +102,6 @@ class CompiledData(Unchanging):
 
     @property
     def n_rows(self) -> int:
-        """The number of rows."""
         return len(self.assets)
 
     def __repr__(self) -> str:
@@ -184,7 +182,6 @@ class CompiledData(Unchanging):
 
     @property
     def policies(self) -> frozenset[str]:
-        """The policies of the table and of those that are in it."""
         return frozenset((self.policy,) if self.ways is None else (table.policy for table in self.ways.tables))
 
     def plain_penalties(self, context: Context, unknown: Unknown = "error") -> NDArray[np.float64]:
@@ -358,7 +355,6 @@ class CompiledData(Unchanging):
 
     @cached_property
     def places(self) -> dict[str, int]:
-        """Where each condition is among `conditions`."""
         return {c.name: at for at, c in enumerate(self.conditions)}
 
     @cached_property
@@ -368,7 +364,6 @@ class CompiledData(Unchanging):
 
     @property
     def nbytes(self) -> int:
-        """Bytes that the masks take."""
         return sum(nbytes(m) for m in self.masks)
 
     def once(self, make: Callable[[Self], Made]) -> Made:
@@ -402,27 +397,10 @@ class CompiledData(Unchanging):
     def answering(self) -> Answering:
         """What the answers of this table share."""
         ask_mirrored = self.query_mirrored if self.mirroring else None
-        version = partial(version_of, self._said)
+        version = partial(version_of, said_by(self))
         own = Answering(self.assets, self.leaves, self.name, version, ask_mirrored, outputs=self.outputs, asked_of=self)
         answering: Answering = self.__dict__.setdefault("answering", own)  # one, whichever thread comes first
         return answering
-
-    @property
-    def _said(self) -> tuple[object, ...]:
-        """All that an answer, and what is picked from it, hangs on."""
-        own = [*self.conditions, *self.ruled]
-        conditions = [(c.name, c.domain, c.expr, c.mirror, *((c.hysteresis,) if c.hysteresis else ())) for c in own]
-        derived = [(step.condition.name, step.expression.text) for step in self.derivation.steps] if self.derivation else []
-        ways = [] if self.ways is None else [self.ways.numbers, self.ways.rows]
-        inner = () if self.ways is None else self.ways.tables
-        return (
-            (self.name, self.policy, self.fallback, list(self.assets), conditions, derived),
-            *(self.enabled, self.priorities, self.row_weights, *self.texts, *(self.slots or ())),
-            *((self.when.texts,) if self.when is not None else ()),
-            *self.outputs.said,
-            *(*ways, *(part for t in inner for part in ((t.name, t.policy), t.priorities, t.row_weights))),
-            *(said for picking in (self.picking, *(t.picking for t in inner)) for part in picking.arrays.items() for said in part),
-        )
 
     @cached_property
     def _all_bits(self) -> tuple[int, int]:

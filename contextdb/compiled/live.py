@@ -30,7 +30,6 @@ from contextdb.compiled.pick import pick
 from contextdb.errors import Fault, NoSuchFact, in_quotes, plural, some
 
 BLOCK = 5
-"""Facts in a block."""
 LOOKED_AT = 16
 """Of so many times that blocks are intersected, one looks for facts that move."""
 MOST_MOVING = 8

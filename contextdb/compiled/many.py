@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from operator import and_, or_, xor
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +19,11 @@ from contextdb import bitmask
 from contextdb.bitmask import Rows, Words, read_only
 from contextdb.cells.arguments import require_place
 from contextdb.cells.notebook import one_line
+from contextdb.cells.sequences import Made
+from contextdb.compiled.answered_table import SaidRows
 from contextdb.compiled.batch_costs import CostsOfPairs
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.matches import Join, Matches, layered_penalties, minus
-from contextdb.compiled.said_rows import SaidRows
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.errors import ContextError, Fault, Place, WrongType, plural
 
@@ -32,7 +33,7 @@ MOST_PAIRS = 2**18
 """Pairs of a context and a row whose costs are worked out together."""
 
 
-class ManyMatches(Unchanging, Sequence[Matches]):
+class ManyMatches(Unchanging, Made[Matches]):
     """The valid rows of many contexts: a sequence of `Matches`, each as `query` gives it, with or without actors. Results are
     computed on first use and kept; arrays are read-only. As with `Matches`, `&`, `|`, `-` and `^` join the answers for as many
     contexts, each with its own; `&` and `-` also take what `only` takes.
@@ -176,16 +177,7 @@ class ManyMatches(Unchanging, Sequence[Matches]):
             raise ContextError(Fault(found, "an answer for each context"))
         return other
 
-    @overload
-    def __getitem__(self, context: int) -> Matches: ...
-
-    @overload
-    def __getitem__(self, context: slice) -> list[Matches]: ...
-
-    def __getitem__(self, context: int | slice) -> Matches | list[Matches]:
-        """The answer of one context, as `query` gives it, or those of a slice; NoSuchPlace, an IndexError too, where none is."""
-        if isinstance(context, slice):
-            return [self._answer(i) for i in range(*context.indices(len(self)))]
+    def _at(self, context: int) -> Matches:
         return self._answer(require_place(context, len(self), "context"))
 
     def __iter__(self) -> Iterator[Matches]:
@@ -251,7 +243,6 @@ class FewerMatches(ManyMatches):
 
     @property
     def compiled(self) -> CompiledData:  # type: ignore[override]
-        """The table."""
         return self.whole.compiled
 
     @cached_property
@@ -267,7 +258,6 @@ class FewerMatches(ManyMatches):
         return len(self.whole)
 
     def _costs_of_pairs(self) -> CostsOfPairs:
-        """Those of the whole."""
         return self.whole._costs_of_pairs()
 
     def __iter__(self) -> Iterator[Matches]:
@@ -291,7 +281,6 @@ class JoinedMatches(ManyMatches):
 
     @property
     def compiled(self) -> CompiledData:  # type: ignore[override]
-        """The table."""
         return self.first.compiled
 
     @cached_property

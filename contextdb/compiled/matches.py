@@ -15,8 +15,7 @@ from contextdb import bitmask
 from contextdb.bitmask import Flags, Rows, Words, read_only
 from contextdb.cells.arguments import require_place
 from contextdb.cells.notebook import as_html, one_line
-from contextdb.compiled.answered_table import AnsweredTable, rows_of
-from contextdb.compiled.said_rows import SaidRows, bits_said
+from contextdb.compiled.answered_table import AnsweredTable, SaidRows, bits_said, rows_of
 from contextdb.errors import ContextError, Fault, WrongType, plural
 
 Bits = TypeVar("Bits", int, Words)
@@ -405,7 +404,6 @@ class SetMatches(Matches):
 
 
 def answering_of(answer: Matches) -> Answering:
-    """What all answers of the table of an answer share."""
     return answer._table
 
 

@@ -20,7 +20,7 @@ from contextdb.cells.output_types import OutputValue
 from contextdb.cells.outputs import Output
 from contextdb.columns import TextColumn
 from contextdb.compiled.unchanging import Unchanging
-from contextdb.errors import ContextError, Fault, NoSuchOutput, NoSuchPlace, in_quotes, nearest, shown, some
+from contextdb.errors import ContextError, Fault, NoSuchOutput, NoSuchPlace, no_such, shown, some
 
 Column = NDArray[Any]
 OutputCells = Column | TextColumn
@@ -118,9 +118,8 @@ class Outputs(Unchanging):
     def _place(self, name: str) -> int:
         if require_text(name, "name") in self.names:
             return self.names.index(name)
-        near = nearest(name, self.names)
         accepted = some(self.names) or "no name: the table has no outputs"
-        raise NoSuchOutput(Fault(f"there is no output {in_quotes(name)}.", accepted, in_quotes(near) if near else ""))
+        raise NoSuchOutput(no_such("output", name, self.names, accepted))
 
     @cached_property
     def _arrays(self) -> dict[str, Column]:

@@ -79,7 +79,6 @@ def pick(compiled: CompiledData, matches: Matches, rng: Rng | int | None = None,
 
 
 def pick_row(compiled: CompiledData, matches: Matches, rng: Rng | int | None = None, last: str | None = None) -> int | None:
-    """The row that `pick` picks, or None."""
     compiled.answering.require_own(matches)
     source = compiled.memory.rng(rng)
     if last is not None and not isinstance(last, str):
@@ -212,7 +211,6 @@ class Outcome:
         self.compiled = compiled
         self._matches = matches
         self.rows = matches.indices
-        """The valid rows."""
         self.refusal: PolicyError | None = None
         """Why `pick` refuses: the policy is "unique", here or in a table inside, and several rows are valid."""
         self.candidates: Rows = self.rows[:0]

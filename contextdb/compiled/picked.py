@@ -37,7 +37,6 @@ class Picked:
         self.last_s = np.zeros((0, 0), np.float64)
         """The time at which it was, in seconds: [C, L]."""
         self.assets: dict[str, int] = {}
-        """The number of each asset."""
         self.limits: dict[Key, int] = {}
         """The column of each row that rests."""
         self._n_ordered = 0
@@ -67,7 +66,6 @@ class Picked:
         return found
 
     def slots_of(self, who: NDArray[np.int64]) -> Rows:
-        """Where characters are in the arrays."""
         n = len(who)
         if n and who[0] == 0 and who[-1] == n - 1 and np.array_equal(who, np.arange(n)):
             if self._n_ordered == self.n < n:
@@ -118,7 +116,6 @@ class Picked:
         return found
 
     def rests(self, limits: Limits, columns: Rows, slots: Rows, rows: Rows, time_s: float) -> NDArray[np.bool_]:
-        """Whether each row rests for its character."""
         found = np.zeros(len(rows), np.bool_)
         for of_row in limits.of_row:
             of = of_row[rows]

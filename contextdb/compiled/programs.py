@@ -128,12 +128,10 @@ class Programs:
         self._number_of = {name: number for number, name in enumerate(self.facts)}
 
     def add(self, plan: Part) -> None:
-        """Add the program of a plan."""
         self.put(plan)
         self.starts.append(len(self.code))
 
     def emit(self, op: Op, a: int = 0, b: int = 0, c: int = 0) -> None:
-        """Add one instruction."""
         self.code.append((op, a, b, c))
 
     @singledispatchmethod

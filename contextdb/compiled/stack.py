@@ -98,7 +98,6 @@ class MaskStack:
 
     @cached_property
     def n_codes(self) -> int:
-        """How many codes a context has."""
         return sum(self.n_slots)
 
     def holds(self, codes: Codes) -> bool:

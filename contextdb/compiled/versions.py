@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +19,23 @@ def version_of(parts: Sequence[object]) -> str:
         digest.update(len(said).to_bytes(8, "little"))
         digest.update(said)
     return digest.hexdigest()
+
+
+def said_by(compiled: Any) -> tuple[object, ...]:
+    """All of a `CompiledData` that an answer, and what is picked from it, hangs on."""
+    own = [*compiled.conditions, *compiled.ruled]
+    conditions = [(c.name, c.domain, c.expr, c.mirror, *((c.hysteresis,) if c.hysteresis else ())) for c in own]
+    derived = [(step.condition.name, step.expression.text) for step in compiled.derivation.steps] if compiled.derivation else []
+    ways = [] if compiled.ways is None else [compiled.ways.numbers, compiled.ways.rows]
+    inner = () if compiled.ways is None else compiled.ways.tables
+    return (
+        (compiled.name, compiled.policy, compiled.fallback, list(compiled.assets), conditions, derived),
+        *(compiled.enabled, compiled.priorities, compiled.row_weights, *compiled.texts, *(compiled.slots or ())),
+        *((compiled.when.texts,) if compiled.when is not None else ()),
+        *compiled.outputs.said,
+        *(*ways, *(part for t in inner for part in ((t.name, t.policy), t.priorities, t.row_weights))),
+        *(said for picking in (compiled.picking, *(t.picking for t in inner)) for part in picking.arrays.items() for said in part),
+    )
 
 
 def _said(part: object) -> bytes:

@@ -66,7 +66,6 @@ class WayTable:
     """How specific its rows are, and how long they rest."""
 
     def place(self, row: int) -> Place:
-        """Where a row is."""
         if self.table is not None:
             return self.table.place(row)
         line = -1 if self.lines is None else int(self.lines[row])

@@ -8,16 +8,5 @@ from contextdb.covering.progress import Cancelled
 from contextdb.covering.report import CoverageReport, Crowd, Gap, Nearest, Overlap
 from contextdb.covering.shares import format_percent
 
-__all__ = [
-    "Cancelled",
-    "CoverageReport",
-    "Crowd",
-    "Gap",
-    "Nearest",
-    "Overlap",
-    "PairTable",
-    "Slice",
-    "coverage",
-    "format_percent",
-    "pairs",
-]
+__all__ = ["Cancelled", "CoverageReport", "Crowd", "Gap", "Nearest", "Overlap", "PairTable", "Slice", "coverage"]
+__all__ += ["format_percent", "pairs"]

@@ -41,11 +41,9 @@ class EarlierGap:
 
     @property
     def text(self) -> str:
-        """The cells on one line."""
         return ", ".join(f"{name}: {cell}" for name, cell in self.cells.items()) or "every context"
 
     def to_json(self) -> dict[str, object]:
-        """As plain data."""
         return {"id": self.id, "share": self.share, "cells": self.cells}
 
 
@@ -78,7 +76,6 @@ class Change:
     names a rule that was rewritten."""
 
     def to_json(self) -> dict[str, object]:
-        """As plain data."""
         return {
             "before": self.before,
             "drop": self.drop,
@@ -98,8 +95,7 @@ def read_baseline(text: str, file: str) -> dict[str, Earlier]:
         return {_text(entry["table"]): _earlier(entry) for entry in document["tables"]}
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         why = f"{error} is missing" if isinstance(error, KeyError) else str(error)
-        fault = Fault(f"the baseline cannot be read: {why}.", ACCEPTED, place=Place(file))
-        raise ContextError(fault) from None
+        raise ContextError(Fault(f"the baseline cannot be read: {why}.", ACCEPTED, place=Place(file))) from None
 
 
 def _earlier(entry: Mapping[str, Any]) -> Earlier:

@@ -237,7 +237,6 @@ def _has_measure(boxes: Sequence[Box], weights: Sequence[NDArray[np.float64]]) -
 
 
 def _weighing(weights: NDArray[np.float64]) -> int:
-    """The classes of some weight."""
     return bitmask.int_of(np.flatnonzero(weights > 0.0).tolist())
 
 

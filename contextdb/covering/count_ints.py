@@ -14,18 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import bitmask
-from contextdb.covering.count_kernels import (
-    DENSE,
-    EPSILON,
-    FEW,
-    LEAST_DEPTH,
-    MANY,
-    PER_NODE,
-    PROBES,
-    ROOM,
-    SAME,
-    SMALL_SUM,
-)
+from contextdb.covering import count_kernels
 from contextdb.covering.progress import Progress
 
 Array = NDArray[Any]
@@ -86,7 +75,6 @@ class Factor(dict[int, tuple[int, int, float, int]]):
         return found
 
     def inside(self, box: int) -> Factor:
-        """The factor within a box."""
         base = self.base
         cell = base.cells[self.number][base.boxes[box]]
         known = base.within.get((self.number, self.salt, cell))
@@ -141,7 +129,7 @@ class Count:
     def __init__(self, part: tuple[Array, ...], table: tuple[Array, ...], n_known: int, depth: int, progress: Progress) -> None:
         self.boxes, self.factors = factors_of(part, table[0].T.tolist(), table[3].tolist())
         self.depth, self.progress = depth, progress
-        self.deepest_alone = max(LEAST_DEPTH, depth - 4 * len(self.factors))
+        self.deepest_alone = max(count_kernels.LEAST_DEPTH, depth - 4 * len(self.factors))
         self.keys: list[Any] = [np.zeros(n_known, np.uint64).data for _ in range(2)]
         self.bounds: list[Any] = [np.zeros(n_known).data for _ in range(2)]
         self.stirred: dict[int, int] = {}
@@ -206,21 +194,21 @@ class Count:
         at, is_known = self._slot(key1, key2)
         if is_known:
             low, high = max(low, self.bounds[0][at]), min(high, self.bounds[1][at])
-            if high - low <= SAME:
+            if high - low <= count_kernels.SAME:
                 return min(low, high), high
-        if self.work >= self.limit or depth >= self.depth - ROOM:
+        if self.work >= self.limit or depth >= self.depth - count_kernels.ROOM:
             self.cut += 1
             return low, high
         kept = hanging_together(limits)
         if kept != opened:
             return self._product(part, depth + 1, kept, opened ^ kept, boxes, own, limits)
-        self.work += PER_NODE + (m >> 1)
+        self.work += count_kernels.PER_NODE + (m >> 1)
         if self.work >= self.asked:
             self.asked = self.work + ASK_EVERY
             self.progress.at(self.work / max(1, self.most))
-        if m >= (FEW if total <= SMALL_SUM else MANY) and depth < self.deepest_alone:
+        if m >= (count_kernels.FEW if total <= count_kernels.SMALL_SUM else count_kernels.MANY) and depth < self.deepest_alone:
             found_low, found_high = self._one_after_the_other(part, depth + 2, boxes, own)
-        elif part.n_words > 1 and m <= DENSE * part.n_words:
+        elif part.n_words > 1 and m <= count_kernels.DENSE * part.n_words:
             self.work += m * len(own) >> 2
             less, factors = renumbered(part, opened, own)
             found_low, found_high = self._uncovered(less, depth + 2, len(factors), less.boxes, factors)
@@ -237,7 +225,7 @@ class Count:
         firsts, seconds = self.keys
         last = len(firsts) - 1
         home = at = key1 >> 1 & last
-        for _ in range(PROBES):
+        for _ in range(count_kernels.PROBES):
             first = firsts[at]
             if first == key1 and seconds[at] == key2:
                 return at, True
@@ -273,7 +261,7 @@ class Count:
         ordered = sorted(boxes, key=lambda box: -box[1])
         for t, (box, size, _) in enumerate(ordered):
             is_over = self.work >= self.limit
-            if is_over or 1.0 - low <= m * EPSILON:
+            if is_over or 1.0 - low <= m * count_kernels.EPSILON:
                 self.cut += is_over
                 others = 0.0
                 for _, other, _ in ordered[t:]:
@@ -293,7 +281,7 @@ class Count:
             high += size * b
         low, high = 1.0 - high, 1.0 - low
         if low < 1e-3:
-            low, high = max(0.0, low - m * EPSILON), max(0.0, high) + m * EPSILON
+            low, high = max(0.0, low - m * count_kernels.EPSILON), max(0.0, high) + m * count_kernels.EPSILON
         return low, high
 
     def _within(self, part: Part, depth: int, box: int, met: int, own: list[Factor], n_shares: int) -> Shares:

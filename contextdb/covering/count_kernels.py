@@ -146,7 +146,6 @@ def _sum(shares):
 
 @njit(**options)
 def count_bits(words, n_words):
-    """How many bits are set."""
     n = 0
     for w in range(n_words):
         n += n_bits(words[w])

@@ -60,7 +60,6 @@ class ValueFactor:
         return cls(values, has_others, np.full(n_classes, 1.0 / n_classes), assumed)
 
     def classes(self, accepts: Accepted) -> int:
-        """The classes that a set holds."""
         assert isinstance(accepts, ValueSet)
         held = bitmask.int_of(sorted(self._class_of[value] for value in accepts.values if value in self._class_of))
         return ((1 << len(self.values) + self.has_others) - 1) ^ held if accepts.is_complement else held
@@ -70,7 +69,6 @@ class ValueFactor:
         return {value: k for k, value in enumerate(self.values)}
 
     def accepts(self, classes: int) -> Accepted:
-        """The values of some classes."""
         flags = bitmask.flags_of(classes, len(self.weights))
         is_complement = self.has_others and bool(flags[-1])
         return ValueSet(frozenset(compress(self.values, (flags != is_complement).tolist())), is_complement)
@@ -96,7 +94,6 @@ class NumberFactor:
 
     @property
     def cuts(self) -> list[float]:
-        """The first number of each class."""
         return self._ends[0]
 
     @cached_property
@@ -114,7 +111,6 @@ class NumberFactor:
         return held
 
     def accepts(self, classes: int) -> Accepted:
-        """The numbers of some classes."""
         spans = list(compress(self.spans, bitmask.flags_of(classes, len(self.spans)).tolist()))
         return NumberSet(self.kind.fitted(intervals.union(spans)), self.kind.is_circular)
 

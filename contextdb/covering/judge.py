@@ -327,7 +327,6 @@ class Judge:
 
     @cached_property
     def _of_asset(self) -> dict[str, list[int]]:
-        """For each asset its rows."""
         rows: dict[str, list[int]] = {}
         for i in range(len(self.space.boxes)):
             rows.setdefault(self._asset(i), []).append(i)

@@ -13,7 +13,7 @@ from typing import Any
 from contextdb.cells.arguments import require_kind, require_mapping
 from contextdb.covering.clip_contexts import TableContexts, asked_axes, clip_contexts, is_axis
 from contextdb.covering.space import require_counts
-from contextdb.errors import ContextError, Fault, MotionError, in_quotes, nearest, some
+from contextdb.errors import ContextError, Fault, MotionError, in_quotes, mend_for, some
 from contextdb.motion.measuring.coverage import ContextCoverage, MotionCoverage, coverage
 from contextdb.motion.measuring.moves import DIRECTION, MAPS, SPEED, TURN
 from contextdb.motion.measuring.near_clips import NEAR_COST
@@ -62,7 +62,6 @@ class TableMotion:
         return self.contexts is None or self.contexts.method == "exact"
 
     def to_json(self) -> dict[str, Any]:
-        """As plain data."""
         found, contexts = self.coverage, self.contexts
         return {
             "table": found.table,
@@ -227,17 +226,15 @@ def _axes(tables: Mapping[str, Table], axes: Mapping[str, str] | None) -> dict[s
         has = set(_having(tables, condition))
         if not has:
             known = sorted({c.condition.name for t in tables.values() for c in t.flat().conditions if is_axis(c.condition)})
-            near = nearest(str(condition), known)
             found = f"no table with clips has a condition {in_quotes(str(condition))} of numbers with min and max."
             accepted = some(known) or "none: no condition is an angle, or a number with min and max"
-            raise ContextError(Fault(found, accepted, in_quotes(near) if near else ""))
+            raise ContextError(Fault(found, accepted, mend_for(str(condition), known)))
         for name in has:
             named[name][axis] = condition
     return named
 
 
 def _having(tables: Mapping[str, Table], condition: str) -> Iterator[str]:
-    """The tables that have such a condition of a name."""
     for name, table in tables.items():
         if any(c.condition.name == condition and is_axis(c.condition) for c in table.flat().conditions):
             yield name

@@ -68,7 +68,6 @@ class Slice:
         return round(self.covered or 0.0, DIGITS), -round(self.share, DIGITS)
 
     def to_json(self) -> dict[str, object]:
-        """As plain data."""
         return {
             "cells": self.cells,
             "share": self.share,
@@ -142,7 +141,6 @@ class PairTable:
         return ((i, j) for i in range(len(self.conditions)) for j in range(i + 1, len(self.conditions)))
 
     def to_json(self) -> dict[str, object]:
-        """As plain data."""
         items = [
             {
                 "conditions": [self.conditions[i], self.conditions[j]],

@@ -29,7 +29,6 @@ from contextdb.covering.kernels import ALL, IS_COMPILED, NONE, ONE, mixed, njit,
 
 @njit(**options)
 def part_of(boxes, factors, weights, salts, table):
-    """The part of some boxes over some factors."""
     cells, edges = table[0], table[4]
     n_words, n_classes = (boxes.shape[0] + 63) >> 6, 0
     for x in range(factors.shape[0]):

@@ -28,7 +28,6 @@ class Progress:
 
     @property
     def is_silent(self) -> bool:
-        """Whether nobody waits."""
         return self.tell is None and self.should_stop is None
 
     def within(self, part: str, start: float, stop: float) -> Progress:

@@ -24,7 +24,6 @@ class Nearest:
     cell: str
 
     def to_json(self) -> dict[str, object]:
-        """As plain data."""
         return {"row": self.row, "asset": self.asset, "changes": self.n_changes, "condition": self.condition, "cell": self.cell}
 
 
@@ -50,7 +49,6 @@ class Gap:
         return ", ".join(f"{name}: {cell}" for name, cell in self.cells.items()) or "every context"
 
     def to_json(self) -> dict[str, object]:
-        """As plain data."""
         nearest = None if self.nearest is None else self.nearest.to_json()
         return {
             "id": self.id,
@@ -72,7 +70,6 @@ class Overlap:
     method: Literal["exact", "estimate"]
 
     def to_json(self) -> dict[str, object]:
-        """As plain data."""
         return {"mean": self.mean, "histogram": list(self.histogram), "method": self.method}
 
 
@@ -91,7 +88,6 @@ class Crowd:
         return len(self.rows)
 
     def to_json(self) -> dict[str, object]:
-        """As plain data."""
         return {"rows": list(self.rows), "share": self.share, "cells": self.cells}
 
 

@@ -108,7 +108,6 @@ class _Folder:
         """The rows whose rule is false in every context: they are switched off."""
 
     def add(self, rule: Rule) -> None:
-        """Put one rule in."""
         boxes, expression = rule.true_boxes, rule.expression
         if constant_truth(expression) is False:
             self.never |= rule.rows

@@ -9,21 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contextdb.covering.count_kernels import (
-    CUT,
-    DENSE,
-    LIMIT,
-    ROOM,
-    WORK,
-    choose,
-    count_bits,
-    drop_inner,
-    holds_one_of,
-    list_factors,
-    numbers_of,
-    open_all,
-    split,
-)
+from contextdb.covering import count_kernels
 from contextdb.covering.kernels import ALL, IS_COMPILED, NONE, ONE, lowest_bit, njit, options
 from contextdb.covering.part_kernels import part_of
 
@@ -36,42 +22,44 @@ def leaves_open(part, depth, n_listed, weights, salts, table, scratch, state):
     """Whether some context is in no open box of a part; "no" where that was cut short, which state[CUT] tells."""
     opened, kept, listed, chosen = scratch[:4]
     n_words, open_boxes = part[1].shape[1], opened[depth]
-    n = list_factors(part, depth, n_listed, scratch)
-    state[WORK] += 2 + (n_listed * n_words >> 4)
+    n = count_kernels.list_factors(part, depth, n_listed, scratch)
+    state[count_kernels.WORK] += 2 + (n_listed * n_words >> 4)
     if n < 0:
         return False
-    m = count_bits(open_boxes, n_words)
+    m = count_kernels.count_bits(open_boxes, n_words)
     if m <= 1:
         return True
-    if state[WORK] >= state[LIMIT] or depth >= opened.shape[0] - ROOM:
-        state[CUT] += 1
+    if state[count_kernels.WORK] >= state[count_kernels.LIMIT] or depth >= opened.shape[0] - count_kernels.ROOM:
+        state[count_kernels.CUT] += 1
         return False
-    if n_words > 1 and m <= DENSE * n_words:
-        less = part_of(numbers_of(part[9], open_boxes, n_words, m), part[0][listed[depth + 1, :n]], weights, salts, table)
-        state[WORK] += m * n >> 3
-        return leaves_open(less, depth + 2, open_all(less, depth + 2, scratch), weights, salts, table, scratch, state)
+    if n_words > 1 and m <= count_kernels.DENSE * n_words:
+        less = part_of(
+            count_kernels.numbers_of(part[9], open_boxes, n_words, m), part[0][listed[depth + 1, :n]], weights, salts, table
+        )
+        state[count_kernels.WORK] += m * n >> 3
+        return leaves_open(less, depth + 2, count_kernels.open_all(less, depth + 2, scratch), weights, salts, table, scratch, state)
     if n_words <= 2:
-        state[WORK] += m * n_words >> 2
-        if drop_inner(part, depth, n, scratch):
-            n = list_factors(part, depth, n_listed, scratch)
-    if split(part, depth, n, scratch):
+        state[count_kernels.WORK] += m * n_words >> 2
+        if count_kernels.drop_inner(part, depth, n, scratch):
+            n = count_kernels.list_factors(part, depth, n_listed, scratch)
+    if count_kernels.split(part, depth, n, scratch):
         opened[depth + 1, :n_words] = kept[depth, :n_words]
         if not leaves_open(part, depth + 1, n, weights, salts, table, scratch, state):
             return False
         for w in range(n_words):
             opened[depth + 1, w] = open_boxes[w] & ~kept[depth, w]
         return leaves_open(part, depth + 1, n, weights, salts, table, scratch, state)
-    n_chosen, n_tried = choose(part, depth, n, FIRST, scratch), 0
-    state[WORK] += n_chosen * n_words >> 2
+    n_chosen, n_tried = count_kernels.choose(part, depth, n, FIRST, scratch), 0
+    state[count_kernels.WORK] += n_chosen * n_words >> 2
     for t in range(n_chosen):
         group = chosen[depth, t]
-        if holds_one_of(part[2], group, chosen[depth, :n_tried], open_boxes):
+        if count_kernels.holds_one_of(part[2], group, chosen[depth, :n_tried], open_boxes):
             continue
         for w in range(n_words):
             opened[depth + 1, w] = part[2][group, w] & open_boxes[w]
         if leaves_open(part, depth + 1, n - 1, weights, salts, table, scratch, state):
             return True
-        if state[CUT]:
+        if state[count_kernels.CUT]:
             return False
         chosen[depth, n_tried] = group
         n_tried += 1

@@ -28,7 +28,7 @@ from contextdb.cells.sets import Accepted, Cell, NumberSet, TagMeet, TagSet
 from contextdb.compiled.data import CompiledData
 from contextdb.covering.factors import Factor, NumberFactor, TagFactor, ValueFactor, tag_factors, weighted
 from contextdb.covering.progress import SILENT, Progress
-from contextdb.errors import ContextError, Fault, Place, TableError, in_quotes, nearest, plural, some
+from contextdb.errors import ContextError, Fault, Place, TableError, in_quotes, no_such, plural
 
 _WEIGHTS = "a mapping of conditions to mappings of cells to numbers"
 
@@ -149,7 +149,6 @@ class Space:
 
     @cached_property
     def full(self) -> Box:
-        """The box of every context."""
         return tuple((1 << len(f.weights)) - 1 for f in self.factors)
 
     def sides(self, at: int, accepts: Accepted | None) -> tuple[int, ...]:
@@ -199,7 +198,6 @@ class Space:
 
     @cached_property
     def condition_of(self) -> tuple[int, ...]:
-        """For each factor the number of its condition."""
         return tuple(at for at, numbers in enumerate(self.of_condition) for _ in numbers)
 
     def cells(self, sides: Sides, is_label: bool = False) -> dict[str, str]:
@@ -284,7 +282,6 @@ def _codes_of(compiled: CompiledData, at: int, most_rows: int | None) -> Sequenc
 
 
 def tags_of(accepts: TagSet) -> frozenset[str]:
-    """The tags that a set of tag sets names."""
     parts = accepts.parts if isinstance(accepts, TagMeet) else (accepts,)
     return frozenset(tag for part in parts for tag in (*part.needs, *part.bans))
 
@@ -328,8 +325,7 @@ def _condition(name: str, conditions: Sequence[Condition]) -> Condition:
         if condition.name == name:
             return condition
     known = [c.name for c in conditions]
-    near = nearest(require_text(name, "the name of a condition"), known)
-    raise ContextError(Fault(f"there is no condition {in_quotes(name)}.", some(known), in_quotes(near) if near else ""))
+    raise ContextError(no_such("condition", require_text(name, "the name of a condition"), known))
 
 
 def _read_box(box: CellBox, conditions: Sequence[Condition]) -> dict[str, Cell]:
@@ -368,5 +364,4 @@ def runs_of(side: int) -> list[tuple[int, int]]:
 
 
 def used_factors(boxes: Iterable[Box], full: Box) -> list[int]:
-    """The factors that some box restricts."""
     return sorted({f for box in boxes for f, side in enumerate(box) if side != full[f]})

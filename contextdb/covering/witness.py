@@ -109,7 +109,6 @@ class BoxSet:
 
     @property
     def all(self) -> int:
-        """Every box."""
         return (1 << self.n_boxes) - 1
 
     def meeting(self, f: int, side: int) -> int:

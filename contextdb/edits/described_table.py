@@ -78,7 +78,6 @@ class Difference:
     """The cell that the clip would have."""
 
     def to_json(self) -> dict[str, Any]:
-        """As plain data."""
         return {name: getattr(self, name) for name in self.__slots__}
 
     def __str__(self) -> str:
@@ -98,7 +97,6 @@ class DescribedTable:
 
     @property
     def toml_path(self) -> Path:
-        """The contextdb.toml."""
         return self.folder / SCHEMA_FILE
 
     @property

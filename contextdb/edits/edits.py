@@ -116,7 +116,6 @@ def insert_rows(table: Table, at: int, rows: Sequence[Mapping[str, str]], name: 
 
 
 def delete_rows(table: Table, rows: Sequence[int]) -> Edit:
-    """Delete rows."""
     gone = _rows_of(table, rows)
     return Edit(f"Delete {_named(table, gone)}", (Rows(np.delete(np.arange(table.n_rows), gone)),))
 
@@ -154,8 +153,7 @@ def enable_rows(table: Table, rows: Sequence[int], is_enabled: bool) -> Edit:
         column = _free_name("Enabled", table)
         changes += [Columns((*_layout(table), (column, None))), Sections({"enabled": column})]
     texts = dict.fromkeys(chosen.tolist(), str(is_enabled))
-    name = f"{'Enable' if is_enabled else 'Disable'} {_named(table, chosen)}"
-    return Edit(name, (*changes, Cells({column: texts})))
+    return Edit(f"{'Enable' if is_enabled else 'Disable'} {_named(table, chosen)}", (*changes, Cells({column: texts})))
 
 
 # ---- edits of columns

@@ -87,7 +87,6 @@ class Renaming:
 
     @property
     def reversed(self) -> Renaming:
-        """What takes it back."""
         return Renaming(self.new, self.old, tuple(Rewrite(file.path, file.after, file.before) for file in self.files))
 
     def write(self) -> None:
@@ -127,7 +126,6 @@ class TableFile:
 
     @property
     def rules(self) -> TextColumn | None:
-        """The column of rules."""
         return next((c for c in self.columns if c.name == self.settings.when), None)
 
 
@@ -331,8 +329,7 @@ def rewritten_toml(path: Path, raw: bytes, change: Callable[[dict[str, Any]], No
         text = _with_section(text, section, tomllib.loads(text).get(section, {}), wanted.get(section, {}))
     if tomllib.loads(text) != wanted:
         found = "this cannot be renamed without changing more of the file."
-        mend = "to rename it in a text editor"
-        raise SchemaError(Fault(found, "sections such as [conditions.NAME]", mend, Place(str(path))))
+        raise SchemaError(Fault(found, "sections such as [conditions.NAME]", "to rename it in a text editor", Place(str(path))))
     read_schema(text, str(path))  # refuses what no project can be
     yield Rewrite(path, raw, bom + text.encode())
 

@@ -34,7 +34,6 @@ class AssetUses:
     n_cases: int = 0
     n_fallbacks: int = 0
     n_markup: int = 0
-    """Lines of markup."""
     clips: tuple[str, ...] = ()
     """Files of clips that are called so."""
 

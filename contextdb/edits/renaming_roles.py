@@ -14,19 +14,7 @@ from pathlib import Path
 from contextdb.cells.outputs import SLOT_COLUMNS
 from contextdb.columns import TextColumn
 from contextdb.disk import read_bytes
-from contextdb.edits.renaming import (
-    Renaming,
-    Rewrite,
-    TableFile,
-    actors_path,
-    everywhere_in,
-    folder_of,
-    only_here_in,
-    rewritten_table,
-    rewritten_toml,
-    uses_of,
-    with_texts,
-)
+from contextdb.edits import renaming
 from contextdb.edits.renaming_values import with_value
 from contextdb.errors import Fault, SchemaError, in_quotes, plural
 from contextdb.schema.settings import Schema, TableSettings
@@ -43,7 +31,7 @@ def facts_of(table: Table, role: str) -> tuple[str, ...]:
 
 def role_uses(table: Table, role: str) -> tuple[str, tuple[str, ...]]:
     """What speaks of a role, in words, and the other tables that do."""
-    uses = [uses_of(table, fact) for fact in facts_of(table, role)]
+    uses = [renaming.uses_of(table, fact) for fact in facts_of(table, role)]
     tables = tuple(dict.fromkeys(name for one in uses for name in one.tables))
     derived = {name for one in uses for name in one.derived if name.partition(".")[0] != role}
     counts = (
@@ -57,16 +45,16 @@ def role_uses(table: Table, role: str) -> tuple[str, tuple[str, ...]]:
     return ", ".join(plural(n, noun) for n, noun in counts if n), tables
 
 
-def role_renaming(table: Table, old: str, new: str, only_here: bool = False) -> Renaming:
+def role_renaming(table: Table, old: str, new: str, only_here: bool = False) -> renaming.Renaming:
     """What is to be written so that a role has another name, in all the project or in this table only. Raises TableError,
     SchemaError or FileError where there is such a role already, or it is no name; a file cannot be read, or could not say what it
     should."""
-    folder = folder_of(table)
+    folder = renaming.folder_of(table)
     assert table.path is not None
     raw = read_bytes(folder / SCHEMA_FILE) if (folder / SCHEMA_FILE).is_file() else b""
     schema = read_folder_schema(folder) if raw else table.schema
     read = {
-        path.resolve(): TableFile.read(name, path, schema.tables.get(name, TableSettings(name)))
+        path.resolve(): renaming.TableFile.read(name, path, schema.tables.get(name, TableSettings(name)))
         for name, path in table_files(folder, schema)
     }
     own = read[table.path.resolve()]
@@ -75,12 +63,16 @@ def role_renaming(table: Table, old: str, new: str, only_here: bool = False) -> 
     _require_role(new, {*schema.conditions, *(c.name for file in files for c in file.columns)})
     found = [rewrite for file in files for rewrite in _rewritten(file, names, old, new)]
     if raw:
-        change = (lambda said: only_here_in(said, names, own.name)) if only_here else (lambda said: everywhere_in(said, names))
-        found += rewritten_toml(folder / SCHEMA_FILE, raw, change, {} if only_here else names)
-    return Renaming(old, new, tuple(found))
+        change = (
+            (lambda said: renaming.only_here_in(said, names, own.name))
+            if only_here
+            else (lambda said: renaming.everywhere_in(said, names))
+        )
+        found += renaming.rewritten_toml(folder / SCHEMA_FILE, raw, change, {} if only_here else names)
+    return renaming.Renaming(old, new, tuple(found))
 
 
-def _names(schema: Schema, files: list[TableFile], old: str, new: str) -> dict[str, str]:
+def _names(schema: Schema, files: list[renaming.TableFile], old: str, new: str) -> dict[str, str]:
     """The conditions of the role, each with its other name."""
     columns = (c.name for file in files for c in file.columns if file.has_condition(c.name))
     named = (name for name in dict.fromkeys((*schema.conditions, *columns)) if name.startswith(f"{old}."))
@@ -95,17 +87,17 @@ def _require_role(new: str, taken: set[str]) -> None:
         raise SchemaError(Fault(f"there is a role {in_quotes(new)} already.", "a name that no role has yet"))
 
 
-def _rewritten(file: TableFile, names: Mapping[str, str], old: str, new: str) -> Iterator[Rewrite]:
+def _rewritten(file: renaming.TableFile, names: Mapping[str, str], old: str, new: str) -> Iterator[renaming.Rewrite]:
     def slots(column: TextColumn) -> TextColumn:
         if column.name not in SLOT_COLUMNS or column.name not in file.settings.outputs:
             return column
-        return with_texts(column, {text: with_value(text, old, new) for text in column.texts})
+        return renaming.with_texts(column, {text: with_value(text, old, new) for text in column.texts})
 
-    yield from rewritten_table(file, names, slots)
-    yield from _rewritten_actors(actors_path(file.path), names, old, new)
+    yield from renaming.rewritten_table(file, names, slots)
+    yield from _rewritten_actors(renaming.actors_path(file.path), names, old, new)
 
 
-def _rewritten_actors(path: Path, names: Mapping[str, str], old: str, new: str) -> Iterator[Rewrite]:
+def _rewritten_actors(path: Path, names: Mapping[str, str], old: str, new: str) -> Iterator[renaming.Rewrite]:
     if not path.is_file():
         return
     raw = read_bytes(path)
@@ -118,4 +110,4 @@ def _rewritten_actors(path: Path, names: Mapping[str, str], old: str, new: str) 
     except (ValueError, AttributeError, TypeError):  # no file of actors: said where it is read
         return
     if renamed != teams:
-        yield Rewrite(path, raw, (json.dumps(renamed, ensure_ascii=False, indent=2) + "\n").encode())
+        yield renaming.Rewrite(path, raw, (json.dumps(renamed, ensure_ascii=False, indent=2) + "\n").encode())

@@ -14,7 +14,7 @@ from typing import Any
 
 from contextdb.disk import read_bytes
 from contextdb.edits.schema_file import SchemaChange
-from contextdb.errors import Fault, Place, SchemaError, in_quotes, nearest, some
+from contextdb.errors import Fault, Place, SchemaError, in_quotes, mend_for, some
 from contextdb.files.toml_text import Path as KeyPath
 from contextdb.motion.storage.config import MotionConfig
 from contextdb.schema import toml_edit
@@ -60,16 +60,13 @@ def weights_change(
 
 def _known(section: str, name: str, parts: Mapping[str, Any], path: Path) -> Any:
     if name not in parts:
-        near = nearest(name, parts)
-        found = f"there is no [{section}.{name}]."
-        raise SchemaError(Fault(found, some(parts) or "none", in_quotes(near) if near else "", Place(str(path))))
+        raise SchemaError(Fault(f"there is no [{section}.{name}].", some(parts) or "none", mend_for(name, parts), Place(str(path))))
     return parts[name]
 
 
 def _place(name: str, known: list[str], found: str, path: Path) -> int:
     if name not in known:
-        near = nearest(name, known)
-        raise SchemaError(Fault(f"{found} {in_quotes(name)}.", some(known), in_quotes(near) if near else "", Place(str(path))))
+        raise SchemaError(Fault(f"{found} {in_quotes(name)}.", some(known), mend_for(name, known), Place(str(path))))
     return known.index(name)
 
 

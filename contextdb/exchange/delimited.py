@@ -213,3 +213,22 @@ def _pointed(column: TextColumn, numeric: Sequence[str]) -> TextColumn:
     if len(Counter(texts)) < len(texts):  # two texts became one
         return TextColumn.of(column.name, (texts[code] for code in column.codes.tolist()))
     return replace(column, texts=tuple(texts))
+
+
+# ---- tab-separated text
+
+
+_NEEDS_QUOTES = re.compile(r'[\t\r\n]|^"')
+
+
+def tsv_field(text: str) -> str:
+    """A cell as tab-separated text has it."""
+    return '"' + text.replace('"', '""') + '"' if _NEEDS_QUOTES.search(text) else text
+
+
+def write_tab_text(columns: Sequence[TextColumn]) -> bytes:
+    """Columns as tab-separated text in UTF-8, the names first."""
+    fields = [[tsv_field(text) for text in column.texts] for column in columns]
+    header = "\t".join(tsv_field(column.name) for column in columns)
+    cells = [[texts[code] for code in column.codes.tolist()] for texts, column in zip(fields, columns, strict=True)]
+    return "".join(f"{line}\n" for line in (header, *map("\t".join, zip(*cells, strict=True)))).encode()

@@ -9,7 +9,6 @@ from contextdb.schema.sections import condition_to_dict, settings_to_dict
 from contextdb.tables.table import Table
 
 TYPES_SHEET = "contextdb"
-"""The name of that sheet."""
 FIRST_LINE = "# contextdb 1: what contextdb.toml says of this table; contextdb import reads it"
 LONG_LINE = 1_000
 """A list of more characters has a line for each value: Excel holds so many in a cell, and no more."""

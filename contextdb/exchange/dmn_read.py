@@ -22,7 +22,7 @@ from contextdb.cells.domains import TEXT, Domain
 from contextdb.cells.output_types import OUTPUT_TYPES, OutputValue
 from contextdb.cells.outputs import Output
 from contextdb.columns import TextColumn
-from contextdb.errors import Fault, Place, TableError, in_quotes, nearest, plural, shown, some
+from contextdb.errors import Fault, Place, TableError, in_quotes, no_such, plural, shown, some
 from contextdb.exchange.conflicts import require_no_conflicts
 from contextdb.exchange.dmn_types import InputType, Types, children_of, domain_of, tag_of, text_of
 from contextdb.exchange.encodings import decoded
@@ -150,11 +150,7 @@ def _chosen(root: Element, wanted: str | None, file: str) -> tuple[Element, str]
         for (one, table), name in zip(found, names, strict=True):
             if wanted in (name, one.get("id")):
                 return table, name
-        near = nearest(wanted, names)
-        fault = Fault(
-            f"there is no decision table {in_quotes(wanted)}.", some(names) or "none", in_quotes(near) if near else "", Place(file)
-        )
-        raise TableError(fault)
+        raise TableError(no_such("decision table", wanted, names, some(names) or "none", Place(file)))
     if not found:
         raise TableError(Fault("the file has no decision table.", _ACCEPTED, place=Place(file)))
     if len(found) > 1:
@@ -287,7 +283,6 @@ class Rules:
         return [TextColumn.of(name, texts)]
 
     def remarks(self) -> Iterator[Remark]:
-        """What is said of the rules."""
         if self.n_tests:
             named = f"; the game supplies the other facts that they name: {listed(list(self.facts))}" if self.facts else ""
             yield Remark(f"{plural(self.n_tests, 'test')} that no cell can say became rules of their rows{named}.")

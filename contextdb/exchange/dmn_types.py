@@ -74,7 +74,6 @@ class Types:
 
     @classmethod
     def of(cls, root: Element) -> Types:
-        """Read the types of a file."""
         items = dict(_items(root))
         named = [one for tag in ("inputData", "decision") for one in children_of(root, tag)]
         variables = [(one, next(iter(children_of(one, "variable")), None)) for one in named]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import codecs
 
-from contextdb.errors import Fault, Place, TableError, in_quotes, nearest
+from contextdb.errors import Fault, Place, TableError, in_quotes, no_such
 from contextdb.exchange.reading import Remark
 from contextdb.files.strangers import line_of, other_kind
 
@@ -67,11 +67,7 @@ def _known(encoding: str, file: str) -> str:
         codecs.lookup(encoding)
         "".encode(encoding)
     except (LookupError, UnicodeError):
-        near = nearest(encoding, COMMON)
-        fault = Fault(
-            f"there is no encoding {in_quotes(encoding)}.", ", ".join(COMMON), in_quotes(near) if near else "", Place(file)
-        )
-        raise TableError(fault) from None
+        raise TableError(no_such("encoding", encoding, COMMON, ", ".join(COMMON), Place(file))) from None
     return encoding
 
 

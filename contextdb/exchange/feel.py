@@ -30,7 +30,6 @@ from contextdb.cells.words import NUMBER_TEXT, quoted
 _PART = re.compile(r'"(?:[^"\\]|\\.)*"?|[^,"]+|,', re.DOTALL)
 """A string, also one that is not closed, so that no part of a text is looked at twice; a comma; or what is between."""
 STRING = re.compile(r'"(?:[^"\\]|\\.)*"', re.DOTALL)
-"""A string of FEEL."""
 STRINGS = re.compile(rf"\s*{STRING.pattern}\s*(?:,\s*{STRING.pattern}\s*)*", re.DOTALL)
 """Strings with commas between."""
 _ESCAPE = re.compile(r"\\(u[0-9A-Fa-f]{4}|U(?:0[0-9A-Fa-f]|10)[0-9A-Fa-f]{4}|.)", re.DOTALL)
@@ -51,7 +50,6 @@ MOST_NOTS = 8
 
 
 def strings_of(text: str) -> list[str]:
-    """The texts of the strings in a text, in order."""
     return [string_of(part) for part in _PART.findall(text) if len(part) > 1 and STRING.fullmatch(part)]
 
 
@@ -146,7 +144,6 @@ def value_of(expression: str) -> str | None:
 
 
 def feel_type(kind: Kind) -> str:
-    """The type of FEEL that facts of a type have."""
     return kind.name if kind.is_spelt else "number" if kind.is_numeric else "boolean" if kind.is_truth else "string"
 
 
@@ -174,7 +171,6 @@ def _with_half_turn(spans: Spans) -> Spans:
 
 
 def feel_number(number: float, kind: Kind) -> str:
-    """A number as FEEL writes it."""
     return _written(kind.spelling.write(number), kind)
 
 
@@ -202,6 +198,5 @@ def _values_test(accepts: ValueSet) -> str | None:
 
 
 def literal(text: str) -> str:
-    """A text as a string of FEEL."""
     plain = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n").replace("\r", "\\r").replace("\t", "\\t")
     return f'"{plain}"'

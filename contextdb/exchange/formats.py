@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import PurePath
 
 from contextdb.columns import TextColumn
-from contextdb.errors import Fault, FileError, Place, TableError, in_quotes, nearest
+from contextdb.errors import Fault, FileError, Place, TableError, in_quotes, nearest, no_such
 from contextdb.exchange.formulas import Formulas
 from contextdb.exchange.reading import Reading, Remark
 from contextdb.files.strangers import page, pointer, seems_to_be
@@ -72,8 +72,7 @@ def format_of(name: str, wanted: str | None = None, raw: bytes = b"", for_writin
     known = {key: one for key, one in FORMATS.items() if (one.is_written if for_writing else one.is_read)}
     if wanted is not None:
         if wanted not in known:
-            near = nearest(wanted, known)
-            raise FileError(Fault(f"there is no format {in_quotes(wanted)}.", ", ".join(known), in_quotes(near) if near else ""))
+            raise FileError(no_such("format", wanted, known, ", ".join(known)))
         return known[wanted]
     if sign := _BINARY_SIGNS.get(seems_to_be(raw[:10_000]) or ""):
         return known[sign]
@@ -213,7 +212,7 @@ def _written(table: Table, kind: str, formulas: Formulas) -> tuple[bytes, tuple[
 
         return written_over(table.source, columns, table.origin, as_parquet=kind == "parquet").raw, told
     if kind == "tsv":
-        from contextdb.exchange.tab_text import write_tab_text
+        from contextdb.exchange.delimited import write_tab_text
 
         return write_tab_text(columns), told
     if kind in ("json", "jsonl"):

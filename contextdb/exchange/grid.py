@@ -198,8 +198,7 @@ def doubts(columns: Sequence[TextColumn]) -> list[Remark]:
     odd = next((c for c in columns if _is_value(c.name) or (c.name and c.name in c.texts)), None)
     if odd is not None:
         why = "also appears among its cells" if odd.name in odd.texts else "looks like a value"
-        told = f"is the header missing? The column name {in_quotes(odd.name)} {why}. The first row is read as names."
-        found.append(Remark(told))
+        found.append(Remark(f"is the header missing? The column name {in_quotes(odd.name)} {why}. The first row is read as names."))
     last = columns[0].n_rows - 1 if columns else -1
     first = next((c[last] for c in columns if c[last].strip()), "") if last > 0 else ""
     if first.strip().rstrip(":").casefold() in _SUMS:

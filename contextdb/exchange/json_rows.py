@@ -13,8 +13,7 @@ from contextdb.columns import TextColumn
 from contextdb.errors import Fault, Place, TableError, in_quotes, row_name
 from contextdb.exchange.conflicts import require_no_conflicts
 from contextdb.exchange.json_shapes import rows_of_shape
-from contextdb.exchange.reading import Reading, Remark, listed
-from contextdb.exchange.values import text_of_value
+from contextdb.exchange.reading import Reading, Remark, listed, text_of_value
 from contextdb.files.csv_faults import MOST_CHARACTERS
 from contextdb.files.csv_source import name_faults
 from contextdb.files.toml_text import what

@@ -15,7 +15,7 @@ from contextdb.cells.grammar import reads
 from contextdb.cells.kinds import KINDS
 from contextdb.columns import TextColumn
 from contextdb.edits.edits import check_cell
-from contextdb.errors import ContextDBError, Fault, in_quotes, nearest, plural, some
+from contextdb.errors import ContextDBError, Fault, in_quotes, mend_for, nearest, plural, some
 from contextdb.exchange.proposals import as_lists, as_numbers, n_unreadable, names_of, pair_in, propose_type, rewritten
 from contextdb.exchange.reading import Reading
 from contextdb.schema.jobs import PlainJob
@@ -42,7 +42,6 @@ class Mapped:
     source: str
     """Its name in the file."""
     name: str
-    """Its name in the table."""
     job: Job
     why: str
     """Why, in a few words for a person."""
@@ -158,8 +157,7 @@ def _require_known(renames: Mapping[str, str], names: Sequence[str]) -> None:
     faults = []
     for source in renames:
         if source not in names:
-            near = nearest(source, names)
-            faults.append(Fault(f"the file has no column {in_quotes(source)}.", some(names), in_quotes(near) if near else ""))
+            faults.append(Fault(f"the file has no column {in_quotes(source)}.", some(names), mend_for(source, names)))
     if faults:
         raise ContextDBError(*faults)
 

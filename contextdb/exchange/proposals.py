@@ -94,7 +94,6 @@ class _Said:
         return self.n_errors + sum(n for is_read, n in self.reads(domain) if not is_read)
 
     def read_as(self, domain: Domain) -> list[str]:
-        """The texts that a domain reads."""
         return [text for text, (is_read, _) in zip(self.texts, self.reads(domain), strict=True) if is_read]
 
     @property

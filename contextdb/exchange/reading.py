@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import datetime
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.cells.words import quoted, says_any
+from contextdb.cells.words import format_number, quoted, says_any
 from contextdb.columns import TextColumn
 from contextdb.errors import TableError, shown
 from contextdb.files.texts import AnySource
@@ -123,3 +125,34 @@ def listed(names: Sequence[str], most: int = 6) -> str:
     """Names for a remark, the first few of them."""
     head = ", ".join(f'"{shown(name)}"' for name in names[:most])
     return head if len(names) <= most else f"{head} and {len(names) - most} more"
+
+
+# ---- values of other formats as the texts of cells
+
+
+DATES = (datetime.date, datetime.time, datetime.datetime, datetime.timedelta)
+
+
+def text_of_value(value: object) -> str:
+    """The text of a value: a string as it is, a bool True or False, a number in the fewest digits, a list its names, None empty.
+
+    Dates become ISO texts, at midnight without a time; NaN, which no cell can mean, is empty. What is nested deeper becomes its
+    Python text.
+    """
+    if isinstance(value, str):
+        return value
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return ""
+    if isinstance(value, bool):
+        return str(value)
+    if isinstance(value, int):
+        return str(value)
+    if isinstance(value, float):
+        return format_number(value)
+    if isinstance(value, datetime.datetime) and value.time() == datetime.time():
+        return value.date().isoformat()
+    if isinstance(value, (datetime.date, datetime.time)):
+        return value.isoformat()
+    if isinstance(value, (list, tuple)):
+        return " ".join(quoted(text_of_value(item)) for item in value)
+    return str(value)

@@ -14,11 +14,10 @@ from typing import Any
 import python_calamine as calamine
 
 from contextdb.columns import TextColumn
-from contextdb.errors import ContextDBError, Fault, Place, TableError, in_quotes, nearest, plural, shown, some
+from contextdb.errors import ContextDBError, Fault, Place, TableError, in_quotes, mend_for, plural, shown, some
 from contextdb.exchange.described import FIRST_LINE, TYPES_SHEET
 from contextdb.exchange.grid import Block, column_letters, columns_of, parse_block
-from contextdb.exchange.reading import ERRORS, Reading, Remark, SheetWanted, capped, listed
-from contextdb.exchange.values import DATES, text_of_value
+from contextdb.exchange.reading import DATES, ERRORS, Reading, Remark, SheetWanted, capped, listed, text_of_value
 from contextdb.exchange.xlsx_scan import Marks, is_old, marks_of, require_workbook
 from contextdb.schema.settings import EMPTY, Schema, read_schema
 
@@ -92,8 +91,8 @@ def _wanted(sheet: str | None, names: Sequence[str], file: str) -> tuple[str | N
     name = name.strip("'") or names[0]
     if block is not None and name in names and (mark or len(names) == 1):
         return name, block
-    near = nearest(sheet.partition("!")[0], names)
-    raise TableError(Fault(f"there is no sheet {in_quotes(sheet)}.", some(names), in_quotes(near) if near else "", Place(file)))
+    mend = mend_for(sheet.partition("!")[0], names)
+    raise TableError(Fault(f"there is no sheet {in_quotes(sheet)}.", some(names), mend, Place(file)))
 
 
 def _hidden_sheets(book: calamine.CalamineWorkbook) -> frozenset[str]:
@@ -178,8 +177,7 @@ def _fill_merged(grid: list[list[str]], merged: Sequence[tuple[tuple[int, int], 
         block, text = Block(top, left, min(bottom + 1, len(grid)), min(right + 1, len(grid[0]))), grid[top][left]
         n_left -= (block.bottom - block.top) * (block.right - block.left)
         if n_left < 0:
-            fault = Fault("the workbook is broken: merged areas overlap.", "a workbook as Excel saves it")
-            raise TableError(fault.at(Place(file)))
+            raise TableError(Fault("the workbook is broken: merged areas overlap.", "a workbook as Excel saves it").at(Place(file)))
         for row in grid[block.top : block.bottom]:
             row[block.left : block.right] = [text] * (block.right - block.left)
         remarks.append(Remark(f"merged cells; each now holds {in_quotes(text)}.", f"cells {block}"))

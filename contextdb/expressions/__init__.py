@@ -28,19 +28,5 @@ from contextdb.expressions.expression import Expression, read_expression
 from contextdb.expressions.faults import ExpressionError, ExpressionFault
 from contextdb.expressions.names import names_in, with_names
 
-__all__ = [
-    "Assumptions",
-    "Box",
-    "Derivation",
-    "Expression",
-    "ExpressionError",
-    "ExpressionFault",
-    "assumption_faults",
-    "constant_truth",
-    "derivation_faults",
-    "derive",
-    "names_in",
-    "read_assumptions",
-    "read_expression",
-    "with_names",
-]
+__all__ = ["Assumptions", "Box", "Derivation", "Expression", "ExpressionError", "ExpressionFault", "assumption_faults"]
+__all__ += ["constant_truth", "derivation_faults", "derive", "names_in", "read_assumptions", "read_expression", "with_names"]

@@ -87,7 +87,6 @@ def highest(*values: float) -> float:
 
 
 def all_lowest(*values: Doubles) -> Doubles:
-    """The least of each."""
     least = values[0]
     for other in values[1:]:
         least = np.minimum(least, other)
@@ -95,7 +94,6 @@ def all_lowest(*values: Doubles) -> Doubles:
 
 
 def all_highest(*values: Doubles) -> Doubles:
-    """The greatest of each."""
     most = values[0]
     for other in values[1:]:
         most = np.maximum(most, other)
@@ -108,7 +106,6 @@ def clamped(value: float, low: float, high: float) -> float:
 
 
 def all_clamped(value: Doubles, low: Doubles, high: Doubles) -> Doubles:
-    """Each value clamped."""
     return np.minimum(np.maximum(value, low), high)
 
 
@@ -121,7 +118,6 @@ def length(x: float, y: float) -> float:
 
 
 def lengths(x: Doubles, y: Doubles) -> Doubles:
-    """The length of each vector."""
     most = np.maximum(np.abs(x), np.abs(y))
     scale = np.where(most > _FAR, SCALE_DOWN, np.where(most < _NEAR, SCALE_UP, 1.0))
     a, b = x * scale, y * scale
@@ -139,5 +135,4 @@ def heading(y: float, x: float) -> float:
 
 
 def headings(y: Doubles, x: Doubles) -> Doubles:
-    """The direction of each vector."""
     return wrap_angles(trigonometry.directions(y, x))

@@ -31,7 +31,6 @@ class Assumptions:
 
     expressions: tuple[Expression, ...]
     conditions: tuple[Condition, ...]
-    """The conditions of the table."""
     derived: tuple[Expression, ...] = ()
     """That derived bools of the table are what they are computed as, where boxes can tell."""
 

@@ -66,7 +66,6 @@ class _Boxes:
         self.conditions = conditions
 
     def of(self, plan: Part, truth: bool) -> list[Sets]:
-        """The boxes of a truth."""
         if isinstance(plan, Const):
             return [{}] if plan.value is truth else []
         if isinstance(plan, Given):
@@ -142,7 +141,6 @@ def _alternatives(name: str, accepts: Accepted, domain: Domain, truth: bool) -> 
 
 
 def all_of(found: Iterable[list[Sets]]) -> list[Sets]:
-    """The boxes of what is in each of some lists of boxes."""
     common: list[Sets] = [{}]
     for boxes in found:
         pairs = product(common, boxes)

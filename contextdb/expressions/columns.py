@@ -173,5 +173,4 @@ def is_missing_in(column: Column, row: int) -> bool:
 
 
 def taken(column: Column, contexts: NDArray[np.int64]) -> Column:
-    """The values of some contexts."""
     return Coded(column.codes[contexts], column.values) if isinstance(column, Coded) else column[contexts]

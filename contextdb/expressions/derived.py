@@ -56,7 +56,6 @@ class Derivation:
 
     @cached_property
     def names(self) -> frozenset[str]:
-        """The derived facts."""
         return frozenset(step.condition.name for step in self.steps)
 
     @cached_property

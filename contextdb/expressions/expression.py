@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import read_fact
+from contextdb.cells.kinds import Kind
 from contextdb.cells.sets import Cell
-from contextdb.errors import ContextError, Fault, Place, plural
+from contextdb.errors import ContextError, Fault, Place, in_quotes, nearest, plural, some
 from contextdb.expressions.boxes import Box, boxes_of
 from contextdb.expressions.check import Checker
 from contextdb.expressions.columns import UNKNOWN, YES, Column, as_array, read_column
@@ -21,8 +22,9 @@ from contextdb.expressions.faults import ExpressionError, Refusal, fault_of
 from contextdb.expressions.frame import run_frame
 from contextdb.expressions.parse import parse
 from contextdb.expressions.plan import Part, Type
-from contextdb.expressions.results import require_result
 from contextdb.expressions.scalar import Run, Value, is_missing, runner
+from contextdb.expressions.tokens import written_text
+from contextdb.expressions.tree import Node, Number, Text
 
 NAN = float("nan")
 
@@ -48,7 +50,6 @@ class Expression:
 
     @property
     def kind(self) -> str:
-        """The name of the type of its values."""
         return self.type.kind.name
 
     def evaluate(self, facts: Mapping[str, object]) -> float | bool | str | frozenset[str] | None:
@@ -142,3 +143,55 @@ def check_length(given: Any, condition: Condition, n_contexts: int) -> None:
     if given is not None and len(given) != n_contexts:
         told = f"the column has {plural(len(given), 'fact')}."
         raise ContextError(Fault(told, plural(n_contexts, "fact"), place=Place(column=condition.name)))
+
+
+# ---- whether a result fits its condition
+
+
+def require_result(tree: Node, found: Type, wants: Condition) -> None:
+    """Raise Refusal when the values of a whole expression cannot be those of a condition.
+
+    A number outside the condition's bounds is compared as it is, like a given one, so bounds are not asked for. An angle takes any
+    number and wraps it. A text whose values are not known is taken for an enum.
+    """
+    kind = wants.domain.type
+    if not _fits(found.kind, kind):
+        raise _wrong_kind(tree, found, wants)
+    if kind.needs_values and found.values is not None:
+        for value in sorted(found.values - wants.domain.known):
+            raise _undeclared(tree, value, wants)
+    if kind.has_unit and found.unit and wants.unit and found.unit != wants.unit:
+        why = f"this is in {in_quotes(found.unit)}, and {in_quotes(wants.name)} in {in_quotes(wants.unit)}"
+        raise Refusal(tree.start, tree.stop, why, "one unit; a factor, as in * 3.6, takes a number out of its unit")
+
+
+def _fits(found: Kind, wants: Kind) -> bool:
+    if wants.is_numeric:
+        return found.is_whole or (found.is_numeric and not wants.is_whole)
+    return found.family is wants.family and found.is_truth is wants.is_truth
+
+
+def _wrong_kind(tree: Node, found: Type, wants: Condition) -> Refusal:
+    kind = wants.domain.type
+    what = "not whole" if kind.is_whole and found.is_number else found.kind.value
+    meant = None
+    if kind.is_truth and isinstance(tree, Number):
+        meant = {0.0: "False", 1.0: "True"}.get(tree.value)
+    why = f"{in_quotes(wants.name) if wants.name else 'this place'} is of type {kind.name}, and this is {what}"
+    return Refusal(tree.start, tree.stop, why, kind.result or kind.value, meant)
+
+
+def _undeclared(tree: Node, value: str, wants: Condition) -> Refusal:
+    known = wants.domain.values or ()
+    place = next((node for node in _texts(tree) if node.value == value), tree)
+    near = nearest(value, known)
+    why = f"{in_quotes(value)} is not a declared value of {in_quotes(wants.name)}"
+    meant = written_text(near) if near and isinstance(place, Text) else None
+    return Refusal(place.start, place.stop, why, some(known), meant)
+
+
+def _texts(node: Node) -> Iterator[Text]:
+    if isinstance(node, Text):
+        yield node
+    for part in node.parts:
+        yield from _texts(part)

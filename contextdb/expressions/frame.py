@@ -28,7 +28,6 @@ _COMPARE = {
 
 
 def run_frame(plan: Part, columns: Columns, n_contexts: int) -> Column:
-    """The values of a plan for each of N contexts."""
     blocks: list[Column] = []
     with np.errstate(all="ignore"):
         for start in range(0, max(n_contexts, 1), BLOCK):
@@ -45,7 +44,6 @@ def _cut(column: Column, start: int, stop: int) -> Column:
 
 
 def _spread(value: Any, n_contexts: int) -> Column:
-    """A constant as a column."""
     if isinstance(value, Coded):
         return Coded(np.broadcast_to(value.codes, n_contexts), value.values)
     spread: Doubles | Truths = np.broadcast_to(value, n_contexts)

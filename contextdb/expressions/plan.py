@@ -24,12 +24,10 @@ class Type:
 
     @property
     def is_number(self) -> bool:
-        """Whether it is a number of some type."""
         return self.kind.is_numeric
 
     @property
     def is_text(self) -> bool:
-        """Whether it is an enum or a text."""
         return self.kind.is_named
 
 

@@ -45,7 +45,6 @@ def _parts(plan: Part) -> tuple[Part, ...]:
 
 @singledispatch
 def runner(plan: Part) -> Run:
-    """The function that computes a plan."""
     raise AssertionError(plan)
 
 
@@ -166,7 +165,6 @@ def _(plan: Select) -> Run:
 
 
 def is_number(plan: Part) -> bool:
-    """Whether a plan gives numbers."""
     if isinstance(plan, Select):
         return is_number(plan.then)
     if isinstance(plan, Const):

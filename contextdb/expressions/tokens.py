@@ -139,5 +139,4 @@ def written_name(name: str) -> str:
 
 
 def written_text(value: str) -> str:
-    """A text as an expression has it."""
     return '"' + value.replace('"', '""') + '"'

@@ -21,7 +21,6 @@ class Node:
 
     @property
     def parts(self) -> tuple[Node, ...]:
-        """The nodes right below."""
         return ()
 
 

@@ -35,7 +35,6 @@ def direction(y: float, x: float) -> float:
 
 
 def directions(y: Doubles, x: Doubles) -> Doubles:
-    """The angle of each vector."""
     wide, high = np.abs(x), np.abs(y)
     is_steep = high > wide
     most, least = np.where(is_steep, high, wide), np.where(is_steep, wide, high)

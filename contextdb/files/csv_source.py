@@ -64,7 +64,6 @@ class Source:
 
     @property
     def line_end(self) -> str:
-        """How a new record ends."""
         return next(iter(self.line_ends), "\n")
 
     @property

@@ -14,7 +14,6 @@ FORMAT = 1
 
 
 def line_of(record: Record) -> bytes:
-    """One line of a journal."""
     body = json.dumps(record, ensure_ascii=True, separators=(",", ":")).encode()
     return b"%08x %s\n" % (zlib.crc32(body), body)
 

@@ -47,7 +47,6 @@ class ParquetSource:
 
     @property
     def n_records(self) -> int:
-        """How many rows the file has."""
         return self.columns[0].n_rows
 
     def line(self, record: int) -> int | None:

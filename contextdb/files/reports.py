@@ -25,7 +25,6 @@ def document_of(text: str) -> Any:
 
 
 def sealed(document: Mapping[str, object]) -> dict[str, object]:
-    """A document with its digest."""
     return {**document, DIGEST: digest_of(document)}
 
 

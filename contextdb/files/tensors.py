@@ -134,7 +134,6 @@ def texts_to_array(texts: list[str]) -> NDArray[np.uint8]:
 
 
 def texts_from_array(octets: NDArray[np.uint8]) -> list[str]:
-    """The list of texts in an array."""
     texts: list[str] = json.loads(octets.tobytes().decode("utf-8", "surrogatepass"))
     return texts
 

@@ -52,7 +52,6 @@ class Shape:
 
 
 def said_of(key: str, value: object, most: int = SHOWN_CHARACTERS) -> str:
-    """A key with its value."""
     return shown(f"{key} = {as_toml(value)}", most)
 
 
@@ -78,7 +77,6 @@ def wrong_text(value: object) -> str | None:
 
 
 def meant_number(value: object) -> object:
-    """The number that a text holds."""
     try:
         return json.loads(value) if isinstance(value, str) else None
     except (ValueError, RecursionError):
@@ -174,7 +172,6 @@ class Section:
         self.faults.extend(fault.at(Place(self.file)) for fault in faults)
 
     def add(self, found: str, accepted: str = "", mend: str = "") -> None:
-        """Keep a fault."""
         self._keep(Fault(found, accepted, mend))
 
     def wrong(self, key: str, why: str, accepted: str, mend: str = "") -> None:
@@ -197,11 +194,9 @@ class Section:
         return None
 
     def number(self, key: str, accepted: str, least: float, most: float) -> float | None:
-        """A number from `least` to `most`."""
         return as_number(self.read(key, between(accepted, least, most)))
 
     def whole(self, key: str, accepted: str, least: int, most: int) -> int | None:
-        """A whole number from `least` to `most`."""
         number = self.read(key, between(accepted, least, most, is_whole=True))
         return None if number is None else int(number)
 
@@ -221,6 +216,5 @@ class Section:
         return word
 
     def flag(self, key: str) -> bool | None:
-        """True or false."""
         flag: bool | None = self.read(key, FLAG)
         return flag

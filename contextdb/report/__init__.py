@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from importlib import import_module
 
-from contextdb.errors import ContextDBError, Fault, in_quotes, nearest, some
+from contextdb.errors import ContextDBError, no_such
 from contextdb.findings import Level
 from contextdb.report.results import Report, Subject
 
@@ -26,15 +26,15 @@ RENDERERS: Mapping[tuple[Subject, str], tuple[str, tuple[str, ...]]] = {
     ("coverage", "html"): ("coverage_html", ()),
     ("measures", "text"): ("measure_text", ("colour", "width", "shows_all")),
     ("measures", "json"): ("render_json", ()),
-    ("measures", "junit"): ("measure_junit", ()),
+    ("measures", "junit"): ("motion_junit:measures", ()),
     ("measures", "markdown"): ("measure_markdown", ()),
     ("motion coverage", "text"): ("motion_coverage_text", ("colour", "width", "shows_all")),
     ("motion coverage", "json"): ("render_json", ()),
     ("motion coverage", "markdown"): ("motion_coverage_markdown", ()),
     ("motion coverage", "html"): ("motion_coverage_html", ()),
-    ("motion coverage", "junit"): ("motion_coverage_junit", ()),
+    ("motion coverage", "junit"): ("motion_junit:motion_coverage", ()),
 }
-"""For each subject and format the module that renders it and the options that it takes."""
+"""For each subject and format the module that renders it, by `render` or as said, and the options that it takes."""
 ERRORS: tuple[Level, ...] = ("error",)
 
 
@@ -60,10 +60,10 @@ def render(
     """
     known = formats(report.subject)
     if format_name not in known:
-        near = nearest(format_name, known)
-        found = f"there is no format {in_quotes(format_name)}."
-        raise ContextDBError(Fault(found, some(known), in_quotes(near) if near else ""))
+        raise ContextDBError(no_such("format", format_name, known))
     module, taken = RENDERERS[report.subject, format_name]
     options = {"colour": colour, "width": width, "shows_all": shows_all, "failing": failing}
-    text: str = import_module(f"contextdb.report.{module}").render(report, **{name: options[name] for name in taken})
+    module, _, function = module.partition(":")
+    rendered = getattr(import_module(f"contextdb.report.{module}"), function or "render")
+    text: str = rendered(report, **{name: options[name] for name in taken})
     return text

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from html import escape
 
 from contextdb.console import printable
 from contextdb.covering import PairTable, Slice, format_percent
 from contextdb.report.coverage_words import covered_text
+from contextdb.report.html_parts import embedded
 
 MOST_CONDITIONS = 24
 """The map shows so many conditions, those whose own values are covered least."""
@@ -64,8 +64,7 @@ def _data(pairs: PairTable, order: list[int], squares: list[tuple[int, int]]) ->
     at = {condition: i for i, condition in enumerate(order)}
     conditions = [{"name": printable(pairs.conditions[c]), "parts": [printable(p) for p in pairs.parts[c]]} for c in order]
     opened = [{"of": [at[a], at[b]], "slices": list(_slices(pairs.slices(a, b)))} for a, b in squares]
-    text = json.dumps({"conditions": conditions, "pairs": opened}, ensure_ascii=True, separators=(",", ":"))
-    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+    return embedded({"conditions": conditions, "pairs": opened})
 
 
 def _slices(slices: list[Slice]) -> Iterator[list[object]]:

@@ -5,26 +5,17 @@ What is in the page is complete without its script, which only sorts tables and 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from html import escape
-from importlib.resources import files
 
 from contextdb.console import __version__, printable
 from contextdb.covering import CoverageReport, format_percent
 from contextdb.covering.report import share_at_once
+from contextdb.report import coverage_words as words
 from contextdb.report.coverage_heat import heat_map
-from contextdb.report.coverage_results import CoverageResults, Gate, Measured, gap_moments, gap_size, has_moments
+from contextdb.report.coverage_results import CoverageResults, Measured, gap_moments, gap_size, has_moments
 from contextdb.report.coverage_text import by_rule
-from contextdb.report.coverage_words import (
-    assumed_sentences,
-    cells_text,
-    change_sentence,
-    facts_sentences,
-    gaps_sentence,
-    nearest_sentence,
-    overlap_sentence,
-)
-from contextdb.report.html_parts import POLICY, escaped, paragraph, table_of
+from contextdb.report.html_parts import cell, escaped, gates_of, page, paragraph, table_of, verdict_of
 from contextdb.report.results import as_path
 from contextdb.tables.variety import VARIETY
 
@@ -33,25 +24,13 @@ MOST_ROWS = 5_000
 
 
 def render(results: CoverageResults) -> str:
-    """The page."""
     sections = "".join(_section(measured, number) for number, measured in enumerate(results.tables))
     names = [printable(m.report.table) for m in results.tables]
     title = f"Coverage of {names[0]}" if len(names) == 1 else f"Coverage of {len(names)} tables"
     summary = _summary(results.tables) if len(names) > 1 else ""
-    verdict = f'<p class="{"passed" if results.passed else "failed"}">{escape(results.verdict)}</p>' if results.verdict else ""
-    gone = _gates(results.gone.values()) if results.gone else ""
-    return (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{escape(title)}</title>\n<style>\n{_part('coverage.css')}</style>\n</head>\n<body>\n"
-        f"<h1>{escape(title)}</h1>\n{verdict}{gone}{summary}\n<main>\n{sections}</main>\n"
-        f'<p class="muted">contextdb {__version__}</p>\n<script>\n{_part("coverage.js")}</script>\n</body>\n</html>\n'
-    )
-
-
-def _part(name: str) -> str:
-    return files("contextdb.report").joinpath(name).read_text(encoding="utf-8")
+    bars = verdict_of(results.passed, results.verdict) + (gates_of(results.gone.values()) if results.gone else "")
+    head = f"<h1>{escape(title)}</h1>\n{bars}{summary}\n"
+    return page(title, "coverage", f'{head}<main>\n{sections}</main>\n<p class="muted">contextdb {__version__}</p>\n')
 
 
 def _summary(tables: Sequence[Measured]) -> str:
@@ -64,8 +43,8 @@ def _summary(tables: Sequence[Measured]) -> str:
 def _summary_line(measured: Measured, number: int, is_held: bool) -> list[str]:
     report = measured.report
     name = f'<td class="k"><a href="#t{number}">{escaped(report.table)}</a></td>'
-    gaps = _cell(f"{len(report.gaps):,}{'' if report.gaps_complete else '+'}", len(report.gaps))
-    line = [name, _cell(format_percent(report.lower), report.lower), gaps, _cell(f"{report.n_rows:,}", report.n_rows)]
+    gaps = cell(f"{len(report.gaps):,}{'' if report.gaps_complete else '+'}", len(report.gaps))
+    line = [name, cell(format_percent(report.lower), report.lower), gaps, cell(f"{report.n_rows:,}", report.n_rows)]
     return [*line, *([_word(_kept(measured))] if is_held else []), f'<td class="share">{_bar(report)}</td>']
 
 
@@ -100,18 +79,9 @@ def _head(measured: Measured) -> Iterator[str]:
     report = measured.report
     yield paragraph(report.headline, "headline")
     yield f"{_bar(report)}\n"
-    yield from (paragraph(sentence, "muted") for sentence in assumed_sentences(report))
+    yield from (paragraph(sentence, "muted") for sentence in words.assumed_sentences(report))
     if measured.gates:
-        yield _gates(measured.gates)
-
-
-def _gates(gates: Iterable[Gate]) -> str:
-    items = (
-        f'<li><span class="{"passed" if g.passed else "failed"}">{"Passed" if g.passed else "Failed"}</span> '
-        f"{escape(g.name)}: {escaped(g.message)}</li>"
-        for g in gates
-    )
-    return f'<ul class="gates">{"".join(items)}</ul>\n'
+        yield gates_of(measured.gates)
 
 
 def _change(measured: Measured) -> Iterator[str]:
@@ -119,12 +89,12 @@ def _change(measured: Measured) -> Iterator[str]:
     if change is None:
         return
     yield "<h3>Since the baseline</h3>\n"
-    yield paragraph(f"{change_sentence(measured, change)}.")
+    yield paragraph(f"{words.change_sentence(measured, change)}.")
     rows = [("new gap", gap.text, gap.share) for gap in change.opened] + [
         ("closed gap", gap.text, gap.share) for gap in change.closed
     ]
-    lines = [[_cell(kind), _cell(text), _cell(format_percent(share), share)] for kind, text, share in rows]
-    lines += [[_cell("newly dead"), _cell(measured.named(f.row or 0)), _cell("", 0.0)] for f in change.dead]
+    lines = [[cell(kind), cell(text), cell(format_percent(share), share)] for kind, text, share in rows]
+    lines += [[cell("newly dead"), cell(measured.named(f.row or 0)), cell("", 0.0)] for f in change.dead]
     if lines:
         yield table_of("What changed", [("", False), ("contexts, or row", False), ("share", True)], lines)
 
@@ -135,28 +105,28 @@ def _telemetry(measured: Measured) -> Iterator[str]:
         return
     yield "<h3>Recorded moments</h3>\n"
     yield paragraph(seen.headline)
-    lines = [[_cell(format_percent(gap.share), gap.share), _cell(gap.text)] for gap in measured.seen_elsewhere]
+    lines = [[cell(format_percent(gap.share), gap.share), cell(gap.text)] for gap in measured.seen_elsewhere]
     if lines:
         yield table_of("Moments without a valid row", [("share of the moments", True), ("contexts", False)], lines)
-    yield from (paragraph(f"{sentence}.", "muted") for sentence in facts_sentences(seen))
+    yield from (paragraph(f"{sentence}.", "muted") for sentence in words.facts_sentences(seen))
 
 
 def _gaps(measured: Measured) -> Iterator[str]:
     report = measured.report
     yield "<h3>Gaps</h3>\n"
-    yield paragraph(f"{gaps_sentence(report)}.")
+    yield paragraph(f"{words.gaps_sentence(report)}.")
     if not report.gaps:
         return
     columns = [("", True), ("share", True), ("in no gap above", True), ("contexts without a valid row", False), ("nearest", False)]
     columns[2:2] = [("of the moments", True)] if has_moments(report) else []
     lines = [
         [
-            _cell(str(i), i),
-            _cell(gap_size(gap), gap.share),
-            *([_cell(gap_moments(gap), gap.telemetry or 0.0)] if has_moments(report) else []),
-            _cell(format_percent(gap.new_share), gap.new_share),
-            _cell(gap.text),
-            _cell(nearest_sentence(measured, gap).removeprefix("nearest: ")),
+            cell(str(i), i),
+            cell(gap_size(gap), gap.share),
+            *([cell(gap_moments(gap), gap.telemetry or 0.0)] if has_moments(report) else []),
+            cell(format_percent(gap.new_share), gap.new_share),
+            cell(gap.text),
+            cell(words.nearest_sentence(measured, gap).removeprefix("nearest: ")),
         ]
         for i, gap in enumerate(report.gaps, 1)
     ]
@@ -166,7 +136,7 @@ def _gaps(measured: Measured) -> Iterator[str]:
 def _overlap(measured: Measured) -> Iterator[str]:
     report = measured.report
     yield "<h3>Rows valid at once</h3>\n"
-    yield paragraph(f"{overlap_sentence(report)}.")
+    yield paragraph(f"{words.overlap_sentence(report)}.")
     most = max(report.overlap.histogram, default=0.0)
     bars = "".join(
         f'<tr><td class="n">{n}</td><td class="n">{escape(share_at_once(report, n))}</td>'
@@ -179,7 +149,7 @@ def _overlap(measured: Measured) -> Iterator[str]:
         table = f'<table class="hist">{head}<tbody>{bars}</tbody></table>'
         yield f'<div class="scroll" tabindex="0" role="region" aria-label="Overlap">{table}</div>\n'
     for crowd in report.crowded[:5]:
-        yield paragraph(f"{crowd.n_rows} rows where {cells_text(crowd.cells, len(crowd.cells))}", "muted")
+        yield paragraph(f"{crowd.n_rows} rows where {words.cells_text(crowd.cells, len(crowd.cells))}", "muted")
 
 
 def _findings(measured: Measured) -> Iterator[str]:
@@ -191,7 +161,7 @@ def _findings(measured: Measured) -> Iterator[str]:
     if not report.findings_complete:
         yield paragraph("The work ended before every row was decided.", "muted")
     lines = [
-        [_word(f.level), _word(rule), _cell("" if f.row is None else measured.named(f.row)), _cell(f.message)]
+        [_word(f.level), _word(rule), cell("" if f.row is None else measured.named(f.row)), cell(f.message)]
         for rule, found in blocks.items()
         for f in found[:MOST_ROWS]
     ]
@@ -219,17 +189,13 @@ def _rows(measured: Measured) -> Iterator[str]:
     for row in sorted(order):
         line = measured.lines[row]
         place = row + 1 if line is None else line
-        hits = [_cell(f"{seen.hits[row]:,}", seen.hits[row])] if seen else []
-        share = _cell(format_percent(report.hits[row]), report.hits[row])
-        lines.append([_cell(str(place), place), _cell(measured.assets[row]), share, *hits, _cell(", ".join(rules.get(row, [])))])
+        hits = [cell(f"{seen.hits[row]:,}", seen.hits[row])] if seen else []
+        share = cell(format_percent(report.hits[row]), report.hits[row])
+        lines.append([cell(str(place), place), cell(measured.assets[row]), share, *hits, cell(", ".join(rules.get(row, [])))])
     yield "<h3>Rows</h3>\n"
     if len(order) < len(measured.assets):
         yield paragraph(f"{len(order):,} of {len(measured.assets):,} rows are listed, those with findings before others.", "muted")
     yield table_of("Rows", columns, lines)
-
-
-def _cell(text: str, value: float | None = None) -> str:
-    return f"<td>{escaped(text)}</td>" if value is None else f'<td class="n" data-v="{value!r}">{escaped(text)}</td>'
 
 
 def _word(text: str) -> str:

@@ -12,7 +12,6 @@ MOST_GAPS = 20
 
 
 def render(results: CoverageResults) -> str:
-    """The bars as a JUnit document."""
     gone = (bars_of(name, [gate], "", "coverage", with_kept=True) for name, gate in results.gone.items())
     measured = (
         bars_of(each.report.table, each.gates, "\n".join(_lines(each)), "coverage", each.file, with_kept=True)

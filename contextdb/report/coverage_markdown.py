@@ -7,20 +7,11 @@ from collections.abc import Iterable, Iterator
 from contextdb.covering import Gap, format_percent
 from contextdb.covering.baseline import EarlierGap
 from contextdb.errors import plural
-from contextdb.report.coverage_results import CoverageResults, Gate, Measured, gap_moments, gap_size, has_moments
+from contextdb.report import coverage_words as words
+from contextdb.report.coverage_results import CoverageResults, Measured, gap_moments, gap_size, has_moments
 from contextdb.report.coverage_text import by_rule
-from contextdb.report.coverage_words import (
-    assumed_sentences,
-    cells_text,
-    change_sentence,
-    covered_text,
-    facts_sentences,
-    gaps_sentence,
-    nearest_sentence,
-    overlap_sentence,
-    rows_words,
-)
 from contextdb.report.render_markdown import MOST_BYTES, escaped
+from contextdb.report.results import Gate
 from contextdb.tables.variety import VARIETY
 
 STEPS = (10, 5, 3, 1, 0)
@@ -28,7 +19,6 @@ STEPS = (10, 5, 3, 1, 0)
 
 
 def render(results: CoverageResults, shows_all: bool = False) -> str:
-    """The coverage of each table as Markdown."""
     if shows_all:
         return _document(results, 1 << 30, len(results.tables))
     texts = (_document(results, most, len(results.tables)) for most in STEPS)
@@ -64,7 +54,7 @@ def _row(measured: Measured) -> str:
 
 def _section(measured: Measured, most: int) -> str:
     parts = [f"### {escaped(measured.report.table)}\n", f"{escaped(measured.report.headline)}\n"]
-    parts += [f"{escaped(sentence)}\n" for sentence in assumed_sentences(measured.report)]
+    parts += [f"{escaped(sentence)}\n" for sentence in words.assumed_sentences(measured.report)]
     if measured.gates:
         parts.append(_gates(measured.gates))
     for lines in (
@@ -75,7 +65,7 @@ def _section(measured: Measured, most: int) -> str:
         _findings(measured, most),
     ):
         parts += ["\n".join(found) + "\n" for found in [list(lines)] if found]
-    parts.append(f"Rows valid at once: {escaped(overlap_sentence(measured.report))}.\n")
+    parts.append(f"Rows valid at once: {escaped(words.overlap_sentence(measured.report))}.\n")
     return "\n".join(parts)
 
 
@@ -91,8 +81,8 @@ def _telemetry(measured: Measured, most: int) -> Iterator[str]:
     others = measured.seen_elsewhere[:most]
     if others:
         yield "\n| share of the moments | contexts without a valid row |\n| --- | --- |"
-        yield from (f"| {escaped(format_percent(gap.share))} | {escaped(cells_text(gap.cells))} |" for gap in others)
-    if facts := list(facts_sentences(seen)):
+        yield from (f"| {escaped(format_percent(gap.share))} | {escaped(words.cells_text(gap.cells))} |" for gap in others)
+    if facts := list(words.facts_sentences(seen)):
         yield "\n" + "\n".join(f"- {escaped(sentence)}" for sentence in facts)
 
 
@@ -100,28 +90,28 @@ def _change(measured: Measured, most: int) -> Iterator[str]:
     change = measured.change
     if change is None:
         return
-    yield f"Since the baseline: {escaped(change_sentence(measured, change))}."
+    yield f"Since the baseline: {escaped(words.change_sentence(measured, change))}."
     yield ""
     gaps: list[tuple[str, Gap | EarlierGap]] = [("new", g) for g in change.opened[:most]]
     gaps += [("closed", g) for g in change.closed[:most]]
     for word, gap in gaps:
         size = gap_size(gap) if isinstance(gap, Gap) else format_percent(gap.share)
-        yield f"- {word} gap, {escaped(size)}: {escaped(cells_text(gap.cells))}"
+        yield f"- {word} gap, {escaped(size)}: {escaped(words.cells_text(gap.cells))}"
     for finding in change.dead[:most]:
         yield f"- newly dead: {escaped(measured.named(finding.row or 0))}, {escaped(finding.message)}"
 
 
 def _gaps(measured: Measured, most: int) -> Iterator[str]:
     report = measured.report
-    yield f"{escaped(gaps_sentence(report))}."
+    yield f"{escaped(words.gaps_sentence(report))}."
     shown = report.gaps[:most]
     if shown:
         head, line, blank = (" moments |", " --- |", " |") if has_moments(report) else ("", "", "")
         yield f"\n| | share |{head} contexts without a valid row | nearest |\n| --- | --- |{line} --- | --- |"
         for i, gap in enumerate(shown, 1):
-            near = nearest_sentence(measured, gap).removeprefix("nearest: ")
+            near = words.nearest_sentence(measured, gap).removeprefix("nearest: ")
             moments = f" {escaped(gap_moments(gap))} |" if has_moments(report) else ""
-            yield f"| {i} | {escaped(gap_size(gap))} |{moments} {escaped(cells_text(gap.cells))} | {escaped(near)} |"
+            yield f"| {i} | {escaped(gap_size(gap))} |{moments} {escaped(words.cells_text(gap.cells))} | {escaped(near)} |"
         if len(shown) < len(report.gaps):
             yield f"| | |{blank} … and {len(report.gaps) - len(shown):,} more | |"
 
@@ -134,7 +124,7 @@ def _pairs(measured: Measured, most: int) -> Iterator[str]:
         yield "| pair covered least | covered | of the contexts |\n| --- | --- | --- |"
         for found in worst:
             cells = ", ".join(f"{name}: {cell}" for name, cell in found.cells.items())
-            yield f"| {escaped(cells)} | {escaped(covered_text(found))} | {escaped(format_percent(found.share))} |"
+            yield f"| {escaped(cells)} | {escaped(words.covered_text(found))} | {escaped(format_percent(found.share))} |"
 
 
 def _findings(measured: Measured, most: int) -> Iterator[str]:
@@ -142,7 +132,7 @@ def _findings(measured: Measured, most: int) -> Iterator[str]:
     if blocks:
         yield "| level | finding | rows |\n| --- | --- | --- |"
     for rule, found in blocks.items():
-        named = [rows_words(measured, f) for f in found[:most]]
+        named = [words.rows_words(measured, f) for f in found[:most]]
         noun = "group" if rule == VARIETY else "row"
         more = [f"… and {len(found) - len(named):,} more"] if len(named) < len(found) else []
         yield f"| {found[0].level} | {escaped(rule)}, {plural(len(found), noun)} | {escaped(', '.join(named + more))} |"

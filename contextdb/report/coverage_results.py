@@ -15,30 +15,12 @@ from contextdb.covering.shares import told_apart
 from contextdb.errors import in_quotes, plural, row_name, some
 from contextdb.files.reports import sealed
 from contextdb.findings import Finding
-from contextdb.report.results import CheckReport, Subject, TableSummary
+from contextdb.report.results import CheckReport, Gate, Subject, TableSummary
 from contextdb.telemetry.observed import Observed, SeenGap
 
 ROUNDING = 1e-12
 """Shares are as exact as this; a bar of 100 % takes nothing less all the same."""
 MOST_GAP_FINDINGS = 10
-
-
-@dataclass(frozen=True)
-class Gate:
-    """A bar that a table is held to."""
-
-    name: str
-    """The option: fail-under, max-drop, fail-under-telemetry."""
-    limit: float
-    value: float
-    passed: bool
-    message: str
-    rule: str
-    """The rule that a table breaks which misses the bar."""
-
-    def to_json(self) -> dict[str, object]:
-        """As plain data."""
-        return {"name": self.name, "limit": self.limit, "value": self.value, "passed": self.passed, "message": self.message}
 
 
 @dataclass(frozen=True)
@@ -116,24 +98,24 @@ class CoverageResults:
     """For each table of the baseline that no longer exist the bar that this misses, or keeps where it is intended."""
 
     @property
+    def gates(self) -> list[Gate]:
+        return [*self.gone.values(), *(gate for measured in self.tables for gate in measured.gates)]
+
+    @property
     def passed(self) -> bool:
         """Whether every bar is kept."""
-        return all(gate.passed for gate in self._gates())
-
-    def _gates(self) -> list[Gate]:
-        return [*self.gone.values(), *(gate for measured in self.tables for gate in measured.gates)]
+        return all(gate.passed for gate in self.gates)
 
     @property
     def verdict(self) -> str:
         """Whether the bars are kept, in one sentence; "" where there are none."""
-        gates = self._gates()
+        gates = self.gates
         n_failed = sum(not gate.passed for gate in gates)
         if n_failed:
             return f"{n_failed} of {plural(len(gates), 'threshold')} missed."
         return f"{plural(len(gates), 'threshold')} met." if gates else ""
 
     def to_json(self) -> dict[str, object]:
-        """The JSON document."""
         return sealed(
             {
                 "format": 1,
@@ -146,7 +128,7 @@ class CoverageResults:
 
     def as_check(self) -> CheckReport:
         """Missed bars, findings and the largest gaps as findings, for formats that know nothing else."""
-        gone = [Finding(gate.rule, "error", gate.message, name) for name, gate in self.gone.items() if not gate.passed]
+        gone = [Finding(gate.rule or gate.name, "error", gate.message, name) for name, gate in self.gone.items() if not gate.passed]
         return CheckReport(tuple(m.summary for m in self.tables), (*gone, *(f for m in self.tables for f in _findings(m))))
 
 
@@ -158,7 +140,7 @@ def reaches(value: float, limit: float) -> bool:
 def fail_under(report: CoverageReport, limit: float) -> Gate:
     """Hold the lower bound of the covered share to a bar."""
     at_least = "" if report.method == "exact" else "at least "
-    return _bar("fail-under", report.lower, limit, f"{at_least}{{}} of the contexts are covered", rule="coverage-below")
+    return bar("fail-under", report.lower, limit, f"{at_least}{{}} of the contexts are covered", rule="coverage-below")
 
 
 def max_drop(change: Change, limit: float) -> Gate:
@@ -199,13 +181,14 @@ def _still_there(name: str, found: str, is_intended: bool, more: str = "") -> Ga
 
 def fail_under_telemetry(telemetry: Observed, limit: float) -> Gate:
     """Hold the covered share of recorded moments to a bar."""
-    return _bar("fail-under-telemetry", telemetry.covered, limit, "{} of the recorded moments are covered", rule="telemetry-below")
+    return bar("fail-under-telemetry", telemetry.covered, limit, "{} of the recorded moments are covered", rule="telemetry-below")
 
 
-def _bar(name: str, value: float, limit: float, said: str, rule: str) -> Gate:
+def bar(name: str, value: float, limit: float, said: str, rule: str | None = None) -> Gate:
+    """The gate of a share that is to reach a bar; `said` is what it is, with {} for it."""
     passed = reaches(value, limit)
-    found, bar = told_apart(value, limit) if not passed else (format_percent(value), format_percent(limit))
-    message = f"{said.format(found)}, which {'reaches' if passed else 'is below'} the threshold of {bar}."
+    found, wanted = told_apart(value, limit) if not passed else (format_percent(value), format_percent(limit))
+    message = f"{said.format(found)}, which {'reaches' if passed else 'is below'} the threshold of {wanted}."
     return Gate(name, limit, value, passed, message, rule)
 
 
@@ -228,7 +211,7 @@ def _findings(measured: Measured) -> Iterator[Finding]:
     report = measured.report
     for gate in measured.gates:
         if not gate.passed:
-            yield Finding(gate.rule, "error", gate.message, report.table, measured.file)
+            yield Finding(gate.rule or gate.name, "error", gate.message, report.table, measured.file)
     yield from report.findings
     if measured.change is not None:
         for gap in measured.change.opened[:MOST_GAP_FINDINGS]:

@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 
-from contextdb.console import printable, styled, width_of
+from contextdb.console import aligned, printable, styled, width_of
 from contextdb.covering import Gap, format_percent
-from contextdb.errors import plural
+from contextdb.covering.inside import facts_inside
+from contextdb.errors import joined, plural, row_name
 from contextdb.findings import LEVELS, Finding
-from contextdb.report.coverage_results import CoverageResults, Gate, Measured, gap_moments, gap_size, has_moments
-from contextdb.report.coverage_words import (
-    assumed_sentences,
-    cells_text,
-    change_sentence,
-    facts_sentences,
-    gaps_sentence,
-    nearest_sentence,
-    overlap_sentence,
-    rows_words,
-    slice_sentence,
-)
+from contextdb.report import coverage_words as words
+from contextdb.report.coverage_results import CoverageResults, Measured, gap_moments, gap_size, has_moments
+from contextdb.report.coverage_words import nearest_sentence
 from contextdb.report.render_text import STYLES, wrapped
+from contextdb.report.results import Gate
+from contextdb.tables.table import EitherTable
+from contextdb.tables.variety import VARIETY
 
 BAR_CELLS = 50
 MOST_LINES = 42
@@ -75,7 +71,7 @@ def _head(measured: Measured, colour: bool, width: int) -> Iterator[str]:
         yield styled(line, "bold", colour)
     yield from wrapped(report.headline, width)
     yield bar(report.lower, report.upper, min(BAR_CELLS, width))
-    for sentence in assumed_sentences(report):
+    for sentence in words.assumed_sentences(report):
         yield from wrapped(printable(sentence), width)
 
 
@@ -90,7 +86,7 @@ def bar(lower: float, upper: float, n_cells: int) -> str:
 
 def _gaps(measured: Measured, colour: bool, width: int, most: int) -> Iterator[str]:
     report = measured.report
-    yield from (styled(line, "bold", colour) for line in wrapped(gaps_sentence(report), width))
+    yield from (styled(line, "bold", colour) for line in wrapped(words.gaps_sentence(report), width))
     shown = report.gaps[:most]
     sizes = [[gap_size(gap), *([gap_moments(gap)] if has_moments(report) else [])] for gap in shown]
     if has_moments(report):
@@ -101,9 +97,9 @@ def _gaps(measured: Measured, colour: bool, width: int, most: int) -> Iterator[s
         yield f"{INDENT}{'':>{number}}  {columns.pop(0)}".rstrip()
     for i, (gap, column) in enumerate(zip(shown, columns, strict=True), 1):
         head = f"{INDENT}{i:>{number}}  {column}"
-        yield from hanging(head, cells_text(gap.cells), width)
+        yield from hanging(head, words.cells_text(gap.cells), width)
         if gap.nearest is not None:
-            yield from hanging(" " * width_of(head), nearest_sentence(measured, gap), width)
+            yield from hanging(" " * width_of(head), words.nearest_sentence(measured, gap), width)
     if len(shown) < len(report.gaps):
         yield from hanging(
             INDENT, f"… and {len(report.gaps) - len(shown):,} more; --gap N shows one in full, --all lists them", width
@@ -124,9 +120,9 @@ def hanging(head: str, text: str, width: int) -> Iterator[str]:
 def _overlap(measured: Measured, colour: bool, width: int) -> Iterator[str]:
     report = measured.report
     yield styled("Rows valid at once", "bold", colour)
-    yield from hanging(INDENT, overlap_sentence(report), width)
+    yield from hanging(INDENT, words.overlap_sentence(report), width)
     for crowd in report.crowded[:1]:
-        yield from hanging(INDENT, f"most, {crowd.n_rows}, where {cells_text(crowd.cells)}", width)
+        yield from hanging(INDENT, f"most, {crowd.n_rows}, where {words.cells_text(crowd.cells)}", width)
 
 
 def _pairs(measured: Measured, colour: bool, width: int, most: int) -> Iterator[str]:
@@ -137,7 +133,7 @@ def _pairs(measured: Measured, colour: bool, width: int, most: int) -> Iterator[
         return
     yield styled("Pairs of conditions covered least", "bold", colour)
     for found in worst:
-        yield from hanging(INDENT, slice_sentence(found), width)
+        yield from hanging(INDENT, words.slice_sentence(found), width)
 
 
 def _findings(findings: Sequence[Finding], measured: Measured, colour: bool, width: int, most: int) -> Iterator[str]:
@@ -150,10 +146,8 @@ def _findings(findings: Sequence[Finding], measured: Measured, colour: bool, wid
     for rule, found in blocks.items():
         room = f"{rule} {len(found):>{max(1, widest - len(rule) - 1)},}"
         head = f"{INDENT}{styled(room, STYLES[found[0].level], colour)}  "
-        shown = found[:most]
-        named = ", ".join(rows_words(measured, f) for f in shown)
-        more = f" and {len(found) - len(shown):,} more" if len(shown) < len(found) else ""
-        lines = list(hanging(" " * (len(INDENT) + widest + 2), named + more, width))
+        named = joined([words.rows_words(measured, f) for f in found], most)
+        lines = list(hanging(" " * (len(INDENT) + widest + 2), named, width))
         yield head + lines[0].lstrip() if lines[0].strip() else head.rstrip()
         yield from lines[1:]
 
@@ -179,13 +173,14 @@ def _telemetry(measured: Measured, colour: bool, width: int) -> Iterator[str]:
     yield styled("Recorded moments", "bold", colour)
     yield from hanging(INDENT, seen.headline, width)
     for gap in measured.seen_elsewhere[:MOST_ITEMS]:
-        yield from hanging(f"{INDENT}{'' if gap.is_exact else '≈ '}{format_percent(gap.share)}  ", cells_text(gap.cells), width)
+        yield from hanging(
+            f"{INDENT}{'' if gap.is_exact else '≈ '}{format_percent(gap.share)}  ", words.cells_text(gap.cells), width
+        )
     never = seen.never_used
     if never:
-        named = ", ".join(measured.named(row) for row in never[:MOST_ITEMS])
-        more = f" and {len(never) - MOST_ITEMS:,} more" if len(never) > MOST_ITEMS else ""
-        yield from hanging(INDENT, f"{plural(len(never), 'row')} never valid in them: {named}{more}", width)
-    for sentence in facts_sentences(seen):
+        named = joined([measured.named(row) for row in never], MOST_ITEMS)
+        yield from hanging(INDENT, f"{plural(len(never), 'row')} never valid in them: {named}", width)
+    for sentence in words.facts_sentences(seen):
         yield from hanging(INDENT, sentence, width)
 
 
@@ -194,11 +189,11 @@ def _change(measured: Measured, colour: bool, width: int) -> Iterator[str]:
     if change is None:
         return
     yield styled("Since the baseline", "bold", colour)
-    yield from hanging(INDENT, change_sentence(measured, change), width)
+    yield from hanging(INDENT, words.change_sentence(measured, change), width)
     for sign, gaps in (("+", change.opened), ("-", change.closed)):
         for gap in gaps[:MOST_ITEMS]:
             size = gap_size(gap) if isinstance(gap, Gap) else format_percent(gap.share)
-            yield from hanging(f"{INDENT}{sign} {size}  ", cells_text(gap.cells), width)
+            yield from hanging(f"{INDENT}{sign} {size}  ", words.cells_text(gap.cells), width)
         if len(gaps) > MOST_ITEMS:
             yield f"{INDENT}{sign} … and {len(gaps) - MOST_ITEMS:,} more"
     if change.dead:
@@ -216,3 +211,69 @@ def _gate(gate: Gate, colour: bool, width: int) -> Iterator[str]:
     first, *rest = hanging(f"{word}  {gate.name}  ", gate.message, width)
     yield styled(word, style, colour) + first.removeprefix(word)
     yield from rest
+
+
+# ---- one gap or one row in full
+
+
+def gap_details(measured: Measured, gap: Gap, table: EitherTable, width: int) -> str:
+    """Everything about a gap: its cells, a context of it to try, and how each cell of the nearest row stands to it."""
+    return "".join(f"{line}\n" for line in _gap_lines(measured, gap, table, width))
+
+
+def _gap_lines(measured: Measured, gap: Gap, table: EitherTable, width: int) -> Iterator[str]:
+    report = measured.report
+    size = f"{'' if gap.is_exact else 'about '}{format_percent(gap.share)} of the contexts" if gap.share else "single points"
+    yield f"Gap {report.gaps.index(gap) + 1} of {len(report.gaps)} in {printable(report.table)} ({gap.id}): {size}"
+    if gap.share and gap.new_share != gap.share:
+        yield f"{format_percent(gap.new_share)} of the contexts are in no gap before it"
+    if gap.telemetry is not None:
+        yield f"{format_percent(gap.telemetry)} of the recorded moments"
+    yield ""
+    yield from aligned(list(gap.cells.items()) or [("every context", "")], indent="  ")
+    if gap.nearest is not None:
+        yield ""
+        yield from wrapped(printable(nearest_sentence(measured, gap)), width)
+        names = [c.condition.name for c in table.conditions if c.condition.name in gap.cells]
+        row = gap.nearest.row
+        names += [name for name in (table.settings.when,) if name is not None and name in gap.cells]
+        rows = [(name, table.text(row, name) or "Any", gap.cells[name]) for name in names]
+        yield ""
+        yield from aligned([("condition", "its cell", "the gap"), *rows], indent="  ")
+    facts = facts_inside(gap.cells, [c.condition for c in table.conditions])
+    given = " ".join(shlex.quote(f"{name}={fact}") for name, fact in facts.items())
+    yield ""
+    yield "To see which rows are nearest in one context of it:"
+    yield printable(f"  contextdb query {shlex.quote(measured.file or report.table)} {given} --unknown any --explain")
+
+
+def row_details(measured: Measured, row: int, width: int) -> str:
+    """Everything about a row: how often it is valid, and what is wrong with it, with the rows that cause that."""
+    return "".join(f"{line}\n" for line in _row_lines(measured, row, width))
+
+
+def _row_lines(measured: Measured, row: int, width: int) -> Iterator[str]:
+    report = measured.report
+    yield printable(f"{measured.named(row)} of {report.table} ({row_name(row)})")
+    share = report.hits[row]
+    yield f"valid in {format_percent(share)} of the contexts" if share else "valid in no context, or in single points only"
+    if measured.telemetry is not None:
+        yield f"valid in {measured.telemetry.hits[row]:,} of {measured.telemetry.moments:,} recorded moments"
+    findings = [f for f in (*report.findings, *report.needless) if f.rule != VARIETY]
+    found = [finding for finding in findings if finding.row == row]
+    for finding in found:
+        yield ""
+        yield from wrapped(printable(f"{finding.level} {finding.rule}: {finding.message}"), width)
+        for cause in finding.by:
+            share_text = format_percent(report.hits[cause]) if report.hits[cause] else "points"
+            yield printable(f"  {measured.named(cause)}, valid in {share_text}")
+    if not found:
+        yield ""
+        sure = "" if report.findings_complete else ", as far as the work limit allowed"
+        yield f"Nothing is wrong with it: no other rows are valid wherever it is{sure}."
+    needed_by = [f for f in findings if row in f.by]
+    if needed_by:
+        yield ""
+        yield f"It is one of the rows that make {plural(len(needed_by), 'row')} redundant:"
+        for finding in needed_by[:10]:
+            yield printable(f"  {measured.named(finding.row or 0)}: {finding.rule}")

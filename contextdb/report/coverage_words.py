@@ -8,7 +8,7 @@ from contextdb.covering import CoverageReport, Gap, Slice, format_percent
 from contextdb.covering.baseline import Change
 from contextdb.covering.report import share_at_once
 from contextdb.covering.shares import told_apart
-from contextdb.errors import in_quotes, nearest, plural
+from contextdb.errors import in_quotes, joined, nearest, plural
 from contextdb.findings import Finding
 from contextdb.report.coverage_results import Measured, has_moments
 from contextdb.tables.variety import VARIETY
@@ -27,11 +27,11 @@ def assumed_sentences(report: CoverageReport) -> Iterator[str]:
     if report.weighted:
         yield f"Weighed by the values of {', '.join(report.weighted)}; those of the others count the same."
     if report.assumptions:
-        yield f"Only contexts that can happen count: {_some(report.assumptions, '; ')}."
+        yield f"Only contexts that can happen count: {joined(report.assumptions, MOST_TOLD, '; ')}."
     if report.sampled:
-        yield f"Known to samples only: {_some(report.sampled, '; ')}."
+        yield f"Known to samples only: {joined(report.sampled, MOST_TOLD, '; ')}."
     if report.assumed:
-        yield f"Without bounds: {_some([f'{name} ({text})' for name, text in report.assumed.items()], '; ')}."
+        yield f"Without bounds: {joined([f'{name} ({text})' for name, text in report.assumed.items()], MOST_TOLD, '; ')}."
 
 
 def rows_words(measured: Measured, finding: Finding) -> str:
@@ -42,13 +42,7 @@ def rows_words(measured: Measured, finding: Finding) -> str:
     return measured.named(finding.row) + more
 
 
-def _some(texts: tuple[str, ...] | list[str], between: str) -> str:
-    more = f" and {len(texts) - MOST_TOLD:,} more" if len(texts) > MOST_TOLD else ""
-    return between.join(texts[:MOST_TOLD]) + more
-
-
 def gaps_sentence(report: CoverageReport) -> str:
-    """How many gaps there are, and whether these are all."""
     if not report.gaps:
         if report.gaps_complete:
             return "No gap: every context has a valid row"
@@ -118,11 +112,11 @@ def facts_sentences(seen: Observed) -> Iterator[str]:
     for word, notes in (("missing", seen.missing), ("outside the domain", seen.outside)):
         told = [f"{note.condition} in {plural(note.moments, 'moment')}{_examples(note) or _meant(note, seen)}" for note in notes]
         if told:
-            yield f"{word}: {_some(told, ', ')}"
+            yield f"{word}: {joined(told, MOST_TOLD)}"
     if seen.unknown_columns:
-        yield f"columns that the table does not use: {_some(seen.unknown_columns, ', ')}"
+        yield f"columns that the table does not use: {joined(seen.unknown_columns, MOST_TOLD)}"
     if seen.unread:
-        yield f"not read: {_some([file.file for file in seen.unread], ', ')}"
+        yield f"not read: {joined([file.file for file in seen.unread], MOST_TOLD)}"
 
 
 def _meant(note: FactNote, seen: Observed) -> str:

@@ -3,27 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Protocol
 from xml.etree import ElementTree as ET
 
 from contextdb.console import printable
-from contextdb.report.results import as_path
-
-
-class Bar(Protocol):
-    """A bar that was compared with something measured."""
-
-    @property
-    def name(self) -> str:
-        """Which bar it is."""
-
-    @property
-    def passed(self) -> bool:
-        """Whether it is kept."""
-
-    @property
-    def message(self) -> str:
-        """What was compared, in a sentence."""
+from contextdb.report.results import Gate, as_path
 
 
 def document(name: str, suites: Iterable[ET.Element]) -> str:
@@ -41,7 +24,6 @@ def document(name: str, suites: Iterable[ET.Element]) -> str:
 
 
 def case_in(suite: ET.Element, name: str, file: str | None = None) -> ET.Element:
-    """A new case of a suite."""
     case = ET.SubElement(suite, "testcase", classname=suite.get("name", ""), name=name, time="0")
     if file:
         case.set("file", as_path(file))
@@ -49,7 +31,7 @@ def case_in(suite: ET.Element, name: str, file: str | None = None) -> ET.Element
 
 
 def bars_of(
-    what: str, bars: Sequence[Bar], said: str, otherwise: str, file: str | None = None, *, with_kept: bool = False
+    what: str, bars: Sequence[Gate], said: str, otherwise: str, file: str | None = None, *, with_kept: bool = False
 ) -> ET.Element:
     """The bars of one table or session as a suite: `said` stands in a broken bar, and `with_kept` in a kept one too.
 

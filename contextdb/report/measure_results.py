@@ -16,7 +16,7 @@ from contextdb.files.reports import document_of, sealed
 from contextdb.findings import Finding
 from contextdb.motion.measuring.measures import Measures
 from contextdb.motion.measuring.parts import NO_CHANGE, NO_FORCED, NO_JUMP
-from contextdb.report.results import CheckReport, Subject, as_path
+from contextdb.report.results import CheckReport, Gate, Subject, as_path
 
 NOTHING_TO_EXCEED = (NO_FORCED, NO_JUMP, NO_CHANGE)
 """A measure that is missing for such a reason keeps every bar."""
@@ -84,21 +84,6 @@ class Bar:
     most: float
 
 
-@dataclass(frozen=True, slots=True)
-class Gate:
-    """A bar that a session is held to, or a comparison with the baseline."""
-
-    name: str
-    limit: float
-    value: float | None
-    passed: bool
-    message: str
-
-    def to_json(self) -> dict[str, object]:
-        """As plain data."""
-        return {"name": self.name, "limit": self.limit, "value": self.value, "passed": self.passed, "message": self.message}
-
-
 @dataclass(frozen=True)
 class SessionMeasures:
     """One session: its file, its measures, those of the baseline by name, and its gates."""
@@ -110,7 +95,6 @@ class SessionMeasures:
 
     @property
     def headline(self) -> str:
-        """How long it is."""
         return f"{self.measures.seconds:.2f} s, {plural(self.measures.updates, 'update')}, {plural(self.measures.jumps, 'jump')}"
 
     def rows(self) -> Iterator[tuple[str, str, str, str]]:
@@ -131,7 +115,6 @@ class SessionMeasures:
         return (f"not measured, as {why}: {'; '.join(labels)}" for why, labels in of.items())
 
     def to_json(self) -> dict[str, object]:
-        """The session in the JSON document."""
         return {"file": as_path(self.file), **self.measures.to_json(), "bars": [gate.to_json() for gate in self.gates]}
 
 
@@ -148,7 +131,6 @@ class MeasureResults:
         return all(gate.passed for session in self.sessions for gate in session.gates)
 
     def to_json(self) -> dict[str, object]:
-        """The JSON document."""
         return sealed({"format": 1, "sessions": [session.to_json() for session in self.sessions]})
 
     def as_check(self) -> CheckReport:

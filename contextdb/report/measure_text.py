@@ -11,7 +11,6 @@ from contextdb.report.render_text import wrapped
 
 
 def render(results: MeasureResults, colour: bool = False, width: int = 100, shows_all: bool = False) -> str:
-    """The measures of all sessions."""
     blocks = ["\n".join(_lines(session, colour, width, shows_all)) for session in results.sessions]
     return "\n\n".join(blocks) + "\n"
 

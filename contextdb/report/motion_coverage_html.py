@@ -5,9 +5,8 @@ What is in the page is complete without its script, which only sorts tables.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from html import escape
-from importlib.resources import files
 
 from contextdb.console import __version__, printable
 from contextdb.covering import format_percent
@@ -15,8 +14,7 @@ from contextdb.errors import plural, some
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.measuring.coverage import ContextCoverage
 from contextdb.motion.measuring.moves import LEAST_FRAMES, MAPS, Counts, Map
-from contextdb.report.html_parts import POLICY, escaped, paragraph, table_of
-from contextdb.report.measure_results import Gate
+from contextdb.report.html_parts import cell, escaped, gates_of, page, paragraph, table_of, verdict_of
 from contextdb.report.motion_coverage_results import (
     AHEAD_ALONE,
     MotionCoverageResults,
@@ -45,24 +43,14 @@ LEGEND = (("c0", "0", "wanted, never filled"), ("c3", "12", "filled in part of t
 
 
 def render(results: MotionCoverageResults) -> str:
-    """The page."""
     names = [printable(measured.motion.name) for measured in results.tables]
     title = f"Motion coverage of {names[0]}" if len(names) == 1 else f"Motion coverage of {len(names)} tables"
-    verdict = f'<p class="{"passed" if results.passed else "failed"}">{escape(results.verdict)}</p>\n' if results.verdict else ""
-    gone = _gates(results.gone.values()) if results.gone else ""
+    verdict = f"{verdict_of(results.passed, results.verdict)}\n" if results.verdict else ""
+    gone = gates_of(results.gone.values()) if results.gone else ""
     sections = "".join(f"<article>\n{''.join(_section(measured))}</article>\n" for measured in results.tables)
     unlisted = _list("Clips without a row in their table", results.unlisted) if results.unlisted else ""
-    style, script = (
-        files("contextdb.report").joinpath(name).read_text(encoding="utf-8") for name in ("coverage.css", "coverage.js")
-    )
-    return (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{escape(title)}</title>\n<style>\n{style}{OWN_STYLE}</style>\n</head>\n<body>\n"
-        f"<h1>{escape(title)}</h1>\n{verdict}{gone}<main>\n{sections}{unlisted}</main>\n"
-        f'<p class="muted">contextdb {__version__}</p>\n<script>\n{script}</script>\n</body>\n</html>\n'
-    )
+    body = f"<h1>{escape(title)}</h1>\n{verdict}{gone}<main>\n{sections}{unlisted}</main>\n"
+    return page(title, "coverage", f'{body}<p class="muted">contextdb {__version__}</p>\n', style=OWN_STYLE)
 
 
 def _section(measured: MotionMeasured) -> Iterator[str]:
@@ -74,9 +62,9 @@ def _section(measured: MotionMeasured) -> Iterator[str]:
     yield f'<div class="bar" role="img" aria-label="{escape(measured.headline)}"><i style="width:{width}"></i></div>\n'
     yield from (paragraph(sentence, "muted") for sentence in measured.notes())
     if measured.gates:
-        yield _gates(measured.gates)
+        yield gates_of(measured.gates)
     if measured.lost:
-        lines = [[_cell(each.words), _share(each.before), _share(each.now)] for each in measured.lost]
+        lines = [[cell(each.words), _share(each.before), _share(each.now)] for each in measured.lost]
         yield "<h3>Lost since the baseline</h3>\n" + table_of("Lost", (("movement", False), ("before", True), ("now", True)), lines)
     for name, of in MAPS.items():
         yield f"<h3>{escape(of.told.capitalize())}</h3>\n"
@@ -87,7 +75,7 @@ def _section(measured: MotionMeasured) -> Iterator[str]:
         columns = (("movement", False), ("fills", True), ("missing in", True), ("moves so, not valid there", False))
         both = {False: "", True: BOTH}
         lines = [
-            [_cell(f"{c.words}{both[c.is_both_sides]}"), _share(c.fills), _share(c.contexts), _cell(_named(c.elsewhere))]
+            [cell(f"{c.words}{both[c.is_both_sides]}"), _share(c.fills), _share(c.contexts), cell(_named(c.elsewhere))]
             for c in found.to_capture
         ]
         yield table_of("Capture next", columns, lines)
@@ -163,15 +151,6 @@ def _legend() -> str:
     return f'<p class="heat legend">{squares}</p>\n{paragraph(told, "muted")}'
 
 
-def _gates(gates: Iterable[Gate]) -> str:
-    items = "".join(
-        f'<li><span class="{"passed" if g.passed else "failed"}">{"Passed" if g.passed else "Failed"}</span> '
-        f"{escape(g.name)}: {escaped(g.message)}</li>"
-        for g in gates
-    )
-    return f'<ul class="gates">{items}</ul>\n'
-
-
 def _list(heading: str, items: Sequence[str]) -> str:
     listed = "".join(f"<li>{escaped(item)}</li>\n" for item in items)
     return f"<h3>{escaped(heading)}</h3>\n<ul>\n{listed}</ul>\n"
@@ -182,8 +161,4 @@ def _named(assets: Sequence[str]) -> str:
 
 
 def _share(share: float) -> str:
-    return f'<td class="n" data-v="{share!r}">{escape(format_percent(share, 1))}</td>'
-
-
-def _cell(text: str) -> str:
-    return f"<td>{escaped(text)}</td>"
+    return cell(format_percent(share, 1), share)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from contextdb.errors import joined
 from contextdb.motion.measuring.moves import MAPS
 from contextdb.report.motion_coverage_results import (
     AHEAD_ALONE,
@@ -49,5 +50,4 @@ def _lines(measured: MotionMeasured) -> Iterator[str]:
     yield from (f"{i}. {escaped(capture_sentence(each))}" for i, each in enumerate(found.to_capture[:MOST_CAPTURES], 1))
     for title, told, items in measured.asides():
         if items:
-            more = f" and {len(items) - MOST_ITEMS:,} more" if len(items) > MOST_ITEMS else ""
-            yield f"\n**{title.capitalize()}** ({escaped(told)}): {escaped(', '.join(items[:MOST_ITEMS]))}{more}"
+            yield f"\n**{title.capitalize()}** ({escaped(told)}): {escaped(joined(items, MOST_ITEMS))}"

@@ -12,7 +12,6 @@ import numpy as np
 
 from contextdb.covering import format_percent
 from contextdb.covering.motion import TableMotion
-from contextdb.covering.shares import told_apart
 from contextdb.errors import ContextError, Fault, Place, in_quotes, plural, some
 from contextdb.files.reports import document_of, sealed
 from contextdb.findings import Finding
@@ -20,9 +19,8 @@ from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.measuring.coverage import ContextCoverage, ToCapture, about_bins
 from contextdb.motion.measuring.moves import DIRECTION, MAPS, Counts, Map
 from contextdb.motion.measuring.near_clips import Near
-from contextdb.report.coverage_results import reaches
-from contextdb.report.measure_results import Gate
-from contextdb.report.results import CheckReport, Subject
+from contextdb.report.coverage_results import bar
+from contextdb.report.results import CheckReport, Gate, Subject
 
 AHEAD_ALONE = "No clip goes another way than ahead, and none is wanted to."
 BASELINE = "the document that `contextdb motion coverage --format json` writes"
@@ -43,11 +41,9 @@ class Lost:
 
     @property
     def words(self) -> str:
-        """Which bin it is."""
         return MAPS[self.map].words(self.row, self.column)
 
     def to_json(self) -> dict[str, object]:
-        """As plain data."""
         where = {"map": self.map, "row": self.row, "column": self.column, "what": self.words}
         return {**where, "before": self.before, "now": self.now}
 
@@ -123,7 +119,6 @@ class MotionCoverageResults:
 
     @property
     def gates(self) -> list[Gate]:
-        """All bars."""
         return [*self.gone.values(), *(gate for measured in self.tables for gate in measured.gates)]
 
     @property
@@ -140,7 +135,6 @@ class MotionCoverageResults:
         return f"{plural(len(self.gates), 'bar')} kept." if self.gates else ""
 
     def to_json(self) -> dict[str, object]:
-        """The JSON document."""
         return sealed(
             {
                 "format": 1,
@@ -175,12 +169,8 @@ def _near_words(near: Iterable[Near]) -> Iterator[str]:
 def fail_under(motion: TableMotion, limit: float) -> Gate:
     """Hold the covered share to a bar."""
     value = motion.coverage.covered if motion.is_exact else max(0.0, motion.coverage.covered - DRAWN)
-    passed = reaches(value, limit)
-    found, bar = told_apart(value, limit) if not passed else (format_percent(value), format_percent(limit))
     at_least = "" if motion.is_exact else "at least "
-    verdict = "reaches" if passed else "is below"
-    told = f"{at_least}{found} of the wanted movements have a valid clip, which {verdict} the threshold of {bar}."
-    return Gate("fail-under", limit, value, passed, told)
+    return bar("fail-under", value, limit, f"{at_least}{{}} of the wanted movements have a valid clip")
 
 
 def no_loss(lost: tuple[Lost, ...]) -> Gate:
@@ -192,7 +182,6 @@ def no_loss(lost: tuple[Lost, ...]) -> Gate:
 
 
 def table_gone(name: str) -> Gate:
-    """A table of the baseline that has no clips any more."""
     return Gate("gone", 0.0, 1.0, False, f"{in_quotes(name)} of the baseline has no clips any more.")
 
 
@@ -276,7 +265,6 @@ def worst_contexts(measured: MotionMeasured) -> list[ContextCoverage]:
 
 
 def context_words(each: ContextCoverage) -> str:
-    """Which contexts they are."""
     return ", ".join(f"{name}: {cell}" for name, cell in each.contexts.cells.items()) or "every context"
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from contextdb.console import printable, styled
 from contextdb.covering import format_percent
-from contextdb.errors import plural
+from contextdb.errors import joined, plural
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.measuring.coverage import ContextCoverage
 from contextdb.motion.measuring.moves import LEAST_FRAMES, MAPS, Counts, Map
@@ -38,7 +38,6 @@ LEGEND = f"Numbers are frames; a bin is filled from {LEAST_FRAMES} on. ! wanted 
 
 
 def render(results: MotionCoverageResults, colour: bool = False, width: int = 100, shows_all: bool = False) -> str:
-    """All tables."""
     blocks = ["\n".join(_section(measured, colour, width, shows_all)) for measured in results.tables]
     tail = [f"clips without a row in their table: {_listed(results.unlisted, shows_all)}"] if results.unlisted else []
     lines = [line for sentence in tail for line in wrapped(printable(sentence), width)]
@@ -166,5 +165,4 @@ def _contexts(measured: MotionMeasured, width: int, shows_all: bool) -> Iterator
 
 
 def _listed(items: Sequence[str], shows_all: bool, few: int = FEW_ITEMS, between: str = ", ") -> str:
-    shown = items if shows_all else items[:few]
-    return between.join(shown) + (f" and {len(items) - len(shown):,} more" if len(items) > len(shown) else "")
+    return joined(items, len(items) if shows_all else few, between)

@@ -14,7 +14,6 @@ _UNSAFE = re.compile("[\x7f-\x9f\u2028\u2029\ud800-\udfff]")
 
 
 def render(report: Report) -> str:
-    """The report as one JSON document."""
     return as_json(report.to_json())
 
 

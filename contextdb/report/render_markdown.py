@@ -13,8 +13,7 @@ from collections.abc import Iterator
 from contextdb.console import printable
 from contextdb.errors import plural, row_name
 from contextdb.findings import Finding
-from contextdb.report.results import CheckReport, Group, as_path
-from contextdb.report.shorten import fitted, n_hidden
+from contextdb.report.results import CheckReport, Group, as_path, fitted, n_hidden
 
 MOST_BYTES = 60_000
 """GitHub takes a comment of 65,536 characters and a job summary of 1 MiB."""
@@ -32,7 +31,6 @@ DEAD = "<!-- -->"
 
 
 def render(report: CheckReport, shows_all: bool = False) -> str:
-    """The findings as Markdown."""
     groups = report.groups()
     faulty, clean = [g for g in groups if g.findings], [g for g in groups if not g.findings]
 

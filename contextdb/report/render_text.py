@@ -9,8 +9,7 @@ from collections.abc import Iterator
 from contextdb.console import printable, styled, width_of
 from contextdb.errors import plural
 from contextdb.findings import Finding, Level
-from contextdb.report.results import Block, CheckReport, Group, place_of, told
-from contextdb.report.shorten import fitted, n_hidden
+from contextdb.report.results import Block, CheckReport, Group, fitted, n_hidden, place_of, told
 
 MOST_LINES = 40
 MOST_CLEAN = 8

@@ -6,9 +6,9 @@ A renderer is a pure function of a `Report` that gives text: the same report giv
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain, count
+from itertools import accumulate, chain, count
 from pathlib import PurePath
 from typing import ClassVar, Literal, Protocol
 
@@ -34,11 +34,9 @@ class TableSummary:
 
     @property
     def size(self) -> str:
-        """The size in words."""
         return f"{plural(self.n_rows, 'row')}, {plural(self.n_conditions, 'condition')}"
 
     def to_json(self) -> dict[str, object]:
-        """The table in the JSON document."""
         return {"table": self.name, "file": self.file, "rows": self.n_rows, "conditions": self.n_conditions}
 
 
@@ -59,6 +57,23 @@ class Group:
             found.setdefault((finding.level, finding.rule), []).append(finding)
         ordered = sorted(found, key=lambda key: LEVELS.index(key[0]))
         return [(level, rule, tuple(found[level, rule])) for level, rule in ordered]
+
+
+@dataclass(frozen=True, slots=True)
+class Gate:
+    """A bar that a table or a session is held to, or a comparison with the baseline."""
+
+    name: str
+    """The option, such as fail-under."""
+    limit: float
+    value: float | None
+    passed: bool
+    message: str
+    rule: str | None = None
+    """The rule that a table breaks which misses the bar, where it has a name of its own."""
+
+    def to_json(self) -> dict[str, object]:
+        return {"name": self.name, "limit": self.limit, "value": self.value, "passed": self.passed, "message": self.message}
 
 
 class Report(Protocol):
@@ -89,12 +104,10 @@ class CheckReport:
         return f"{plural(len(self.tables), 'table')} checked: {said or 'nothing found'}."
 
     def to_json(self) -> dict[str, object]:
-        """The JSON document."""
         findings = [finding.to_json() for finding in self.findings]
         return {"format": 1, "findings": findings, "tables": [table.to_json() for table in self.tables]}
 
     def as_check(self) -> CheckReport:
-        """The report itself."""
         return self
 
     def groups(self) -> list[Group]:
@@ -165,3 +178,31 @@ def _with_labels(groups: list[Group]) -> Iterator[Group]:
         label = next(text for text in chain([label], (f"{label} #{n}" for n in count(2))) if text not in taken)
         taken.add(label)
         yield replace(group, label=label)
+
+
+# ---- how a report for people is kept short: the first findings of each rule, then how many more there are
+
+
+FINDING_STEPS = (20, 10, 5, 3, 2, 1)
+"""How many findings of one rule are shown; the first that fits."""
+
+
+def fitted(sections_at: Callable[[int], Sequence[str]], size: Callable[[str], int], room: int) -> tuple[list[str], int]:
+    """The sections of the longest form of a report that fits into `room`, and how many findings of one rule they show.
+
+    `sections_at` gives the sections with at most so many findings of one rule, `size` how much room a section takes. Where not even
+    one finding of each rule fits, the last sections are left out; the first one never is.
+    """
+    sections: Sequence[str] = ()
+    for most in FINDING_STEPS:
+        sections = sections_at(most)
+        if sum(map(size, sections)) <= room:
+            return list(sections), most
+    n_fitting = sum(total <= room for total in accumulate(map(size, sections)))
+    return list(sections[: max(1, n_fitting)]), FINDING_STEPS[-1]
+
+
+def n_hidden(groups: Sequence[Group], n_shown: int, most: int) -> int:
+    """How many findings are not shown, with the first `n_shown` groups and at most so many findings of each rule."""
+    cut = sum(max(0, len(findings) - most) for group in groups[:n_shown] for _, _, findings in group.blocks())
+    return cut + sum(len(group.findings) for group in groups[n_shown:])

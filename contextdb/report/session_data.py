@@ -161,7 +161,6 @@ class SessionView:
 
     @property
     def seconds(self) -> float:
-        """How long it is."""
         return max(0, len(self.positions) - 1) / self.rate
 
 

@@ -6,15 +6,13 @@ session is escaped, and nothing of it can become markup or script.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
-from importlib.resources import files
 
 from contextdb.console import __version__, printable
+from contextdb.report.html_parts import embedded, page
 from contextdb.report.session_data import Detail, SessionView, document_of
 
-POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
 BYTES_A_MINUTE = 1_000_000
 """A page is at most as long for each minute of its sessions, as long as the plainest one is; see `Detail`."""
 LEAST_MINUTES = 1.0
@@ -45,24 +43,14 @@ def _page(sessions: Sequence[SessionView], detail: Detail, parting: str) -> str:
     names = [printable(session.name) for session in sessions]
     title = f"Session {names[0]}" if len(names) == 1 else f"Sessions {' and '.join(names)}"
     said = f"<p>{escape(parting)}</p>\n" if parting else ""
-    document = json.dumps(document_of(sessions, detail), ensure_ascii=True, separators=(",", ":"), allow_nan=False)
-    embedded = document.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
     changes = "".join(_changes(session, name) for session, name in zip(sessions, names, strict=True))
-    return (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{escape(title)}</title>\n<style>\n{_part('session.css')}</style>\n</head>\n<body>\n"
+    body = (
         f"<header><h1>{escape(title)}</h1>\n{said}</header>\n<main>\n"
         f"{_player(names)}{_measures(sessions, names)}{changes}</main>\n"
         f'<footer><p class="muted">contextdb {__version__}</p></footer>\n'
-        f'<script type="application/json" id="session">{embedded}</script>\n'
-        f"<script>\n{_part('session.js')}</script>\n</body>\n</html>\n"
+        f'<script type="application/json" id="session">{embedded(document_of(sessions, detail))}</script>\n'
     )
-
-
-def _part(name: str) -> str:
-    return files("contextdb.report").joinpath(name).read_text(encoding="utf-8")
+    return page(title, "session", body)
 
 
 def _player(names: Sequence[str]) -> str:

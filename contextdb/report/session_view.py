@@ -13,7 +13,7 @@ from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.measuring import measure, shown
 from contextdb.motion.measuring.raw_clips import Clips, toe_of
-from contextdb.motion.measuring.strips import strips_of
+from contextdb.motion.measuring.shown import strips_of
 from contextdb.motion.output.bank import PoseBank, loops
 from contextdb.motion.output.settings import PoseSettings
 from contextdb.motion.output.stream import Pose
@@ -24,18 +24,7 @@ from contextdb.motion.trace.reasked_decision import ReaskedDecision
 from contextdb.motion.trace.session import Trace
 from contextdb.motion.trace.status import status_of
 from contextdb.motion.trace.views import fact_text
-from contextdb.report.session_data import (
-    FORCED,
-    JUMPED,
-    MIRRORED,
-    SEARCHED,
-    AssetCosts,
-    Candidate,
-    ChangeLine,
-    Ghost,
-    Moment,
-    SessionView,
-)
+from contextdb.report import session_data
 
 MOST_CANDIDATES = 12
 GHOST_S = 0.7
@@ -55,7 +44,7 @@ def view_of(
     reasked: Reasked | None = None,
     measured: Measured | None = None,
     poses: Sequence[Pose] | None = None,
-) -> SessionView:
+) -> session_data.SessionView:
     """A session as the page shows it.
 
     `banks` are the poses of its databases, by name, and `settings` how its poses are made; `poses` are those that were shown, one
@@ -74,7 +63,7 @@ def view_of(
     rig = next(iter(banks.values()))
     feet = [toe_of(rig.skeleton, foot) for foot in rig.feet]
     contacts = np.zeros((len(decisions), len(feet)), np.bool_) if played.contacts is None else played.contacts
-    return SessionView(
+    return session_data.SessionView(
         name=name,
         rate=played.rate,
         bones=rig.skeleton.names,
@@ -96,8 +85,12 @@ def view_of(
 
 def _flags(decision: Decision) -> int:
     playing = decision.playing
-    found = SEARCHED * decision.searched + JUMPED * (decision.action in CHANGES) + FORCED * shown.is_forced(decision)
-    return found + MIRRORED * (playing is not None and playing.mirrored)
+    found = (
+        session_data.SEARCHED * decision.searched
+        + session_data.JUMPED * (decision.action in CHANGES)
+        + session_data.FORCED * shown.is_forced(decision)
+    )
+    return found + session_data.MIRRORED * (playing is not None and playing.mirrored)
 
 
 def _costs(decisions: Sequence[Decision]) -> Floats:
@@ -107,10 +100,12 @@ def _costs(decisions: Sequence[Decision]) -> Floats:
     return np.where(known < 0, np.nan, found[known])
 
 
-def _change(decision: Decision) -> ChangeLine:
+def _change(decision: Decision) -> session_data.ChangeLine:
     action = "jumps, forced" if shown.is_forced(decision) else str(decision.action)
     asset = "" if decision.playing is None else _named(decision.playing.asset, decision.playing.mirrored)
-    return ChangeLine(decision.time_s, (action, asset, "" if decision.cost is None else cost_text(decision.cost), decision.why))
+    return session_data.ChangeLine(
+        decision.time_s, (action, asset, "" if decision.cost is None else cost_text(decision.cost), decision.why)
+    )
 
 
 def _named(asset: str, mirrored: bool) -> str:
@@ -126,12 +121,12 @@ def _moments(
     banks: Mapping[str, PoseBank],
     trace: Trace,
     reasked: Reasked | None,
-) -> Iterator[Moment]:
+) -> Iterator[session_data.Moment]:
     for i, decision in enumerate(decisions):
         if not decision.searched:
             continue
         is_change = decision.action in CHANGES
-        told = Moment(i, decision.why, is_change, shown.is_forced(decision), _facts(decision), (), (), ())
+        told = session_data.Moment(i, decision.why, is_change, shown.is_forced(decision), _facts(decision), (), (), ())
         asked = _asked(trace, reasked, i) if is_change else None
         if asked is not None and reasked is not None:
             pose, warp = warped[i]
@@ -153,7 +148,7 @@ def _asked(trace: Trace, reasked: Reasked | None, at: int) -> ReaskedDecision | 
     return reasked[at]
 
 
-def _in_full(moment: Moment, asked: ReaskedDecision, decision: Decision, ghosts: _Ghosts) -> Moment:
+def _in_full(moment: session_data.Moment, asked: ReaskedDecision, decision: Decision, ghosts: _Ghosts) -> session_data.Moment:
     best = asked.best_of_assets()
     ordered = sorted(best, key=lambda each: (each.row.left_out is not LeftOut.NO, each.row.cost))
     channels = tuple(ordered[0].row.channels) if ordered else ()
@@ -167,14 +162,14 @@ def _in_full(moment: Moment, asked: ReaskedDecision, decision: Decision, ghosts:
     )
 
 
-def _candidate(each: Ranked, channels: Sequence[str]) -> Candidate:
+def _candidate(each: Ranked, channels: Sequence[str]) -> session_data.Candidate:
     row = each.row
     parts = (*(row.channels.get(channel, 0.0) for channel in channels), sum(row.biases.values()))
     said = "" if row.left_out is LeftOut.NO else row.left_out.text
-    return Candidate(row.asset, row.time_s or 0.0, row.mirrored, row.cost, parts, said, each.role == "chosen")
+    return session_data.Candidate(row.asset, row.time_s or 0.0, row.mirrored, row.cost, parts, said, each.role == "chosen")
 
 
-def _assets(asked: ReaskedDecision, best: Sequence[Ranked]) -> Iterator[AssetCosts]:
+def _assets(asked: ReaskedDecision, best: Sequence[Ranked]) -> Iterator[session_data.AssetCosts]:
     """The costs of every range that was searched, by asset."""
     for each in best:
         search = asked.searched[each.database]
@@ -182,7 +177,7 @@ def _assets(asked: ReaskedDecision, best: Sequence[Ranked]) -> Iterator[AssetCos
         said = "" if each.row.left_out is LeftOut.NO else each.row.left_out.text
         may_play = search.left_out[own] == LeftOut.NO
         permutation = "" if each.row.permutation_s is None else f" +{each.row.permutation_s:g} s"
-        yield AssetCosts(_named(each.row.asset, each.row.mirrored) + permutation, search.costs[own], may_play, said)
+        yield session_data.AssetCosts(_named(each.row.asset, each.row.mirrored) + permutation, search.costs[own], may_play, said)
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,7 +187,7 @@ class _Ghosts:
     banks: Mapping[str, PoseBank]
     heading: float
 
-    def of(self, decision: Decision, ordered: Sequence[Ranked]) -> Iterator[Ghost]:
+    def of(self, decision: Decision, ordered: Sequence[Ranked]) -> Iterator[session_data.Ghost]:
         """What would have played on, and the best of the other assets that could have been chosen."""
         if decision.before is not None:
             yield from self._ghost(decision.before, plays_on=True)
@@ -206,7 +201,7 @@ class _Ghosts:
                 if len(taken) > MOST_GHOSTS:
                     return
 
-    def _ghost(self, playing: Playing, *, plays_on: bool) -> Iterator[Ghost]:
+    def _ghost(self, playing: Playing, *, plays_on: bool) -> Iterator[session_data.Ghost]:
         bank = self.banks.get(playing.database)
         if bank is None:
             return
@@ -214,7 +209,7 @@ class _Ghosts:
         steps = np.arange(round(GHOST_S * bank.rate) + 1) / bank.rate
         times_s = np.minimum(playing.time_s + steps, bank.last_s(number)).tolist()
         positions = np.stack([self._placed(bank, number, time_s) for time_s in times_s])
-        yield Ghost(_named(playing.asset, playing.mirrored), positions, bank.rate, plays_on)
+        yield session_data.Ghost(_named(playing.asset, playing.mirrored), positions, bank.rate, plays_on)
 
     def _placed(self, bank: PoseBank, number: int, time_s: float) -> Floats:
         sample = bank.sample_of(number, time_s)

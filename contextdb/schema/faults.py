@@ -17,7 +17,7 @@ from contextdb.cells.kinds import KINDS, Kind, names_where
 from contextdb.cells.mirroring import partner_of, sided_pairs, swap_faults, swapped_tag
 from contextdb.cells.sets import covers
 from contextdb.disk import TABLE_SUFFIXES
-from contextdb.errors import Fault, in_quotes, nearest, shown, some
+from contextdb.errors import Fault, in_quotes, mend_for, nearest, no_such, shown, some
 from contextdb.expressions import assumption_faults, derivation_faults
 from contextdb.files.file_names import alike
 from contextdb.files.toml_shapes import near_key, no_key, said_of
@@ -262,8 +262,7 @@ def _unknown_partners(mirror: Mapping[str, str], is_tags: bool, values: Sequence
     names = dict.fromkeys(name for pair in mirror.items() for name in pair)
     unknown = [name for name in names if not (covers(name, known) if is_tags else name in known)]
     for name in unknown:
-        near = nearest(name, values)
-        yield Fault(f"there is no value {in_quotes(name)}.", some(values), in_quotes(near) if near else "")
+        yield no_such("value", name, values)
     for value in values if is_tags and not unknown else ():
         image = swapped_tag(value, tuple(mirror.items()))
         if not covers(image, known):
@@ -278,8 +277,7 @@ def column_faults(path: Path, table: Said, conditions: Set[str]) -> Iterator[Fou
             yield (*path, key), replace(twice, found=f"{header(path)} {twice.found}")
         if column in conditions:
             found = f"{header(path)} {key} names {in_quotes(column)}, which is declared as a condition."
-            mend = f"to leave out {header(('conditions', column))}"
-            yield (*path, key), Fault(found, "a column that is not a condition", mend)
+            yield (*path, key), Fault(found, "a column that is not a condition", f"to leave out {header(('conditions', column))}")
 
 
 def _file_faults(tables: Mapping[str, Said]) -> Iterator[Found]:
@@ -302,6 +300,5 @@ def _file_faults(tables: Mapping[str, Said]) -> Iterator[Found]:
 def _blueprint_faults(path: Path, blueprint: Said, conditions: Set[str]) -> Iterator[Found]:
     for name in blueprint.get("conditions", ()):
         if name not in conditions:
-            near = nearest(name, conditions)
             found = f"{header(path)} names the condition {in_quotes(name)}, which is not declared."
-            yield (*path, "conditions"), Fault(found, some(conditions), in_quotes(near) if near else "")
+            yield (*path, "conditions"), Fault(found, some(conditions), mend_for(name, conditions))

@@ -18,7 +18,7 @@ from typing import Any
 
 from contextdb.cells.output_types import MOST_NUMBERS, OUTPUT_TYPES, OutputType, OutputValue, names_where
 from contextdb.cells.outputs import SLOT_COLUMNS, Output
-from contextdb.errors import Fault, in_quotes, nearest, some
+from contextdb.errors import Fault, in_quotes, mend_for, nearest, some
 from contextdb.files.toml_shapes import Shape, near_key, no_key, nothing, one_of, said_of
 from contextdb.files.toml_text import dotted, what
 from contextdb.schema.shapes import KEY_SYNONYMS, KIND_SYNONYMS, NUMBER, TEXT, VALUES, wrong_name
@@ -98,7 +98,6 @@ def outputs_to_toml(names: Sequence[str], declared: Iterable[Output]) -> list[st
 
 
 def fallback_to_toml(asset: str | None, outputs: Iterable[tuple[str, OutputValue]]) -> str | dict[str, object] | None:
-    """What `fallback` says."""
     values = {name: _plain(value) for name, value in outputs}
     return {"asset": asset, "outputs": values} if values and asset is not None else asset
 
@@ -197,11 +196,10 @@ def _given_faults(given: Said, declared: Mapping[str, Output]) -> Iterator[Found
     for name, value in given.items():
         path = ("fallback", "outputs", name)
         if name not in declared:
-            near = nearest(str(name), declared)
             accepted = some(declared) or "no name: the table has no outputs"
             yield (
                 path,
-                Fault(f"fallback gives {in_quotes(str(name))}, which is not an output.", accepted, in_quotes(near) if near else ""),
+                Fault(f"fallback gives {in_quotes(str(name))}, which is not an output.", accepted, mend_for(str(name), declared)),
             )
             continue
         try:

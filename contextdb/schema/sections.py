@@ -12,7 +12,7 @@ from typing import Any
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
-from contextdb.errors import Fault, SchemaError, in_quotes, nearest, some
+from contextdb.errors import Fault, SchemaError, in_quotes, mend_for, nearest, some
 from contextdb.files.toml_shapes import no_key
 from contextdb.schema.faults import KINDS_WITH
 from contextdb.schema.jobs import columns_checked
@@ -128,8 +128,7 @@ def job_faults(settings: TableSettings, columns: Sequence[str], schema: Schema) 
     known = frozenset(columns)
     for key, column, twice in columns_checked(vars(settings)):
         if column not in known:
-            near = nearest(column, columns)
-            yield Fault(f"there is no column {in_quotes(column)} for {key}.", some(columns), in_quotes(near) if near else "")
+            yield Fault(f"there is no column {in_quotes(column)} for {key}.", some(columns), mend_for(column, columns))
         elif twice:
             yield twice
         elif column in schema.conditions:
@@ -142,9 +141,8 @@ def blueprint_faults(schema: Schema) -> Iterator[Fault]:
     for name, conditions in schema.blueprints.items():
         for condition in conditions:
             if condition not in schema.conditions:
-                near = nearest(condition, schema.conditions)
                 found = f"the blueprint {in_quotes(name)} names the condition {in_quotes(condition)}, which is not declared."
-                yield Fault(found, some(schema.conditions), in_quotes(near) if near else "")
+                yield Fault(found, some(schema.conditions), mend_for(condition, schema.conditions))
 
 
 def _with(parts: Mapping[str, Any], said: Mapping[str, Any]) -> dict[str, Any]:

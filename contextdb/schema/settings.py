@@ -132,8 +132,7 @@ class Schema:
     """How clips that lead from one state to another are named, such as "{from}_to_{to}"; "" where that is not declared."""
 
     def __repr__(self) -> str:
-        told = f"{plural(len(self.conditions), 'condition')}, {plural(len(self.tables), 'table')}"
-        return one_line("Schema", self.name, told)
+        return one_line("Schema", self.name, f"{plural(len(self.conditions), 'condition')}, {plural(len(self.tables), 'table')}")
 
     def __getstate__(self) -> dict[str, object]:
         """What is pickled: not how facts are derived, which is functions."""

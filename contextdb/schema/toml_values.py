@@ -34,7 +34,6 @@ def keys_of(dotted: str) -> Path:
 
 
 def end_of_line(text: str) -> str:
-    """How the lines of a text end."""
     first = text.partition("\n")
     return "\r\n" if first[1] and first[0].endswith("\r") else "\n"
 

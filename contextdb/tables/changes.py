@@ -22,16 +22,7 @@ from numpy.typing import NDArray
 from contextdb.columns import TextColumn
 from contextdb.errors import Fault, SchemaError, TableError
 from contextdb.files.csv_source import name_faults
-from contextdb.schema.sections import (
-    EDITED_SECTIONS,
-    blueprint_faults,
-    differences,
-    job_faults,
-    schema_to_dict,
-    schema_with,
-    settings_to_dict,
-    settings_with,
-)
+from contextdb.schema import sections
 from contextdb.schema.settings import expression_faults, settings_renamed
 from contextdb.tables.data import AnyTable, TableData, conditions_of, with_columns
 
@@ -79,7 +70,6 @@ class Cells:
     texts: Mapping[str, Mapping[int, str]]
 
     def apply(self, table: AnyTable) -> AnyTable:
-        """The table with these texts."""
         changed = {name: _with_texts(table.text_column(name), texts) for name, texts in self.texts.items()}
         return with_columns(table, [changed.get(c.name, c) for c in table.columns], table.origin)
 
@@ -113,7 +103,6 @@ class Columns:
         return replace(table, columns=tuple(columns), conditions=found, settings=settings, schema=schema)
 
     def to_json(self) -> dict[str, object]:
-        """The change as plain data."""
         return {"change": "columns", "layout": self.layout}
 
 
@@ -132,22 +121,21 @@ class Sections:
     @classmethod
     def between(cls, before: TableData, after: TableData) -> Sections:
         """What leads from what one table says to what another says."""
-        settings = differences(settings_to_dict(before.settings), settings_to_dict(after.settings))
-        old, new = schema_to_dict(before.schema), schema_to_dict(after.schema)
-        parts = {section: cast(Any, differences(old[section], new[section])) for section in EDITED_SECTIONS}
+        settings = sections.differences(sections.settings_to_dict(before.settings), sections.settings_to_dict(after.settings))
+        old, new = sections.schema_to_dict(before.schema), sections.schema_to_dict(after.schema)
+        parts = {section: cast(Any, sections.differences(old[section], new[section])) for section in sections.EDITED_SECTIONS}
         return cls(settings, {section: part for section, part in parts.items() if part})
 
     @property
     def is_empty(self) -> bool:
-        """Whether nothing changes."""
         return not self.settings and not any(self.parts.values())
 
     def apply(self, table: AnyTable) -> AnyTable:
         """The table under these settings and this schema; columns whose meaning stays are not read again."""
-        schema = schema_with(table.schema, self.parts)
-        settings = settings_with(table.settings, self.settings)
+        schema = sections.schema_with(table.schema, self.parts)
+        settings = sections.settings_with(table.settings, self.settings)
         names = [c.name for c in table.columns]
-        faults = [*job_faults(settings, names, schema), *blueprint_faults(schema)]
+        faults = [*sections.job_faults(settings, names, schema), *sections.blueprint_faults(schema)]
         if "conditions" in self.parts or "assume" in self.settings:
             faults += expression_faults(replace(schema, tables={**schema.tables, settings.name: settings}))
         if faults:
@@ -156,7 +144,6 @@ class Sections:
         return replace(table, conditions=conditions, settings=settings, schema=schema)
 
     def to_json(self) -> dict[str, object]:
-        """The change as plain data."""
         return {"change": "sections", "settings": dict(self.settings), "parts": {k: dict(v) for k, v in self.parts.items()}}
 
 
@@ -164,7 +151,6 @@ Change = Rows | Cells | Columns | Sections
 
 
 def change_from_json(data: Mapping[str, Any]) -> Change:
-    """The change that `to_json` wrote."""
     if data["change"] == "cells":
         return Cells({name: dict(zip(rows, texts, strict=True)) for name, rows, texts in data["cells"]})
     if data["change"] == "columns":
@@ -208,7 +194,6 @@ class Edit:
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Edit:
-        """The edit that `to_json` wrote."""
         return cls(data["name"], tuple(change_from_json(change) for change in data["changes"]))
 
 

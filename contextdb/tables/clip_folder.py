@@ -11,17 +11,16 @@ from pathlib import Path
 import numpy as np
 
 from contextdb.disk import path_in_quotes
-from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, nearest, plural
+from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, plural
 from contextdb.motion.clips.clip import CENTIMETRE, Clip, Up, load_bvh
 from contextdb.motion.clips.doubts import LEAST_BODY_M, LYING_SHARE, UNITS, USUAL_BODY_M, measure
 from contextdb.motion.storage.clip_files import paths_of
 from contextdb.motion.storage.config import MotionConfig
 from contextdb.motion.storage.database_settings import DatabaseSettings
 from contextdb.motion.storage.rigs import Rig
-from contextdb.tables.project import SCHEMA_FILE, read_folder_schema
+from contextdb.tables.project import SCHEMA_FILE, folder_of, read_folder_schema
 
 MARKUP = "marks.csv"
-"""The markup of a folder of clips."""
 Databases = Mapping[str, DatabaseSettings]
 Tell = Callable[[int, int, str], None]
 """Takes how many clips are done of how many, and the name of the next."""
@@ -55,7 +54,7 @@ def clips_of(
 ) -> FolderClips:
     """Read the clips of a folder; of a project with `wants` those of the databases that it leaves of all. Raises ContextDBError
     where there is no such folder, no clip in it, or two clips of one name."""
-    folder = _folder(Path(path))
+    folder = folder_of(Path(path), f"a folder of clips, or of tables with {SCHEMA_FILE}")
     found = FolderClips(folder)
     if (folder / SCHEMA_FILE).is_file():
         schema = read_folder_schema(folder)
@@ -96,18 +95,6 @@ def bvh_files(folder: Path) -> list[Path]:
     if not files:
         raise FileError(Fault("there is no BVH file in this folder or below it.", "*.bvh", place=Place(str(folder))))
     return files
-
-
-def _folder(path: Path) -> Path:
-    if os.path.isdir(path):
-        return path
-    if path.name == SCHEMA_FILE and os.path.isfile(path):
-        return path.parent
-    found = "not a folder." if os.path.exists(path) else "there is no such folder."
-    siblings = [each.name for each in path.parent.iterdir() if each.is_dir()] if os.path.isdir(path.parent) else []
-    near = nearest(path.name, siblings)
-    mend = path_in_quotes(path.parent / near) if near else ""
-    raise FileError(Fault(found, f"a folder of clips, or of tables with {SCHEMA_FILE}", mend, Place(str(path)), "no-such-path"))
 
 
 def _files(found: FolderClips, unit: float | None, up: Up | None) -> dict[Path, tuple[float | None, Up, Rig | None]]:

@@ -81,7 +81,6 @@ class ConditionColumn:
         return ConditionColumn(condition, texts, tuple(cell for cell, _ in found), wrong)
 
     def cell(self, row: int) -> Cell:
-        """What the row accepts."""
         return self.cells[int(self.texts.codes[row])]
 
     def faulty_rows(self) -> Iterable[tuple[int, Fault]]:

@@ -31,7 +31,7 @@ from contextdb.compiled.outputs import Outputs
 from contextdb.compiled.pick_columns import PickColumns, specificities
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.compiled.ways import Ways
-from contextdb.errors import ContextError, Fault, NoSuchRow, Place, TableError, in_quotes, nearest, plural, some
+from contextdb.errors import ContextError, Fault, NoSuchRow, Place, TableError, in_quotes, no_such, plural, some
 from contextdb.expressions.rules import WhenColumn
 from contextdb.files.texts import AnySource
 from contextdb.schema.settings import EMPTY, Schema, TableSettings, plain_names
@@ -226,7 +226,6 @@ class TableData(Unchanging):
 
     @cached_property
     def _output_columns(self) -> tuple[OutputColumn, ...]:
-        """The outputs' columns, in the order of the settings."""
         return output_columns(self.columns, self.settings)
 
     @cached_property
@@ -310,10 +309,7 @@ def with_columns(table: AnyTable, columns: Sequence[TextColumn], origin: NDArray
 
 
 def _no_such(what: str, name: str, known: list[str]) -> Fault:
-    near = nearest(name, known)
-    return Fault(
-        f"there is no {what} {in_quotes(name)}.", some(known) or f"no {what}: there is none", in_quotes(near) if near else ""
-    )
+    return no_such(what, name, known, some(known) or f"no {what}: there is none")
 
 
 def _require_columns(columns: Sequence[TextColumn], settings: TableSettings, path: Path | None) -> None:

@@ -45,7 +45,6 @@ def other_form(path: Path, conditions: Collection[str]) -> str | None:
 
 
 def cases_path(table: Path) -> Path:
-    """The file of the cases of a table's file."""
     return table.with_name(table.stem + CASES_SUFFIX)
 
 
@@ -55,7 +54,6 @@ def notes_path(table: Path) -> Path:
 
 
 def stray_sentence(path: Path, form: str) -> str:
-    """What to say of such a file."""
     name = path.stem
     section = name if name.isidentifier() and name.isascii() else f'"{name}"'
     declared = f"[tables.{section}] file = {in_quotes(path.name)}"

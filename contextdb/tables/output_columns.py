@@ -61,7 +61,6 @@ class OutputColumn:
 
     @cached_property
     def cells(self) -> OutputCells:
-        """The value of each row."""
         return cells_of(self.output, self.values, self.texts.codes)
 
     def with_texts(self, texts: TextColumn) -> OutputColumn:

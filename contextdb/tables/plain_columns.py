@@ -90,10 +90,6 @@ def _read(
     return np.array([reader.empty if value is None else value for value in values], np.float64)[column.codes]
 
 
-def _truth(text: str) -> float | None:
-    return truth_of(text)
-
-
 def _priority(text: str) -> float | None:
     try:
         value = float(text)
@@ -116,10 +112,10 @@ def _weight(text: str) -> float | None:
 
 
 READERS: dict[PlainJob, Reader] = {
-    "enabled": Reader(_truth, True, '"True" or "False"'),
+    "enabled": Reader(truth_of, True, '"True" or "False"'),
     "priority": Reader(_priority, 0, "a whole number"),
     "weight": Reader(_weight, 1.0, "a number from 0 up"),
-    "once": Reader(_truth, False, '"True" or "False"'),
+    "once": Reader(truth_of, False, '"True" or "False"'),
     "cooldown_s": Reader(_weight, 0.0, "a number of seconds from 0 up"),
     "cooldown_turns": Reader(_turns, 0, "a whole number of picks from 0 up"),
 }

@@ -25,6 +25,7 @@ from contextdb.errors import (
     TableError,
     in_quotes,
     nearest,
+    no_such,
     plural,
     some,
 )
@@ -41,9 +42,10 @@ T = TypeVar("T")
 
 
 class ByName(Mapping[str, T]):
-    """A mapping by names that is equal to itself alone, and true though it may be empty."""
+    """A mapping by names that is equal to itself alone, and true though it may be empty: `tables`."""
 
     __slots__ = ()
+    tables: Mapping[str, T]
 
     def __eq__(self, other: object) -> bool:
         return self is other
@@ -53,6 +55,12 @@ class ByName(Mapping[str, T]):
 
     def __bool__(self) -> bool:
         return True
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.tables)
+
+    def __len__(self) -> int:
+        return len(self.tables)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -98,16 +106,8 @@ class Project(Unchanging, ByName[Table]):
     def __getitem__(self, name: str) -> Table:
         """One table by its name; a name that is missing raises NoSuchTable, which is a KeyError too, and names the nearest."""
         if name not in self.tables:
-            near = nearest(str(name), self.tables)
-            found = f"there is no table {in_quotes(str(name))}."
-            raise NoSuchTable(Fault(found, some(self.tables) or "none: the folder has no table", in_quotes(near) if near else ""))
+            raise NoSuchTable(no_such("table", name, self.tables, some(self.tables) or "none: the folder has no table"))
         return self.tables[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.tables)
-
-    def __len__(self) -> int:
-        return len(self.tables)
 
     def with_table(self, table: Table) -> Project:
         """The project with one table in another version, for those too whose rows refer to it; raises ContextError for no table."""
@@ -233,7 +233,11 @@ def read_folder_schema(folder: Path) -> Schema:
     path = folder / SCHEMA_FILE
     if not path.is_file():
         return EMPTY
-    raw = read_bytes(path)
+    return schema_of(read_bytes(path), path)
+
+
+def schema_of(raw: bytes, path: Path) -> Schema:
+    """What the bytes of a contextdb.toml say. Raises SchemaError where they are no UTF-8, or have an invalid setting."""
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -320,7 +324,7 @@ def twice_named(found: Iterable[tuple[str, Path]]) -> list[Fault]:
     return faults
 
 
-def folder_of(path: Path) -> Path:
+def folder_of(path: Path, accepted: str = f"a folder of tables, or its {SCHEMA_FILE}") -> Path:
     """The folder that a path to a folder, or to a contextdb.toml, means."""
     if os.path.isdir(path):  # os.path says no, where Path raises, to a name that no file can have
         return path
@@ -331,7 +335,7 @@ def folder_of(path: Path) -> Path:
     siblings = [p.name for p in path.parent.iterdir() if p.is_dir()] if os.path.isdir(path.parent) else []
     near = nearest(path.name, siblings)
     mend = path_in_quotes(path.parent / near) if near else ""
-    raise FileError(Fault(found, f"a folder of tables, or its {SCHEMA_FILE}", mend, Place(str(path)), "no-such-path"))
+    raise FileError(Fault(found, accepted, mend, Place(str(path)), "no-such-path"))
 
 
 def _read_table(path: Path, schema: Schema, folder: Path, strict: bool, around: Mapping[str, Table] | None = None) -> Table:

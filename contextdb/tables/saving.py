@@ -39,8 +39,7 @@ def require_related(base: TableData, on_disk: TableData, mend: str) -> None:
     """Raise TableError when what is in a file has no row in common with the table that was read from it."""
     if base.n_rows and not (align(base, on_disk).rows >= 0).any():
         said = "the file now has no row in common with the table that was read from it."
-        accepted = "the table as it was, with changes"
-        raise TableError(Fault(said, accepted, mend, Place(str(on_disk.path)), "merge-conflict"))
+        raise TableError(Fault(said, "the table as it was, with changes", mend, Place(str(on_disk.path)), "merge-conflict"))
 
 
 def _is_same(one: Path, other: Path) -> bool:

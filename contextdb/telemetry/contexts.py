@@ -133,6 +133,5 @@ def as_given(fact: object, condition: Condition) -> object:
 
 
 def fact_type(condition: Condition) -> pl.DataType:
-    """The type of a column of facts."""
     dtype: pl.DataType = condition.domain.type.dtype
     return dtype

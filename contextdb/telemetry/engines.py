@@ -102,6 +102,5 @@ def _distributed() -> Any:
     try:
         import distributed
     except ImportError:
-        found = "Dask is not installed."
-        raise EngineError(Fault(found, "", 'to install it: pip install "contextdb[dask]"')) from None
+        raise EngineError(Fault("Dask is not installed.", "", 'to install it: pip install "contextdb[dask]"')) from None
     return distributed

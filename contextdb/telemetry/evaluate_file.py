@@ -122,8 +122,7 @@ def answers_written(place: Path) -> Iterator[None]:
     except (OSError, pl.exceptions.PolarsError) as error:
         refused = _of_system(error)
         new = place.with_suffix(".new") if place.is_dir() else place  # the folder of what is not finished is no old file
-        fault = replace(why_unwritten(refused, new), place=Place(str(place)))
-        raise FileError(fault, errno=refused.errno) from None
+        raise FileError(replace(why_unwritten(refused, new), place=Place(str(place))), errno=refused.errno) from None
 
 
 def _of_system(error: Exception) -> OSError:

@@ -51,7 +51,6 @@ class FactColumn:
 
 
 def read_facts(given: pl.Series, condition: Condition, is_text: bool) -> FactColumn:
-    """Read one column of a file."""
     kind = condition.domain.type
     if kind.is_numeric:
         return _numbers(given, condition, is_text)

@@ -40,7 +40,6 @@ class Fields:
 
     @cached_property
     def slots(self) -> tuple[tuple[int, ...], ...]:
-        """For each condition its fields."""
         stack, found = self.compiled.stack, []
         plain, wide = 0, stack.n_plain
         for at, masks in enumerate(self.compiled.masks):

@@ -16,7 +16,7 @@ from contextdb.covering.factors import TagFactor
 from contextdb.covering.report import Gap
 from contextdb.covering.ruled import RuledTable
 from contextdb.covering.space import Space, require_counts
-from contextdb.errors import ContextError, Fault, FileError, in_quotes, nearest, some
+from contextdb.errors import ContextError, Fault, FileError, no_such
 from contextdb.tables.table import EitherTable
 from contextdb.telemetry.contexts import context_files
 from contextdb.telemetry.engines import ENGINES, Engine, with_dask
@@ -83,8 +83,7 @@ def observe(
     """
     require_counts(max_gaps=max_gaps)
     if not isinstance(engine, str) or engine not in ENGINES:
-        near = nearest(str(engine), ENGINES)
-        raise ContextError(Fault(f"there is no engine {in_quotes(str(engine))}.", some(ENGINES), in_quotes(near) if near else ""))
+        raise ContextError(no_such("engine", engine, ENGINES))
     if count is not None:
         require_text(count, "count")
     if resume is not None:

@@ -13,14 +13,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.bitmask import Flags
-from contextdb.errors import ContextDBError
+from contextdb.errors import ContextDBError, Fault, Place, TableError, in_quotes, no_such, plural
 from contextdb.telemetry import parts
 from contextdb.telemetry.chunks import Chunk, chunks_of
-from contextdb.telemetry.counts import moments_of
 from contextdb.telemetry.facts_read import FactColumn, read_facts
 from contextdb.telemetry.fields import Fields
 from contextdb.telemetry.keys import NUMPY_BLOCK, Counts, Hashes, KeyWords, grouped, load_kernels
@@ -146,7 +146,6 @@ class _Sums:
         self.open = SmallestKeys(parts.MOST_OPEN, plan.fields.n_words)
 
     def add(self, found: _Found) -> None:
-        """Add a chunk."""
         require_countable(self.moments + found.moments)
         self.rows += found.rows
         self.moments += found.moments
@@ -161,7 +160,6 @@ class _Sums:
         self.open.add(found.hashes[at], found.words, found.first[at], found.sums[at])
 
     def part(self) -> Part:
-        """The sums as they are kept."""
         hashes, is_full = self.distinct.found()
         open_hashes, words, moments, has_all = self.open.found()
         return Part(
@@ -181,3 +179,33 @@ class _Sums:
             has_all_open=has_all,
             files=1,
         )
+
+
+# ---- how often each moment was seen
+
+
+MOST_COUNT = 1 << 40
+"""The largest number in a count column."""
+
+
+def moments_of(count: str | None, names: Sequence[str], chunk: Chunk, file: str) -> Counts:
+    """The number of moments of each row: int64 [N]; 1 without a count column. Raises TableError where there is no such column, or a
+    count is missing or no whole number from 0 up; file and line, else row, are named."""
+    if count is None:
+        return np.ones(chunk.n_rows, np.int64)
+    if count not in names:
+        raise TableError(no_such("count column", count, names, f"one of {plural(len(names), 'column')}", Place(file)))
+    if not chunk.n_rows:
+        return np.zeros(0, np.int64)
+    given = chunk.frame[count]
+    is_number = given.dtype.is_numeric() or given.dtype in (pl.String, pl.Null)
+    plain = given if is_number else pl.repeat(None, chunk.n_rows, dtype=pl.Null, eager=True)
+    numbers = (plain.str.strip_chars() if plain.dtype == pl.String else plain).cast(pl.Float64, strict=False)
+    right = (numbers.is_finite() & (numbers >= 0) & (numbers <= MOST_COUNT) & (numbers.floor() == numbers)).fill_null(False)
+    if not is_number or not right.all():
+        at = 0 if not is_number else int(np.flatnonzero(~right.to_numpy())[0])
+        value = given[at]
+        said = "is missing" if value is None else f"{in_quotes(str(value))} is not a count"
+        place = Place(file, chunk.line(at), count, chunk.first_row + at)
+        raise TableError(Fault(f"the count {said}.", f"a whole number from 0 to {MOST_COUNT:,}", place=place))
+    return numbers.cast(pl.Int64).to_numpy()

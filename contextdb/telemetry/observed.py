@@ -32,7 +32,6 @@ class SeenGap:
         return ", ".join(f"{name}: {cell}" for name, cell in self.cells.items()) or "every context"
 
     def to_json(self) -> dict[str, object]:
-        """As plain data."""
         return {
             "id": self.id,
             "moments": self.moments,
@@ -54,7 +53,6 @@ class FactNote:
     """A few of the values found outside the domain, in the order of their letters."""
 
     def to_json(self) -> dict[str, object]:
-        """As plain data."""
         return {"condition": self.condition, "moments": self.moments, "examples": list(self.examples)}
 
 
@@ -66,7 +64,6 @@ class BadFile:
     faults: tuple[Fault, ...]
 
     def to_json(self) -> dict[str, object]:
-        """As plain data."""
         return {"file": self.file, "message": "\n".join(map(str, self.faults))}
 
 

@@ -56,7 +56,6 @@ class SmallestHashes:
         self._smallest = Smallest(most)
 
     def add(self, hashes: Hashes) -> None:
-        """Add those of some contexts."""
         self._smallest.add(hashes)
         if self._smallest.wants_sorting:
             self._smallest.settle()

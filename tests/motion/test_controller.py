@@ -16,11 +16,11 @@ from contextdb.motion import Entry, FeatureSchema, MotionDatabase, Selector, Sta
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.markup.marks import TagFilter
 from contextdb.motion.search.filters import Biases
-from contextdb.motion.selection.continuing import continuing_cost
 from contextdb.motion.selection.controller import Controller
 from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.controller_state import ControllerState
 from contextdb.motion.selection.decision import Action
+from contextdb.motion.selection.step import continuing_cost
 from contextdb.motion.selection.variation import Variation
 
 EVERY = {"search_every_s": 0.0, "jump_threshold_s": 0.0, "history_s": 0.0, "rate": RATE}

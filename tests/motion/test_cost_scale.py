@@ -22,7 +22,7 @@ from contextdb.motion import (
 from contextdb.motion.features.extraction import ClipFeatures
 from contextdb.motion.features.normalisation import Normalisation
 from contextdb.motion.features.schema import Channel
-from contextdb.motion.selection.continuing import continuing_cost
+from contextdb.motion.selection.step import continuing_cost
 
 WEIGHTS = st.one_of(st.just(0.0), st.floats(1e-3, 1e3))
 

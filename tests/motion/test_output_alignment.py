@@ -14,7 +14,7 @@ from played import RATE, bank, decisions, range_of
 from contextdb.motion import FeatureSchema, PoseBank, PoseSettings, PoseStream, Steered, make_clip
 from contextdb.motion.clips import quaternions
 from contextdb.motion.output.alignment import _followed
-from contextdb.motion.output.spine import spine_of
+from contextdb.motion.output.pipeline import spine_of
 from contextdb.motion.output.stages import TURN, damping
 
 STEP = 1.0 / RATE

@@ -15,7 +15,7 @@ from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.measuring import measure, shown
 from contextdb.motion.measuring.raw_clips import Clips
-from contextdb.motion.measuring.strips import strips_of
+from contextdb.motion.measuring.shown import strips_of
 from contextdb.motion.output.bank import PoseBank
 from contextdb.motion.output.settings import PoseSettings
 from contextdb.motion.search.database import MotionDatabase

@@ -116,8 +116,7 @@ class CastExplanation(Explanation):
         for at, fact in offer.facts.items():
             bits, _ = self._compiled.condition_bits(at, fact, self._stage.unknown)
             if not bits >> row & 1:
-                told = f"{told_fact(self._compiled, at, fact)} of {offer.name}"
-                yield from cell_failures(self._compiled, at, row, fact, told)
+                yield from cell_failures(self._compiled, at, row, fact, f"{told_fact(self._compiled, at, fact)} of {offer.name}")
 
 
 def _most_filled(parts: list[Part]) -> dict[str, Offer]:

@@ -12,7 +12,7 @@ from contextdb.cells.facts import Context, Fact, Unknown, missing_error, misspel
 from contextdb.cells.mirroring import kept_facts, mirrored_facts
 from contextdb.compiled.casting.roles import roles_of_table
 from contextdb.compiled.data import CompiledData
-from contextdb.errors import ContextError, Fault, Place, in_quotes, nearest, shown
+from contextdb.errors import ContextError, Fault, Place, in_quotes, mend_for, shown
 
 Actor = Mapping[str, Any]
 Actors = Mapping[str, Sequence[Actor]]
@@ -131,9 +131,8 @@ class _Reader:
         """Raise ContextError when actors are preferred by a fact that none of them tells."""
         for name, is_told in self.preferred.items():
             if not is_told:
-                near = nearest(name, sorted(self.names))
                 found = f"no actor has {in_quotes(name)}, by which actors are preferred."
-                mend = in_quotes(near) if near else ""
+                mend = mend_for(name, sorted(self.names))
                 raise ContextError(Fault(found, "a number fact of the actors", mend, rule="unknown-fact"))
 
     def read(self, role: str, places: Sequence[int], place: int, actor: Actor) -> Offer:
@@ -286,5 +285,4 @@ def _text(value: object) -> str:
 def _in_actor(fault: Fault, where: str) -> Fault:
     """A fault of an actor's fact, with the actor before it."""
     column = fault.place.column if fault.place else None
-    place = Place(column=f"{where}: {column}" if column else where)
-    return Fault(fault.found, fault.accepted, fault.mend, place, fault.rule)
+    return Fault(fault.found, fault.accepted, fault.mend, Place(column=f"{where}: {column}" if column else where), fault.rule)

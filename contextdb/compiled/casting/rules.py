@@ -53,7 +53,6 @@ class CastRules:
 
     @cached_property
     def rows(self) -> int:
-        """The rows that have one of these rules."""
         return reduce(or_, (self.when.rules[number].rows for number in self.roles))
 
     def holds(self, row: int, cast: Cast) -> bool:
@@ -122,7 +121,6 @@ class CastRules:
 
 
 def _by_needs(rows: int, roles: Sequence[str], required: Mapping[str, int]) -> Iterator[tuple[tuple[str, ...], int]]:
-    """Some rows by which of these roles they need."""
     groups: list[tuple[tuple[str, ...], int]] = [((), rows)]
     for role in roles:
         needing = [((*needed, role), own & required[role]) for needed, own in groups]

@@ -31,7 +31,7 @@ from contextdb.compiled.casting.rules import CastRules
 from contextdb.compiled.casting.together import CastRows, casts_of
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.matches import Answering, SetMatches, Stages, with_mirrored, with_penalties, with_widened
-from contextdb.errors import ContextError, Fault, in_quotes, nearest, some
+from contextdb.errors import ContextError, Fault, in_quotes, no_such, some
 
 Casting = dict[str, Actor]
 CastBy = tuple[tuple[int, "Stage"], ...]
@@ -220,7 +220,6 @@ class Stage:
         return costs
 
     def best(self, row: int) -> Casting:
-        """The best casting of a row that can be cast."""
         return _as_casting(self.cast(row))
 
     def cast(self, row: int) -> Chosen:
@@ -380,10 +379,7 @@ def _require_roles(actors: Actors, known: Sequence[str]) -> None:
     faults = []
     for role in actors:
         if role not in known:
-            near = nearest(str(role), known)
             accepted = some(known) if known else "no actors: the table has no roles"
-            faults.append(
-                Fault(f"there is no role {in_quotes(str(role))}.", accepted, in_quotes(near) if near else "", rule="unknown-fact")
-            )
+            faults.append(no_such("role", role, known, accepted, rule="unknown-fact"))
     if faults:
         raise ContextError(*faults)

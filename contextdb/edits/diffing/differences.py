@@ -81,7 +81,6 @@ class Diff:
 
     @cached_property
     def rows_removed(self) -> list[int]:
-        """Rows of before that are gone."""
         return np.flatnonzero(inverse(*self._sizes[0]) < 0).tolist()
 
     @cached_property
@@ -101,17 +100,14 @@ class Diff:
 
     @cached_property
     def columns_added(self) -> list[str]:
-        """Columns of after that were not there."""
         return [self.after.columns[a].name for a in np.flatnonzero(self.alignment.columns < 0).tolist()]
 
     @cached_property
     def columns_removed(self) -> list[str]:
-        """Columns of before that are gone."""
         return [self.before.columns[b].name for b in np.flatnonzero(inverse(*self._sizes[1]) < 0).tolist()]
 
     @cached_property
     def columns_renamed(self) -> list[Renamed]:
-        """Columns with another name."""
         pairs = ((b, a) for a, b in enumerate(self.alignment.columns.tolist()) if b >= 0)
         named = (Renamed(self.before.columns[b].name, self.after.columns[a].name, b, a) for b, a in pairs)
         return [one for one in named if one.before != one.after]
@@ -234,5 +230,4 @@ def _is_writing_only(
 
 
 def _row(table: EitherTable, row: int) -> dict[str, object]:
-    place = table.place(row)
-    return {"row": row, "asset": table.assets[row], "line": place.line}
+    return {"row": row, "asset": table.assets[row], "line": table.place(row).line}

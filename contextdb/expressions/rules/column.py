@@ -51,7 +51,6 @@ class WhenColumn:
 
     @property
     def name(self) -> str:
-        """The name of the column."""
         return self.texts.name
 
     def rule(self, row: int) -> Expression | None:
@@ -105,7 +104,6 @@ class _Known:
 
     @cached_property
     def names(self) -> frozenset[str]:
-        """Their names."""
         return frozenset(c.name for c in self.conditions)
 
     @cached_property

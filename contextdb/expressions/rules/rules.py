@@ -118,7 +118,6 @@ class WhenRules:
 
     @property
     def name(self) -> str:
-        """The name of the column."""
         return self.texts.name
 
     @cached_property
@@ -128,7 +127,6 @@ class WhenRules:
 
     @cached_property
     def names(self) -> frozenset[str]:
-        """Their names."""
         return frozenset(c.name for c in self.conditions)
 
     @cached_property
@@ -138,7 +136,6 @@ class WhenRules:
 
     @cached_property
     def rows(self) -> int:
-        """The rows that have a rule."""
         return reduce(or_, (rule.rows for rule in self.rules))
 
     def numbers(self, left: int) -> Iterator[int]:

@@ -299,7 +299,6 @@ class Character:
     # ---- the parts of an update, for a crowd
 
     def _step(self, dt: float, stick: Ground, facts: Facts | None, facing: float | None, body: Steered | None) -> Step:
-        """The body and the facts of an update."""
         dt = require_real(dt, "dt", 0.0)
         stick = require_point(stick, "stick", "two numbers, x and z in metres a second")
         given = {} if facts is None else require_mapping(facts, "facts", "a mapping of names to facts")

@@ -6,13 +6,14 @@ Bodies and paths are computed in arrays, each table is asked once with all conte
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, overload
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from contextdb.cells.arguments import require_kind, require_many_of, require_mapping, require_real
+from contextdb.cells.sequences import Kept
 from contextdb.errors import ContextError, Fault, MotionError, in_quotes, plural
 from contextdb.motion.arguments import HasAssets
 from contextdb.motion.characters import tables as asking
@@ -37,7 +38,7 @@ from contextdb.motion.selection.decision import Decision
 FactsOfMany = Mapping[str, Any] | Sequence[Facts]
 
 
-class Crowd(Sequence[Character]):
+class Crowd(Kept[Character]):
     """Characters in order, updated together: a sequence, with whose numbers sticks and facts go.
 
     Parameters
@@ -52,7 +53,7 @@ class Crowd(Sequence[Character]):
     """
 
     def __init__(self, characters: Iterable[Character] = ()) -> None:
-        self._characters: list[Character] = []
+        self._items = []
         for character in require_many_of(characters, Character, "characters", "a list of Character"):
             self.add(character)
 
@@ -61,29 +62,14 @@ class Crowd(Sequence[Character]):
         require_kind(character, Character, "character", "a Character")
         if any(own is character or own.controller is character.controller for own in self):
             raise MotionError(Fault("the crowd has this character already.", "one of its own, such as character.copy()"))
-        self._characters.append(character)
+        self._items.append(character)
 
     def remove(self, character: Character) -> None:
         """Let one go; those after it move up by one."""
         kept = [own for own in self if own is not character]
         if len(kept) == len(self):
             raise MotionError(Fault("the crowd does not have this character.", "one that was added"))
-        self._characters = kept
-
-    @overload
-    def __getitem__(self, i: int) -> Character: ...
-
-    @overload
-    def __getitem__(self, i: slice) -> list[Character]: ...
-
-    def __getitem__(self, i: int | slice) -> Character | list[Character]:
-        return self._characters[i]
-
-    def __len__(self) -> int:
-        return len(self._characters)
-
-    def __iter__(self) -> Iterator[Character]:
-        return iter(self._characters)
+        self._items = kept
 
     def __copy__(self) -> Crowd:
         return Crowd(character.copy() for character in self)
@@ -235,7 +221,6 @@ def _answers(table: Table, facts: Sequence[Facts], unknown: Any) -> Iterable[Has
 
 
 def _facts_of_each(facts: object, n: int) -> list[Facts]:
-    """The facts of each of n characters, as mappings."""
     if facts is None:
         return [{}] * n
     if isinstance(facts, (list, tuple)):

@@ -32,7 +32,6 @@ class Drive:
 
 
 def drives(speed_mps: float) -> list[Drive]:
-    """All drives at a speed."""
     rate = speed_mps / RADIUS_M  # radians a second on the circle
     round_s = math.tau / rate
 

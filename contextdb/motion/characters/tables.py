@@ -68,7 +68,6 @@ def answers_many(table: object) -> TypeGuard[AnswersMany]:
 
 
 def is_one(tables: object) -> TypeGuard[Table]:
-    """Whether it is one table, for all databases."""
     return keeps_facts(tables) or can_answer(tables)
 
 
@@ -85,7 +84,6 @@ def checked(tables: object) -> Tables:
 
 
 def each_of(tables: Tables) -> list[Table]:
-    """Each table once."""
     if tables is None:
         return []
     if is_one(tables):

@@ -17,7 +17,7 @@ import numpy as np
 
 from contextdb.cells.arguments import require_kind, require_many, require_path, require_text, require_whole
 from contextdb.disk import read_bytes, write_atomic
-from contextdb.errors import ClipError, ContextError, Fault, FileError, Place, in_quotes, nearest, some
+from contextdb.errors import ClipError, ContextError, Fault, FileError, Place, in_quotes, mend_for, some
 from contextdb.files.strangers import line_of
 from contextdb.motion.clips import bvh
 from contextdb.motion.clips.quaternions import Floats
@@ -157,7 +157,6 @@ def write_bvh(clip: Clip, target: str | PathLike[str] | TextIO, *, digits: int =
 
 
 def text_of(raw: bytes, file: str) -> str:
-    """The text of a file's bytes."""
     if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise _no_text("the file is UTF-16", 1, file)
     if b"\0" in raw:
@@ -183,8 +182,7 @@ def _faults(clip: Clip) -> Iterable[Fault]:
     if not math.isfinite(unit) or unit <= 0.0:
         yield Fault(f"metres_per_unit is {unit!r}.", "a number above 0, such as 0.01 for centimetres")
     if clip.up not in UPS:
-        near = nearest(str(clip.up), UPS)
-        yield Fault(f"the axis that points up is {in_quotes(str(clip.up))}.", some(UPS), in_quotes(near) if near else "")
+        yield Fault(f"the axis that points up is {in_quotes(str(clip.up))}.", some(UPS), mend_for(str(clip.up), UPS))
     if not 0.0 < clip.frame_time_s <= bvh.LONGEST_FRAME_S:
         yield Fault(f"the frame time is {clip.frame_time_s!r} s.", f"more than 0 and at most {bvh.LONGEST_FRAME_S:g}")
     wanted = clip.skeleton.n_channels

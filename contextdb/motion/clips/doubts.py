@@ -137,7 +137,6 @@ class Measures:
 
     @classmethod
     def of_json(cls, said: Mapping[str, Any]) -> Measures:
-        """What `to_json` wrote."""
         return cls(**{**said, "extents": tuple(said["extents"])})
 
 

@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from contextdb.cells.arguments import require_kind, require_number, require_pair, require_text
-from contextdb.errors import Fault, MotionError, in_quotes, nearest, some
+from contextdb.errors import MotionError, no_such
 from contextdb.motion.clips.clip import Clip
 from contextdb.motion.clips.contacts import ground_points, stances
 from contextdb.motion.clips.foot_bones import UNDECLARED, Foot, FootBones
@@ -79,8 +79,7 @@ class Footfalls:
 
     def _of(self, foot: str) -> Floats:
         if require_text(foot, "foot") not in self.down:
-            near = nearest(foot, self.feet)
-            raise MotionError(Fault(f"there is no foot {in_quotes(foot)}.", some(self.feet), in_quotes(near) if near else ""))
+            raise MotionError(no_such("foot", foot, self.feet))
         return self.down[foot]
 
 
@@ -149,7 +148,6 @@ def _held(marked: Floats, rests: Floats, flat: Floats) -> Floats:
 
 
 def _with_marks(feet: tuple[Foot, Foot], found: tuple[Floats, Floats], marks: ContactMarks, duration_s: float) -> Footfalls:
-    """The footfalls that are found, or marked."""
     down = {
         foot.bone: intervals if mark is None else marked(mark, duration_s)
         for foot, intervals, mark in zip(feet, found, marks, strict=True)

@@ -25,7 +25,7 @@ from typing import TypeVar
 import numpy as np
 
 from contextdb.cells.arguments import require_kind, require_many, require_pair
-from contextdb.errors import Fault, MotionError, in_quotes, nearest, some
+from contextdb.errors import Fault, MotionError, in_quotes, mend_for, some
 from contextdb.motion.clips.own_axes import own_axes
 from contextdb.motion.clips.poses import LocalPoses, Poses
 from contextdb.motion.clips.quaternions import inverse, multiply, rotate
@@ -171,9 +171,8 @@ def _rests(pattern: str, names: tuple[str, ...]) -> list[str]:
 
 
 def _missing(bone: str, pair: tuple[str, str], skeleton: Skeleton) -> Fault:
-    near = nearest(bone, skeleton.names)
     found = f"mirror: {_told(pair)} names the bone {in_quotes(bone)}, which does not exist."
-    return Fault(found, some(skeleton.names), in_quotes(near) if near else "", rule="unknown-bone")
+    return Fault(found, some(skeleton.names), mend_for(bone, skeleton.names), rule="unknown-bone")
 
 
 def _unlike_parents(skeleton: Skeleton, partners: Ints) -> Iterator[Fault]:

@@ -71,7 +71,6 @@ class Rig:
         return alone + [role for role, names in listed if bone in names]
 
     def partner(self, bone: str) -> str | None:
-        """The bone on the other side."""
         return next((right if bone == left else left for left, right in self.mirror if bone in (left, right)), None)
 
 

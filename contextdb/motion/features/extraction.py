@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.cells.arguments import require_kind, require_whole
-from contextdb.errors import Fault, MotionError, Place, QueryError, in_quotes, nearest, plural, some
+from contextdb.errors import Fault, MotionError, Place, QueryError, in_quotes, mend_for, plural, some
 from contextdb.motion.clips import mirror, own_axes, quaternions
 from contextdb.motion.clips.clip import Clip
 from contextdb.motion.clips.feet import NO_MARKS, ContactMarks, footfalls_of, phases, rounds_of
@@ -370,9 +370,8 @@ def _feet_faults(skeleton: Skeleton) -> Iterator[Fault]:
 
 def _no_function(channel: Channel, schema: FeatureSchema) -> Fault:
     name = str(channel.function)
-    near = nearest(name, schema.functions)
     accepted = f"schema.with_functions({{{in_quotes(name)}: function}}); there are {some(schema.functions) or 'none'}"
-    return Fault(f"channel {in_quotes(channel.name)} has no function.", accepted, in_quotes(near) if near else "")
+    return Fault(f"channel {in_quotes(channel.name)} has no function.", accepted, mend_for(name, schema.functions))
 
 
 def _mirror_faults(skeleton: Skeleton, schema: FeatureSchema) -> Iterator[Fault]:

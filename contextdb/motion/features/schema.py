@@ -14,7 +14,7 @@ import numpy as np
 
 from contextdb.cells.arguments import require_mapping, require_text
 from contextdb.cells.notebook import one_line
-from contextdb.errors import Fault, SchemaError, in_quotes, nearest, plural, shown, some
+from contextdb.errors import Fault, SchemaError, in_quotes, mend_for, plural, shown, some
 from contextdb.files.toml_shapes import Mapped, Section
 from contextdb.files.toml_text import as_toml, what
 from contextdb.motion.clips.foot_bones import FootBones, Pair
@@ -213,9 +213,8 @@ class FeatureSchema:
 
 
 def _unasked(name: str, asked: list[str], schema: str) -> Fault:
-    near = nearest(name, asked)
     accepted = some(asked) or 'the name in a channel { type = "custom", function = "…" }'
-    return Fault(f"no channel of [features.{schema}] has function = {in_quotes(name)}.", accepted, in_quotes(near) if near else "")
+    return Fault(f"no channel of [features.{schema}] has function = {in_quotes(name)}.", accepted, mend_for(name, asked))
 
 
 def _read_schema(

@@ -32,7 +32,6 @@ class JointBoxes(NamedTuple):
 
 
 def boxes_of(joint: JointDatabase) -> JointBoxes:
-    """The boxes of a joint database."""
     layout = joint.database.layout
     counts = -(-joint.lengths // LANES)
     ranges = np.repeat(np.arange(len(counts)), counts)

@@ -106,7 +106,6 @@ def nothing(choice: Choice) -> JointHit:
 
 
 def _sided(way: RootMotion) -> str:
-    """A movement for people."""
     left, ahead, turn = way.left_m, way.ahead_m, math.degrees(way.turn_rad)
     return (
         f"{abs(left):.2f} m {'left' if left >= 0 else 'right'}, {abs(ahead):.2f} m {'ahead' if ahead >= 0 else 'back'}, "

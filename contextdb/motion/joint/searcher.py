@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from contextdb.cells.arguments import as_number, require_kind, require_many_of, require_mapping, require_whole
-from contextdb.errors import ContextError, Fault, MotionError, QueryError, in_quotes, nearest, some
+from contextdb.errors import ContextError, Fault, MotionError, QueryError, in_quotes, nearest, no_such, some
 from contextdb.motion.clips.ground_place import A_BODY, GroundPlace, OfBody, place_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.features.extraction import FARTHEST_M
@@ -390,8 +390,7 @@ def _gives_of(gives: Mapping[str, float] | None, roles: Sequence[str]) -> Floats
     given = {} if gives is None else require_mapping(gives, "gives", "a mapping of roles to numbers")
     for role, value in given.items():
         if role not in roles:
-            near = nearest(str(role), roles)
-            raise QueryError(Fault(f"there is no role {in_quotes(str(role))}.", some(roles), in_quotes(near) if near else ""))
+            raise QueryError(no_such("role", role, roles))
         number = as_number(value)
         if number is None or not 0.0 <= number <= FARTHEST_M:
             raise QueryError(Fault(f"{role} gives way by {value!r}.", "a number from 0, not at all, to a million"))

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from contextdb.cells.arguments import require_path, require_text
-from contextdb.errors import Fault, MotionError, in_quotes, nearest, some
+from contextdb.errors import MotionError, no_such
 from contextdb.motion.clips.clip import CENTIMETRE, Clip, write_bvh
 from contextdb.motion.clips.poses import poses_of
 from contextdb.motion.clips.quaternions import Floats
@@ -33,9 +33,7 @@ REACH = {"RightArm": (-55.0, 24.0), "RightForeArm": (-25.0, 0.0)}
 def make_joint_clip(name: str) -> dict[str, Clip]:
     """Compute one joint clip of `JOINT_RECIPES`, by role; the same every time. Raises MotionError for another name."""
     if require_text(name, "name") not in JOINT_RECIPES:
-        near = nearest(name, JOINT_RECIPES)
-        found = f"there is no made joint clip {in_quotes(name)}."
-        raise MotionError(Fault(found, some(list(JOINT_RECIPES)), in_quotes(near) if near else ""))
+        raise MotionError(no_such("made joint clip", name, JOINT_RECIPES))
     walked = make_clip(JOINT_RECIPES[name]).clip
     host = replace(walked, name=f"{name}.Host", values=_reaching(walked))
     poses = poses_of(host)

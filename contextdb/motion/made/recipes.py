@@ -19,7 +19,7 @@ from typing import Literal
 import numpy as np
 
 from contextdb.cells.arguments import require_many_of, require_path, require_text
-from contextdb.errors import Fault, MotionError, in_quotes, nearest, plural
+from contextdb.errors import MotionError, no_such, plural
 from contextdb.motion.clips.clip import CENTIMETRE, Clip, write_bvh
 from contextdb.motion.clips.feet import Footfalls
 from contextdb.motion.clips.poses import poses_of
@@ -160,8 +160,7 @@ def _about_turns() -> Iterable[Recipe]:
     """About, on the way, to either side: at a walk and at a jog."""
     for pace in ("walk", "jog"):
         for side, sign in (("left", 1.0), ("right", -1.0)):
-            name = f"{pace}_about_{side}"
-            turn = _recipe(name, pace, change="turn")
+            turn = _recipe(f"{pace}_about_{side}", pace, change="turn")
             yield replace(turn, n_cycles=turn.n_cycles + 1, turned_deg=sign * 180.0)
 
 
@@ -176,9 +175,8 @@ def make_clip(name: str) -> MadeClip:
     """
     known = RECIPES | ABOUT_TURNS
     if require_text(name, "name") not in known:
-        near = nearest(name, known)
         accepted = f"one of {plural(len(known), 'made clip')}, the names of RECIPES and ABOUT_TURNS"
-        raise MotionError(Fault(f"there is no made clip {in_quotes(name)}.", accepted, in_quotes(near) if near else ""))
+        raise MotionError(no_such("made clip", name, known, accepted))
     recipe = known[name]
     if recipe.change == "turn":
         way = about_turn(recipe.pace, recipe.turned_deg, recipe.n_cycles, RAMP_S[recipe.gait])

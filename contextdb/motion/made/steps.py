@@ -70,7 +70,6 @@ class Timeline:
 
     @property
     def frame_times(self) -> Floats:
-        """The moments of the clip's frames."""
         return np.arange(round(self.duration_s * RATE) + 1) / RATE
 
     def at(self, values: Floats, times: Floats) -> Floats:
@@ -80,7 +79,6 @@ class Timeline:
         return np.stack([np.interp(times, self.times, column) for column in values.T], axis=-1)
 
     def when(self, phases: Floats) -> Floats:
-        """The moments of some phases."""
         return np.interp(phases, self.phases, self.times)
 
 

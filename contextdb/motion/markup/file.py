@@ -50,8 +50,7 @@ def text_of(raw: bytes, file: str) -> str:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         found = f"byte 0x{raw[error.start]:02X} on this line is not UTF-8."
-        place = Place(file, line_of(raw, error.start))
-        raise MotionError(Fault(found, _ACCEPTED, "to save it as UTF-8", place)) from None
+        raise MotionError(Fault(found, _ACCEPTED, "to save it as UTF-8", Place(file, line_of(raw, error.start)))) from None
 
 
 def rows_of(text: str, file: str | None) -> Rows:

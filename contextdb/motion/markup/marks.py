@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.bitmask import read_only
-from contextdb.errors import Fault, QueryError, in_quotes, nearest, some
+from contextdb.errors import QueryError, no_such, some
 from contextdb.motion.arguments import Flags, frame_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.markup.left_out import LeftOut
@@ -227,9 +227,8 @@ class _Tags:
         """Which kinds have a tag or one below it: bool [K]."""
         at = [i for i, known in enumerate(self.names) if covers(tag, known)]
         if not at:
-            near = nearest(tag, self.names)
             accepted = some(self.names) or "none: the markup has no tags"
-            raise QueryError(Fault(f"there is no tag {in_quotes(tag)}.", accepted, in_quotes(near) if near else ""))
+            raise QueryError(no_such("tag", tag, self.names, accepted))
         return np.asarray(self.flags[:, at].any(axis=1))
 
     def passes(self, tags: TagFilter) -> Flags:

@@ -27,7 +27,7 @@ from pathlib import Path
 
 from contextdb import disk
 from contextdb.cells.arguments import require_many, require_path, require_text
-from contextdb.errors import Fault, MotionError, Place, in_quotes, nearest, plural
+from contextdb.errors import Fault, MotionError, Place, in_quotes, mend_for, plural
 from contextdb.motion.clips.bvh_words import number_fault
 from contextdb.motion.clips.feet import ContactMark, ContactMarks
 from contextdb.motion.markup import file as markup_file
@@ -173,8 +173,7 @@ class Markup:
         accepted = f"one of {plural(len(assets), 'asset')}" if assets else "none: there are no assets"
         if self.spans[indices[0]].is_pattern:
             return Fault(f"no asset fits the pattern {in_quotes(text)}.{more}", accepted, place=place)
-        near = nearest(text, near_ones)
-        return Fault(f"no database holds the asset {in_quotes(text)}.{more}", accepted, in_quotes(near) if near else "", place)
+        return Fault(f"no database holds the asset {in_quotes(text)}.{more}", accepted, mend_for(text, near_ones), place)
 
     def _idle(self, i: int, durations_s: Sequence[float], rate: float | None) -> Fault | None:
         """The fault of a span that holds no frame of any clip it is meant for; None when a clip's length is not known."""

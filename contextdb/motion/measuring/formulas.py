@@ -152,7 +152,6 @@ def apart(roots: Floats, bodies: Floats) -> tuple[Floats, Floats]:
 
 
 def rms(values: Floats) -> float:
-    """The root of the mean square."""
     return math.sqrt(float(np.mean(np.square(values))))
 
 

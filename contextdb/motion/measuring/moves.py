@@ -81,11 +81,9 @@ class Map:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Rows and columns."""
         return len(self.rows), len(self.columns)
 
     def words(self, row: int, column: int) -> str:
-        """One bin in words."""
         speed = self.rows[row].name
         if self.name == DIRECTION:
             return f"{speed} m/s going {self.columns[column].name}"

@@ -16,6 +16,7 @@ from contextdb.errors import Fault, MotionError, plural
 from contextdb.motion.clips.foot_bones import feet_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints, Skeleton
+from contextdb.motion.measuring import formulas
 from contextdb.motion.measuring.raw_clips import At, Clips, toe_of
 from contextdb.motion.output.samples import Flags
 from contextdb.motion.output.stream import Pose
@@ -191,3 +192,39 @@ def _feet(bones: Sequence[str], parents: Ints) -> Ints | None:
         return np.array([toe_of(rig, foot) for foot in feet_of(rig)], np.int64)
     except MotionError:
         return None
+
+
+# ---- what is measured, moment by moment: for a timeline. NaN where a moment has no value
+
+
+def strips_of(it: Shown) -> dict[str, Floats]:
+    """Of each measure that there is its value at each moment: float64 [T].
+
+    "skate": the speed of the fastest planted foot, cm/s; "accel": the largest acceleration of a joint, m/s²; "error": how far the
+    root is from the game's body, m.
+    """
+    found: dict[str, Floats] = {}
+    if it.positions is not None and len(it.times_s) > 1:
+        found["accel"] = _accelerations(it.positions, it.times_s)
+        if it.feet is not None and it.contacts is not None:
+            found["skate"] = _skate(it.positions[:, it.feet], it)
+    if it.roots is not None and it.bodies is not None:
+        found["error"] = formulas.apart(it.roots, it.bodies)[0]
+    return found
+
+
+def _accelerations(positions: Floats, times_s: Floats) -> Floats:
+    step = formulas.step_of(times_s)
+    found = np.full(len(times_s), np.nan)
+    largest = formulas.accelerations(positions, times_s, step)
+    if len(largest):
+        found[step:-step] = largest.max(axis=1)
+    return found
+
+
+def _skate(feet: Floats, it: Shown) -> Floats:
+    assert it.contacts is not None, "was looked at before"
+    slides = formulas.Slides.of(feet, it.times_s, it.contacts, formulas.floor_of(feet))
+    found = np.full(len(it.times_s), np.nan)
+    found[len(found) - len(slides.seconds) :] = np.where(slides.planted, 100.0 * slides.speeds, 0.0).max(axis=1)
+    return found

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from contextdb.cells.arguments import as_number, require_kind, require_many, require_text
-from contextdb.errors import Fault, MotionError, QueryError, in_quotes, nearest, some
+from contextdb.errors import Fault, MotionError, QueryError, in_quotes, mend_for, some
 from contextdb.motion.arguments import HasAssets, Valid
 from contextdb.motion.clips.foot_bones import feet_of
 from contextdb.motion.clips.mirror import Pairs
@@ -192,8 +192,7 @@ def _check_names(database: MotionDatabase, names: list[str]) -> None:
     faults = []
     for name in names:
         if not isinstance(name, str) or name not in known:
-            near = nearest(str(name), known)
             found = f"the database has no asset {in_quotes(str(name))}."
-            faults.append(Fault(found, some(known) or "none: it is empty", in_quotes(near) if near else ""))
+            faults.append(Fault(found, some(known) or "none: it is empty", mend_for(str(name), known)))
     if faults:
         raise QueryError(*faults)

@@ -19,21 +19,9 @@ from __future__ import annotations
 
 import math
 
-from contextdb.motion.output import kernels
+from contextdb.motion.output import kernels, stages
 from contextdb.motion.output.kernels import compiled, flat_length, remainder
 from contextdb.motion.output.root import rotation_share
-from contextdb.motion.output.stages import (
-    HAS_VELOCITY,
-    PATH,
-    RATE,
-    STRIDE,
-    STRIDE_SPEED,
-    TRAVEL,
-    TURN,
-    TURN_SPEED,
-    VELOCITY,
-    WEIGHT,
-)
 
 LEAST_MPS = 0.2
 """What goes slower goes nowhere: neither turn nor stride are wanted of it."""
@@ -43,32 +31,34 @@ MOST_TURN = math.pi / 2.0
 @compiled
 def align(to, bones, given, heading, dt, before, row, rotations, positions):
     """Write how the body is bent, and turn its hips by that; a rig without a spine is left as it is."""
-    row[TURN], row[TURN_SPEED], row[STRIDE], row[STRIDE_SPEED] = 0.0, 0.0, 1.0, 0.0
+    row[stages.TURN], row[stages.TURN_SPEED], row[stages.STRIDE], row[stages.STRIDE_SPEED] = 0.0, 0.0, 1.0, 0.0
     if not to.is_warping or bones.spine.shape[0] == 0:
         return
     turn, stride = _wanted(to, given, heading, row)
-    row[TURN], row[TURN_SPEED] = _followed(before[TURN], before[TURN_SPEED], turn, to.turn_damping, dt)
-    row[STRIDE], row[STRIDE_SPEED] = _followed(before[STRIDE], before[STRIDE_SPEED], stride, to.turn_damping, dt)
-    if row[TURN] != 0.0:
+    row[stages.TURN], row[stages.TURN_SPEED] = _followed(before[stages.TURN], before[stages.TURN_SPEED], turn, to.turn_damping, dt)
+    row[stages.STRIDE], row[stages.STRIDE_SPEED] = _followed(
+        before[stages.STRIDE], before[stages.STRIDE_SPEED], stride, to.turn_damping, dt
+    )
+    if row[stages.TURN] != 0.0:
         kernels.align(
-            bones.parents, bones.tops, bones.top_places, bones.spine, bones.left, row[TURN], rotations, positions
+            bones.parents, bones.tops, bones.top_places, bones.spine, bones.left, row[stages.TURN], rotations, positions
         )  # fmt: skip
 
 
 @compiled
 def _wanted(to, given, heading, row):
     """The turn and the stride that the game's velocity asks for; 0 and 1 where either body stands."""
-    left, ahead = given[RATE] * given[TRAVEL], given[RATE] * given[TRAVEL + 1]
-    sway = given[TRAVEL + 2] * rotation_share(to, given[WEIGHT])
-    x = row[VELOCITY] if row[HAS_VELOCITY] != 0.0 else 0.0
-    z = row[VELOCITY + 1] if row[HAS_VELOCITY] != 0.0 else 0.0
+    left, ahead = given[stages.RATE] * given[stages.TRAVEL], given[stages.RATE] * given[stages.TRAVEL + 1]
+    sway = given[stages.TRAVEL + 2] * rotation_share(to, given[stages.WEIGHT])
+    x = row[stages.VELOCITY] if row[stages.HAS_VELOCITY] != 0.0 else 0.0
+    z = row[stages.VELOCITY + 1] if row[stages.HAS_VELOCITY] != 0.0 else 0.0
     own, wanted = flat_length(left, ahead), flat_length(x, z)
     if own < LEAST_MPS or wanted < LEAST_MPS:
         return 0.0, 1.0
     turn = remainder(math.atan2(x, z) - (heading - sway) - math.atan2(left, ahead))
     if abs(turn) > MOST_TURN:
         return 0.0, 1.0
-    stride = 1.0 if to.root == PATH else wanted / own
+    stride = 1.0 if to.root == stages.PATH else wanted / own
     return min(max(turn, -to.turn_limit), to.turn_limit), min(max(stride, to.min_stride), to.max_stride)
 
 

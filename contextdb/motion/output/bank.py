@@ -21,7 +21,7 @@ import numpy as np
 
 from contextdb.cells.arguments import require_kind, require_many, require_real, require_text
 from contextdb.console import announce
-from contextdb.errors import Fault, MotionError, Place, in_quotes, nearest, plural, some
+from contextdb.errors import Fault, MotionError, Place, in_quotes, mend_for, plural, some
 from contextdb.motion.clips import mirror as mirrors
 from contextdb.motion.clips import quaternions
 from contextdb.motion.clips.clip import Clip
@@ -31,9 +31,8 @@ from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints, Skeleton
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.markup.markup import Markup
-from contextdb.motion.output.legs import leg_of, steps_of
+from contextdb.motion.output.legs import leg_of, steps_of, travels
 from contextdb.motion.output.samples import Flags, Frames, Moment, Place3, Sample, Singles
-from contextdb.motion.output.travel import travels
 
 SAME_M = 1e-6
 """A joint that is never farther from its offset keeps it."""
@@ -304,8 +303,7 @@ class PoseBank:
         names = list(dict.fromkeys(self.assets))
         if asset in names:
             return Fault(f"{in_quotes(asset)} has no mirrored poses.", "a bank built with mirror = true, as its database is")
-        near = nearest(asset, names)
-        return Fault(f"there are no poses of {in_quotes(asset)}.", some(names), in_quotes(near) if near else "")
+        return Fault(f"there are no poses of {in_quotes(asset)}.", some(names), mend_for(asset, names))
 
 
 @dataclass(frozen=True, eq=False)

@@ -136,7 +136,6 @@ def rotated(q, v):
 
 @compiled
 def _rotation(turn):
-    """The rotation of a rotation vector."""
     angle = math.sqrt(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2])
     share = math.sin(0.5 * angle) / angle if angle > 1e-9 else 0.5
     return (math.cos(0.5 * angle), share * turn[0], share * turn[1], share * turn[2])

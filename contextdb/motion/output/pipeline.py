@@ -12,56 +12,29 @@ import numpy as np
 
 from contextdb.cells.arguments import require_kind, require_mapping
 from contextdb.console import announce
-from contextdb.errors import Fault, MotionError, in_quotes, nearest, some
+from contextdb.errors import Fault, MotionError, in_quotes, no_such
 from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.clips.skeleton import Ints, Skeleton
+from contextdb.motion.output import stages
 from contextdb.motion.output.bank import RIG_MEND, PoseBank, tops_of
 from contextdb.motion.output.feet import OnGround, hinges_of, legs_of
 from contextdb.motion.output.ground import ManyGround, Triple, below, below_many
 from contextdb.motion.output.pose import CrowdPoses
 from contextdb.motion.output.samples import Flags
 from contextdb.motion.output.settings import PoseSettings
-from contextdb.motion.output.spine import spine_of
-from contextdb.motion.output.stages import (
-    ANIMATION,
-    CLIP_RATE,
-    CODE,
-    CONTINUES,
-    DEAD,
-    ELSE,
-    FRAME,
-    GIVEN_BODY,
-    GIVES_BODY,
-    HOLDS,
-    IN_BANK,
-    IS_FLAT,
-    MIXED,
-    PATH,
-    PLAIN,
-    PLAY_RATE,
-    POSITIONS,
-    ROTATIONS,
-    SINCE,
-    SPRING,
-    STRIDE,
-    Bones,
-    Columns,
-    Ground,
-    Shaping,
-    damping,
-)
 from contextdb.motion.selection.decision import Action, Decision, Playing
 
 ADDED_SHARE = 0.75
 """What is added to the clips may accelerate joints by this share of what the clips do; the rest is left for the clips."""
 NEAR_S = 0.1
 """What is shown goes on where it is not farther from where it should be than this."""
-ROOTS = {"animation": ANIMATION, "code": CODE, "mixed": MIXED, "path": PATH}
-BLENDS = {"none": PLAIN, "spring": SPRING, "dead": DEAD}
+ROOTS = {"animation": stages.ANIMATION, "code": stages.CODE, "mixed": stages.MIXED, "path": stages.PATH}
+BLENDS = {"none": stages.PLAIN, "spring": stages.SPRING, "dead": stages.DEAD}
 WRITTEN = (0.0,) * 6
 """What loops write behind what is given."""
 Seam = tuple[int, int, float, float]
 """A moment at a seam: the number of its bank, its range and second, and how fast it plays."""
-Grounds = Sequence[Ground | None] | ManyGround | None
+Grounds = Sequence[stages.Ground | None] | ManyGround | None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -75,7 +48,6 @@ class Rows:
         return len(self.playing)
 
     def row(self, i: int) -> Rows:
-        """One of them alone."""
         return self if len(self) == 1 else Rows(self.numbers[i : i + 1], self.playing[i : i + 1])
 
 
@@ -90,7 +62,7 @@ class Pipeline:
         self.rig = self.all[0]
         self._numbers = {name: i for i, name in enumerate(self.banks)}
         self._to, self._bones = _shaping(settings), _bones(self.all)
-        self._columns = Columns(self.rig.n_joints, len(self.rig.moving), len(self.rig.feet), self._to.blend)
+        self._columns = stages.Columns(self.rig.n_joints, len(self.rig.moving), len(self.rig.feet), self._to.blend)
 
     def is_like(self, other: Pipeline) -> bool:
         """Whether another one is of the same banks and settings."""
@@ -101,16 +73,15 @@ class Pipeline:
 
     @property
     def width(self) -> int:
-        """Numbers in a row."""
         return self._columns.width
 
     def begun(self) -> Rows:
         """One character that has not shown anything yet: the rig at rest."""
         row, at = np.zeros(self.width), self._columns.at
-        row[PLAY_RATE] = row[CLIP_RATE] = row[STRIDE] = 1.0
-        row[SINCE] = -1.0
-        row[at[ROTATIONS] : at[POSITIONS] : 4] = 1.0
-        row[at[POSITIONS] :] = self.rig.skeleton.offsets[self.rig.moving].ravel()
+        row[stages.PLAY_RATE] = row[stages.CLIP_RATE] = row[stages.STRIDE] = 1.0
+        row[stages.SINCE] = -1.0
+        row[at[stages.ROTATIONS] : at[stages.POSITIONS] : 4] = 1.0
+        row[at[stages.POSITIONS] :] = self.rig.skeleton.offsets[self.rig.moving].ravel()
         return Rows(row[None], [None])
 
     def update(
@@ -119,11 +90,11 @@ class Pipeline:
         """The rows and the poses of all after a decision for each; `places` [N, 3] are those of the bodies, NaN for none."""
         given, seams, playing, jumps, forced = self._given(rows, decisions, dt, grounds)
         if places is not None:
-            given[:, GIVES_BODY], given[:, GIVEN_BODY : GIVEN_BODY + 3] = places[:, 0] == places[:, 0], places
+            given[:, stages.GIVES_BODY], given[:, stages.GIVEN_BODY : stages.GIVEN_BODY + 3] = places[:, 0] == places[:, 0], places
         loops, to, bones, at = _loops(), self._to, self._bones, self._columns.at
         n, n_joints, n_feet = len(rows), self.rig.n_joints, len(self.rig.feet)
         after, roots, contacts = np.empty((n, self.width)), np.empty((n, 3)), np.zeros((n, n_feet), np.bool_)
-        for number in self._used(given[:, IN_BANK]):
+        for number in self._used(given[:, stages.IN_BANK]):
             loops.sample_rows(number, self.all[number].frames, at, given, after, contacts)
         left, velocities = self._seams(seams)
         rotations, moved = np.empty((n, n_joints, 4)), np.empty((n, len(self.rig.moving), 3))
@@ -133,22 +104,20 @@ class Pipeline:
         loops.move_rows(
             to, bones, at, before, given, left, velocities, dt, after, roots, rotations, moved, translations, positions, world, free
         )
-        if grounds is not None or not given[:, IS_FLAT].all():
+        if grounds is not None or not given[:, stages.IS_FLAT].all():
             self._stand(given, before, dt, grounds, contacts, roots, free, after)
         loops.stand_rows(
             to, bones, at, before, given, contacts, dt, after, roots, rotations, moved, free, translations, positions, world
         )
         shown = [now or last for now, last in zip(playing, rows.playing, strict=True)]
-        poses = CrowdPoses(playing, jumps, forced, roots, rotations, translations, positions, contacts, after[:, PLAY_RATE])
+        poses = CrowdPoses(playing, jumps, forced, roots, rotations, translations, positions, contacts, after[:, stages.PLAY_RATE])
         return Rows(after, shown), poses
 
     def find(self, playing: Playing) -> tuple[int, int]:
         """The number of the bank of what plays, and its range there."""
         number = 0 if self.only is not None else self._numbers.get(playing.database, -1)
         if number < 0:
-            near = nearest(playing.database, self.banks)
-            found = f"there is no pose bank of the database {in_quotes(playing.database)}."
-            raise MotionError(Fault(found, some(self.banks), in_quotes(near) if near else ""))
+            raise MotionError(no_such("pose bank of the database", playing.database, self.banks))
         return number, self.all[number].range_of(playing.asset, playing.mirrored)
 
     def _given(
@@ -159,7 +128,7 @@ class Pipeline:
         seams: list[Seam] = []
         all_playing, jumps, forced = [], [], []
         gives = _gives(grounds, len(rows))
-        rates = rows.numbers[:, [CLIP_RATE, PLAY_RATE]].tolist()
+        rates = rows.numbers[:, [stages.CLIP_RATE, stages.PLAY_RATE]].tolist()
         for decision, shown, (rate, shown_rate), ground in zip(decisions, rows.playing, rates, gives, strict=True):
             playing, action, before, is_ahead = decision.playing, decision.action, decision.before, False
             number, at, time_s, seam, lost_s = -1, 0, 0.0, -1, 0.0
@@ -181,7 +150,7 @@ class Pipeline:
                         left,
                         (number, at, time_s, decision.play_rate),
                     ]
-            code = CONTINUES if action is Action.CONTINUE else HOLDS if action is Action.HOLD else ELSE
+            code = stages.CONTINUES if action is Action.CONTINUE else stages.HOLDS if action is Action.HOLD else stages.ELSE
             motion = decision.root_motion
             given.append(
                 (
@@ -215,7 +184,7 @@ class Pipeline:
         velocities = np.empty((n, 3))
         if seams:
             wanted, (rotations, spins, positions, speeds) = np.array(seams, np.float64), left
-            for number in self._used(wanted[:, IN_BANK]):
+            for number in self._used(wanted[:, stages.IN_BANK]):
                 frames = self.all[number].frames
                 _loops().sample_seams(number, frames, wanted, velocities, rotations, spins, positions, speeds)
         return left, velocities
@@ -234,8 +203,8 @@ class Pipeline:
         """Write the footings and the hips of all that feel a ground."""
         feet: list[tuple[int, OnGround]] = []
         gives = _gives(grounds, len(given))
-        for i in np.flatnonzero(given[:, IS_FLAT] == 0.0).tolist():
-            number, frame = int(given[i, IN_BANK]), int(given[i, FRAME])
+        for i in np.flatnonzero(given[:, stages.IS_FLAT] == 0.0).tolist():
+            number, frame = int(given[i, stages.IN_BANK]), int(given[i, stages.FRAME])
             steps: Sequence[Sequence[float]] = ()
             if gives[i]:
                 steps = self.all[number].steps_at(frame) if number >= 0 else [(0.0, 0.0, 0.0)] * len(self.rig.feet)
@@ -263,7 +232,6 @@ def _goes_on(decision: Decision, shown: Playing, passed_s: float) -> bool:
 
 
 def _gives(grounds: Grounds, n: int) -> Sequence[bool]:
-    """Which of n characters have a ground."""
     if isinstance(grounds, Sequence):
         return [each is not None for each in grounds]
     return [grounds is not None] * n
@@ -279,8 +247,8 @@ def _loops() -> ModuleType:
     return row_loops
 
 
-def _shaping(settings: PoseSettings) -> Shaping:
-    return Shaping(
+def _shaping(settings: PoseSettings) -> stages.Shaping:
+    return stages.Shaping(
         root=ROOTS[settings.root],
         blend=BLENDS[settings.blend],
         position_weight=float(settings.position_weight),
@@ -289,28 +257,28 @@ def _shaping(settings: PoseSettings) -> Shaping:
         rotation_pull_s=float(settings.rotation_pull_s),
         position_clamp_m=float(settings.position_clamp_m),
         rotation_clamp=math.radians(settings.rotation_clamp_deg),
-        damping=damping(settings.halflife_s),
+        damping=stages.damping(settings.halflife_s),
         fade_s=float(settings.fade_s),
         braking=math.log(2.0) / settings.fade_halflife_s,
         is_warping=settings.is_warping,
         turn_limit=math.radians(settings.alignment_limit_deg) if settings.path_alignment else 0.0,
-        turn_damping=damping(settings.alignment_halflife_s),
+        turn_damping=stages.damping(settings.alignment_halflife_s),
         min_stride=float(settings.min_stride),
         max_stride=float(settings.max_stride),
         is_locking=bool(settings.foot_lock),
-        foot_damping=damping(settings.foot_halflife_s),
+        foot_damping=stages.damping(settings.foot_halflife_s),
         foot_radius_m=float(settings.foot_radius_m),
     )
 
 
-def _bones(banks: Sequence[PoseBank]) -> Bones:
+def _bones(banks: Sequence[PoseBank]) -> stages.Bones:
     bank = banks[0]
     rig, spine, tops = bank.skeleton, spine_of(bank), np.array(tops_of(bank.skeleton), np.int64)
     joints, left = (np.zeros(0, np.int64), np.zeros(0)) if spine is None else (spine.joints, spine.left)
     parents, offsets = np.array(rig.parents, np.int64), np.array(rig.offsets, np.float64)
     legs, hinges = legs_of(bank), hinges_of(bank)
     tops_at, most = np.searchsorted(bank.moving, tops), ADDED_SHARE * max(each.most_accel for each in banks)
-    return Bones(parents, offsets, bank.places, legs, hinges, tops, tops_at, joints, left, most)
+    return stages.Bones(parents, offsets, bank.places, legs, hinges, tops, tops_at, joints, left, most)
 
 
 def _checked(banks: object) -> dict[str, PoseBank]:
@@ -324,8 +292,7 @@ def _checked(banks: object) -> dict[str, PoseBank]:
     for name, other in others:
         if apart := _apart(rig, other):
             both = " and ".join(f"{in_quotes(at)} (with {in_quotes(bank.assets[0])})" for at, bank in ((first, rig), (name, other)))
-            found = f"the banks {both} are of different rigs: {apart}."
-            raise MotionError(Fault(found, "banks of one rig", RIG_MEND))
+            raise MotionError(Fault(f"the banks {both} are of different rigs: {apart}.", "banks of one rig", RIG_MEND))
     return named
 
 
@@ -339,3 +306,48 @@ def _apart(rig: PoseBank, other: PoseBank) -> str:
         return "their joints have another order or other parents"
     apart = np.setxor1d(rig.moving, other.moving).tolist()
     return f"the joint {in_quotes(rig.skeleton.names[apart[0]])} has positions of its own in one of them alone" if apart else ""
+
+
+# ---- the spine: the joints that turn back what `contextdb.motion.output.alignment` turns the hips by
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Spine:
+    """The joints that hang on the root, where they are in positions [M, 3], and the joints from the hips to the chest, which turn
+    back: after each so much of the turn is left."""
+
+    tops: Ints
+    places: Ints
+    joints: Ints
+    left: Floats
+
+
+def spine_of(bank: PoseBank) -> Spine | None:
+    """The spine of a rig: from where the legs part up to where the arms do; None where there are no feet or nothing above them."""
+    rig = bank.skeleton
+    if not bank.feet:
+        return None
+    legs = [{rig.index(foot), *rig.ancestors(rig.index(foot))} for foot in bank.feet]
+    shared = set.intersection(*legs)
+    hips = max(shared, key=lambda joint: int(rig.depths[joint]), default=0)
+    above = [joint for joint in _below(rig, hips) if not any(joint in leg for leg in legs)]
+    joints: list[int] = []
+    while above:
+        joints.append(max(above, key=lambda joint: _size(rig, joint)))
+        above = [joint for joint in _below(rig, joints[-1]) if _below(rig, joint)]
+        if len(above) > 1:
+            break
+    if not joints:
+        return None
+    tops = np.array(tops_of(rig), np.int64)
+    left = 1.0 - np.arange(1, len(joints) + 1) / len(joints)
+    return Spine(tops, np.searchsorted(bank.moving, tops), np.array(joints, np.int64), left)
+
+
+def _below(rig: Skeleton, joint: int) -> list[int]:
+    return [other for other in range(rig.n_joints) if rig.parents[other] == joint]
+
+
+def _size(rig: Skeleton, joint: int) -> int:
+    """How many joints hang on a joint, itself among them."""
+    return 1 + sum(_size(rig, other) for other in _below(rig, joint))

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import overload
 
+from contextdb.cells.sequences import Made
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.output.samples import Flags, Place3
 from contextdb.motion.selection.decision import Playing
@@ -47,7 +46,7 @@ class Pose:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class CrowdPoses(Sequence[Pose]):
+class CrowdPoses(Made[Pose]):
     """The poses of N characters: a sequence, whose poses are made when they are asked for, with their arrays as views.
 
     Attributes
@@ -75,15 +74,7 @@ class CrowdPoses(Sequence[Pose]):
     def __len__(self) -> int:
         return len(self.playing)
 
-    @overload
-    def __getitem__(self, i: int) -> Pose: ...
-
-    @overload
-    def __getitem__(self, i: slice) -> list[Pose]: ...
-
-    def __getitem__(self, i: int | slice) -> Pose | list[Pose]:
-        if isinstance(i, slice):
-            return [self[k] for k in range(*i.indices(len(self)))]
+    def _at(self, i: int) -> Pose:
         x, z, heading = self.roots[i].tolist()
         arrays = self.rotations[i], self.translations[i], self.positions[i], self.contacts[i]
         return Pose(self.playing[i], self.is_jump[i], self.is_forced[i], (x, z, heading), *arrays, float(self.play_rates[i]))

@@ -25,29 +25,8 @@ from __future__ import annotations
 import math
 
 from contextdb.motion.clips.steering import STANDING_MPS
+from contextdb.motion.output import stages
 from contextdb.motion.output.kernels import compiled, flat_length, remainder
-from contextdb.motion.output.stages import (
-    ANIMATION,
-    BASE,
-    BEGUN,
-    BODY,
-    CLIP_ROOT,
-    CODE,
-    GIVEN_BODY,
-    GIVES_BODY,
-    HAS_BODY,
-    HAS_VELOCITY,
-    IS_AHEAD,
-    MIXED,
-    OFFSET,
-    OFFSET_SPEED,
-    PATH,
-    PLAIN,
-    STRIDE,
-    TURN,
-    VELOCITY,
-    WEIGHT,
-)
 
 MOST_PULL = 0.5
 """The pull is at most this share of the character's own movement."""
@@ -58,31 +37,33 @@ TURN_PER_M = 6.0
 @compiled
 def rotation_share(to, root_weight):
     """How much of the turning is the animation's."""
-    if to.root == MIXED:
+    if to.root == stages.MIXED:
         return root_weight * to.rotation_weight
-    return 1.0 if to.root == ANIMATION else 0.0
+    return 1.0 if to.root == stages.ANIMATION else 0.0
 
 
 @compiled
 def _position_share(to, root_weight):
     """How much of the movement is the animation's."""
-    if to.root == MIXED:
+    if to.root == stages.MIXED:
         return root_weight * to.position_weight
-    return 0.0 if to.root == CODE else 1.0
+    return 0.0 if to.root == stages.CODE else 1.0
 
 
 @compiled
 def move_body(given, dt, before, row):
     """Write where the game has the body, and how fast it moves it: by how far it came since the last update, as a session knows no
     more."""
-    has_place, had_body = given[GIVES_BODY] != 0.0, before[HAS_BODY] != 0.0
-    row[HAS_BODY] = 1.0 if has_place or had_body else 0.0
+    has_place, had_body = given[stages.GIVES_BODY] != 0.0, before[stages.HAS_BODY] != 0.0
+    row[stages.HAS_BODY] = 1.0 if has_place or had_body else 0.0
     for i in range(3):
-        row[BODY + i] = given[GIVEN_BODY + i] if has_place else before[BODY + i]
+        row[stages.BODY + i] = given[stages.GIVEN_BODY + i] if has_place else before[stages.BODY + i]
     is_moved = has_place and had_body and dt > 0.0
-    row[HAS_VELOCITY] = 1.0 if is_moved else before[HAS_VELOCITY]
+    row[stages.HAS_VELOCITY] = 1.0 if is_moved else before[stages.HAS_VELOCITY]
     for i in range(2):
-        row[VELOCITY + i] = (given[GIVEN_BODY + i] - before[BODY + i]) / dt if is_moved else before[VELOCITY + i]
+        row[stages.VELOCITY + i] = (
+            (given[stages.GIVEN_BODY + i] - before[stages.BODY + i]) / dt if is_moved else before[stages.VELOCITY + i]
+        )
 
 
 @compiled
@@ -91,46 +72,46 @@ def place_root(to, given, motion, dt, is_seam, left, entered, before, row):
 
     At a seam, `left` and `entered` are the velocities of what was left and what is entered, in the body's own frame.
     """
-    moved, turned = _position_share(to, given[WEIGHT]), rotation_share(to, given[WEIGHT])
+    moved, turned = _position_share(to, given[stages.WEIGHT]), rotation_share(to, given[stages.WEIGHT])
     base = _moved(to, given, motion, dt, moved, turned, before, row)
-    offset = (before[OFFSET], before[OFFSET + 1], before[OFFSET + 2])
-    speed = (before[OFFSET_SPEED], before[OFFSET_SPEED + 1], before[OFFSET_SPEED + 2])
-    if to.blend != PLAIN:
+    offset = (before[stages.OFFSET], before[stages.OFFSET + 1], before[stages.OFFSET + 2])
+    speed = (before[stages.OFFSET_SPEED], before[stages.OFFSET_SPEED + 1], before[stages.OFFSET_SPEED + 2])
+    if to.blend != stages.PLAIN:
         offset, speed = _decayed(offset, speed, to.damping, dt)
         if is_seam:
-            if given[IS_AHEAD] != 0.0 and dt > 0.0:
+            if given[stages.IS_AHEAD] != 0.0 and dt > 0.0:
                 entered = (motion[0] / dt, motion[1] / dt, motion[2] / dt)
             apart = (left[0] - entered[0], left[1] - entered[1], 0.0)
             step = _after((0.0, 0.0, base[2]), _bent(apart, before), moved, 0.0)
             change = (step[0], step[1], turned * (left[2] - entered[2]))
             speed = _sum(speed, change)
-            if given[IS_AHEAD] != 0.0:
+            if given[stages.IS_AHEAD] != 0.0:
                 offset = _sum(offset, (change[0] * dt, change[1] * dt, change[2] * dt))
-    if (to.root == MIXED or to.root == PATH) and given[GIVES_BODY] != 0.0:
+    if (to.root == stages.MIXED or to.root == stages.PATH) and given[stages.GIVES_BODY] != 0.0:
         base = _clamped(to, base, offset, row)
     for i in range(3):
-        row[BASE + i], row[OFFSET + i], row[OFFSET_SPEED + i] = base[i], offset[i], speed[i]
+        row[stages.BASE + i], row[stages.OFFSET + i], row[stages.OFFSET_SPEED + i] = base[i], offset[i], speed[i]
     return _sum(base, offset)
 
 
 @compiled
 def _moved(to, given, motion, dt, moved, turned, before, row):
     """The base after this update's movement and the pull to the game's body."""
-    body = (row[BODY], row[BODY + 1], row[BODY + 2])
-    has_body = given[GIVES_BODY] != 0.0
-    if before[BEGUN] != 0.0:
-        base = (before[BASE], before[BASE + 1], before[BASE + 2])
+    body = (row[stages.BODY], row[stages.BODY + 1], row[stages.BODY + 2])
+    has_body = given[stages.GIVES_BODY] != 0.0
+    if before[stages.BEGUN] != 0.0:
+        base = (before[stages.BASE], before[stages.BASE + 1], before[stages.BASE + 2])
     elif has_body:
         base = body
     else:
-        base = (row[CLIP_ROOT], row[CLIP_ROOT + 1], row[CLIP_ROOT + 2])
+        base = (row[stages.CLIP_ROOT], row[stages.CLIP_ROOT + 1], row[stages.CLIP_ROOT + 2])
     after = _after(base, _bent(motion, before), moved, turned)
-    if not has_body or to.root == ANIMATION:
+    if not has_body or to.root == stages.ANIMATION:
         return after
-    if to.root == CODE:
+    if to.root == stages.CODE:
         return body
     is_on, way = _way(to, row)
-    last = (before[BODY], before[BODY + 1], before[BODY + 2]) if before[HAS_BODY] != 0.0 else body
+    last = (before[stages.BODY], before[stages.BODY + 1], before[stages.BODY + 2]) if before[stages.HAS_BODY] != 0.0 else body
     x, z, heading = after
     if is_on:
         far = flat_length(x - base[0], z - base[1])
@@ -158,7 +139,7 @@ def _clamped(to, base, offset, row):
     """The base from which the shown root is within the clamp: of the body, or of its way in the mode "path"."""
     x, z, heading = _sum(base, offset)
     is_on, way = _way(to, row)
-    body = _beside(x, z, (row[BODY], row[BODY + 1], row[BODY + 2]), is_on, way)
+    body = _beside(x, z, (row[stages.BODY], row[stages.BODY + 1], row[stages.BODY + 2]), is_on, way)
     left, ahead, turn = x - body[0], z - body[1], remainder(heading - body[2])
     apart, most = flat_length(left, ahead), to.position_clamp_m
     share = most / apart - 1.0 if apart > most else 0.0
@@ -191,7 +172,7 @@ def _after(base, motion, moved, turned):
 @compiled
 def _bent(motion, before):
     """A movement of what plays, turned and stretched as the legs were."""
-    turn, stride = before[TURN], before[STRIDE]
+    turn, stride = before[stages.TURN], before[stages.STRIDE]
     if turn == 0.0 and stride == 1.0:
         return motion
     sin, cos = stride * math.sin(turn), stride * math.cos(turn)
@@ -201,9 +182,9 @@ def _bent(motion, before):
 @compiled
 def _way(to, row):
     """Whether the game goes a way that the root keeps to, and which; none where it stands."""
-    if to.root != PATH or row[HAS_VELOCITY] == 0.0:
+    if to.root != stages.PATH or row[stages.HAS_VELOCITY] == 0.0:
         return False, (0.0, 0.0)
-    x, z = row[VELOCITY], row[VELOCITY + 1]
+    x, z = row[stages.VELOCITY], row[stages.VELOCITY + 1]
     size = flat_length(x, z)
     if size > STANDING_MPS:
         return True, (x / size, z / size)

@@ -131,7 +131,6 @@ class Columns:
 
     @property
     def width(self) -> int:
-        """Numbers in a row."""
         return int(self.at[-1])
 
 

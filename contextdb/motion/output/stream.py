@@ -176,6 +176,5 @@ class PoseStream:
 def checked_place(body: OfBody | None, settings: PoseSettings) -> tuple[float, float, float] | None:
     """Where the game's body is. Raises MotionError where some settings need one and none is given."""
     if body is None and settings.root != "animation":
-        found = f'root = "{settings.root}" needs a body, and none was given.'
-        raise MotionError(Fault(found, A_BODY, 'root = "animation"'))
+        raise MotionError(Fault(f'root = "{settings.root}" needs a body, and none was given.', A_BODY, 'root = "animation"'))
     return place_of(body)

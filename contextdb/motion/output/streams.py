@@ -7,12 +7,12 @@ asked for. The streams go on from where the crowd left them, and the crowd from 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
-from typing import overload
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from contextdb.cells.arguments import require_many_of, require_real
+from contextdb.cells.sequences import Kept
 from contextdb.errors import ContextError, Fault, MotionError, Place, plural
 from contextdb.motion.clips.ground_place import OfBody
 from contextdb.motion.clips.many_steered import ManySteered
@@ -29,7 +29,7 @@ UNKNOWN = (math.nan, math.nan, math.nan)
 OfBodies = ManySteered | Sequence[OfBody | None] | Floats
 
 
-class PoseStreams(Sequence[PoseStream]):
+class PoseStreams(Kept[PoseStream]):
     """The streams of a crowd, in order: a sequence, with whose numbers decisions, bodies and poses go.
 
     Parameters
@@ -44,29 +44,14 @@ class PoseStreams(Sequence[PoseStream]):
     """
 
     def __init__(self, streams: Iterable[PoseStream]) -> None:
-        self._streams: list[PoseStream] = require_many_of(streams, PoseStream, "streams", "a list of PoseStream")
-        if not self._streams:
+        self._items = require_many_of(streams, PoseStream, "streams", "a list of PoseStream")
+        if not self._items:
             raise MotionError(Fault("there is no stream.", "at least one"))
-        if len(set(map(id, self._streams))) < len(self._streams):
+        if len(set(map(id, self._items))) < len(self._items):
             raise MotionError(Fault("the same stream is there twice.", "one of its own for each, such as copy.copy(stream)"))
-        self._pipeline = self._streams[0]._pipeline
-        if not all(stream.is_like(self._streams[0]) for stream in self._streams):
+        self._pipeline = self._items[0]._pipeline
+        if not all(stream.is_like(self._items[0]) for stream in self._items):
             raise MotionError(Fault("the streams have different banks or settings.", "streams of the same banks and settings"))
-
-    @overload
-    def __getitem__(self, i: int) -> PoseStream: ...
-
-    @overload
-    def __getitem__(self, i: slice) -> list[PoseStream]: ...
-
-    def __getitem__(self, i: int | slice) -> PoseStream | list[PoseStream]:
-        return self._streams[i]
-
-    def __len__(self) -> int:
-        return len(self._streams)
-
-    def __iter__(self) -> Iterator[PoseStream]:
-        return iter(self._streams)
 
     def __repr__(self) -> str:
         return f"<PoseStreams: {plural(len(self), 'character')}>"
@@ -115,8 +100,7 @@ class PoseStreams(Sequence[PoseStream]):
         decided = require_many_of(decisions, Decision, "decisions", "a list of Decision")
         dt = require_real(dt, "dt", 0.0)
         if len(decided) != len(self):
-            found = f"{plural(len(decided), 'decision')} for {plural(len(self), 'character')}."
-            raise ContextError(Fault(found, "one for each"))
+            raise ContextError(Fault(f"{plural(len(decided), 'decision')} for {plural(len(self), 'character')}.", "one for each"))
         poses, rows = self.updated(decided, dt, self._places(bodies), self._grounds(ground))
         self.go_on(rows)
         return poses
@@ -130,12 +114,12 @@ class PoseStreams(Sequence[PoseStream]):
 
     def go_on(self, rows: Rows) -> None:
         """Go on from some rows, one for each."""
-        for i, stream in enumerate(self._streams):
+        for i, stream in enumerate(self._items):
             stream._go_on(rows, i)
 
     def _rows(self) -> Rows:
         """The rows of all: as the last update left them, unless a stream was elsewhere meanwhile."""
-        each = [stream._place for stream in self._streams]
+        each = [stream._place for stream in self._items]
         first = each[0][0]
         if len(first) == len(each) and all(rows is first and at == i for i, (rows, at) in enumerate(each)):
             return first

@@ -276,7 +276,6 @@ def _direction(velocities: Floats) -> Spread | None:
 
 
 def _end_state(path: Trajectory, falls: Footfalls | None, gait: str, stands_mps: float, *, is_end: bool) -> str:
-    """How a clip begins or ends."""
     n = max(1, min(round(ENDS_S * path.rate), len(path.headings) - 1))
     part = path.positions[-n - 1 :] if is_end else path.positions[: n + 1]
     speed = float(np.linalg.norm(part[-1] - part[0])) * path.rate / n

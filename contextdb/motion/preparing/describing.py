@@ -127,7 +127,6 @@ def _counts(clips: Sequence[Clip]) -> Counter[str]:
 
 
 def condition_sections(rows: Sequence[Described]) -> Sections:
-    """What the conditions of some rows are."""
     fastest = max((row.facts.speed_mps.high for row in rows), default=0.0)
     styles = sorted({NORMAL, *(row.facts.style for row in rows)})
     return {

@@ -76,7 +76,6 @@ class Look:
 
     @cached_property
     def moments(self) -> Moments:
-        """The clip step by step."""
         return Moments.of(self.path, step_of(self.falls))
 
     @property
@@ -96,7 +95,6 @@ class Look:
 
     @property
     def usual_mps(self) -> float:
-        """The middle speed."""
         return float(np.median(self.moments.speeds))
 
     def said(self, kind: Kind, tag: str | None, first: int | None, last: int | None, reason: str, measure: float) -> Proposal:

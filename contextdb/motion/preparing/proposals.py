@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.cells.arguments import require_callable, require_kind, require_many, require_many_of
-from contextdb.errors import ContextError, Fault, MotionError, in_quotes, nearest, some
+from contextdb.errors import ContextError, Fault, MotionError, in_quotes, no_such, some
 from contextdb.motion.clips.clip import Clip
 from contextdb.motion.clips.contacts import spans_of
 from contextdb.motion.clips.foot_bones import UNDECLARED
@@ -140,9 +140,7 @@ def _wanted(kinds: Sequence[str] | None) -> set[str]:
     wanted = list(require_many(kinds, "kinds", "a list of kinds"))
     for kind in wanted:
         if not isinstance(kind, str) or kind not in KINDS:
-            near = nearest(str(kind), KINDS)
-            found = f"there is no kind {in_quotes(str(kind))}."
-            raise ContextError(Fault(found, some(KINDS, len(KINDS)), in_quotes(near) if near else ""))
+            raise ContextError(no_such("kind", kind, KINDS, some(KINDS, len(KINDS))))
     return set(wanted)
 
 
@@ -172,7 +170,6 @@ def _roots(look: Look) -> Iterator[Proposal]:
 
 
 def _contacts(look: Look) -> Iterator[Proposal]:
-    """When the feet are down."""
     if look.falls is None:
         return
     for foot, tag in zip(look.falls.feet, CONTACTS, strict=True):
@@ -316,8 +313,7 @@ def _targets(look: Look) -> Iterator[Proposal]:
     begin = first or None
     reason = f"from {slows / look.rate:.2f} s on it slows down to a stand"
     yield look.said("targets", ReservedTag.MATCH_RANGE, begin, slows, reason, slows / look.rate)
-    reason = f"comes {metres:.2f} m far and then stands"
-    yield look.said("targets", ReservedTag.WARP_POSITION, begin, last, reason, metres)
+    yield look.said("targets", ReservedTag.WARP_POSITION, begin, last, f"comes {metres:.2f} m far and then stands", metres)
 
 
 # ---- noise

@@ -24,18 +24,15 @@ from numbers import Real
 from typing import Any, Unpack
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from contextdb.cells.arguments import (
     require_kind,
-    require_many,
     require_mapping,
     require_number,
-    require_real,
     require_text,
-    require_whole,
 )
-from contextdb.errors import Fault, MotionError, QueryError, in_quotes, nearest, plural, some
+from contextdb.errors import Fault, MotionError, QueryError, in_quotes, no_such, plural
 from contextdb.motion import arguments
 from contextdb.motion.arguments import Currents, Flags, Valid, ValidForMany, ValidRanges
 from contextdb.motion.clips.clip import Clip
@@ -56,7 +53,7 @@ from contextdb.motion.search.filtering import FilterMaker, Penalties, SearchOpti
 from contextdb.motion.search.filters import NO_BIAS, Biases, Filter
 from contextdb.motion.search.hit import NOTHING, Hit
 from contextdb.motion.search.inputs import as_features, check_finite, check_permutations, parts_of
-from contextdb.motion.search.layout import Features, Layout
+from contextdb.motion.search.layout import Layout
 from contextdb.motion.search.many_filters import ManyFilters, together
 from contextdb.motion.search.searched import Searched
 from contextdb.motion.search.searcher import Searcher
@@ -204,28 +201,6 @@ class MotionDatabase(Searched):
             Normalisation.none(n_features),
             Marks.none(len(array), len(names)),
         )
-
-    @property
-    def n_frames(self) -> int:
-        """How many frames there are, those between ranges included."""
-        return self.layout.n_frames
-
-    @property
-    def n_features(self) -> int:
-        """How many features a frame has."""
-        return self.layout.n_features
-
-    @property
-    def feature_names(self) -> tuple[str, ...]:
-        """The name of each feature."""
-        return tuple(f"feature {i}" for i in range(self.n_features)) if self.schema is None else self.schema.feature_names
-
-    @property
-    def features(self) -> Features:
-        """The features as rows: float32 [N, F], gathered again; frames between ranges hold zeros."""
-        found = np.zeros((self.n_frames, self.n_features), np.float32)
-        found[self.layout.frames] = self.layout.take(self.layout.frames)
-        return found
 
     def search(
         self,
@@ -384,56 +359,9 @@ class MotionDatabase(Searched):
         found = cost.channel_costs(self.layout, frames, self._searcher.normalised(query), self.slices, self.cost_weights)
         return dict(zip(self.channel_names, found[:, 0].tolist(), strict=True))
 
-    def raw(self, frame: Hit | int) -> Floats:
-        """The features of one frame in the schema's units, as a query has them: float64 [F]. Raises QueryError for a frame
-        that is in no range."""
-        return self.normalisation.undo(self.layout.take(np.array([self._number(frame)]))[0])
-
-    def raw_many(self, frames: Sequence[int] | NDArray[np.integer]) -> Floats:
-        """The features of many frames in the schema's units, the poses of a crowd: float64 [Q, F]. Raises QueryError for a
-        frame that is in no range."""
-        given = require_many(frames, "frames", "a list of frames")
-        numbers = np.array([arguments.frame_of(frame, self.n_frames, "frame") for frame in given], np.int64)
-        for frame in numbers[~self.layout.are_in_ranges(numbers)].tolist():
-            self._number(frame)
-        return self.normalisation.undo(self.layout.take(numbers))
-
-    def path_speed(self, frame: int) -> float | None:
-        """How fast the path of a frame goes, m/s, by the features that say so; None where the schema has none. Kept once asked."""
-        if frame not in self._path_speeds:
-            where = None if self.schema is None else self.schema.speed_features
-            self._path_speeds[frame] = None if where is None else math.hypot(*self.raw(frame)[where[0]].tolist()) / where[1]
-        return self._path_speeds[frame]
-
-    @cached_property
-    def _path_speeds(self) -> dict[int, float | None]:
-        return {}
-
     def normalised(self, query: ArrayLike) -> Floats:
         """A query [F] in the schema's units, checked, as costs are computed with it: float64. Raises QueryError for another."""
         return self._searcher.normalised(query)
-
-    def time_s(self, hit: Hit) -> float:
-        """Seconds from the start of the hit's range to its frame. Raises QueryError for a hit of nothing, and for a database of
-        arrays."""
-        require_kind(hit, Hit, "hit", "a Hit of this database")
-        if self.schema is None or not hit:
-            raise QueryError(Fault("there is no time to return.", "a hit of this database, built from clips"))
-        return (hit.frame - int(self.starts[hit.range])) / self.schema.rate
-
-    def frame_at(self, range_number: int, time_s: float) -> int:
-        """The frame of a range that is nearest to a time since the range's start, inside the range. Raises QueryError where there
-        is no such range, or no time, and for a database of arrays."""
-        range_number, time_s = require_whole(range_number, "range_number"), require_real(time_s, "time_s")
-        if self.schema is None or not 0 <= range_number < len(self.assets) or not math.isfinite(time_s):
-            found = f"there is no frame at {time_s!r} s of range {range_number}."
-            raise QueryError(Fault(found, "a range of this database, built from clips, and seconds"))
-        start, stop = int(self.starts[range_number]), int(self.stops[range_number])
-        return min(max(start, start + round(time_s * self.schema.rate)), stop - 1)
-
-    def range_of(self, frame: int) -> int:
-        """The range that holds a frame, or -1 for a frame between ranges. Raises ContextError for no whole number."""
-        return self.layout.range_of(require_whole(frame, "frame"))
 
     def with_weights(self, weights: Mapping[str, float]) -> MotionDatabase:
         """The same database with some channels weighed otherwise; nothing is rebuilt, the features are shared.
@@ -444,9 +372,7 @@ class MotionDatabase(Searched):
         for name, weight in require_mapping(weights, "weights", "a mapping of channels to weights").items():
             require_kind(weight, Real, "one of weights", "a number, 0 or more")
             if require_text(name, "one of weights") not in self.channel_names:
-                near = nearest(name, self.channel_names)
-                found = f"there is no channel {in_quotes(name)}."
-                raise MotionError(Fault(found, some(self.channel_names), in_quotes(near) if near else ""))
+                raise MotionError(no_such("channel", name, self.channel_names))
             if not math.isfinite(weight) or weight < 0.0:
                 raise MotionError(Fault(f"the weight of channel {in_quotes(name)} is {weight!r}.", "a finite number, 0 or more"))
             changed[self.channel_names.index(name)] = weight
@@ -492,12 +418,6 @@ class MotionDatabase(Searched):
         assets = self.assets
         each = zip(ranges.tolist(), frames.tolist(), totals.tolist(), strict=True)
         return [Hit(assets[i], i, frame, total) if i >= 0 else NOTHING for i, frame, total in each]
-
-    def _number(self, frame: Hit | int) -> int:
-        number = arguments.frame_of(frame.frame if isinstance(frame, Hit) else frame, self.n_frames, "frame")
-        if self.range_of(number) < 0:
-            raise QueryError(Fault(f"frame {number} is in no range: nothing is known of it.", "a frame of a range"))
-        return number
 
 
 def build_databases(sets: Mapping[str, Iterable[Clip]], schema: FeatureSchema) -> dict[str, MotionDatabase]:

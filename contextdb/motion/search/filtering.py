@@ -195,7 +195,6 @@ class FilterMaker:
         return found
 
     def _kinds_of(self, tags: TagFilter, in_match_range: bool) -> Kinds:
-        """What a tag filter says of each kind."""
         known = self._kinds.get((tags, in_match_range))
         if known is None:
             left_out = self.marks.left_out(tags, in_match_range=in_match_range)

@@ -89,7 +89,6 @@ class Groups:
 
     @cached_property
     def n_groups(self) -> Ints:
-        """How many groups each range has."""
         return self.n_places // SIZE
 
     @cached_property

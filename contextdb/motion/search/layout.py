@@ -104,12 +104,10 @@ class Layout:
 
     @property
     def n_features(self) -> int:
-        """How many features a frame has."""
         return int(self.blocks.shape[1])
 
     @property
     def n_bytes(self) -> int:
-        """The memory of all arrays."""
         return sum(array.nbytes for array in vars(self).values() if isinstance(array, np.ndarray))
 
     def take(self, frames: Ints) -> Features:

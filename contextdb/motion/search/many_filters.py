@@ -51,7 +51,6 @@ class ManyFilters(NamedTuple):
 
     @classmethod
     def alone(cls, chosen: Filter) -> ManyFilters:
-        """One filter."""
         skips = (chosen.skips,) if chosen.skips else ()
         return cls(chosen, chosen.ranges[None], chosen.range_biases[None], np.array([chosen.current]), skips)
 
@@ -69,7 +68,6 @@ class ManyFilters(NamedTuple):
         return np.array(spans, np.int64), np.cumsum([0, *map(len, self.skips)])
 
     def one(self, i: int) -> Filter:
-        """The filter of one search."""
         biases = self.range_biases[i if len(self.range_biases) > 1 else 0]
         return self.shared._replace(
             ranges=self.ranges[i if len(self.ranges) > 1 else 0],

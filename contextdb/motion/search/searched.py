@@ -1,10 +1,18 @@
-"""What a motion database holds: data only. `MotionDatabase` says what each part is, and asks it."""
+"""What a motion database holds, and what is known of each frame. `MotionDatabase` says what each part is, and searches."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb.cells.arguments import require_kind, require_many, require_real, require_whole
+from contextdb.errors import Fault, QueryError
+from contextdb.motion import arguments
 from contextdb.motion.arguments import Flags
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
@@ -13,6 +21,7 @@ from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.markup.marks import Marks
 from contextdb.motion.search import cost
 from contextdb.motion.search.filters import NO_BIAS, Biases
+from contextdb.motion.search.hit import Hit
 from contextdb.motion.search.layout import Features, Layout
 
 
@@ -62,3 +71,78 @@ class Searched:
         for every schema. Of a database made from features the weights themselves.
         """
         return self.weights if self.schema is None else cost.shares_of(self.slices, self.weights)
+
+    @property
+    def n_frames(self) -> int:
+        """How many frames there are, those between ranges included."""
+        return self.layout.n_frames
+
+    @property
+    def n_features(self) -> int:
+        """How many features a frame has."""
+        return self.layout.n_features
+
+    @property
+    def feature_names(self) -> tuple[str, ...]:
+        """The name of each feature."""
+        return tuple(f"feature {i}" for i in range(self.n_features)) if self.schema is None else self.schema.feature_names
+
+    @property
+    def features(self) -> Features:
+        """The features as rows: float32 [N, F], gathered again; frames between ranges hold zeros."""
+        found = np.zeros((self.n_frames, self.n_features), np.float32)
+        found[self.layout.frames] = self.layout.take(self.layout.frames)
+        return found
+
+    def raw(self, frame: Hit | int) -> Floats:
+        """The features of one frame in the schema's units, as a query has them: float64 [F]. Raises QueryError for a frame
+        that is in no range."""
+        return self.normalisation.undo(self.layout.take(np.array([self._number(frame)]))[0])
+
+    def raw_many(self, frames: Sequence[int] | NDArray[np.integer]) -> Floats:
+        """The features of many frames in the schema's units, the poses of a crowd: float64 [Q, F]. Raises QueryError for a
+        frame that is in no range."""
+        given = require_many(frames, "frames", "a list of frames")
+        numbers = np.array([arguments.frame_of(frame, self.n_frames, "frame") for frame in given], np.int64)
+        for frame in numbers[~self.layout.are_in_ranges(numbers)].tolist():
+            self._number(frame)
+        return self.normalisation.undo(self.layout.take(numbers))
+
+    def path_speed(self, frame: int) -> float | None:
+        """How fast the path of a frame goes, m/s, by the features that say so; None where the schema has none. Kept once asked."""
+        if frame not in self._path_speeds:
+            where = None if self.schema is None else self.schema.speed_features
+            self._path_speeds[frame] = None if where is None else math.hypot(*self.raw(frame)[where[0]].tolist()) / where[1]
+        return self._path_speeds[frame]
+
+    @cached_property
+    def _path_speeds(self) -> dict[int, float | None]:
+        return {}
+
+    def time_s(self, hit: Hit) -> float:
+        """Seconds from the start of the hit's range to its frame. Raises QueryError for a hit of nothing, and for a database of
+        arrays."""
+        require_kind(hit, Hit, "hit", "a Hit of this database")
+        if self.schema is None or not hit:
+            raise QueryError(Fault("there is no time to return.", "a hit of this database, built from clips"))
+        return (hit.frame - int(self.starts[hit.range])) / self.schema.rate
+
+    def frame_at(self, range_number: int, time_s: float) -> int:
+        """The frame of a range that is nearest to a time since the range's start, inside the range. Raises QueryError where there
+        is no such range, or no time, and for a database of arrays."""
+        range_number, time_s = require_whole(range_number, "range_number"), require_real(time_s, "time_s")
+        if self.schema is None or not 0 <= range_number < len(self.assets) or not math.isfinite(time_s):
+            found = f"there is no frame at {time_s!r} s of range {range_number}."
+            raise QueryError(Fault(found, "a range of this database, built from clips, and seconds"))
+        start, stop = int(self.starts[range_number]), int(self.stops[range_number])
+        return min(max(start, start + round(time_s * self.schema.rate)), stop - 1)
+
+    def range_of(self, frame: int) -> int:
+        """The range that holds a frame, or -1 for a frame between ranges. Raises ContextError for no whole number."""
+        return self.layout.range_of(require_whole(frame, "frame"))
+
+    def _number(self, frame: Hit | int) -> int:
+        number = arguments.frame_of(frame.frame if isinstance(frame, Hit) else frame, self.n_frames, "frame")
+        if self.range_of(number) < 0:
+            raise QueryError(Fault(f"frame {number} is in no range: nothing is known of it.", "a frame of a range"))
+        return number

@@ -96,8 +96,7 @@ class _Lanes:
 
     def load(self, array: int, offset: Any) -> Any:
         """The 16 numbers from an offset on; arrays are aligned to 4 bytes only."""
-        place = self.builder.bitcast(self.builder.gep(self.start(array), [offset]), _LANES.as_pointer())
-        loaded = self.builder.load(place)
+        loaded = self.builder.load(self.builder.bitcast(self.builder.gep(self.start(array), [offset]), _LANES.as_pointer()))
         loaded.align = 4
         return loaded
 

@@ -5,16 +5,18 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import NoneType
-from typing import Any, TypeAlias, TypedDict
+from typing import Any, TypeAlias, TypedDict, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from contextdb.errors import Fault, QueryError
-from contextdb.motion.arguments import HasAssets, Valid
+from contextdb.cells.arguments import require_many
+from contextdb.errors import Fault, QueryError, plural
+from contextdb.motion.arguments import HasAssets, Valid, ValidForMany
 from contextdb.motion.markup.left_out import Skip
 from contextdb.motion.markup.tag_filter import TagFilter
 from contextdb.motion.records import quickly_made
+from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.filtering import Penalties, Tags
 from contextdb.motion.selection.choice import Choice
 
@@ -122,3 +124,33 @@ def _is_pair(current: object) -> bool:
 def _are_of_assets(penalties: OfPenalties) -> bool:
     """Costs are of assets, mappings and arrays of databases."""
     return not any(isinstance(each, (Mapping, Sequence, np.ndarray)) for each in penalties.values())
+
+
+# ---- of many characters: one for all, or one for each
+
+
+T = TypeVar("T")
+OfValidForMany: TypeAlias = ValidForMany | Mapping[str, ValidForMany] | Sequence[OfValid | None]
+
+
+def each_of(given: Any, n: int, what: str, *, is_one: bool) -> Sequence[Any]:
+    """What each of n characters is given: the same, or one of as many as there are characters."""
+    if is_one:
+        return [given] * n
+    if not isinstance(given, Sequence) or isinstance(given, str):
+        given = list(require_many(given, what, f"one {what} for each character"))
+    if len(given) != n:
+        raise QueryError(Fault(f"{plural(len(given), what)} for {plural(n, 'character')}.", "one for all, or one for each"))
+    return cast("Sequence[Any]", given)
+
+
+def valid_of_each(databases: Mapping[str, MotionDatabase], valid: OfValidForMany | None, n: int) -> Sequence[OfValid | None]:
+    """What may play of each of n characters, as `Selector.search` takes it. Masks are read for all characters at once."""
+    if valid is None or n == 0:
+        return [None] * n
+    if isinstance(valid, (list, tuple)) and any(isinstance(each, Mapping) for each in valid):
+        return each_of(valid, n, "mask", is_one=False)
+    of_databases = valid if isinstance(valid, Mapping) else dict.fromkeys(databases, cast("ValidForMany", valid))
+    read = {name: databases[name].valid_of_each(own, n) for name, own in of_databases.items() if name in databases}
+    of_others: dict[str, Valid] = {name: () for name in of_databases if name not in databases}  # not loaded, or unknown and refused
+    return [of_others | {name: own[i] for name, own in read.items()} for i in range(n)]

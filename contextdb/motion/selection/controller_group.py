@@ -6,21 +6,20 @@ are those of `contextdb.motion.selection.controller`, and there is no second cop
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import overload
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from contextdb.cells.arguments import require_many_of
+from contextdb.cells.sequences import Kept
 from contextdb.errors import ContextError, Fault, MotionError, Place, QueryError, plural
 from contextdb.motion import arguments
 from contextdb.motion.clips.ground_place import GroundPlace, OfBody, place_of
 from contextdb.motion.clips.many_steered import ManySteered
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.records import collector_at_rest
-from contextdb.motion.selection.asked import Among, Asked, OfPenalties, OfTags
-from contextdb.motion.selection.asked_of_many import OfValidForMany, each_of, valid_of_each
+from contextdb.motion.selection.asked import Among, Asked, OfPenalties, OfTags, OfValidForMany, each_of, valid_of_each
 from contextdb.motion.selection.choice import Choice
 from contextdb.motion.selection.controller import Asking, Controller
 from contextdb.motion.selection.controller_state import ControllerState
@@ -33,7 +32,7 @@ Flag = bool | Sequence[bool] | NDArray[np.bool_]
 OfBodies = ManySteered | Sequence[OfBody | None] | NDArray[np.float64]
 
 
-class ControllerGroup(Sequence[Controller]):
+class ControllerGroup(Kept[Controller]):
     """The controllers of a crowd, in order: a sequence, with whose numbers queries, masks and decisions go.
 
     Parameters
@@ -48,37 +47,22 @@ class ControllerGroup(Sequence[Controller]):
     """
 
     def __init__(self, controllers: Iterable[Controller] = ()) -> None:
-        self._controllers: list[Controller] = require_many_of(controllers, Controller, "controllers", "a list of Controller")
-        if len({id(controller) for controller in self._controllers}) < len(self._controllers):
+        self._items = require_many_of(controllers, Controller, "controllers", "a list of Controller")
+        if len({id(controller) for controller in self._items}) < len(self._items):
             raise MotionError(HAS_IT)
 
     def add(self, controller: Controller) -> None:
         """Take one more character, as the last."""
-        if any(own is controller for own in self._controllers):
+        if any(own is controller for own in self._items):
             raise MotionError(HAS_IT)
-        self._controllers.append(controller)
+        self._items.append(controller)
 
     def remove(self, controller: Controller) -> None:
         """Let a character go; those after it move up by one."""
-        kept = [own for own in self._controllers if own is not controller]
-        if len(kept) == len(self._controllers):
+        kept = [own for own in self._items if own is not controller]
+        if len(kept) == len(self._items):
             raise MotionError(Fault("the group does not have this controller.", "one that was added"))
-        self._controllers = kept
-
-    @overload
-    def __getitem__(self, i: int) -> Controller: ...
-
-    @overload
-    def __getitem__(self, i: slice) -> list[Controller]: ...
-
-    def __getitem__(self, i: int | slice) -> Controller | list[Controller]:
-        return self._controllers[i]
-
-    def __len__(self) -> int:
-        return len(self._controllers)
-
-    def __iter__(self) -> Iterator[Controller]:
-        return iter(self._controllers)
+        self._items = kept
 
     def __repr__(self) -> str:
         return f"<ControllerGroup: {plural(len(self), 'character')}>"

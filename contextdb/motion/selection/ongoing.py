@@ -48,7 +48,6 @@ class Ongoing:
 
     @property
     def database(self) -> str:
-        """The name of the database."""
         return self.playing.database
 
     def cheapest(self, query: Floats, chosen: Filter) -> Ongoing:
@@ -79,7 +78,6 @@ def playing_at(database: str, head: Playhead, frame: int, time_s: float) -> Play
 
 
 def _still_plays(last: Playhead, playing: Playing, database: MotionDatabase, rate: float) -> bool:
-    """Whether a playhead is one of what plays."""
     is_range = last.database is database and last.range == playing.range and last.rate == rate_of(database, rate)
     return is_range and last.asset == playing.asset and last.mirrored == playing.mirrored and last.stop > last.start
 

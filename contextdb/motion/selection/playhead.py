@@ -54,7 +54,6 @@ class Playhead:
 
     @cached_property
     def start(self) -> int:
-        """The first frame."""
         return int(self.database.starts[self.range])
 
     @cached_property
@@ -74,12 +73,10 @@ class Playhead:
 
     @cached_property
     def asset(self) -> str:
-        """What plays."""
         return self.database.assets[self.range]
 
     @cached_property
     def mirrored(self) -> bool:
-        """Whether it plays mirrored."""
         return bool(self.database.mirrored[self.range])
 
     @cached_property

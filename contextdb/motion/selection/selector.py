@@ -17,24 +17,34 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Real
 from typing import Any, Unpack
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from contextdb.cells.arguments import require_kind, require_many_of, require_text
-from contextdb.errors import Fault, MotionError, QueryError, in_quotes, nearest, some
+from contextdb.errors import Fault, MotionError, QueryError, in_quotes, mend_for, some
 from contextdb.motion import arguments
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.markup.left_out import Skip
 from contextdb.motion.search.candidates import Candidates
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.hit import NOTHING, Hit
-from contextdb.motion.selection.asked import Among, Asked, Current, OfPenalties, OfTags, OfValid, Options
-from contextdb.motion.selection.asked_of_many import OfValidForMany, each_of, valid_of_each
+from contextdb.motion.selection.asked import (
+    Among,
+    Asked,
+    Current,
+    OfPenalties,
+    OfTags,
+    OfValid,
+    OfValidForMany,
+    Options,
+    each_of,
+    valid_of_each,
+)
 from contextdb.motion.selection.choice import Choice, Reason, Search, Status
-from contextdb.motion.selection.known_tags import with_tags
 
 __all__ = ["Choice", "Entry", "Reason", "Search", "Selector", "Status"]
 
@@ -250,9 +260,8 @@ class Selector:
     def _check_names(self, names: Iterable[str]) -> None:
         for name in names:
             if not isinstance(name, str) or name not in self.names:
-                near = nearest(str(name), self.names)
                 found = f"the selector has no database {in_quotes(str(name))}."
-                raise QueryError(Fault(found, some(self.names), in_quotes(near) if near else ""))
+                raise QueryError(Fault(found, some(self.names), mend_for(str(name), self.names)))
 
 
 def choice_of(entries: Sequence[Entry], hits: Mapping[str, Hit], among: frozenset[str], stopped: str | None) -> Choice:
@@ -297,3 +306,16 @@ def _check_entries(entries: Sequence[Entry]) -> None:
                 f"the databases {in_quotes(first)} and {in_quotes(name)} have different channels: their costs cannot be compared."
             )
             raise MotionError(Fault(found, "databases of one schema"))
+
+
+# ---- databases that know each other's tags, so that one tag filter can be asked of all
+
+
+def with_tags(database: MotionDatabase, tags: Iterable[str]) -> MotionDatabase:
+    """The same database, its markup knowing some tags more; the same object if it knows them already. The features are shared."""
+    marks = database.marks
+    new = tuple(tag for tag in tags if tag not in marks.tags)
+    if not new:
+        return database
+    wider = np.pad(marks.kind_tags, ((0, 0), (0, len(new))))
+    return replace(database, marks=replace(marks, tags=marks.tags + new, kind_tags=wider))

@@ -205,7 +205,6 @@ def checked(config: object, folder: object, assets: object, names: object) -> Pa
 
 
 def _open(path: Path, digest: str) -> MotionDatabase | None:
-    """The saved database of a digest, or None."""
     try:
         return stored.open_database(path) if digest and stored.inputs_of(path) == digest else None
     except (ArtefactError, FileError):

@@ -126,8 +126,7 @@ def _unused(config: MotionConfig, found: str, name: str, known: Collection[str],
     names = sorted(known)
     near = nearest(name, names)
     mend = f"[{section}.{near}]" if near else ""
-    fault = Fault(found, some(names) or "none: there are none", mend, Place(config.file), "unused-section")
-    return Finding.of(fault, "warning")
+    return Finding.of(Fault(found, some(names) or "none: there are none", mend, Place(config.file), "unused-section"), "warning")
 
 
 def _of_assets(config: MotionConfig, folder: Path, assets: Assets) -> Iterator[Finding]:

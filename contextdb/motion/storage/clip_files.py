@@ -44,7 +44,6 @@ class ClipFile:
 
     @property
     def asset(self) -> str:
-        """The clip's name."""
         return self.path.stem
 
     @property

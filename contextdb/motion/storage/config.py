@@ -18,7 +18,19 @@ from typing import TypedDict, TypeVar, Unpack
 
 from contextdb.cells.arguments import require_mapping, require_text
 from contextdb.cells.notebook import one_line
-from contextdb.errors import ClipError, Fault, FileError, MotionError, Place, SchemaError, in_quotes, nearest, plural, shown, some
+from contextdb.errors import (
+    ClipError,
+    Fault,
+    FileError,
+    MotionError,
+    Place,
+    SchemaError,
+    in_quotes,
+    mend_for,
+    plural,
+    shown,
+    some,
+)
 from contextdb.files.toml_shapes import Mapped, Section
 from contextdb.files.toml_text import as_toml, what
 from contextdb.motion.clips.clip import Clip
@@ -126,9 +138,8 @@ class MotionConfig:
         asked = {name: {channel.function for channel in schema.channels} for name, schema in self.features.items()}
         every = {function for names in asked.values() for function in names if function is not None}
         for unknown in (function for function in functions if function not in every):
-            near = nearest(unknown, every)
             found = f"no channel has function = {in_quotes(unknown)}."
-            raise SchemaError(Fault(found, some(sorted(every)), in_quotes(near) if near else "", Place(self.file)))
+            raise SchemaError(Fault(found, some(sorted(every)), mend_for(unknown, every), Place(self.file)))
         given = {
             name: schema.with_functions({each: functions[each] for each in functions if each in asked[name]})
             for name, schema in self.features.items()
@@ -152,8 +163,7 @@ class MotionConfig:
         settings = self.database(name)
         weights = {"place_weight": settings.place_weight, "facing_weight": settings.facing_weight}
         if not settings.roles:
-            found = f"[databases.{name}] has no roles."
-            raise SchemaError(Fault(found, 'roles = ["Tackler", "Carrier"]', place=Place(self.file)))
+            raise SchemaError(Fault(f"[databases.{name}] has no roles.", 'roles = ["Tackler", "Carrier"]', place=Place(self.file)))
         return JointDatabase.of(database, settings.roles, **weights)
 
     def joint_searcher(self, name: str, databases: Mapping[str, MotionDatabase]) -> JointSearcher:
@@ -195,9 +205,7 @@ class ControllerOptions(TypedDict, total=False):
 def _known(section: str, name: str, parts: Mapping[str, Part], file: str | None) -> Part:
     """The part of a name, or a SchemaError with the nearest name."""
     if require_text(name, "name") not in parts:
-        near = nearest(name, parts)
-        found = f"there is no [{section}.{name}]."
-        raise SchemaError(Fault(found, some(parts), in_quotes(near) if near else "", Place(file)))
+        raise SchemaError(Fault(f"there is no [{section}.{name}].", some(parts), mend_for(name, parts), Place(file)))
     return parts[name]
 
 

@@ -83,7 +83,6 @@ class _File:
         return len(self.gltf.accessors) - 1
 
     def bytes(self) -> bytes:
-        """The whole file."""
         import pygltflib
 
         data = b"".join(self.parts)

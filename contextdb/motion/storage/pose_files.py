@@ -161,7 +161,6 @@ def _built(inputs: Inputs, name: str) -> PoseBank:
 
 
 def _open(path: Path, digest: str) -> PoseBank | None:
-    """The saved bank of a digest, or None."""
     try:
         return open_poses(path) if digest and read_tensors(path, STORED_POSES)[1].get("inputs") == digest else None
     except (ArtefactError, FileError):

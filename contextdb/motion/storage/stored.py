@@ -184,7 +184,6 @@ def _shapes(tensors: Tensors) -> str:
 
 
 def _arrays(prefix: str, part: Layout | Marks) -> Tensors:
-    """The arrays of a part of a database."""
     values = {each.name: getattr(part, each.name) for each in fields(part) if each.init}
     return {f"{prefix}.{name}": value for name, value in values.items() if isinstance(value, np.ndarray)}
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from contextdb.errors import plural
+from contextdb.errors import joined, plural
 from contextdb.motion.trace.cost_views import cost_text, seconds
 from contextdb.motion.trace.session_diff import SessionDiff
 from contextdb.motion.trace.stats import GAINS, SessionStats
@@ -48,7 +48,6 @@ def _part_text(part: ChangePart) -> str:
 
 
 def stats_lines(told: SessionStats, width: int = WIDTH) -> Iterator[str]:
-    """The figures of a session."""
     gain = (
         ""
         if told.gain_median is None
@@ -65,9 +64,7 @@ def stats_lines(told: SessionStats, width: int = WIDTH) -> Iterator[str]:
     ]
     never = told.assets_never_used
     if never is not None:
-        more = f" and {len(never) - MOST_NAMES} more" if len(never) > MOST_NAMES else ""
-        names = ", ".join(never[:MOST_NAMES])
-        rows.append(("never used", f"{len(never):,}: {names}{more}" if never else "none"))
+        rows.append(("never used", f"{len(never):,}: {joined(never, MOST_NAMES)}" if never else "none"))
     yield from _labelled([(label, text) for label, text in rows if text], width)
 
 
@@ -108,7 +105,6 @@ def what_if_lines(told: WhatIf, width: int = WIDTH) -> Iterator[str]:
 
 
 def diff_lines(told: SessionDiff, width: int = WIDTH) -> Iterator[str]:
-    """Where two sessions part."""
     parting = told.parting
     if parting is None:
         yield f"both play the same in all {plural(told.updates, 'update')}"

@@ -19,7 +19,6 @@ Event = dict[str, object]
 
 
 def chrome_trace(decisions: Iterable[Decision]) -> dict[str, object]:
-    """The whole document."""
     found = list(decisions)
     events = [*_names(), *_slices(found), *(event for each in found for event in _events(each))]
     return {"format": 1, "displayTimeUnit": "ms", "traceEvents": events}

@@ -124,5 +124,4 @@ def cost_text(cost: float | None) -> str:
 
 
 def seconds(time_s: float | None) -> str:
-    """Seconds, to the hundredth."""
     return "" if time_s is None else f"{time_s:.2f}"

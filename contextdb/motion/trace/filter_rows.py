@@ -26,7 +26,6 @@ RUNS = ("frame_runs", "bias_runs")
 
 
 def filter_type() -> PolarsType:
-    """The type of the column `filters`."""
     import polars as pl
 
     flags, numbers = pl.List(pl.Boolean()), pl.List(pl.Float64())
@@ -48,7 +47,6 @@ def filter_type() -> PolarsType:
 
 
 def filter_row(database: str, chosen: Filter) -> Row:
-    """The filter of one database's search."""
     (frame_runs, frames), (bias_runs, biases) = _runs(chosen.frames), _runs(np.asarray(chosen.frame_biases, np.float64))
     return {
         "database": database,

@@ -33,7 +33,6 @@ def decision_json(decision: Decision, events: Events | None = None) -> Json:
 
 
 def candidates_json(database: str, found: Candidates, events: Events | None = None) -> Json:
-    """The candidates of one database."""
     rows = [_candidate_json(rank, row, (events or {}).get((database, row.frame), ())) for rank, row in enumerate(found, 1)]
     return {"database": database, "left_out": {reason.text: count for reason, count in found.counts.items()}, "rows": rows}
 

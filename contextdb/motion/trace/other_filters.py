@@ -18,7 +18,7 @@ from contextdb.motion.markup.left_out import Skip
 from contextdb.motion.markup.tag_filter import TagFilter
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.filters import Biases, Filter
-from contextdb.motion.selection.known_tags import with_tags
+from contextdb.motion.selection.selector import with_tags
 from contextdb.motion.trace.stock import Asked
 
 UNKNOWN = "any"

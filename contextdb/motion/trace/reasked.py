@@ -14,10 +14,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import cached_property
-from typing import Any, TypedDict, overload
+from typing import Any, TypedDict
 
 from contextdb.cells.arguments import require_kind, require_mapping, require_place
-from contextdb.errors import Fault, MotionError, Place, in_quotes, nearest, plural, some
+from contextdb.cells.sequences import Made
+from contextdb.errors import Fault, MotionError, Place, in_quotes, mend_for, plural, some
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.filters import Biases, Filter
 from contextdb.motion.selection.decision import Decision
@@ -41,7 +42,7 @@ class Changes(TypedDict, total=False):
     tables: Mapping[str, Edited] | None
 
 
-class Reasked(Sequence[ReaskedDecision]):
+class Reasked(Made[ReaskedDecision]):
     """A session asked again: one `ReaskedDecision` for each decision, worked out when it is asked for.
 
     Parameters
@@ -84,13 +85,7 @@ class Reasked(Sequence[ReaskedDecision]):
         found.decisions = decisions
         return found
 
-    @overload
-    def __getitem__(self, index: int) -> ReaskedDecision: ...
-    @overload
-    def __getitem__(self, index: slice) -> list[ReaskedDecision]: ...
-    def __getitem__(self, index: int | slice) -> ReaskedDecision | list[ReaskedDecision]:
-        if isinstance(index, slice):
-            return [self.of(decision) for decision in self.decisions[index]]
+    def _at(self, index: int) -> ReaskedDecision:
         return self.of(self.decisions[require_place(index, len(self), "decision")])
 
     def __iter__(self) -> Iterator[ReaskedDecision]:
@@ -182,9 +177,7 @@ def require_known(name: str, databases: Mapping[str, MotionDatabase], file: str)
     """Raise MotionError when no asset's name contains a text, with the nearest."""
     known = list(dict.fromkeys(asset for database in databases.values() for asset in database.assets))
     if not any(name.casefold() in asset.casefold() for asset in known):
-        near = nearest(name, known)
-        found = f"no asset's name contains {in_quotes(name)}."
-        raise MotionError(Fault(found, some(known), in_quotes(near) if near else "", Place(file)))
+        raise MotionError(Fault(f"no asset's name contains {in_quotes(name)}.", some(known), mend_for(name, known), Place(file)))
 
 
 def _mapping(given: object, what: str) -> Mapping[str, Any]:

@@ -15,9 +15,9 @@ from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.search import candidates
 from contextdb.motion.search.hit import Hit
 from contextdb.motion.selection.choice import Choice, Status
-from contextdb.motion.selection.continuing import continuing_cost
 from contextdb.motion.selection.decision import Decision
 from contextdb.motion.selection.selector import Entry, choice_of
+from contextdb.motion.selection.step import continuing_cost
 from contextdb.motion.trace.cost_views import Ranked
 from contextdb.motion.trace.reasked_search import ReaskedSearch
 from contextdb.motion.trace.stock import Stock

@@ -4,7 +4,7 @@ One row a decision. What a decision may lack is null. Times of searching are in 
 may leave out: all other columns are the same whenever the same session is recorded.
 
 A context becomes JSON: tags a sorted list, a NaN fact null, and what JSON has no word for its text. What else an update was given
-is JSON too, see `contextdb.motion.trace.input_rows`.
+is JSON too.
 
 Candidates are not kept: they are worked out again from the query, the filters and the databases. The column `candidates` holds
 those that sessions of format 1 kept; of their frames `Candidates.why` comes back empty, its sums are in `counts`.
@@ -15,21 +15,25 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, fields
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from contextdb.motion.clips.ground_place import GroundPlace
 from contextdb.motion.markup.left_out import LeftOut
+from contextdb.motion.markup.tag_filter import TagFilter
 from contextdb.motion.search.candidates import Candidate, Candidates
 from contextdb.motion.search.hit import NOTHING, Hit
 from contextdb.motion.selection.choice import Choice, Reason, Search, Status
+from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.decision import Action, Decision, Playing, Together
+from contextdb.motion.selection.inputs import Inputs
 from contextdb.motion.selection.root_motion import RootMotion
+from contextdb.motion.selection.variation import Variation
 from contextdb.motion.selection.worked_out import WorkedOut
 from contextdb.motion.trace.filter_rows import filter_of, filter_row, filter_type
-from contextdb.motion.trace.input_rows import inputs_json, inputs_of
 
 if TYPE_CHECKING:
     from polars import DataType as PolarsType
@@ -50,7 +54,6 @@ OPTIONAL = (TIMINGS, FILTERS, INPUTS, *BODY, HELD, PLAY_RATE, TOGETHER)
 
 
 def columns() -> dict[str, PolarsType]:
-    """Every column with its type."""
     import polars as pl
 
     text, whole, number, flag = pl.String(), pl.Int64(), pl.Float64(), pl.Boolean()
@@ -110,7 +113,6 @@ def columns() -> dict[str, PolarsType]:
 
 
 def row_of(decision: Decision, events_of: EventsOf) -> Row:
-    """A decision as a row of `columns`."""
     move = decision.root_motion
     return {
         "tick": int(decision.tick),
@@ -322,3 +324,59 @@ def _candidate(row: Row, channels: list[str]) -> Candidate:
         biases={_known(each["name"]): float(each["cost"]) for each in row["biases"]},
         left_out=LeftOut[row["left_out"]],
     )
+
+
+# ---- what an update was given next to query, context and valid assets, as JSON; settings by their names, so that versions differ
+
+
+Json = dict[str, Any]
+TAGS = ("include", "every", "exclude", "prefer", "avoid")
+
+
+def inputs_json(inputs: Inputs) -> str:
+    """Inputs as JSON; the same inputs give the same text."""
+    tags = inputs.tags
+    of_each = {name: _tags_row(each) for name, each in tags.items()} if isinstance(tags, Mapping) else None
+    told = {
+        "dt_s": float(inputs.dt_s),
+        "force": bool(inputs.force),
+        "interrupt": bool(inputs.interrupt),
+        "among": None if inputs.among is None else list(inputs.among),
+        "tags": _tags_row(tags) if isinstance(tags, TagFilter) else None,
+        "tags_of": of_each,
+    }
+    return f'{json.dumps(told)[:-1]}, "settings": {_settings_json(inputs.settings)}}}'
+
+
+@lru_cache(64)
+def inputs_of(text: str) -> Inputs:
+    """The inputs that a text was made of; those of one text are one. Raises ValueError, TypeError, KeyError or AttributeError where
+    the text was made of none."""
+    row = json.loads(text)
+    tags = None if row["tags"] is None else _tags(row["tags"])
+    of_each = None if row["tags_of"] is None else {name: _tags(each) for name, each in row["tags_of"].items()}
+    among = None if row["among"] is None else tuple(row["among"])
+    settings = _settings(json.dumps(row["settings"]))
+    return Inputs(float(row["dt_s"]), bool(row["force"]), bool(row["interrupt"]), among, tags or of_each, settings)
+
+
+def _tags_row(tags: TagFilter) -> Json:
+    return {name: list(map(list, given) if name in TAGS[3:] else given) for name in TAGS if (given := getattr(tags, name))}
+
+
+def _tags(row: Json) -> TagFilter:
+    return TagFilter(*(row.get(name, ()) for name in TAGS[:3]), *(dict(row.get(name, ())) for name in TAGS[3:]))
+
+
+@lru_cache(16)
+def _settings_json(settings: ControllerSettings) -> str:
+    return json.dumps(asdict(settings))
+
+
+@lru_cache(16)
+def _settings(text: str) -> ControllerSettings:
+    row = json.loads(text)
+    varied = row.pop("variation", None)
+    known = {each.name for each in fields(ControllerSettings)}
+    given = {name: value for name, value in row.items() if name in known}
+    return ControllerSettings(variation=None if varied is None else Variation(**varied), **given)

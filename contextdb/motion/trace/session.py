@@ -26,9 +26,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from itertools import islice
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Unpack, overload
+from typing import TYPE_CHECKING, Any, Unpack
 
 from contextdb.cells.arguments import require_kind, require_many, require_mapping, require_path, require_place, require_text
+from contextdb.cells.sequences import Made
 from contextdb.disk import read_bytes, write_atomic
 from contextdb.errors import (
     ContextDBError,
@@ -82,7 +83,7 @@ MOST = 108_000
 """So many decisions stay unless another number is given: an hour at 30 a second."""
 
 
-class Trace(Sequence[Decision]):
+class Trace(Made[Decision]):
     """Decisions in order. A recorder for a `Controller`, and what a saved session is read into.
 
     Parameters
@@ -144,13 +145,7 @@ class Trace(Sequence[Decision]):
     def __len__(self) -> int:
         return self._n_loaded + len(self._rows)
 
-    @overload
-    def __getitem__(self, index: int) -> Decision: ...
-    @overload
-    def __getitem__(self, index: slice) -> list[Decision]: ...
-    def __getitem__(self, index: int | slice) -> Decision | list[Decision]:
-        if isinstance(index, slice):
-            return [self._decision(i) for i in range(*index.indices(len(self)))]
+    def _at(self, index: int) -> Decision:
         return self._decision(self._place(index))
 
     def __iter__(self) -> Iterator[Decision]:

@@ -49,7 +49,7 @@ class SessionDiff:
     other: Mapping[str, float | None]
 
     def to_json(self) -> dict[str, object]:
-        """The same as JSON has it."""
+        """As plain data."""
         parting = None if self.parting is None else vars(self.parting)
         return {**vars(self), "parting": parting, "one": dict(self.one), "other": dict(self.other)}
 

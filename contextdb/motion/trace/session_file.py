@@ -40,7 +40,6 @@ MEND = "to record the session again"
 
 
 def frame_of_rows(rows: list[Row]) -> pl.DataFrame:
-    """Rows as a table of `columns`."""
     import polars as pl
 
     return pl.DataFrame(rows, schema=columns())

@@ -12,7 +12,7 @@ from typing import Any, Protocol, runtime_checkable
 
 from contextdb.cells.arguments import require_kind, require_mapping
 from contextdb.cells.conditions import Condition
-from contextdb.errors import Fault, MotionError, in_quotes, nearest, some
+from contextdb.errors import Fault, MotionError, in_quotes, mend_for, some
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.storage.building import open_or_build
 from contextdb.motion.storage.config import MotionConfig
@@ -97,13 +97,11 @@ class Stock:
 
     @classmethod
     def with_tables(cls, databases: Mapping[str, MotionDatabase], project: Described) -> Stock:
-        """Some databases, and the tables of a project."""
         config = MotionConfig.from_dict(project.schema.motion, tables=project.tables)
         table_of = {name: table for name in databases if name in config.databases and (table := config.databases[name].table)}
         return cls(databases, project.tables, table_of)
 
     def table(self, database: str) -> Edited | None:
-        """The table of a database."""
         return self.tables.get(self.table_of.get(database, ""))
 
 
@@ -111,6 +109,4 @@ def require_name(name: object, what: str, known: Iterable[str]) -> None:
     """Raise MotionError for a name that is not among some, with the nearest."""
     names = list(known)
     if name not in names:
-        near = nearest(str(name), names)
-        found = f"there is no {what} {in_quotes(str(name))}."
-        raise MotionError(Fault(found, some(names) or "none", in_quotes(near) if near else ""))
+        raise MotionError(Fault(f"there is no {what} {in_quotes(str(name))}.", some(names) or "none", mend_for(str(name), names)))

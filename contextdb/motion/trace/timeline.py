@@ -83,7 +83,6 @@ class Timeline:
 
 
 def timeline_of(trace: Trace) -> Timeline:
-    """The columns of a session."""
     import polars as pl
 
     playing, ranges = pl.col("playing").struct, pl.element().struct.field("ranges")

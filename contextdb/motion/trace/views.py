@@ -278,7 +278,6 @@ def _ranked(decision: Decision) -> list[Ranked]:
 
 
 def role_of(decision: Decision, database: str, frame: int) -> str:
-    """What a candidate is to a decision."""
     here = (database, frame)
     playing, before = ((each.database, each.frame) if each else None for each in (decision.playing, decision.before))
     if here == playing and decision.action in (Action.START, Action.JUMP):

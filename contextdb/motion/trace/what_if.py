@@ -73,7 +73,7 @@ class WhatIf:
     is_reproduced: bool
 
     def to_json(self) -> dict[str, object]:
-        """The same as JSON has it."""
+        """As plain data."""
         return {
             "searches": self.searches,
             "other_frames": self.other_frames,

@@ -15,11 +15,20 @@ from contextdb.cells.arguments import require_text
 from contextdb.errors import Fault, MotionError, row_name
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.selection.choice import Choice, Reason
-from contextdb.motion.trace.asset_place import OF_MARKUP, OF_TIME, Place, is_mirrored, let_in, place_of, rows_of
 from contextdb.motion.trace.cost_views import cost_text
 from contextdb.motion.trace.reasked_decision import ReaskedDecision
 from contextdb.motion.trace.stock import require_name
-from contextdb.motion.trace.winning_changes import Change, winning_changes
+from contextdb.motion.trace.winning_changes import (
+    OF_MARKUP,
+    OF_TIME,
+    Change,
+    Place,
+    is_mirrored,
+    let_in,
+    place_of,
+    rows_of,
+    winning_changes,
+)
 
 
 @dataclass(frozen=True, slots=True)

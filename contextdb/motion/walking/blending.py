@@ -164,7 +164,6 @@ class Mix:
 
     @cached_property
     def stride_m(self) -> float:
-        """The weighted mean of the strides."""
         return sum(weight * cycle.stride_m for cycle, weight in self._pairs)
 
     @cached_property

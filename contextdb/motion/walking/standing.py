@@ -59,7 +59,6 @@ class Legs:
 
     @classmethod
     def of(cls, cycles: Sequence[Cycle]) -> Legs:
-        """The legs of the rig of some cycles."""
         rig, feet = cycles[0].skeleton, cycles[0].feet
         legs = leg_of(rig, feet[0]), leg_of(rig, feet[1])
         rotations = np.concatenate([cycle.rotations for cycle in cycles])

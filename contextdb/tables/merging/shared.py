@@ -36,7 +36,6 @@ class Shared:
 
     @property
     def is_any(self) -> NDArray[np.bool_]:
-        """For each text whether it says nothing."""
         return np.array([says_any(text) for text in self.texts], np.bool_)
 
     def at(self, column: int, rows: CameFrom) -> NDArray[np.int64]:

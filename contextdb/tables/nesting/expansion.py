@@ -37,7 +37,6 @@ class Expansion:
 
     @property
     def n_rows(self) -> int:
-        """How many flat rows there are."""
         return int(self.rows.shape[1])
 
     def layers(self, columns: Iterable[tuple[int, TextColumn]]) -> Layers:

@@ -26,8 +26,7 @@ from contextdb.tables.condition_column import ConditionColumn
 from contextdb.tables.data import TableData, picking_of
 from contextdb.tables.nesting.expansion import NO_ROWS, Expansion, expand
 from contextdb.tables.nesting.flat_columns import FlatColumn
-from contextdb.tables.nesting.flat_outputs import declared_of, flat_outputs
-from contextdb.tables.nesting.flat_texts import free_name, outputs_of, paths_and_leaves, rules_of
+from contextdb.tables.nesting.flat_texts import declared_of, flat_outputs, free_name, outputs_of, paths_and_leaves, rules_of
 from contextdb.tables.nesting.links import Neighbours, require_sound
 from contextdb.tables.plain_columns import PlainColumns
 
@@ -86,7 +85,6 @@ class FlatTable(TableData):
         return [(self.expansion.tables[n], r) for n, r in zip(numbers, rows, strict=True) if n >= 0]
 
     def flat(self) -> FlatTable:
-        """The table itself."""
         return self
 
     def compile(self) -> CompiledTable:

@@ -61,7 +61,6 @@ def inner_rows(table: TableData) -> dict[str, list[int]]:
 
 
 def inner_tables(tables: Iterable[TableData]) -> set[str]:
-    """The names of the tables that rows of some tables refer to."""
     return {name for table in tables for name in inner_rows(table)}
 
 

@@ -28,7 +28,6 @@ def asset_name(text: str) -> str:
 
 
 def asset_text(asset: str) -> str:
-    """The cell that names an asset."""
     return '"' + asset.replace('"', '""') + '"' if asset.startswith(MARK) else asset
 
 

@@ -6,7 +6,7 @@ columns that changed are compiled. The disk is touched only to say why a file th
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,12 +14,21 @@ from contextdb.cells.notebook import one_line
 from contextdb.compiled.table import CompiledTable, data_of
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.disk import read_bytes
-from contextdb.errors import ContextDBError, Fault, FileError, Place, SchemaError, TableError, plural
+from contextdb.errors import ContextDBError, Fault, FileError, Place, TableError, plural
 from contextdb.files.texts import texts_of
-from contextdb.schema.settings import EMPTY, Schema, read_schema
+from contextdb.schema.settings import EMPTY, Schema
 from contextdb.tables.data import require_readable
 from contextdb.tables.nesting.links import reached
-from contextdb.tables.project import SCHEMA_FILE, ByName, Project, around_each_other, require_all_sound, settings_of, twice_named
+from contextdb.tables.project import (
+    SCHEMA_FILE,
+    ByName,
+    Project,
+    around_each_other,
+    require_all_sound,
+    schema_of,
+    settings_of,
+    twice_named,
+)
 from contextdb.tables.table import Table
 from contextdb.tables.watching.sharing import table_like
 from contextdb.tables.watching.stamps import Digests, digests_of
@@ -52,12 +61,6 @@ class Snapshot(Unchanging, ByName[CompiledTable]):
         """One compiled table; a name that is missing raises NoSuchTable, which is a KeyError too, and names the nearest."""
         return self.tables[self.project[name].name]
 
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.tables)
-
-    def __len__(self) -> int:
-        return len(self.tables)
-
 
 def schema_from(folder: Path, contents: Contents, last: Snapshot | None) -> Schema:
     """What the folder's contextdb.toml says; the same object as before when its bytes are the same. Raises FileError where it was
@@ -73,7 +76,7 @@ def schema_from(folder: Path, contents: Contents, last: Snapshot | None) -> Sche
         return EMPTY
     if last is not None and digests_of({path: raw})[path] == last._digests.get(path):
         return last.project.schema
-    return read_schema(_decoded(raw, path), str(path))
+    return schema_of(raw, path)
 
 
 def next_snapshot(folder: Path, schema: Schema, found: Found, contents: Contents, last: Snapshot | None = None) -> Snapshot:
@@ -122,11 +125,3 @@ def _compiled(table: Table, older: CompiledTable | None) -> CompiledTable:
         data_of(compiled).remember_as(data_of(older))
     compiled.query({}, unknown="any")
     return compiled
-
-
-def _decoded(raw: bytes, path: Path) -> str:
-    try:
-        return raw.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = raw[: error.start].count(b"\n") + 1
-        raise SchemaError(Fault("the file is not UTF-8.", "TOML is UTF-8", "to save it as UTF-8", Place(str(path), line))) from None

@@ -23,7 +23,6 @@ Digests = Mapping[Path, bytes]
 
 
 def look(paths: Iterable[Path]) -> dict[Path, Stamp]:
-    """The stamp of each file."""
     return {path: _stamp(path) for path in paths}
 
 

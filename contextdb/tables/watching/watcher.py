@@ -18,7 +18,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
-from types import TracebackType
 
 from contextdb.cells.arguments import require_callable, require_number, require_path
 from contextdb.cells.notebook import one_line
@@ -157,7 +156,7 @@ class Watch(ByName[CompiledTable]):
     def __enter__(self) -> Watch:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _run(self, poll_s: float) -> None:

@@ -60,36 +60,27 @@ def opened(name: str) -> Door:
                 own = name if number == 1 else f"{name}-{number}"
                 path = folder / f"{own}{SOCKET if IS_UNIX else PORT}"
                 if _is_free(path):
-                    return _unix_door(own, path) if IS_UNIX else _port_door(own, path)
+                    return _door(own, path)
     except OSError as error:
         why = f"the game cannot listen: {error.strerror or error}."
         raise FileError(Fault(why, "a folder for sockets, with a short path", place=Place(str(folder)))) from None
     raise ContextError(Fault(f"{MOST_OF_A_NAME} games are called {in_quotes(name)}.", "another name"))
 
 
-def _unix_door(name: str, path: Path) -> Door:
-    server = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+def _door(name: str, path: Path) -> Door:
+    """A socket that is a file; elsewhere a port of this machine, which the file names, with a word that only its readers know."""
+    server = socket.socket(socket.AF_UNIX if IS_UNIX else socket.AF_INET, socket.SOCK_STREAM)
+    token = "" if IS_UNIX else secrets.token_hex(32)
     try:
-        server.bind(str(path))
-        os.chmod(path, 0o600)  # nobody can connect before it listens
+        server.bind(str(path) if IS_UNIX else ("127.0.0.1", 0))
+        if IS_UNIX:
+            os.chmod(path, 0o600)  # nobody can connect before it listens
         server.listen(WAITING)
         server.setblocking(False)
-        return Door(name, path, server, "", os.lstat(path).st_ino)
-    except OSError:
-        server.close()
-        raise
-
-
-def _port_door(name: str, path: Path) -> Door:
-    server = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-    token = secrets.token_hex(32)
-    try:
-        server.bind(("127.0.0.1", 0))
-        server.listen(WAITING)
-        server.setblocking(False)
-        handle = os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600)
-        with os.fdopen(handle, "w", encoding="ascii") as file:
-            json.dump({"port": server.getsockname()[1], "token": token}, file)
+        if not IS_UNIX:
+            handle = os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600)
+            with os.fdopen(handle, "w", encoding="ascii") as file:
+                json.dump({"port": server.getsockname()[1], "token": token}, file)
         return Door(name, path, server, token, os.lstat(path).st_ino)
     except OSError:
         server.close()

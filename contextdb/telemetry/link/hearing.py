@@ -7,9 +7,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 
-from contextdb.errors import ContextDBError, Fault, Place, in_quotes, nearest, some
+from contextdb.errors import ContextDBError, Fault, Place, in_quotes, mend_for, some
 from contextdb.telemetry.link.doors import connected, doors, token_of
 from contextdb.telemetry.link.lines import FORMAT, HEADER, MOST_BYTES, Line, dumped, read_line
 
@@ -83,7 +82,7 @@ class Hearing:
     def __enter__(self) -> Hearing:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _first(self) -> tuple[Line, bytes]:
@@ -169,7 +168,5 @@ def no_game(name: str | None, running: Sequence[Game]) -> ContextDBError:
     names = [game.name for game in running]
     if name is None:
         return ContextDBError(Fault("no game is running.", 'a game that calls contextdb.link("game")'))
-    near = nearest(name, names)
     found = f"no game {in_quotes(name)} is running{'' if names else ', nor any other'}."
-    fault = Fault(found, some(names) if names else "", in_quotes(near) if near else "")
-    return ContextDBError(fault)
+    return ContextDBError(Fault(found, some(names) if names else "", mend_for(name, names)))

@@ -117,12 +117,10 @@ class SocketListener:
                 self.offer(line)
 
     def lose(self, n_lines: int) -> None:
-        """Learn that lines are lost."""
         self._n_lost += n_lines
         self._knows.clear()
 
     def read(self) -> None:
-        """Read what it asks for."""
         try:
             got = self.connection.recv(MOST_REQUEST)
         except BlockingIOError:
@@ -173,7 +171,6 @@ class SocketListener:
                 del self._pending[:sent]
 
     def close(self) -> None:
-        """Hang up."""
         self.is_gone = True
         self.connection.close()
 
@@ -195,11 +192,9 @@ class FileListener:
         self._is_refused = False
 
     def wants(self, moment: Moment) -> bool:
-        """Every moment."""
         return True
 
     def offer(self, line: bytes) -> None:
-        """Write a line."""
         if self._n_lost:
             line = dumped({"line": LOST, "count": self._n_lost}) + line
             self._n_lost = 0
@@ -209,7 +204,6 @@ class FileListener:
         """A recording has the lines that everybody gets."""
 
     def lose(self, n_lines: int) -> None:
-        """Learn that lines are lost."""
         self._n_lost += n_lines
 
     def send(self) -> None:
@@ -217,7 +211,6 @@ class FileListener:
         self._try(self._file.flush)
 
     def close(self) -> None:
-        """End the file."""
         if self._n_lost:
             self.offer(b"")
         self._try(self._file.flush)

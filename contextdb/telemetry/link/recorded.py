@@ -24,7 +24,6 @@ Texts = Mapping[str, str | None]
 
 
 def is_recording(path: Path) -> bool:
-    """Whether a file is a recording: by its suffix."""
     return path.suffix.lower() == SUFFIX
 
 
@@ -50,7 +49,6 @@ class Piece:
 
 
 def facts_frame(facts: Sequence[Texts], names: Sequence[str]) -> pl.DataFrame:
-    """Facts as columns of texts."""
     return pl.DataFrame([pl.Series(name, [each.get(name) for each in facts], dtype=pl.String) for name in names])
 
 

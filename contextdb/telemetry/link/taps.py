@@ -73,11 +73,9 @@ class TableTap:
 
     @property
     def target(self) -> CompiledData | None:
-        """The table."""
         return self._compiled()
 
     def open(self) -> None:
-        """Begin to tell."""
         compiled = self._compiled()
         if compiled is not None and compiled.heard is None:
             hear(compiled, self)
@@ -123,7 +121,6 @@ class TableTap:
             self._ring.put(self._teller(who), time.monotonic(), who, self.source, facts, answer)
 
     def picked(self, answer: Matches, row: int | None, asset: str | None) -> None:
-        """Tell of a pick."""
         who = self._who() if self.is_watched else UNNAMED
         tellers = (self._teller(who), self.last_live)
         self._ring.put_pick(tellers, time.monotonic(), who, self.source, Picked(row, asset), answer)
@@ -148,11 +145,9 @@ class LiveTap:
 
     @property
     def target(self) -> LiveContext | None:
-        """The context."""
         return self._live()
 
     def open(self) -> None:
-        """Begin to tell."""
         if (live := self._live()) is not None and getattr(live, "_ears", None) is None:
             hear_live(live, self)
 
@@ -162,11 +157,9 @@ class LiveTap:
             unhear_live(live)
 
     def rename(self, who: Who) -> None:
-        """Call it otherwise."""
         self._who = who_of(who)
 
     def asked(self, context: Context, answer: Matches, actors: Actors | None = None) -> None:
-        """Tell of a question."""
         facts = _kept(self._keep(context), actors)
         self._table.last_live = self
         self._ring.put(self, time.monotonic(), self._who(), self._table.source, facts, answer)
@@ -183,11 +176,9 @@ class ControllerTap:
 
     @property
     def target(self) -> object | None:
-        """The controller."""
         return self._controller()
 
     def open(self) -> None:
-        """Begin to tell."""
         controller = self._controller()
         if controller is not None and not self._is_open:
             self._other, controller.recorder, self._is_open = controller.recorder, self, True
@@ -200,7 +191,6 @@ class ControllerTap:
             controller.recorder, self._other = self._other, None
 
     def rename(self, who: Who) -> None:
-        """Call it otherwise."""
         self._who = who_of(who)
 
     @property
@@ -210,7 +200,6 @@ class ControllerTap:
         return max(wanted, 1) if self._ring.keeps_filters else wanted
 
     def record(self, decision: object) -> None:
-        """Take one decision."""
         self._ring.put(self, time.monotonic(), self._who(), None, decision, None)
         if self._other is not None:
             self._other.record(decision)

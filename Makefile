@@ -110,7 +110,7 @@ $(VENV)/.dev: pyproject.toml | $(VENV)/pyvenv.cfg
 	$(STAMP)
 
 # What numba compiles is kept in its cache. Two workers of the tests that found nothing there would both compile everything.
-$(VENV)/.kernels: $(wildcard contextdb/*kernels.py contextdb/*/*kernels.py contextdb/*/*/*kernels.py) | $(VENV)/.dev
+$(VENV)/.kernels: $(wildcard contextdb/*/*kernels.py contextdb/*/*/*kernels.py contextdb/motion/output/*.py) | $(VENV)/.dev
 	$(PY) tests/kernels.py
 	$(STAMP)
 

@@ -1,4 +1,7 @@
-"""Compile the kernels into numba's cache: `make` does it once, before the workers of the tests would each do it for themselves."""
+"""Compile the kernels into numba's cache: `make` does it once, before the workers of the tests would each do it for themselves.
+
+What is there already goes first: numba looks only at a function's own file, not at those of the functions that it calls.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,8 @@ from running import ROOT, run
 import contextdb as cdb
 
 if __name__ == "__main__":
+    for kept in (ROOT / "contextdb").rglob("*.nb[ic]"):
+        kept.unlink()
     table = ROOT / "tables" / "locomotion.csv"
     cdb.load(table).compile().prepare(casting=True, batches=True)
     with TemporaryDirectory() as folder:

@@ -17,6 +17,7 @@ import numpy as np
 from contextdb.cells.conditions import Condition
 from contextdb.cells.grammar import parse_cell
 from contextdb.cells.kinds import Family
+from contextdb.cells.output_types import OutputType
 from contextdb.columns import TextColumn
 from contextdb.disk.together import NewFile, write_together
 from contextdb.edits.schema_file import schema_change
@@ -281,12 +282,17 @@ def _declared_otherwise(table: Table, column: str) -> str:
     declared = ""
     if job and (column in CONDITIONS or job != "outputs"):
         declared = "an output" if job == "outputs" else f"a column for {job}"
-    elif output is not None and output.kind not in ("text", "number" if SHOWN[column] == "number" else "enum"):
+    elif output is not None and not _may_say(output.type, column):
         declared = f"an output of type {output.kind}"
     elif condition is not None and not _is_shown(condition, column):
         unit = condition.unit.strip()
         declared = f"{condition.domain.type.name} in {unit}" if unit else condition.domain.type.name
     return f'"{column}" is not filled: clips show {SHOWN[column]}, contextdb.toml declares {declared}.' if declared else ""
+
+
+def _may_say(kind: OutputType, column: str) -> bool:
+    """Whether outputs of a type can be what clips show."""
+    return kind.is_free or (kind.is_numeric and not kind.is_whole if column == "duration_s" else kind.has_values)
 
 
 def _is_shown(condition: Condition, column: str) -> bool:

@@ -261,7 +261,7 @@ class ImportDialog(Dialog[Import]):
         self.draft = found
         self._show_columns()
         self._show_keys("F6 import · Enter change a column · F2 another file · Esc cancel")
-        self.call_after_refresh(self.query_one("#import-columns", LineList).focus)
+        self.set_focus(self.query_one("#import-columns", LineList))  # before it is painted: a key then goes there
 
     def _show_sheets(self, sheets: Sequence[str]) -> None:
         self.set_class(len(sheets) < 2, "-no-sheets")

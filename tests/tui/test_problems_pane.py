@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from threading import Event
@@ -211,7 +212,7 @@ def test_a_check_ends_when_its_table_is_no_longer_wanted(monkeypatch):
 
     def for_ever(table, should_stop):
         while not should_stop():
-            pass
+            time.sleep(0.001)
         ended.set()
         raise Cancelled("the computation was stopped.")
 

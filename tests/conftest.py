@@ -98,4 +98,4 @@ def pytest_collection_finish() -> None:
     """What is loaded and collected by now stays: the search for what can be thrown away begins here, and comes less often."""
     gc.freeze()
     gc.enable()
-    gc.set_threshold(5000)
+    gc.set_threshold(20_000, 10, 20)

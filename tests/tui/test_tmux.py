@@ -56,6 +56,11 @@ class Terminal:
         command = f"env -u COLORTERM {' '.join(said)} {sys.executable} {program}; echo exit code $?; cat"
         self.tmux("new-session", "-d", "-x", "80", "-y", "24", "-c", str(self.folder), command)
 
+    def end(self) -> None:
+        """Close the terminal; one that is started then has another socket, since the server that ends still holds this one."""
+        self.tmux("kill-server")
+        self.socket += "-next"
+
     def resize(self, columns: int, rows: int) -> None:
         self.tmux("resize-window", "-x", str(columns), "-y", str(rows))
 
@@ -191,7 +196,7 @@ def test_two_editors_of_one_table_lose_nothing_of_what_was_saved_and_each_is_tol
     terminal.wait("exit code 137")
     other_terminal.wait("left edits that are not saved")
 
-    terminal.tmux("kill-server")
+    terminal.end()
     terminal.start("screen-256color")
     terminal.wait("1 unsaved edit restored", "F2 Edit")
     other_terminal.wait("has opened this table")

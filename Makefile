@@ -44,8 +44,8 @@ play: $(VENV)/.playground
 
 test: export EXAMPLES := $(EXAMPLES)
 test: export PYTHONDONTWRITEBYTECODE :=
-test: $(VENV)/.dev $(VENV)/.kernels
-	$(PY) -m pytest --numprocesses auto --dist worksteal $(if $(SEED),--hypothesis-seed=$(SEED))
+test: $(VENV)/.dev $(VENV)/.kernels   # one worker more than cores: many tests wait for a terminal or another process
+	$(PY) -m pytest --numprocesses $$($(PY) -c "import os; print((os.cpu_count() or 1) + 1)") --dist worksteal $(if $(SEED),--hypothesis-seed=$(SEED))
 
 cover: $(VENV)/.dev
 	$(PY) -m pytest --numprocesses auto --dist worksteal --cov

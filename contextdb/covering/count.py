@@ -43,6 +43,8 @@ MANY_FACTORS = 100
 """Above so many factors boxes that share none are counted apart from the start."""
 POLL_S = 0.02
 """How often a long count is looked at."""
+BOXES_A_CHECK = 10_000
+"""How many boxes are read between two looks whether to stop."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,7 +154,7 @@ def _count(boxes: list[Box], full: Box, weights: list[NDArray[np.float64]], work
     boxes = [box for box, has_measure in zip(boxes, _has_measure(boxes, weights), strict=True) if has_measure]
     if not boxes:
         return Bounds(1.0, 1.0)
-    table = table_of(boxes, full, [len(own) for own in weights])
+    table = table_of(boxes, full, [len(own) for own in weights], progress)
     low, high, done, is_cut = _run(table, np.concatenate([_whole(own) for own in weights]), work, progress)
     if is_cut or high - low > EXACT:
         return Bounds(max(0.0, low - ROUNDING), min(1.0, high + ROUNDING), done)
@@ -208,12 +210,14 @@ def _share(side: int, weights: NDArray[np.float64]) -> float:
     return float(np.cumsum(inside)[-1]) if len(inside) else 0.0  # one after the other: `sum` rounds otherwise from Python 3.12 on
 
 
-def table_of(boxes: Sequence[Box], full: Box, n_classes: Sequence[int]) -> tuple[NDArray[Any], ...]:
-    """The boxes as `part_kernels` wants them; `n_classes` are those of each factor."""
+def table_of(boxes: Sequence[Box], full: Box, n_classes: Sequence[int], progress: Progress = SILENT) -> tuple[NDArray[Any], ...]:
+    """The boxes as `part_kernels` wants them; `n_classes` are those of each factor. It can be stopped."""
     rng = np.random.default_rng(0)
     number: dict[tuple[int, int], int] = {}
     cells = np.full((len(boxes), len(full)), -1, np.int32)
     for i, box in enumerate(boxes):
+        if i % BOXES_A_CHECK == 0:
+            progress.check()
         for f, side in enumerate(box):
             if side != full[f]:
                 cells[i, f] = number.setdefault((f, side), len(number))

@@ -286,7 +286,7 @@ class Judge:
             return None
         if not is_prepared():
             self.progress.within(PREPARING, self.progress.start, self.progress.start)
-        return Questions(boxes, self.space.full)
+        return Questions(boxes, self.space.full, self.progress)
 
     def _asked(self, questions: Questions, box: Box, by: int, allowed: int) -> bool:
         self.progress.check()

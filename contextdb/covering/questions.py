@@ -40,10 +40,12 @@ class Questions:
 
     boxes: Sequence[Box]
     full: Box
+    progress: Progress = SILENT
+    """Whom to ask whether to stop."""
 
     @cached_property
     def _table(self) -> Arrays:
-        return table_of(self.boxes, self.full, [side.bit_length() for side in self.full])
+        return table_of(self.boxes, self.full, [side.bit_length() for side in self.full], self.progress)
 
     def are_held(self, box: Box, by: int, most: int) -> tuple[bool, bool, int]:
         """Whether the boxes whose bits are in `by` hold all of a box, whether that is certain, and the steps it took."""

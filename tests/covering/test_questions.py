@@ -93,6 +93,11 @@ def test_the_first_holders_are_told_of_and_can_be_stopped(monkeypatch: pytest.Mo
         Questions(boxes, FULL).holders(3, Progress(None, lambda: len(told) == 3))
 
 
+def test_boxes_are_read_until_it_is_time_to_stop():
+    with pytest.raises(Cancelled):
+        Questions([FULL], FULL, Progress(None, lambda: True)).are_held(FULL, 1, 1_000)
+
+
 def test_a_question_without_steps_is_not_certain():
     boxes = [(1, 3, 7, 15, 3, 7), (3, 1, 7, 15, 3, 7), (2, 2, 7, 15, 3, 7)]
     assert Questions(boxes, FULL).are_held(FULL, 7, 0)[:2] == (False, False)

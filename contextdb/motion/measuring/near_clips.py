@@ -21,6 +21,8 @@ from contextdb.motion.search.layout import Features
 NEAR_COST = 0.02
 """A clip of which 95 % of the frames cost no more with another clip is near it; frames that have nothing in common cost about 2."""
 PERCENTILE = 95.0
+PLACES = 4
+"""Costs are told with so many places: further ones depend on how a machine adds up, and would choose among equally near clips."""
 EVERY_S = 0.2
 """A frame is compared of each so many seconds."""
 
@@ -61,7 +63,7 @@ def near_clips(database: MotionDatabase, most: float = NEAR_COST, progress: Tell
     for done, at in enumerate(plain, 1):
         asset = database.assets[filled[at]]
         asked = frames[first[at] : first[at] + stops[at] - starts[at] : step]
-        far = np.percentile(_least_costs(asked, frames, squares, first), PERCENTILE, axis=0)
+        far = np.round(np.percentile(_least_costs(asked, frames, squares, first), PERCENTILE, axis=0), PLACES)
         far[[database.assets[number] == asset for number in filled.tolist()]] = np.inf
         best = int(np.argmin(far))
         if far[best] <= most:

@@ -3,6 +3,7 @@
 
 MAKEFLAGS += --no-print-directory
 VENV := .venv
+BENCH_VENV := .venv-bench
 OLD := import sys; sys.exit(sys.version_info < (3, 11))
 
 ifeq ($(OS),Windows_NT)
@@ -17,14 +18,18 @@ PY := $(BIN)/python
 STAMP = @$(PY) -c "import pathlib; pathlib.Path('$@').touch()"
 INSTALL = $(PY) -m pip install --quiet --disable-pip-version-check --editable
 
+# What pip builds and installs: the core in C is compiled again when one of its files changed.
+PACKAGE := pyproject.toml build_core.py $(wildcard contextdb/core/*.[ch])
+
 .DEFAULT_GOAL := help
 # A set-up that failed half-way is done again from its start.
 .DELETE_ON_ERROR:
-.PHONY: help demo play test cover check format docs site bench fuzz clean
+.PHONY: help demo play edit test cover check format docs site bench fuzz mutate clean
 
 help:
 	@$(info make demo     the whole way on the sample tables: read, ask, explain, search)
 	@$(info make play     open the playground: a game whose characters obey tables that you edit beside it)
+	@$(info make edit     the editor on the tables of that game)
 	@$(info make test     run the tests; EXAMPLES=full draws all examples from a new seed, SEED=1 draws the same ones again)
 	@$(info make cover    run the tests and list the lines and branches of the code that none of them reaches)
 	@$(info make check    formatting, lint, types and import contracts)
@@ -32,8 +37,9 @@ help:
 	@$(info make docs     run the commands of README.md and docs/ and write down what they print now)
 	@$(info make site     the pages of docs/ as a site in build/site, with a search; open build/site/index.html)
 	@$(info make fuzz     damage files at random for SECONDS=60 and read them; SEED=1 tries the same ones again)
+	@$(info make mutate   change an engine at random for SECONDS=600 and list the changes that no test notices; SEED=1 draws the same)
 	@$(info make bench    measure against other engines)
-	@$(info make clean    remove what was made, .venv too)
+	@$(info make clean    remove what was made, .venv and .venv-bench too)
 	@cd .
 
 demo: $(VENV)/.runtime
@@ -42,9 +48,12 @@ demo: $(VENV)/.runtime
 play: $(VENV)/.playground
 	@$(PY) -m examples.playground $(if $(CLIPS),--clips "$(CLIPS)")
 
+edit: $(VENV)/.runtime
+	@$(PY) -m contextdb edit examples/playground/tables
+
 test: export EXAMPLES := $(EXAMPLES)
 test: export PYTHONDONTWRITEBYTECODE :=
-test: $(VENV)/.dev $(VENV)/.kernels   # one worker more than cores: many tests wait for a terminal or another process
+test: $(VENV)/.dev   # one worker more than cores: many tests wait for a terminal or another process
 	$(PY) -m pytest --numprocesses $$($(PY) -c "import os; print((os.cpu_count() or 1) + 1)") --dist worksteal $(if $(SEED),--hypothesis-seed=$(SEED))
 
 cover: $(VENV)/.dev
@@ -65,16 +74,24 @@ docs: $(VENV)/.dev
 	$(PY) tests/test_api.py --update
 	$(PY) docs/keys.py
 	$(PY) docs/commands.py
+	$(PY) docs/settings.py
 	$(PY) docs/pictures.py
 	$(PY) docs/playground_pictures.py
 
 site: $(VENV)/.site
 	$(PY) docs/site/build.py
 
+mutate: $(VENV)/.dev
+	$(PY) tests/mutate.py --seconds $(or $(SECONDS),600) $(if $(SEED),--seed $(SEED))
+
 fuzz: $(VENV)/.dev
 	$(PY) tests/fuzz.py --seconds $(or $(SECONDS),60) $(if $(SEED),--seed $(SEED))
 
-bench: $(VENV)/.bench
+# An environment of its own: what the bench extra brings would change what the tests see.
+bench:
+	@$(MAKE) VENV=$(BENCH_VENV) measure
+
+measure: $(VENV)/.bench
 	$(PY) benchmarks/query.py
 	$(PY) benchmarks/casting.py
 	$(PY) benchmarks/reload.py
@@ -88,36 +105,30 @@ bench: $(VENV)/.bench
 	$(PY) benchmarks/playground.py
 	$(PY) benchmarks/editor.py
 	$(PY) benchmarks/start.py
-	$(PY) benchmarks/no_numba.py
 
 clean:
-	$(PYTHON) -c "import shutil; [shutil.rmtree(p, ignore_errors=True) for p in '$(VENV) build dist .hypothesis .mypy_cache .pytest_cache .ruff_cache .import_linter_cache'.split()]"
+	$(PYTHON) -c "import shutil; [shutil.rmtree(p, ignore_errors=True) for p in '$(VENV) $(BENCH_VENV) build dist .hypothesis .mypy_cache .pytest_cache .ruff_cache .import_linter_cache'.split()]"
 
 $(VENV)/pyvenv.cfg:
 	@$(PYTHON) -c "$(OLD)" || (echo "contextdb needs Python 3.11 or newer; '$(PYTHON)' is none. Try: make PYTHON=python3.12"; exit 1)
 	@$(PYTHON) -m venv $(VENV) || (echo "'$(PYTHON) -m venv' failed. On Debian and Ubuntu: apt install python3-venv"; exit 1)
 
-$(VENV)/.runtime: pyproject.toml | $(VENV)/pyvenv.cfg
+$(VENV)/.runtime: $(PACKAGE) | $(VENV)/pyvenv.cfg
 	$(INSTALL) .
 	$(STAMP)
 
-$(VENV)/.playground: pyproject.toml | $(VENV)/pyvenv.cfg
+$(VENV)/.playground: $(PACKAGE) | $(VENV)/pyvenv.cfg
 	$(INSTALL) ".[playground]"
 	$(STAMP)
 
-$(VENV)/.dev: pyproject.toml | $(VENV)/pyvenv.cfg
+$(VENV)/.dev: $(PACKAGE) | $(VENV)/pyvenv.cfg
 	$(INSTALL) ".[dev]"
 	$(STAMP)
 
-# What numba compiles is kept in its cache. Two workers of the tests that found nothing there would both compile everything.
-$(VENV)/.kernels: $(wildcard contextdb/*/*kernels.py contextdb/*/*/*kernels.py contextdb/motion/output/*.py) | $(VENV)/.dev
-	$(PY) tests/kernels.py
-	$(STAMP)
-
-$(VENV)/.site: pyproject.toml | $(VENV)/pyvenv.cfg
+$(VENV)/.site: $(PACKAGE) | $(VENV)/pyvenv.cfg
 	$(INSTALL) ".[site]"
 	$(STAMP)
 
-$(VENV)/.bench: pyproject.toml | $(VENV)/pyvenv.cfg
+$(VENV)/.bench: $(PACKAGE) | $(VENV)/pyvenv.cfg
 	$(INSTALL) ".[bench]"
 	$(STAMP)

@@ -16,7 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import motion
-from contextdb.motion import Clip, FeatureSchema, Normalisation
+from contextdb.motion import Clip, FeatureSchema
+from contextdb.motion.features.extraction import features_of
+from contextdb.motion.features.normalisation import Normalisation
+from contextdb.motion.made.recipes import made_clips
 
 BESIDE = Path(__file__).parents[1].parent / "shared" / "data" / "mocap"
 FOLDER = Path(os.environ.get("CONTEXTDB_MOCAP", BESIDE))
@@ -69,9 +72,9 @@ def load() -> Frames:
     """The 27 features of feet, hips and the way ahead, of every clip there is."""
     found = clips()
     name = "captured clips" if found else "made clips (no captured ones: set CONTEXTDB_MOCAP)"
-    found = found or [made.clip for made in motion.made_clips()]
+    found = found or [made.clip for made in made_clips()]
     schemas = [_schema(clip) for clip in found]
-    blocks = [motion.features_of(clip, schema) for clip, schema in zip(found, schemas, strict=True)]
+    blocks = [features_of(clip, schema) for clip, schema in zip(found, schemas, strict=True)]
     normalisation = Normalisation.of(blocks, schemas[0])
     scale = np.concatenate([np.full(c.n_features, np.sqrt(c.weight)) for c in schemas[0].channels])
     stops = np.cumsum([len(block) for block in blocks])

@@ -91,7 +91,7 @@ def measured(repeats: int) -> dict[str, timing.Summary]:
 
     def with_castings() -> object:
         matches = compiled.query({}, actors=offered, prefer="distance")
-        return [matches.casting(row) for row in matches]
+        return [matches.casting(row) for row in matches.rows.tolist()]
 
     ways: dict[str, Callable[[], object]] = {
         "query with actors": lambda: compiled.query({}, actors=offered, prefer="distance").bits,

@@ -6,7 +6,7 @@
 
 Every part of a report is timed by itself: the count within its budget, 200,000 samples, gaps, findings. Beside it, where the
 package `dd` is installed, the decision diagram of the same rows; then all overlaps and gaps of tables of published sizes.
-Memory is the highest of the process so far, so sizes go upwards. The first calls of each kernel are not timed.
+Memory is the highest of the process so far, so sizes go upwards. A first small report is not timed.
 """
 
 from __future__ import annotations

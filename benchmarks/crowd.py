@@ -36,21 +36,24 @@ from benchmarks.captured import Frames
 from benchmarks.sections import print_aligned
 from contextdb import motion
 from contextdb.motion import (
-    Biases,
     Controller,
     ControllerGroup,
     ControllerSettings,
     Decision,
     Entry,
     FeatureSchema,
-    ManySteered,
     MotionConfig,
     MotionDatabase,
     Selector,
     Steered,
     Trajectory,
 )
+from contextdb.motion.clips.many_steered import ManySteered, steered_paths
+from contextdb.motion.clips.steering import steered_path
 from contextdb.motion.features.extraction import trajectory_features
+from contextdb.motion.features.path_features import with_paths
+from contextdb.motion.made.recipes import made_clips
+from contextdb.motion.search.filters import Biases
 
 TABLES = Path(__file__).parent.parent / "tables"
 N_AGENTS = 10_000
@@ -266,7 +269,7 @@ def _frames(n_rounds: int) -> dict[str, Any]:
 def _made() -> tuple[FeatureSchema, Selector]:
     """The sample project's schema, and its databases of made clips."""
     schema = MotionConfig.from_dict(tomllib.loads((TABLES / "contextdb.toml").read_text(encoding="utf-8"))).features["loco"]
-    clips = [each.clip for each in motion.made_clips()]
+    clips = [each.clip for each in made_clips()]
     shared: dict[str, Any] = {"biases": Biases(0.0, -0.005, -0.01), "end_s": 0.3}
     loco = MotionDatabase.build(clips, schema, **shared)
     worn = [clip for clip in clips if clip.name.endswith("_tired")]
@@ -304,25 +307,25 @@ class _Crowd:
         for _ in range(PAST):
             self._step()
         past = [[bodies[i] for bodies in self.past] for i in range(self.n)]
-        paths = motion.steered_paths(self.past, self.sticks)
+        paths = steered_paths(self.past, self.sticks)
         poses = self.group.poses(DT_S)
         each = list(zip(past, [(float(x), float(z)) for x, z in self.sticks], strict=True))
         return {
             "one's path, by moments and at once": (
                 lambda: [_path_by_moments(bodies, stick) for bodies, stick in each],
-                lambda: [motion.steered_path(bodies, stick) for bodies, stick in each],
+                lambda: [steered_path(bodies, stick) for bodies, stick in each],
             ),
             "one's query, by channels and at once": (
                 lambda: [_query_by_channels(self.schema, pose, paths[i]) for i, pose in enumerate(poses)],
                 lambda: [motion.with_path(self.schema, pose, paths[i]) for i, pose in enumerate(poses)],
             ),
             "paths of sticks": (
-                lambda: [motion.steered_path(bodies, stick) for bodies, stick in each],
-                lambda: motion.steered_paths(self.past, self.sticks),
+                lambda: [steered_path(bodies, stick) for bodies, stick in each],
+                lambda: steered_paths(self.past, self.sticks),
             ),
             "queries with paths": (
                 lambda: [motion.with_path(self.schema, pose, paths[i]) for i, pose in enumerate(poses)],
-                lambda: motion.with_paths(self.schema, poses, paths),
+                lambda: with_paths(self.schema, poses, paths),
             ),
         }
 
@@ -354,7 +357,7 @@ class _Crowd:
         if next(self.ticks) % 30 == 29:
             self._turn_sticks()
         self.past = [*self.past, self.past[-1].moved(DT_S, self.sticks)][-PAST:]
-        return motion.with_paths(self.schema, self.group.poses(DT_S), motion.steered_paths(self.past, self.sticks))
+        return with_paths(self.schema, self.group.poses(DT_S), steered_paths(self.past, self.sticks))
 
 
 def _path_by_moments(past: Sequence[Steered], stick: tuple[float, float]) -> Trajectory:

@@ -114,7 +114,7 @@ STEPS = {
 
 def _whole(recording: Any, figures: Figures) -> None:
     from tui.debug.recording import Turned
-    from tui.debug.whole import asked_again, run_both
+    from tui.debug.whole import repeated_searches, run_both
 
     name, weight = next(iter(recording.weights().items()))
     turned = Turned({name: 2.0 * weight + 1.0})
@@ -122,7 +122,7 @@ def _whole(recording: Any, figures: Figures) -> None:
     recording.decisions(lambda: None)
     figures["read all decisions, once"] = 1e3 * (time.process_time() - start)
     start = time.process_time()
-    asked_again(recording, turned, lambda: None)
+    repeated_searches(recording, turned, lambda: None)
     figures["ask all searches again"] = 1e3 * (time.process_time() - start)
     start = time.process_time()
     run_both(recording, turned, lambda: None)

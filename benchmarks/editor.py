@@ -196,13 +196,13 @@ async def _ours(made: generator.GameTable, has_all: bool) -> Figures:
 
 def _turn_all_on(app: Any, made: generator.GameTable) -> None:
     """A filter, a sort by two columns, three columns that do not scroll, and the pane of reasons."""
-    from tui.model.columns_shown import ColumnsShown
     from tui.model.views import CellTest, Filter, Sort
+    from tui.model.visible_columns import VisibleColumns
 
     assets = app.main.assets
     assets.sheet.set_filter(Filter(tests=(CellTest(made.bool_names[1], "!=", "False"),)))
     assets.sheet.set_sort(Sort.by([Sort(made.bool_names[2]), Sort(made.bool_names[3])]))
-    assets.sheet.show_columns(ColumnsShown(frozen=assets.sheet.table.columns[2].name))
+    assets.sheet.show_columns(VisibleColumns(frozen=assets.sheet.table.columns[2].name))
     assets.why_pane.turn(assets.sheet)
     assets.show()
 
@@ -254,7 +254,7 @@ async def _live(app: Any, made: generator.GameTable) -> float:
     from tui.model.moments import Moment
     from tui.screens.following import ITEMS, RATE
     from tui.widgets.bar import Item
-    from tui.widgets.live_line import Said
+    from tui.widgets.live_line import LiveState
 
     assets, times, rng = app.main.assets, [], random.Random(1)
     facts: dict[str, object] = dict.fromkeys(made.bool_names, True) | dict.fromkeys(made.number_names, 50.0)
@@ -263,8 +263,10 @@ async def _live(app: Any, made: generator.GameTable) -> float:
         start = time.process_time()
         if i % (30 // RATE) == 0:
             assets.follow(moment.texts(assets.sheet.query.wanted.given), {}, i, "game")
-            said = Said("●", "game", GameAnswer(moment, assets.sheet.query).said, "")
-            assets.show_live(said, [Item(*item) for item in ITEMS])
+            state = LiveState(
+                "●", "game", GameAnswer(moment, assets.sheet.query, assets.sheet.table, assets.sheet.table).summary, ""
+            )
+            assets.show_live(state, [Item(*item) for item in ITEMS])
         await asyncio.sleep(1 / 30)
         times.append(1e3 * (time.process_time() - start))
         facts[rng.choice(made.bool_names)] = rng.random() < 0.5

@@ -2,6 +2,7 @@
 
     python benchmarks/motion_quality.py                       all captured clips of one rig, and the made ones: some minutes
     python benchmarks/motion_quality.py --set made --seconds 20
+    python benchmarks/motion_quality.py --half 1              a random half of the captured ones
     python benchmarks/motion_quality.py --probes              the last stage probe by probe too; --json FILE for programs
 
 A body follows a stick as `Steered` does, in six probes of a minute: straight on, turns of 90 and of 180 degrees, changes of speed,
@@ -17,6 +18,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import random
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
@@ -32,7 +34,10 @@ from benchmarks import captured, timing
 from benchmarks.plain_matching import PlainMatching
 from benchmarks.sections import print_aligned
 from contextdb import motion
-from contextdb.motion import Biases, ControllerSettings, FeatureSchema, Markup, Measures, MotionDatabase, PoseBank, PoseSettings
+from contextdb.motion import ControllerSettings, FeatureSchema, Markup, Measures, MotionDatabase, PoseBank, PoseSettings
+from contextdb.motion.clips.steering import steered_path
+from contextdb.motion.made.recipes import ABOUT_TURNS, RECIPES, make_clip
+from contextdb.motion.search.filters import Biases
 from contextdb.motion.storage.database_settings import DatabaseSettings
 
 RATE = 30.0
@@ -100,16 +105,18 @@ class Clips:
         return cls(name, schema, database, PoseBank.build(clips, schema, mirror=True, markup=marks))
 
 
-def sets(wanted: Sequence[str]) -> Iterator[Clips]:
+def sets(wanted: Sequence[str], half: int | None = None) -> Iterator[Clips]:
     """The sets of clips, as far as they are there."""
     if "captured" in wanted:
-        clips = [motion.load_bvh(path) for path in sorted(captured.FOLDER.glob(RIG))]
+        paths = sorted(captured.FOLDER.glob(RIG))
+        paths = paths if half is None else sorted(random.Random(half).sample(paths, len(paths) // 2))
+        clips = [motion.load_bvh(path) for path in paths]
         if clips:
             yield Clips.of("captured clips", clips, ("Foot_L", "Foot_R"), [["*_L", "*_R"]], "")
         else:
             print("no captured clips: set CONTEXTDB_MOCAP\n")
     if "made" in wanted:
-        made = [motion.make_clip(name).clip for name in (*motion.RECIPES, *motion.ABOUT_TURNS)]
+        made = [make_clip(name).clip for name in (*RECIPES, *ABOUT_TURNS)]
         yield Clips.of("made clips", made, ("LeftFoot", "RightFoot"), [["Left*", "Right*"]], LOOPS)
 
 
@@ -186,7 +193,7 @@ def run(clips: Clips, stick: Stick, seconds: float, chooser: Any) -> Run:
             past = [*past, body][-31:]
         ahead = chooser.upcoming(dt_s)
         pose = pose if ahead is None else clips.database.raw(ahead.frame)
-        query = motion.with_path(clips.schema, pose, motion.steered_path(past, asked))
+        query = motion.with_path(clips.schema, pose, steered_path(past, asked))
         chooser.update(dt_s, query, body=body)
     return Run(trace, None, wanted)
 
@@ -206,7 +213,14 @@ COLUMNS = (
     ("forced", "forced_jumps", 0),
     ("jump cm", "jump_cm", 1),
     ("skate cm/s", "skate_cm_s", 1),
-    ("m/min", "skate_m_min", 1),
+    ("toe down", "toe_skate_cm_s", 1),
+    ("worst s", "toe_skate_worst_cm_s", 1),
+    ("MANN", "skate_weighted_cm_s", 1),
+    ("dip cm", "dip_cm", 1),
+    ("below cm", "penetration_cm", 1),
+    ("knees %", "knee_limit_share", -1),
+    ("off feet cm", "balance_cm", 1),
+    ("lean deg", "lean_deg", 1),
     ("acc p99", "accel_p99", 1),
     ("snaps %", "snap_share", -1),
     ("path m", "path_rms_m", 3),
@@ -217,8 +231,18 @@ COLUMNS = (
     ("used %", "frames_used_share", -1),
     ("forced cost", "forced_cost", 2),
 )
-RAW = {"skate_cm_s": "skate_raw_cm_s", "skate_m_min": "skate_raw_m_min", "accel_p99": "accel_raw_p99"}
-TOGETHER: dict[str, Callable[..., Any]] = {"forced_jumps": sum, "n_missed": sum, "forced_cost": max}
+RAW = {
+    "skate_cm_s": "skate_raw_cm_s",
+    "toe_skate_cm_s": "toe_skate_raw_cm_s",
+    "skate_weighted_cm_s": "skate_weighted_raw_cm_s",
+    "penetration_cm": "penetration_raw_cm",
+    "knee_limit_share": "knee_limit_raw_share",
+    "accel_p99": "accel_raw_p99",
+}
+TOGETHER: dict[str, Callable[..., Any]] = {
+    **{"forced_jumps": sum, "n_missed": sum, "forced_cost": max},
+    **dict.fromkeys(("dip_cm", "penetration_cm", "balance_cm", "lean_deg", "toe_skate_worst_cm_s"), max),
+}
 
 
 def row(name: str, found: Sequence[Measures]) -> tuple[str, ...]:
@@ -227,14 +251,18 @@ def row(name: str, found: Sequence[Measures]) -> tuple[str, ...]:
     for _, key, decimals in COLUMNS:
         values = [value for each in found if (value := getattr(each, key)) is not None]
         value = (TOGETHER.get(key, np.mean)(values)) if values else None
-        cells.append("-" if value is None else f"{100.0 * value:.2f}" if decimals < 0 else f"{value:.{decimals}f}")
+        cells.append("-" if value is None else _figure(value, decimals))
     return tuple(cells)
+
+
+def _figure(value: float, decimals: int) -> str:
+    return f"{100.0 * value:.2f}" if decimals < 0 else f"{value:.{decimals}f}"
 
 
 def raw_row(found: Measures) -> tuple[str, ...]:
     """The line of the clips as they are."""
     values = {key: getattr(found, raw) for key, raw in RAW.items()}
-    shown = [f"{values[key]:.{decimals}f}" if key in values else "-" for _, key, decimals in COLUMNS]
+    shown = ["-" if values.get(key) is None else _figure(values[key], decimals) for _, key, decimals in COLUMNS]
     return ("raw clips", *shown)
 
 
@@ -264,13 +292,14 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description="how good the motion is, stage by stage")
     parser.add_argument("--set", choices=("captured", "made"), action="append", help="only this set of clips")
+    parser.add_argument("--half", type=int, metavar="SEED", help="of the captured clips a random half, drawn by this number")
     parser.add_argument("--seconds", type=float, default=60.0, help="of each probe (default: 60)")
     parser.add_argument("--probes", action="store_true", help="the last stage probe by probe too")
     parser.add_argument("--json", metavar="FILE", help="write all measures to a file")
     arguments = parser.parse_args()
     print(", ".join(f"{name} {value}" for name, value in timing.machine().items()))
     documents: dict[str, Any] = {}
-    for clips in sets(arguments.set or ("captured", "made")):
+    for clips in sets(arguments.set or ("captured", "made"), arguments.half):
         told = list(measured(clips, arguments.seconds))
         n_assets = len(set(clips.database.assets))
         print(

@@ -20,15 +20,13 @@ def build(table: GameTable) -> cdb.Table:
 
 
 def engines(compiled: cdb.CompiledTable, contexts: Contexts, dicts: list[dict[str, Any]], answers: list[list[int]]) -> list[Engine]:
-    """A full dict, codes made beforehand, and live contexts in which three facts change before each question."""
-    query, query_codes = compiled.query, compiled.query_codes
-    codes = [compiled.encode(context) for context in dicts]
+    """A full dict, and live contexts in which three facts change before each question."""
+    query = compiled.query
     numbers = contexts.table.number_names[:CHANGED]
     return [
         Engine(QUERY, lambda context: query(context).indices, dicts, answers),
         _live_engine(compiled, f"contextdb live, the same {CHANGED} numbers change", dicts, [numbers] * len(dicts)),
         _live_engine(compiled, f"contextdb live, any {CHANGED} facts change", dicts, _some_names(dicts)),
-        Engine("contextdb query_codes", lambda c: query_codes(c).indices, codes, answers),
     ]
 
 

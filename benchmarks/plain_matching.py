@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from contextdb.motion import Action, Decision, MotionDatabase, Playing, Recorder
+from contextdb.motion import Action, Decision, MotionDatabase
+from contextdb.motion.selection.decision import Playing, Recorder
 from contextdb.motion.selection.playhead import Move, Playhead
 from contextdb.motion.selection.root_motion import NO_MOTION
 

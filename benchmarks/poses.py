@@ -41,7 +41,9 @@ from contextdb.motion import (
     Selector,
     Steered,
 )
-from contextdb.motion.output.stages import Ground
+from contextdb.motion.clips.steering import steered_path
+from contextdb.motion.made.recipes import made_clips
+from contextdb.motion.output.ground import Ground
 
 RATE, SECONDS, ROUNDS = 30.0, 60, 15
 CHANNELS = [
@@ -59,7 +61,6 @@ STAGES = {
     "and stride": PoseSettings(foot_lock=False),
     "and foot lock": PoseSettings(),
     "and ground": PoseSettings(),
-    "dead blending, all but ground": PoseSettings(blend="dead"),
 }
 CROWD = 1000
 
@@ -67,7 +68,7 @@ CROWD = 1000
 def main() -> None:
     """Measure and print."""
     schema = FeatureSchema.from_dict("loco", {"rate": RATE, "channels": CHANNELS})
-    clips = [made.clip for made in motion.made_clips()]
+    clips = [made.clip for made in made_clips()]
     bank = PoseBank.build(clips, schema)
     controller_us: list[float] = []
     database = MotionDatabase.build(clips, schema)
@@ -110,7 +111,7 @@ def decisions(database: MotionDatabase, schema: FeatureSchema, times_us: list[fl
         past = [*past, body][-31:]
         ahead = controller.upcoming(1.0 / RATE)
         pose = pose if ahead is None else database.raw(ahead.frame)
-        query = motion.with_path(schema, pose, motion.steered_path(past, stick))
+        query = motion.with_path(schema, pose, steered_path(past, stick))
         began = time.process_time()
         decision = controller.update(1.0 / RATE, query)
         times_us.append((time.process_time() - began) * 1e6)

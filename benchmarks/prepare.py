@@ -16,6 +16,7 @@ if __package__ in (None, ""):
 
 from benchmarks import captured, timing
 from contextdb import motion
+from contextdb.motion.made.recipes import made_clips
 from contextdb.motion.preparing.proposal import KINDS
 
 REPEATS = 3
@@ -23,7 +24,7 @@ REPEATS = 3
 
 def main() -> None:
     """Measure and print."""
-    clips = captured.clips() or [made.clip for made in motion.made_clips()]
+    clips = captured.clips() or [made.clip for made in made_clips()]
     print(f"{timing.machine()}\n{timing.versions()}")
     seconds = sum(clip.duration_s for clip in clips)
     print(f"{len(clips)} clips, {seconds:.0f} s of movement; median (lowest, highest) of {REPEATS}")

@@ -234,7 +234,7 @@ def startup(effort: Effort, quick: bool) -> dict[str, Any]:
         "contextdb check on the sample tables": ["-m", "contextdb", "check", str(table.parent)],
     }
     found: dict[str, Any] = {n: asdict(seconds(lambda c=c: _run(c), effort.repeats * 2)) for n, c in commands.items()}  # type: ignore[misc]
-    heavy = "numba", "textual", "scipy", "rich", "safetensors", "polars"
+    heavy = "textual", "scipy", "rich", "safetensors", "polars"
     loaded = _run(["-c", f"import contextdb, sys; print(*(m for m in {heavy} if m in sys.modules))"]).split()
     print("\nFresh processes, start to end; milliseconds")
     lines = [("", "median", "lowest..highest", "n")]

@@ -58,6 +58,7 @@ COMMANDS: Mapping[str, Sequence[str]] = {
     "evaluate": ("evaluate", "locomotion", "moments.csv"),
     "check": ("check", "tables"),
     "coverage": ("coverage", "tables/hit_mid_air.csv"),
+    "ci": ("ci", "tables"),
     "diff": ("diff", "tables/locomotion.csv", "moves.csv"),
     "merge": ("merge", "tables/locomotion.csv", "moves.csv", "moves.csv"),
     "git status": ("git", "status"),

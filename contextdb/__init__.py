@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from contextdb import motion as motion
+    from contextdb.authoring.game_link import link
+    from contextdb.authoring.motion_coverage import ProjectMotion, TableMotion, motion_coverage
     from contextdb.cells.facts import Context, FactSet, Unknown, cell
     from contextdb.compiled.casting.facts import Actors, Prefer
     from contextdb.compiled.explain import Explanation, Failure, RowExplanation
@@ -27,7 +29,6 @@ if TYPE_CHECKING:
     from contextdb.compiled.table import CompiledTable
     from contextdb.console import __version__ as __version__
     from contextdb.covering import CoverageReport, Gap, coverage
-    from contextdb.covering.motion import ProjectMotion, TableMotion, motion_coverage
     from contextdb.errors import (
         ArtefactError,
         CellError,
@@ -51,10 +52,11 @@ if TYPE_CHECKING:
     from contextdb.tables.project import Project, load
     from contextdb.tables.table import Table
     from contextdb.tables.watching import Snapshot, Watch, watch
-    from contextdb.telemetry.link import Link, link
+    from contextdb.telemetry.link.game import Link
 
 # The same names for the interpreter, by module; tests/test_face.py compares the three lists.
 _HOMES = {
+    "authoring.game_link": "link",
     "cells.facts": "Context FactSet Unknown cell",
     "compiled.casting.facts": "Actors Prefer",
     "compiled.explain": "Explanation Failure RowExplanation",
@@ -66,7 +68,7 @@ _HOMES = {
     "compiled.table": "CompiledTable",
     "console": "__version__",
     "covering": "CoverageReport Gap coverage",
-    "covering.motion": "ProjectMotion TableMotion motion_coverage",
+    "authoring.motion_coverage": "ProjectMotion TableMotion motion_coverage",
     "errors": "ArtefactError CellError ContextDBError ContextError Fault FileError NoSuchFact NoSuchOutput"
     " NoSuchPlace NoSuchRow NoSuchTable Place PolicyError SchemaError TableError WrongType",
     "findings": "Finding",
@@ -74,11 +76,9 @@ _HOMES = {
     "tables.project": "Project load",
     "tables.table": "Table",
     "tables.watching": "Snapshot Watch watch",
-    "telemetry.link": "Link link",
+    "telemetry.link.game": "Link",
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names.split()}
-_OLD = {name: f"contextdb.motion.{name}" for name in ("ClipError", "MotionError", "QueryError")}
-"""Names that go away, and the new ones."""
 
 __all__ = ["Link", "Project", "Schema", "Snapshot", "Table", "TableSettings", "Watch", "link", "load", "watch"]
 __all__ += ["CompiledTable", "Context", "FactSet", "LiveContext", "ManyMatches", "Matches", "Unknown", "cell"]
@@ -92,8 +92,6 @@ if not TYPE_CHECKING:  # a type checker takes every name for one that exists whe
     def __getattr__(name: str) -> object:
         if name == "motion":
             return import_module(f"{__name__}.motion")
-        if name in _OLD:
-            return _old(name)
         if name not in _HOME_OF:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         value = getattr(import_module(f"{__name__}.{_HOME_OF[name]}"), name)
@@ -103,11 +101,3 @@ if not TYPE_CHECKING:  # a type checker takes every name for one that exists whe
 
 def __dir__() -> list[str]:
     return sorted([*__all__, "__version__", "motion"])
-
-
-def _old(name: str) -> object:
-    from contextdb.errors import warn_of_old
-
-    warn_of_old(f"contextdb.{name}", _OLD[name], levels=4)
-    module, _, attribute = _OLD[name].rpartition(".")
-    return getattr(import_module(module), attribute)

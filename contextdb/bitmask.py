@@ -52,6 +52,7 @@ def from_rows(row_numbers: Rows, n_rows: int) -> Words:
 
 
 def full(n_rows: int) -> Words:
+    """The mask of all rows: uint64 [W]."""
     return pack(np.ones(n_rows, np.bool_))
 
 
@@ -75,6 +76,11 @@ def from_int(bits: int, n_rows: int) -> Words:
 def flags_of(bits: int, n_rows: int) -> Flags:
     """Flags of one mask as a Python integer whose bits are all below `n_rows`: bool [n_rows], read-only."""
     return unpack(from_int(bits, n_rows), n_rows)
+
+
+def rows_of(bits: int) -> list[int]:
+    """Row numbers of one mask as a Python integer, ascending."""
+    return [] if bits == 0 else rows(from_int(bits, bits.bit_length())).tolist()
 
 
 def int_of(row_numbers: Sequence[int]) -> int:

@@ -11,7 +11,7 @@ import sys
 import textwrap
 import warnings
 from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -29,6 +29,7 @@ COMMANDS = {
     "evaluate": "every context of a file: how many assets are valid in each",
     "check": "what is wrong with the tables",
     "coverage": "which contexts have a valid asset, and which have none",
+    "ci": "check and coverage as a build runs them, against a commit, with report files",
     "diff": "what changed between two versions of a table",
     "merge": "merge two versions of a table",
     "git": "let git merge and show tables cell by cell",
@@ -41,6 +42,8 @@ COMMANDS = {
     "demo": "a tour of the sample tables",
 }
 
+
+CRASH = "an error of contextdb itself. Please report it with these lines, which hold nothing of your files:"
 
 _PLAIN = "\0--\0"
 """Before each argument behind "--": no argument of a process begins so, and argparse takes it for no option in any version."""
@@ -120,13 +123,16 @@ class Group:
             return import_module(f"contextdb.commands.{'_'.join((*self.words, name))}_command")
         near = nearest(name, self.commands)
         mend = in_quotes(" ".join((*self.words, near))) if near else ""
-        found = f"there is no command {in_quotes(' '.join((*self.words, name)))}."
-        raise ContextDBError(Fault(found, joined(list(self.commands), 6), mend))
+        problem = f"there is no command {in_quotes(' '.join((*self.words, name)))}."
+        raise ContextDBError(Fault(problem, joined(list(self.commands), 6), mend))
 
     def parser(self, name: str, command: ModuleType) -> Parser:
         """What reads the arguments of a command."""
         parser = _new_parser((*self.words, name), command.__doc__)
         command.add_arguments(parser)
+        limits = parser.add_argument_group("limits")
+        limits.add_argument("--max-memory", type=_limit, metavar="MB", help="exit with 2 if it needs more memory (on Linux)")
+        limits.add_argument("--max-time", type=_limit, metavar="S", help="exit with 2 after so many seconds")
         return parser
 
     def _help(self) -> str:
@@ -142,12 +148,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; gives the exit code. Errors of contextdb go to standard error, each fault on its line."""
     if arguments is None:
         _name_files_in_utf8()
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # nothing here multiplies large matrices: threads cost 50 ms for nothing
     given = list(sys.argv[1:] if arguments is None else arguments)
     _use_utf8()
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", UnfinishedWarning)
         code = _main(given)
-    for warning in told:
+    for warning in caught:
         if issubclass(warning.category, UnfinishedWarning):
             note(warning.message)
         else:
@@ -171,11 +178,27 @@ def _main(given: Sequence[str]) -> int:
         return _failed(Fault(f"{error.strerror or error}.", place=place))
     except UnicodeEncodeError as error:
         if error.encoding != sys.getfilesystemencoding() or error.encoding == "utf-8":
-            raise
+            return _crashed(error, given)
         return _failed(unnameable(error, Path(error.object)))
     except KeyboardInterrupt:
         note("interrupted")
         return ExitCode.INTERRUPTED
+    except GeneratorExit:
+        raise
+    except BaseException as error:  # a panic of polars is no Exception
+        return _crashed(error, given)
+
+
+def _crashed(error: BaseException, given: Sequence[str]) -> ExitCode:
+    """Report an error of contextdb's own, with what memory is left."""
+    drop_output()
+    with suppress(Exception):
+        note(CRASH)
+        from contextdb.commands import crash
+
+        for line in crash.lines(error, given):
+            print(printable(line), file=sys.stderr)
+    return ExitCode.INTERNAL
 
 
 def _failed(*faults: Fault) -> ExitCode:
@@ -203,7 +226,12 @@ def _run(group: Group, given: Sequence[str]) -> int:
     try:
         takes_screen = group.words == () and given[0] == "edit"
         with nullcontext() if takes_screen else announced():
-            return int(command.run(group.parser(given[0], command).parse(given[1:])))
+            arguments = group.parser(given[0], command).parse(given[1:])
+            if arguments.max_memory is None and arguments.max_time is None:
+                return int(command.run(arguments))
+            from contextdb.commands.limits import limited
+
+            return limited(arguments, (*group.words, *given), lambda: int(command.run(arguments)))
     except SystemExit as leaving:  # how argparse ends after --help and after an error
         sys.stdout.flush()
         return int(leaving.code or 0)
@@ -212,6 +240,13 @@ def _run(group: Group, given: Sequence[str]) -> int:
 def _new_parser(words: Sequence[str], about: str | None) -> Parser:
     prog = " ".join(("contextdb", *words))
     return Parser(prog=prog, description=about, formatter_class=Help, allow_abbrev=False)
+
+
+def _limit(text: str) -> float:
+    with suppress(ValueError):
+        if 0.1 <= (number := float(text)) <= 1e9:
+            return number
+    raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a limit. Accepted: a number from 0.1 to 1e9.")
 
 
 def _overview(commands: Mapping[str, str]) -> str:

@@ -10,10 +10,8 @@ import unicodedata
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from enum import IntEnum
-from functools import cache
-from pathlib import Path
 from time import monotonic
-from typing import IO, Any, TypeVar
+from typing import IO, TypeVar
 
 Item = TypeVar("Item")
 
@@ -22,12 +20,8 @@ PATIENCE_S = 0.5
 
 __version__ = "0.1.0"
 
-PREPARING = "Preparing the loops, for the first time on this machine only"
-"""What is reported while numba compiles loops."""
-LOOPS = logging.getLogger("contextdb.loops")
-"""Where the library reports it: silent by itself; commands show it on standard error."""
 READING = logging.getLogger("contextdb.reading")
-"""Where it reports that it reads a large file, likewise."""
+"""Where the library reports that it reads a large file: silent by itself; commands show it on standard error."""
 MANY_BYTES = 2_000_000
 """A table's file of so many bytes is large: to read it may take a second."""
 
@@ -42,7 +36,17 @@ class ExitCode(IntEnum):
     """No asset is valid; findings at the level that fails."""
     BAD_USE = 2
     """A wrong argument, no such file, a table that cannot be read."""
+    INTERNAL = 70
+    """An error of contextdb's own (EX_SOFTWARE of sysexits.h): nothing is known of the input."""
     INTERRUPTED = 130
+
+
+class ScreenCrash(Exception):
+    """The editor or the debugger ended by an error of contextdb's own, its `cause`; the screen is restored."""
+
+    def __init__(self, cause: BaseException) -> None:
+        super().__init__()
+        self.cause = cause
 
 
 @contextmanager
@@ -90,6 +94,8 @@ def note(*texts: object) -> None:
 
 def width_of(text: str) -> int:
     """How many terminal cells the text takes; wide characters take two, combining ones none."""
+    if text.isascii():
+        return len(text)
     return sum(0 if unicodedata.combining(c) else 2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text)
 
 
@@ -128,27 +134,7 @@ def _with_bar(rest: Iterator[Item], label: str, total: int) -> Iterator[Item]:
     yield from track(rest, label, total, console=Console(stderr=True), transient=True)
 
 
-# ---- loops that numba compiles
-
-
-def was_compiled(loop: Any) -> bool:
-    """Whether a numba function is compiled: in this process, or in numba's cache on this machine."""
-    folder, module = Path(loop.stats.cache_path or ""), loop.py_func.__module__.rpartition(".")[2]
-    return bool(loop.signatures) or any(folder.glob(f"{module}.{loop.py_func.__qualname__}-*.nbi"))
-
-
-@cache
-def has_numba() -> bool:
-    """Whether numba is installed: to try to import what needs it costs milliseconds each time where it is not."""
-    from importlib.util import find_spec
-
-    return find_spec("numba") is not None
-
-
-def announce(loop: Any) -> None:
-    """Say that the loops are compiled, where this one, the longest of them, is not compiled yet."""
-    if not was_compiled(loop):
-        LOOPS.info(PREPARING)
+# ---- large files
 
 
 def announce_file(file: str, n_bytes: int) -> None:
@@ -164,14 +150,12 @@ class _OnStandardError(logging.Handler):
 
 @contextmanager
 def announced() -> Iterator[None]:
-    """Show on standard error that loops are compiled, and that large files are read."""
-    handler, levels = _OnStandardError(), {logger: logger.level for logger in (LOOPS, READING)}
-    for logger in levels:
-        logger.addHandler(handler)
-        logger.setLevel(logging.INFO)
+    """Show on standard error that large files are read."""
+    handler, level = _OnStandardError(), READING.level
+    READING.addHandler(handler)
+    READING.setLevel(logging.INFO)
     try:
         yield
     finally:
-        for logger, level in levels.items():
-            logger.setLevel(level)
-            logger.removeHandler(handler)
+        READING.setLevel(level)
+        READING.removeHandler(handler)

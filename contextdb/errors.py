@@ -26,13 +26,10 @@ from __future__ import annotations
 
 import difflib
 import unicodedata
-import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 SHOWN_CHARACTERS = 60
-GONE_IN = "0.2"
-"""The version without what this one warns of: a minor version more than pyproject.toml says."""
 
 
 def row_name(row: int) -> str:
@@ -56,7 +53,7 @@ class Place:
         elif self.row is not None:
             parts.append(row_name(self.row))
         if self.column is not None:
-            parts.append(f'column "{shown(self.column)}"')
+            parts.append(f'column "{safe_text(self.column)}"')
         return ", ".join(parts)
 
 
@@ -182,7 +179,7 @@ class QueryError(MotionError):
     """A motion query that cannot be searched with."""
 
 
-def shown(text: str, most: int = SHOWN_CHARACTERS) -> str:
+def safe_text(text: str, most: int = SHOWN_CHARACTERS) -> str:
     """Text as a message shows it: control characters escaped, the middle of a long text left out.
 
     An accent that stands after its letter as a character of its own is escaped too, so that "e\u0301" is told from "é".
@@ -206,7 +203,7 @@ def _is_loose(before: str, character: str) -> bool:
 def in_quotes(text: str, most: int = SHOWN_CHARACTERS) -> str:
     """Text in quotes for a message: in double ones, or in single ones where it has double ones itself."""
     mark = "'" if '"' in text else '"'
-    return f"{mark}{shown(text, most)}{mark}"
+    return f"{mark}{safe_text(text, most)}{mark}"
 
 
 def nearest(word: str, known: Iterable[str]) -> str | None:
@@ -214,8 +211,8 @@ def nearest(word: str, known: Iterable[str]) -> str | None:
     known_as: dict[str, str] = {}
     for name in known:
         known_as.setdefault(folded(name), name)
-    found = difflib.get_close_matches(folded(word)[:200], known_as, n=1, cutoff=0.6)
-    return known_as[found[0]] if found else None
+    matches = difflib.get_close_matches(folded(word)[:200], known_as, n=1, cutoff=0.6)
+    return known_as[matches[0]] if matches else None
 
 
 def mend_for(word: str, known: Iterable[str]) -> str:
@@ -240,7 +237,7 @@ def folded(name: str) -> str:
 def some(names: Iterable[str], most: int = 6) -> str:
     """The first few names, quoted, and how many more there are."""
     listed = list(names)
-    head = ", ".join(f'"{shown(n)}"' for n in listed[:most])
+    head = ", ".join(f'"{safe_text(n)}"' for n in listed[:most])
     return head if len(listed) <= most else f"{head} and {len(listed) - most} more"
 
 
@@ -252,11 +249,3 @@ def joined(texts: Sequence[str], most: int, between: str = ", ") -> str:
 def plural(count: int, noun: str) -> str:
     """ "1 row", "2 rows": a count with its noun."""
     return f"{count:,} {noun}" if count == 1 else f"{count:,} {noun}s"
-
-
-def warn_of_old(old: str, new: str, levels: int = 3) -> None:
-    """Warn that something goes away in the next minor version, and name the new way.
-
-    `levels`: how many calls the caller of the old way is above, this one counted.
-    """
-    warnings.warn(f"{old} goes away in contextdb {GONE_IN}. Use {new}.", DeprecationWarning, stacklevel=levels)

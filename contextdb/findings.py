@@ -40,5 +40,5 @@ class Finding:
 
 def worst(findings: Iterable[Finding]) -> Level | None:
     """The highest level among the findings, or None."""
-    found = {f.level for f in findings}
-    return next((level for level in LEVELS if level in found), None)
+    levels = {f.level for f in findings}
+    return next((level for level in LEVELS if level in levels), None)

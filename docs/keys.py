@@ -53,7 +53,7 @@ SECTIONS = {
     "Find in all tables": ("FindEverywhere",),
     "Why, and nearest rows": ("NearestDialog",),
     "Actors": ("ActorsDialog",),
-    "Contexts": ("ContextsDialog", "NameDialog"),
+    "Contexts": ("ContextsDialog",),
     "Save the test row": ("KeepDialog",),
     "Open a file of contexts": ("OpenDialog",),
     "Follow a game": ("LiveDialog",),

@@ -6,6 +6,7 @@ import hashlib
 import os
 import shutil
 import subprocess
+import sys
 from functools import cache
 from pathlib import Path
 
@@ -29,6 +30,16 @@ def c_compiler() -> str | None:
 def cxx_compiler() -> str | None:
     """The C++ compiler: $CXX, else the first one that is found."""
     return next((path for name in (os.environ.get("CXX", "c++"), "g++", "clang++") if (path := shutil.which(name))), None)
+
+
+@cache
+def all_compilers() -> list[tuple[str, ...]]:
+    """The commands of all C compilers that are there; zig as a program, or as PyPI's package."""
+    found = [(path,) for name in ("gcc", "clang") if (path := shutil.which(name))]
+    if zig := shutil.which("zig"):
+        return [*found, (zig, "cc")]
+    has_package = subprocess.run([sys.executable, "-m", "ziglang", "version"], capture_output=True).returncode == 0
+    return [*found, (sys.executable, "-m", "ziglang", "cc")] if has_package else found
 
 
 def compiler_for(options: list[str]) -> str:

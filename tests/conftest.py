@@ -9,9 +9,11 @@ Files of the tests are in memory where the machine has such a folder with room; 
 
 from __future__ import annotations
 
+import atexit
 import gc
 import os
 import random
+import shutil
 import sys
 import tempfile
 from pathlib import Path
@@ -50,6 +52,12 @@ if "TMPDIR" not in os.environ and has_room(MEMORY):
     # Each save waits for the disk, for some milliseconds, and there are thousands of saves. The workers and all commands do so too.
     os.environ["TMPDIR"] = str(MEMORY)
     tempfile.tempdir = None
+
+if "PYTEST_XDIST_WORKER" not in os.environ:
+    # What tests and their processes make outside `tmp_path` is in one folder, which is removed with all that is left in it.
+    os.environ.setdefault("PYTEST_DEBUG_TEMPROOT", tempfile.gettempdir())
+    os.environ["TMPDIR"] = tempfile.tempdir = tempfile.mkdtemp(prefix="t-")
+    atexit.register(shutil.rmtree, os.environ["TMPDIR"], ignore_errors=True)
 
 gc.disable()
 if SIZE not in SIZES:

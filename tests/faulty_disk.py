@@ -12,12 +12,11 @@ from typing import Any
 import pytest
 
 from contextdb import disk
-from contextdb.disk import folder_lock, together
-from tui.model import journal, lock
+from contextdb.disk import folder_lock, own_files, together
 
-WRITERS: tuple[ModuleType, ...] = (disk, folder_lock, together, journal, lock)
+WRITERS: tuple[ModuleType, ...] = (disk, folder_lock, own_files, together)
 """The modules that ask the system to write; `tests/test_failing_disk.py` sees to it that there is no other."""
-CALLS = ("open", "write", "fsync", "replace", "rename", "close", "link", "chmod", "mkdir", "truncate")
+CALLS = ("open", "write", "fsync", "replace", "rename", "close", "link", "chmod", "mkdir", "ftruncate")
 ERRORS = (errno.ENOSPC, errno.EIO, errno.EACCES, errno.EINTR)
 
 
@@ -36,6 +35,8 @@ class FaultyDisk:
 
     def _counted(self, name: str, real: Callable[..., Any]) -> Callable[..., Any]:
         def call(*given: Any, **more: Any) -> Any:
+            if name == "open" and not given[1] & (os.O_WRONLY | os.O_RDWR) and not os.path.isdir(given[0]):
+                return real(*given, **more)  # a file that is read
             self.n_calls += 1
             if self.n_calls - 1 != self._fails_at:
                 return real(*given, **more)

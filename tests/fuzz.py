@@ -8,23 +8,32 @@ from __future__ import annotations
 
 import argparse
 import hashlib
+import os
 import random
+import signal
 import subprocess
 import sys
 import tempfile
 import time
 import traceback
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+
+try:
+    import resource
+except ImportError:  # Windows
+    resource = None
 
 TESTS = Path(__file__).resolve().parent
 sys.path[:0] = [str(TESTS), str(TESTS.parent)]
 
 CORPUS = TESTS / "corpus"
 BATCH = 100
-SLOW_CPU_S = 5.0
-"""An input of a few kilobytes that takes longer to read is a find; far above what a busy machine makes of a fast one."""
-HANG_S = 120.0
+SLOW_CPU_S = 2.0
+"""An input of a few kilobytes that takes longer to read is a find."""
+HANG_CPU_S, HANG_S = 60.0, 1200.0
+"""An input that takes more is stopped: by what it works, and where it only waits, by the clock."""
 TOKENS = [
     *b"\0 \n \r\n , \" ' ( ) [ ] { } < > ; : = | ~ . .. - + * / \\ % # @".split(b" "),
     *b"Any not and or in 1e999 -0 nan inf 170,20 9223372036854775808 ]]> <!-- null true".split(),
@@ -75,13 +84,15 @@ def input_of(reader: str, seed: int) -> bytes:
 
 
 def child(reader: str, first: int, progress: Path) -> None:
-    """Read a batch, writing before each input which it is, and after it what was wrong, if anything."""
+    """Read a batch, writing before each input which it is, after it how long it took and what was wrong, if anything."""
     from fuzz_readers import read_bytes
 
-    with progress.open("w", encoding="utf-8", buffering=1) as told:
+    with progress.open("w", encoding="utf-8", buffering=1) as lines:
         for seed in range(first, first + BATCH):
             raw = input_of(reader, seed)
-            told.write(f"{seed} ")
+            lines.write(f"{seed} ")
+            if hasattr(signal, "setitimer"):
+                signal.setitimer(signal.ITIMER_PROF, HANG_CPU_S)
             start, why = time.process_time(), ""
             try:
                 read_bytes(reader, raw)
@@ -89,32 +100,54 @@ def child(reader: str, first: int, progress: Path) -> None:
                 frame = traceback.extract_tb(error.__traceback__)[-1]
                 why = f"{type(error).__name__} in {Path(frame.filename).name}:{frame.lineno}"
             taken = time.process_time() - start
-            told.write(f"{why or (f'slow: {taken:.0f} s of CPU' if taken > SLOW_CPU_S else '')}\n")
+            is_slow = taken > SLOW_CPU_S and seed != first  # the first one loads the reader
+            lines.write(f"{taken:.3f} {why or (f'slow: {taken:.0f} s of CPU' if is_slow else '')}\n")
+        if resource is not None:
+            unit = 1 if sys.platform == "darwin" else 1024
+            lines.write(f"peak {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6:.0f}\n")
 
 
-def batch(reader: str, first: int) -> tuple[int, list[tuple[int, str]]]:
-    """Run a batch in a process of its own; gives how many inputs were read, and the finds by their seeds."""
+@dataclass
+class Batch:
+    """What a batch came to."""
+
+    n_read: int
+    finds: list[tuple[int, str]]
+    """Seeds and what was wrong."""
+    slowest_s: float
+    """Of CPU, without the first, which loads the reader."""
+    peak_mb: int
+
+
+def batch(reader: str, first: int) -> Batch:
+    """Run a batch in a process of its own."""
     with tempfile.TemporaryDirectory() as folder:
         progress = Path(folder) / "progress"
         command = [sys.executable, __file__, "--child", reader, str(first), str(progress)]
-        end = how_it_ended(command, progress)
-        lines = [line.partition(" ") for line in progress.read_text("utf-8").splitlines()]
-    found = [(int(seed), why) for seed, _, why in lines if why]
+        # What a killed process leaves in its temporary folder goes with this one.
+        end = how_it_ended(command, progress, {**os.environ, "TMPDIR": folder})
+        lines = [line.split(" ", 2) for line in progress.read_text("utf-8").splitlines()]
+    peak = next((int(parts[1]) for parts in lines if parts[0] == "peak"), 0)
+    inputs = [parts for parts in lines if parts[0] != "peak"]
+    finds = [(int(parts[0]), parts[2]) for parts in inputs if len(parts) > 2 and parts[2]]
     if end:
-        found.append((int(lines[-1][0]), end))
-    return len(lines), found
+        finds.append((int(inputs[-1][0]) if inputs else first, end))
+    slowest = max((float(parts[1]) for parts in inputs[1:] if len(parts) > 2), default=0.0)
+    return Batch(len(inputs), finds, slowest, peak)
 
 
-def how_it_ended(command: Sequence[str], progress: Path) -> str:
+def how_it_ended(command: Sequence[str], progress: Path, environment: Mapping[str, str] | None = None) -> str:
     """Run a batch to its end, or until it goes no further for HANG_S; nothing where all was read."""
-    process, told = subprocess.Popen(command, stderr=subprocess.DEVNULL), -1
+    process, size = subprocess.Popen(command, stderr=subprocess.DEVNULL, env=environment), -1
     progress.touch()
-    while (size := progress.stat().st_size) != told:
-        told = size
+    while (now := progress.stat().st_size) != size:
+        size = now
         try:
             code = process.wait(HANG_S)
         except subprocess.TimeoutExpired:
             continue  # a busy machine may take so long for a batch
+        if hasattr(signal, "SIGPROF") and code == -signal.SIGPROF:
+            return f"no answer after {HANG_CPU_S:.0f} s of CPU"
         return f"the process ended with {code}" if code else ""
     process.kill()
     process.wait()
@@ -142,19 +175,23 @@ def main() -> int:
     first = random.SystemRandom().randrange(10**9) if options.seed is None else options.seed
     readers = options.reader or list(READERS)
     print(f"seed {first}, {options.seconds:.0f} s, {', '.join(readers)}")
-    until, n_read, causes = time.monotonic() + options.seconds, 0, {}
-    while time.monotonic() < until:
+    until, causes = time.monotonic() + options.seconds, {}
+    batches: dict[str, list[Batch]] = {reader: [] for reader in readers}
+    while time.monotonic() < until:  # every reader as often as the others: a round is not cut off
         for reader in readers:
-            n, found = batch(reader, first)
-            n_read += n
-            for seed, why in found:
+            one = batch(reader, first)
+            batches[reader].append(one)
+            for seed, why in one.finds:
                 if (reader, why) not in causes:
                     causes[reader, why] = keep(reader, seed)
-                    print(f"{reader}, seed {seed}: {why}; kept as {causes[reader, why].relative_to(TESTS.parent)}")
-            if time.monotonic() > until:
-                break
+                    print(f"{reader}, seed {seed}: {why}; kept as {causes[reader, why].relative_to(TESTS.parent)}", flush=True)
         first += BATCH
-    print(f"{n_read:,} inputs read, {len(causes)} causes found")
+    width = max(map(len, readers))
+    print(f"{'reader':<{width}}  {'inputs':>8}  slowest, s  peak, MB")
+    for reader, own in batches.items():
+        n_read, slowest_s, peak_mb = sum(b.n_read for b in own), max(b.slowest_s for b in own), max(b.peak_mb for b in own)
+        print(f"{reader:<{width}}  {n_read:8,}  {slowest_s:10.2f}  {peak_mb:8,}")
+    print(f"{sum(b.n_read for own in batches.values() for b in own):,} inputs read, {len(causes)} causes found")
     return 1 if causes else 0
 
 

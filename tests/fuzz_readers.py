@@ -6,13 +6,18 @@ A reader takes a file. Whatever stands in it, it comes back, or raises a Context
 from __future__ import annotations
 
 import io
+import os
+import shutil
+import socket
+import zlib
 from collections.abc import Callable, Mapping
-from contextlib import suppress
+from contextlib import redirect_stderr, redirect_stdout, suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import clip_files
 import numpy as np
 import polars as pl
 from running import ROOT, run
@@ -22,14 +27,21 @@ from contextdb import motion
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import ANGLE, BOOL, INT, NUMBER, TAGS, TEXT, Domain
 from contextdb.cells.grammar import parse_cell
+from contextdb.commands.live_command import _show
+from contextdb.commands.live_views import Changes
 from contextdb.covering.baseline import read_baseline
+from contextdb.disk.folder_lock import UNFINISHED
 from contextdb.errors import ContextDBError
 from contextdb.exchange.formats import FORMATS, write
 from contextdb.expressions import read_expression
 from contextdb.files.journal_lines import line_of
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.storage.stored import open_database, save_database
-from tui.model.journal import journal_path, recover
+from contextdb.tables.other_files import notes_path
+from contextdb.telemetry.link.hearing import Hearing, Wanted
+from contextdb.telemetry.link.listeners import SocketListener
+from tui.model.journal import journal_path
+from tui.model.session import Session
 from tui.model.watched import digest_of
 
 SCHEMA = {
@@ -56,6 +68,13 @@ STICK = "time_s,speed_mps,turn_dps,ok\n0,1.5,0,True\n0.5,2,-30,False\n1.25,0,,Tr
 MARKS = (ROOT / "tables/clips/marks.csv").read_bytes()
 
 
+NOTES = b'Asset,Column,Note,Colour\njog,speed,"too, fast",red\nrun,,hm,#ff0000\n'
+UNFINISHED_RECORD = b'{"format":1,"files":[{"file":"t.csv","new":".contextdb-00000000-aa.tmp","is":"00","old":null,"was":"11"}]}'
+LINK = (
+    b'{"line":"header","format":1,"game":"g","pid":1,"tables":{"t":{"version":"0"}}}\n'
+    b'{"line":"ask","t":1.5,"who":"a","table":"t","facts":{"speed":1.5,"ok":true,"n":{"number":"inf"}},"rows":"AQ==","valid":1}\n'
+    b'{"line":"pick","t":1.5,"who":"a","table":"t","pick":{"row":0,"asset":"jog"}}\n{"line":"lost","count":3}\n{"line":"end"}\n'
+)
 EXPRESSIONS = (
     b'speed > 2 and not (ok or pos in ["CB", "FS"])\nabs(heading - 90) <= 30\n"Move" in tags\nmin(speed, 3) * 2 % 5 // 1\n'
 )
@@ -198,11 +217,116 @@ def read_merge(path: Path) -> None:
     commanded("merge", path.parent / "base.csv", path.parent / "ours.csv", path)
 
 
+def opened(path: Path) -> None:
+    """Open a table as the editor does."""
+    with suppress(ContextDBError):
+        Session(path).close()
+
+
 def read_journal(path: Path) -> None:
+    """As it is, and with check sums that are right: what is altered in a line is then read."""
     (path.parent / "t.csv").write_bytes(csv_table())
-    journal_path(path.parent / "t.csv").parent.mkdir()
-    path.rename(journal_path(path.parent / "t.csv"))
-    recover(cdb.load(path.parent / "t.csv", strict=False))
+    raw, journal = path.read_bytes(), journal_path(path.parent / "t.csv")
+    journal.parent.mkdir()
+    path.unlink()
+    bodies = [line[9:] for line in raw.split(b"\n")]
+    for altered in (raw, b"".join(b"%08x %s\n" % (zlib.crc32(body), body) for body in bodies)):
+        journal.write_bytes(altered)
+        opened(path.parent / "t.csv")
+
+
+def read_notes(path: Path) -> None:
+    (path.parent / "t.csv").write_bytes(csv_table())
+    notes = path.rename(notes_path(path.parent / "t.csv"))
+    commanded("check", path.parent)
+    commanded("merge", notes, notes, notes, "--path", "t.notes.csv", "--out", path.parent / "merged")
+    opened(path.parent / "t.csv")
+
+
+def read_unfinished(path: Path) -> None:
+    (path.parent / "t.csv").write_bytes(csv_table())
+    path.rename(path.parent / UNFINISHED)
+    commanded("check", path.parent)
+
+
+def read_merged_toml(path: Path) -> None:
+    for name in ("base", "ours"):
+        (path.parent / f"{name}.toml").write_text(TOML, encoding="utf-8")
+    commanded("merge", path.parent / "base.toml", path.parent / "ours.toml", path, "--path", "contextdb.toml")
+
+
+def read_link(path: Path) -> None:
+    """What a game sends to `contextdb live`, and what somebody sends to a game."""
+    raw = path.read_bytes()
+    for hears in (True, False):
+        game, listener = socket.socketpair()
+        with game, listener, redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()), suppress(ContextDBError, OSError):
+            game.settimeout(5.0)
+            game.sendall(raw[:100_000])
+            game.shutdown(socket.SHUT_WR)
+            if hears:
+                _show(Hearing(Path("game.sock"), listener, Wanted()), Changes({}, False), None, None)
+            else:
+                one = SocketListener(listener, "", lambda: b"{}\n")
+                while not one.is_gone:
+                    one.read()
+
+
+# ---- folders in which something odd is in the place of a file
+
+ODD = ("a file", "empty", "folder", "link to nothing", "link to itself", "link to a folder", "not allowed", "pipe")
+PROJECT = (
+    "t.csv", "u.csv", "contextdb.toml", "t.cases.csv", "t.notes.csv", "t.actors.json", "t.safetensors", UNFINISHED,
+    ".contextdb-journal", ".contextdb-journal/t.csv.journal", ".contextdb-journal/t.csv.lock", ".contextdb-cache", "clips",
+)  # fmt: skip
+FOLDER_COMMANDS = (
+    "", "check {0}", "coverage {0} --work 1000 --samples 100", "compile {0}", "query {0}/t.csv speed=1 --unknown any",
+    "verify {0}/t.csv", "motion check {0}", "motion build {0}", "export {0}/t.csv {0}/new.json",
+    "import {0}/t.csv {0}/u.csv --force",
+    "diff {0}/t.csv {0}/u.csv", "evaluate {0}/t.csv {0}/u.csv --unknown any",
+)  # fmt: skip
+
+
+def read_folder(path: Path) -> None:
+    """A byte for what is in the place of each file, 64 and above something odd, and a last one for the command."""
+    folder, raw = path.parent / "project", path.read_bytes() or b"\0"
+    (folder / ".contextdb-journal").mkdir(parents=True)
+    (folder / "t.csv").write_bytes(csv_table())
+    for name, byte in zip(PROJECT, raw[:-1], strict=False):
+        if byte >= 64 and (folder / name).parent.is_dir():
+            make_odd(folder / name, ODD[byte % len(ODD)])
+    command = FOLDER_COMMANDS[raw[-1] % len(FOLDER_COMMANDS)]
+    if command:
+        commanded(*(word.format(folder) for word in command.split()))
+    else:
+        opened(folder / "t.csv")
+
+
+def make_odd(path: Path, kind: str) -> None:
+    """Put something into the place of a file."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    path.unlink(missing_ok=True)
+    match kind:
+        case "a file":
+            path.write_bytes(csv_table())
+        case "folder":
+            path.mkdir()
+        case "link to nothing":
+            path.symlink_to("nothing")
+        case "link to itself":
+            path.symlink_to(path.name)
+        case "link to a folder":
+            path.symlink_to(".")
+        case "not allowed":
+            path.touch(0)
+        case "pipe" if hasattr(os, "mkfifo"):
+            os.mkfifo(path)
+        case _:
+            path.touch()
+
+
+# ---- texts
 
 
 def read_cells(path: Path) -> None:
@@ -223,6 +347,10 @@ def read_expressions(path: Path) -> None:
             read_expression(text, conditions())
 
 
+def read_clips(path: Path) -> None:
+    motion.load_clips([path])
+
+
 READERS: dict[str, Reader] = {
     "csv": Reader(".csv", lambda: [csv_table()], lambda path: commanded("check", path)),
     "parquet": Reader(".parquet", lambda: [parquet(CELLS)], lambda path: commanded("check", path)),
@@ -239,7 +367,19 @@ READERS: dict[str, Reader] = {
     "merge": Reader(".csv", lambda: [csv_table()], read_merge),
     "journal": Reader(".journal", lambda: [journal()], read_journal),
     "bvh": Reader(".bvh", lambda: [BVH], lambda path: motion.load_bvh(path)),
+    "npz": Reader(".npz", lambda: [clip_files.amass(clip_files.SMPL_OFFSETS), clip_files.joints()], read_clips),
+    "glb": Reader(".glb", lambda: [clip_files.gltf(clip_files.BODY)], read_clips),
+    "fbx": Reader(".fbx", lambda: [clip_files.fbx(clip_files.BODY)], read_clips),
+    "usd": Reader(".usda", lambda: [clip_files.usda(clip_files.BODY)], read_clips),
+    "gltf": Reader(".gltf", lambda: [clip_files.gltf(clip_files.BODY, binary=False)], read_clips),
     "marks": Reader(".csv", lambda: [MARKS], lambda path: Markup.load(path)),
+    "notes": Reader(".csv", lambda: [NOTES], read_notes),
+    "unfinished": Reader(".json", lambda: [UNFINISHED_RECORD], read_unfinished),
+    "merge-toml": Reader(".toml", lambda: [TOML.encode()], read_merged_toml),
+    "link": Reader(".jsonl", lambda: [LINK, b'{"format":1,"every":true,"who":["a"],"tables":["t"],"trace":true}\n'], read_link),
+    "folder": Reader(
+        ".bin", lambda: [bytes([byte] * len(PROJECT) + [at]) for at, byte in enumerate(bytes(range(60, 72)))], read_folder
+    ),
     "cells": Reader(".txt", lambda: parts(ROOT / "tests/cells.csv"), read_cells),
     "expressions": Reader(".txt", lambda: [*parts(ROOT / "tests/expressions/refused.txt"), EXPRESSIONS], read_expressions),
     **{

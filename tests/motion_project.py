@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 from running import run
 
-from contextdb.motion import make_clip, write_bvh
+from contextdb.motion import write_bvh
+from contextdb.motion.made.recipes import make_clip
 
 TOML = """
 [tables.moves]

@@ -1,7 +1,7 @@
 """Picks, one row at a time and in the plainest way: what `Picker`, `pick` and `Outcome` are held to.
 
 Tables are lists of rows with the meaning of their cells written out here; nothing of how contextdb reads, compiles, ranks or keeps
-is used, but the numbers that chance gives.
+is used, nor its chance.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from fractions import Fraction
 
 from hypothesis import strategies as st
 
-from contextdb.compiled.chance import uniform
 from contextdb.schema.settings import TableSettings
 from contextdb.tables.table import Table
 
@@ -32,6 +31,17 @@ ANY = ("Any", "")
 Facts = Mapping[str, object]
 Path = tuple[tuple[str, int], ...]
 """The rows of a way: the name of each table, and the row."""
+
+
+def uniform(seed: int, who: int, turn: int, depth: int) -> float:
+    """A number in [0, 1) by the mixing step of SplitMix64: the same for the same seed, character, turn and depth."""
+    z, all_bits = seed, 2**64 - 1
+    for part in (who, turn, depth):
+        z = (z + (part + 1) * 0x9E3779B97F4A7C15) & all_bits
+        z = ((z ^ (z >> 30)) * 0xBF58476D1CE4E5B9) & all_bits
+        z = ((z ^ (z >> 27)) * 0x94D049BB133111EB) & all_bits
+        z ^= z >> 31
+    return (z >> 11) * 2.0**-53
 
 
 @dataclass(frozen=True)
@@ -131,6 +141,11 @@ class Character:
         turn, time = self.picked[table.key(row)]
         return one.once or self.turn <= turn + one.cooldown_turns or (one.cooldown_s > 0 and time_s < time + one.cooldown_s)
 
+    def is_over(self, tables: Tables, key: tuple[str, str, int], time_s: float) -> bool:
+        """Whether a row of these tables does not rest any more; it is forgotten then."""
+        rows = [(table, row) for table in used(tables) for row in range(len(table.rows)) if table.key(row) == key]
+        return any(table.rows[row].is_limited and not self.rests(table, row, time_s) for table, row in rows)
+
     def pick(self, tables: Tables, facts: Facts, time_s: float) -> Path | None:
         """What the character picks, and remembers."""
         ways = possible(tables, facts, lambda table, row: self.rests(table, row, time_s))
@@ -146,6 +161,7 @@ class Character:
             hit = next((row for row, total in zip(rows, sums, strict=True) if chance * sums[-1] < total), rows[-1])
             ways = [way for way in ways if way[depth] == hit]
             depth += 1
+        self.picked = {key: at for key, at in self.picked.items() if not self.is_over(tables, key, time_s)}
         if ways:
             self.recent = [name_of(tables, ways[0]), *self.recent][: self.memory]
             for name, row in ways[0]:

@@ -78,7 +78,7 @@ def checked(game: Game, seconds: float, stick: Sticks) -> Iterator[Game]:
             decision, facts = actor.moved.decision, actor.moved.facts
             assert decision.playing is not None
             if frame % ORACLE_EVERY == 0:
-                assert list(actor.readout.valid) == oracles.rows(table, facts)
+                assert actor.readout.valid.rows.tolist() == oracles.rows(table, facts)
             is_right = decision.playing.asset in actor.readout.valid.assets
             assert is_right or decision.held or not actor.readout.valid, (actor.name, decision.playing.asset, facts)
         yield each

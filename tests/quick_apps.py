@@ -46,8 +46,9 @@ _paint = Screen._compositor_refresh
 
 
 @contextlib.contextmanager
-def quick(paints: bool = IS_FULL) -> Iterator[None]:
-    """Apps that are run here wait so. Without `paints` they paint each screen once when it has opened, and at the end."""
+def quick(paints: bool = IS_FULL, is_light: bool = not IS_FULL) -> Iterator[None]:
+    """Apps that are run here wait so. Without `paints` they paint each screen once when it has opened, and at the end; with
+    `is_light` their styles and strips are made with less ado."""
     n_threads = threading.active_count()
 
     async def rested(min_sleep: float = 0.0, max_sleep: float = 1.0) -> None:
@@ -64,7 +65,7 @@ def quick(paints: bool = IS_FULL) -> Iterator[None]:
         patch("textual.pilot.wait_for_idle", rested),
         patch.object(Stylesheet, "_parse_rules", _shared_rules),
         patch.object(RuleSet, "__hash__", object.__hash__),  # by identity as before, without a call of Python for each
-        contextlib.nullcontext() if IS_FULL else _lighter(),
+        _lighter() if is_light else contextlib.nullcontext(),
     ):
         try:
             yield

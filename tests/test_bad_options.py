@@ -11,7 +11,8 @@ import contextdb as cdb
 from contextdb.commands.motion_page import Played, parting_of
 from contextdb.commands.motion_stick import conditions_of
 from contextdb.errors import ContextDBError
-from contextdb.motion import Action, Decision, Playing, Trace
+from contextdb.motion import Action, Decision, Trace
+from contextdb.motion.selection.decision import Playing
 
 TABLE = "Asset,speed\nwalk,0..2\nwalk,1..3\nrun,2..6\n"
 TOML = '[conditions.speed]\ntype = "number"\nmin = 0\nmax = 9\n'
@@ -36,7 +37,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         ("motion describe . --metres-per-unit much", '"much" is not a unit. Accepted: metres, such as 0.01 for centimetres.'),
         ("motion run . player s.csv --out s.parquet --rate fast", '"fast" is not a rate.'),
         ("motion coverage . --near cheap", '"cheap" is not a cost. Accepted: a number from 0 up'),
-        ("motion describe .", "there is no BVH file in this folder or below it."),
+        ("motion describe .", "there is no file of clips in this folder or below it."),
     ],
 )
 def test_what_cannot_be_asked_is_refused_in_a_sentence(command: str, said: str):
@@ -90,7 +91,7 @@ def test_bones_that_are_not_found_are_named_with_what_declares_them(folder: Path
     (folder / "ball.bvh").write_text("\n".join(lines), encoding="utf-8")
     result = run("motion", "bones", "ball.bvh")
     assert result.code == 0, result.err
-    assert result.lines[-1].startswith("not found: feet, toes, mirror pairs; [features.NAME] can declare")
+    assert result.lines[-1].startswith("no bone for: feet, toes, mirror pairs; [features.NAME] can declare")
 
 
 def test_where_two_sessions_part_is_a_sentence():

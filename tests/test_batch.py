@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import enum
 import math
-import sys
 from bisect import bisect_right
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from datetime import date
 from decimal import Decimal
 from fractions import Fraction
@@ -22,29 +21,24 @@ import strategies
 from hypothesis import given
 from hypothesis import strategies as st
 
-import contextdb
 from contextdb import bitmask
 from contextdb.cells.domains import Domain
-from contextdb.compiled import batch, kernels
+from contextdb.cells.fact_columns import column_type
+from contextdb.compiled import batch
 from contextdb.compiled.classes import FLAT_BYTES, TagMasks
 from contextdb.compiled.many import ManyMatches
-from contextdb.compiled.table import CompiledTable
+from contextdb.compiled.table import CompiledTable, data_of
+from contextdb.core import read_column
 from contextdb.errors import ContextError
 from contextdb.tables.table import Table
 
-ENGINES = pytest.mark.parametrize("engine", [kernels, None], ids=["numba", "numpy"])
 COLUMNS = pytest.mark.parametrize("flat_bytes", [FLAT_BYTES, 0, 100], ids=["flat", "wide", "mixed"])
 N_CONTEXTS = [0, 1, 2, 127, 128, 129, 300]
 
 
-@contextmanager
-def using(engine: object, flat_bytes: int = FLAT_BYTES) -> Iterator[None]:
-    """With or without the compiled kernels, however little the work; number columns whose masks take more bytes are wide."""
-    with (
-        mock.patch.object(batch, "load_kernels", return_value=engine),
-        mock.patch("contextdb.compiled.classes.FLAT_BYTES", flat_bytes),
-    ):
-        yield
+def cut_at(flat_bytes: int) -> AbstractContextManager[object]:
+    """Number columns whose masks take more bytes are wide."""
+    return mock.patch("contextdb.compiled.classes.FLAT_BYTES", flat_bytes)
 
 
 def assert_answers(many: ManyMatches, n_rows: int, expected: list[list[int]]) -> None:
@@ -83,7 +77,7 @@ def as_series(facts: list[strategies.Fact], domain: Domain) -> pl.Series:
     plain = [sorted(fact.plain) if isinstance(fact.plain, frozenset) else fact.plain for fact in facts]
     if domain.kind == "date":
         return pl.Series(plain, dtype=pl.Float64).cast(pl.Int32).cast(pl.Date)
-    return pl.Series(plain, dtype=domain.type.dtype)
+    return pl.Series(plain, dtype=column_type(domain.type))
 
 
 def as_narrow_series(facts: list[strategies.Fact], domain: Domain) -> pl.Series:
@@ -117,11 +111,10 @@ FORMS: dict[str, Callable[[list[strategies.Fact], Domain], object]] = {
 
 
 @pytest.mark.parametrize("form", FORMS)
-@ENGINES
 @COLUMNS
 @given(strategies.tables(least_conditions=1), st.sampled_from(["any", "never"]), st.data())
 @strategies.examples(0.25)
-def test_a_batch_finds_what_reading_every_cell_for_each_context_finds(flat_bytes, engine, form, table, unknown, data):
+def test_a_batch_finds_what_reading_every_cell_for_each_context_finds(flat_bytes, form, table, unknown, data):
     pools = {}
     for column in table.conditions:
         fact = strategies.plain_facts(column.condition.domain, column.texts.texts)
@@ -137,22 +130,22 @@ def test_a_batch_finds_what_reading_every_cell_for_each_context_finds(flat_bytes
         key = tuple(plain.values())
         known[key] = known[key] if key in known else oracles.rows(table, plain, unknown)
         expected.append(known[key])
-    with using(engine, flat_bytes):
+    with cut_at(flat_bytes):
         assert_answers(table.compile().query_many(contexts, unknown=unknown), table.n_rows, expected)
 
 
-@ENGINES
 @COLUMNS
 @given(strategies.tables(least_conditions=1), st.data())
 @strategies.examples(0.25)
-def test_the_codes_of_a_batch_are_those_of_each_context(flat_bytes, engine, table, data):
+def test_the_codes_of_a_batch_are_those_of_each_context(flat_bytes, table, data):
     contexts = [data.draw(strategies.contexts(table, has_missing=True))[0] for _ in range(3)]
     columns = {c.condition.name: [context.get(c.condition.name) for context in contexts] for c in table.conditions}
-    with using(engine, flat_bytes):
+    with cut_at(flat_bytes):
         compiled = table.compile()
         codes = compiled.query_many(columns, unknown="never").codes
     assert codes.dtype == np.int32
-    assert codes.tolist() == [compiled.encode(context, unknown="never").tolist() for context in contexts]
+    alone = [{name: [fact] for name, fact in context.items()} for context in contexts]
+    assert codes.tolist() == [compiled.query_many(one, unknown="never").codes[0].tolist() for one in alone]
 
 
 def big_table() -> Table:
@@ -168,8 +161,7 @@ def big_table() -> Table:
     )
 
 
-@ENGINES
-def test_more_contexts_than_one_thread_and_one_block_takes_are_all_answered(engine):
+def test_more_contexts_than_one_thread_and_one_block_takes_are_all_answered():
     table, n_contexts = big_table(), 2 * batch.THREAD_CONTEXTS + batch.BLOCK + 77
     speeds, states, tags = np.arange(n_contexts) % 23, ["CB", "FS", "SS"], [["InAir"], []]
     columns = {
@@ -181,7 +173,7 @@ def test_more_contexts_than_one_thread_and_one_block_takes_are_all_answered(engi
     one = [
         oracles.rows(table, {"speed": float(i % 23), "state": states[i % 3], "tags": frozenset(tags[i % 2])}) for i in range(period)
     ]
-    with using(engine), mock.patch("os.cpu_count", return_value=4):
+    with mock.patch("os.cpu_count", return_value=4), mock.patch.object(batch, "PART", 1000):
         many = table.compile().query_many(columns)
         counts, hits = many.counts, many.hits
     expected = [one[i % period] for i in range(n_contexts)]
@@ -189,34 +181,43 @@ def test_more_contexts_than_one_thread_and_one_block_takes_are_all_answered(engi
     assert hits.tolist() == np.bincount(np.concatenate(expected).astype(np.int64), minlength=table.n_rows).tolist()
 
 
-@ENGINES
-def test_a_table_without_conditions_answers_every_row_in_every_context(engine):
-    with using(engine):
-        assert_answers(Table.from_columns({"Asset": ["a", "b"]}).compile().query_many({"speed": [1, 2, 3]}), 2, [[0, 1]] * 3)
+def test_a_table_without_conditions_answers_every_row_in_every_context():
+    assert_answers(Table.from_columns({"Asset": ["a", "b"]}).compile().query_many({"speed": [1, 2, 3]}), 2, [[0, 1]] * 3)
 
 
-@ENGINES
-def test_no_contexts_have_no_answers(engine):
-    with using(engine):
-        many = big_table().compile().query_many({"speed": [], "state": [], "tags": []})
-        assert_answers(many, 200, [])
+def test_no_contexts_have_no_answers():
+    many = big_table().compile().query_many({"speed": [], "state": [], "tags": []})
+    assert_answers(many, 200, [])
 
 
-def test_the_kernels_are_loaded_when_there_is_much_work_or_they_are_there_already(monkeypatch):
-    assert batch.load_kernels(0) is kernels
-    monkeypatch.delitem(sys.modules, "contextdb.compiled.kernels")
-    assert batch.load_kernels(batch.MUCH_WORK - 1) is None
-    assert batch.load_kernels(batch.MUCH_WORK) is not None
+def test_many_numbers_have_the_classes_that_bisection_finds():
+    rng = np.random.default_rng(3)
+    edges = [-1.7e308, -3.0, -1.0, 0.0, 5e-324, 1e-300, 1.0, 1.0 + 1e-9, 2.0, 3.5, 72.0, 1e16, 1.7e308]
+    for seed in range(20):
+        low = rng.choice(edges, 1 + seed) if seed % 2 else np.round(rng.uniform(-9.0, 9.0, 1 + seed) * 2.0) / 2.0
+        cells = [f"{a!r}..{b!r}" for a, b in zip(low.tolist(), np.maximum(low, 4.0).tolist(), strict=True)]
+        table = Table.from_columns({"Asset": [f"a{i}" for i in range(len(cells))], "x": cells}, {"x": {"type": "number"}}).compile()
+        masks = data_of(table).masks[0]
+        near = np.concatenate([np.nextafter(masks.bounds, -np.inf), masks.bounds, np.nextafter(masks.bounds, np.inf)])
+        facts = np.concatenate([near, edges, [np.inf, -np.inf, -0.0], rng.normal(0.0, 30.0, batch.MANY_NUMBERS)])
+        codes = table.query_many({"x": np.append(facts, np.nan)}, unknown="never").codes[:, 0]
+        assert codes.tolist() == [*(1 + bisect_right(masks.bounds.tolist(), x) for x in facts.tolist()), len(masks.bounds) + 2]
 
 
-def test_without_numba_numpy_answers(monkeypatch):
-    monkeypatch.delattr(contextdb.compiled, "kernels")
-    monkeypatch.setitem(sys.modules, "contextdb.compiled.kernels", None)
-    assert batch.load_kernels() is None
-    compiled = big_table().compile()
-    context = {"speed": 3, "state": "CB", "tags": []}
-    assert compiled.query_codes(compiled.encode(context)) == compiled.query(context)
-    assert compiled.query_many({name: [fact] for name, fact in context.items()}).counts.tolist() == [len(compiled.query(context))]
+def test_codes_and_arrays_that_do_not_go_together_are_refused():
+    data = data_of(big_table().compile())
+    codes = np.zeros((3, 4), np.int32)
+    with pytest.raises(ValueError, match="shape"):
+        data.codes.batch.answer(codes, 0, 5, None, None, None, None)
+    with pytest.raises(ValueError, match="shape"):
+        data.codes.batch.answer(codes, 0, 4, np.zeros(3, np.int64), None, None, None)
+    for wrong in (-1, 1, 100_000):
+        codes[1, 2] = wrong
+        assert data.codes.batch.answer(codes, 0, 4, None, None, None, None) is False
+    with pytest.raises(ValueError, match="column"):
+        read_column(data.core, 7, [1.0], 1, False, None, codes[:1])
+    with pytest.raises(ValueError, match="cells"):
+        read_column(data.core, 0, [1.0] * 4, 1, False, (np.zeros(99), 0.0, 1.0, np.zeros(2, np.int32)), codes[:1])
 
 
 # ---- what is said of contexts that cannot be asked with
@@ -390,12 +391,58 @@ def test_each_distinct_set_of_tags_is_looked_up_once(kind: type):
     assert [rows.tolist() for rows in many.lists()] == [*([0, 1], [], [1]) * 100, []]
 
 
-def test_codes_that_were_made_without_the_kernels_are_answered_with_them():
-    many = TABLE.query_many({"speed": [1.0, 2.0, 9.0], "state": ["Ground", "Air", "Ground"], "steps": [1, 2, 3]})
-    with using(None):
-        codes = many.codes.tolist()
-    with using(kernels):
-        assert many.mask.tolist() == [TABLE.query_codes(np.array(of)).mask.tolist() for of in codes]
+SERIES: dict[str, tuple[dict[str, object], list[object], list[pl.DataType]]] = {
+    "number": ({"type": "number"}, [1.5, None, -3.0, 7.25, float("nan"), 2.0], [pl.Float64(), pl.Float32()]),
+    "int": ({"type": "int"}, [1, None, -3, 7, 100, 2], [pl.Int8(), pl.Int16(), pl.Int32(), pl.Int64(), pl.Int128(), pl.Float64()]),
+    "unsigned": ({"type": "int"}, [1, None, 3, 7, 100, 2], [pl.UInt8(), pl.UInt16(), pl.UInt32(), pl.UInt64()]),
+    "angle": ({"type": "angle"}, [190.0, None, -180.0, 540.0, 1e9, 2.0], [pl.Float64()]),
+    "date": ({"type": "date"}, [date(2026, 2, 1), None, date(1, 1, 1), date(9999, 12, 31), date(2026, 2, 2)], [pl.Date()]),
+    "bool": ({"type": "bool"}, [True, None, False, True, True], [pl.Boolean()]),
+    "enum": (
+        {"type": "enum", "values": ["a", "bb", "a text that is longer than twelve"]},
+        ["a", None, "a text that is longer than twelve", "bb"],
+        [pl.String(), pl.Categorical(), pl.Enum(["bb", "a", "a text that is longer than twelve", "c"])],
+    ),
+    "text": (
+        {"type": "text"},
+        ["a", None, "", "\u00e9t\u00e9", "none of them", "a text that is longer than twelve"],
+        [pl.String(), pl.Categorical()],
+    ),
+}
+
+
+@pytest.mark.parametrize(("name", "at"), [(name, at) for name, (_, _, dtypes) in SERIES.items() for at in range(len(dtypes))])
+def test_series_in_parts_and_cut_out_of_others_are_read_as_lists_are(name: str, at: int):
+    schema, values, dtypes = SERIES[name]
+    cells = {
+        "enum": ["a", "not bb", "Any"],
+        "text": ["a", "\u00e9t\u00e9", "Any"],
+        "bool": ["True", "False", "Any"],
+        "date": ["2026-02-01", ">=2026-02-02", "Any"],
+    }
+    texts = cells.get(name, ["0..2", ">=5", "Any"])
+    table = Table.from_columns({"Asset": ["x", "y", "z"], "c": texts}, {"c": schema}).compile()
+    plain = [values[i * 7 % len(values)] for i in range(200)]
+    whole = pl.Series("c", plain, dtype=dtypes[at], strict=False)
+    parts = pl.concat([whole[:3], whole[3:80], whole[80:80], whole[80:]], rechunk=False)
+    expected = table.query_many({"c": plain}, unknown="never").codes.tolist()
+    for start in (0, 1, 7, 77, 199):
+        for series in (whole[start:], parts[start:], parts.slice(start, 50)):
+            codes = table.query_many({"c": series}, unknown="never").codes
+            assert codes.tolist() == expected[start : start + len(series)]
+    n_missing = sum(value is None or value != value for value in plain)
+    with pytest.raises(ContextError, match=f"missing in {n_missing} contexts"):
+        table.query_many({"c": parts})
+
+
+@pytest.mark.parametrize("dtype", [np.int8, np.uint16, np.int64, np.uint64, np.float32, np.float16, np.longdouble, ">f8", ">i4"])
+def test_numbers_of_every_type_and_place_of_an_array_are_read_as_lists_are(dtype):
+    table = Table.from_columns({"Asset": ["x", "y"], "c": ["0..2", ">=5"]}, {"c": {"type": "int"}}).compile()
+    values = [(i * 7) % 11 for i in range(300)]
+    expected = table.query_many({"c": values}).codes.tolist()
+    array = np.array(values, dtype)
+    for column in (array, np.repeat(array, 3)[::3], array[::-1][::-1], list(array), [*array, 1][:-1], tuple(array)):
+        assert table.query_many({"c": column}).codes.tolist() == expected
 
 
 def test_tags_may_be_lists_sets_or_texts():
@@ -444,13 +491,6 @@ def test_a_fact_that_numpy_masks_is_missing():
         table.query_many({"x": masked})
 
 
-@pytest.mark.parametrize("n_bounds", [0, 1, batch.FEW_BOUNDS, batch.FEW_BOUNDS + 1])
-def test_few_bounds_and_many_give_the_classes_that_bisection_gives(n_bounds: int):
-    bounds = np.linspace(-9.0, 9.0, n_bounds)
-    facts = np.array([-np.inf, -9.0, *np.random.default_rng(3).uniform(-10.0, 10.0, 50), *bounds, 9.0, np.inf])
-    assert batch._n_not_above(facts, bounds).tolist() == [bisect_right(bounds.tolist(), fact) for fact in facts.tolist()]
-
-
 @pytest.mark.parametrize("unknown", ["any", "never"])
 def test_what_soft_cells_cost_in_many_contexts_is_what_they_cost_in_each(unknown: Literal["any", "never"]):
     cells = {"A": ["a", "b", "c"], "speed": ["0..2 ~1.5", "Any", "2.. ~0.1"], "gait": ["Walk ~0.7", "Run ~0.2", "Walk"]}
@@ -460,3 +500,13 @@ def test_what_soft_cells_cost_in_many_contexts_is_what_they_cost_in_each(unknown
     each = [matches.penalties.tolist() for matches in many]
     assert each[1] == pytest.approx([2.2, 0.0, 0.0])
     assert many.penalties.tolist() == many.only([0]).penalties.tolist() == (many | many).penalties.tolist() == each
+
+
+def test_what_only_a_single_answer_has_is_refused_with_what_to_use():
+    many = Table.from_columns({"Asset": ["a"], "x": ["True"]}, {"x": {"type": "bool"}}).compile().query_many({"x": [True]})
+    with pytest.raises(AttributeError, match=r"ManyMatches has no attribute 'indices': use lists\(\) .* or many\[i\]\.indices"):
+        many.indices  # noqa: B018
+    with pytest.raises(AttributeError, match=r"'assets': each of its answers has it, many\[i\]\.assets"):
+        many.assets  # noqa: B018
+    with pytest.raises(AttributeError, match=r"ManyMatches has no attribute 'nope'$"):
+        many.nope  # noqa: B018

@@ -128,6 +128,14 @@ def test_a_folder_that_others_may_open_is_refused_in_c(game: Path, meeting: Path
         assert process.wait(LIMIT_S) == 4
 
 
+def test_a_file_in_place_of_a_socket_is_not_deleted_in_c(game: Path, meeting: Path):
+    meeting.mkdir(mode=0o700)
+    (meeting / "game.sock").write_text("mine")
+    with running(game, 1) as process:
+        assert named(process) == "game-2"
+    assert (meeting / "game.sock").read_text() == "mine"
+
+
 def test_a_listener_that_stalls_stops_no_game_in_c(game: Path, meeting: Path):
     with running(game, 1500) as process:
         name = named(process)

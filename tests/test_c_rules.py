@@ -155,6 +155,17 @@ def test_a_missing_fact_of_a_rule_and_a_rule_without_a_finite_value_are_named(as
     assert answers == [python_says(compiled, *moment) for moment in moments]
 
 
+def test_a_fact_that_is_computed_needs_all_that_it_names_as_in_python(ask: Path, tmp_path: Path):
+    schema: dict[str, dict[str, object]] = {**NUMBERS, "ok": {"type": "bool"}}
+    schema |= {"some": {"type": "bool", "expr": "ok or a > 1"}, "more": {"type": "number", "expr": "b if some else 1 / a"}}
+    compiled = Table.from_columns({"Asset": ["x"], "more": ["2.."]}, schema).compile()
+    facts = [{"a": 1.0, "b": 3.0, "ok": True}, {"b": 3.0, "ok": True}, {"a": 2.0, "b": 3.0}, {"a": 1.0, "ok": False}, {}]
+    moments: list[tuple[str, Facts]] = [(unknown, some) for some in facts for unknown in ("error", "any", "never")]
+    [(_, answers)] = asked(ask, tmp_path, conditions_of(data_of(compiled)), [artefact(compiled, tmp_path)], moments)
+    assert [status for status, _ in answers[::3]] == [OK, 5, 5, 5, 5]
+    assert answers == [python_says(compiled, *moment) for moment in moments]
+
+
 def test_a_condition_that_the_game_does_not_know_is_refused_or_any(ask: Path, tmp_path: Path):
     schema = {
         **NUMBERS,
@@ -173,7 +184,7 @@ def test_a_condition_that_the_game_does_not_know_is_refused_or_any(ask: Path, tm
 
 def test_a_file_of_an_older_version_without_programs_is_refused(ask: Path, tmp_path: Path):
     compiled = plain_table(["a > 1"], NUMBERS)
-    with mock.patch("contextdb.compiled.artefact.programs_to_tensors", return_value={}):
+    with mock.patch("contextdb.compiled.programs.programs_to_tensors", return_value={}):
         older = artefact(compiled, tmp_path)
     assert CompiledTable.open(tmp_path / "table.safetensors").query({"a": 2}).assets == ["row 0"]
     assert asked(ask, tmp_path, conditions_of(data_of(compiled)), [older], []) == [(OTHER_TABLE, [])]

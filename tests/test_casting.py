@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 from strategies import examples
 
 import contextdb as cdb
+from contextdb.compiled.casting.facts import Ask
+from contextdb.compiled.casting.stage import query_with_actors, set_stage
 from contextdb.compiled.table import CompiledTable, data_of
 from contextdb.errors import ContextError
 from contextdb.schema.settings import TableSettings
@@ -73,13 +75,51 @@ def test_valid_rows_and_castings_are_those_of_trying_every_assignment(moment):
     matches = table_of(rows).query(context, actors=actors, prefer="distance")
     expected = [every_casting(row, context, actors) for row in rows]
     assert matches.indices.tolist() == [i for i, found in enumerate(expected) if found is not None]
-    for row in matches:
+    for row in matches.rows.tolist():
         castings = matches.castings(row)
         key = lambda c: sorted(as_ids(c).items())  # noqa: E731
         assert sorted(castings, key=key) == sorted(expected[row], key=key)
         least = min(sum(a["distance"] for a in c.values()) for c in expected[row])
         assert sum(a["distance"] for a in matches.casting(row).values()) == least
         assert castings[0] == matches.casting(row)
+
+
+ODD = [
+    {"id": [1], "kind": "a"},
+    {"kind": "x"},
+    {"kind": None, "id": 1},
+    {"id": 1, "kind": "b", "distance": True},
+    {1: 2, "kind": "a"},
+    7,
+]
+
+
+@examples(0.4)
+@given(
+    moments(),
+    st.sampled_from([None, "distance", "-distance", {"Judge": "distance"}, "height"]),
+    st.lists(st.sampled_from(ODD), max_size=1),
+)
+def test_plain_actors_are_cast_as_the_careful_way_casts_them(moment, prefer, odd):
+    rows, context, actors = moment
+    compiled, actors = data_of(table_of(rows)), {**actors, "Judge": [*actors["Judge"], *odd]}
+
+    def described(careful: bool) -> object:
+        try:
+            if careful:
+                stage, plain = set_stage(compiled, context, Ask(actors, prefer))
+                matches = stage.matches(plain)
+            else:
+                matches = query_with_actors(compiled, context, Ask(actors, prefer))
+        except ContextError as error:
+            return str(error)
+        casts = [
+            {role: (offer.place, offer.name, offer.cost) for role, offer in matches.cast(row).items()}
+            for row in matches.rows.tolist()
+        ]
+        return matches.bits, matches.always.tolist(), casts, [matches.castings(row) for row in matches.rows.tolist()]
+
+    assert described(careful=False) == described(careful=True)
 
 
 @examples(0.4)
@@ -92,8 +132,8 @@ def test_every_valid_row_has_a_casting_and_every_other_a_reason(moment):
     assert explanation.matches == matches
     for r in range(len(rows)):
         told = explanation.row(r)
-        assert told.is_valid == (r in matches)
-        if r in matches:
+        assert told.is_valid == (r in matches.rows)
+        if r in matches.rows:
             cast = as_ids(matches.casting(r))
             assert len(set(cast.values())) == len(cast)
             assert all(any(a["id"] == i for a in actors[role]) for role, i in cast.items())
@@ -238,7 +278,7 @@ def test_with_two_teams_the_best_casting_is_that_of_trying_every_assignment(mome
     matches = table_of(rows).query(context, actors=actors, prefer="distance")
     for r, row in enumerate(rows):
         found = castings_of_many(row, actors) if row["is_wet"] == "Any" or context["is_wet"] else []
-        assert (r in matches) == bool(found)
+        assert (r in matches.rows) == bool(found)
         if found:
             cast = matches.casting(r)
             assert len(cast) == len(found[0])

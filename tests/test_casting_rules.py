@@ -134,7 +134,7 @@ def cast_of(ask):
         matches = ask()
     except ContextError:
         return None
-    return {row: matches.casting(row) for row in matches}
+    return {row: matches.casting(row) for row in matches.rows.tolist()}
 
 
 CHANGES = st.sampled_from(["x", "kind", "other", "more", "fewer", "list", "number", "is_wet", "limit", "nothing"])
@@ -210,7 +210,7 @@ def test_casts_of_two_roles_are_those_of_trying_every_pair(moment):
     pair = ("Receiver", "Defender")
     matches = table_of(rows).query(context, actors=actors)
     expected = {}
-    for at in matches:
+    for at in matches.rows.tolist():
         row = rows[at]
         mandatory, optional = (row.get(s, "").split() for s in SLOTS)
         named, holds = RULES[row["When"]]

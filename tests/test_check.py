@@ -12,8 +12,7 @@ from hypothesis import given
 
 from contextdb.checks import run as check_module
 from contextdb.checks.run import check
-from contextdb.commands.check_command import check_path
-from contextdb.errors import Place
+from contextdb.errors import ContextDBError, Place
 from contextdb.findings import Finding, worst
 from contextdb.schema.settings import TableSettings
 from contextdb.tables.project import Project, load_table
@@ -412,61 +411,16 @@ def test_facts_of_one_foot_that_see_themselves_in_a_mirror_are_told(tmp_path: Pa
     assert all(says in message for message in told)
 
 
-OLD_COSTS = """
-[features.loco]
-rate = 30.0
-channels = [
-  { type = "position", bone = "Foot", weight = 2.0 },
-  { type = "trajectory", what = "direction", at = [0.5, 1.0], weight = 1.5 },
-]
-[databases.tired]
-clips = "tired/*.bvh"
-features = "loco"
-continuing_bias = {bias}
-base_bias = 30.0
-[databases.loco]
-clips = "*.bvh"
-features = "loco"
-weights = { "Foot position" = 0.0 }
-looping_bias = {bias}
-[selectors.locomotion]
-order = [ { database = "tired", threshold = {threshold} }, { database = "loco" } ]
-"""
-
-
-def old_costs(folder: Path, bias: str, threshold: str) -> list[Finding]:
-    toml = OLD_COSTS.replace("{bias}", bias).replace("{threshold}", threshold)
-    (folder / "contextdb.toml").write_text(toml, encoding="utf-8")
-    (folder / "a.csv").write_text("Asset,direction\na,10\nb,20\n", encoding="utf-8")
-    return [f for f in check_path(str(folder)).findings if f.rule == "old-cost-scale"]
-
-
-def test_thresholds_and_biases_of_the_old_cost_scale_are_told_with_what_they_are_today(tmp_path: Path):
-    found = old_costs(tmp_path, "-6", "24.0")
-    assert {(f.level, f.line) for f in found} == {("info", 8), ("info", 13), ("info", 18)}
-    far = "than 2 below 0, which is what two unrelated frames cost on average, so it outweighs nearly every difference."
-    earlier = "Earlier versions did not divide costs by the sum of weight x features, here"
-    assert [f.message for f in found] == [
-        "[selectors.locomotion] order 1: threshold = 24.0 is above 2, which is what two unrelated frames cost on average,"
-        f" so nearly every frame is under it. {earlier} 12: 24.0 of then is 2 today.",
-        f"[databases.tired] continuing_bias = -6.0 is more {far} {earlier} 12: -6.0 of then is -0.5 today.",
-        f"[databases.loco] looping_bias = -6.0 is more {far} {earlier} 6: -6.0 of then is -1 today.",
-    ]
-
-
-@pytest.mark.parametrize(("bias", "threshold"), [("-0.07", "0.1"), ("-1.0", "1.9"), ("-1e6", "1e6"), ("3.0", "-5.0"), ("0", "0")])
-def test_costs_that_may_be_meant_are_not_told(tmp_path: Path, bias: str, threshold: str):
-    assert old_costs(tmp_path, bias, threshold) == []
-
-
-@pytest.mark.parametrize("value", ["true", '"30"', "[]", "{ x = 1 }"])
-def test_costs_that_cannot_be_read_are_no_matter_of_their_scale(tmp_path: Path, value: str):
-    assert old_costs(tmp_path, value, value) == []
-
-
-def test_an_old_threshold_is_told_where_the_features_cannot_be_read(tmp_path: Path):
-    old_costs(tmp_path, "0", "24.0")
-    toml = (tmp_path / "contextdb.toml").read_text(encoding="utf-8").replace("rate = 30.0", "rate = -1.0")
-    (tmp_path / "contextdb.toml").write_text(toml, encoding="utf-8")
-    (finding,) = [f for f in check_path(str(tmp_path)).findings if f.rule == "old-cost-scale"]
-    assert finding.message.endswith("Earlier versions did not divide costs by the sum of weight x features.")
+@pytest.mark.parametrize(
+    ("column", "cell", "line"), [("When", "speed < 3", "when"), ("Rest", "30", "cooldown_s"), ("weight", "2", "weight")]
+)
+def test_a_column_with_the_name_of_a_job_is_said_to_be_meant_for_it(tmp_path: Path, column: str, cell: str, line: str):
+    (tmp_path / "contextdb.toml").write_text('[conditions.speed]\ntype = "number"\n', "utf-8")
+    (tmp_path / "moves.csv").write_text(f"Asset,speed,{column}\nwalk,1..3,{cell}\n", "utf-8")
+    mend = f'Did you mean {line} = "{column}" in [tables.moves]?'
+    found = [f.message for f in check(load_table(tmp_path / "moves.csv", strict=False)) if f.column == column]
+    assert all(mend in message for message in found)
+    assert len(found) == (2 if column == "When" else 1)
+    if column == "When":
+        with pytest.raises(ContextDBError, match='Did you mean when = "When" in'):
+            load_table(tmp_path / "moves.csv")

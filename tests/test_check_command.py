@@ -6,10 +6,10 @@ import json
 from pathlib import Path
 from xml.etree import ElementTree
 
-import polars as pl
 import pytest
-from running import ROOT, Result, run
+from running import ROOT, run
 
+import contextdb as cdb
 from contextdb.report import formats
 
 TOML = """
@@ -39,11 +39,6 @@ def write(here: Path, csv: str | bytes, name: str = "jog.csv") -> None:
     (here / "game" / name).write_bytes(csv if isinstance(csv, bytes) else csv.encode())
 
 
-def found(path: str = "game", *more: str) -> list[tuple[str, str, str | None]]:
-    """Level, rule and table of each finding."""
-    return [(f["level"], f["rule"], f["table"]) for f in run("check", path, "--json", *more).json["findings"]]
-
-
 # ---- exit codes
 
 
@@ -69,97 +64,7 @@ def test_the_exit_code_is_1_for_findings_of_the_level_that_fails(
     assert (result.code, result.err) == (1 if level in failing else 0, "")
 
 
-@pytest.mark.parametrize("path", ["gane", "game/jgo.csv", "nothing/here", "game/contextdb.tml", "game/none/"])
-def test_the_exit_code_is_2_when_there_is_no_such_path(path: str):
-    result = run("check", path)
-    assert (result.code, result.out) == (2, "")
-    assert "there is no such" in result.err
-
-
-def test_a_misspelt_path_is_named_with_the_nearest():
-    assert run("check", "game/jgo.csv").err == (
-        "contextdb: game/jgo.csv: there is no such table. "
-        'Accepted: a file, a folder of one table, or the name of a table of the project. Did you mean "game/jog.csv"?\n'
-    )
-
-
 # ---- what is checked
-
-
-@pytest.mark.parametrize("path", ["game", "game/", "game/contextdb.toml", "game/jog.csv", "./game/../game"])
-def test_a_folder_its_schema_or_one_table_can_be_checked(path: str):
-    assert run("check", path) == Result(0, "jog: 1 row, 1 condition, nothing found\n\n1 table checked: nothing found.\n", "")
-
-
-def test_the_name_of_a_table_can_be_checked(here: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.chdir(here / "game")
-    assert run("check", "jog").code == 0
-
-
-def test_every_table_of_a_folder_is_checked(here: Path):
-    write(here, "Asset,speed\nrun,fast\n")
-    write(here, "Asset,speed\nrun,5..3\n", "stray.csv")
-    pl.DataFrame({"Asset": ["a"], "speed": [99]}).write_parquet(here / "game" / "stray2.parquet")
-    assert found() == [
-        ("error", "unreadable-cell", "jog"),
-        ("error", "empty-cell", "stray"),
-        ("warning", "outside-domain", "stray2"),
-    ]
-
-
-def test_a_declared_table_whose_file_is_missing_is_an_error(here: Path):
-    (here / "game" / "contextdb.toml").write_text(TOML, encoding="utf-8")
-    result = run("check", "game", "--json")
-    assert result.code == 1
-    (finding,) = result.json["findings"]
-    assert {k: finding[k] for k in ("rule", "level", "table", "file", "row", "line")} == {
-        **{"rule": "no-such-path", "level": "error", "table": "gone", "file": "game/moved.csv"},
-        **{"row": None, "line": None},
-    }
-    assert [table["table"] for table in result.json["tables"]] == ["jog"]
-
-
-def test_files_that_are_no_tables_are_errors_and_the_others_are_checked_all_the_same(here: Path):
-    write(here, b"PK\x03\x04" + bytes(100), "sheet.csv")
-    write(here, b"\xff\xfeA\0", "wide.csv")
-    write(here, "Asset,speed\nrun,1,2\n", "ragged.csv")
-    assert found() == [("error", "unreadable", "ragged"), ("error", "unreadable", "sheet"), ("error", "unreadable", "wide")]
-    assert [t["table"] for t in run("check", "game", "--json").json["tables"]] == ["jog"]
-
-
-def test_two_files_of_one_name_are_an_error(here: Path):
-    pl.DataFrame({"Asset": ["a"], "speed": [1]}).write_parquet(here / "game" / "jog.parquet")
-    result = run("check", "game", "--json")
-    assert result.code == 1
-    (finding,) = result.json["findings"]
-    assert finding["message"] == 'table "jog" is also defined in "game/jog.csv". Accepted: one file for each table.'
-    assert finding["file"] == "game/jog.parquet"
-
-
-@pytest.mark.parametrize(
-    ("toml", "line", "message"),
-    [
-        (b'[conditions.speed]\ntype = "nmber"\n', 2, 'Did you mean type = "number"?'),
-        (b'[conditions.speed]\ntype = "number"\nmni = 0\n', 3, 'Did you mean "min"?'),
-        (b"[conditions.speed\n", 1, ""),
-        (b'[project]\nname = "caf\xe9"\n', 2, "the file is not UTF-8"),
-        (b'[conditions.speed]\ntype = "number"\nmin = "low"\n', 3, "this is text, not a number"),
-    ],
-)
-@pytest.mark.parametrize("path", ["game", "game/jog.csv", "game/contextdb.toml"])
-def test_a_schema_that_cannot_be_meant_is_an_error_with_its_line(here: Path, path: str, toml: bytes, line: int, message: str):
-    (here / "game" / "contextdb.toml").write_bytes(toml)
-    result = run("check", path, "--json")
-    assert result.code == 1
-    (finding,) = result.json["findings"]
-    assert (finding["level"], finding["file"], finding["line"]) == ("error", "game/contextdb.toml", line)
-    assert message in finding["message"]
-
-
-def test_a_folder_without_tables_is_an_error(here: Path):
-    (here / "empty").mkdir()
-    assert found("empty") == [("error", "no-tables", None)]
-    assert run("check", "empty").code == 1
 
 
 def test_the_sample_tables_pass(monkeypatch: pytest.MonkeyPatch):
@@ -169,105 +74,10 @@ def test_the_sample_tables_pass(monkeypatch: pytest.MonkeyPatch):
     assert {f["rule"] for f in result.json["findings"]} <= {"variety", "always-any"}
 
 
-# ---- saved contexts
-
-
-CASES = "Case,Expected,speed\nslow,run,1\nfast,run,9\nbroken,run,quick\n"
-
-
-@pytest.mark.parametrize("path", ["game", "game/jog.csv", "game/jog.cases.csv", "./game/jog.cases.csv"])
-def test_saved_contexts_are_checked_with_their_table(here: Path, path: str):
-    write(here, CASES, "jog.cases.csv")
-    result = run("check", path, "--json")
-    assert result.code == 1
-    places = [(f["rule"], f["level"], f["table"], f["file"], f["line"], f["column"]) for f in result.json["findings"]]
-    assert [(*place[:3], Path(place[3]).as_posix(), *place[4:]) for place in places] == [
-        ("case-failed", "error", "jog", "game/jog.cases.csv", 3, "Expected"),
-        ("unreadable-case", "error", "jog", "game/jog.cases.csv", 4, "speed"),
-    ]
-
-
-def test_saved_contexts_that_hold_say_nothing(here: Path):
-    write(here, "".join(CASES.splitlines(keepends=True)[:2]), "jog.cases.csv")
-    assert run("check", "game").lines == ["jog: 1 row, 1 condition, nothing found", "", "1 table checked: nothing found."]
-
-
-def test_saved_contexts_are_not_asked_of_a_table_that_cannot_be_read(here: Path):
-    write(here, "Asset,speed\nrun,fast\n")
-    write(here, CASES, "jog.cases.csv")
-    assert found("game/jog.cases.csv") == [("error", "unreadable-cell", "jog")]
-
-
-@pytest.mark.parametrize("path", ["game", "game/jgo.cases.csv"])
-def test_saved_contexts_without_a_table_are_an_error(here: Path, path: str):
-    write(here, CASES, "jgo.cases.csv")
-    [finding] = run("check", path, "--json").json["findings"]
-    assert (finding["rule"], finding["level"], finding["file"]) == ("unreadable-case", "error", "game/jgo.cases.csv")
-    assert 'Accepted: "jgo.csv" or "jgo.parquet". Did you mean "jog.cases.csv"?' in finding["message"]
-
-
-@pytest.mark.parametrize("path", ["game", "game/jog.csv", "game/jog.cases.csv"])
-def test_a_file_of_cases_that_cannot_be_read_is_an_error(here: Path, path: str):
-    write(here, "case,speed\nslow,1\n", "jog.cases.csv")
-    [finding] = run("check", path, "--json").json["findings"]
-    assert (finding["rule"], finding["table"], finding["line"]) == ("unreadable", "jog", 1)
-    assert finding["message"].endswith('Try to rename "case".')
-
-
-def test_notes_with_a_git_conflict_are_an_error_and_others_are_not(here: Path):
-    notes = "Asset,Column,Note,Colour\nrun,speed,why?,\n"
-    write(here, notes, "jog.notes.csv")
-    assert found() == []
-    write(here, f"{notes}<<<<<<< ours\nrun,,,red\n=======\nrun,,,blue\n>>>>>>> theirs\n", "jog.notes.csv")
-    for path in ("game", "game/jog.csv"):
-        assert found(path) == [("error", "unreadable", "jog")]
-    (finding,) = run("check", "game", "--json").json["findings"]
-    assert (Path(finding["file"]).name, finding["line"]) == ("jog.notes.csv", 3)
-
-
-def test_a_file_of_cases_that_is_not_there_is_no_such_path():
-    result = run("check", "game/jog.cases.csv")
-    assert (result.code, result.out) == (2, "")
-
-
-def test_saved_contexts_of_a_declared_table_lie_beside_its_file(here: Path):
-    (here / "game" / "deep").mkdir()
-    (here / "game" / "contextdb.toml").write_text(TOML.replace("moved.csv", "deep/moved.csv"), encoding="utf-8")
-    write(here, CLEAN, "deep/moved.csv")
-    write(here, CASES, "deep/moved.cases.csv")
-    write(here, CASES, "deep/stray.cases.csv")
-    assert found() == [
-        ("error", "case-failed", "gone"),
-        ("error", "unreadable-case", "gone"),
-        ("error", "unreadable-case", None),
-    ]
-
-
 # ---- formats
 
 
 BAD = "Asset,speed\nrun,5..3\nrun,fast\n"
-
-
-def test_the_json_document_has_the_promised_fields(here: Path):
-    write(here, BAD)
-    document = run("check", "game", "--json").json
-    assert document["format"] == 1
-    assert document == run("check", "game", "--format", "json").json
-    empty, twice, unreadable = document["findings"]
-    assert {key: empty[key] for key in ("rule", "level", "row", "asset", "line", "column", "message", "by")} == {
-        "rule": "empty-cell",
-        "level": "error",
-        "row": 0,
-        "asset": "run",
-        "line": 2,
-        "column": "speed",
-        "message": '"5..3" accepts no value at all, so the row never matches.',
-        "by": [],
-    }
-    rules = {f["rule"]: f for f in (twice, unreadable)}
-    assert rules["duplicate-asset"]["by"] == [0]
-    assert rules["unreadable-cell"]["line"] == 3
 
 
 def test_each_format_names_file_line_and_rule(here: Path):
@@ -280,22 +90,6 @@ def test_each_format_names_file_line_and_rule(here: Path):
     json.loads(run("check", "game", "--format", "sarif").out)
     ElementTree.fromstring(run("check", "game", "--format", "junit").out)
     assert run("check", "game", "--format", "github").lines[0].startswith("::error file=game/jog.csv,line=2,")
-
-
-def test_in_junit_those_findings_fail_that_make_the_command_fail(here: Path):
-    write(here, LEVELS["warning"] or "")
-    for options, n_failures in [([], "0"), (["--fail-on", "warning"], "1")]:
-        suites = ElementTree.fromstring(run("check", "game", "--format", "junit", *options).out)
-        assert suites.get("failures") == n_failures
-
-
-@pytest.mark.parametrize("width", [50, 80, 160])
-def test_text_is_wrapped_to_the_terminal(here: Path, monkeypatch: pytest.MonkeyPatch, width: int):
-    monkeypatch.setenv("COLUMNS", str(width))
-    write(here, "Asset,speed\n" + "".join(f"run{i},{i}..fast\n" for i in range(3)))
-    lines = run("check", "game").lines
-    assert max(map(len, lines)) <= width
-    assert len(lines) >= 6
 
 
 def test_every_finding_is_printed_on_demand(here: Path):
@@ -313,3 +107,82 @@ def test_names_from_a_file_cannot_move_the_cursor(here: Path):
         assert not set(out) & {"\x1b", "\x07", "\r"}
     text = run("check", "game").out
     assert "\u202e" not in text
+
+
+CONTRACTS = """
+[conditions.p]
+type = "bool"
+[tables.t]
+[contracts.held]
+table = "t"
+when = "p"
+some = "asset == 'a'"
+[contracts.broken]
+table = "t"
+some = "asset == 'a'"
+why = "There is always an a"
+"""
+
+
+@pytest.fixture
+def promised(tmp_path: Path) -> Path:
+    (tmp_path / "contextdb.toml").write_text(CONTRACTS)
+    (tmp_path / "t.csv").write_text("Asset,p\na,True\nb,False\n")
+    return tmp_path
+
+
+def test_a_broken_contract_fails_a_check_and_one_that_holds_is_listed(promised: Path):
+    result = run("check", promised, "--format", "json")
+    assert result.code == 1
+    held, broken = json.loads(result.out)["contracts"]
+    assert (held["name"], held["table"], held["holds"], held["share"], held["witness"]) == ("held", "t", True, [1.0, 1.0], None)
+    assert (broken["holds"], broken["share"], broken["why"]) == (False, [0.5, 0.5], "There is always an a")
+    assert broken["witness"] == {"cells": {"p": "False"}, "context": {"p": False}, "matches": [{"row": 1, "asset": "b"}]}
+
+
+@pytest.mark.parametrize("form", ["text", "github", "junit", "sarif", "markdown"])
+def test_every_format_shows_a_broken_contract(form: str, promised: Path):
+    result = run("check", promised, "--format", form)
+    assert result.code == 1
+    assert "contracts.broken" in result.out.replace("\\", "")
+
+
+def test_a_check_of_one_table_proves_its_contracts(promised: Path):
+    assert "1 of 2 contracts proved." in run("check", promised / "t.csv").out
+
+
+def test_a_contract_of_a_table_that_there_is_not_is_an_error(promised: Path):
+    text = (promised / "contextdb.toml").read_text()
+    (promised / "contextdb.toml").write_text(text.replace('[contracts.held]\ntable = "t"', '[contracts.held]\ntable = "tt"'))
+    assert 'there is no table "tt"' in run("check", promised).out
+
+
+def test_a_save_from_python_and_a_rename_keep_contracts(promised: Path):
+    table = cdb.Project.load(promised)["t"]
+    table.with_cell(0, "p", "Any").save()
+    assert (promised / "contextdb.toml").read_text() == CONTRACTS
+    assert cdb.load(promised / "t.csv").schema.contracts.keys() == {"held", "broken"}
+
+
+def test_proposed_contracts_hold_and_are_not_proposed_again(tmp_path: Path):
+    toml = '[conditions.gait]\ntype = "enum"\nvalues = ["Walk", "Half Run"]\n[conditions.p]\ntype = "bool"\n[tables.t]\n'
+    (tmp_path / "contextdb.toml").write_text(toml)
+    (tmp_path / "t.csv").write_text('Asset,gait,p\na,Walk,Any\nb,"""Half Run""",True\n')
+    proposed = run("check", tmp_path, "--propose")
+    assert (proposed.code, proposed.lines) == (
+        0,
+        [
+            "[contracts.t_gait_Walk_has_a_row]",
+            'table = "t"',
+            "when = \"gait == 'Walk'\"",
+            "some = \"asset like '*'\"",
+            "",
+            "[contracts.t_one_at_a_time]",
+            'table = "t"',
+            "at_most = 1",
+        ],
+    )
+    assert [p["holds"] for p in run("check", tmp_path, "--propose", "--json").json["proposed"]] == [True, True]
+    (tmp_path / "contextdb.toml").write_text(toml + proposed.out)
+    assert "2 of 2 contracts proved." in run("check", tmp_path).out
+    assert run("check", tmp_path, "--propose").lines == ["# no contract holds that is likely meant"]

@@ -18,6 +18,7 @@ from contextdb.cells.facts import cell, read_fact
 from contextdb.cells.grammar import parse_cell
 from contextdb.cells.sets import Cell
 from contextdb.compiled.classes import NumberMasks, TagMasks, ValueMasks, WideMasks, column_masks
+from contextdb.core import turn_rows
 
 DEPTH = Domain("enum", ("CB", "FS", "SS"))
 Masks = ValueMasks | NumberMasks | WideMasks | TagMasks
@@ -178,3 +179,24 @@ def test_rows_that_share_a_cell_share_its_bits_at_every_size(domain, n_rows):
     masks = column_masks([parse_cell(text, domain), parse_cell(f"not {text}", domain), Cell()], codes, domain)
     assert rows(masks, fact) == [r for r in range(n_rows) if codes[r] != 1]
     assert bits_of(masks, None) == bitmask.to_int(bitmask.pack(codes == 2))
+
+
+@given(st.data())
+def test_each_row_is_turned_over_in_the_masks_of_its_cell(data):
+    n_cells, n_masks = data.draw(st.integers(1, 6)), data.draw(st.integers(1, 5))
+    codes = data.draw(st.lists(st.integers(0, n_cells), max_size=140))
+    pairs = data.draw(st.lists(st.tuples(st.integers(0, n_cells - 1), st.integers(0, n_masks - 1)), max_size=12))
+    masks = np.zeros((n_masks, bitmask.n_words(len(codes))), np.uint64)
+    cells, numbers = np.array(pairs, np.int64).reshape(-1, 2).T.copy()
+    turn_rows(np.array(codes, np.int32), cells, numbers, masks)
+    for mask in range(n_masks):
+        expected = [row for row, code in enumerate(codes) if pairs.count((code, mask)) % 2]
+        assert bitmask.rows(masks[mask]).tolist() == expected
+
+
+@pytest.mark.parametrize(("cell", "number"), [(-1, 0), (2**40, 0), (0, -1), (0, 2)])
+def test_a_mask_or_a_cell_that_is_none_is_refused(cell, number):
+    masks = np.zeros((2, 1), np.uint64)
+    with pytest.raises(ValueError, match="out of range"):
+        turn_rows(np.zeros(3, np.int32), np.array([cell]), np.array([number]), masks)
+    assert not masks.any()

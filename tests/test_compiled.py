@@ -21,7 +21,6 @@ from hypothesis import strategies as st
 import contextdb as cdb
 from contextdb import bitmask
 from contextdb.cells.facts import cell
-from contextdb.compiled import batch, kernels
 from contextdb.compiled.classes import FLAT_BYTES, NumberMasks, WideMasks
 from contextdb.compiled.table import CompiledTable, data_of
 from contextdb.errors import ContextError, TableError
@@ -31,7 +30,6 @@ from contextdb.tables.table import Table
 COLUMNS = pytest.mark.parametrize("flat_bytes", [FLAT_BYTES, 0, 100], ids=["flat", "wide", "mixed"])
 """How number columns are kept: in flat masks, all of them in two digits as very long ones are, or some so and some so."""
 
-ENGINES = pytest.mark.parametrize("engine", [kernels, None], ids=["numba", "numpy"])
 UNKNOWN = st.sampled_from(["any", "never"])
 
 
@@ -87,18 +85,6 @@ def test_sets_of_values_find_the_rows_that_may_and_that_always_match(flat_bytes,
         answer = table.compile().query(context, unknown=unknown)
     assert answer.indices.tolist() == oracles.rows(table, plain, unknown)
     assert bitmask.rows(answer.always).tolist() == oracles.rows_always(table, plain, unknown)
-
-
-@COLUMNS
-@ENGINES
-@given(strategies.tables(), UNKNOWN, st.data())
-def test_codes_find_what_their_context_finds(flat_bytes, engine, table, unknown, data):
-    context, plain = data.draw(strategies.contexts(table, has_missing=True))
-    with keeping(flat_bytes), mock.patch.object(batch, "load_kernels", return_value=engine):
-        ready = table.compile()
-        codes = ready.encode(context, unknown=unknown)
-        assert ready.query_codes(codes).indices.tolist() == oracles.rows(table, plain, unknown)
-    assert codes.dtype == np.int32
 
 
 @COLUMNS
@@ -175,11 +161,10 @@ def test_every_way_to_ask_takes_or_refuses_an_odd_number_alike(fact):
     ways = [
         lambda: found(table, {"speed": fact}, "never"),
         lambda: table.live({"speed": fact}, unknown="never").matches().indices.tolist(),
-        lambda: table.query_codes(table.encode({"speed": fact}, unknown="never")).indices.tolist(),
         lambda: table.query_many({"speed": [fact, fact]}, unknown="never").lists()[1].tolist(),
     ]
     answers = [answer_of(way) for way in ways]
-    assert answers == answers[:1] * 4
+    assert answers == answers[:1] * 3
 
 
 def answer_of(way: Callable[[], list[int]]) -> list[int] | str:
@@ -231,7 +216,6 @@ def test_a_table_without_conditions_answers_every_enabled_row():
     columns = {"Asset": ["a", "b", "c"], "Enabled": ["True", "False", ""]}
     table = Table.from_columns(columns, settings=TableSettings("t", enabled="Enabled")).compile()
     assert table.query({}).assets == ["a", "c"]
-    assert table.query_codes(table.encode({})).assets == ["a", "c"]
     assert table.live().matches().assets == ["a", "c"]
 
 
@@ -311,8 +295,6 @@ def test_four_threads_that_ask_at_once_get_the_answers_of_one():
     def ask(_: int) -> list[list[int]]:
         start.wait()
         answers = [found(together, context) for context in contexts]
-        codes = [together.query_codes(together.encode(context)).indices.tolist() for context in contexts[:20]]
-        assert codes == answers[:20]
         return answers
 
     with ThreadPoolExecutor(4) as pool:
@@ -403,50 +385,6 @@ def test_a_context_that_is_no_mapping_is_refused(context):
         compiled(DECLARED).query(context)
 
 
-def test_a_set_of_values_has_no_single_code():
-    with pytest.raises(ContextError) as caught:
-        compiled(DECLARED).encode({**COMPLETE, "speed": cell("0..5")})
-    assert str(caught.value) == 'column "speed": a set of values has no single code. Accepted: one value.'
-
-
-@ENGINES
-@pytest.mark.parametrize("dtype", [np.int64, np.uint64, np.int16, np.uint8])
-def test_codes_may_be_of_any_whole_number_type(engine, dtype):
-    with mock.patch.object(batch, "load_kernels", return_value=engine):
-        table = compiled(DECLARED)
-        codes = table.encode(COMPLETE)
-        assert table.query_codes(codes.astype(dtype)).assets == ["A0"]
-        assert table.query_codes(codes.tolist()).assets == ["A0"]
-        assert table.query_codes(np.repeat(codes, 2)[::2]).assets == ["A0"]
-
-
-@ENGINES
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (lambda codes: codes[:-1], r"the codes have shape \(2,\). Accepted: \(3,\), as encode gives them."),
-        (lambda codes: codes[None], r"the codes have shape \(1, 3\)."),
-        (lambda codes: np.int32(7), "the codes have shape"),
-        (lambda codes: codes + 1000, "a code is out of range. Accepted: the codes that encode of this same compiled table gives."),
-        (lambda codes: codes - 1000, "a code is out of range."),
-        (lambda codes: codes.astype(np.int64) + 2**32, "a code is out of range."),
-        (lambda codes: [2**40, 1, 1], "a code is out of range."),
-        (lambda codes: codes + 0.5, "codes"),
-        (lambda codes: ["a", "b", "c"], "codes"),
-        (lambda codes: None, "codes"),
-    ],
-    ids=["few", "too many dimensions", "one", "large", "negative", "wraps", "too large", "no whole numbers", "texts", "nothing"],
-)
-@COLUMNS
-def test_wrong_codes_are_refused(engine, flat_bytes, change, message):
-    with keeping(flat_bytes), mock.patch.object(batch, "load_kernels", return_value=engine):
-        table = compiled({"speed": DECLARED["speed"], "state": DECLARED["state"], "tags": ({"type": "tags"}, ["+InAir"])})
-        codes = table.encode(COMPLETE)
-        assert table.query_codes(codes).assets == ["A0"]
-        with pytest.raises(ContextError, match=message):
-            table.query_codes(change(codes))
-
-
 @pytest.mark.parametrize("unknown", ["any", "never"])
 def test_a_declared_fact_of_another_table_is_no_slip_for_a_missing_one(unknown, tmp_path):
     schema = {name: {"type": "bool"} for name in ("Defender.Catching", "Defender.CatchingAnim")}
@@ -455,9 +393,9 @@ def test_a_declared_fact_of_another_table_is_no_slip_for_a_missing_one(unknown, 
     facts = {"Defender.CatchingAnim": True}
     for asked in (table, cdb.CompiledTable.open(tmp_path / "table.safetensors")):
         rows = [0] if unknown == "any" else []
-        assert list(asked.query(facts, unknown=unknown)) == rows
+        assert asked.query(facts, unknown=unknown).rows.tolist() == rows
         assert asked.query_many({name: [value] for name, value in facts.items()}, unknown=unknown).counts.tolist() == [len(rows)]
         actors = {"Defender": [{"CatchingAnim": True}]}
-        assert list(asked.query({}, unknown=unknown, actors=actors)) == rows
+        assert asked.query({}, unknown=unknown, actors=actors).rows.tolist() == rows
         with pytest.raises(ContextError, match=r'Did you mean "Defender\.Catching"'):
             asked.query({"Defender.Catchin": True}, unknown=unknown)

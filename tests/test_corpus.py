@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from pathlib import Path
 
 import pytest
-from fuzz import BATCH, CORPUS, batch, how_it_ended, input_of
+from fuzz import BATCH, CORPUS, HANG_CPU_S, batch, how_it_ended, input_of
 from fuzz_readers import READERS, examples, read_bytes
 
 FILES = sorted(path for path in CORPUS.rglob("*") if path.is_file())
@@ -29,7 +30,8 @@ def test_a_reader_reads_its_whole_examples_and_some_damaged_ones(reader: str):
 
 def test_a_seed_means_one_input_and_a_batch_finds_nothing_in_a_sound_reader():
     assert input_of("cells", 7) == input_of("cells", 7) != input_of("cells", 8)
-    assert batch("journal", 0) == (BATCH, [])
+    one = batch("journal", 0)
+    assert (one.n_read, one.finds) == (BATCH, [])
 
 
 def test_a_batch_that_goes_no_further_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -40,3 +42,9 @@ def test_a_batch_that_goes_no_further_is_ended(tmp_path: Path, monkeypatch: pyte
 
 def test_how_a_process_ended_is_told(tmp_path: Path):
     assert how_it_ended([sys.executable, "-c", "raise SystemExit(3)"], tmp_path / "progress") == "the process ended with 3"
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGPROF"), reason="a limit of CPU as POSIX has it")
+def test_a_batch_that_works_on_one_input_for_ever_is_ended(tmp_path: Path):
+    ends = [sys.executable, "-c", "import os, signal; os.kill(os.getpid(), signal.SIGPROF)"]
+    assert how_it_ended(ends, tmp_path / "progress") == f"no answer after {HANG_CPU_S:.0f} s of CPU"

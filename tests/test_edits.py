@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from strategies import examples, tables
 
+from contextdb.authoring.selectors import set_selector
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
 from contextdb.edits import edits
@@ -73,7 +74,7 @@ def test_a_history_that_keeps_few_tables_goes_the_same_ways(data):
         edit = data.draw(edits_of(wide.table))
         wide.do(edit)
         narrow.do(edit)
-    assert len(narrow._kept) <= 16
+    assert len(narrow._cached) <= 16
     for position in data.draw(st.lists(st.integers(0, wide.position), max_size=6)):
         one, other = wide.go(position), narrow.go(position)
         assert one.name == other.name
@@ -317,12 +318,12 @@ order = [{ database = "a", threshold = 2 }, { database = "b" }]
 
 def test_a_selector_takes_another_order_and_another_threshold():
     table = Table.build("t", read_csv(RAW, "t.csv")[1], read_schema(MOTION, "contextdb.toml"))
-    now = edits.set_selector(table, "s", [("b", 0.5), ("a", None)]).apply(table)
+    now = set_selector(table, "s", [("b", 0.5), ("a", None)]).apply(table)
     assert now.schema.selectors["s"] == {"order": [{"database": "b", "threshold": 0.5}, {"database": "a"}]}
-    assert edits.set_selector(now, "s", [("b", 0.5), ("a", None)]).changes == ()
-    assert edits.set_selector(now, "s", None).apply(now).schema.selectors == {}
+    assert set_selector(now, "s", [("b", 0.5), ("a", None)]).changes == ()
+    assert set_selector(now, "s", None).apply(now).schema.selectors == {}
     with pytest.raises(SchemaError, match="threshold"):
-        edits.set_selector(table, "s", [("a", None), ("b", None)])
+        set_selector(table, "s", [("a", None), ("b", None)])
 
 
 @pytest.mark.parametrize(
@@ -354,7 +355,7 @@ def test_a_selector_takes_another_order_and_another_threshold():
         lambda t: edits.set_blueprint(t, "b", ["sped"]),
         lambda t: edits.set_blueprint(t, " ", ["speed"]),
         lambda t: edits.set_blueprint(t, "b", ["speed", "speed"]),
-        lambda t: edits.set_selector(t, "s", [("loco", None)]),
+        lambda t: set_selector(t, "s", [("loco", None)]),
         lambda t: edits.insert_columns(t, 1, [edits.NewColumn("a"), edits.NewColumn("a")]).apply(t),
         lambda t: edits.insert_columns(t, 1, [edits.NewColumn("a", declared={"type": "enum"})]).apply(t),
     ],

@@ -129,5 +129,16 @@ def test_a_merge_tells_the_contexts_that_both_sides_covered():
 
 def test_two_boxes_meet_in_the_cells_that_both_hold():
     conditions = {column.condition.name: column.condition for column in table(("a", "", "", "")).conditions}
-    assert meet({"way": "N E"}, {"way": "E S", "on": "True"}, conditions) == {"way": "E", "on": "True"}
-    assert meet({"way": "N"}, {"way": "E"}, conditions) is None
+    assert meet({"way": "N E"}, {"way": "E S", "on": "True"}, conditions) == [{"way": "E", "on": "True"}]
+    assert meet({"way": "N"}, {"way": "E"}, conditions) == []
+
+
+def test_tags_that_no_single_cell_holds_are_told_in_several():
+    schema = {"state": {"type": "tags", "values": ["Move", "Move.Run", "InAir"]}, "p": {"type": "bool"}}
+    columns = [{"Asset": ["a"], "state": ["-Move"], "p": ["Any"]}, {"Asset": ["a"], "state": ["not +Move -InAir"], "p": ["Any"]}]
+    effects_of = effects(*(Table.from_columns(some, schema) for some in columns))
+    assert [box.cells for box in effects_of.closed] == [{"state": "+InAir +Move"}]
+    conditions = {column.condition.name: column.condition for column in Table.from_columns(columns[0], schema).conditions}
+    assert meet({"state": "+Move.Run"}, {"state": "not +Move -InAir"}, conditions) == [{"state": "+InAir +Move.Run"}]
+    both = meet({"state": "-Move.Run"}, {"state": "not +Move -InAir"}, conditions)
+    assert both == [{"state": "-Move -Move.Run"}, {"state": "+InAir -Move.Run"}]

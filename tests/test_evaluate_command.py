@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import os
 import stat
 import subprocess
@@ -16,14 +15,13 @@ import pytest
 import strategies
 from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
-from running import ROOT, Result, run
+from running import ROOT, run
 from warm_start import python
 
 from contextdb.cells.domains import Domain
 from contextdb.cells.facts import describe
 from contextdb.commands.evaluate_command import share
 from contextdb.compiled.table import data_of
-from contextdb.errors import ContextError
 from contextdb.tables.table import Table
 from contextdb.telemetry import evaluate_file
 from contextdb.telemetry.chunks import chunks_of
@@ -84,47 +82,6 @@ def hits(*arguments: str) -> list[int]:
 # ---- the answer
 
 
-def test_sums_stand_on_standard_output():
-    assert run("evaluate", "moves", "data/a.csv") == Result(
-        0,
-        "4 contexts against 3 rows of moves\n"
-        "1 context without a valid asset (25.0 %)\n"
-        "\n"
-        "contexts   share  row  asset\n"
-        "       1  25.0 %    1  run\n"
-        "       1  25.0 %    2  jump\n"
-        "       1  25.0 %    3  fall\n",
-        "",
-    )
-
-
-def test_rows_are_listed_by_how_often_they_are_valid_and_those_that_never_are_counted(here: Path):
-    (here / "t.csv").write_text("Asset,speed\n" + "".join(f"a{i},{i}..40\n" for i in range(20)) + "never,99\n", encoding="utf-8")
-    (here / "c.csv").write_text("speed\n5\n0\n17\n", encoding="utf-8")
-    lines = run("evaluate", "t", "c.csv").lines
-    assert lines[1] == "0 contexts without a valid asset (0.0 %)"
-    assert lines[3:6] == [
-        "contexts    share  row  asset",
-        "       3  100.0 %    1  a0",
-        "       2   66.7 %    2  a1",
-    ]
-    assert lines[-3:] == ["… and 3 more rows", "", "3 rows never valid"]
-
-
-def test_the_json_document_has_the_promised_fields():
-    assert run("evaluate", "moves", "data/a.csv", "--json").json == {
-        "format": 1,
-        "table": "moves",
-        "contexts": 4,
-        "without_asset": 1,
-        "rows": [
-            {"row": 0, "asset": "run", "hits": 1},
-            {"row": 1, "asset": "jump", "hits": 1},
-            {"row": 2, "asset": "fall", "hits": 1},
-        ],
-    }
-
-
 @pytest.mark.parametrize(
     ("part", "whole", "said"),
     [
@@ -151,43 +108,6 @@ def test_a_share_says_0_or_100_only_when_it_is_exactly_that(part: int, whole: in
 # ---- files
 
 
-def test_a_glob_means_all_its_files_in_the_order_of_their_names(here: Path):
-    (here / "data" / "deep").mkdir()
-    (here / "data" / "deep" / "b.csv").write_text("ok\nFalse\n", encoding="utf-8")
-    (here / "data" / "notes.txt").write_text("no contexts", encoding="utf-8")
-    result = run("evaluate", "moves", "data/**/*.csv", "--unknown", "any", "--out", "answers.csv", "--json")
-    assert result.json["contexts"] == 5
-    with (here / "answers.csv").open(encoding="utf-8") as file:
-        assert [row["file"] for row in csv.DictReader(file)] == ["data/a.csv"] * 4 + ["data/deep/b.csv"]
-
-
-def test_a_file_whose_name_looks_like_a_glob_is_that_file(here: Path):
-    (here / "data" / "[a].csv").write_text(WHOLE, encoding="utf-8")
-    pl.read_csv(here / "data" / "a.csv").with_columns(
-        ok=pl.Series([True, True, False, False]), tags=pl.Series([["Move"]] * 4)
-    ).write_parquet(here / "data" / "[a]*.parquet")
-    assert run("evaluate", "moves", "data/[a].csv", "--json").json["contexts"] == 4
-    assert run("evaluate", "moves", "data/[a]*.parquet", "--json").json["contexts"] == 4
-
-
-def test_a_missing_file_is_named_with_the_nearest(here: Path):
-    assert refused("moves", "data/aa.csv") == [
-        "data/aa.csv: no file of contexts is there. Accepted: a .csv, .parquet or .jsonl file, or a glob. "
-        'Did you mean "data/a.csv"?'
-    ]
-    assert refused("moves", "none/*.csv") == [
-        "none/*.csv: no file of contexts is there. Accepted: a .csv, .parquet or .jsonl file, or a glob."
-    ]
-    assert refused("moves", "data") == [
-        'data: no file of contexts is there. Accepted: a .csv, .parquet or .jsonl file, or a glob. Did you mean "data/*.csv"?'
-    ]
-
-
-def test_a_file_of_another_kind_is_refused(here: Path):
-    (here / "data" / "c.json").write_text("[]", encoding="utf-8")
-    assert refused("moves", "data/c.json")[0].startswith('data/c.json: a file of contexts does not end in ".json".')
-
-
 @pytest.mark.parametrize("unknown", ["error", "any", "never"])
 def test_a_file_without_contexts_has_sums_of_nothing(here: Path, unknown: str):
     (here / "none.csv").write_text(WHOLE.splitlines()[0] + "\n", encoding="utf-8")
@@ -197,13 +117,6 @@ def test_a_file_without_contexts_has_sums_of_nothing(here: Path, unknown: str):
         assert result.lines[:2] == ["0 contexts against 3 rows of moves", "0 contexts without a valid asset"]
         assert result.lines[-1] == "3 rows never valid"
         assert pl.read_parquet(here / "answers.parquet").height == 0
-
-
-def test_a_table_without_conditions_has_every_row_valid_in_each_context(here: Path):
-    (here / "bare.csv").write_text("Asset\nx\ny\n", encoding="utf-8")
-    result = run("evaluate", "bare", "data/a.csv", "--json")
-    assert (result.json["contexts"], result.json["without_asset"]) == (4, 0)
-    assert [row["hits"] for row in result.json["rows"]] == [4, 4]
 
 
 @pytest.mark.parametrize("name", ["c.csv", "c.parquet"])
@@ -275,12 +188,6 @@ def _as_text(fact: object, domain: Domain) -> str:
 # ---- missing facts
 
 
-@pytest.mark.parametrize(("unknown", "found"), [("any", [1, 1, 2]), ("never", [1, 0, 1])])
-def test_missing_facts_are_treated_as_said(here: Path, unknown: str, found: list[int]):
-    (here / "c.csv").write_text("state,speed,heading,ok,tags\nGround,4,10,,Move\nIn Air,,,,\n,,180,False,\n", encoding="utf-8")
-    assert hits("c.csv", "--unknown", unknown) == found
-
-
 @pytest.mark.parametrize(
     ("name", "place"), [("c.csv", 'c.csv, line 3, column "speed"'), ("c.parquet", 'c.parquet, row 2, column "speed"')]
 )
@@ -294,39 +201,7 @@ def test_a_missing_fact_is_named_with_its_place(here: Path, name: str, place: st
     ]
 
 
-@pytest.mark.parametrize("unknown", ["error", "any", "never"])
-def test_a_misspelt_column_is_never_passed_over(here: Path, unknown: str):
-    (here / "c.csv").write_text(WHOLE.replace("heading", "headin"), encoding="utf-8")
-    assert refused("moves", "c.csv", "--unknown", unknown) == [
-        'c.csv: there is no condition "headin", and "heading" is missing. '
-        'Accepted: the names of the table\'s conditions. Did you mean "heading"?'
-    ]
-
-
 # ---- wrong facts
-
-
-def test_every_wrong_fact_of_a_csv_is_named_with_its_line(here: Path):
-    rows = ["Gruond,fast,x,maybe,+Move", "Ground,1..2,1,True,a", "Ground,1,1,True,a"]
-    (here / "c.csv").write_text("state,speed,heading,ok,tags\n" + "\n".join(rows) + "\n", encoding="utf-8")
-    told = refused("moves", "c.csv")
-    assert [line.partition(": ")[0] for line in told] == [
-        'c.csv, line 2, column "state"',
-        'c.csv, line 2, column "speed"',
-        'c.csv, line 2, column "heading"',
-        'c.csv, line 2, column "ok"',
-        'c.csv, line 2, column "tags"',
-        'c.csv, line 3, column "speed"',
-    ]
-    assert 'Did you mean "Ground"?' in told[0]
-    assert told[1].endswith('cannot read "fast" as a number. Accepted: one value of its type in each context.')
-    assert told[5].endswith('"1..2" is a set of values. Accepted: one value of its type in each context.')
-
-
-def test_a_wrong_fact_that_stands_in_many_lines_is_told_once(here: Path):
-    (here / "c.csv").write_text("speed\n1\n" + "fast\n" * 1000, encoding="utf-8")
-    (line,) = refused("moves", "c.csv", "--unknown", "any")
-    assert line.startswith('c.csv, line 3, column "speed": cannot read "fast" as a number.')
 
 
 @pytest.mark.parametrize(
@@ -367,11 +242,6 @@ def test_a_cut_off_parquet_file_is_refused(here: Path):
         assert refused("moves", "c.parquet", "--unknown", "any")[0].startswith("c.parquet: ")
 
 
-def test_a_csv_that_is_no_table_is_refused_with_its_line(here: Path):
-    (here / "c.csv").write_text("speed,ok\n1\n", encoding="utf-8")
-    assert refused("moves", "c.csv")[0].startswith("c.csv, line 2: found 1 field, the header has 2.")
-
-
 # ---- writing answers
 
 
@@ -391,31 +261,6 @@ def test_the_answers_of_each_context_are_written(here: Path, name: str):
             "2,data/a.csv,1,2,fall",
             '3,data/a.csv,0,"",""',
         ]
-
-
-def test_several_assets_of_a_context_stand_in_one_cell_of_a_csv(here: Path):
-    (here / "c.csv").write_text("ok\nTrue\n", encoding="utf-8")
-    run("evaluate", "moves", "c.csv", "--unknown", "any", "--out", "answers.csv")
-    assert (here / "answers.csv").read_text(encoding="utf-8").splitlines()[1] == "0,c.csv,2,0 1,run | jump"
-
-
-@pytest.mark.parametrize(
-    ("out", "message"),
-    [
-        ("answers.json", "answers.json: answers cannot be written to such a file. Accepted: a name that ends in .csv or .parquet."),
-        ("none/answers.csv", 'none/answers.csv: there is no folder "none". Accepted: an existing folder.'),
-        ("data/../data/a.csv", "data/../data/a.csv: the answers would be written over the contexts. Accepted: another file."),
-    ],
-)
-def test_where_answers_cannot_go_is_said_before_the_work(here: Path, out: str, message: str):
-    assert refused("moves", "data/a.csv", "--out", out) == [message]
-    assert (here / "data" / "a.csv").read_text(encoding="utf-8") == WHOLE
-
-
-def test_nothing_is_written_when_a_context_is_wrong(here: Path):
-    (here / "data" / "b.csv").write_text("speed\nfast\n", encoding="utf-8")
-    assert refused("moves", "data/*.csv", "--out", "answers.csv", "--unknown", "any")
-    assert not (here / "answers.csv").exists()
 
 
 def test_an_interrupted_run_leaves_the_old_answers_and_nothing_else(here: Path, monkeypatch: pytest.MonkeyPatch):
@@ -467,12 +312,6 @@ def test_the_place_of_a_fault_counts_what_was_read_before(here: Path, monkeypatc
     assert line.startswith(f'{place}: cannot read "fast" as a number.')
 
 
-def test_a_scheduler_wants_the_engine_that_has_one(here: Path):
-    assert refused("moves", "data/a.csv", "--scheduler", "tcp://x:1") == [
-        "--scheduler is the address of Dask's. Accepted: --engine dask with it."
-    ]
-
-
 # ---- reading contexts
 
 
@@ -480,13 +319,6 @@ def test_texts_of_a_csv_are_read_as_on_the_command_line():
     compiled = Table.from_columns({"Asset": ["a"], "x": ["1"]}, {"x": {"type": "angle"}}).compile()
     Path("c.csv").write_text('x\n370\n"20, 0"\n=5\n\n -0.0 \nnan\n', encoding="utf-8")
     assert read_contexts(Path("c.csv"), compiled).facts["x"].to_list() == [10.0, 20.0, 5.0, 0.0, None]
-
-
-def test_a_set_in_a_file_of_contexts_is_refused():
-    compiled = Table.from_columns({"Asset": ["a"], "x": ["b"]}, {"x": {"type": "text"}}).compile()
-    Path("c.csv").write_text("x\na b\n", encoding="utf-8")
-    with pytest.raises(ContextError, match='"a b" is a set of values'):
-        read_contexts(Path("c.csv"), compiled)
 
 
 # ---- where answers cannot go, and where they can

@@ -130,7 +130,7 @@ def test_a_row_whose_failing_cells_are_changed_as_said_is_valid(table: Table, da
     explanation = table.compile().explain(context, unknown=unknown)
     rows = explanation._order.tolist()[:: max(1, table.n_rows // 8)]
     edits = [(row, f.condition, f.mend) for row in rows for f in explanation.row(row).failures]
-    mended = table.with_cells(edits).compile().query(context, unknown=unknown)
+    mended = table.with_cells(edits).compile().query(context, unknown=unknown).rows.tolist()
     assert [row for row in rows if oracles.is_enabled(table, row) and row not in mended] == []
 
 

@@ -1,19 +1,16 @@
-"""The names of `contextdb` itself: the same for the interpreter, for type checkers and in `dir`; what goes away says so."""
+"""The names of `contextdb` itself: the same for the interpreter, for type checkers and in `dir`."""
 
 from __future__ import annotations
 
 import ast
 import importlib
-import re
 
 import pytest
 from running import ROOT
 from test_imports import modules_after
 
 import contextdb as cdb
-from contextdb import errors, motion
-
-OLD = {"ClipError": motion.ClipError, "MotionError": motion.MotionError, "QueryError": motion.QueryError}
+from contextdb import motion
 
 
 def for_checkers() -> dict[str, str]:
@@ -48,45 +45,8 @@ def test_a_name_that_there_is_not_is_an_attribute_error():
         cdb.Projectt  # type: ignore[attr-defined]  # noqa: B018
 
 
-@pytest.mark.parametrize("name", OLD)
-def test_the_errors_of_motion_are_in_motion_and_their_old_names_warn(name: str):
-    with pytest.warns(DeprecationWarning, match="goes away") as caught:
-        assert getattr(cdb, name) is OLD[name]
-    said = f"contextdb.{name} goes away in contextdb {errors.GONE_IN}. Use contextdb.motion.{name}."
-    assert [(str(w.message), w.filename) for w in caught] == [(said, __file__)]
-    assert name not in cdb.__all__
-    assert name not in dir(cdb)
-
-
-def test_an_old_name_warns_whoever_imports_it():
-    with pytest.warns(DeprecationWarning, match=r"Use contextdb\.motion\.QueryError"):
-        exec("from contextdb import QueryError")
-
-
-def test_our_own_warnings_of_old_names_are_errors_in_the_tests():
-    with pytest.raises(DeprecationWarning, match="goes away in contextdb"):
-        cdb.ClipError  # type: ignore[attr-defined]  # noqa: B018
-    with pytest.raises(DeprecationWarning, match="goes away in contextdb"):
-        errors.warn_of_old("the old", "the new")
-
-
-def test_what_goes_away_stays_one_minor_version():
-    """Fails when the version is raised: remove what GONE_IN names, then raise GONE_IN."""
-    major, minor = map(int, cdb.__version__.split(".")[:2])
-    assert f"{major}.{minor + 1}" == errors.GONE_IN
-
-
 def test_the_public_modules_have_the_names_that_they_list():
     for name in ("contextdb", "contextdb.motion", "contextdb.telemetry"):
         module = importlib.import_module(name)
         assert len(set(module.__all__)) == len(module.__all__)
         assert all(getattr(module, public) is not None for public in module.__all__)
-
-
-def test_no_code_or_page_of_ours_uses_an_old_name():
-    old = re.compile(rf"\b(?:cdb|contextdb)\.(?:{'|'.join(OLD)})\b(?! goes)|from contextdb import [^#\n]*\b(?:{'|'.join(OLD)})\b")
-    folders = [ROOT / name for name in ("contextdb", "tui", "tests", "benchmarks", "docs")]
-    files = [path for folder in folders for path in folder.rglob("*.*") if path.suffix in (".py", ".md")]
-    assert len(files) > 500
-    tests = {ROOT / "tests" / name for name in ("test_face.py", "test_stubs.py")}
-    assert [path.name for path in files if path not in tests and old.search(path.read_text(encoding="utf-8"))] == []

@@ -21,7 +21,8 @@ from strategies import some
 
 from contextdb.edits.edits import set_cells, set_settings
 from contextdb.errors import ContextDBError
-from contextdb.motion import make_clip, write_bvh
+from contextdb.motion import write_bvh
+from contextdb.motion.made.recipes import make_clip
 from contextdb.tables.project import load
 from tui.model.session import Session
 
@@ -243,19 +244,26 @@ def test_edits_after_one_that_could_not_be_kept_do_not_come_back_without_it(fold
 # ---- every writer is counted
 
 
-OPENERS = {"write_text", "write_bytes", "NamedTemporaryFile", "mkstemp", "sink_csv", "sink_parquet"}
-SYSTEM = {"open", "write", "replace", "rename", "link", "fsync", "truncate", "ftruncate"}
-CALLED = re.compile(rf"\b({'|'.join(OPENERS | SYSTEM)})\s*\(")
+OPENERS = {"write_text", "write_bytes", "touch", "mkdir", "rmdir", "unlink", "symlink_to", "hardlink_to", "chmod"}
+OPENERS |= {"NamedTemporaryFile", "TemporaryDirectory", "mkstemp", "mkdtemp"}
+OPENERS |= {"sink_csv", "sink_parquet"}
+SYSTEM = {"open", "write", "replace", "rename", "renames", "link", "symlink", "fsync", "truncate", "ftruncate", "chmod", "chown"}
+SYSTEM |= {"remove", "unlink", "mkdir", "makedirs", "rmdir", "removedirs", "mkfifo", "mknod"}
+SHUTIL = {"rmtree", "copyfile", "copy", "copy2", "copytree", "move"}
+CALLED = re.compile(rf"\b({'|'.join(OPENERS | SYSTEM | SHUTIL)})\s*\(")
 ALLOWED = {
     "contextdb/console.py": {"os.open"},  # nowhere
-    "contextdb/telemetry/evaluate_file.py": {"os.rename", "write_parquet"},  # into the folder of what is not finished
-    "contextdb/commands/evaluate_command.py": {"sink_csv", "sink_parquet"},
-    "contextdb/edits/diffing/lines.py": {"write_bytes"},  # into a temporary folder, for git to read
-    "contextdb/commands/demo_command.py": {"os.rename"},  # a whole folder
-    "tui/model/played_run.py": {"write_bytes"},  # into a temporary folder
+    "contextdb/commands/limits.py": {"os.open", "open"},  # nowhere, and a second number of standard error
+    "contextdb/telemetry/evaluate_file.py": {"write_parquet"},  # into the folder of what is not finished
+    "contextdb/commands/evaluate_command.py": {"sink_csv", "sink_parquet"},  # into the same
+    "contextdb/edits/diffing/lines.py": {"TemporaryDirectory", "write_bytes"},  # into a temporary folder, for git to read
+    "contextdb/commands/ci_command.py": {"TemporaryDirectory"},  # into a temporary folder
+    "contextdb/commands/demo_command.py": {"TemporaryDirectory", "shutil.copyfile"},  # into a folder that nobody has yet
+    "contextdb/motion/clips/parser_child.py": {"TemporaryDirectory", "open", "os.open"},  # what a library reads as a file; nowhere
+    "tui/model/played_run.py": {"TemporaryDirectory"},
     "contextdb/telemetry/link/game.py": {"path.open"},  # a recording, which grows while the game runs
-    "contextdb/telemetry/link/folder.py": {"os.open"},  # a lock
-    "contextdb/telemetry/link/doors.py": {"os.open"},  # the token of a door
+    "contextdb/telemetry/link/folder.py": {"os.open", "mkdir"},  # a lock, in a folder of this user alone
+    "contextdb/telemetry/link/doors.py": {"os.open", "os.chmod", "unlink"},  # sockets, and the token of a door
 }
 
 
@@ -270,7 +278,7 @@ def writes_of(path: Path) -> set[str]:
             continue
         called = ast.unparse(node.func)
         last = called.rpartition(".")[2]
-        if called in {f"os.{name}" for name in SYSTEM}:
+        if called in {f"os.{name}" for name in SYSTEM} | {f"shutil.{name}" for name in SHUTIL}:
             found.add(called)
         elif last in OPENERS:
             found.add(last)

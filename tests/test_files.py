@@ -17,7 +17,7 @@ import polars as pl
 import pytest
 
 from contextdb.columns import TextColumn
-from contextdb.disk import read_bytes, write_atomic
+from contextdb.disk import read_bytes, real_path, write_atomic
 from contextdb.errors import FileError, TableError
 from contextdb.files.csv_source import Source
 from contextdb.files.parquet import ParquetSource
@@ -147,20 +147,20 @@ def test_a_folder_taken_for_a_file_is_named_with_a_table_in_it(table: Path):
 
 
 def test_a_file_that_may_not_be_read_is_named(table: Path, monkeypatch: pytest.MonkeyPatch):
-    def denied(self: Path) -> bytes:
+    def denied(*_: object) -> int:
         raise PermissionError(errno.EACCES, "Permission denied")
 
-    monkeypatch.setattr(Path, "read_bytes", denied)
+    monkeypatch.setattr(os, "open", denied)
     assert refused(lambda: read_bytes(table)) == (
         f"{table}: the file may not be read. Accepted: a file that you have the permission to read."
     )
 
 
 def test_other_refusals_give_the_systems_reason(table: Path, monkeypatch: pytest.MonkeyPatch):
-    def broken(self: Path) -> bytes:
+    def broken(*_: object) -> int:
         raise OSError(errno.EIO, "Input/output error")
 
-    monkeypatch.setattr(Path, "read_bytes", broken)
+    monkeypatch.setattr(os, "open", broken)
     assert refused(lambda: read_bytes(table)) == f"{table}: the file cannot be read: Input/output error."
 
 
@@ -178,6 +178,18 @@ def test_a_pipe_is_refused_and_not_waited_for(tmp_path: Path):
 def test_a_link_to_nothing_is_named(tmp_path: Path):
     (tmp_path / "a.csv").symlink_to("gone.csv")
     assert 'this is a link to "gone.csv", which does not exist' in refused(lambda: read_bytes(tmp_path / "a.csv"))
+
+
+@needs_links
+def test_a_link_that_leads_to_itself_has_a_whole_path(tmp_path: Path):
+    (tmp_path / "a.csv").symlink_to("b.csv")
+    (tmp_path / "b.csv").symlink_to("a.csv")
+    assert real_path(tmp_path / "b.csv").parent == tmp_path.resolve()
+
+
+def test_no_path_is_made_whole_in_the_way_that_fails_at_such_a_link():
+    sources = [path for package in ("contextdb", "tui") for path in (ROOT / package).rglob("*.py")]
+    assert [str(path) for path in sources if ".resolve()" in path.read_text(encoding="utf-8")] == []
 
 
 # ---- writing

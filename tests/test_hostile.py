@@ -339,7 +339,7 @@ def test_any_python_value_as_a_fact_is_answered_or_refused(name: str, value: obj
     }
     compiled = Table.from_columns(columns, schema).compile()
     context = GOOD | {name: value}
-    for ask in (compiled.query, compiled.explain, compiled.pick, compiled.encode, compiled.penalties):
+    for ask in (compiled.query, compiled.explain, compiled.pick, compiled.penalties):
         try:
             ask(context, unknown="any")  # type: ignore[operator]
         except ContextError as error:

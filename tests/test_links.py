@@ -14,7 +14,6 @@ from contextdb.cells.domains import Domain
 from contextdb.cells.grammar import reads
 from contextdb.motion import MotionConfig
 from contextdb.schema.settings import read_schema
-from contextdb.schema.shapes import SECTIONS
 
 ROOT = Path(__file__).parent.parent
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").rglob("*.md"))]
@@ -143,11 +142,3 @@ def test_an_example_of_an_expression_gives_what_the_page_says(source: str, resul
     live = table.compile().live({name: FACTS[name] for name in table.compile().asked})
     assert live["result"] == result
     assert type(live["result"]) is type(result) or not isinstance(result, bool)
-
-
-def test_the_format_page_names_every_section_and_key_of_contextdb_toml():
-    page = text_of("docs/format.md")
-    for section, keys in SECTIONS.items():
-        assert f"[{section}" in page
-        for key in keys or ():
-            assert f"`{key}`" in page or f"\n{key} = " in page, f"{section}.{key}"

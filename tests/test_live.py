@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from contextdb import bitmask
 from contextdb.cells.facts import cell
 from contextdb.compiled.classes import FLAT_BYTES
-from contextdb.compiled.live import BLOCK, LOOKED_AT, MOST_MOVING, LiveContext
+from contextdb.compiled.live import LiveContext
 from contextdb.compiled.matches import Matches
 from contextdb.errors import ContextError
 from contextdb.tables.table import Table
@@ -65,18 +65,11 @@ def steps(table: Table) -> st.SearchStrategy[tuple[str, strategies.Fact]]:
     )
 
 
-@pytest.mark.parametrize(("most_moving", "looked_at"), [(MOST_MOVING, LOOKED_AT), (MOST_MOVING, 1), (1, 1)])
 @pytest.mark.parametrize("flat_bytes", [FLAT_BYTES, 0], ids=["flat", "wide"])
 @given(strategies.tables(least_conditions=1), st.sampled_from(["any", "never"]), st.data())
 @strategies.examples(0.6)
-def test_after_any_changes_a_live_context_answers_what_reading_every_cell_does(
-    flat_bytes, most_moving, looked_at, table, unknown, data
-):
-    with (
-        mock.patch("contextdb.compiled.classes.FLAT_BYTES", flat_bytes),
-        mock.patch("contextdb.compiled.live.MOST_MOVING", most_moving),
-        mock.patch("contextdb.compiled.live.LOOKED_AT", looked_at),
-    ):
+def test_after_any_changes_a_live_context_answers_what_reading_every_cell_does(flat_bytes, table, unknown, data):
+    with mock.patch("contextdb.compiled.classes.FLAT_BYTES", flat_bytes):
         live = table.compile().live(unknown=unknown)
         plain: dict[str, object] = {}
         for name, fact in data.draw(st.lists(steps(table), min_size=1, max_size=12)):
@@ -99,28 +92,24 @@ def test_a_live_context_insists_on_every_fact_as_a_query_does(table, data):
         assert answer_or_message(live.matches) == answer_or_message(lambda: compiled.query(live.facts))
 
 
-@pytest.mark.parametrize("n_facts", [BLOCK - 1, BLOCK, 3 * BLOCK + 2])
-@pytest.mark.parametrize("looked_at", [LOOKED_AT, 2, 1])
-def test_facts_that_move_again_and_again_stand_still_and_move_again_as_in_a_query(n_facts, looked_at):
+@pytest.mark.parametrize("n_facts", [4, 5, 17, 70])
+def test_facts_that_change_again_and_again_are_answered_as_in_a_query(n_facts):
     rng = random.Random(n_facts)
     names = [f"c{i}" for i in range(n_facts)]
     cells = {name: [rng.choice(["Any", "<5", ">=3", "2..4"]) for _ in range(70)] for name in names}
     columns = {"Asset": [f"a{r}" for r in range(70)], **cells}
     table = Table.from_columns(columns, {name: {"type": "number"} for name in names}).compile()
-    with mock.patch("contextdb.compiled.live.LOOKED_AT", looked_at):
-        live = table.live(dict.fromkeys(names, 4.0))
-        for phase in range(12):
-            moving = rng.sample(names, min(3, n_facts))
-            for frame in range(2 * looked_at + 2):
-                for name in moving if phase % 3 else rng.sample(names, min(3, n_facts)):
-                    live[name] = rng.choice([1.0, 3.5, 4.5, 6.0])
-                if frame == 3:
-                    live = live.copy()
-                assert live.matches() == table.query(live.facts)
+    live = table.live(dict.fromkeys(names, 4.0))
+    for frame in range(150):
+        for name in rng.sample(names, min(3, n_facts)):
+            live[name] = rng.choice([1.0, 3.5, 4.5, 6.0])
+        if frame == 30:
+            live = live.copy()
+        assert live.matches() == table.query(live.facts)
 
 
-def test_more_facts_may_move_than_are_kept_apart():
-    names = [f"c{i}" for i in range(3 * MOST_MOVING)]
+def test_each_of_many_facts_counts_as_soon_as_it_is_set():
+    names = [f"c{i}" for i in range(24)]
     table = Table.from_columns(
         {"Asset": ["a", "b"], **{name: ["<5", ">=3"] for name in names}}, {name: {"type": "number"} for name in names}
     )
@@ -152,7 +141,7 @@ def test_facts_that_the_table_does_not_ask_for_are_passed_over_by_live_and_updat
     assert set(live.facts) == set(FACTS)
 
 
-@pytest.mark.parametrize("n_updates", [1, LOOKED_AT * 3], ids=["at once", "with facts that move"])
+@pytest.mark.parametrize("n_updates", [1, 48])
 @pytest.mark.parametrize("wrong", [{"state": "Water"}, {"heading": "north"}, {"state": []}])
 def test_an_update_with_a_wrong_fact_sets_none(wrong: dict[str, object], n_updates: int):
     live = TABLE.compile().live(FACTS)

@@ -257,10 +257,10 @@ def test_a_table_that_is_not_here_is_noted_once_and_lost_lines_are_counted():
     changes = Changes({"x": own}, False)
     header = {"line": "tables", "tables": {"y": {"rows": 1}, "x": {"rows": 1, "version": "0" * 64}}}
     unknown, version = changes.of(header).notes
-    assert unknown == '"y" is not one of your tables, so it is not asked.'
+    assert unknown == '"y" is not one of your tables, so its answer is not compared.'
     assert version.startswith('the game has another version of "x": 00000000, yours is ')
     assert changes.of(header).notes == []
-    assert changes.of({"line": "lost", "count": 2}).notes == ["2 lines lost: the game told more than could be sent."]
+    assert changes.of({"line": "lost", "count": 2}).notes == ["2 lines lost: the game produced more than could be sent."]
 
 
 def test_nothing_that_a_game_sends_moves_the_cursor_or_stops_the_listener():
@@ -269,11 +269,9 @@ def test_nothing_that_a_game_sends_moves_the_cursor_or_stops_the_listener():
     assert len(lines) == 1
     assert all(character.isprintable() for character in lines[0])
     own = cdb.Table.from_columns({"Asset": ["a"]}, name="x").compile()
-    assert Changes({"x": own}, True).of(ask(facts={"z": {"odd": 1}})).notes == [
-        'your "x" cannot be asked that: this is not a fact.'
-    ]
-    assert "cannot be asked" in Changes({"x": own}, True).of(ask(actors={"A": [{"hp": 3}]})).notes[0]
-    assert Changes({"x": own}, True).of(ask(rows="0")).notes == ['your "x" answers otherwise than the game\'s.']
+    assert Changes({"x": own}, True).of(ask(facts={"z": {"odd": 1}})).notes == ['your "x" cannot answer that: this is not a fact.']
+    assert "cannot answer" in Changes({"x": own}, True).of(ask(actors={"A": [{"hp": 3}]})).notes[0]
+    assert Changes({"x": own}, True).of(ask(rows="0")).notes == ['your "x" answers differently from the game\'s.']
 
 
 @pytest.mark.parametrize("fault", [TypeError, ValueError, AttributeError])

@@ -6,7 +6,7 @@ from itertools import chain, combinations, product
 
 import pytest
 
-from contextdb.cells.sets import Accepted, Cell, TagSet, ValueSet, meet, meet_exactly, meet_in_a_cell
+from contextdb.cells.sets import Accepted, Cell, TagSet, ValueSet, meet, meet_exactly
 
 NAMES = ("A", "B", "C")
 
@@ -33,7 +33,6 @@ def test_a_meet_holds_what_both_hold_and_one_in_a_cell_at_least_that(sets: list[
     for one, other in product(sets, repeat=2):
         both = [a and b for a, b in zip(held(one), held(other), strict=True)]
         assert held(meet_exactly(one, other)) == both, (one, other)
-        assert all(a for a, b in zip(held(meet_in_a_cell(one, other)), both, strict=True) if b), (one, other)
 
 
 def test_penalties_of_soft_cells_are_added_one_after_the_other():

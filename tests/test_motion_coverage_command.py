@@ -13,9 +13,12 @@ from motion_project import work_in_copy, write_project
 from running import Result, run
 
 import contextdb as cdb
-from contextdb.files.reports import sealed
-from contextdb.motion import make_clip, make_joint_clip, write_bvh
+from contextdb.files.reports import sealed, with_marks
+from contextdb.motion import write_bvh
+from contextdb.motion.made.joint import make_joint_clip
+from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.measuring.moves import MAPS
+from contextdb.report.render_json import as_json
 
 TOML = """
 [tables.moves]
@@ -65,6 +68,11 @@ CLIPS = {
     "stand_to_walk": "start_walk",
     "unlisted_<b>": "run",
 }
+
+
+def resealed(document: object) -> str:
+    """The text of a report with the digest that belongs to it."""
+    return sealed(as_json(with_marks(document)))
 
 
 @pytest.fixture(scope="module")
@@ -174,7 +182,7 @@ def test_the_page_tells_the_numbers_of_the_json():
     flat = [n for row in maps["turn"]["frames"] for n in row]
     assert [n for n in numbers(shown) if n] == [n for n in flat if n]
     assert sum("!" in square for square in shown) == sum(share > 0.0 for row in maps["turn"]["holes"] for share in row)
-    assert "No clip goes another way than ahead" in text
+    assert "Every clip moves straight ahead" in text
     assert {c for row in maps["direction"]["frames"] for c, n in enumerate(row) if n} == {MAPS["direction"].centre}
     page.feed(text)
     assert "b" not in page.tags
@@ -188,13 +196,13 @@ def test_the_terminal_tells_the_numbers_of_the_json_in_80_columns():
     tables = before()["tables"]
     text = result.out.split("\n\n")
     for name, of in MAPS.items():
-        told = of.told.capitalize()
+        told = of.caption.capitalize()
         shown = [block for block in text if block.startswith(told)]
         for block, table in zip(shown, tables, strict=True):
             lines = {line.split()[0]: re.findall(r"(\d+)!?(?=\s|$)", line[7:]) for line in block.splitlines()[3:]}
             rows = {row.name: [n for n in table["maps"][name]["frames"][i] if n] for i, row in enumerate(of.rows)}
             assert {row: [int(n) for n in squares if int(n)] for row, squares in lines.items()} == {row: rows[row] for row in lines}
-            assert sum(map(sum, rows.values())) == sum(sum(rows[row]) for row in lines) or "No clip goes" in block
+            assert sum(map(sum, rows.values())) == sum(sum(rows[row]) for row in lines) or "Every clip moves" in block
     assert "Capture next" in result.out
     percent = f"{100 * tables[0]['covered']:.1f} %"
     assert result.lines[0] == f"moves: {percent} of the wanted movements have a valid clip"
@@ -210,8 +218,8 @@ def test_one_set_of_contexts_is_shown_alone():
 
 
 def test_a_bar_that_is_missed_fails_and_one_that_is_kept_does_not():
-    assert "MISSED  fail-under" in covered("--fail-under", "99", code=1).out
-    assert "kept  fail-under" in covered("--fail-under", "10").out
+    assert "FAILED  fail-under" in covered("--fail-under", "99", code=1).out
+    assert "passed  fail-under" in covered("--fail-under", "10").out
     assert "is not a percentage" in refused("--fail-under", "x")
 
 
@@ -241,16 +249,40 @@ def test_a_table_that_has_no_clips_any_more_fails():
     toml = Path("game", "contextdb.toml")
     toml.write_text(toml.read_text(encoding="utf-8").partition("[databases.free]")[0], encoding="utf-8")
     result = covered("--baseline", "before.json", code=1)
-    assert '"free" of the baseline has no clips any more' in result.out
+    assert 'the table "free" of the baseline no longer exists' in " ".join(result.out.split())
+    accepted = covered("--baseline", "before.json", "--gone", "free")
+    assert "as --gone accepts" in " ".join(accepted.out.split())
+    assert "accepts nothing" in refused("--baseline", "before.json", "--gone", "fre")
+
+
+def test_a_table_that_the_baseline_does_not_have_fails_unless_it_is_named():
+    document = before()
+    Path("before.json").write_text(resealed({**document, "tables": document["tables"][:1]}), encoding="utf-8")
+    assert 'the table "free" is not in the baseline' in " ".join(covered("--baseline", "before.json", code=1).out.split())
+    covered("--baseline", "before.json", "--new", "free")
+    Path("before.json").write_text(resealed({**document, "tables": []}), encoding="utf-8")
+    assert "it has no tables" in refused("--baseline", "before.json")
+
+
+def test_shares_of_other_contexts_are_not_compared_unless_that_is_accepted():
+    toml = Path("game", "contextdb.toml")
+    text = toml.read_text(encoding="utf-8").replace('policy = "collect"', 'policy = "collect"\nassume = ["speed < 2"]')
+    toml.write_text(text, encoding="utf-8")
+    result = covered("--baseline", "before.json", "--json", code=1)
+    (gate,) = result.json["tables"][0]["gates"]
+    assert (gate["name"], 'assume now has "speed < 2"' in gate["message"]) == ("redefined", True)
+    covered("--baseline", "before.json", "--redefined", "moves")
+    assert "wanted by" in covered("--baseline", "before.json", "--axis", "turn=speed", code=1).out
 
 
 @pytest.mark.parametrize(
     ("text", "said"),
     [
         ("", "cannot be read"),
-        ("[]", 'no "format": 1'),
-        ('{"format": 1, "bins": {}, "tables": []}', "its bins are others"),
-        ('{"format": 1}', "is missing"),
+        ("[]", "neither the writer nor the digest"),
+        (resealed({"format": 2}), 'no "format": 1'),
+        (resealed({"format": 1, "bins": {}, "tables": []}), "its bins are others"),
+        (resealed({"format": 1}), "is missing"),
         ("\udcff", "cannot be read"),
     ],
 )
@@ -266,7 +298,7 @@ def test_shares_of_a_baseline_that_are_none_are_refused():
     document["tables"][0]["maps"]["turn"]["filled"][0][0] = 7
     Path("bad.json").write_text(json.dumps(document), encoding="utf-8")
     assert "its contents do not match its digest" in refused("--baseline", "bad.json")
-    Path("bad.json").write_text(json.dumps(sealed(document)), encoding="utf-8")
+    Path("bad.json").write_text(resealed(document), encoding="utf-8")
     assert "no shares from 0 to 1" in refused("--baseline", "bad.json")
 
 
@@ -317,7 +349,7 @@ def test_where_no_context_has_a_valid_clip_nothing_is_covered():
 def test_python_gives_what_the_command_prints():
     found = cdb.motion_coverage(cdb.Project.load("game"))
     assert [each.to_json() for each in found.tables] == [
-        {key: value for key, value in table.items() if key not in ("baseline", "gates")} for table in before()["tables"]
+        {key: value for key, value in table.items() if key not in ("space", "baseline", "gates")} for table in before()["tables"]
     ]
     assert found.unlisted == ("unlisted_<b>",)
 

@@ -16,9 +16,10 @@ from running import Result, run
 from strategies import some
 
 from contextdb.errors import ContextError
-from contextdb.files.reports import sealed
+from contextdb.files.reports import sealed, with_marks
 from contextdb.motion import Trace, measure
 from contextdb.report.measure_results import read_baseline
+from contextdb.report.render_json import as_json
 
 OUTPUT = "[output.player]\nfoot_lock = false\n"
 """So that feet slide."""
@@ -60,6 +61,11 @@ def made() -> Path:
 def here(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A working folder with a copy of it all."""
     return work_in_copy(made, tmp_path, monkeypatch)
+
+
+def resealed(document: object) -> str:
+    """The text of a report with the digest that belongs to it."""
+    return sealed(as_json(with_marks(document)))
 
 
 def measured(*arguments: str, code: int = 0) -> Result:
@@ -123,19 +129,21 @@ def test_the_text_has_the_raw_clips_beside_and_says_what_is_never_played():
     assert any(line.startswith("not measured, as the session does not say where") for line in measured("poses.npz").lines)
 
 
-@pytest.mark.parametrize("name", some(["skate", "jumps", "accel", "path", "heading", "reach", "forced", "forced-cost"], 3))
-def test_a_broken_bar_fails_and_is_told(name: str):
+@pytest.mark.parametrize(
+    "name", some(["skate", "toe-skate", "dip", "jumps", "accel", "path", "heading", "reach", "forced", "forced-cost"], 3)
+)
+def test_a_missed_threshold_fails_and_is_reported(name: str):
     session = session_of("session.parquet", f"--max-{name}", "0.0001", code=1)
     (gate,) = session["bars"]
     assert (gate["name"], gate["passed"], gate["limit"]) == (f"max-{name}", False, 0.0001)
     assert session_of("session.parquet", f"--max-{name}", "99999")["bars"][0]["passed"] is True
     text = measured("session.parquet", f"--max-{name}", "0.0001", code=1)
-    assert text.lines[-1].startswith(f"BROKEN  max-{name}: ")
+    assert text.lines[-1].startswith(f"FAILED  max-{name}  ")
     case = ET.fromstring(measured("session.parquet", f"--max-{name}", "0", "--format", "junit", code=1).out).find(".//failure")
     assert case is not None
     assert case.get("type") == f"max-{name}"
     markdown = measured("session.parquet", f"--max-{name}", "0", "--format", "markdown", code=1).out
-    assert f"- **max-{name}**: " in markdown
+    assert f"- ✗ max-{name}: " in markdown
 
 
 def test_a_session_without_bars_is_one_passed_case():
@@ -147,20 +155,19 @@ def test_the_same_session_is_no_worse_than_its_baseline():
     session = session_of("session.parquet", "--baseline", "before.json")
     assert session["bars"]
     assert all(gate["passed"] for gate in session["bars"])
-    assert measured("session.parquet", "--baseline", "before.json").lines[-1] == "kept  baseline: nothing is worse"
+    assert measured("session.parquet", "--baseline", "before.json").lines[-1] == "passed  baseline  nothing is worse"
 
 
 @pytest.mark.parametrize("value", ["x", True, [1], {}, math.nan, math.inf, "gone"])
 def test_a_measure_of_the_baseline_that_is_no_number_is_refused_and_never_passed_over(here: Path, value: object):
     document = json.loads((here / "before.json").read_text(encoding="utf-8"))
-    del document["digest"]
     session = document["sessions"][0]
     if value == "gone":
         del session["jumps_per_s"]
     else:
         session["jumps_per_s"] = value
     with pytest.raises(ContextError, match=r'b\.json: in the baseline "session\.parquet" has no number as "jumps_per_s"'):
-        read_baseline(json.dumps(document), "b.json")
+        read_baseline(resealed(document), "b.json")
 
 
 def test_a_baseline_that_was_merged_badly_is_refused_in_words(here: Path):
@@ -171,28 +178,43 @@ def test_a_baseline_that_was_merged_badly_is_refused_in_words(here: Path):
         (merged, "line 2 begins a conflict of git"),
         ("[" * 100_000, "lists are nested too deeply"),
         (text.replace('"updates": ', '"updates": ' + "1" * 400), "a number has 40"),
-        (json.dumps({"format": 1, "sessions": document["sessions"] * 2}), '"session.parquet" is there twice'),
+        (resealed({"format": 1, "sessions": document["sessions"] * 2}), '"session.parquet" is there twice'),
     ):
         with pytest.raises(ContextError, match=said):
             read_baseline(wrong, "b.json")
 
 
-def test_an_altered_digit_of_a_baseline_is_refused_and_one_without_a_digest_is_told_of(here: Path):
+def test_an_altered_digit_of_a_baseline_is_refused_and_one_without_a_digest_too(here: Path):
     document = json.loads((here / "before.json").read_text(encoding="utf-8"))
     document["sessions"][0]["jumps_per_s"] += 9.0
     (here / "before.json").write_text(json.dumps(document), encoding="utf-8")
     assert "its contents do not match its digest" in refused("session.parquet", "--baseline", "before.json")
     del document["digest"]
     (here / "before.json").write_text(json.dumps(document), encoding="utf-8")
-    assert "before.json: the baseline has no digest" in measured("session.parquet", "--baseline", "before.json").err
+    assert "it has no digest" in refused("session.parquet", "--baseline", "before.json")
+
+
+def test_a_baseline_of_other_sessions_is_refused_with_the_names(here: Path):
+    shutil.copy("session.parquet", "other.parquet")
+    (here / "both.json").write_text(run("motion", "measure", "session.parquet", "other.parquet", "--json").out, encoding="utf-8")
+    assert 'the session "other.parquet" of the baseline is not measured' in refused("session.parquet", "--baseline", "both.json")
+    shutil.copy("session.parquet", "third.parquet")
+    names = ("session.parquet", "other.parquet", "third.parquet")
+    assert 'the baseline has no session "third.parquet"' in refused(*names, "--baseline", "both.json")
+
+
+def test_a_measure_that_the_baseline_has_and_that_is_missing_now_fails(here: Path):
+    shutil.move(here / "game", here / "moved")
+    result = measured("session.parquet", "--baseline", "before.json", code=1)
+    assert any(line.startswith("FAILED  baseline skate_cm_s") and "not measured, before" in line for line in result.lines)
 
 
 def test_a_session_of_a_baseline_is_known_however_its_path_is_written(here: Path):
     shutil.copy("session.parquet", "other.parquet")
     both = run("motion", "measure", "session.parquet", "other.parquet", "--json").out
     (here / "both.json").write_text(both, encoding="utf-8")
-    bars = session_of("./other.parquet", "--baseline", "both.json")["bars"]
-    assert bars
+    sessions = measured("./other.parquet", "session.parquet", "--baseline", "both.json", "--json").json["sessions"]
+    assert all(session["bars"] for session in sessions)
     assert [each["file"] for each in json.loads(both)["sessions"]] == ["session.parquet", "other.parquet"]
     assert measured("./session.parquet", "--json").json["sessions"][0]["file"] == "session.parquet"
 
@@ -202,11 +224,10 @@ def test_what_got_worse_than_the_baseline_fails_and_is_told(here: Path):
     now = document["sessions"][0]["jumps_per_s"]
     document["sessions"][0]["jumps_per_s"] = 0.9 * now
     document["sessions"][0]["skate_raw_cm_s"] *= 0.5  # what the clips do is no fault of the session
-    del document["digest"]
-    (here / "before.json").write_text(json.dumps(document), encoding="utf-8")
+    (here / "before.json").write_text(resealed(document), encoding="utf-8")
     result = measured("session.parquet", "--baseline", "before.json", code=1)
-    (line,) = [line for line in result.lines if line.startswith("BROKEN")]
-    assert line == f"BROKEN  baseline jumps_per_s: jumps a second: {now:.2f}, worse than {0.9 * now:.2f} before."
+    (line,) = [line for line in result.lines if line.startswith("FAILED")]
+    assert line == f"FAILED  baseline jumps_per_s  jumps a second: {now:.2f}, worse than {0.9 * now:.2f} before."
 
 
 def test_a_session_whose_project_is_gone_tells_its_jumps_and_why_no_more(here: Path):
@@ -247,7 +268,10 @@ def test_the_output_of_the_controller_says_how_poses_are_made(here: Path):
             "stick.csv: the baseline is not a report of measures: line 1 is no JSON: Expecting value at character 1.",
         ),
         (["session.parquet", "--baseline", "other.json"], 'other.json: the baseline has no session "session.parquet".'),
-        (["session.parquet", "--baseline", "newer.json"], 'newer.json: the baseline has format "2"; this version reads format 1.'),
+        (
+            ["session.parquet", "--baseline", "newer.json"],
+            'newer.json: the baseline is not a report of measures: it has no "format": 1.',
+        ),
         (["poses.npz", "--max-path", "1"], "--max-path cannot be judged: the session does not say where the game had the body."),
     ],
 )
@@ -257,8 +281,8 @@ def test_what_cannot_be_measured_is_refused_in_one_sentence(arguments: list[str]
     with np.load("poses.npz") as poses:
         every = ("positions", "root", "asset", "time_s", "mirrored", "jumped", "forced")
         np.savez("short.npz", **{name: poses[name][:9] if name in every else poses[name] for name in poses.files})
-    for name, document in (("other", sealed({"format": 1, "sessions": []})), ("newer", {"format": 2, "sessions": []})):
-        (here / f"{name}.json").write_text(json.dumps(document), encoding="utf-8")
+    for name, number in (("other", 1), ("newer", 2)):
+        (here / f"{name}.json").write_text(resealed({"format": number, "sessions": []}), encoding="utf-8")
     assert message in refused(*arguments)
 
 

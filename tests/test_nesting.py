@@ -110,6 +110,9 @@ def test_the_cells_that_an_explanation_names_are_those_that_fail(nest: Nest, dat
         failures = explained.row(row).failures
         found = [(f.step.table, f.step.row, f.condition) if f.step else ("outer", row, f.condition) for f in failures]
         assert found == failing
+    assert len(explained.nearest(10**6)) == len(nest.ways()) - len(explained.matches)
+    n_failing = [len(row.failures) + (not row.is_enabled) for row in explained.nearest(10**6)]
+    assert n_failing == sorted(n_failing), "as many as the pages say: cells, not conditions"
 
 
 @given(nests(), st.integers(0, 2**32), st.data())
@@ -121,7 +124,7 @@ def test_a_pick_goes_through_the_tables_one_by_one(nest: Nest, seed: int, data: 
     outcome = Outcome(data_of(compiled), matches)
     assert set(outcome.candidates.tolist()) == pickable(nest, matches.indices.tolist()) == set(outcome.chances)
     assert sum(outcome.chances.values()) == pytest.approx(1.0 if possible else 0.0)
-    assert {row for row in matches if outcome.said_of([row]).startswith("picked")} == set(outcome.chances)
+    assert {row for row in matches.rows.tolist() if outcome.said_of([row]).startswith("picked")} == set(outcome.chances)
     rng = random.Random(seed)
     picked = [compiled.pick(given_facts, rng) for _ in range(6)]
     assert set(picked) <= (possible or {None})
@@ -184,7 +187,7 @@ def test_actors_are_cast_as_for_the_table_by_hand(nest: Nest, data: st.DataObjec
     actors = actors if "Defender.Tags" in data_of(compiled).places else {}
     found, expected = (c.query(facts, actors=actors) for c in (compiled, by_hand))
     assert found.indices.tolist() == expected.indices.tolist()
-    assert [found.casting(row) for row in found] == [expected.casting(row) for row in expected]
+    assert [found.casting(row) for row in found.rows] == [expected.casting(row) for row in expected.rows]
 
 
 # ---- edits

@@ -151,9 +151,13 @@ def test_a_new_text_stands_behind_those_that_were_read_before():
 def test_new_texts_in_any_number_stand_behind_old_ones_in_any_number(n_before: int, n_more: int):
     old, new = [f"{i}" for i in range(n_before)], [f"<{i}" for i in range(n_more - 1)] + ["nothing"]
     before = ConditionColumn.read(TextColumn.of("x", old), Condition("x", NUMBER))
+    _ = before.cells[0]  # what was read of the old ones is taken as it is
     after = before.with_texts(before.texts.with_inserted(0, new))
     assert list(after.cells) == [*(parse_cell(t, NUMBER) for t in (*old, *new[:-1])), ANY]
     assert list(after.faults) == [n_before + n_more - 1]
+    anew = ConditionColumn.read(after.texts, after.condition)
+    assert (after.masks.bounds == anew.masks.bounds).all()
+    assert [after.masks.codes(x) for x in range(9)] == [anew.masks.codes(x) for x in range(9)]
 
 
 def test_what_can_be_read_is_not_read_before_it_is_asked_for():

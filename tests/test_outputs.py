@@ -403,12 +403,12 @@ def test_what_an_output_says_is_part_of_the_version():
 @pytest.mark.parametrize("damage", [1, 2, 3, 4, 5])
 def test_a_file_whose_outputs_do_not_fit_is_refused(tmp_path: Path, damage: int):
     """The digest is made anew: the shapes are looked at too."""
-    from contextdb.compiled.artefact import WITH_RULES
+    from contextdb.compiled.artefact import COMPILED
     from contextdb.files.tensors import digest_of
 
     path = tmp_path / "t.safetensors"
     table_of("damage", "3").compile().save(path)
-    tensors, metadata = read_tensors(path, WITH_RULES)
+    tensors, metadata = read_tensors(path, COMPILED)
     declared = json.loads(tensors["outputs.declared"].tobytes())
     if damage == 1:
         tensors["outputs.000.values"] = tensors["outputs.000.values"][:-1]
@@ -421,7 +421,8 @@ def test_a_file_whose_outputs_do_not_fit_is_refused(tmp_path: Path, damage: int)
     else:
         declared[1]["type"] = "nothing"
         tensors["outputs.declared"] = np.frombuffer(json.dumps(declared).encode(), np.uint8)
-    write_tensors(path, WITH_RULES, dict(tensors), {"about": metadata["about"], "digest": digest_of(tensors, metadata["about"])})
+    digest = digest_of(tensors, metadata["about"], str(COMPILED.layout))
+    write_tensors(path, COMPILED, dict(tensors), {"about": metadata["about"], "digest": digest})
     with pytest.raises(cdb.ArtefactError, match="does not hold what its header says"):
         CompiledTable.open(path)
 
@@ -489,7 +490,6 @@ def test_settings_come_back_from_what_the_file_says_of_them(drawn):
         ('outputs = { a = "int" }', 'a = "int": this is text, not a table.*Did you mean a = { type = "int" }'),
         ('outputs = { a = { type = "enum" } }', 'is of type "enum" and has no values.*Accepted: values ='),
         ('outputs = { a = { type = "numbers" } }', 'is of type "numbers" and has no size.*Accepted: size = 3'),
-        ('outputs = { a = { type = "numbers", size = 0 } }', "size = 0: there are no cells of so many numbers"),
         ('outputs = { a = { type = "bool", max = 1 } }', 'max = 1 has no place here: its type is "bool"'),
         ('outputs = { a = { type = "int", min = 2, max = 1 } }', "min = 2 is above max = 1.*Did you mean min = 1 and max = 2"),
         ('outputs = { a = { type = "number", min = inf } }', "min = inf leaves no number"),
@@ -593,3 +593,16 @@ def test_a_hot_reload_takes_over_outputs_that_changed(tmp_path: Path):
         watch.poll()
         assert watch["t"].outputs.of_row(0) == {"n": 12}
         assert [fault.rule for fault in watch.faults] == ["unreadable-output"]
+
+
+def test_outputs_are_a_mapping_of_names_to_columns():
+    columns = {"Asset": ["a", "b"], "damage": ["1", "2"], "line": ["x", "y"]}
+    settings = settings_with(TableSettings("t"), {"outputs": {"damage": {"type": "int"}, "line": {"type": "text"}}})
+    outputs = Table.from_columns(columns, {}, settings).compile().outputs
+    assert {name: column.tolist() for name, column in outputs.items()} == {"damage": [1, 2], "line": ["x", "y"]}
+    assert (outputs["damage"] is outputs.column("damage")) or outputs["damage"].tolist() == [1, 2]
+    assert outputs.get("damge") is None
+    with pytest.raises(cdb.NoSuchOutput, match='"damage"'):
+        outputs["damge"]
+    assert outputs == outputs
+    assert len({outputs, Table.from_columns(columns, {}, settings).compile().outputs}) == 2

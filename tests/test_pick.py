@@ -20,8 +20,8 @@ from contextdb.compiled.memory import FEW, Memory, Rng
 from contextdb.compiled.pick import Outcome, pick_row
 from contextdb.compiled.table import CompiledTable, data_of
 from contextdb.errors import ContextError, PolicyError
+from contextdb.schema.policies import Policy
 from contextdb.schema.settings import TableSettings
-from contextdb.schema.shapes import Policy
 from contextdb.tables.table import Table
 
 
@@ -327,7 +327,7 @@ def test_disabled_rows_are_never_picked():
 def said(table: CompiledTable) -> list[str]:
     matches = table.query({"x": True})
     outcome = Outcome(data_of(table), matches)
-    return [outcome.said_of([row]) for row in matches]
+    return [outcome.said_of([row]) for row in matches.rows.tolist()]
 
 
 def test_a_row_that_is_not_picked_says_who_outranks_it():
@@ -363,4 +363,4 @@ def test_the_outcome_holds_just_the_rows_that_picks_give(rows: list[tuple[bool, 
     seen = {row for _ in range(60) if (row := pick_row(data_of(table), matches, rng, last="")) is not None}
     assert seen == set(outcome.candidates.tolist()) == set(outcome.chances)
     assert outcome.chance(outcome.candidates.tolist()) == pytest.approx(1.0 if seen else 0.0)
-    assert all(outcome.said_of([row]).startswith("picked") == (row in seen) for row in matches)
+    assert all(outcome.said_of([row]).startswith("picked") == (row in seen) for row in matches.rows.tolist())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -10,9 +11,13 @@ from running import run
 import contextdb as cdb
 from contextdb.checks.rows import check_rows
 from contextdb.checks.run import check
+from contextdb.compiled.artefact import COMPILED
 from contextdb.compiled.table import data_of
 from contextdb.edits.edits import check_cell
+from contextdb.errors import ArtefactError
 from contextdb.exchange.dmn_write import write_dmn
+from contextdb.files.tensors import digest_of, read_tensors, write_tensors
+from contextdb.schema.policies import POLICIES, ranks_of
 from contextdb.schema.settings import TableSettings, read_schema
 from contextdb.tables.merging.meaning import meaning_of
 from contextdb.tables.table import Table
@@ -140,19 +145,29 @@ def test_what_rests_is_part_of_the_version_and_of_the_compiled_file(tmp_path: Pa
     assert data_of(opened).picking.limited.tolist() == [1]
 
 
-@pytest.mark.parametrize(
-    ("policy", "layout"), [("collect", b'"contextdb":"1"'), ("specific", b'"contextdb":"3"'), ("cheapest", b'"contextdb":"3"')]
-)
-def test_a_version_that_would_pick_otherwise_refuses_the_compiled_file(tmp_path: Path, policy: str, layout: bytes):
+@pytest.mark.parametrize("policy", POLICIES)
+def test_a_compiled_file_says_how_it_is_picked_from(tmp_path: Path, policy: str):
     made(tmp_path, HEAD + "a,1,,,,,\n", policy).compile().save(tmp_path / "t.safetensors")
-    assert layout in (tmp_path / "t.safetensors").read_bytes()
+    tensors, metadata = read_tensors(tmp_path / "t.safetensors", COMPILED)
+    about, kind = json.loads(metadata["about"]), POLICIES[policy]
+    assert (about["policy"], about["choose"], about["by_cost"]) == (policy, kind.choose, kind.by_cost)
+    assert tensors["ranks"].tolist() == ranks_of(policy, tensors["priorities"], tensors.get("specificities")).tolist()
 
 
-def test_a_table_inside_that_picks_by_its_cells_needs_the_new_layout_too(tmp_path: Path):
+def test_a_compiled_file_of_a_policy_that_is_not_known_is_refused(tmp_path: Path):
+    path = tmp_path / "t.safetensors"
+    made(tmp_path, HEAD + "a,1,,,,,\n").compile().save(path)
+    tensors, metadata = read_tensors(path, COMPILED)
+    about = json.dumps(json.loads(metadata["about"]) | {"policy": "newest"})
+    write_tensors(path, COMPILED, dict(tensors), {"about": about, "digest": digest_of(tensors, about, str(COMPILED.layout))})
+    with pytest.raises(ArtefactError):
+        cdb.CompiledTable.open(path)
+
+
+def test_a_table_inside_that_picks_by_its_cells_is_stored_with_its_policy(tmp_path: Path):
     inner = Table.from_columns({"asset": ["x"]}, {}, TableSettings("inner", policy="specific"))
     outer = Table.from_columns({"asset": ["@inner", "y"]}, {}, TableSettings("outer"), "outer").compile({"inner": inner})
     outer.save(tmp_path / "t.safetensors")
-    assert b'"contextdb":"3"' in (tmp_path / "t.safetensors").read_bytes()
     assert data_of(cdb.CompiledTable.open(tmp_path / "t.safetensors")).policies == {"collect", "specific"}
 
 

@@ -17,9 +17,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import contextdb as cdb
-from contextdb.compiled import choosing
 from contextdb.compiled import picker as picker_module
-from contextdb.compiled.chance import uniform, uniforms
+from contextdb.compiled.choosing import Choosing, nothing_picked
 from contextdb.compiled.pick import Outcome, pick_row
 from contextdb.compiled.table import CompiledTable, data_of
 from contextdb.errors import ContextError, PolicyError
@@ -128,8 +127,8 @@ def test_the_outcome_and_the_stateless_pick_know_what_the_policies_may_pick(tabl
     rows = {row for _ in range(40) if (row := pick_row(data_of(compiled), matches, rng, "")) is not None}
     assert rows <= set(outcome.candidates.tolist())
     assert bool(rows) == bool(expected)
-    assert all(outcome.said_of([row]) for row in matches)
-    for row in matches:
+    assert all(outcome.said_of([row]) for row in matches.rows.tolist())
+    for row in matches.rows.tolist():
         assert outcome.said_of([row]).startswith("picked") == (row in outcome.candidates)
     assert sum(outcome.chances.values()) == pytest.approx(1.0 if expected else 0.0)
 
@@ -159,13 +158,16 @@ def outcome(picker, table: CompiledTable, facts: oracle.Facts, time_s: float) ->
 
 
 def test_chance_is_the_same_everywhere_and_for_one_and_many():
-    known = [uniform(0, 0, 0, 0), uniform(7, 3, 2, 1), uniform(2**64 - 1, -5, 10**12, 0)]
+    known = [oracle.uniform(0, 0, 0, 0), oracle.uniform(7, 3, 2, 1), oracle.uniform(2**64 - 1, -5, 10**12, 0)]
     assert known == [0.13870941014555427, 0.3263417356334446, 0.07240612029416893]  # a replay of last year must stay what it was
-    who, turns = np.array([0, 1, -5, 2**62]), np.array([0, 3, 7, 2**40])
+    n_rows, who = 4096, [0, 1, -5, 2**62]
+    table = table_of(x=["Any"] * n_rows, asset=[f"a{row}" for row in range(n_rows)])
+    many = table.query_many({"x": [True] * len(who)})
     for seed in (0, 1, 2**64 - 1):
-        for depth in range(3):
-            expected = [uniform(seed, w, t, depth) for w, t in zip(who.tolist(), turns.tolist(), strict=True)]
-            assert uniforms(seed, who, turns, depth).tolist() == expected
+        picker = table.picker(seed, memory=0)
+        for turn in range(3):
+            expected = [int(oracle.uniform(seed, one, turn, 0) * n_rows) for one in who]
+            assert picker.pick_many(many, who=who).tolist() == expected
 
 
 def table_of(policy: str = "collect", fallback: str | None = None, **columns: list[str]) -> CompiledTable:
@@ -243,8 +245,6 @@ def test_runs_of_very_different_length_are_drawn_a_part_at_a_time(monkeypatch):
     many = table.query_many({name: [rng.random() < 0.5 for _ in range(60)] for name in "xy"})
     alone = table.picker(5, 0)
     expected = [-1 if (row := alone.pick(one, who=i).row) is None else row for i, one in enumerate(many)]
-    assert table.picker(5, 0).pick_many(many).tolist() == expected
-    monkeypatch.setattr(choosing, "MOST_PADDED", 100)
     assert table.picker(5, 0).pick_many(many).tolist() == expected
     monkeypatch.setattr(picker_module, "MOST_PAIRS", 200)
     assert table.picker(5, 0).pick_many(many).tolist() == expected
@@ -402,7 +402,7 @@ def test_outcomes_say_what_the_policies_went_by():
 
     def said(table: CompiledTable) -> list[str]:
         outcome = Outcome(data_of(table), table.query(facts))
-        return [outcome.said_of([row]) for row in table.query(facts)]
+        return [outcome.said_of([row]) for row in table.query(facts).rows.tolist()]
 
     assert said(table_of("specific", x=["True", "Any"], y=["True", "True"])) == ["picked", "outranked by a (specificity 2)"]
     assert said(table_of("cheapest", y=["False ~2", "Any"])) == ["outranked by b (penalty 0)", "picked"]
@@ -483,6 +483,27 @@ def test_the_time_is_asked_for_where_rows_rest_for_seconds():
             picker.pick(table.query({"x": True}), time_s=time)
     none = table_of(x=["Any"], cooldown_s=[""])
     assert none.picker().pick(none.query({"x": True}))
+
+
+def test_a_time_that_goes_back_is_refused_where_rows_rest_for_seconds():
+    table = table_of(x=["Any"], cooldown_s=["1"])
+    picker, matches, many = table.picker(), table.query({"x": True}), table.query_many({"x": [True]})
+    assert picker.pick(matches, time_s=5.0)
+    then = pickle.loads(pickle.dumps(picker))
+    assert picker.pick(matches, time_s=12.5)
+    with pytest.raises(ContextError, match=r"time_s is 12\.0, and this picker last picked at 12\.5: .* or forget\(\)"):
+        picker.pick(matches, time_s=12.0)
+    with pytest.raises(ContextError, match="time_s is 12"):
+        picker.copy().pick_many(many, time_s=12.0)
+    assert then.pick(matches, time_s=12.0), "the copy from then goes on from then"
+    picker.forget()
+    assert picker.pick(matches, time_s=0.0)
+
+
+def test_a_character_that_is_named_twice_is_refused_in_many_picks():
+    table = table_of(x=["Any"])
+    with pytest.raises(ContextError, match=r"who names the character 7 more than once\. Accepted: whole numbers"):
+        table.picker().pick_many(table.query_many({"x": [True, True]}), who=[7, 7])
 
 
 @pytest.mark.parametrize(
@@ -575,6 +596,41 @@ def test_a_picker_is_small_in_a_pickle():
     picker = table.picker()
     picker.pick_many(table.query_many({"x": [True] * 100}))
     assert len(pickle.dumps(picker)) < 20_000
+
+
+def test_a_picker_forgets_rests_that_are_over_and_stays_small():
+    table = table_of(x=["Any"] * 300, cooldown_turns=["5"] * 300)
+    many, picker = table.query_many({"x": [True] * 1000}), table.picker()
+    for _ in range(30):
+        picker.pick_many(many)
+    assert (picker._picked.rests >= 0).sum(axis=1).max() <= 6
+    assert picker._picked.rests.shape[1] <= 12
+    assert len(pickle.dumps(picker)) < 60_000
+    unpickled = pickle.loads(pickle.dumps(picker))
+    for _ in range(3):
+        assert unpickled.pick_many(many).tolist() == picker.pick_many(many).tolist()
+
+
+def test_arrays_that_are_not_those_of_one_table_and_its_characters_are_refused():
+    data = data_of(table_of(x=["Any"] * 70, once=["True"] * 70))
+    choosing = data.once(Choosing.of)
+    assets, columns = np.arange(70), np.arange(70)
+    choices = choosing.choices(assets, columns, 70)
+    masks, one, none = np.full((1, 2), 2**6 - 1, np.uint64), np.zeros(1, np.int64), nothing_picked()
+    assert choices.pick(masks, one, one, 0, 0.0, none, None, one.copy(), None) is None
+    for wrong in ((masks, one + 1, one + 1), (masks[:, :1], one, one), (masks, np.zeros(2, np.int64), one)):
+        with pytest.raises(ValueError, match=r"together|contiguous"):
+            choices.pick(*wrong, 0, 0.0, none, None, one.copy(), None)
+    with pytest.raises(ValueError, match="costs"):
+        choices.pick(masks, one, one, 0, 0.0, none, np.zeros((1, 3)), one.copy(), None)
+    for rows in (np.array([70]), np.array([-2])):
+        with pytest.raises(ValueError, match="together"):
+            choices.remember(one, rows, 0.0, none)
+    for wrong_columns in (columns - 1, columns + 1):
+        with pytest.raises((ValueError, IndexError)):
+            choosing.choices(assets, wrong_columns, 70)
+    with pytest.raises(ValueError, match="together"):
+        choosing.choices(assets[:-1], columns, 70)
 
 
 def test_live_contexts_are_picked_from():

@@ -97,10 +97,14 @@ def test_what_cannot_be_read_is_said_and_the_game_plays_on(tmp_path: Path):
     tables = play.copied(tmp_path / "tables")
     with play.opened(tables) as game:
         moves = tables / "moves.csv"
-        moves.write_text(moves.read_text().replace("idle,Idle", "idle,Idel"))
+        good = moves.read_text()
+        moves.write_text(good.replace("idle,Idle", "idle,Idel"))
         push(game, 0.5, REST)
         assert game.player.playing == "idle"
-        assert any(line.startswith("not loaded") and "Idel" in line for line in game.state)
+        assert any(line.startswith("not loaded: moves.csv, ") and "Idel" in line for line in game.state)
+        moves.write_text(good)
+        push(game, 0.5, REST)
+        assert not any(line.startswith("not loaded") for line in game.state), "undoing the slip clears the message"
 
 
 @pytest.mark.parametrize(
@@ -303,8 +307,8 @@ def test_the_pictures_of_the_page_show_what_is_drawn_now():
 
 def test_the_game_is_as_small_as_its_page_says():
     files = (ROOT / "examples" / "playground").glob("*.py")
-    assert sum(len(file.read_text("utf-8").splitlines()) for file in files) < 900
-    assert "under 900 lines" in (ROOT / "docs" / "playground.md").read_text(encoding="utf-8")
+    assert sum(len(file.read_text("utf-8").splitlines()) for file in files) < 950
+    assert "under 950 lines" in (ROOT / "docs" / "playground.md").read_text(encoding="utf-8")
 
 
 def test_the_pages_name_what_there_is():
@@ -380,9 +384,11 @@ def test_keys_steer_and_the_f_keys_do_what_the_help_says(window: Any, tmp_path: 
         for _ in range(times):
             base.taskMgr.step()
 
+    assert "contextdb edit " in window.middle.getText()
     base.messenger.send("f4")
     base.messenger.send("w")
     step(60)
+    assert not window.middle.getText()
     assert window.game.player.moved.facts["gait"] == "Walk"
     assert window.game.player.character.root.ahead_m > 0.3
     base.messenger.send("shift")
@@ -398,7 +404,7 @@ def test_keys_steer_and_the_f_keys_do_what_the_help_says(window: Any, tmp_path: 
     assert len(motion.Trace.load(next(tmp_path.glob("playground-*.parquet")))) > 50
     window.paging.join(60)
     step(1)
-    assert window.notice.startswith("written: ")
+    assert window.notice.startswith("Written: ")
     page = Path(unquote(urlparse(shown[0]).path))
     assert "walk" in page.read_text(encoding="utf-8")
     shutil.rmtree(page.parent)

@@ -3,20 +3,14 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from importlib import import_module
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
-from running import ROOT, run
+from running import run
 
 from contextdb.commands.progress import log_of
-from contextdb.console import LOOPS, PREPARING, announce, announced
-from contextdb.covering import count, coverage
 from contextdb.tables.project import load_table
-from contextdb.tables.table import Table
 
 
 def test_a_log_gets_one_line_for_each_tenth(capsys: pytest.CaptureFixture[str]):
@@ -28,12 +22,11 @@ def test_a_log_gets_one_line_for_each_tenth(capsys: pytest.CaptureFixture[str]):
     assert lines == [f"contextdb: measuring t: {10 * tenth} % Counting contexts" for tenth in range(11)]
 
 
-def test_of_a_small_table_only_the_preparing_is_told(capsys: pytest.CaptureFixture[str]):
+def test_a_log_is_not_told_of_a_small_table(capsys: pytest.CaptureFixture[str]):
     log = log_of("measuring t", False)
     assert log is not None
-    log(10, 1000, PREPARING)
     log(10, 1000, "Counting contexts")
-    assert capsys.readouterr().err == f"contextdb: measuring t: 0 % {PREPARING}\n"
+    assert capsys.readouterr().err == ""
 
 
 def test_work_that_gets_long_is_told_of_however_small_the_table(
@@ -71,24 +64,6 @@ def test_a_large_table_is_told_of(command: str, monkeypatch: pytest.MonkeyPatch,
     assert " % " not in run(command, str(tmp_path / "t.csv"), "--format", "json").out.split("{")[0]
 
 
-def test_the_first_count_on_a_machine_says_that_it_is_prepared(monkeypatch: pytest.MonkeyPatch):
-    prepared: list[object] = []
-    monkeypatch.setattr("contextdb.covering.engine.is_prepared", lambda: False)
-    monkeypatch.setattr("contextdb.covering.engine.prepare", prepared.append)
-    told: list[str] = []
-    coverage(
-        Table.from_columns({"Asset": ["a"], "up": ["True"]}, {"up": {"type": "bool"}}), progress=lambda part, _: told.append(part)
-    )
-    assert PREPARING in told
-    assert told.index(PREPARING) < told.index("Counting contexts")
-    assert len(prepared) == 1
-
-
-def test_a_loop_that_was_compiled_is_prepared():
-    count.prepare(count.SILENT)
-    assert count.is_prepared()
-
-
 def test_a_log_is_told_of_the_pairs_too(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
     monkeypatch.setattr("contextdb.commands.progress.MANY_CELLS", 4)
     (tmp_path / "t.csv").write_text("Asset,up,down\na,True,Any\nb,Any,True\n", encoding="utf-8")
@@ -103,14 +78,6 @@ def test_pairs_of_too_many_conditions_are_left_out_and_that_is_said(form: str, m
     assert said not in run("coverage", str(tmp_path / "t.csv"), "--format", form).out
     monkeypatch.setattr(import_module("contextdb.covering.pairs"), "MOST_CONDITIONS", 1)
     assert said in " ".join(run("coverage", str(tmp_path / "t.csv"), "--format", form).out.split())
-
-
-@pytest.mark.parametrize("is_ready", [True, False])
-def test_a_check_says_once_that_its_loops_are_compiled(is_ready: bool, monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
-    monkeypatch.setattr("contextdb.covering.judge.MANY", 2)
-    monkeypatch.setattr("contextdb.covering.judge.is_prepared", lambda: is_ready)
-    (tmp_path / "t.csv").write_text("Asset,up,down\na,True,Any\nb,Any,True\n", encoding="utf-8")
-    assert run("check", str(tmp_path / "t.csv")).err.count(PREPARING) == (0 if is_ready else 1)
 
 
 def test_the_json_tells_pairs_that_are_left_out_from_pairs_that_are_all_covered(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
@@ -139,49 +106,3 @@ def test_a_log_is_told_of_long_recordings(command: tuple[str, ...], monkeypatch:
         assert (lines[-1:] == [f"contextdb: {label}: 100 %"]) is is_told
         assert (f"contextdb: {label}: 50 %" in lines) is is_told
         assert len(lines) == len(set(lines))
-
-
-class Loop:
-    """A loop as numba has it, compiled or not."""
-
-    def __init__(self, folder: Path, is_compiled: bool) -> None:
-        self.stats, self.signatures, self.py_func = SimpleNamespace(cache_path=str(folder)), (), type(self).turn
-        if is_compiled:
-            (folder / f"{__name__.rpartition('.')[2]}.{type(self).turn.__qualname__}-12.py311.nbi").touch()
-
-    def turn(self) -> None:
-        """What is compiled."""
-
-
-@pytest.mark.parametrize("is_compiled", [True, False])
-def test_commands_say_that_loops_are_compiled_and_the_library_is_silent(
-    is_compiled: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-):
-    loop = Loop(tmp_path, is_compiled)
-    announce(loop)
-    assert capsys.readouterr().err == ""
-    with announced():
-        announce(loop)
-    assert capsys.readouterr().err == ("" if is_compiled else f"contextdb: {PREPARING}\n")
-    assert not LOOPS.handlers
-
-
-@pytest.mark.parametrize(
-    ("load", "module", "longest"),
-    [
-        ("contextdb.compiled.batch", "contextdb.compiled.kernels", "batch"),
-        ("contextdb.telemetry.keys", "contextdb.telemetry.kernels", "evaluate"),
-        ("contextdb.motion.search.searcher", "contextdb.motion.search.kernels", "search"),
-    ],
-)
-def test_whoever_loads_loops_first_says_that_they_are_compiled(load: str, module: str, longest: str):
-    script = f"""
-from importlib import import_module
-loader = import_module({load!r})
-told = []
-loader.announce = told.append
-assert loader.load_kernels() is loader.load_kernels() is import_module({module!r})
-print([loop.py_func.__name__ for loop in told])
-"""
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, cwd=ROOT)
-    assert done.stdout == f"{[longest]}\n"

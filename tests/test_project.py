@@ -222,8 +222,10 @@ def test_a_table_that_is_a_link_is_read_as_the_schema_beside_the_link_says(folde
     (folder / "jog.csv").rename(tmp_path / "store.csv")
     (folder / "jog.csv").symlink_to(tmp_path / "store.csv")
     assert load_table(folder / "jog.csv").settings.outputs == ("Slot",)
-    (folder / "low").rename(tmp_path / "elsewhere")
-    (folder / "low").symlink_to(tmp_path / "elsewhere")
+    (folder / "jog.csv").unlink()
+    (tmp_path / "store.csv").rename(folder / "jog.csv")
+    (folder / "low").rename(folder / "elsewhere")
+    (folder / "low").symlink_to("elsewhere")
     assert Project.load(folder)["crouch"].settings.outputs == ("Slot",)
 
 
@@ -231,3 +233,17 @@ def test_a_table_without_any_schema_has_its_types_inferred(tmp_path: Path):
     (tmp_path / "t.csv").write_text("Asset,x\na,1..2\n", encoding="utf-8")
     table = cdb.load(str(tmp_path / "t.csv"))
     assert (table.name, table.condition("x").condition.is_declared) == ("t", False)
+
+
+def test_the_likeliest_slips_of_loading_and_asking_are_refused_with_what_to_write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    folder = tmp_path / "tables"
+    folder.mkdir()
+    (folder / "moves.csv").write_text("Asset,speed\nwalk,1..3\n", "utf-8")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(cdb.FileError, match=r"this is a folder. .* Did you mean contextdb.Project.load\('tables'\)\?"):
+        cdb.load("tables")
+    for name in ("moves", "tables/moves"):
+        with pytest.raises(cdb.FileError, match=r'there is no such file. .* Did you mean "tables.moves.csv"\?'):
+            cdb.load(name)
+    with pytest.raises(AttributeError, match=r"Table has no attribute 'query': .* Did you mean table.compile\(\).query\?"):
+        cdb.load("tables/moves.csv").query({"speed": 2.0})  # type: ignore[attr-defined]

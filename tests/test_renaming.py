@@ -43,6 +43,11 @@ assume = ["not (speed > 8)"]   # nobody
 
 [blueprints.base]
 conditions = ["speed", "target"]
+
+[contracts.no_walk]
+table = "a"
+when = "speed > 5"      # and not walking
+none = "asset like 'walk*'"
 """
 FILES = {
     "contextdb.toml": TOML,
@@ -71,7 +76,7 @@ def texts(folder: Path) -> dict[str, str]:
 
 def test_who_else_uses_a_condition_is_counted(folder: Path):
     uses = uses_of(load(folder / "a.csv"), "speed")
-    assert uses.text == "1 table, 1 derived fact, 2 assumptions, 1 blueprint, 1 rule, 2 saved contexts"
+    assert uses.text == "1 table, 1 derived fact, 3 assumptions, 1 blueprint, 1 rule, 2 saved contexts"
     assert uses.is_elsewhere
     assert uses_of(load(folder / "a.csv"), "closing").text == ""
     assert uses_of(load(folder / "b.csv"), "Note").text == ""
@@ -95,6 +100,7 @@ def test_only_here_leaves_all_others_as_they_are_and_declares_the_new_name_alike
     old, new = table.schema.conditions["speed"], table.schema.conditions["velocity"]
     assert (old.domain, old.unit) == (new.domain, new.unit)
     assert table.settings.assume == ("velocity < 9",)
+    assert table.schema.contracts["no_walk"].when == "velocity > 5"
     assert table.schema.tables["b"].assume == ("not (speed > 8)",)
     assert table.schema.conditions["closing"].expr == "speed - target"
     assert names_in(table.text(0, "Rule")) == ("velocity", "target")

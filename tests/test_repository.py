@@ -48,7 +48,7 @@ def test_the_package_says_that_it_is_typed():
 def test_the_sample_tables_travel_in_the_wheel():
     wheel = PYPROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]
     assert "/tables" in wheel["include"]
-    assert wheel["sources"] == {"tables": "contextdb/_tables"}
+    assert wheel["sources"]["tables"] == "contextdb/_tables"
     assert (ROOT / "tables" / "contextdb.toml").is_file()
 
 
@@ -77,3 +77,10 @@ def test_no_file_names_a_folder_of_one_machine():
 def test_no_two_modules_of_tests_have_one_name():
     names = Counter(path.name for path in SOURCES if path.is_relative_to(ROOT / "tests"))
     assert [name for name, count in names.items() if count > 1] == []
+
+
+def test_a_wheel_has_the_editor_inside_the_package_and_takes_no_other_name():
+    wheel = PYPROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]
+    assert wheel["sources"]["tui"] == "contextdb/_tui"
+    absolute = re.compile(r"^\s*(?:from|import) tui\b", re.M)
+    assert [str(path) for path in sorted((ROOT / "tui").rglob("*.py")) if absolute.search(path.read_text(encoding="utf-8"))] == []

@@ -14,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from strategies import examples
 
+from contextdb.authoring.selectors import set_selector
 from contextdb.edits import edits
 from contextdb.edits.schema_file import schema_change
 from contextdb.errors import FileError, SchemaError
@@ -125,7 +126,7 @@ def changed_lines(before: str, after: str) -> list[str]:
             ["+[conditions.wet]", '+type = "bool"', '+description = "in rain"'],
         ),
         (
-            lambda t: edits.set_selector(t, "walk", [("a", 3.5), ("b", None)]),
+            lambda t: set_selector(t, "walk", [("a", 3.5), ("b", None)]),
             [
                 '-order = [ { database = "a", threshold = 2.75 }, { database = "b" } ]   # tired first',
                 '+order = [ { database = "a", threshold = 3.5 }, { database = "b" } ]   # tired first',
@@ -309,7 +310,7 @@ def test_order_and_thresholds_of_a_list_on_many_lines_move_with_their_comments(t
 """
     toml = TOML[: TOML.index("order = ")] + order
     table = project(tmp_path, toml)
-    after = edits.set_selector(table, "walk", [("b", 1.0), ("a", None)]).apply(table)
+    after = set_selector(table, "walk", [("b", 1.0), ("a", None)]).apply(table)
     assert_says_the_same(saved(table, after), after)
     assert raw(tmp_path).endswith("""order = [
   { database = "b", threshold = 1 },   # else
@@ -323,7 +324,7 @@ def test_a_list_of_tables_becomes_one_list(tmp_path: Path):
     toml = TOML[: TOML.index("order = ")].replace("[selectors.walk]\n", "")
     toml += '[[selectors.walk.order]]\ndatabase = "a"\nthreshold = 1\n[[selectors.walk.order]]\ndatabase = "b"\n'
     table = project(tmp_path, toml)
-    after = edits.set_selector(table, "walk", [("b", 1.0), ("a", None)]).apply(table)
+    after = set_selector(table, "walk", [("b", 1.0), ("a", None)]).apply(table)
     assert_says_the_same(saved(table, after), after)
 
 
@@ -408,7 +409,7 @@ def any_declaring(draw: st.DrawFn, table: Table) -> Edit:
     if kind == "selector" and table.schema.databases:
         order = draw(st.permutations(list(table.schema.databases)))[: draw(st.integers(1, 2))]
         thresholds = [draw(st.sampled_from([0.5, 2.75, 1e-7])) for _ in order[:-1]]
-        return edits.set_selector(table, draw(st.sampled_from(["walk", "run"])), list(zip(order, [*thresholds, None], strict=True)))
+        return set_selector(table, draw(st.sampled_from(["walk", "run"])), list(zip(order, [*thresholds, None], strict=True)))
     free = next(f"new.{i}" for i in range(99) if f"new.{i}" not in [c.name for c in table.columns])
     if kind == "rename" and names:
         return edits.rename_column(table, draw(st.sampled_from(names)), free)

@@ -222,10 +222,9 @@ def test_the_arrays_of_many_answers_and_of_explanations_cannot_be_written_to(act
         assert not array.flags.writeable
 
 
-def test_codes_cannot_be_written_to_and_can_be_asked_with():
+def test_codes_cannot_be_written_to():
     many = MOVES.query_many({name: [value] for name, value in FACTS.items()})
     assert not many.codes.flags.writeable
-    assert MOVES.query_codes(many.codes[0]) == MOVES.query(FACTS)
 
 
 # ---- copies of live contexts
@@ -407,7 +406,7 @@ def snapshot() -> object:
 def shown(thing: object) -> object:
     """What a thing says, in plain data."""
     if isinstance(thing, cdb.Matches):
-        castings = [thing.castings(row) for row in thing] if hasattr(thing, "cast") else None
+        castings = [thing.castings(row) for row in thing.rows] if hasattr(thing, "cast") else None
         return thing.assets, thing.mask.tolist(), thing.always.tolist(), thing.penalties.tolist(), castings
     if isinstance(thing, cdb.Table):
         return thing.assets, thing.name, [c.to_list() for c in thing.columns], shown(thing.compile())
@@ -498,12 +497,9 @@ def test_a_fact_that_is_not_set_is_a_key_error_that_prints_well(name: str):
 def test_an_answer_holds_rows_and_assets():
     matches = MOVES.query(FACTS)
     assert matches.assets == ["walk", "limp"]
-    assert [what in matches for what in ("walk", "run", "nothing", 0, 1, 2.0, 1.5, -1, 99, None, b"0", np.int64(2))] == [
-        True, False, False, True, False, True, False, False, False, False, False, True,
-    ]  # fmt: skip
-    assert float("nan") not in matches
-    assert float("inf") not in matches
-    assert [] not in matches
+    assert [what for what in ("walk", "run", "nothing", 0, 1.5, None, b"walk", np.int64(2), np.ones(2), []) if what in matches] == [
+        "walk"
+    ]
 
 
 def test_an_asset_of_a_table_inside_is_held_with_its_path_and_without(tmp_path: Path):

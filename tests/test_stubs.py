@@ -107,6 +107,16 @@ MODULES: dict[str, tuple[dict[str, CompiledTable], str]] = {
         + 'live = table.live()\n    live["speed"] = 1\n    live["state"] = None\n    del live["n"]\n'
         + "    live.copy().matches().assets\n",
     ),
+    "reading live": (
+        PLAIN,
+        "import contextdb as cdb\n"
+        + LIVE
+        + 'live = table.live()\n    live["speed"] = 2.5\n    state: str | cdb.FactSet = live["state"]\n'
+        + '    told: dict[facts.JogFact, object] = dict(live)\n    print(len(live), "speed" in live, list(live), state, told)\n'
+        + "    print(live.explain().nearest(1)[0].asset, live.pick(rng=1, last=None))\n",
+    ),
+    "read as another type": (PLAIN, LIVE + 'ok: str = live["ok"]\n'),
+    "slip in reading": (PLAIN, LIVE + 'live["speeed"]\n'),
     "slip in live": (PLAIN, LIVE + 'live["speeed"] = 1.0\n'),
     "value in live": (PLAIN, LIVE + 'live["state"] = "Water"\n'),
     "slip in update": (PLAIN, LIVE + 'live.update({"sped": 1.0})\n'),
@@ -138,7 +148,6 @@ MODULES: dict[str, tuple[dict[str, CompiledTable], str]] = {
         '    j = cdb.cell("1..2")\n    return cdb.__version__\n',
     ),
     "misspelt": ({}, "import contextdb as cdb\ncdb.Projectt\n"),
-    "old": ({}, "import contextdb as cdb\ncdb.QueryError\n"),
 }
 """What mypy reads in one run: for each name some tables, whose types are the module `facts`, and Python that uses them."""
 
@@ -169,6 +178,7 @@ RIGHT = [
     "sets",
     "some",
     "live",
+    "reading live",
     "actors",
     "samples",
     "names",
@@ -203,13 +213,14 @@ def test_mypy_refuses_a_context_that_a_query_refuses(said: dict[str, list[str]],
     [
         ("slip in some", 'Extra key "sped"'),
         ("slip in live", "No overload variant"),
+        ("slip in reading", "No overload variant"),
+        ("read as another type", "Incompatible types in assignment"),
         ("value in live", "No overload variant"),
         ("slip in update", 'Extra key "sped"'),
         ("slip in del", "incompatible type \"Literal['sped']\""),
         ("slip in actor", 'Missing key "height"'),
         ("no plain fact", 'Missing key "speed"'),
         ("misspelt", 'no attribute "Projectt"; maybe "Project"'),
-        ("old", 'no attribute "QueryError"'),
     ],
 )
 def test_mypy_refuses_slips(said: dict[str, list[str]], name: str, told: str):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import subprocess
@@ -15,6 +16,7 @@ from running import ROOT, run
 from contextdb.disk import folder_lock, staged, write_atomic
 from contextdb.disk.folder_lock import UNFINISHED, folder_turn, sweep, temporary_folder, temporary_name
 from contextdb.disk.together import NewFile, UnfinishedWarning, finish, write_together
+from contextdb.errors import FileError
 from contextdb.tables.project import Project
 
 KILLED_AT_EACH_CALL = """
@@ -209,6 +211,33 @@ def test_a_save_sweeps_files_and_folders_of_dead_saves_and_no_others(tmp_path):
         write_atomic(tmp_path / "t.csv", b"new")
         assert sorted(p for p in tmp_path.iterdir() if p.name != "t.csv") == sorted([stranger, living.temporary, growing])
     assert sorted(os.listdir(tmp_path)) == sorted([stranger.name, "t.csv"])
+
+
+def test_a_file_that_cannot_be_put_back_is_said_to_be_new(tmp_path, monkeypatch):
+    a, b = tmp_path / "a.csv", tmp_path / "b.csv"
+    for path in (a, b):
+        path.write_text("old")
+    replace, n_done = os.replace, 0
+
+    def refusing(old: Path, new: Path) -> None:
+        nonlocal n_done
+        if Path(new).suffix == ".csv":
+            n_done += 1
+            if n_done > 1:  # the second file, and then the first one's old bytes
+                raise OSError(errno.EROFS, "Read-only file system")
+        replace(old, new)
+
+    monkeypatch.setattr(os, "replace", refusing)
+    with pytest.raises(FileError) as caught:
+        write_together(tmp_path, [NewFile(a, b"new"), NewFile(b, b"new")])
+    assert a.read_text() == "new"
+    assert "this one is new already" in str(caught.value)
+    assert "as it was" not in str(caught.value)
+    assert (tmp_path / UNFINISHED).exists()
+    monkeypatch.undo()
+    with pytest.warns(UnfinishedWarning, match="as they were before"):
+        finish(tmp_path)
+    assert (a.read_text(), b.read_text()) == ("old", "old")
 
 
 def test_files_that_an_unfinished_record_wants_are_not_swept(tmp_path):

@@ -71,6 +71,32 @@ def test_a_section_taken_away_here_and_changed_there_puts_the_whole_file_between
     assert found.with_markers.count("=======") == 1
 
 
+@pytest.mark.parametrize(
+    ("theirs", "said"),
+    [
+        ('name = "gridiron"\n', {"name": "gridiron"}),
+        ('project = "gridiron"\n', {"project": "gridiron"}),
+        ('# theirs\nproject.name.long = "gridiron"\n', {"project": {"name": {"long": "gridiron"}}}),
+    ],
+)
+def test_a_key_that_theirs_moved_out_of_a_section_or_into_one_is_moved(theirs, said):
+    """A header that became part of a comment leaves its keys above all sections."""
+    rest = BASE[BASE.index("[conditions") :]
+    found = merge_toml(BASE, BASE, theirs + rest)
+    assert (found.conflicts, _without_empty(tomllib.loads(found.text))) == ((), said | tomllib.loads(rest))
+
+
+@pytest.mark.parametrize(("base", "ours"), [("", "a = 3\n"), ("a = 5\n", "a = 6\n")])
+def test_a_value_here_and_a_section_of_that_name_there_are_a_conflict(base, ours):
+    found = merge_toml(base, ours, "[a]\nb = 1\n")
+    assert (found.conflicts[-1:], found.text) == ((("a",),) if base else (("a", "b"),), ours)
+    assert found.with_markers == f"<<<<<<< ours\n{ours}||||||| base\n{base}=======\n[a]\nb = 1\n>>>>>>> theirs\n"
+
+
+def test_a_section_here_and_a_value_of_that_name_there_are_a_conflict():
+    assert merge_toml("", "[a]\nc = 2\n", "a = 5\n").conflicts == (("a",),)
+
+
 def test_a_text_that_is_no_toml_is_refused_with_its_name():
     with pytest.raises(SchemaError, match=r"theirs\.toml"):
         merge_toml(BASE, BASE, "[conditions", ("base.toml", "ours.toml", "theirs.toml"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import os
 import random
@@ -21,6 +22,8 @@ from contextdb.tables.watching import Snapshot, Watch, table_like
 from contextdb.tables.watching.rest import Rest
 
 N_SAVED = 1000 if IS_FULL else 250
+N_TURNS = 200 if IS_FULL else 25
+"""Turns of each thread that asks and reloads."""
 STEP_S = 0.06
 """Between two looks; the files have to rest for 0.1 s, so a change is taken at the third look that sees it."""
 
@@ -206,13 +209,20 @@ def test_a_mended_file_is_swapped_in_and_its_faults_are_told_again_when_they_ret
     assert len(folder.errors) == 2
 
 
-def test_going_back_to_the_version_at_hand_ends_the_faults_without_a_swap(folder: Folder):
+def test_going_back_to_the_version_at_hand_ends_the_faults_without_a_swap_and_is_called_back(folder: Folder):
     good = (folder.path / "jog.csv").read_text(encoding="utf-8")
-    folder.jog("jog,fast,Air")
-    folder.look(4)
+    for n in (1, 2):
+        folder.jog("jog,fast,Air")
+        folder.look(4)
+        assert len(folder.errors) == n
+        folder.write("jog.csv", good)
+        assert folder.look(4) == 0
+        assert folder.watch.faults == ()
+        assert folder.changes == [folder.watch.snapshot()] * n
+    folder.write("jog.csv", good + " ")
     folder.write("jog.csv", good)
     assert folder.look(4) == 0
-    assert folder.watch.faults == ()
+    assert len(folder.changes) == 2, "nothing was wrong"
 
 
 @pytest.mark.parametrize("name", ["jog.csv", "contextdb.toml"])
@@ -420,6 +430,62 @@ def test_every_answer_is_of_one_good_version_while_hundreds_are_saved_and_four_t
     assert latest > 0.9 * N_SAVED
     assert len(seen) > 10
     assert len(errors) > 0.05 * N_SAVED
+
+
+def test_eight_threads_ask_and_reload_together_and_no_answer_is_wrong(tmp_path: Path):
+    """Row i of version v accepts speeds from i to i + v, the gait that i leaves with three, and every third row only True."""
+    gaits, latest, turn = ("Idle", "Walk", "Run"), 0, threading.Lock()
+    (tmp_path / "contextdb.toml").write_text(
+        '[conditions.speed]\ntype = "number"\n[conditions.ok]\ntype = "bool"\n'
+        '[conditions.gait]\ntype = "enum"\nvalues = ["Idle", "Walk", "Run"]\n[tables.a]\n',
+        encoding="utf-8",
+    )
+
+    def write(version: int) -> None:
+        rows = (f"v{version}_{i},{i}..{i + version},{gaits[i % 3]},{'Any' if i % 3 else True}" for i in range(100 + version))
+        (tmp_path / "part").write_text("\n".join(["Asset,speed,gait,ok", *rows, ""]), encoding="utf-8")
+        os.replace(tmp_path / "part", tmp_path / "a.csv")
+
+    def expected(version: int, speed: float, gait: str, ok: bool) -> list[int]:
+        rows = range(100 + version)
+        return [i for i in rows if i <= speed <= i + version and gaits[i % 3] == gait and (ok or i % 3 > 0)]
+
+    def ask_and_reload(seed: int) -> None:
+        nonlocal latest
+        rng, swapped = random.Random(seed), 0
+        try:
+            for _ in range(N_TURNS):
+                table = watch["a"]
+                version, live = int(table.assets[0][1:].partition("_")[0]), table.live(unknown="never")
+                for _ in range(20):
+                    facts = {"speed": rng.uniform(-1, 110), "gait": rng.choice(gaits), "ok": rng.random() < 0.5}
+                    again = json.loads(json.dumps(facts))  # equal texts that are other objects
+                    live.update(again)
+                    for answer in (table.query(facts), table.query(again), live.matches()):
+                        assert answer.indices.tolist() == expected(version, *facts.values())  # type: ignore[arg-type]
+                if rng.random() < 0.3:
+                    with turn:
+                        latest = latest % 40 + 1
+                        write(latest)
+                swapped += watch.poll()
+            n_swapped.append(swapped)
+        except BaseException as error:
+            wrong.append(error)
+
+    write(latest)
+    wrong, n_swapped = list[BaseException](), list[int]()
+    with cdb.watch(tmp_path, poll_s=None, settle_s=0.0) as watch:
+        threads = [threading.Thread(target=ask_and_reload, args=(seed,)) for seed in range(8)]
+        interval_s = sys.getswitchinterval()
+        sys.setswitchinterval(1e-5)
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        sys.setswitchinterval(interval_s)
+    assert wrong == []
+    assert len(n_swapped) == 8
+    assert sum(n_swapped) > N_TURNS
 
 
 def test_a_thread_of_the_watch_swaps_in_by_itself_until_it_is_closed(tmp_path: Path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shlex
 import shutil
 import subprocess
@@ -48,7 +49,7 @@ def git(folder: Path, *arguments: str) -> None:
     subprocess.run(["git", *arguments], cwd=folder, check=True, capture_output=True)
 
 
-def run_step(name: str, checkout: Path, max_drop: str = "0", gone: str = "") -> subprocess.CompletedProcess[str]:
+def run_step(name: str, checkout: Path, max_drop: str = "0", accept: str = "") -> subprocess.CompletedProcess[str]:
     """A step of the workflow as the runner runs it."""
     temporary = checkout.parent / "runner"
     temporary.mkdir(exist_ok=True)
@@ -57,15 +58,19 @@ def run_step(name: str, checkout: Path, max_drop: str = "0", gone: str = "") -> 
     program.chmod(0o755)
     own = {
         "PATH": os.pathsep.join([str(temporary), str(Path(sys.executable).parent), os.environ["PATH"]]),
+        "ACCEPT": accept,
         "FOLDER": "tables",
-        "GONE": gone,
         "MAX_DROP": max_drop,
         "GITHUB_BASE_REF": "main",
         "GITHUB_STEP_SUMMARY": str(temporary / "summary.md"),
-        "RUNNER_TEMP": str(temporary),
+        "RUNNER_TEMP": str(temporary / "own"),
     }
     command = ["bash", "--noprofile", "--norc", "-eo", "pipefail", "-c", STEPS[name]]
     return subprocess.run(command, cwd=checkout, env=os.environ | own, capture_output=True, encoding="utf-8")
+
+
+def reports(checkout: Path) -> Path:
+    return checkout.parent / "runner" / "own" / "contextdb"
 
 
 pytestmark = pytest.mark.skipif(
@@ -75,23 +80,25 @@ pytestmark = pytest.mark.skipif(
 
 
 def test_the_workflow_lets_a_change_pass_that_opens_no_gap(checkout: Path):
-    assert run_step("check", checkout).returncode == 0
-    done = run_step("coverage", checkout)
-    assert done.returncode == 0, done.stderr
-    assert (checkout / "coverage.html").is_file()
+    done = run_step("compare", checkout)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.stdout.startswith("tables: 1 table, compared with origin/main (commit ")
+    assert (reports(checkout) / "coverage.html").is_file()
+    assert run_step("summary", checkout).returncode == 0
     assert "moves" in (checkout.parent / "runner" / "summary.md").read_text(encoding="utf-8")
 
 
 def test_the_workflow_fails_a_change_that_opens_a_gap_and_names_it(checkout: Path):
     (checkout / "tables" / "moves.csv").write_text(TABLE.replace("run,(2..5]\n", ""), encoding="utf-8")
-    done = run_step("coverage", checkout)
+    done = run_step("compare", checkout)
     assert done.returncode == 1
     assert "speed: (2..5]" in done.stdout
-    assert (checkout / "coverage.html").is_file()
+    assert (reports(checkout) / "coverage.html").is_file()
+    assert run_step("compare", checkout, max_drop="60").returncode == 0
 
 
 @pytest.mark.parametrize("is_there", [False, True])
-def test_the_workflow_lets_the_first_tables_pass_and_those_that_mend_broken_ones(checkout: Path, is_there: bool):
+def test_the_workflow_lets_the_first_tables_pass_and_those_that_mend_broken_ones_when_told(checkout: Path, is_there: bool):
     moves = checkout / "tables" / "moves.csv"
     if is_there:
         moves.write_text(TABLE.replace("0..2", "slow"), encoding="utf-8")
@@ -101,27 +108,35 @@ def test_the_workflow_lets_the_first_tables_pass_and_those_that_mend_broken_ones
     git(checkout, "-c", "user.name=a", "-c", "user.email=a@example.com", "commit", "--quiet", "--allow-empty", "-m", "before")
     git(checkout, "update-ref", "refs/remotes/origin/main", "HEAD")
     moves.write_text(TABLE, encoding="utf-8")
-    done = run_step("coverage", checkout)
-    assert done.returncode == 0, done.stderr
-    assert "::warning::The tables of main cannot be measured" in done.stdout
-    assert (checkout / "coverage.html").is_file()
+    done = run_step("compare", checkout)
+    assert (done.returncode, "Where that is intended: --uncompared" in done.stdout) == (1, True)
+    assert run_step("compare", checkout, accept="--uncompared").returncode == 0
 
 
 def test_the_workflow_names_a_table_that_is_gone_and_lets_it_go_when_told(checkout: Path):
     (checkout / "tables" / "moves.csv").rename(checkout / "tables" / "steps.csv")
-    done = run_step("coverage", checkout)
+    done = run_step("compare", checkout)
     assert (done.returncode, "moves" in done.stdout) == (1, True)
-    assert (checkout / "coverage.html").is_file()
-    assert "moves" in (checkout.parent / "runner" / "summary.md").read_text(encoding="utf-8")
-    git(checkout, "worktree", "remove", str(checkout.parent / "runner" / "base"))
-    assert run_step("coverage", checkout, gone="moves others").returncode == 0
+    assert "moves" in (reports(checkout) / "summary.md").read_text(encoding="utf-8")
+    assert run_step("compare", checkout, accept="--gone moves --new steps").returncode == 0
+    assert run_step("compare", checkout, accept="--gone moves --gone others --new steps").returncode == 2
 
 
 def test_the_workflow_fails_a_table_that_cannot_be_read_at_its_line(checkout: Path):
     (checkout / "tables" / "moves.csv").write_text(TABLE.replace("0..2", "fast"), encoding="utf-8")
-    done = run_step("check", checkout)
-    assert done.returncode == 1
-    assert "::error file=tables/moves.csv,line=2" in done.stdout
+    for step in ("check", "compare"):
+        done = run_step(step, checkout)
+        assert done.returncode == 1
+        assert "::error file=tables/moves.csv,line=2" in done.stdout
+
+
+def test_the_example_of_the_page_is_the_step_of_the_workflow():
+    """The page shows one job; the gates that hold it are held in tests/test_ci_command.py."""
+    page = (ROOT / "docs" / "ci.md").read_text(encoding="utf-8")
+    job = next(yaml.safe_load(block) for block in re.findall(r"```yaml\n(.*?)```", page, re.S) if "contextdb ci" in block)
+    (command,) = [step["run"] for step in job["jobs"]["tables"]["steps"] if "contextdb ci" in step.get("run", "")]
+    assert command == 'contextdb ci tables --against "origin/$GITHUB_BASE_REF" --out "$RUNNER_TEMP/contextdb" --format github'
+    assert command.replace("tables --against", '"$FOLDER" --against').split(" --out")[0] in STEPS["compare"]
 
 
 def test_the_forms_of_issues_have_what_a_forge_asks_of_them():

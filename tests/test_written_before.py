@@ -1,8 +1,7 @@
 """Files that the version before the packages wrote: each still opens, and says what it said then; or says why it does not.
 
-`tests/written_before` holds a project, its compiled table, a table in Parquet, a report of coverage, the journal of an editor
-that was killed, a motion database and a recorded session; `said.json` holds what that version itself read in them. The costs of
-databases are on another scale today, so these are refused; a session says what it cost then.
+`tests/written_before` holds a project, a table in Parquet, the journal of an editor that was killed, and a motion database;
+`said.json` holds what that version itself read in them. The costs of databases are on another scale today, so these are refused.
 """
 
 from __future__ import annotations
@@ -22,21 +21,6 @@ from contextdb.motion.storage.stored import open_database
 from tui.model.session import Session
 
 WRITTEN = ROOT / "tests/written_before"
-CONTEXTS: list[dict[str, Any]] = [
-    {"stance": "Stand", "speed": 1.0, "heading": 175.0, "tags": ["wet"], "tired": False, "armed": True},
-    {"stance": "Crouch", "speed": 4.5, "heading": -175.0, "tags": [], "tired": True, "armed": False},
-    {"stance": "Air", "speed": 9.0, "heading": 0.0, "tags": ["wet", "night"], "tired": False, "armed": True},
-    {"stance": "Stand", "speed": 6.0, "heading": 90.0, "tags": ["night"], "tired": True, "armed": True},
-]
-
-
-def compiled(folder: Path) -> Any:
-    table = cdb.CompiledTable.open(folder / "moves.safetensors")
-    told = []
-    for context in CONTEXTS:
-        why = {row.asset: [[f.condition, f.cell] for f in row.failures] for row in table.explain(context)}
-        told.append([table.query(context).assets, why, table.penalties(context).tolist(), table.pick(context, 7)])
-    return told
 
 
 def parquet(folder: Path) -> Any:
@@ -48,12 +32,6 @@ def parquet(folder: Path) -> Any:
     ]
 
 
-def baseline(folder: Path) -> Any:
-    result = run("coverage", str(folder / "moves.csv"), "--baseline", str(folder / "coverage.json"), "--format", "json")
-    (table,) = result.json["tables"]
-    return [result.code, *(table["covered"][key] for key in ("value", "lower", "upper")), table["baseline"]]
-
-
 def journal(folder: Path) -> Any:
     home = folder / ".contextdb-journal"
     home.mkdir()
@@ -62,12 +40,7 @@ def journal(folder: Path) -> Any:
     return [session.sheet.history.names, [list(column) for column in session.sheet.table.columns]]
 
 
-def trace(folder: Path) -> Any:
-    decisions = run("motion", "replay", str(folder / "session.parquet"), "--json").json["decisions"]
-    return [[d[key] for key in ("time_s", "action", "playing", "cost", "context", "root_motion")] for d in decisions[::6]]
-
-
-READERS: dict[str, Callable[[Path], Any]] = {read.__name__: read for read in (compiled, parquet, baseline, journal, trace)}
+READERS: dict[str, Callable[[Path], Any]] = {read.__name__: read for read in (parquet, journal)}
 
 
 def what_is_said(name: str, folder: Path) -> Any:
@@ -84,8 +57,6 @@ def test_a_file_written_before_the_packages_says_what_it_said(name: str, tmp_pat
 
 
 def test_a_database_with_costs_on_the_old_scale_is_refused_with_the_reason():
-    message = (
-        "layout 1; this version reads layout 2. Since layout 2 costs are divided .* build it again with `contextdb motion build`"
-    )
+    message = "layout 1; this version reads layout 3.* build it again with `contextdb motion build`"
     with pytest.raises(ArtefactError, match=message):
         open_database(WRITTEN / "walk.database.safetensors")

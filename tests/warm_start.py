@@ -33,7 +33,6 @@ from typing import Any, NoReturn
 HERE = Path(__file__).parent
 STREAMS = "stdin", "stdout", "stderr"
 LOADED = (
-    "numba",
     "polars",
     "contextdb.cli",
     "contextdb.motion",

@@ -19,21 +19,22 @@ from contextdb.errors import ContextDBError
 from contextdb.tables.merging.conflicts import Side
 from contextdb.tables.merging.merging import Merge
 from contextdb.tables.table import Table
-from tui.commands import BY_ID, COMMANDS, bindings, key_names
-from tui.contrast import READABLE
-from tui.editor import Editor
-from tui.editor_settings import EditorSettings
-from tui.messages import GoToCell
-from tui.model.conflicted import conflicts_in, sides_in, write_decided
-from tui.model.importing import Import
-from tui.model.session import Session
-from tui.model.workspace import Workspace
-from tui.screens.begin import Begin
-from tui.screens.conflicts import ConflictsDialog
-from tui.screens.leaving import HeldDialog, LeavingDialog
-from tui.screens.main import MainScreen
-from tui.screens.palette import Palette
-from tui.themes import DARK, THEMES
+
+from .commands import BY_ID, COMMANDS, bindings, key_names
+from .contrast import READABLE
+from .editor import Editor
+from .editor_settings import EditorSettings
+from .messages import GoToCell
+from .model.conflicted import conflicts_in, sides_in, write_decided
+from .model.importing import Import
+from .model.session import Session
+from .model.workspace import Workspace
+from .screens.begin import Begin
+from .screens.conflicts import ConflictsDialog
+from .screens.leaving import HeldDialog, LeavingDialog
+from .screens.main import MainScreen
+from .screens.palette import Palette
+from .themes import DARK, THEMES
 
 LOW, TALL = 14, 30
 """On a screen of fewer lines than the first the details give way to the rows. On one of as many as the second a dialog with a list
@@ -85,7 +86,7 @@ class EditorApp(Editor):
         self._at = at
         """The cell that is gone to first."""
         self._debugger: Any = None
-        """The debugger, once it was asked for: a `tui.debug.inside.Inside`."""
+        """The debugger, once it was requested: a `tui.debug.inside.Inside`."""
         self.workspace = workspace
         self.settings = settings or EditorSettings()
         for one in THEMES:
@@ -97,27 +98,24 @@ class EditorApp(Editor):
 
     @staticmethod
     def theme_names() -> list[str]:
-        """Every theme there is."""
         return sorted([*(theme.name for theme in THEMES), *BUILTIN_THEMES])
 
     def get_css_variables(self) -> dict[str, str]:
         """The colours of the theme; fields and buttons stand out from the page in those, too, that have one colour for both."""
-        found = super().get_css_variables()
-        if found["panel"] == found["surface"] and not found["panel"].startswith(("ansi", "transparent")):
-            found["panel"] = Color.parse(found["surface"]).blend(Color.parse(found["foreground"]), 0.12).hex
-        return found
+        variables = super().get_css_variables()
+        if variables["panel"] == variables["surface"] and not variables["panel"].startswith(("ansi", "transparent")):
+            variables["panel"] = Color.parse(variables["surface"]).blend(Color.parse(variables["foreground"]), 0.12).hex
+        return variables
 
     def get_line_filters(self) -> Sequence[LineFilter]:
         """What is done to all that is painted: every text can be read."""
         return [*super().get_line_filters(), READABLE]
 
     def action_command_palette(self) -> None:
-        """Show every command."""
         if not CommandPalette.is_open(cast(App[object], self)):
             self.push_screen(Palette("Commands"))
 
     def search_themes(self) -> None:
-        """Show every theme."""
         self.push_screen(Palette("Theme", [ThemeProvider]))
 
     def on_mount(self) -> None:
@@ -132,7 +130,7 @@ class EditorApp(Editor):
 
     def on_debug_wanted(self, message: Message) -> None:
         """Show the debugger of a session, or of a running game once it has decided something."""
-        from tui.debug.inside import Inside  # loads the motion search
+        from .debug.inside import Inside  # loads the motion search
 
         self._debugger = self._debugger or Inside(self)
         self._debugger.show(message)
@@ -155,7 +153,7 @@ class EditorApp(Editor):
         return next(screen for screen in reversed(self.screen_stack) if isinstance(screen, MainScreen))
 
     def say_renamed(self, text: str) -> None:
-        """Say on the screen that is shown now that a condition was renamed, also after its next change."""
+        """Say on the screen that is displayed now that a condition was renamed, also after its next change."""
         self.main.renamed = text
 
     def go_to_cell(self, place: GoToCell) -> None:
@@ -253,11 +251,11 @@ class EditorApp(Editor):
         """Quit; asks about unsaved edits."""
         unsaved = self.workspace.unsaved
         if unsaved:
-            self.push_screen(LeavingDialog(unsaved), self._left)
+            self.push_screen(LeavingDialog(unsaved), self._leave_with)
         else:
             self._leave()
 
-    def _left(self, answer: str | None) -> None:
+    def _leave_with(self, answer: str | None) -> None:
         if answer == "save" and not self._save_all():
             return
         if answer is not None:

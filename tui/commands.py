@@ -12,8 +12,8 @@ from typing import Literal
 
 from textual.binding import Binding, BindingType
 
-from tui.model.selection import Selection
-from tui.model.sheet import Done, Sheet
+from .model.selection import Selection
+from .model.sheet import Done, Sheet
 
 Scope = Literal["grid", "assets", "screen"]
 """Where an action runs: in the grid, in the pane round it, or on the screen."""
@@ -122,7 +122,7 @@ GRID: tuple[Command, ...] = (
         "fill-series",
         "ctrl+t",
         "Fill series",
-        "Count on from the first selected cells: _v1, _v2.",
+        "Continue the series of the first selected cells: _v1, _v2.",
         "Edit",
         verb=lambda s: s.fill_series(),
     ),
@@ -185,9 +185,9 @@ _OF_ASSETS = (
     Command("fold", "", "Fold the group", "Fold the columns of one prefix, or open them.", "Columns", "fold"),
     Command("freeze", "", "Freeze columns", "The columns up to this one never scroll.", "Columns", "freeze"),
     Command("sort-then", "alt+t", "Sort then", "Sort rows that are alike by this column, too.", "View", "sort_then"),
-    Command("values", "alt+d", "Values", "What the column holds; filter, mend, replace, rename.", "Columns", "values"),
-    Command("unfilter", "alt+y", "Filter less", "Take the last part off the filter.", "View", "unfilter"),
-    Command("sort-file", "", "Sort the file", "Sort the rows of the file itself as shown.", "Rows", "sort_file"),
+    Command("values", "alt+d", "Values", "The values of the column: filter, mend, replace, rename.", "Columns", "values"),
+    Command("unfilter", "alt+y", "Filter less", "Remove the last part of the filter.", "View", "unfilter"),
+    Command("sort-file", "", "Sort the file", "Sort the rows of the file itself as in the view.", "Rows", "sort_file"),
     Command("autofit", "alt+w", "Autofit", "Make each column as wide as its texts.", "View", "autofit"),
     Command("rename-column", "", "Rename column", "Give the column another name.", "Columns", "rename_column"),
     Command("clear-context", "alt+x", "Clear test row", "Empty the test row.", "Test row", "clear_context"),
@@ -216,7 +216,7 @@ _OF_SCREEN = (
     Command("import", "", "Import", "Read rows from Excel, CSV, Parquet or JSON.", "File", "import"),
     Command("export", "", "Export", "Write the table for Excel or other tools.", "File", "export"),
     Command("history", "alt+z", "Undo history", "Every step; go back to any of them.", "Edit", "history"),
-    Command("autofill", "shift+f4", "Autofill", "Fill the columns that clips can say, from the clips.", "Columns", "autofill"),
+    Command("autofill", "shift+f4", "Autofill", "Fill columns from the clips.", "Columns", "autofill"),
     Command("add-column", "alt+c", "Add column", "Add a condition or another column.", "Columns", "add_column"),
     Command("rename-role", "", "Rename role", "Give the role of the column another name, everywhere.", "Columns", "rename_role"),
     Command("rename-asset", "", "Rename asset", "Give the asset of the row another name, everywhere.", "Rows", "rename_asset"),
@@ -227,19 +227,17 @@ _OF_SCREEN = (
     Command("next-context", "f8", "Next context", "Load the next context of the file.", "Test row", "step(1)"),
     Command("previous-context", "f7", "Previous context", "Load the previous context.", "Test row", "step(-1)"),
     Command("live", "alt+u", "Follow a game", "Let the test row follow a running game, or a recording.", "Test row", "live"),
-    Command(
-        "live-pause", "alt+6", "Pause the game", "Hold the moment of the game that is followed; go on.", "Test row", "live_pause"
-    ),
-    Command("live-back", "alt+8", "A second back", "Go back a second in what the game did.", "Test row", "live_by(-1)"),
-    Command("live-ahead", "alt+9", "A second ahead", "Go on a second in what the game did.", "Test row", "live_by(1)"),
+    Command("live-pause", "alt+6", "Pause the game", "Pause the game that is followed, or go on.", "Test row", "live_pause"),
+    Command("live-back", "alt+8", "A second back", "Go back one second in the game.", "Test row", "live_by(-1)"),
+    Command("live-ahead", "alt+9", "A second ahead", "Go ahead one second in the game.", "Test row", "live_by(1)"),
     Command("live-keep", "alt+7", "Keep the moment", "Save this moment as a context.", "Test row", "live_keep"),
-    Command("live-stop", "", "Stop following", "Let go of the game; its last facts stay.", "Test row", "live_stop"),
-    Command("actors", "alt+p", "Actors", "Who may fill each role, for the test row.", "Test row", "actors"),
+    Command("live-stop", "", "Stop following", "Stop following the game; its last facts stay.", "Test row", "live_stop"),
+    Command("actors", "alt+p", "Actors", "The actors for each role, for the test row.", "Test row", "actors"),
     Command(
         "why",
         "f12",
         "Why",
-        "Why this row is valid or not; beside the table where there is room.",
+        "Why this row is valid or not; next to the table where there is room.",
         "Test row",
         "why",
         in_footer=True,
@@ -252,7 +250,7 @@ _OF_SCREEN = (
     Command("priorities", "alt+3", "Priorities", "Which database comes first.", "Tabs", "tab('priorities')"),
     Command("coverage", "alt+4", "Coverage", "Which contexts have no asset.", "Tabs", "tab('coverage')"),
     Command("problems", "alt+5", "Problems", "What is wrong with the table.", "Tabs", "tab('problems')"),
-    Command("motion", "", "Motion", "The recorded sessions of the project: see why.", "Tabs", "tab('motion')"),
+    Command("motion", "", "Motion", "The recorded sessions of the project, to debug.", "Tabs", "tab('motion')"),
     Command("quit", "ctrl+q", "Quit", "Quit; asks about unsaved edits.", "File", "quit"),
 )
 

@@ -53,8 +53,8 @@ def readable(style: Style) -> Style:
     poles = (ColorTriplet(0, 0, 0), ColorTriplet(255, 255, 255))
     pole = max(poles, key=lambda pole: contrast(pole, ground))
     steps = (_between(text, pole, step / _STEPS) for step in range(_STEPS + 1))
-    found = next((one for one in steps if contrast(one, ground) >= LEAST), pole)
-    return style if found == text else style + Style(color=Color.from_triplet(found))
+    chosen = next((one for one in steps if contrast(one, ground) >= LEAST), pole)
+    return style if chosen == text else style + Style(color=Color.from_triplet(chosen))
 
 
 def contrast(one: ColorTriplet, other: ColorTriplet) -> float:

@@ -1,6 +1,6 @@
 """Do what a person asks of a sheet, and say what was done. What takes long is worked out beside the screen.
 
-Its share is said meanwhile, Esc stops it before a cell is changed, and other keys wait.
+Its share is displayed meanwhile, Esc stops it before a cell is changed, and other keys wait.
 """
 
 from __future__ import annotations
@@ -13,10 +13,11 @@ from typing import TypeVar
 from textual.widget import Widget
 
 from contextdb.errors import ContextDBError, Fault, TableError
-from tui.messages import Edited, Told
-from tui.model.long_work import PRESENT, StoppedError, Work
-from tui.model.sheet import Done, Sheet
-from tui.one_key import OneKeyAtATime
+
+from .messages import Edited, Notice
+from .model.long_work import PRESENT, StoppedError, Work
+from .model.sheet import Done, Sheet
+from .one_key import OneKeyAtATime
 
 T = TypeVar("T")
 LONG = 100_000
@@ -28,7 +29,7 @@ SLOW = 500
 
 
 def do(widget: Widget, sheet: Sheet, verb: Callable[[], Done], n_cells: int = 0, then: Callable[[], None] = lambda: None) -> None:
-    """Do a verb that looks at so many cells, and `then` something else; what cannot be done is said."""
+    """Do a verb that looks at so many cells, and `then` something else; what cannot be done is reported."""
     app = widget.app
     if n_cells >= LONG and isinstance(app, OneKeyAtATime):
         stop = Event()
@@ -38,7 +39,7 @@ def do(widget: Widget, sheet: Sheet, verb: Callable[[], Done], n_cells: int = 0,
     try:
         widget.post_message(Edited(verb()))
     except ContextDBError as error:
-        widget.post_message(Told(str(error), "error"))
+        widget.post_message(Notice(str(error), "error"))
     then()
 
 
@@ -51,7 +52,7 @@ async def _beside(
         if stop.is_set():
             raise StoppedError
         full = round(20 * share)
-        app.call_from_thread(widget.post_message, Told(f"{'█' * full}{'░' * (20 - full)} {share:.0%} · Esc stops it"))
+        app.call_from_thread(widget.post_message, Notice(f"{'█' * full}{'░' * (20 - full)} {share:.0%} · Esc stops it"))
 
     def in_turn(change: Callable[[], T]) -> T:
         def changed() -> T:
@@ -70,9 +71,9 @@ async def _beside(
     try:
         widget.post_message(Edited(await asyncio.to_thread(work)))
     except StoppedError:
-        widget.post_message(Told("Stopped: no cell was changed."))
+        widget.post_message(Notice("Stopped: no cell was changed."))
     except ContextDBError as error:
-        widget.post_message(Told(str(error), "error"))
+        widget.post_message(Notice(str(error), "error"))
     finally:
         stop.set()  # also where the app is left
         app.let_keys()

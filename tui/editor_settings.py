@@ -25,7 +25,8 @@ from textual.keys import KEY_TO_UNICODE_NAME, Keys
 
 from contextdb.disk import read_bytes
 from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, nearest, no_such
-from tui.commands import BY_ID, COMMANDS
+
+from .commands import BY_ID, COMMANDS
 
 VARIABLE = "CONTEXTDB_EDITOR"
 MODIFIERS = ("ctrl", "alt", "shift", "super")
@@ -67,19 +68,19 @@ def read_settings(path: Path, themes: Collection[str]) -> EditorSettings:
     if not path.is_file():
         return EditorSettings()
     try:
-        said = tomllib.loads(read_bytes(path).decode("utf-8-sig"))
+        document = tomllib.loads(read_bytes(path).decode("utf-8-sig"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, FileError) as error:
         raise SettingsError(Fault(f"cannot read the settings of the editor: {error}.", place=Place(str(path)))) from None
-    faults = [fault.at(Place(str(path))) for fault in _faults(said, themes)]
+    faults = [fault.at(Place(str(path))) for fault in _faults(document, themes)]
     if faults:
         raise SettingsError(*faults)
-    return EditorSettings(said.get("theme"), said.get("keys", {}))
+    return EditorSettings(document.get("theme"), document.get("keys", {}))
 
 
-def _faults(said: Mapping[str, object], themes: Collection[str]) -> Iterator[Fault]:
-    for key in said.keys() - {"theme", "keys"}:
+def _faults(document: Mapping[str, object], themes: Collection[str]) -> Iterator[Fault]:
+    for key in document.keys() - {"theme", "keys"}:
         yield Fault(f"there is no setting {in_quotes(key)}.", "theme, [keys]")
-    theme, keys = said.get("theme"), said.get("keys", {})
+    theme, keys = document.get("theme"), document.get("keys", {})
     if theme is not None and theme not in themes:
         yield no_such("theme", theme, themes, ", ".join(sorted(themes)))
     if not isinstance(keys, dict):
@@ -114,5 +115,5 @@ def _clashes(keys: Mapping[str, str]) -> Iterator[Fault]:
         for key in filter(None, keys.get(command.id, command.keys).replace(" ", "").split(",")):
             other = taken.setdefault(key, command.id)
             if other != command.id and (command.id in keys or other in keys):
-                found = f"{in_quotes(key)} is the key of {in_quotes(other)} and of {in_quotes(command.id)}."
-                yield Fault(found, "a key of its own for each command")
+                problem = f"{in_quotes(key)} is the key of {in_quotes(other)} and of {in_quotes(command.id)}."
+                yield Fault(problem, "a key of its own for each command")

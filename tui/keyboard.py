@@ -128,7 +128,7 @@ class KeyParser(XTermParser):
 
     def _sequence(self, unit: str) -> Iterator[Message]:
         try:
-            keys = [] if _PLACE.fullmatch(unit) else list(self._sequence_to_key_events(_WITH_TEXT.sub(_said, unit)))
+            keys = [] if _PLACE.fullmatch(unit) else list(self._sequence_to_key_events(_WITH_TEXT.sub(_with_modifiers, unit)))
         except (ValueError, OverflowError):  # a character that there is not
             return
         if keys:
@@ -184,12 +184,12 @@ class WindowsKeyParser(KeyParser):
 
 
 def _begun(data: str, at: int) -> str:
-    found = _BEGUN.match(data, at)
-    assert found is not None
-    return found[0]
+    match = _BEGUN.match(data, at)
+    assert match is not None
+    return match[0]
 
 
-def _said(match: re.Match[str]) -> str:
+def _with_modifiers(match: re.Match[str]) -> str:
     """A key of kitty's protocol with modifiers and text: a command, or the text, by what the modifiers are."""
     code, others, modifiers, text = match.groups()
     held = int(modifiers) - 1 & _HELD

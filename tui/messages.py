@@ -8,7 +8,7 @@ from typing import Literal
 
 from textual.message import Message
 
-from tui.model.sheet import Done
+from .model.sheet import Done
 
 
 @dataclass
@@ -36,7 +36,7 @@ class SetContext(Message):
     facts: Mapping[str, str]
     """Condition to fact, as written in `contextdb query`; a condition that is not named is left out of the question."""
     name: str = ""
-    """Where the context comes from: shown next to the test row."""
+    """Where the context comes from: displayed next to the test row."""
 
 
 @dataclass
@@ -47,7 +47,7 @@ class Edited(Message):
 
 
 @dataclass
-class Told(Message):
+class Notice(Message):
     """Say something in the line over the footer."""
 
     text: str

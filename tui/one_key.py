@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections import deque
 from collections.abc import Callable, Sequence
+from typing import Any, cast
 
 from textual import events
 from textual.app import App
@@ -12,7 +13,9 @@ from textual.dom import DOMNode
 from textual.filter import LineFilter
 from textual.widget import Widget
 
-from tui.drawn import SameWidths
+from contextdb.console import ScreenCrash
+
+from .drawn import SameWidths
 
 SAME_WIDTHS = SameWidths()
 WAIT_FOR_PART_S = 2.0
@@ -29,6 +32,47 @@ class OneKeyAtATime(App[None]):
         self._settling: asyncio.Task[None] | None = None
         self._stop: Callable[[], None] | None = None
         """Stops long work, while which keys wait."""
+
+    def stay(self) -> int:
+        """Show the app until it is left; gives its exit code.
+
+        Raises
+        ------
+        ScreenCrash
+            An error escaped from a screen; the terminal is restored.
+        """
+        try:
+            self.run()
+        except (KeyboardInterrupt, SystemExit):
+            raise
+        except BaseException as error:  # a panic of polars is no Exception
+            raise ScreenCrash(error) from error
+        if self._exception is not None:
+            raise ScreenCrash(self._exception)
+        return self.return_code or 0
+
+    def on_load(self) -> None:
+        """Watch every task: Textual ends the app for an Exception, but waits for ever for a part that ended by another error."""
+        loop = asyncio.get_running_loop()
+        make: Callable[..., Any] = loop.get_task_factory() or (
+            lambda loop, work, **options: asyncio.Task(work, loop=loop, **options)
+        )
+
+        def watched(loop: asyncio.AbstractEventLoop, work: Any, **options: Any) -> asyncio.Task[Any]:
+            task: asyncio.Task[Any] = make(loop, work, **options)
+            task.add_done_callback(self._end_with)
+            return task
+
+        loop.set_task_factory(watched)
+
+    def _end_with(self, task: asyncio.Task[Any]) -> None:
+        error = None if task.cancelled() else task.exception()
+        if error is not None and not isinstance(error, (Exception, KeyboardInterrupt, SystemExit)):  # a panic of polars
+            self._handle_exception(cast(Exception, error))
+
+    def _fatal_error(self) -> None:
+        """End without Textual's traceback, which shows the values of variables, and so the table."""
+        self._close_messages_no_wait()
 
     def hold_keys(self, stop: Callable[[], None]) -> None:
         """From now on keys wait, but for Esc, which stops something."""
@@ -80,7 +124,7 @@ class OneKeyAtATime(App[None]):
 
 
 async def _done(part: DOMNode) -> None:
-    """Wait until a part of the screen has handled all that it was told up to now; one that is being closed is not waited for."""
+    """Wait until a part of the screen has handled all that it received up to now; one that is being closed is not waited for."""
     done = asyncio.Event()
     if part.post_message(events.Callback(done.set)):  # `call_later` wraps it, and Textual then inspects it anew each time
         try:

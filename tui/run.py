@@ -6,35 +6,38 @@ import gc
 import os
 
 from contextdb.errors import ContextDBError, Fault, in_quotes, mend_for
-from tui.app import EditorApp
-from tui.editor_settings import EditorSettings, SettingsError, read_settings, settings_path
-from tui.keyboard import read_whole_keys
-from tui.model.conflicted import conflicts_in
-from tui.model.workspace import Workspace
+
+from .app import EditorApp
+from .editor_settings import EditorSettings, SettingsError, read_settings, settings_path
+from .keyboard import read_whole_keys
+from .model.conflicted import conflicts_in
+from .model.workspace import Workspace
 
 FEW_COLOURS = ("ansi", "linux", "vt100", "vt220", "xterm", "xterm-color", "screen", "tmux", "rxvt", "cygwin")
 """Terminals of 16 colours or fewer, by TERM, unless COLORTERM says that they can do more."""
 
 
-def edit(path: str | None, theme: str | None = None) -> None:
-    """Open a table or a folder of tables, and stay until the editor is left.
+def edit(path: str | None, theme: str | None = None) -> int:
+    """Open a table or a folder of tables, and stay until the editor is left; gives the exit code.
 
     Raises
     ------
     ContextDBError
         There is no such table, it cannot be read, or the settings cannot be taken.
+    ScreenCrash
+        The editor ended by an error of its own.
     """
     workspace = Workspace(path)
     themes = EditorApp.theme_names()
     settings = read_settings(settings_path(), themes)
     if theme is not None and theme not in themes:
-        found = f"there is no theme {in_quotes(theme)}."
-        raise SettingsError(Fault(found, ", ".join(themes), mend_for(theme, themes)))
+        problem = f"there is no theme {in_quotes(theme)}."
+        raise SettingsError(Fault(problem, ", ".join(themes), mend_for(theme, themes)))
     _require_readable(workspace)
     forget_exported_size()
     read_whole_keys()
     pass_over_what_stays()
-    EditorApp(workspace, settings, theme or theme_for(settings)).run()
+    return EditorApp(workspace, settings, theme or theme_for(settings)).stay()
 
 
 def pass_over_what_stays() -> None:
@@ -51,7 +54,7 @@ def forget_exported_size() -> None:
 
 
 def _require_readable(workspace: Workspace) -> None:
-    """Say what cannot be read before the screen is taken; a file with a conflict between marks is asked about there, and so is
+    """Say what cannot be read before the screen is taken; a file with a conflict between marks is resolved there, and so is
     one of another program, that can be imported."""
     if not workspace.first:
         return

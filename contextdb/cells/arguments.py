@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from numbers import Real
 from operator import index
 from pathlib import Path
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.errors import ContextError, Fault, FileError, NoSuchPlace, Place, WrongType, in_quotes, plural, warn_of_old
+from contextdb.errors import ContextError, Fault, FileError, NoSuchPlace, Place, WrongType, in_quotes, plural
 
 MOST = 1e9
 """The most seconds, or whatever else is waited for or counted."""
@@ -46,6 +46,7 @@ def require_place(place: object, length: int, what: str) -> int:
 
 
 def require_text(value: object, what: str) -> str:
+    """The text. Raises WrongType for all else; `what` is its name in the message."""
     if not isinstance(value, str):
         raise _wrong(value, what, "a text")
     return value
@@ -106,24 +107,13 @@ def require_path(value: object, what: str = "path") -> Path:
     except UnicodeEncodeError:
         is_name = False
     if not is_name:
-        found = "the path holds a character that no name of a file can hold."
-        raise FileError(Fault(found, place=Place(str(path)), rule="no-such-path"))
+        problem = "the path holds a character that no name of a file can hold."
+        raise FileError(Fault(problem, place=Place(str(path)), rule="no-such-path"))
     return path
 
 
-def by_name(call: str, given: Sequence[object], **named: Any) -> dict[str, Any]:
-    """The arguments of a function that takes them by name now, where the first, `given`, were given by position; warns that they
-    were. `named` are those that are to be given by name, in the order in which they could be given by position; `call` is what the
-    warning says was called."""
-    if len(given) > len(named):
-        raise WrongType(Fault(f"{call} is given {plural(len(given) - len(named), 'argument')} too many.", ", ".join(named)))
-    now = dict(zip(named, given, strict=False))
-    what = "an argument" if len(now) == 1 else "arguments"
-    warn_of_old(f"{call} with {what} by position", ", ".join(f"{name}=..." for name in now), levels=4)
-    return {**named, **now}
-
-
 def require_mapping(value: object, what: str, accepted: str) -> Mapping[Any, Any]:
+    """The mapping. Raises WrongType for all else; `what` is its name in the message."""
     if not isinstance(value, Mapping):
         raise _wrong(value, what, accepted)
     return value

@@ -50,6 +50,7 @@ def write_date(day: float) -> str:
 
 
 def date_of(day: float) -> datetime.date:
+    """The date of a day; of one out of the calendar the first or the last date."""
     low, high = LIMITS
     return datetime.date.fromordinal(int(min(max(day, low), high)) + _EPOCH)
 

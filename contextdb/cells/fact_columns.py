@@ -3,36 +3,60 @@
 from __future__ import annotations
 
 import datetime
-from typing import Any
+import sys
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
-import polars as pl
 from numpy.typing import NDArray
 
 from contextdb.cells.kinds import Kind
 
-_PLAIN: dict[pl.DataType, tuple[type, ...]] = {
-    pl.Boolean(): (bool, np.bool_),
-    pl.String(): (str,),
-    pl.Float64(): (int, float, np.integer, np.floating, np.ndarray),
-    pl.Date(): (datetime.date,),
+if TYPE_CHECKING:
+    import polars as pl
+else:
+    from contextdb.columns import polars as pl
+
+_PLAIN: dict[str, tuple[type, ...]] = {
+    "Boolean": (bool, np.bool_),
+    "String": (str,),
+    "Float64": (int, float, np.integer, np.floating, np.ndarray),
+    "Date": (datetime.date,),
 }
 """The types of which every value is a fact; of others polars takes some that a query refuses, such as an int for a date."""
 
 
+def is_series(given: object) -> TypeGuard[pl.Series]:
+    """Whether it is a polars series; nobody has one who has not loaded polars."""
+    polars = sys.modules.get("polars")
+    return polars is not None and isinstance(given, polars.Series)
+
+
+def is_frame(given: object) -> TypeGuard[pl.DataFrame]:
+    """Whether it is a polars DataFrame."""
+    polars = sys.modules.get("polars")
+    return polars is not None and isinstance(given, polars.DataFrame)
+
+
+def column_type(kind: Kind) -> pl.DataType:
+    """The polars type of a column of facts."""
+    dtype: pl.DataType = pl.List(pl.String()) if kind.is_tags else getattr(pl, kind.dtype)()
+    return dtype
+
+
 def listed(given: Any) -> list[Any]:
     """A column as a list of single facts; dates and times of numpy as they are, because many of them are ints to Python."""
-    if isinstance(given, pl.Series):
+    if is_series(given):
         return given.to_list()
     return given.tolist() if isinstance(given, np.ndarray) and given.dtype.kind not in "mM" else list(given)
 
 
-def as_series(given: Any, dtype: pl.DataType) -> pl.Series | None:
+def as_series(given: Any, dtype: str) -> pl.Series | None:
     """A column as a polars series, or None when it has no single plain type.
 
-    A list must be of the type `dtype`: left to itself polars takes a list after its first items for float32 or for truth.
+    A list must be of the polars type named `dtype`: left to itself polars takes a list after its first items
+    for float32 or for truth.
     """
-    if isinstance(given, pl.Series):
+    if is_series(given):
         return given
     is_typed = isinstance(given, np.ndarray) and given.dtype.kind in "biufM"
     try:
@@ -41,7 +65,7 @@ def as_series(given: Any, dtype: pl.DataType) -> pl.Series | None:
         items = listed(given)
         if not items or not all(_is_plain(kind, _PLAIN[dtype]) for kind in set(map(type, items))):
             return None
-        return pl.Series(items, dtype=dtype, strict=True, nan_to_null=False)
+        return pl.Series(items, dtype=getattr(pl, dtype), strict=True, nan_to_null=False)
     except (TypeError, ValueError, OverflowError, pl.exceptions.PolarsError, pl.exceptions.PanicException):
         return None
 

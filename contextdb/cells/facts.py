@@ -35,7 +35,7 @@ from contextdb.errors import (
     nearest,
     no_such,
     plural,
-    shown,
+    safe_text,
     some,
 )
 
@@ -65,8 +65,8 @@ def cell(text: str) -> FactSet:
 def check_mode(unknown: str) -> None:
     """Raise ContextError unless `unknown` is a treatment of missing facts."""
     if not isinstance(unknown, str) or unknown not in UNKNOWN_MODES:
-        found = f"there is no treatment {in_quotes(str(unknown))} of missing facts."
-        raise ContextError(Fault(found, some(UNKNOWN_MODES), mend_for(str(unknown), UNKNOWN_MODES)))
+        problem = f"there is no treatment {in_quotes(str(unknown))} of missing facts."
+        raise ContextError(Fault(problem, some(UNKNOWN_MODES), mend_for(str(unknown), UNKNOWN_MODES)))
 
 
 def no_condition(name: str, known: Iterable[str]) -> NoSuchFact:
@@ -84,8 +84,8 @@ def require_names(context: Iterable[object]) -> None:
     """Raise ContextError for keys that are no texts."""
     for name in context:
         if not isinstance(name, str):
-            found = f"a context has the key {in_quotes(text_of(name))}, of type {type(name).__name__}."
-            raise ContextError(Fault(found, "the names of facts, as texts"))
+            problem = f"a context has the key {in_quotes(text_of(name))}, of type {type(name).__name__}."
+            raise ContextError(Fault(problem, "the names of facts, as texts"))
 
 
 def as_context(facts: object) -> Mapping[str, object]:
@@ -142,9 +142,9 @@ def missing_error(missing: list[str], given: Iterable[str]) -> ContextError:
     for name in missing[:1]:
         near = nearest(name, (n for n in extra if isinstance(n, str)))
         rest = f" ({plural(len(missing), 'fact')} missing: {some(missing)})" if len(missing) > 1 else ""
-        found = f"the fact {in_quotes(name)} is missing{rest}."
+        problem = f"the fact {in_quotes(name)} is missing{rest}."
         hint = f"{in_quotes(name)} for {in_quotes(near)}" if near else ""
-        faults.append(Fault(found, 'a value for each condition, or unknown="any" or "never"', hint, rule="missing-fact"))
+        faults.append(Fault(problem, 'a value for each condition, or unknown="any" or "never"', hint, rule="missing-fact"))
     return ContextError(*faults)
 
 
@@ -153,16 +153,16 @@ def misspelt(missing: list[str], extra: Iterable[str]) -> ContextError | None:
     for name in (n for n in extra if isinstance(n, str)):
         near = nearest(name, missing)
         if near is not None and _is_slip(name, near):
-            found = f"there is no condition {in_quotes(name)}, and {in_quotes(near)} is missing."
-            return ContextError(Fault(found, NAMES, in_quotes(near), rule="unknown-fact"))
+            problem = f"there is no condition {in_quotes(name)}, and {in_quotes(near)} is missing."
+            return ContextError(Fault(problem, NAMES, in_quotes(near), rule="unknown-fact"))
     return None
 
 
 def alike(name: str, known: Iterable[str]) -> tuple[str, ...]:
     """The known names of which a given one is very likely a misspelling, the nearest first."""
-    found = [n for n in known if _is_slip(name, n)]
-    near = nearest(name, found)
-    return tuple(sorted(found, key=lambda n: n != near))
+    candidates = [n for n in known if _is_slip(name, n)]
+    near = nearest(name, candidates)
+    return tuple(sorted(candidates, key=lambda n: n != near))
 
 
 def _is_slip(name: str, near: str) -> bool:
@@ -176,43 +176,43 @@ def _fault(value: object, condition: Condition, mend: str = "", accepted: str = 
     return ContextError(Fault(f"{what} is not a fact of type {condition.domain.kind}.", expected, mend, place, "wrong-fact"))
 
 
-def _checked_set(found: Cell, condition: Condition) -> Cell:
+def _checked_set(cell: Cell, condition: Condition) -> Cell:
     """A set of values that was read before, if it is one of the condition's own kind."""
     accepts = SET_OF[condition.domain.type.family]
-    if found.accepts is None or (isinstance(found.accepts, accepts) and not found.is_soft and not found.is_empty):
-        return _within_limits(found, condition)
-    raise _fault(found, condition, accepted=f"a set of values of type {condition.domain.kind}")
+    if cell.accepts is None or (isinstance(cell.accepts, accepts) and not cell.is_soft and not cell.is_empty):
+        return _within_limits(cell, condition)
+    raise _fault(cell, condition, accepted=f"a set of values of type {condition.domain.kind}")
 
 
 def _read_set(text: str, condition: Condition) -> Cell:
     try:
-        found = parse_cell(text, condition.domain)
+        cell = parse_cell(text, condition.domain)
     except CellError as error:
         raise ContextError(*(f.at(Place(column=condition.name)) for f in error.faults)) from None
-    if found.is_soft:
+    if cell.is_soft:
         raise _fault(text, condition, accepted='a set without a penalty ("~")')
-    if found.is_empty:
+    if cell.is_empty:
         raise _fault(text, condition, accepted="a set that holds at least one value")
-    return _within_limits(found, condition)
+    return _within_limits(cell, condition)
 
 
-def _within_limits(found: Cell, condition: Condition) -> Cell:
+def _within_limits(cell: Cell, condition: Condition) -> Cell:
     """A set of facts without numbers that no fact of the type can be, such as days after the last of the calendar."""
     low, high = condition.domain.type.limits
     if (low, high) == EVERYTHING[0]:
-        return found
-    spans = EVERYTHING if found.accepts is None else found.accepts.spans  # type: ignore[union-attr]
+        return cell
+    spans = EVERYTHING if cell.accepts is None else cell.accepts.spans  # type: ignore[union-attr]
     return Cell(NumberSet(tuple((max(first, low), min(last, high)) for first, last in spans if first <= high and last >= low)))
 
 
-def _plain_if_single(found: Cell) -> Fact:
+def _plain_if_single(cell: Cell) -> Fact:
     """A set of one value as that value."""
-    accepts = found.accepts
+    accepts = cell.accepts
     if isinstance(accepts, ValueSet) and len(accepts.values) == 1 and not accepts.is_complement:
         return next(iter(accepts.values))
     if isinstance(accepts, NumberSet) and len(accepts.spans) == 1 and accepts.spans[0][0] == accepts.spans[0][1]:
         return accepts.spans[0][0]
-    return found
+    return cell
 
 
 def _read_number(value: object, condition: Condition) -> Fact:
@@ -262,8 +262,8 @@ def _read_one_value(value: object, condition: Condition) -> str:
 def _unknown(value: str, condition: Condition) -> ContextError:
     known = condition.domain.values or ()
     place = Place(column=condition.name)
-    found = f"{in_quotes(value)} is not a declared value."
-    return ContextError(Fault(found, some(known), mend_for(value, known), place, "wrong-fact"))
+    problem = f"{in_quotes(value)} is not a declared value."
+    return ContextError(Fault(problem, some(known), mend_for(value, known), place, "wrong-fact"))
 
 
 def _read_tags(value: object, condition: Condition) -> Fact:
@@ -295,5 +295,5 @@ def describe(fact: Fact, domain: Domain) -> str:
     if isinstance(fact, frozenset):
         return " ".join(sorted(fact)) or "(no tags)"
     if isinstance(fact, bool) or not isinstance(fact, (int, float)):
-        return shown(str(fact))
+        return safe_text(str(fact))
     return domain.type.spelling.write(180.0 if fact == -180.0 and domain.type.is_circular else fact)

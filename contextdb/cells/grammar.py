@@ -29,7 +29,7 @@ from contextdb.cells.intervals import Spans
 from contextdb.cells.mends import candidates
 from contextdb.cells.sets import Accepted, Cell, NumberSet, TagSet, ValueSet, complement, covers
 from contextdb.cells.words import NUMBER_TEXT, format_number, is_name, is_reserved, quoted, says_any, truth_of
-from contextdb.errors import CellError, Fault, in_quotes, shown, some
+from contextdb.errors import CellError, Fault, in_quotes, safe_text, some
 
 _NUMBER = re.compile(NUMBER_TEXT)
 _TOKEN = re.compile(r'([+-]?)(?:"((?:[^"]|"")*)"|([^\s"]+))(?=\s|$)\s*')
@@ -133,31 +133,31 @@ def _read_plain_set(text: str, domain: Domain) -> Accepted | None:
 
 def _read_spans(part: str, text: str, domain: Domain) -> Spans:
     patterns = _patterns(domain.type.spelling.number, domain.type.spelling.step)
-    if found := patterns.centre.fullmatch(part):
-        return _centred(_number(found[1], text, domain), float(found[2]), text, domain)
-    if found := patterns.interval.fullmatch(part):
-        left, low, high, right = found.groups()
+    if match := patterns.centre.fullmatch(part):
+        return _centred(_number(match[1], text, domain), float(match[2]), text, domain)
+    if match := patterns.interval.fullmatch(part):
+        left, low, high, right = match.groups()
         if low is None and high is None:
             raise _unreadable(text, domain, '".." needs a number before or after it')
         if (left and left not in "[(") or (low is None and left == "[") or (high is None and right == "]"):
             raise _unreadable(text, domain, "a bracket is at a missing end")
         return _between(_end(low, text, domain), _end(high, text, domain), left == "(", right == ")", text, domain)
-    if found := patterns.compare.fullmatch(part):
-        return _compared(found[1] or "=", _number(found[2], text, domain), text, domain)
+    if match := patterns.compare.fullmatch(part):
+        return _compared(match[1] or "=", _number(match[2], text, domain), text, domain)
     raise _unreadable(text, domain)
 
 
-def _end(found: str | None, text: str, domain: Domain) -> float | None:
-    return None if found is None else _number(found, text, domain)
+def _end(end: str | None, text: str, domain: Domain) -> float | None:
+    return None if end is None else _number(end, text, domain)
 
 
-def _number(found: str, text: str, domain: Domain) -> float:
+def _number(number: str, text: str, domain: Domain) -> float:
     try:
-        value = domain.type.spelling.read(found)
+        value = domain.type.spelling.read(number)
     except ValueError as error:
         raise _unreadable(text, domain, str(error)) from None
-    if math.isinf(value) and ("inf" not in found.casefold() or domain.type.is_circular):
-        raise _unreadable(text, domain, f'"{shown(found)}" is too large for a number')
+    if math.isinf(value) and ("inf" not in number.casefold() or domain.type.is_circular):
+        raise _unreadable(text, domain, f'"{safe_text(number)}" is too large for a number')
     return value + 0.0
 
 
@@ -219,7 +219,7 @@ def _bare(word: str, text: str, domain: Domain) -> str:
     if is_name(word):
         return word
     why = "reads like a number or a word of the grammar" if is_reserved(word) else "has characters that need quotes"
-    raise _unreadable(text, domain, f'"{shown(word)}" {why}')
+    raise _unreadable(text, domain, f'"{safe_text(word)}" {why}')
 
 
 def _read_names(text: str, domain: Domain) -> ValueSet:
@@ -238,7 +238,7 @@ def _read_tags(text: str, domain: Domain) -> TagSet:
     signed: dict[str, list[str]] = {"+": [], "-": []}
     for sign, tag in _tokens(text, domain):
         if not sign:
-            raise _unreadable(text, domain, f'before the tag "{shown(tag)}" a + (has) or - (has not) is missing')
+            raise _unreadable(text, domain, f'before the tag "{safe_text(tag)}" a + (has) or - (has not) is missing')
         if domain.values is not None and not covers(tag, domain.known):
             raise _unknown_value(tag, text, domain, domain.values)
         signed[sign].append(tag)
@@ -252,8 +252,8 @@ def _unknown_value(name: str, text: str, domain: Domain, known: tuple[str, ...])
 
 def _unreadable(text: str, domain: Domain, why: str = "") -> CellError:
     reason = f": {why}." if why else "."
-    found = f"cannot read {in_quotes(text)} as {domain.type.noun}{reason}"
-    return CellError(Fault(found, domain.type.cells, rule="unreadable-cell"))
+    problem = f"cannot read {in_quotes(text)} as {domain.type.noun}{reason}"
+    return CellError(Fault(problem, domain.type.cells, rule="unreadable-cell"))
 
 
 def format_cell(cell: Cell, domain: Domain) -> str:
@@ -293,14 +293,14 @@ def _format_spans(spans: Spans, domain: Domain) -> str:
         return f"not {format_number(rest[0][0])}"
     first, last = spans[0], spans[-1]
     if len(spans) > 1 and first[0] == -180.0 and last[1] == intervals.CIRCLE[1]:
-        spans = (*spans[1:-1], (last[0], _shown_end(first[1])))
+        spans = (*spans[1:-1], (last[0], _displayed_end(first[1])))
     return " | ".join(
-        _format_span(_shown_end(low) if low == high else low, _shown_end(high) if low == high else high, format_number)
+        _format_span(_displayed_end(low) if low == high else low, _displayed_end(high) if low == high else high, format_number)
         for low, high in spans
     )
 
 
-def _shown_end(degrees: float) -> float:
+def _displayed_end(degrees: float) -> float:
     """Half a turn is shown as 180, not as the -180 that is stored."""
     return 180.0 if degrees == -180.0 else degrees
 
@@ -319,6 +319,6 @@ def _format_span(low: float, high: float, write: Callable[[float], str]) -> str:
 
 
 def _is_rung_after(value: float, step: Callable[[float], float]) -> bool:
-    """Whether a double is best told as the open end at its neighbour: 4.999999999999999 is just below 5."""
+    """Whether a double is best written as the open end at its neighbour: 4.999999999999999 is just below 5."""
     near = step(value)
     return math.isfinite(value) and math.isfinite(near) and (near == 0.0 or len(repr(near)) + 4 <= len(repr(value)))

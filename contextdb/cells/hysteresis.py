@@ -2,8 +2,8 @@
 
 A condition says by `hysteresis` how far, in its own unit. A cell widened by h accepts a fact x when it accepts some value between
 x - h and x + h; in tables inside tables, all cells of the condition that a row has accept one such value. So the fact is widened,
-to a set of values, and no cell: a table asked with widened facts answers with the rows whose widened cells all accept. Only what
-plays already is asked for in this way; every other answer is exact.
+to a set of values, and no cell: a table queried with widened facts answers with the rows whose widened cells all accept. Only what
+plays already is requested in this way; every other answer is exact.
 """
 
 from __future__ import annotations

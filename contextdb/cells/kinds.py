@@ -23,7 +23,6 @@ from numbers import Real
 from typing import Any
 
 import numpy as np
-import polars as pl
 
 from contextdb.cells import dates, intervals
 from contextdb.cells.intervals import EVERYTHING, Span, Spans
@@ -74,12 +73,12 @@ def _from_number(value: object) -> float | None:
     return None if math.isnan(number) else number
 
 
-def _is_number_column(dtype: pl.DataType) -> bool:
-    return dtype.is_numeric() and not dtype.is_decimal()
+def _is_number_column(dtype: Any) -> bool:
+    return bool(dtype.is_numeric() and not dtype.is_decimal())
 
 
-def _is_date_column(dtype: pl.DataType) -> bool:
-    return dtype in (pl.Date(), pl.Float64())
+def _is_date_column(dtype: Any) -> bool:
+    return str(dtype) in ("Date", "Float64")
 
 
 def _as_date(day: float) -> object:
@@ -108,8 +107,8 @@ class Kind:
     """What a part of an expression gives, for messages."""
     unbounded: str
     """Why keys of contextdb.toml that other types have are wrong here."""
-    dtype: Any
-    """The polars type of a column of facts."""
+    dtype: str
+    """The polars type of a column of facts, by its name: polars is loaded where a column needs it."""
     result: str = ""
     """How an expression gives a fact, for messages; "" where any of its values is one."""
     python: type | None = None
@@ -174,9 +173,9 @@ class Kind:
     def __post_init__(self) -> None:
         is_numeric, is_tags, is_truth = self.family is Family.NUMBERS, self.family is Family.TAGS, self.fixed == (False, True)
         is_named = self.family is Family.VALUES and not is_truth
-        found = {"is_numeric": is_numeric, "is_tags": is_tags, "is_truth": is_truth, "is_named": is_named}
-        found |= {"is_decimal": is_numeric and self.spelling is DECIMALS, "is_spelt": is_numeric and self.spelling is not DECIMALS}
-        for name, value in (found | {"is_swapped": is_named or is_tags}).items():  # fields, as each fact that is read asks for them
+        claims = {"is_numeric": is_numeric, "is_tags": is_tags, "is_truth": is_truth, "is_named": is_named}
+        claims |= {"is_decimal": is_numeric and self.spelling is DECIMALS, "is_spelt": is_numeric and self.spelling is not DECIMALS}
+        for name, value in (claims | {"is_swapped": is_named or is_tags}).items():  # fields, which reading a fact needs
             object.__setattr__(self, name, value)
 
     def __repr__(self) -> str:
@@ -200,7 +199,7 @@ _ALL = (
         value="True or False",
         result="True or False: a comparison such as speed > 0",
         unbounded="a bool is True or False",
-        dtype=pl.Boolean(),
+        dtype="Boolean",
         python=bool,
         annotation="bool",
         synonyms=("boolean", "flag", "logical", "truth"),
@@ -217,7 +216,7 @@ _ALL = (
         value="a number",
         result="a whole number: round(x), floor(x) or ceil(x)",
         unbounded="a number is declared by min and max",
-        dtype=pl.Float64(),
+        dtype="Float64",
         annotation="int",
         synonyms=("integer", "long", "int32", "int64", "whole", "count"),
         is_bounded=True,
@@ -237,7 +236,7 @@ _ALL = (
         noun="a number",
         value="a number",
         unbounded="a number is declared by min and max",
-        dtype=pl.Float64(),
+        dtype="Float64",
         python=float,
         annotation="float",
         synonyms=("float", "double", "real", "decimal", "numeric", "float32", "float64", "range"),
@@ -254,7 +253,7 @@ _ALL = (
         noun="an angle",
         value="an angle",
         unbounded="an angle wraps around, so it has no ends and no list",
-        dtype=pl.Float64(),
+        dtype="Float64",
         annotation="float",
         synonyms=("degrees", "degree", "deg", "direction", "heading", "rotation", "yaw"),
         is_circular=True,
@@ -271,7 +270,7 @@ _ALL = (
         value="a date",
         result='date("2026-01-31"), or a whole number of days since 1970-01-01',
         unbounded="a date is declared by min and max",
-        dtype=pl.Date(),
+        dtype="Date",
         annotation="datetime.date",
         synonyms=("day", "datetime", "calendar"),
         spelling=Spelling(dates.DATE_TEXT, dates.read_date, dates.write_date, mends=dates.MENDS),
@@ -295,7 +294,7 @@ _ALL = (
         value="a value of an enum",
         result="one of its declared values in quotes",
         unbounded="names have no order",
-        dtype=pl.String(),
+        dtype="String",
         synonyms=("choice", "option", "category", "categorical", "enumeration", "list"),
         has_values=True,
         needs_values=True,
@@ -309,7 +308,7 @@ _ALL = (
         noun="a text",
         value="a text",
         unbounded="a text can be anything",
-        dtype=pl.String(),
+        dtype="String",
         python=str,
         synonyms=("string", "str", "name"),
         is_open=True,
@@ -323,7 +322,7 @@ _ALL = (
         noun="tags",
         value="a set of tags",
         unbounded="tags have no order",
-        dtype=pl.List(pl.String()),
+        dtype="List(String)",
         synonyms=("tag", "set", "labels", "gameplaytags", "tagset"),
         has_values=True,
     ),

@@ -24,9 +24,9 @@ MOST_WORDS = 24
 _Mends = tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...]
 
 
-def _as_interval(found: re.Match[str]) -> str:
+def _as_interval(match: re.Match[str]) -> str:
     """ ">= 1 and < 5" as "[1..5)"."""
-    low, first, high, last = found.groups()
+    low, first, high, last = match.groups()
     is_closed = len(low) == len(high) == 2
     return f"{first}..{last}" if is_closed else f"{'[' if len(low) == 2 else '('}{first}..{last}{']' if len(high) == 2 else ')'}"
 

@@ -1,6 +1,6 @@
-"""How facts change in a mirror: what a table is asked with for animations that are played mirrored.
+"""How facts change in a mirror: what a table is queried with for animations that are played mirrored.
 
-A clip played mirrored turns right where it turned left, so its row must be asked with the facts as the mirror shows them. A
+A clip played mirrored turns right where it turned left, so its row must be queried with the facts as the mirror shows them. A
 condition says by `mirror` how its facts change:
 
     "negate"             the other sign: a number, an angle; of a bool the other value
@@ -73,31 +73,27 @@ def mirrored_fact(fact: Fact, condition: Condition) -> Fact:
     return _negated(fact, condition.domain) if isinstance(fact, float) else _mirrored_value(fact, way)
 
 
-class InMirror(dict[str, object]):
-    """Facts as a mirror shows them: no moment of the game's own."""
-
-
-def mirrored_facts(facts: Mapping[str, object], conditions: Conditions) -> InMirror:
+def mirrored_facts(facts: Mapping[str, object], conditions: Conditions) -> dict[str, object]:
     """Facts as they are given, those of `conditions` as the mirror shows them; the rest as it is. Raises ContextError for a fact
     that is none of its condition."""
-    found = InMirror(facts)
+    mirrored = dict(facts)
     for name, condition in conditions.items():
-        fact = found.get(name)
+        fact = mirrored.get(name)
         if type(condition.mirror) is tuple and (partner := partner_of(condition)) is not None:
-            found[name] = facts.get(partner)
+            mirrored[name] = facts.get(partner)
         elif type(fact) is float and condition.domain.type.is_numeric:  # the usual fact; an angle is wrapped when it is read
-            found[name] = 0.0 - fact
+            mirrored[name] = 0.0 - fact
         elif fact is not None:
-            found[name] = mirrored_fact(read_fact(fact, condition), condition)
-    return found
+            mirrored[name] = mirrored_fact(read_fact(fact, condition), condition)
+    return mirrored
 
 
-def kept_facts(facts: Mapping[str, object]) -> dict[str, object]:
+def frozen_facts(facts: Mapping[str, object]) -> dict[str, object]:
     """Facts as they are now, whatever becomes of the mapping and of sets and lists in it."""
-    return {name: kept_fact(fact) for name, fact in facts.items()}
+    return {name: frozen_fact(fact) for name, fact in facts.items()}
 
 
-def kept_fact(fact: object) -> object:
+def frozen_fact(fact: object) -> object:
     """One fact as it is now, whatever becomes of the set or list that it may be."""
     return frozenset(fact) if type(fact) is set else tuple(fact) if type(fact) is list else fact
 
@@ -147,8 +143,8 @@ def swapped_tag(tag: str, swaps: Swaps) -> str:
 # ---- one fact
 
 
-def _mirrored_set(found: Cell, way: Mirror, domain: Domain) -> Accepted | None:
-    accepts = found.accepts
+def _mirrored_set(cell: Cell, way: Mirror, domain: Domain) -> Accepted | None:
+    accepts = cell.accepts
     if isinstance(accepts, NumberSet):
         return NumberSet(_negated_spans(accepts.spans, domain), accepts.is_circular)
     if isinstance(accepts, ValueSet):

@@ -3,7 +3,7 @@
 A large table has some hundred thousand different number cells, and nearly all are plain: `5`, `<=5`, `10..30`, `20, 9.99`. A
 pattern over all texts finds those, and their ends become arrays; `contextdb.cells.grammar.parse_cell` reads the others. Both ways
 give the same doubles and so the same cells. All that happens when somebody first asks for a cell or a mask; before, texts are only
-tested for being readable. A `Cell` is made when it is asked for: to compile, the ends are enough.
+tested for being readable. A `Cell` is made on access: to compile, the ends are enough.
 
 n = number of distinct texts. A cell has at most two spans here (an angle through 180), and ends are closed, as in `intervals`.
 """
@@ -13,10 +13,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import overload
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
-import polars as pl
 from numpy.typing import NDArray
 
 from contextdb.cells.angles import wrap_angle, wrap_angles
@@ -25,8 +24,13 @@ from contextdb.cells.grammar import parse_cell
 from contextdb.cells.intervals import CIRCLE, Spans
 from contextdb.cells.sets import Cell, NumberSet
 
-FEW = 64
-"""So many texts are read one by one: it takes no longer."""
+if TYPE_CHECKING:
+    import polars as pl
+else:
+    from contextdb.columns import polars as pl
+
+FEW = 500
+"""So many texts are read one by one: it takes no longer than to load polars."""
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -55,7 +59,7 @@ class Ends:
 
 @dataclass(frozen=True, eq=False)
 class NumberCells(Sequence[Cell]):
-    """Cells of an int, number or angle column. Texts that are sure to be read are read when the first cell is asked for."""
+    """Cells of an int, number or angle column. Texts that are sure to be read are read on the first access."""
 
     texts: tuple[str, ...]
     domain: Domain
@@ -98,9 +102,15 @@ class NumberCells(Sequence[Cell]):
         return Cell(NumberSet(spans, self.domain.type.is_circular))
 
     def followed_by(self, texts: Sequence[str], cells: Sequence[Cell]) -> NumberCells:
-        """These cells and, behind them, some more."""
+        """These cells and, behind them, some more; of few the ends of these are taken as they are."""
         first = len(self)
-        return NumberCells((*self.texts, *texts), self.domain, {**self.read, **{first + i: cell for i, cell in enumerate(cells)}})
+        more = {first + i: cell for i, cell in enumerate(cells)}
+        both = NumberCells((*self.texts, *texts), self.domain, {**self.read, **more})
+        if "ends" in self.__dict__ and len(texts) <= FEW:
+            known, room = self.ends, np.full((len(self.ends.lows), len(texts)), np.nan)
+            lows, highs = np.hstack((known.lows, room)), np.hstack((known.highs, room))
+            both.__dict__["ends"] = Ends(lows, highs, {**known.others, **more})
+        return both
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,10 +148,10 @@ def spans_of(cells: Sequence[Cell]) -> CellSpans:
 def holding(cells: NumberCells, value: float) -> Flags:
     """Which cells accept a number, soft ones taken for Any: bool [n]."""
     ends, number = cells.ends, wrap_angle(value) if cells.domain.type.is_circular else value
-    found: Flags = np.logical_or.reduce((ends.lows <= number) & (number <= ends.highs))
+    flags: Flags = np.logical_or.reduce((ends.lows <= number) & (number <= ends.highs))
     for at, cell in ends.others.items():
-        found[at] = cell.is_soft or cell.holds(value)
-    return found
+        flags[at] = cell.is_soft or cell.holds(value)
+    return flags
 
 
 ColumnCells = tuple[Cell, ...] | NumberCells
@@ -149,6 +159,7 @@ ColumnCells = tuple[Cell, ...] | NumberCells
 
 
 def has_soft(cells: ColumnCells) -> bool:
+    """Whether a distinct cell of a column is soft."""
     return any(c.is_soft for c in (cells.read.values() if isinstance(cells, NumberCells) else cells))
 
 
@@ -189,9 +200,9 @@ def _series(texts: Sequence[str]) -> pl.Series | None:
 def _parts(series: pl.Series, pattern: str, n_groups: int) -> tuple[Numbers, list[pl.Series]]:
     """The texts that a pattern matches, and its groups for each."""
     groups = series.str.extract_groups(pattern).struct.unnest()
-    found = np.flatnonzero(groups.to_series(1).is_not_null().to_numpy())
-    kept = groups[found]
-    return found, [kept.to_series(i) for i in range(n_groups)]
+    places = np.flatnonzero(groups.to_series(1).is_not_null().to_numpy())
+    matched = groups[places]
+    return places, [matched.to_series(i) for i in range(n_groups)]
 
 
 def _floats(series: pl.Series) -> Floats:
@@ -200,7 +211,7 @@ def _floats(series: pl.Series) -> Floats:
 
 def _read_pairs(series: pl.Series, domain: Domain, at: Numbers, lows: Floats, highs: Floats) -> Numbers:
     """Read `a..b` in all its brackets, and `centre, tolerance`; gives what is left."""
-    found, (left, first, between, second, right) = _parts(series, _PAIR, 5)
+    places, (left, first, between, second, right) = _parts(series, _PAIR, 5)
     a, b = _floats(first), _floats(second)
     is_interval = (between == "..").to_numpy()
     is_bare = ((left == "") & (right == "")).to_numpy()
@@ -208,35 +219,35 @@ def _read_pairs(series: pl.Series, domain: Domain, at: Numbers, lows: Floats, hi
     is_read = is_interval | (is_bare & (b >= 0.0))
     if domain.type.is_circular:
         is_whole = ~is_interval & (b >= 180.0)
-        is_read = is_read & is_bare & _set_arcs(lows, highs, at[found], low, high, is_whole)
+        is_read = is_read & is_bare & _set_arcs(lows, highs, at[places], low, high, is_whole)
     else:
         low = np.where((left == "(").to_numpy(), np.nextafter(low, np.inf), low)
         high = np.where((right == ")").to_numpy(), np.nextafter(high, -np.inf), high)
-        is_read = is_read & _set_spans(lows, highs, at[found], low, high, domain)
-    return _left_over(at, found, is_read, lows, highs)
+        is_read = is_read & _set_spans(lows, highs, at[places], low, high, domain)
+    return _left_over(at, places, is_read, lows, highs)
 
 
 def _read_singles(series: pl.Series, domain: Domain, at: Numbers, lows: Floats, highs: Floats) -> Numbers:
     """Read numbers, comparisons and intervals without an end; gives what is left."""
-    found, (before, number, after) = _parts(series, _SINGLE, 3)
+    places, (before, number, after) = _parts(series, _SINGLE, 3)
     value = _floats(number)
     sign, is_from = before.fill_null(""), after.is_not_null().to_numpy()
     has_low = is_from | sign.is_in(["", "=", ">", ">="]).to_numpy()
     has_high = ~is_from & sign.is_in(["", "=", "<", "<=", ".."]).to_numpy()
     is_read = ~is_from | (sign == "").to_numpy()
     if domain.type.is_circular:  # without an end an angle may be refused
-        is_read &= has_low & has_high & _set_arcs(lows, highs, at[found], value, value, np.zeros(len(value), np.bool_))
+        is_read &= has_low & has_high & _set_arcs(lows, highs, at[places], value, value, np.zeros(len(value), np.bool_))
     else:
         low = np.where(has_low, np.where((sign == ">").to_numpy(), np.nextafter(value, np.inf), value), -np.inf)
         high = np.where(has_high, np.where((sign == "<").to_numpy(), np.nextafter(value, -np.inf), value), np.inf)
-        is_read &= _set_spans(lows, highs, at[found], low, high, domain)
-    return _left_over(at, found, is_read, lows, highs)
+        is_read &= _set_spans(lows, highs, at[places], low, high, domain)
+    return _left_over(at, places, is_read, lows, highs)
 
 
-def _left_over(at: Numbers, found: Numbers, is_read: Flags, lows: Floats, highs: Floats) -> Numbers:
+def _left_over(at: Numbers, matched: Numbers, is_read: Flags, lows: Floats, highs: Floats) -> Numbers:
     """The texts that are still to be read; what was set for them too soon is taken back."""
     is_left = np.ones(len(at), np.bool_)
-    is_left[found[is_read]] = False
+    is_left[matched[is_read]] = False
     rest = at[is_left]
     lows[:, rest] = highs[:, rest] = np.nan
     return rest

@@ -76,8 +76,8 @@ class Output:
 
     def array(self, values: list[OutputValue]) -> np.ndarray[Any, np.dtype[Any]]:
         """Some values as numpy has them: bool, int64, float64, float64 [n, size] or, for texts, objects."""
-        found = np.array(values, self.type.dtype)
-        return found.reshape(-1, self.size) if self.type.has_size else found
+        array = np.array(values, self.type.dtype)
+        return array.reshape(-1, self.size) if self.type.has_size else array
 
     def read(self, text: str, wants_mend: bool = True) -> OutputValue:
         """The value that a cell gives. Raises CellError with what was found, what is accepted and, where one is near, a text that
@@ -97,13 +97,13 @@ class Output:
             value = self.type.read(text, self)
         except ValueError as error:
             why = f": {error}." if str(error) else "."
-            found = f"cannot read {in_quotes(text)} as {self._noun}{why}"
+            wrong = f"cannot read {in_quotes(text)} as {self._noun}{why}"
             if self.type.has_values:
-                found = f"{in_quotes(text.strip())} is not a declared value."
-            raise CellError(Fault(found, self.accepted, self._mend(text) if wants_mend else "", rule="unreadable-output")) from None
+                wrong = f"{in_quotes(text.strip())} is not a declared value."
+            raise CellError(Fault(wrong, self.accepted, self._mend(text) if wants_mend else "", rule="unreadable-output")) from None
         if not self._is_inside(value):
-            found = f"{in_quotes(text.strip())} is outside the declared bounds."
-            raise CellError(Fault(found, self.accepted, in_quotes(self.written(self._clipped(value))), rule="output-out-of-bounds"))
+            wrong = f"{in_quotes(text.strip())} is outside the declared bounds."
+            raise CellError(Fault(wrong, self.accepted, in_quotes(self.written(self._clipped(value))), rule="output-out-of-bounds"))
         return value
 
     def fault(self, text: str) -> Fault | None:
@@ -124,10 +124,10 @@ class Output:
     def taken(self, value: object) -> OutputValue:
         """The value that Python or TOML gives, such as a default. Raises ValueError where it is no value of the output;
         with why."""
-        found = self.type.take(value, self)
-        if not self._is_inside(found):
+        taken = self.type.take(value, self)
+        if not self._is_inside(taken):
             raise ValueError("this is outside the declared bounds")
-        return found
+        return taken
 
     def written(self, value: OutputValue) -> str:
         """The text of a cell that gives a value."""

@@ -1,4 +1,4 @@
-"""Sequences whose items are kept in a list, and those whose items are made when they are asked for."""
+"""Sequences whose items are kept in a list, and those whose items are made on access."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Made(Sequence[T]):
         raise NotImplementedError
 
 
-class Kept(Sequence[T]):
+class ListSequence(Sequence[T]):
     """A sequence of what is in its list `_items`."""
 
     _items: list[T]

@@ -2,10 +2,9 @@
 
 A `NumberSet` is spans of doubles, a `ValueSet` some values or all but some, a `TagSet` what a set of tags must have and must not
 have. Two sets of one condition are of one type. Numbers and values meet and join exactly. Tags do not: no single cell says what
-`+A -B` and `not +C -D` have in common. So there are three ways to meet, which differ for tags alone:
+`+A -B` and `not +C -D` have in common. So there are two ways to meet, which differ for tags alone:
 
     meet_exactly       a `TagMeet`, which is exact and no cell
-    meet_in_a_cell     the least box round the meet that a cell can say
     meet_plainly       of plain sets only, whose meet is plain
 
 Nothing here knows a text.
@@ -195,25 +194,20 @@ def meet(cells: Sequence[Cell]) -> Cell:
 
     Soft cells are left out where one is not soft; where all are, the meet is soft too, at the sum of their penalties.
     """
-    said = [c for c in cells if not c.is_any]
-    if not said:
+    specified = [c for c in cells if not c.is_any]
+    if not specified:
         return ANY
-    hard = [c for c in said if not c.is_soft]
-    found = None
-    for cell in hard or said:
-        found = cell.accepts if found is None or cell.accepts is None else meet_exactly(found, cell.accepts)
-    penalty = reduce(add, (c.penalty or 0.0 for c in said))  # one after the other: `sum` rounds otherwise from Python 3.12 on
-    return Cell(found, None if hard else penalty)
+    hard = [c for c in specified if not c.is_soft]
+    accepted = None
+    for cell in hard or specified:
+        accepted = cell.accepts if accepted is None or cell.accepts is None else meet_exactly(accepted, cell.accepts)
+    penalty = reduce(add, (c.penalty or 0.0 for c in specified))  # one after the other: `sum` rounds otherwise from Python 3.12 on
+    return Cell(accepted, None if hard else penalty)
 
 
 def meet_exactly(one: Accepted, other: Accepted) -> Accepted:
     """What two sets have in common; of tags as a `TagMeet` where no plain set is it."""
     return _meet(one, other, _tags_exactly)
-
-
-def meet_in_a_cell(one: Accepted, other: Accepted) -> Accepted:
-    """What two sets have in common; of tags, where no cell can say that, the least box round it that a cell can."""
-    return _meet(one, other, _tags_in_a_cell)
 
 
 def meet_plainly(one: Accepted, other: Accepted) -> Accepted:
@@ -249,16 +243,6 @@ def _plainer(part: TagSet) -> TagSet:
     if part.is_complement and len(part.needs) + len(part.bans) == 1:
         return TagSet(part.bans, part.needs)
     return part
-
-
-def _tags_in_a_cell(one: TagSet, other: TagSet) -> TagSet:
-    if not one.is_complement and not other.is_complement:
-        return _plain_tags(one, other)
-    kept, rest = (other, one) if one.is_complement else (one, other)
-    needs, bans = rest.needs - kept.needs, rest.bans - kept.bans
-    if not kept.is_complement and len(needs) + len(bans) <= 1:
-        return TagSet(kept.needs | bans, kept.bans | needs) if needs or bans else TagSet(frozenset(), is_complement=True)
-    return kept
 
 
 def _plain_tags(one: TagSet, other: TagSet) -> TagSet:

@@ -6,7 +6,7 @@ words; every other column is a fact, written as in `contextdb query`. An empty f
     walk "Half Way"     exactly these assets
     +walk -run          walk is valid and run is not, whatever else is
     (none)              no asset is valid
-    (empty)             nothing is expected: a context that is kept to be looked at
+    (empty)             nothing is expected: a context that is saved to be looked at
 
 An edge: it reads and writes the file of cases.
 """
@@ -28,6 +28,7 @@ from contextdb.cells.words import quoted
 from contextdb.columns import TextColumn
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.table import data_of
+from contextdb.covering.baseline import CaseCounts
 from contextdb.disk import write_atomic
 from contextdb.errors import CellError, ContextError, Fault, Place, TableError, in_quotes, mend_for, nearest, some
 from contextdb.files.csv_rewrite import Origin
@@ -45,7 +46,7 @@ Columns = Sequence[TextColumn]
 
 @dataclass(frozen=True)
 class Case:
-    """A context that was kept: its name, its facts as texts, and what is expected of it."""
+    """A saved context: its name, its facts as texts, and what is expected of it."""
 
     name: str
     facts: Mapping[str, str]
@@ -81,10 +82,12 @@ class Verdict:
     extra: tuple[str, ...] = ()
     """Assets that should not be valid and are."""
     faults: tuple[Fault, ...] = ()
-    """Why the case cannot be asked."""
+    """Why the case cannot be evaluated."""
     is_asked: bool = True
     """Whether anything is expected."""
     n_valid: int = 0
+    valid: int = 0
+    """The valid rows, as bits."""
 
     @property
     def holds(self) -> bool | None:
@@ -112,7 +115,7 @@ def read_cases(path: Path) -> list[Case]:
     nothing = [""] * columns[0].n_rows
     names, expected, notes = texts.pop(NAME), texts.pop(EXPECTED, nothing), texts.pop(NOTE, nothing)
     return [
-        Case(name, {f: said[row] for f, said in texts.items() if said[row].strip()}, expected[row], source.line(row), notes[row])
+        Case(name, {f: facts[row] for f, facts in texts.items() if facts[row].strip()}, expected[row], source.line(row), notes[row])
         for row, name in enumerate(names)
     ]
 
@@ -121,21 +124,21 @@ def keep_case(path: Path, case: Case) -> None:
     """Write a case into a file, in the place of one of its name or at the end. Other lines stay as they are. Raises TableError or
     FileError where the file cannot be read or written, or a condition has a name that such a file uses itself."""
     if taken := [name for name in CASE_COLUMNS if name in case.facts]:
-        found = f"a condition named {in_quotes(taken[0])} cannot be saved: a file of cases has such a column itself."
-        raise TableError(Fault(found, "another name of the condition", place=Place(str(path))))
+        problem = f"a condition named {in_quotes(taken[0])} cannot be saved: a file of cases has such a column itself."
+        raise TableError(Fault(problem, "another name of the condition", place=Place(str(path))))
     empty = [TextColumn.of(NAME, ()), TextColumn.of(EXPECTED, ())]
-    said = {NAME: case.name, EXPECTED: case.expected, **case.facts} | ({NOTE: case.note} if case.note else {})
+    texts = {NAME: case.name, EXPECTED: case.expected, **case.facts} | ({NOTE: case.note} if case.note else {})
 
-    def kept(source: AnySource | None, columns: Columns) -> tuple[Columns, Origin]:
+    def with_case(source: AnySource | None, columns: Columns) -> tuple[Columns, Origin]:
         columns = columns or empty
         row, n_rows = _row_of(case, source, columns), columns[0].n_rows
         known = {c.name for c in columns}
-        columns = [*columns, *(TextColumn.of(name, [""] * n_rows) for name in said if name not in known)]
+        columns = [*columns, *(TextColumn.of(name, [""] * n_rows) for name in texts if name not in known)]
         if row is not None:
-            return [c.with_text(row, said.get(c.name, "")) for c in columns], np.arange(n_rows)
-        return [c.with_inserted(n_rows, [said.get(c.name, "")]) for c in columns], np.append(np.arange(n_rows), -1)
+            return [c.with_text(row, texts.get(c.name, "")) for c in columns], np.arange(n_rows)
+        return [c.with_inserted(n_rows, [texts.get(c.name, "")]) for c in columns], np.append(np.arange(n_rows), -1)
 
-    _rewrite(path, kept)
+    _rewrite(path, with_case)
 
 
 def rename_case(path: Path, case: Case, name: str) -> None:
@@ -178,10 +181,10 @@ def _read(path: Path) -> tuple[AnySource, list[TextColumn]]:
     if NAME in names:
         return source, columns
     near = nearest(NAME, names)
-    found = f"there is no column {in_quotes(NAME)}, which names the cases."
+    problem = f"there is no column {in_quotes(NAME)}, which names the cases."
     place = Place(str(path), source.line(-1))
     raise TableError(
-        Fault(found, f"{NAME}, {EXPECTED} and a column for each fact", f"to rename {in_quotes(near)}" if near else "", place)
+        Fault(problem, f"{NAME}, {EXPECTED} and a column for each fact", f"to rename {in_quotes(near)}" if near else "", place)
     )
 
 
@@ -199,8 +202,8 @@ def _row_of(case: Case, source: AnySource | None, columns: Sequence[TextColumn])
 def _find(path: Path, case: Case, source: AnySource | None, columns: Columns) -> int:
     row = _row_of(case, source, columns)
     if row is None:
-        found = f"there is no case {in_quotes(case.name)} any more."
-        raise TableError(Fault(found, "a case of the file", mend_for(case.name, _names(columns)), Place(str(path))))
+        problem = f"there is no case {in_quotes(case.name)} any more."
+        raise TableError(Fault(problem, "a case of the file", mend_for(case.name, _names(columns)), Place(str(path))))
     return row
 
 
@@ -210,27 +213,27 @@ def _find(path: Path, case: Case, source: AnySource | None, columns: Columns) ->
 def check_cases(table: Table, cases: Sequence[Case], file: str | None = None) -> list[Finding]:
     """What of the cases does not hold: findings of the rules "case-failed" and "unreadable-case".
 
-    A table with cells that cannot be read is not asked; those are findings of their own.
+    A table with cells that cannot be read is not evaluated; those are findings of their own.
     """
     if table.faults:
         return []
     try:
         flat, compiled = table.flat(), data_of(table.compile())
-    except TableError:  # a table inside it cannot be used: said of the row that refers to it
+    except TableError:  # a table inside it cannot be used: reported for the row that refers to it
         return []
-    found = list(_doubtful(flat, cases, file))
-    known = _asked(flat)
+    findings = list(_doubtful(flat, cases, file))
+    known = _known_facts(flat)
     for case in cases:
         if not known.issuperset(case.facts):
             continue
         verdict = judge(compiled, case)
         for fault in verdict.faults:
-            message = f"the case {in_quotes(case.name)} cannot be evaluated: {fault.message}"
-            found.append(Finding("unreadable-case", "error", message, flat.name, file, line=case.line, column=fault.place.column))
+            text = f"the case {in_quotes(case.name)} cannot be evaluated: {fault.message}"
+            findings.append(Finding("unreadable-case", "error", text, flat.name, file, line=case.line, column=fault.place.column))
         if not verdict.faults and verdict.holds is False:
-            message = f"the case {in_quotes(case.name)} fails: {told(verdict, compiled.assets)}."
-            found.append(Finding("case-failed", "error", message, flat.name, file, line=case.line, column=EXPECTED))
-    return sorted(found, key=lambda finding: finding.line or 0)
+            message = f"the case {in_quotes(case.name)} fails: {mismatch(verdict, compiled.assets)}."
+            findings.append(Finding("case-failed", "error", message, flat.name, file, line=case.line, column=EXPECTED))
+    return sorted(findings, key=lambda finding: finding.line or 0)
 
 
 def judge(compiled: CompiledData, case: Case, readable: int | None = None) -> Verdict:
@@ -253,14 +256,33 @@ def judge(compiled: CompiledData, case: Case, readable: int | None = None) -> Ve
             faults += [fault.at(Place(column=name)) for fault in error.faults]
     if faults:
         return Verdict(faults=tuple(faults))
-    found = compiled.query(facts, unknown="any")
-    found = found if readable is None else compiled.matches(found.bits & readable)
-    valid = set(found.assets)
+    matches = compiled.query(facts, unknown="any")
+    matches = matches if readable is None else compiled.matches(matches.bits & readable)
+    valid = set(matches.assets)
     extra = valid - expected.wanted if expected.is_exact else valid & expected.banned
-    return Verdict(tuple(sorted(expected.wanted - valid)), tuple(sorted(extra)), (), not expected.is_anything, n_valid=len(found))
+    return Verdict(
+        tuple(sorted(expected.wanted - valid)), tuple(sorted(extra)), (), not expected.is_anything, len(matches), matches.bits
+    )
 
 
-def told(verdict: Verdict, assets: Sequence[str]) -> str:
+def counted(table: Table, cases: Sequence[Case]) -> CaseCounts:
+    """How much the cases of a table expect. One that can only hold, and another of the same facts and expectation, do not count."""
+    compiled = data_of(table.compile())
+    exact, different, reached = 0, set[tuple[frozenset[tuple[str, str]], str]](), 0
+    for case in cases:
+        facts = frozenset((name, text.strip()) for name, text in case.facts.items() if name in compiled.asked)
+        verdict = judge(compiled, case)
+        if verdict.faults or (facts, case.expected.strip()) in different:
+            continue
+        expected = read_expected(case.expected)
+        if expected.is_exact or expected.wanted or not expected.banned.isdisjoint(compiled.assets):
+            different.add((facts, case.expected.strip()))
+            exact += expected.is_exact
+            reached |= verdict.valid
+    return CaseCounts(len(different), exact, compiled.n_rows, reached.bit_count())
+
+
+def mismatch(verdict: Verdict, assets: Sequence[str]) -> str:
     """What is wrong, in words; with a name that the table does not have, the nearest that it has."""
     parts = []
     if missing := verdict.missing:
@@ -286,8 +308,8 @@ def read_expected(text: str) -> Expected:
             return Expected(needs, bans)
         case ValueSet(values, False) if not cell.is_soft:
             return Expected(frozenset(map(str, values)), is_exact=True)
-    found = f"{in_quotes(body)} is not a valid expectation."
-    raise ContextError(Fault(found, f'assets with spaces between, "+walk -run", "{NONE}"', place=Place(column=EXPECTED)))
+    problem = f"{in_quotes(body)} is not a valid expectation."
+    raise ContextError(Fault(problem, f'assets with spaces between, "+walk -run", "{NONE}"', place=Place(column=EXPECTED)))
 
 
 def _no_asset(asset: str, assets: Sequence[str]) -> str:
@@ -297,15 +319,15 @@ def _no_asset(asset: str, assets: Sequence[str]) -> str:
 
 def _doubtful(table: TableData, cases: Sequence[Case], file: str | None) -> Iterator[Finding]:
     """Facts that no table of the project has a condition for; cases of one name; assets expected not to be valid that are none."""
-    asked = set(_asked(table))
+    facts = set(_known_facts(table))
     assets, first_of = table.assets, dict[str, Case]()
     for case in cases:
         place = Finding("unreadable-case", "error", "", table.name, file, line=case.line)
         about = f"the case {in_quotes(case.name)}"
-        for name in [name for name in case.facts if name not in asked]:
+        for name in [name for name in case.facts if name not in facts]:
             [fault] = no_condition(name, [c.condition.name for c in table.conditions]).faults
             yield replace(place, message=f"{about} cannot be evaluated: {fault.message}", column=name)
-            asked.add(name)
+            facts.add(name)
         if first := first_of.get(case.name):
             where = f"in line {first.line}" if first.line else "before it"
             yield replace(place, level="warning", message=f"{about} is also {where}: each case needs its own name.", column=NAME)
@@ -314,7 +336,7 @@ def _doubtful(table: TableData, cases: Sequence[Case], file: str | None) -> Iter
             yield replace(place, level="warning", message=f"{about} always holds: {_no_asset(asset, assets)}", column=EXPECTED)
 
 
-def _asked(table: TableData) -> set[str]:
+def _known_facts(table: TableData) -> set[str]:
     """The facts that a case may name: those of this table, and those that its project declares for others."""
     return {c.condition.name for c in table.conditions} | table.schema.conditions.keys()
 

@@ -11,13 +11,14 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.grammar import format_cell, parse_cell
 from contextdb.cells.plain_ends import cuts_of, plain
-from contextdb.cells.sets import Cell, meet_in_a_cell
+from contextdb.cells.sets import Accepted, Cell, TagSet, meet_plainly, plain_parts
 from contextdb.checks.effects_space import Cells, Rows, Shared, shared_space
 from contextdb.covering import CoverageReport, coverage, format_percent
 from contextdb.covering.ruled import without_rules
@@ -38,7 +39,7 @@ MOST_BOXES = 20
 MOST_PARTS = 20
 """Parts of one box that are named, the largest."""
 MOST_GAPS = 1
-"""Gaps that are named where only their share is asked for."""
+"""Gaps that are named where only their share is requested."""
 MOST_CELLS = 60_000
 """Cells of conditions above which gaps and the covered share are not worked out."""
 MOST_ROWS = 2_000
@@ -200,10 +201,10 @@ def merge_effects(
     mine, yours = (effects(side, merged, work=work, samples=samples) for side in (ours, theirs))
     ours, theirs, merged = _flat(ours), _flat(theirs), _flat(merged)
     measure = Measure(shared_space(without_rules(ours).table, without_rules(merged).table), work, samples, 0)
-    both = [measure.common(one, other) for one in mine.opened for other in yours.opened]
-    gaps = sorted({box.text: box for box in both if box is not None}.values(), key=lambda box: -box.share)
-    kept = {_key(merged, finding) for finding in (*yours.dead, *yours.overlaps)}
-    findings = tuple(f for f in (*mine.dead, *mine.overlaps) if _key(merged, f) in kept)
+    both = [box for one in mine.opened for other in yours.opened for box in measure.common(one, other)]
+    gaps = sorted({box.text: box for box in both}.values(), key=lambda box: -box.share)
+    retained = {_key(merged, finding) for finding in (*yours.dead, *yours.overlaps)}
+    findings = tuple(f for f in (*mine.dead, *mine.overlaps) if _key(merged, f) in retained)
     return MergeEffects(tuple(gaps), findings)
 
 
@@ -217,8 +218,8 @@ def _flat(table: EitherTable) -> EitherTable:
         return table
     plain = as_plain(flat)
     if plain is None:
-        found = f"tags of {in_quotes(table.name)} and of a table inside it have requirements that no single cell can describe."
-        raise TableError(Fault(found, place=Place(str(table.path) if table.path else None)))
+        problem = f"tags of {in_quotes(table.name)} and of a table inside it have requirements that no single cell can describe."
+        raise TableError(Fault(problem, place=Place(str(table.path) if table.path else None)))
     return plain
 
 
@@ -243,14 +244,14 @@ def _touched_rows(changes: Diff, space: Shared) -> list[int]:
     before, after = changes.before, changes.after
     was = changes.alignment.rows
     is_touched = was < 0
-    kept = np.flatnonzero(~is_touched)
-    is_touched[kept] |= before.enabled[was[kept]] != after.enabled[kept]
+    retained = np.flatnonzero(~is_touched)
+    is_touched[retained] |= before.enabled[was[retained]] != after.enabled[retained]
     for name in space.conditions:
         old, new = space.column(before, name), space.column(after, name)
-        pairs = np.stack([old.codes[was[kept]], new.codes[kept]], axis=1)
+        pairs = np.stack([old.codes[was[retained]], new.codes[retained]], axis=1)
         distinct, which = np.unique(pairs, axis=0, return_inverse=True)
         differs = np.array([old.texts[x] != new.texts[y] for x, y in distinct.tolist()], np.bool_)
-        is_touched[kept] |= differs[which.reshape(-1)] if len(kept) else False
+        is_touched[retained] |= differs[which.reshape(-1)] if len(retained) else False
     return np.flatnonzero(is_touched).tolist()
 
 
@@ -283,39 +284,45 @@ class Measure:
         parts: dict[str, Box] = {}
         for box in boxes:
             whole = share if len(boxes) == 1 else self._report([[box]]).covered
-            found, _ = self._left_by([others], Box(box, whole))
-            parts |= {part.text: part for part in found}
+            pieces, _ = self._left_by([others], Box(box, whole))
+            parts |= {part.text: part for part in pieces}
         if not parts:
             return (), 0.0
         beyond = self._report([others], self._outside([boxes])) if len(boxes) > 1 or others else None
-        kept = tuple(sorted(parts.values(), key=lambda part: -part.share))
-        return kept, share if beyond is None else (1.0 - beyond.covered) * share
+        parts_left = tuple(sorted(parts.values(), key=lambda part: -part.share))
+        return parts_left, share if beyond is None else (1.0 - beyond.covered) * share
 
     def holes(self, table: EitherTable, within: Sequence[Box]) -> tuple[list[Box], bool]:
         """Contexts of some boxes that have no valid row in a table, and whether these are all of them."""
-        found: list[Box] = []
+        boxes: list[Box] = []
         is_complete = len(within) <= MOST_BOXES
         wanted = sorted(within, key=lambda box: -box.share)[:MOST_BOXES]
         compiled = self.space.compiled(table) if wanted else None
         for box in wanted:
             assert compiled is not None
             near = self.space.meeting(compiled, box.cells)
-            seen = [hole.cells for hole in found]
-            holes, told = self._left_by([(table, near[near < table.n_rows]), seen], box)
-            found += holes
-            is_complete = is_complete and told
-        return sorted(found, key=lambda box: -box.share), is_complete
+            seen = [hole.cells for hole in boxes]
+            holes, are_all = self._left_by([(table, near[near < table.n_rows]), seen], box)
+            boxes += holes
+            is_complete = is_complete and are_all
+        return sorted(boxes, key=lambda box: -box.share), is_complete
 
     def _left_by(self, rows: Rows, box: Box) -> tuple[list[Box], bool]:
         """What rows leave of a box, in its cells, and whether that is all."""
         few = replace(self, work=self.work // 10, samples=self.samples // 5)
         report = few._report(rows, self._outside([[box.cells]]), MOST_PARTS)
-        parts = ((meet(box.cells, gap.cells, self.space.conditions), gap.share * box.share) for gap in report.gaps)
-        return [Box(cells, share) for cells, share in parts if cells is not None], report.gaps_complete
+        boxes: list[Box] = []
+        for gap in report.gaps:
+            parts = meet(box.cells, gap.cells, self.space.conditions)
+            boxes += [Box(parts[0], gap.share * box.share)] if len(parts) == 1 else self._measured(parts)
+        return boxes, report.gaps_complete
 
-    def common(self, one: Box, other: Box) -> Box | None:
-        cells = meet(one.cells, other.cells, self.space.conditions)
-        return None if cells is None else Box(cells, self._report([[cells]]).covered)
+    def common(self, one: Box, other: Box) -> list[Box]:
+        """What two boxes share."""
+        return self._measured(meet(one.cells, other.cells, self.space.conditions))
+
+    def _measured(self, parts: Sequence[Cells]) -> list[Box]:
+        return [Box(cells, self._report([[cells]]).covered) for cells in parts]
 
     def _outside(self, rows: Rows) -> list[Cells]:
         """Boxes that hold what rows do not."""
@@ -340,9 +347,9 @@ def _new_findings(
     """The dead rows and overlaps that were not there, placed in the table after."""
     if report is None or earlier[1] is None:
         return []
-    left = Counter(_key(earlier[0], f) for f in _told(earlier[0], earlier[1]))
+    left = Counter(_key(earlier[0], f) for f in _row_findings(earlier[0], earlier[1]))
     new = []
-    for finding in _told(after, report):
+    for finding in _row_findings(after, report):
         key = _key(after, finding)
         left[key] -= 1
         if left[key] < 0:
@@ -350,7 +357,7 @@ def _new_findings(
     return new
 
 
-def _told(table: EitherTable, report: CoverageReport) -> Iterator[Finding]:
+def _row_findings(table: EitherTable, report: CoverageReport) -> Iterator[Finding]:
     rules = (*DEAD_RULES, *OVERLAP_RULES)
     return (f for f in report.findings if f.rule in rules and f.row is not None and f.row < table.n_rows)
 
@@ -368,17 +375,21 @@ def _placed(table: EitherTable, finding: Finding) -> Finding:
 # ---- what two boxes of cells have in common
 
 
-def meet(one: Mapping[str, str], other: Mapping[str, str], conditions: Mapping[str, Condition]) -> dict[str, str] | None:
-    """A box that holds what both hold, as cells; None where that is nothing. Cells are not soft."""
-    found: dict[str, str] = {}
+def meet(one: Mapping[str, str], other: Mapping[str, str], conditions: Mapping[str, Condition]) -> list[dict[str, str]]:
+    """Boxes that together hold what both hold, as cells; one, but for cells of tags that begin with "not". Cells are not soft."""
+    ways: dict[str, list[str]] = {}
     for name in (name for name in conditions if name in one or name in other):
         if not (name in one and name in other):
-            found[name] = one[name] if name in one else other[name]  # as somebody wrote it
+            ways[name] = [one[name] if name in one else other[name]]  # as somebody wrote it
             continue
         domain = conditions[name].domain
         mine, yours = (parse_cell(box[name], domain).accepts for box in (one, other))
-        both = mine if yours is None else yours if mine is None else meet_in_a_cell(mine, yours)
-        if both is not None and both.is_empty:
-            return None
-        found[name] = format_cell(Cell(both and plain(both, cuts_of(mine, yours))), domain)
-    return found
+        both = [mine or yours] if mine is None or yours is None else _meets(mine, yours)
+        ways[name] = [format_cell(Cell(part and plain(part, cuts_of(mine, yours))), domain) for part in both]
+    return [dict(zip(ways, texts, strict=True)) for texts in product(*ways.values())]
+
+
+def _meets(one: Accepted, other: Accepted) -> list[Accepted]:
+    """Sets that together hold what two have in common and that cells can say."""
+    sides = (plain_parts(side) if isinstance(side, TagSet) else [side] for side in (one, other))
+    return [both for pair in product(*sides) if not (both := meet_plainly(*pair)).is_empty]

@@ -1,7 +1,7 @@
 """Two tables under one set of conditions, so that their contexts are the same; for `contextdb.checks.effects`.
 
 A condition is as the table after declares it, else as the one before does. Where no table declares values or bounds, every table
-made here has rows that are switched off and hold all texts of both, so that contexts are the same whichever rows are asked for.
+made here has rows that are switched off and hold all texts of both, so that contexts are the same whichever rows are requested.
 """
 
 from __future__ import annotations
@@ -47,8 +47,8 @@ class Shared:
 
     def column(self, table: EitherTable, name: str) -> TextColumn:
         """A column of a table; empty cells where it has none."""
-        found = next((c for c in table.columns if c.name == name), None)
-        return found or TextColumn(name, ("",), np.zeros(table.n_rows, np.int32))
+        match = next((c for c in table.columns if c.name == name), None)
+        return match or TextColumn(name, ("",), np.zeros(table.n_rows, np.int32))
 
     def table(self, rows: Rows) -> EitherTable:
         """A table of these rows and boxes, under the conditions of both; rows that are switched off come last."""
@@ -65,9 +65,9 @@ class Shared:
     def boxes(self, table: EitherTable, rows: Sequence[int]) -> list[Cells]:
         """What rows of a table hold, as boxes of cells; each once."""
         columns = [(name, self.column(table, name)) for name in self.conditions]
-        found = ({name: column[row] for name, column in columns} for row in rows)
-        kept = ({name: text for name, text in cells.items() if not self._is_open(name, text)} for cells in found)
-        return list({tuple(cells.items()): cells for cells in kept}.values())
+        rows_of_cells = ({name: column[row] for name, column in columns} for row in rows)
+        closed = ({name: text for name, text in cells.items() if not self._is_open(name, text)} for cells in rows_of_cells)
+        return list({tuple(cells.items()): cells for cells in closed}.values())
 
     def _is_open(self, name: str, text: str) -> bool:
         """Whether a cell accepts everything; a soft one does."""
@@ -147,8 +147,8 @@ def _conditions(before: EitherTable, after: EitherTable) -> Iterator[tuple[str, 
         one, other = old[name], new[name]
         kinds = [c.domain.kind for c in (one, other)]
         if one.is_declared and other.is_declared and kinds[0] != kinds[1]:
-            found = f"{in_quotes(name)} is of the type {kinds[0]} before and of the type {kinds[1]} after."
-            raise TableError(Fault(found, place=Place(str(after.path) if after.path else None)))
+            problem = f"{in_quotes(name)} is of the type {kinds[0]} before and of the type {kinds[1]} after."
+            raise TableError(Fault(problem, place=Place(str(after.path) if after.path else None)))
         known = other if other.is_declared or not one.is_declared else one
         yield name, replace(known, domain=_widened(known.domain, one.domain)) if one.is_declared else known
 
@@ -170,11 +170,11 @@ def _spanning(texts: Sequence[str], domain: Domain) -> list[str]:
     """Few texts with the same values or bounds as many."""
     sets = [cell.accepts for cell in (parse_cell(text, domain) for text in texts)]
     if domain.type.is_numeric:
-        ends = [end for found in sets if isinstance(found, NumberSet) for span in found.spans for end in span if np.isfinite(end)]
+        ends = [end for each in sets if isinstance(each, NumberSet) for span in each.spans for end in span if np.isfinite(end)]
         return [domain.type.spelling.write(end) for end in sorted({min(ends), max(ends)})] if ends else []
     if domain.type.is_tags:
         return list(texts[:MOST_SPAN])
-    values = frozenset(value for found in sets if isinstance(found, ValueSet) for value in found.values)
+    values = frozenset(value for accepted in sets if isinstance(accepted, ValueSet) for value in accepted.values)
     return [format_cell(Cell(ValueSet(values)), domain)] if values else []
 
 

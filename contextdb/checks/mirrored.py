@@ -27,7 +27,7 @@ from contextdb.tables.table import Table
 
 def check_mirroring(table: Table) -> Iterator[Finding]:
     """What is to be said of one table."""
-    conditions = _asked(table)
+    conditions = _queried(table)
     for condition in conditions.values():
         if _is_uneven(condition):
             yield Finding("uneven-mirror", "warning", _uneven(condition), table.name, _file(table), column=condition.name)
@@ -37,42 +37,42 @@ def check_mirroring(table: Table) -> Iterator[Finding]:
     by = f"the database{'s' if len(databases) > 1 else ''} {some(databases)}"
     inferred = [c.name for c in conditions.values() if c.mirror is None and way_of(c) == "negate"]
     if inferred:
-        told = f"{some(inferred)} {'is' if len(inferred) == 1 else 'are'} negated for mirrored clips of {by}, as angles are."
-        yield Finding("inferred-mirror", "info", told, table.name, _file(table))
+        message = f"{some(inferred)} {'is' if len(inferred) == 1 else 'are'} negated for mirrored clips of {by}, as angles are."
+        yield Finding("inferred-mirror", "info", message, table.name, _file(table))
     columns = {c.condition.name: c for c in table.conditions}
     for condition in conditions.values():
         if (partner := partner_of(condition)) is not None and partner not in conditions:
-            told = f"{partner} is not a column, so this fact stays as it is for mirrored clips of {by}."
-            told += f" Try a column {partner}, Any in each row."
-            yield Finding("undeclared-mirror", "info", told, table.name, _file(table), column=condition.name)
+            message = f"{partner} is not a column, so this fact stays as it is for mirrored clips of {by}."
+            message += f" Try a column {partner}, Any in each row."
+            yield Finding("undeclared-mirror", "info", message, table.name, _file(table), column=condition.name)
         pairs = _sides(condition, columns.get(condition.name)) or _other_sides(condition, conditions)
         if condition.mirror is None and condition.expr is None and pairs:
-            told = f"no mirror is declared, so its facts stay as they are for mirrored clips of {by}."
-            told += f' Try mirror = {as_toml(pairs)}, or "none".'
-            yield Finding("undeclared-mirror", "info", told, table.name, _file(table), column=condition.name)
+            message = f"no mirror is declared, so its facts stay as they are for mirrored clips of {by}."
+            message += f' Try mirror = {as_toml(pairs)}, or "none".'
+            yield Finding("undeclared-mirror", "info", message, table.name, _file(table), column=condition.name)
 
 
-def _asked(table: Table) -> dict[str, Condition]:
-    """The conditions whose facts the table is asked with: its columns, those of rules, and those that others are computed from."""
-    found = {c.condition.name: c.condition for c in table.conditions}
+def _queried(table: Table) -> dict[str, Condition]:
+    """The conditions whose facts the table is queried with: its columns, those of rules, and the inputs of derived ones."""
+    conditions = {c.condition.name: c.condition for c in table.conditions}
     if table.when is not None:
         known = known_conditions(table)
-        found |= {name: known[name] for name in table.when.names if name in known}
-    derivation = derivation_of(table.schema, found)
-    return found | {c.name: c for c in (derivation.inputs if derivation is not None else ())}
+        conditions |= {name: known[name] for name in table.when.names if name in known}
+    derivation = derivation_of(table.schema, conditions)
+    return conditions | {c.name: c for c in (derivation.inputs if derivation is not None else ())}
 
 
 def _mirroring_databases(table: Table) -> list[str]:
     """The databases that play assets of the table mirrored: its own, and those of tables that it is in."""
     around = table.around or {}
-    found = []
+    names = []
     for name, part in table.schema.databases.items():
         owner = part.get("table")
         if part.get("mirror") is True and isinstance(owner, str):
             outer = around.get(owner)
             if owner == table.name or (outer is not None and table.name in reached(outer, around)):
-                found.append(name)
-    return found
+                names.append(name)
+    return names
 
 
 def _sides(condition: Condition, column: ConditionColumn | None) -> dict[str, str]:

@@ -57,9 +57,9 @@ def _shut_out(flat: FlatTable) -> Iterator[Finding]:
             continue
         for code in [i for i, cell in enumerate(column.cells) if cell.is_empty and not cell.is_soft]:
             for row in np.flatnonzero((column.texts.codes == code) & flat.enabled).tolist():
-                said = column.layers.said(row)
-                if len(said) > 1 and row not in reasons:
-                    texts = " and ".join(in_quotes(text) for _, text in said)
+                origins = column.layers.said(row)
+                if len(origins) > 1 and row not in reasons:
+                    texts = " and ".join(in_quotes(text) for _, text in origins)
                     reasons[row] = f"it can never be valid here: {column.condition.name} must be {texts}, which share nothing."
     for row, why in sorted(reasons.items()):
         yield Finding("shut-out-row", "info", why, flat.name, None, row, flat.assets[row])

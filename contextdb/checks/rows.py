@@ -50,8 +50,8 @@ def check_rows(
         return [_of_schema(table, "bad-assumption", fault.message) for fault in error.faults]
     if contradictions:
         return [_of_schema(table, "no-context", f"no context is possible: {fault.message}") for fault in contradictions]
-    found = capped([*_always_any(table), *_judged(table, work, Progress(progress, should_stop))])
-    return sorted(found, key=lambda f: (f.row is not None, f.row or 0))
+    findings = capped([*_always_any(table), *_judged(table, work, Progress(progress, should_stop))])
+    return sorted(findings, key=lambda f: (f.row is not None, f.row or 0))
 
 
 def _judged(table: EitherTable, work: int, progress: Progress) -> list[Finding]:
@@ -59,18 +59,18 @@ def _judged(table: EitherTable, work: int, progress: Progress) -> list[Finding]:
         return []
     try:
         ready = opened(table, is_cut=True)
-    except ContextDBError:  # such as a domain without a value: said of the cells already
+    except ContextDBError:  # such as a domain without a value: reported for the cells already
         return []
     judging = progress.within("Comparing rows", 0.0, 1.0)
     steps = finding_steps(work, len(ready.space.boxes))
     judge = Judge(ready.space, ready.compiled, ready.table, steps, judging, ready.drawer)
-    found = [finding for finding in judge.findings() if finding.rule != "identical-rows"]
-    undecided = judge.unsure - {finding.row for finding in found}
-    found = [*found, *([_undecided(table, len(undecided), ready.compiled.n_rows)] if undecided else [])]
-    found = found if ready.ruled is None else list(ready.ruled.findings(found))
+    findings = [finding for finding in judge.findings() if finding.rule != "identical-rows"]
+    undecided = judge.unsure - {finding.row for finding in findings}
+    findings = [*findings, *([_undecided(table, len(undecided), ready.compiled.n_rows)] if undecided else [])]
+    findings = findings if ready.ruled is None else list(ready.ruled.findings(findings))
     if isinstance(ready.table, FlatTable):
-        return list(own_findings(ready.table, judge.gathered(list(outer_findings(ready.table, found)))))
-    return judge.gathered(found)
+        return list(own_findings(ready.table, judge.gathered(list(outer_findings(ready.table, findings)))))
+    return judge.gathered(findings)
 
 
 def _undecided(table: EitherTable, n_undecided: int, n_rows: int) -> Finding:
@@ -102,6 +102,7 @@ def unused_conditions(schema: Schema, tables: Iterable[EitherTable], lines: Mapp
     used = {column.name for table in tables for column in table.columns}
     used.update(name for table in tables for text in table.settings.assume for name in names_in(text))
     used.update(name for table in tables if table.when is not None for name in table.when.names)
+    used.update(name for contract in schema.contracts.values() if contract.when for name in names_in(contract.when))
     waiting = [name for name in used if name in schema.conditions]
     while waiting:
         expr = schema.conditions[waiting.pop()].expr

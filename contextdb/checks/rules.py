@@ -23,7 +23,7 @@ RULES: dict[str, Rule] = {
         "error",
         "A file is not in the expected format.",
         "Correct the line that the message names; nothing in the file is used until all of it can be read.",
-        ("errors", "expressions.faults", "schema.faults"),
+        ("errors", "expressions.faults", "schema.contract_faults", "schema.faults"),
     ),
     "no-such-path": Rule(
         "error",
@@ -136,9 +136,9 @@ RULES: dict[str, Rule] = {
     ),
     "too-many-rows": Rule(
         "error",
-        "A table has too many rows when the rows of its inner tables are counted.",
-        "Refer to inner tables from fewer rows.",
-        ("tables.nesting.expansion",),
+        "A table has too many rows, or has when the rows of its inner tables are counted.",
+        "Refer to inner tables from fewer rows, or write a table with fewer.",
+        ("files.parquet", "tables.nesting.expansion"),
     ),
     "shut-out-row": Rule(
         "info",
@@ -181,6 +181,30 @@ RULES: dict[str, Rule] = {
         "Some lines of a file end in LF and some in CRLF.",
         "No action needed; for uniform line ends, convert the file once and set `text` or `eol` in .gitattributes.",
         ("checks.run",),
+    ),
+    "broken-contract": Rule(
+        "error",
+        "A context breaks what a contract of contextdb.toml demands.",
+        "Change the rows so that the counterexample is as demanded, narrow the contract by `when`, or delete it.",
+        ("checks.contracts",),
+    ),
+    "unreadable-contract": Rule(
+        "error",
+        "A contract names a table, a condition or an output that there is not.",
+        "Correct the name in the section of contextdb.toml.",
+        ("checks.contracts",),
+    ),
+    "open-contract": Rule(
+        "warning",
+        "A contract could be neither proved nor broken.",
+        "Write `when` and `assume` as comparisons of one condition with constants, or raise the work.",
+        ("checks.contracts",),
+    ),
+    "empty-contract": Rule(
+        "warning",
+        "No context that can happen is as the contract says, so that it holds of nothing.",
+        "Correct `when`, or the assumptions of the table.",
+        ("checks.contracts",),
     ),
     "no-tables": Rule(
         "error",
@@ -298,12 +322,6 @@ RULES: dict[str, Rule] = {
         'Correct `min` or `max`; if the number has no side, as a speed, remove `mirror = "negate"`.',
         ("checks.mirrored",),
     ),
-    "old-cost-scale": Rule(
-        "info",
-        "A threshold or a bias of contextdb.toml looks as if it was chosen for the costs of an older version.",
-        "Divide it by the number that the message names. From 1,000 on, a number means that its database or frame always wins.",
-        ("checks.costs",),
-    ),
     "undecided-rows": Rule(
         "info",
         "Some rows were not compared with all others, because that would exceed the work limit of a check.",
@@ -340,6 +358,24 @@ RULES: dict[str, Rule] = {
         "Restore the table; if it was renamed or removed on purpose, name it with `--gone`, or make a new baseline.",
         ("report.coverage_results",),
     ),
+    "table-new": Rule(
+        "error",
+        "A table is not in the baseline, so it is compared with nothing.",
+        "If the table is new or renamed on purpose, name it with `--new`, or make a new baseline.",
+        ("report.coverage_results",),
+    ),
+    "space-changed": Rule(
+        "error",
+        "Since the baseline, the conditions of a table, their bounds or values, its `assume`, its rules or its policy changed.",
+        "Look at what the message names; if the change is intended, name the table with `--redefined`, or make a new baseline.",
+        ("report.coverage_results",),
+    ),
+    "cases-fewer": Rule(
+        "error",
+        "The saved contexts of a table expect less than in the baseline, or reach fewer rows.",
+        "Restore them; if they were deleted or weakened on purpose, name the table with `--fewer-cases`.",
+        ("report.coverage_results",),
+    ),
     "coverage-dropped": Rule(
         "error",
         "Since the baseline, the covered share fell by more than `--max-drop` allows.",
@@ -355,12 +391,35 @@ RULES: dict[str, Rule] = {
 }
 """Every rule of check and coverage, by name."""
 
-OF_COVERAGE = ("gap", "new-gap", "coverage-below", "table-gone", "coverage-dropped", "telemetry-below")
+OF_COVERAGE = (
+    "gap",
+    "new-gap",
+    "coverage-below",
+    "table-gone",
+    "table-new",
+    "space-changed",
+    "cases-fewer",
+    "coverage-dropped",
+    "telemetry-below",
+)
 """The rules that only `contextdb coverage` reports."""
+
+OF_CONTRACTS = ("broken-contract", "unreadable-contract", "open-contract", "empty-contract")
+"""The rules of contracts, which are of contextdb.toml."""
 
 TABLE_RULES: tuple[str, ...] = tuple(
     name
     for name in RULES
-    if name not in ("unreadable", "no-such-path", "no-tables", "unused-condition", "unportable-name", "not-a-table", *OF_COVERAGE)
+    if name
+    not in (
+        "unreadable",
+        "no-such-path",
+        "no-tables",
+        "unused-condition",
+        "unportable-name",
+        "not-a-table",
+        *OF_CONTRACTS,
+        *OF_COVERAGE,
+    )
 )
 """The rules that a check applies to every table it can read."""

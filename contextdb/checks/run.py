@@ -20,11 +20,13 @@ from contextdb.expressions import constant_truth
 from contextdb.expressions.rules import WhenRules
 from contextdb.files.csv_source import Source
 from contextdb.findings import Finding, Level
+from contextdb.schema.policies import lets_choose
+from contextdb.schema.table_settings import missing_job
 from contextdb.tables.alike import finding_at, identical_rows, named, where
 from contextdb.tables.condition_column import ConditionColumn
 from contextdb.tables.nesting.names import inner_name
 from contextdb.tables.table import Table
-from contextdb.tables.variety import gathered, lets_choose
+from contextdb.tables.variety import gathered
 
 LINE_ENDS = {"\n": "LF", "\r\n": "CRLF", "\r": "CR"}
 MOST_ROWS = 1000
@@ -34,8 +36,8 @@ MOST_ROWS = 1000
 def check(table: Table) -> list[Finding]:
     """Every finding of a table, in the order of its rows, those of the whole table first."""
     rules = (_whole_table, _unreadable, _cells, _constant_rules, _assets, _identical, check_nesting, check_mirroring)
-    found = capped(finding for rule in rules for finding in rule(table))
-    return sorted(found, key=lambda f: (f.row is not None, f.row or 0))
+    findings = capped(finding for rule in rules for finding in rule(table))
+    return sorted(findings, key=lambda f: (f.row is not None, f.row or 0))
 
 
 def capped(findings: Iterable[Finding]) -> Iterator[Finding]:
@@ -71,7 +73,8 @@ def _whole_table(table: Table) -> Iterator[Finding]:
 def _undeclared(table: Table, column: ConditionColumn, file: str | None, absent: Sequence[str]) -> Finding:
     name, kind = column.condition.name, column.condition.domain.kind
     near = nearest(name, absent)
-    hint = f" Did you mean {in_quotes(near)}?" if near else ""
+    meant = missing_job(name, vars(table.settings)) or (in_quotes(near) if near else "")
+    hint = f" Did you mean {meant}?" if meant else ""
     level: Level = "warning" if table.schema.conditions else "info"
     message = f"the condition is not declared in contextdb.toml; type inferred from its cells: {kind}.{hint}"
     return Finding("undeclared-condition", level, message, table.name, file, column=name)
@@ -85,14 +88,14 @@ def _unreadable(table: Table) -> Iterator[Finding]:
 
 def _cells(table: Table) -> Iterator[Finding]:
     for column in table.conditions:
-        said: dict[int, tuple[str, Level, str]] = {}
+        texts: dict[int, tuple[str, Level, str]] = {}
         for i, cell in enumerate(column.cells):
             verdict = _verdict(cell, column.condition.domain)
             if verdict and i not in column.faults:
-                said[i] = verdict
-        rows = np.flatnonzero(np.isin(column.texts.codes, list(said))).tolist() if said else []
+                texts[i] = verdict
+        rows = np.flatnonzero(np.isin(column.texts.codes, list(texts))).tolist() if texts else []
         for row in rows:
-            rule, level, why = said[int(column.texts.codes[row])]
+            rule, level, why = texts[int(column.texts.codes[row])]
             yield finding_at(table, row, rule, level, f"{in_quotes(column.texts[row])} {why}", column.condition.name)
 
 
@@ -130,9 +133,9 @@ def _constant_rules(table: Table) -> Iterator[Finding]:
             continue
         kind, level = ("always-true", "info") if truth else ("never-true", "warning")
         so = "so it excludes nothing" if truth else "so the row never matches"
-        told = f"the rule {in_quotes(rule.expression.text)} is {truth} in every context of the declared values and bounds, {so}."
-        for row in bitmask.rows(bitmask.from_int(rule.rows, table.n_rows)).tolist():
-            yield finding_at(table, row, kind, cast(Level, level), told, table.settings.when)
+        message = f"the rule {in_quotes(rule.expression.text)} is {truth} in every context of the declared values and bounds, {so}."
+        for row in bitmask.rows_of(rule.rows):
+            yield finding_at(table, row, kind, cast(Level, level), message, table.settings.when)
 
 
 def _assets(table: Table) -> Iterator[Finding]:
@@ -150,9 +153,9 @@ def _assets(table: Table) -> Iterator[Finding]:
 
 
 def _identical(table: Table) -> Iterator[Finding]:
-    found = list(identical_rows(table))
+    findings = list(identical_rows(table))
     if lets_choose([table.settings.policy]):
-        found = gathered(
-            found, table.assets, lambda row: finding_at(table, row, "variety", "info", "", None), partial(named, table)
+        findings = gathered(
+            findings, table.assets, lambda row: finding_at(table, row, "variety", "info", "", None), partial(named, table)
         )
-    yield from found
+    yield from findings

@@ -23,6 +23,6 @@ def missing_facts_by_option() -> Iterator[None]:
     try:
         yield
     except ContextError as error:
-        said = "a value for each condition, or --unknown any, or --unknown never"
-        faults = (replace(f, accepted=said) if f.rule == "missing-fact" else f for f in error.faults)
+        accepted = "a value for each condition, or --unknown any, or --unknown never"
+        faults = (replace(f, accepted=accepted) if f.rule == "missing-fact" else f for f in error.faults)
         raise ContextError(*faults) from None

@@ -1,4 +1,5 @@
-"""Find what is wrong with the tables: unreadable cells, cells that accept nothing, redundant rows, saved contexts that fail.
+"""Find what is wrong with the tables: unreadable cells, cells that accept nothing, redundant rows, saved contexts that fail, and
+contracts that some context breaks.
 
 Exits with 1 if there are findings at the level of --fail-on, with 2 if the path does not exist.
 
@@ -13,17 +14,19 @@ import argparse
 import os
 import sys
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 from contextdb import report
 from contextdb.checks.cases import check_cases, read_cases
-from contextdb.checks.costs import check_costs
+from contextdb.checks.contracts import contract_findings, proofs_of, strayed
 from contextdb.checks.rows import check_rows, unused_conditions
 from contextdb.checks.run import check
 from contextdb.commands import add_format_arguments
 from contextdb.commands.progress import Bar, has_many_cells, log_of
 from contextdb.console import ExitCode, output, printable, progress, terminal_width, wants_colour
+from contextdb.covering.contracts import Proof
 from contextdb.disk import CASES_SUFFIX, TABLE_SUFFIXES, path_in_quotes, read_bytes
 from contextdb.errors import ContextDBError, Fault, in_quotes, nearest
 from contextdb.files.file_names import alike, composed, confusable, why_unportable
@@ -45,19 +48,44 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--fail-on", choices=("error", "warning", "none"), default="error", help="the lowest level that fails (default: error)"
     )
     parser.add_argument("--all", action="store_true", help="print every finding, not the first few of each kind")
+    parser.add_argument(
+        "--propose",
+        action="store_true",
+        help="print contracts that hold today and are likely meant, and nothing else",
+    )
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Check one table or a folder of them."""
+    if arguments.propose:
+        return _propose(arguments)
     return printed(check_path(arguments.path), arguments)
 
 
-def printed(found: CheckReport, arguments: argparse.Namespace) -> ExitCode:
-    """Print a report in the format that is asked for; the code says whether anything in it fails."""
+def _propose(arguments: argparse.Namespace) -> ExitCode:
+    """Print the contracts of tables that can be read which hold and are likely meant."""
+    from contextdb.checks.proposals import proposal_toml, proposals
+    from contextdb.report.render_json import as_json
+
+    path = arguments.path
+    is_folder = os.path.isdir(path) or Path(path).name == project.SCHEMA_FILE
+    tables = project.Project.load(path).tables.values() if is_folder else [project.load_table(table_path(path))]
+    proofs = [proof for table in tables for proof in proposals(table)]
+    if arguments.format == "json":
+        text = as_json({"format": 1, "proposed": [proof.to_json() | {"toml": proposal_toml(proof.contract)} for proof in proofs]})
+    else:
+        text = "\n".join(proposal_toml(proof.contract) for proof in proofs)
+    with output():
+        print(text or "# no contract holds that is likely meant\n", end="")
+    return ExitCode.OK
+
+
+def printed(checked: CheckReport, arguments: argparse.Namespace) -> ExitCode:
+    """Print a report in the wanted format; the code says whether anything in it fails."""
     failing = LEVELS[: LEVELS.index(arguments.fail_on) + 1] if arguments.fail_on != "none" else ()
     text = report.render(
         arguments.format,
-        found,
+        checked,
         colour=wants_colour(sys.stdout),
         width=terminal_width(),
         shows_all=arguments.all,
@@ -65,7 +93,7 @@ def printed(found: CheckReport, arguments: argparse.Namespace) -> ExitCode:
     )
     with output():
         print(text, end="")
-    return ExitCode.FOUND if any(f.level in failing for f in found.findings) else ExitCode.OK
+    return ExitCode.FOUND if any(f.level in failing for f in checked.findings) else ExitCode.OK
 
 
 def check_path(text: str) -> CheckReport:
@@ -86,10 +114,10 @@ def check_path(text: str) -> CheckReport:
         return CheckReport(
             (), (Finding("no-tables", "error", f"the folder holds no table. Accepted: {accepted}.", file=str(folder)),)
         )
-    found = _check_files(files, schema)
+    report = _check_files(files, schema)
     others = (Finding("not-a-table", "info", sentence, file=str(path)) for path, sentence in project.stray_files(folder, schema))
     strays = _strays(folder, [file for _, file in files])
-    return CheckReport(found.tables, (*found.findings, *_unportable(files, schema), *others, *strays))
+    return replace(report, findings=(*report.findings, *_unportable(files, schema), *others, *strays))
 
 
 def _unportable(files: Sequence[tuple[str, Path]], schema: Schema) -> Iterator[Finding]:
@@ -98,21 +126,22 @@ def _unportable(files: Sequence[tuple[str, Path]], schema: Schema) -> Iterator[F
     for name, path in files:
         wanted = [Path(one).name for one in (schema.tables[name].files if name in schema.tables else ())]
         declared = next((one for one in wanted if alike(one) == alike(path.name)), path.name)
-        told = [f"{why}." for why in [why_unportable(path.name)] if why]
+        messages = [f"{why}." for why in [why_unportable(path.name)] if why]
         if other := others.get(str(path)):
             ignored = "the Unicode form of names" if composed(other) == composed(str(path)) else "case"
-            told.append(f"this and {path_in_quotes(other)} are one file on disks that ignore {ignored}.")
+            messages.append(f"this and {path_in_quotes(other)} are one file on disks that ignore {ignored}.")
         if composed(declared) != composed(path.name):
-            told.append(
+            messages.append(
                 f"{project.SCHEMA_FILE} calls it {in_quotes(declared)}: there is no such file on disks that distinguish case."
             )
-        yield from (Finding("unportable-name", "warning", message, name, str(path)) for message in told)
+        yield from (Finding("unportable-name", "warning", message, name, str(path)) for message in messages)
 
 
 def _check_files(files: Sequence[tuple[str | None, Path]], schema: Schema | None = None) -> CheckReport:
     """Check some tables; `schema` is given when they are all of its folder."""
     tables: list[TableSummary] = []
     read: list[Table] = []
+    proofs: list[Proof] = []
     findings = [Finding.of(fault) for fault in project.twice_named((name, path) for name, path in files if name is not None)]
     for name, path in progress(files, "checking"):
         try:
@@ -126,17 +155,24 @@ def _check_files(files: Sequence[tuple[str | None, Path]], schema: Schema | None
         if log is not None:
             log(0, 1, "Reading rows")
         findings += check(table)
-        findings += check_rows(table, progress=None if log is None else partial(_tell, log))
+        tell = None if log is None else partial(_tell, log)
+        findings += check_rows(table, progress=tell)
+        proofs += proofs_of(table, tell)
         findings += _check_cases(table, cases_path(path))
         findings += _check_notes(table, notes_path(path))
-    if schema is not None and len(read) == len(files):
-        lines = key_lines(read_bytes(Path(schema.file)).decode("utf-8-sig")) if schema.file else {}
-        findings += [*unused_conditions(schema, read, lines), *check_costs(schema, lines)]
-    return CheckReport(tuple(tables), tuple(findings))
+    if schema is not None:
+        names = [name for name, _ in files if name is not None]
+        proofs += strayed(schema, names, [name for name in names if name not in {table.name for table in read}])
+    known = schema or next((table.schema for table in read), None)
+    if known is not None and known.file:
+        lines = key_lines(read_bytes(Path(known.file)).decode("utf-8-sig"))
+        findings += contract_findings(proofs, [table.name for table in read if table.faults], known, lines)
+        findings += unused_conditions(known, read, lines) if schema is not None and len(read) == len(files) else []
+    return CheckReport(tuple(tables), tuple(findings), tuple(proofs))
 
 
-def _tell(told: Bar, part: str, share: float) -> None:
-    told(int(1000 * share), 1000, part)
+def _tell(progress: Bar, part: str, share: float) -> None:
+    progress(int(1000 * share), 1000, part)
 
 
 def _check_cases(table: Table, path: Path) -> list[Finding]:
@@ -159,8 +195,8 @@ def _check_notes(table: Table, path: Path) -> list[Finding]:
 def _strays(folder: Path, tables: Sequence[Path]) -> Iterator[Finding]:
     """A finding for every file of cases next to the tables that is none of theirs."""
     taken = {os.path.abspath(cases_path(table)) for table in tables}
-    for beside in sorted({folder, *(table.parent for table in tables if table.parent.is_dir())}):
-        for path in sorted(beside.iterdir()):
+    for folder_near in sorted({folder, *(table.parent for table in tables if table.parent.is_dir())}):
+        for path in sorted(folder_near.iterdir()):
             if _is_cases(path) and path.is_file() and os.path.abspath(path) not in taken:
                 taken.add(os.path.abspath(path))
                 yield _stray(path)

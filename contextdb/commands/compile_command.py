@@ -19,12 +19,13 @@ import os
 import sys
 from pathlib import Path, PurePath
 
-from contextdb.compiled.artefact import SUFFIX
 from contextdb.compiled.c_header import c_header_of, c_link_of
 from contextdb.compiled.stubs import stubs_of
 from contextdb.console import ExitCode, output, printable, progress
 from contextdb.disk import make_folder, path_in_quotes, write_atomic
+from contextdb.disk.boundary import inside
 from contextdb.errors import ContextDBError, Fault, FileError, Place, plural
+from contextdb.files.tensors import SUFFIX
 from contextdb.tables.places import table_path
 from contextdb.tables.project import SCHEMA_FILE, Project, load_table
 from contextdb.tables.table import Table
@@ -122,7 +123,7 @@ def _tables(text: str) -> list[Table]:
 def _target(table: Table, out: str | None, n_tables: int) -> Path:
     assert table.path is not None
     if out is None:
-        return table.path.with_suffix(SUFFIX)
+        return inside(table.path.with_suffix(SUFFIX), _home(table))
     is_artefact = Path(out).suffix == SUFFIX and not out.endswith(SEPARATORS) and not os.path.isdir(out)
     if is_artefact and n_tables > 1:
         raise FileError(Fault(f"{n_tables} tables do not go into one artefact.", "a folder", place=Place(out)))
@@ -130,11 +131,17 @@ def _target(table: Table, out: str | None, n_tables: int) -> Path:
         return Path(out)
     if n_tables > 1 or out.endswith(SEPARATORS) or os.path.isdir(out):
         is_file_name = PurePath(table.name).name == table.name and not any(c in table.name for c in SEPARATORS)
-        return Path(out) / f"{table.name if is_file_name else table.path.stem}{SUFFIX}"
+        return inside(Path(out) / f"{table.name if is_file_name else table.path.stem}{SUFFIX}", Path(out))
     mend = path_in_quotes(Path(out).with_suffix(SUFFIX))
     raise FileError(
         Fault("this is not a valid name for a compiled file.", f"a name that ends in {SUFFIX}, or a folder", mend, Place(out))
     )
+
+
+def _home(table: Table) -> Path:
+    """The folder that what is written next to a table must not leave."""
+    assert table.path is not None
+    return table.path.parent if table.schema.file is None else Path(table.schema.file).parent
 
 
 def _require_different(targets: list[Path]) -> None:

@@ -1,7 +1,8 @@
 """Measure which contexts have a valid row, and which have none.
 
-Exits with 1 if a threshold is missed: --fail-under, --fail-under-telemetry, or --max-drop (by default 0 with a --baseline);
-or if a table of the baseline is missing or has lost all its rows, unless --gone names it.
+Exits with 1 if a threshold is missed: --fail-under, --fail-under-telemetry, or --max-drop (by default 0 with a --baseline).
+With a --baseline also if a table is gone or has lost all its rows, if one is not in it, if one has other conditions, bounds, values
+or assumptions, and if saved contexts expect less: --gone, --new, --redefined and --fewer-cases accept that for a table.
 Thresholds are compared with the lower bound of the covered share, so that a lucky sample does not pass.
 
   contextdb coverage tables/
@@ -17,31 +18,38 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeVar
 
 from contextdb.commands import add_format_arguments, coverage_telemetry
+from contextdb.commands.gating import (
+    Accepted,
+    add_accepting_arguments,
+    case_gates,
+    earlier_report,
+    gone_gates,
+    require_baseline,
+    with_gates,
+)
 from contextdb.commands.numbers import number_of
 from contextdb.commands.progress import Bar, bar, has_many_cells
-from contextdb.console import ExitCode, note, output, printable, terminal_width, wants_colour
-from contextdb.covering.baseline import ACCEPTED, Earlier, read_baseline
+from contextdb.console import ExitCode, output, printable, terminal_width, wants_colour
+from contextdb.covering.baseline import ACCEPTED, Baseline, CaseCounts, read_baseline
 from contextdb.covering.engine import MOST_GAPS, SAMPLES, WORK
 from contextdb.covering.pairs import PairTable
 from contextdb.covering.progress import Tell
-from contextdb.disk import read_bytes, write_atomic
+from contextdb.disk import write_atomic
 from contextdb.errors import ContextDBError, ContextError, Fault, FileError, Place, TableError, in_quotes, no_such, plural
-from contextdb.files.reports import has_digest
 from contextdb.report import formats, render
 from contextdb.report.coverage_results import CoverageResults, Measured
-from contextdb.report.results import as_path
+from contextdb.report.results import Gate, as_path
 from contextdb.tables.nesting.flat import FlatTable
+from contextdb.tables.other_files import cases_path
 from contextdb.tables.places import table_path
 from contextdb.tables.project import SCHEMA_FILE, Project, load_table
 from contextdb.tables.table import EitherTable, Table
-
-AnyReport = TypeVar("AnyReport")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -51,12 +59,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--fail-under", type=percent, metavar="PCT", help="fail if the covered percentage of any table is lower")
     parser.add_argument("--baseline", metavar="FILE", help="compare with the JSON of an earlier run")
     parser.add_argument("--max-drop", type=percent, metavar="PCT", help="how many points a table may fall below the baseline")
-    parser.add_argument(
-        "--gone", action="append", default=[], metavar="TABLE", help="a table of the baseline that is missing or empty on purpose"
-    )
+    add_accepting_arguments(parser)
     parser.add_argument("--gap", metavar="N", help="show all details of one gap, by its number or id")
     parser.add_argument("--explain", metavar="ROW", help="show all details of one row, by its number (from 1) or asset")
     parser.add_argument("--all", action="store_true", help="list every gap and finding")
+    add_measuring_arguments(parser)
+
+
+def add_measuring_arguments(parser: argparse.ArgumentParser) -> None:
+    """The budgets of a measurement, and recorded contexts."""
     parser.add_argument("--seed", type=_count, default=0, metavar="N", help="the seed of the samples (default: 0)")
     parser.add_argument("--work", type=_count, default=WORK, metavar="N", help=f"steps of the exact count (default: {WORK:,})")
     parser.add_argument(
@@ -68,13 +79,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Measure one table or a folder of them."""
     _require_sense(arguments)
-    tables = [table.flat() for table in tables_at(arguments.path)]
+    tables = Tables.at(arguments.path)
     baseline = earlier_report(arguments.baseline, read_baseline, ACCEPTED) if arguments.baseline else None
     if arguments.gap is not None or arguments.explain is not None:
-        text, code = _details(arguments, _only(tables)), ExitCode.OK
+        text, code = _details(arguments, _only([table.flat() for table in tables.outer])), ExitCode.OK
     else:
-        results = _results(arguments, tables, baseline)
-        code = _code(results)
+        counts_cases = baseline is not None or arguments.format == "json"
+        results = measured_results(arguments, tables, baseline, Accepted.of(arguments), counts_cases)
+        code = code_of(results)
         colour = wants_colour(sys.stdout) and not arguments.output
         text = render(arguments.format, results, colour=colour, width=terminal_width(), shows_all=arguments.all)
     if arguments.output:
@@ -85,31 +97,46 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     return code
 
 
-def _code(results: CoverageResults) -> ExitCode:
-    """Whether every bar is kept; telemetry that could not be read whole is no answer."""
+def code_of(results: CoverageResults) -> ExitCode:
+    """Whether every threshold is met; telemetry that could not be read whole is no answer."""
     if any(m.telemetry is not None and not m.telemetry.is_complete for m in results.tables):
         return ExitCode.BAD_USE
     return ExitCode.OK if results.passed else ExitCode.FOUND
 
 
-def tables_at(text: str) -> list[Table]:
-    """The tables under a path: a folder of them, one file, or a table by its name. Of a folder those that are in no other: the
-    others are measured where they are. Raises ContextDBError with every fault of every file; a folder without a table is one."""
-    if not os.path.isdir(text) and Path(text).name != SCHEMA_FILE:
-        return [load_table(table_path(text))]
-    project = Project.load(text)
-    found = [table for name, table in project.tables.items() if name not in project.inner]
-    if not found:
-        accepted = f"a folder with {SCHEMA_FILE} and a .csv or .parquet file for each table"
-        raise FileError(Fault("the folder holds no table.", accepted, place=Place(text), rule="no-tables"))
-    return found
+@dataclass(frozen=True)
+class Tables:
+    """The tables under a path: a folder of them, one file, or a table by its name."""
+
+    outer: Sequence[Table]
+    """Those that are in no other."""
+    inner: Sequence[Table]
+    """Those that are in others, of a folder: they are measured where they are."""
+    is_folder: bool
+
+    @classmethod
+    def at(cls, text: str) -> Tables:
+        """Raises ContextDBError with every fault of every file; a folder without a table is one."""
+        if not os.path.isdir(text) and Path(text).name != SCHEMA_FILE:
+            return cls([load_table(table_path(text))], [], False)
+        project = Project.load(text)
+        if not project.tables:
+            accepted = f"a folder with {SCHEMA_FILE} and a .csv or .parquet file for each table"
+            raise FileError(Fault("the folder holds no table.", accepted, place=Place(text), rule="no-tables"))
+        inner = project.inner
+        own, others = ([t for name, t in project.tables.items() if (name in inner) == is_in] for is_in in (False, True))
+        return cls(own, others, True)
+
+    def case_counts(self) -> dict[str, CaseCounts]:
+        """How much the saved contexts of each table expect. Raises ContextDBError where they cannot be read."""
+        from contextdb.checks.cases import counted, read_cases
+
+        with_files = ((table, table.path) for table in (*self.outer, *self.inner))
+        return {table.name: counted(table, read_cases(cases_path(path))) for table, path in with_files if path is not None}
 
 
 def _require_sense(arguments: argparse.Namespace) -> None:
-    if arguments.max_drop is not None and not arguments.baseline:
-        raise ContextError(Fault("--max-drop compares with a baseline.", "--baseline FILE with it"))
-    if arguments.gone and not arguments.baseline:
-        raise ContextError(Fault("--gone names tables of a baseline.", "--baseline FILE with it"))
+    require_baseline(arguments, bool(arguments.baseline))
     coverage_telemetry.require_telemetry(arguments)
     is_detail = arguments.gap is not None or arguments.explain is not None
     names = ("fail_under", "fail_under_telemetry", "max_drop", "baseline")
@@ -121,60 +148,62 @@ def _require_sense(arguments: argparse.Namespace) -> None:
         raise ContextError(Fault("--gap and --explain do not go together.", "one of them"))
 
 
-def _results(arguments: argparse.Namespace, tables: Sequence[EitherTable], baseline: dict[str, Earlier] | None) -> CoverageResults:
-    from contextdb.report.coverage_results import CoverageResults, table_gone
+def measured_results(
+    arguments: argparse.Namespace, tables: Tables, baseline: Baseline | None, accepted: Accepted, counts_cases: bool = True
+) -> CoverageResults:
+    """Every table measured, and compared with a baseline where there is one: also those of it that are in other tables now."""
+    from contextdb.report.coverage_results import CoverageResults
 
-    measured = tuple(_measured(arguments, table, baseline) for table in tables)
-    names = {table.name for table in tables} | {n for t in tables if isinstance(t, FlatTable) for n in t.expansion.names}
-    is_folder = os.path.isdir(arguments.path) or Path(arguments.path).name == SCHEMA_FILE
-    known = baseline or {}
-    new = [name for name in sorted(names) if name not in known]
-    gone = [name for name in known if name not in names] if is_folder else []
-    return CoverageResults(measured, {name: table_gone(name, name in arguments.gone, new) for name in gone})
+    before = baseline.tables if baseline is not None else {}
+    flat = [table.flat() for table in (*tables.outer, *(t for t in tables.inner if t.name in before))]
+    cases = tables.case_counts() if counts_cases else {}
+    measured, others = [_measured(arguments, table) for table in flat], list[tuple[str, Gate]]()
+    if baseline is not None:
+        names = [table.name for table in (*tables.outer, *tables.inner)]
+        missing = [name for name in dict.fromkeys((*before, *baseline.cases)) if name not in names and tables.is_folder]
+        limit = arguments.max_drop or 0.0
+        measured = [with_gates(m, table, baseline, limit, accepted, missing) for m, table in zip(measured, flat, strict=True)]
+        others = gone_gates(missing, sorted(set(names).difference(before)), accepted)
+        of_cases = case_gates(baseline.cases, cases, accepted)
+        measured = [replace(m, gates=(*m.gates, *of_cases.pop(m.report.table, ()))) for m in measured]
+        others += [(name, gate) for name, gates in sorted(of_cases.items()) for gate in gates]
+        accepted.require_needed()
+    ranked = (coverage_telemetry.ranked(arguments, m, table) for m, table in zip(measured, flat, strict=True))
+    return CoverageResults(tuple(ranked), tuple(others), cases)
 
 
-def _measured(arguments: argparse.Namespace, table: EitherTable, baseline: dict[str, Earlier] | None) -> Measured:
-    from dataclasses import replace
+def _measured(arguments: argparse.Namespace, table: EitherTable) -> Measured:
+    from contextdb.report.coverage_results import fail_under, fail_under_telemetry
 
-    from contextdb.covering.assumed import opened
-    from contextdb.covering.baseline import compared
-    from contextdb.report.coverage_results import fail_under, fail_under_telemetry, max_drop, table_emptied
-
-    found = measure(arguments, table)
-    gates = [] if arguments.fail_under is None else [fail_under(found.report, arguments.fail_under)]
-    if found.telemetry is not None and arguments.fail_under_telemetry is not None:
-        gates.append(fail_under_telemetry(found.telemetry, arguments.fail_under_telemetry))
-    change = None
-    if baseline is not None and table.name in baseline:
-        earlier = baseline[table.name]
-        change = compared(opened(table), found.report, earlier)
-        if earlier.n_rows and not table.n_rows:
-            gates.append(table_emptied(table.name, earlier.n_rows, table.name in arguments.gone))
-        else:
-            gates.append(max_drop(change, arguments.max_drop or 0.0))
-    return coverage_telemetry.ranked(arguments, replace(found, change=change, gates=tuple(gates)), table)
+    measured = measure(arguments, table)
+    gates = [] if arguments.fail_under is None else [fail_under(measured.report, arguments.fail_under)]
+    if measured.telemetry is not None and arguments.fail_under_telemetry is not None:
+        gates.append(fail_under_telemetry(measured.telemetry, arguments.fail_under_telemetry))
+    return replace(measured, gates=tuple(gates))
 
 
 def measure(arguments: argparse.Namespace, table: EitherTable) -> Measured:
     """The coverage of one table and of its pairs of conditions, by the budgets of the arguments."""
     from contextdb.covering import coverage
+    from contextdb.covering.declared import declared
     from contextdb.report.coverage_results import Measured
 
     with _placed(table):
-        with bar(f"measuring {printable(table.name)}", has_many_cells(table)) as told:
+        with bar(f"measuring {printable(table.name)}", has_many_cells(table)) as progress:
             report = coverage(
                 table,
                 seed=arguments.seed,
                 work=arguments.work,
                 samples=arguments.samples,
                 max_gaps=MOST_GAPS,
-                progress=_tell(told),
+                progress=_tell(progress),
             )
         seen = coverage_telemetry.observed(arguments, table, report.gaps)
         compared = _pairs(arguments, table)
     lines = tuple(table.place(row).line for row in range(table.n_rows))
     file = str(table.path) if table.path else None
-    return Measured(report, file, tuple(table.assets), lines, compared, telemetry=seen, inside=_inside(table))
+    space = declared(table, report.assumed)
+    return Measured(report, file, tuple(table.assets), lines, compared, telemetry=seen, inside=_inside(table), space=space)
 
 
 def _pairs(arguments: argparse.Namespace, table: EitherTable) -> PairTable | None:
@@ -185,18 +214,18 @@ def _pairs(arguments: argparse.Namespace, table: EitherTable) -> PairTable | Non
     if left_out(len(table.conditions)):
         return None
     label = f"comparing conditions of {printable(table.name)}"
-    with bar(label, has_many_cells(table)) as told:
+    with bar(label, has_many_cells(table)) as progress:
         return pairs(
             table,
             seed=arguments.seed,
             samples=None if arguments.samples is None else min(arguments.samples, SAMPLES),
-            progress=_tell(told),
+            progress=_tell(progress),
         )
 
 
-def _tell(told: Bar | None) -> Tell | None:
+def _tell(progress: Bar | None) -> Tell | None:
     """What tells a bar of a computation."""
-    return None if told is None else lambda part, share: told(int(1000 * share), 1000, part)
+    return None if progress is None else lambda part, share: progress(int(1000 * share), 1000, part)
 
 
 def _inside(table: EitherTable) -> dict[int, str]:
@@ -228,11 +257,11 @@ def _details(arguments: argparse.Namespace, table: EitherTable) -> str:
     measured = coverage_telemetry.ranked(arguments, measure(arguments, table), table)
     gaps = measured.report.gaps
     text = arguments.gap
-    found = [g for i, g in enumerate(gaps, 1) if text in (str(i), g.id)]
-    if not found:
-        accepted = f"1 to {len(gaps)}, or an id of the JSON report" if gaps else "none: no gap was found"
+    matching = [g for i, g in enumerate(gaps, 1) if text in (str(i), g.id)]
+    if not matching:
+        accepted = f"1 to {len(gaps)}, or an id of the JSON report" if gaps else "none: there is no gap"
         raise ContextError(Fault(f"there is no gap {in_quotes(text)}.", accepted))
-    return gap_details(measured, found[0], table, width)
+    return gap_details(measured, matching[0], table, width)
 
 
 def _row(text: str, table: EitherTable) -> int:
@@ -254,19 +283,6 @@ def _only(tables: Sequence[EitherTable]) -> EitherTable:
         names = ", ".join(in_quotes(table.name) for table in tables[:6])
         raise TableError(Fault(f"--gap and --explain are about one table, and there are {len(tables)}.", f"one of {names}"))
     return tables[0]
-
-
-def earlier_report(file: str, read: Callable[[str, str], AnyReport], accepted: str) -> AnyReport:
-    """The baseline in a file, by what reads its text; `accepted` is what it may be. One without a digest is told of."""
-    try:
-        text = read_bytes(Path(file)).decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise ContextError(Fault("the baseline is not text.", accepted, place=Place(file))) from None
-    earlier = read(text, file)
-    if not has_digest(text):
-        found = "the baseline has no digest, as an older version wrote it, so an altered number would not be noticed"
-        note(f"{file}: {found}. Write the report again to have one.")
-    return earlier
 
 
 def percent(text: str) -> float:

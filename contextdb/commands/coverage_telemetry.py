@@ -19,20 +19,20 @@ ENGINES = ("local", "dask")
 
 
 def add_arguments(parser: argparse.ArgumentParser, percent: Callable[[str], float]) -> None:
-    told = parser.add_argument_group("recorded contexts")
-    told.add_argument(
+    group = parser.add_argument_group("recorded contexts")
+    group.add_argument(
         "--telemetry",
         action="append",
         metavar="GLOB",
         help="CSV or Parquet files with a column for each fact, or recordings (.jsonl); may be repeated",
     )
-    told.add_argument(
+    group.add_argument(
         "--fail-under-telemetry", type=percent, metavar="PCT", help="fail if the covered percentage of recorded moments is lower"
     )
-    told.add_argument("--count", metavar="COLUMN", help="the column that says how often each moment was seen")
-    told.add_argument("--engine", choices=ENGINES, default="local", help="read files here, or on Dask workers (default: local)")
-    told.add_argument("--scheduler", metavar="ADDRESS", help="the Dask scheduler; without it, workers on this machine")
-    told.add_argument(
+    group.add_argument("--count", metavar="COLUMN", help="the column that says how often each moment was seen")
+    group.add_argument("--engine", choices=ENGINES, default="local", help="read files here, or on Dask workers (default: local)")
+    group.add_argument("--scheduler", metavar="ADDRESS", help="the Dask scheduler; without it, workers on this machine")
+    group.add_argument(
         "--resume", metavar="FOLDER", help="keep the sums of finished files, and continue from them after an interruption"
     )
 
@@ -63,7 +63,7 @@ def observed(arguments: argparse.Namespace, table: EitherTable, known: Sequence[
 
     files = [file for pattern in arguments.telemetry for file in context_files(pattern)]
     with bar(f"reading telemetry for {printable(table.name)}", has_many_bytes(files)) as tell:
-        found = observe(
+        result = observe(
             table,
             arguments.telemetry,
             count=arguments.count,
@@ -73,9 +73,9 @@ def observed(arguments: argparse.Namespace, table: EitherTable, known: Sequence[
             resume=arguments.resume,
             known=known,
         )
-    for file in found.unread:
+    for file in result.unread:
         note(*file.faults)
-    return found
+    return result
 
 
 def ranked(arguments: argparse.Namespace, measured: Measured, table: EitherTable) -> Measured:

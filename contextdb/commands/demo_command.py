@@ -25,8 +25,9 @@ from contextdb.commands.motion_page import page_file
 from contextdb.compiled.matches import Matches
 from contextdb.compiled.table import CompiledTable
 from contextdb.console import ExitCode, aligned, output, styled, wants_colour
-from contextdb.disk import make_folder, refused_writing, write_atomic
-from contextdb.disk.folder_lock import temporary_folder
+from contextdb.disk import make_folder, real_path, refused_writing, write_atomic
+from contextdb.disk.boundary import inside
+from contextdb.disk.folder_lock import growing_folder, temporary_folder
 from contextdb.errors import Fault, FileError, Place, plural
 from contextdb.motion.features.extraction import Features
 from contextdb.motion.storage.building import build
@@ -85,26 +86,28 @@ def make_sample(source: Path, folder: Path) -> None:
     be made."""
     Project.load(source)  # says what is wrong with it
     if folder.exists():
-        found = Fault("this already exists.", "the name of a folder that does not exist yet", place=Place(str(folder)))
-        raise FileError(found)
+        fault = Fault("this already exists.", "the name of a folder that does not exist yet", place=Place(str(folder)))
+        raise FileError(fault)
     make_folder(folder.parent)
-    with refused_writing(folder, ()), temporary_folder(folder.parent.resolve()) as temporary:
-        growing = temporary / "growing"
+    with (
+        refused_writing(folder, ()),
+        temporary_folder(real_path(folder.parent)) as temporary,
+        growing_folder(temporary / "growing", folder) as growing,
+    ):
         _copy(source, growing)
-        (growing / "clips").mkdir(exist_ok=True)
+        make_folder(growing / "clips")
         motion.write_made_clips(growing / "clips")
-        os.rename(growing, folder)
 
 
 def _copy(source: Path, to: Path) -> None:
-    """Copy a folder without what is hidden or made. (`shutil.copytree` makes one text of all that the system refuses.)"""
+    """Copy a folder without what is hidden or made."""
     for at, folders, names in os.walk(source):
         folders[:] = [name for name in folders if not name.startswith(".")]
         here = to / Path(at).relative_to(source)
-        here.mkdir(parents=True)
+        make_folder(here)
         for name in names:
             if not name.startswith(".") and not name.endswith((".bvh", ".safetensors")):
-                shutil.copyfile(Path(at, name), here / name)
+                shutil.copyfile(inside(Path(at, name), source), here / name)
 
 
 def sample_folder() -> Path:
@@ -178,9 +181,9 @@ def _motion(project: Project, folder: Path, page: Path | None) -> Iterator[str]:
     if page is not None:
         yield "9. Another minute of his, over stairs, a slope and bumps: legs follow the ground, and the page shows each moment"
         yield ""
-        html, told = world(other)
+        html, sentence = world(other)
         write_atomic(page, html.encode())
-        yield f"   {told}"
+        yield f"   {sentence}"
         yield f"   {page}"
         yield ""
     yield 'Next: "contextdb query --help", and docs/tutorial.md.'

@@ -41,15 +41,15 @@ def cast_lines(compiled: CompiledTable) -> Iterator[str]:
     matches = compiled.query(CATCH, unknown="never", actors={"Defender": everybody}, prefer="distance")
     yield f"   MidAir_Catch_Direction  =  {CATCH['MidAir_Catch_Direction']}"
     yield f"   {len(everybody)} players, all offered as Defender; these are within {NEAR_M:g} m:"
-    yield from aligned([_shown(player) for player in near], indent="     ")
+    yield from aligned([_player_cells(player) for player in near], indent="     ")
     yield ""
     yield f"   {len(matches)} of {plural(compiled.n_rows, 'row')} valid, the nearest who fits cast first:"
-    for row in matches:
+    for row in matches.rows.tolist():
         cast, *others = (casting["Defender"] for casting in matches.castings(row))
         yield f"     {compiled.assets[row]}: Defender is {cast['name']}"
         yield from (f"       {other['name']} could play it too" for other in others)
     yield "   Why nobody else who is near:"
-    for row in matches:
+    for row in matches.rows.tolist():
         can_play = {casting["Defender"]["id"] for casting in matches.castings(row)}
         yield from (f"     {_why_not(compiled, player, row)}" for player in near if player["id"] not in can_play)
     yield ""
@@ -59,7 +59,7 @@ def _distance(player: Player) -> float:
     return float(str(player["distance"]))
 
 
-def _shown(player: Player) -> tuple[str, ...]:
+def _player_cells(player: Player) -> tuple[str, ...]:
     jumps = "jumps" if player["MidAir_Contesting"] else "stays down"
     sees = "sees the ball" if player["FacingBall"] else "has his back to the ball"
     return (

@@ -64,16 +64,16 @@ def world(player: Character) -> tuple[str, str]:
     sticks = [stick for seconds, stick in MINUTE for _ in range(round(seconds * RATE))]
     updated = [player.update(1.0 / RATE, stick, {"gait": _gait(stick), "style": "normal"}) for stick in sticks]
     poses = [each.pose for each in updated if each.pose is not None]
-    found = measure(trace, banks, poses=poses, wanted=sticks)
-    rows = {label: (value, raw) for label, value, raw, _ in SessionMeasures(NAME, found, {}, ()).rows()}
+    measures = measure(trace, banks, poses=poses, wanted=sticks)
+    rows = {label: (value, raw) for label, value, raw, _ in SessionMeasures(NAME, measures, {}, ()).rows()}
     view = view_of(NAME, trace, banks, player.stream.settings, trace.reasked(player.controller.selector.databases), rows, poses)
     heights = [ground(*pose.root[:2])[0] for pose in poses]
-    told = (
+    sentence = (
         f"{len(poses) / RATE:g} s over {N_STEPS} steps, a slope and bumps, up to {max(heights):.2f} m high:"
-        f" {found.jumps_per_s:.1f} jumps a second, feet slide {found.skate_cm_s:.1f} cm/s (clips {found.skate_raw_cm_s:.1f}),"
-        f" {found.path_rms_m:.2f} m from the path"
+        f" {measures.jumps_per_s:.1f} jumps a second, feet slide {measures.skate_cm_s:.1f} cm/s"
+        f" (clips {measures.skate_raw_cm_s:.1f}), {measures.path_rms_m:.2f} m from the path"
     )
-    return session_html.render([view]), told
+    return session_html.render([view]), sentence
 
 
 def _gait(stick: tuple[float, float]) -> str:

@@ -1,27 +1,35 @@
 """Show what changed between two versions of a table: rows by asset, columns, and cells, with changes of text alone listed apart.
 
-Exits with 0 if nothing changed, with 1 if something did, with 2 if a table cannot be read.
+Exits with 0 if nothing changed, with 1 if something did, with 2 if a table cannot be read. With --telemetry both versions are asked
+in every recorded moment; with --max-changed or --max-emptied only these decide between 0 and 1.
 
   contextdb diff old/hit_mid_air.csv tables/hit_mid_air.csv
   contextdb diff a.csv b.csv --format markdown
+  contextdb diff a.csv b.csv --telemetry "play/*.parquet" --max-emptied 0.1
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
+from typing import TYPE_CHECKING
 
 from contextdb.checks.effects import Effects
 from contextdb.commands import add_format_arguments
+from contextdb.commands.coverage_command import percent
 from contextdb.commands.diff_views import as_markdown, as_text, effects_json, effects_markdown, effects_text
 from contextdb.console import ExitCode, output, wants_colour
 from contextdb.edits.diffing import Diff, diff
-from contextdb.errors import ContextDBError, Fault
+from contextdb.errors import ContextDBError, ContextError, Fault
 from contextdb.report.render_json import as_json
 from contextdb.tables.nesting.names import inner_name
 from contextdb.tables.places import table_path
 from contextdb.tables.project import load_table
 
+if TYPE_CHECKING:
+    from contextdb.commands.diff_backtest import Replayed
+
+ENGINES = ("local", "dask")
 FORMATS = ("text", "markdown", "json")
 
 
@@ -30,41 +38,71 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("after", metavar="B", help="the table as it is")
     add_format_arguments(parser, FORMATS)
     parser.add_argument("--no-effects", action="store_false", dest="effects", help="leave out the effects of the change")
+    group = parser.add_argument_group("recorded moments")
+    group.add_argument("--telemetry", action="append", metavar="GLOB", help="files of recorded contexts; may be repeated")
+    group.add_argument("--max-changed", type=percent, metavar="PERCENT", help="fail if the answer changes in more of the moments")
+    group.add_argument("--max-emptied", type=percent, metavar="PERCENT", help="fail if more of the moments are left without a row")
+    group.add_argument("--count", metavar="COLUMN", help="the column that says how often each moment was seen")
+    group.add_argument("--engine", choices=ENGINES, default="local", help="read files here, or on Dask workers (default: local)")
+    group.add_argument("--scheduler", metavar="ADDRESS", help="the Dask scheduler; without it, workers on this machine")
     parser.add_argument("--all", action="store_true", help="print every difference, not the first of each kind")
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Compare two tables. Cells that cannot be read are compared as texts."""
+    require_moments(arguments)
     before, after = (load_table(table_path(text), strict=False) for text in (arguments.before, arguments.after))
-    found = diff(before, after)
-    effect = _effects(found) if arguments.effects and _may_matter(found) else None
-    text = _rendered(found, effect, arguments)
+    changes = diff(before, after)
+    effect = _effects(changes) if arguments.effects and _may_matter(changes) else None
+    replayed = None
+    if arguments.telemetry:
+        from contextdb.commands.diff_backtest import replayed_moments
+
+        replayed = replayed_moments(arguments, before, after, effect)
+    text = _rendered(changes, effect, replayed, arguments)
     with output():
         print(text, end="")
-    return ExitCode.FOUND if found else ExitCode.OK
+    if replayed is not None and replayed.gates:
+        return ExitCode.OK if all(gate.passed for gate in replayed.gates) else ExitCode.FOUND
+    return ExitCode.FOUND if changes else ExitCode.OK
 
 
-def _may_matter(found: Diff) -> bool:
+def require_moments(arguments: argparse.Namespace) -> None:
+    """Refuse options about recorded moments where there are none."""
+    if arguments.telemetry:
+        return
+    for option in ("max_changed", "max_emptied", "count", "scheduler"):
+        if getattr(arguments, option) is not None:
+            sentence = f"--{option.replace('_', '-')} is about recorded moments."
+            raise ContextError(Fault(sentence, "--telemetry GLOB with it"))
+
+
+def _may_matter(changes: Diff) -> bool:
     """Whether more changed than how things are written and where they are."""
-    is_other_rows = found.rows_added or found.rows_removed or found.columns_added or found.columns_removed or found.columns_renamed
-    names_tables = any(inner_name(text) is not None for row in found.rows_renamed for text in (row.before, row.after))
-    return bool(is_other_rows or found.n_changed or names_tables)
+    is_other_rows = (
+        changes.rows_added or changes.rows_removed or changes.columns_added or changes.columns_removed or changes.columns_renamed
+    )
+    names_tables = any(inner_name(text) is not None for row in changes.rows_renamed for text in (row.before, row.after))
+    return bool(is_other_rows or changes.n_changed or names_tables)
 
 
-def _effects(found: Diff) -> Effects | Fault:
+def _effects(changes: Diff) -> Effects | Fault:
     """What the change does, or why that cannot be reported."""
     from contextdb.checks.effects import effects
 
     try:
-        return effects(found.before, found.after, changes=found)
+        return effects(changes.before, changes.after, changes=changes)
     except ContextDBError as error:
         return error.faults[0]
 
 
-def _rendered(found: Diff, effect: Effects | Fault | None, arguments: argparse.Namespace) -> str:
+def _rendered(changes: Diff, effect: Effects | Fault | None, replayed: Replayed | None, arguments: argparse.Namespace) -> str:
     if arguments.format == "json":
-        return as_json(found.to_json() | {"effects": effects_json(effect)})
+        more = {} if replayed is None else replayed.to_json()
+        return as_json(changes.to_json() | {"effects": effects_json(effect)} | more)
     if arguments.format == "markdown":
-        return as_markdown(found, arguments.all, effects_markdown(effect, arguments.all))
+        below = "" if replayed is None else replayed.markdown
+        return as_markdown(changes, arguments.all, effects_markdown(effect, arguments.all) + below)
     colour = wants_colour(sys.stdout)
-    return as_text(found, colour, arguments.all) + effects_text(effect, colour, arguments.all)
+    below = "" if replayed is None else replayed.text(colour, arguments.all)
+    return as_text(changes, colour, arguments.all) + effects_text(effect, colour, arguments.all) + below

@@ -13,47 +13,47 @@ from itertools import accumulate, groupby
 from contextdb.checks.effects import Box, Effects, Reach
 from contextdb.console import aligned, printable, styled
 from contextdb.edits.diffing import CellChange, Diff
-from contextdb.errors import Fault, plural, row_name, shown
+from contextdb.errors import Fault, plural, row_name, safe_text
 from contextdb.findings import Finding
 from contextdb.report.render_markdown import MOST_BYTES, escaped
 from contextdb.tables.table import EitherTable
 
 MARKS = {"added": ("+", "green"), "removed": ("-", "red"), "renamed": ("~", "yellow"), "moved": (">", "cyan")}
 MOST = 40
-"""Differences of one kind that are shown, unless all are asked for."""
+"""Differences of one kind that are listed without --all."""
 MOST_CHARACTERS = 40
 """Of a cell's text in a terminal."""
 
-Told = tuple[str, str]
+Part = tuple[str, str]
 """What became of a row or a column, and which."""
 
 
-def as_text(found: Diff, colour: bool, shows_all: bool = False) -> str:
+def as_text(changes: Diff, colour: bool, shows_all: bool = False) -> str:
     """Differences as aligned lines."""
-    name = printable(str(found.after.path or found.after.name))
-    lines = [styled(f"{name}: {found.summary}", "bold", colour)]
-    for title, parts in (("columns", _columns(found)), ("rows", _rows(found))):
+    name = printable(str(changes.after.path or changes.after.name))
+    lines = [styled(f"{name}: {changes.summary}", "bold", colour)]
+    for title, parts in (("columns", _columns(changes)), ("rows", _rows(changes))):
         if parts:
-            told = [styled(f"  {MARKS[verb][0]} {printable(text)}", MARKS[verb][1], colour) for verb, text in parts]
-            lines += ["", title, *_first(told, sys.maxsize if shows_all else MOST)]
-    lines += _cell_lines(found, colour, shows_all)
+            displayed = [styled(f"  {MARKS[verb][0]} {printable(text)}", MARKS[verb][1], colour) for verb, text in parts]
+            lines += ["", title, *_first(displayed, sys.maxsize if shows_all else MOST)]
+    lines += _cell_lines(changes, colour, shows_all)
     return "".join(f"{line}\n" for line in lines)
 
 
-def as_markdown(found: Diff, shows_all: bool = False, more: str = "") -> str:
+def as_markdown(changes: Diff, shows_all: bool = False, more: str = "") -> str:
     """Differences as Markdown with more below it, together small enough for a comment."""
-    name = str(found.after.path or found.after.name)
-    lines = [f"### {escaped(name)}", "", f"{escaped(found.summary)}"]
-    parts = [f"- column {verb}: {escaped(text)}" for verb, text in _columns(found)]
-    parts += [f"- row {verb}: {escaped(text)}" for verb, text in _rows(found)]
-    rows = [f"| {' | '.join(escaped(shown(t, 200)) for t in _markdown_texts(c))} |" for c in found.cells]
+    name = str(changes.after.path or changes.after.name)
+    lines = [f"### {escaped(name)}", "", f"{escaped(changes.summary)}"]
+    parts = [f"- column {verb}: {escaped(text)}" for verb, text in _columns(changes)]
+    parts += [f"- row {verb}: {escaped(text)}" for verb, text in _rows(changes)]
+    rows = [f"| {' | '.join(escaped(safe_text(t, 200)) for t in _markdown_texts(c))} |" for c in changes.cells]
     room = sys.maxsize if shows_all else MOST_BYTES - len(more.encode())
     for head, listed in (([], parts), (["| asset | column | before | after |", "| --- | --- | --- | --- |"], rows)):
         ends = list(accumulate(map(_size, listed)))
-        kept = listed[: bisect_right(ends, room)]
-        room -= sum(map(_size, kept))
-        left = len(listed) - len(kept)
-        lines += ["", *head, *kept] if kept else []
+        fitting = listed[: bisect_right(ends, room)]
+        room -= sum(map(_size, fitting))
+        left = len(listed) - len(fitting)
+        lines += ["", *head, *fitting] if fitting else []
         lines += ["", f"… and {left:,} more; `contextdb diff --all` shows every one."] if left else []
     return "\n".join(lines) + "\n" + more
 
@@ -67,22 +67,22 @@ def _markdown_texts(change: CellChange) -> tuple[str, str, str, str]:
     return change.asset, change.column, change.before, after
 
 
-def _columns(found: Diff) -> list[Told]:
-    told = [("added", shown(name)) for name in found.columns_added]
-    told += [("removed", shown(name)) for name in found.columns_removed]
-    told += [("renamed", f"{shown(one.before)} → {shown(one.after)}") for one in found.columns_renamed]
-    return told + [
-        ("moved", f"{shown(c.name)}, from column {c.place_before + 1} to {c.place_after + 1}") for c in found.columns_moved
+def _columns(changes: Diff) -> list[Part]:
+    parts = [("added", safe_text(name)) for name in changes.columns_added]
+    parts += [("removed", safe_text(name)) for name in changes.columns_removed]
+    parts += [("renamed", f"{safe_text(one.before)} → {safe_text(one.after)}") for one in changes.columns_renamed]
+    return parts + [
+        ("moved", f"{safe_text(c.name)}, from column {c.place_before + 1} to {c.place_after + 1}") for c in changes.columns_moved
     ]
 
 
-def _rows(found: Diff) -> list[Told]:
-    before, after = found.before, found.after
-    told = [("added", f"{_asset(after.assets[row])}, {_place(after, row)}") for row in found.rows_added]
-    told += [("removed", f"{_asset(before.assets[row])}, {_place(before, row)} before") for row in found.rows_removed]
-    told += [("renamed", f"{_asset(one.before)} → {_asset(one.after)}") for one in found.rows_renamed]
-    places = ((one.name, _place(before, one.place_before), _place(after, one.place_after)) for one in found.rows_moved)
-    return told + [("moved", f"{_asset(name)}, from {old} to {new}") for name, old, new in places]
+def _rows(changes: Diff) -> list[Part]:
+    before, after = changes.before, changes.after
+    parts = [("added", f"{_asset(after.assets[row])}, {_place(after, row)}") for row in changes.rows_added]
+    parts += [("removed", f"{_asset(before.assets[row])}, {_place(before, row)} before") for row in changes.rows_removed]
+    parts += [("renamed", f"{_asset(one.before)} → {_asset(one.after)}") for one in changes.rows_renamed]
+    places = ((one.name, _place(before, one.place_before), _place(after, one.place_after)) for one in changes.rows_moved)
+    return parts + [("moved", f"{_asset(name)}, from {old} to {new}") for name, old, new in places]
 
 
 def _place(table: EitherTable, row: int) -> str:
@@ -90,8 +90,8 @@ def _place(table: EitherTable, row: int) -> str:
     return row_name(row) if line is None else f"line {line}"
 
 
-def _cell_lines(found: Diff, colour: bool, shows_all: bool) -> Iterator[str]:
-    changes = list(found.cells)
+def _cell_lines(difference: Diff, colour: bool, shows_all: bool) -> Iterator[str]:
+    changes = list(difference.cells)
     for title, part in (
         ("cells", [c for c in changes if c.is_meaning]),
         ("written differently", [c for c in changes if not c.is_meaning]),
@@ -99,15 +99,15 @@ def _cell_lines(found: Diff, colour: bool, shows_all: bool) -> Iterator[str]:
         if not part:
             continue
         yield from ("", title)
-        kept = part if shows_all else part[:MOST]
-        yield from _assets(kept, colour)
-        if len(part) > len(kept):
-            yield f"  … and {len(part) - len(kept):,} more; --all shows every one"
+        listed = part if shows_all else part[:MOST]
+        yield from _assets(listed, colour)
+        if len(part) > len(listed):
+            yield f"  … and {len(part) - len(listed):,} more; --all shows every one"
 
 
 def _assets(changes: Sequence[CellChange], colour: bool) -> Iterator[str]:
     """Changes under their assets, aligned across all of them."""
-    rows = [(shown(c.column), _text(c.before), "→", _text(c.after)) for c in changes]
+    rows = [(safe_text(c.column), _text(c.before), "→", _text(c.after)) for c in changes]
     lines = iter(aligned(rows, indent="    "))
     for _, group in groupby(changes, key=lambda c: c.row):
         same = list(group)
@@ -117,11 +117,11 @@ def _assets(changes: Sequence[CellChange], colour: bool) -> Iterator[str]:
 
 
 def _text(text: str) -> str:
-    return shown(text, MOST_CHARACTERS) if text else "(empty)"
+    return safe_text(text, MOST_CHARACTERS) if text else "(empty)"
 
 
 def _asset(name: str) -> str:
-    return shown(name) if name.strip() else "(no name)"
+    return safe_text(name) if name.strip() else "(no name)"
 
 
 def _first(lines: Sequence[str], most: int, more: str = "  … and {:,} more; --all shows every one") -> list[str]:
@@ -133,16 +133,16 @@ def _first(lines: Sequence[str], most: int, more: str = "  … and {:,} more; --
 
 TITLE = "what it does"
 MOST_EFFECTS = 10
-"""Assets and gaps that are shown, unless all are asked for."""
+"""Assets and gaps that are listed without --all."""
 MOST_BOXES = 2
-"""Boxes of one asset that are shown, the largest."""
+"""Boxes of one asset that are listed, the largest."""
 
 Heading = tuple[str, list[str]]
 """A heading and the lines below it."""
 
 
 def effects_json(effect: Effects | Fault | None) -> dict[str, object] | None:
-    """Effects as plain data; None where they were not asked for or nothing could change."""
+    """Effects as plain data; None where they are not wanted or nothing could change."""
     if effect is None:
         return None
     return {"unknown": str(effect)} if isinstance(effect, Fault) else effect.to_json()
@@ -153,23 +153,24 @@ def effects_text(effect: Effects | Fault | None, colour: bool, shows_all: bool =
     if effect is None:
         return ""
     lines = ["", TITLE]
-    for heading, told in _told(effect, shows_all):
-        lines.append(styled(f"  {printable(heading)}", "bold" if told else "dim", colour))
-        lines += [f"    {printable(line)}" for line in told]
+    for heading, items in _headings(effect, shows_all):
+        lines.append(styled(f"  {printable(heading)}", "bold" if items else "dim", colour))
+        lines += [f"    {printable(line)}" for line in items]
     return "".join(f"{line}\n" for line in lines)
 
 
 def effects_markdown(effect: Effects | Fault | None, shows_all: bool = False) -> str:
+    """Effects as a list of Markdown under a heading; nothing where there is nothing to tell."""
     if effect is None:
         return ""
     lines = ["", f"#### {TITLE.capitalize()}", ""]
-    for heading, told in _told(effect, shows_all):
+    for heading, items in _headings(effect, shows_all):
         lines.append(f"- {escaped(heading)}")
-        lines += [f"  - {escaped(line)}" for line in told]
+        lines += [f"  - {escaped(line)}" for line in items]
     return "".join(f"{line}\n" for line in lines)
 
 
-def _told(effect: Effects | Fault, shows_all: bool) -> Iterator[Heading]:
+def _headings(effect: Effects | Fault, shows_all: bool) -> Iterator[Heading]:
     if isinstance(effect, Fault):
         yield f"That cannot be determined: {effect}", []
         return
@@ -206,7 +207,7 @@ def _reach(reach: Reach, shows_all: bool) -> Iterator[Heading]:
     for verb, boxes, share in (("gains", reach.gained, reach.share_gained), ("loses", reach.lost, reach.share_lost)):
         if boxes:
             most = len(boxes) if shows_all else MOST_BOXES
-            yield f"{shown(reach.asset)} {verb} {_percent(share)}", _first(list(map(_line, boxes)), most, "… and {:,} more")
+            yield f"{safe_text(reach.asset)} {verb} {_percent(share)}", _first(list(map(_line, boxes)), most, "… and {:,} more")
 
 
 def _listed(title: str, lines: Sequence[str], most: int) -> Iterator[Heading]:
@@ -216,11 +217,11 @@ def _listed(title: str, lines: Sequence[str], most: int) -> Iterator[Heading]:
 
 def _finding(finding: Finding) -> str:
     line = "" if finding.line is None else f", line {finding.line}"
-    return f"{shown(finding.asset or '(no name)')}{line}: {shown(finding.message, 300)}"
+    return f"{safe_text(finding.asset or '(no name)')}{line}: {safe_text(finding.message, 300)}"
 
 
 def _line(box: Box) -> str:
-    return f"{_percent(box.share)}  {shown(box.text, 400)}"
+    return f"{_percent(box.share)}  {safe_text(box.text, 400)}"
 
 
 def _percent(share: float) -> str:

@@ -11,13 +11,16 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Any
 
 from contextdb.console import ExitCode
 from contextdb.errors import ContextDBError, Fault
 
 
 class TerminalError(ContextDBError):
-    """There is no terminal that an editor could be shown on."""
+    """There is no terminal for an editor."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -28,10 +31,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Open the editor, and stay in it until it is left."""
     require_terminal()
-    from tui.run import edit
+    return ExitCode(screens("run").edit(arguments.path, arguments.theme))
 
-    edit(arguments.path, arguments.theme)
-    return ExitCode.OK
+
+def screens(module: str) -> Any:
+    """A module of the terminal editor, which is inside this package in a wheel and next to it in a checkout."""
+    home = "contextdb._tui" if find_spec("contextdb._tui") else "tui"
+    return import_module(f"{home}.{module}")
 
 
 def require_terminal(instead: str = 'to use "contextdb query" and "contextdb check" in scripts') -> None:
@@ -40,5 +46,5 @@ def require_terminal(instead: str = 'to use "contextdb query" and "contextdb che
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise TerminalError(Fault("standard input and output are not a terminal.", "a terminal", instead))
     if term in ("", "dumb", "unknown"):
-        found = f"the terminal cannot move its cursor (TERM is {term or 'not set'})."
-        raise TerminalError(Fault(found, "a terminal such as xterm", "to set TERM=xterm-256color where the terminal is one"))
+        fault = f"the terminal cannot move its cursor (TERM is {term or 'not set'})."
+        raise TerminalError(Fault(fault, "a terminal such as xterm", "to set TERM=xterm-256color where the terminal is one"))

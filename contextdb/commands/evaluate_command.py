@@ -32,7 +32,7 @@ from contextdb.commands.coverage_telemetry import ENGINES
 from contextdb.commands.progress import bar, has_many_bytes
 from contextdb.compiled.table import CompiledTable
 from contextdb.console import ExitCode, aligned, output, printable, styled, wants_colour
-from contextdb.disk import TABLE_SUFFIXES, is_stream, path_in_quotes, refused_writing, write_atomic
+from contextdb.disk import TABLE_SUFFIXES, is_stream, path_in_quotes, real_path, refused_writing, write_atomic
 from contextdb.disk.folder_lock import temporary_folder
 from contextdb.errors import ContextDBError, ContextError, Fault, FileError, Place, plural
 from contextdb.files.texts import is_parquet
@@ -58,13 +58,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
-    """Evaluate the files; only sums are kept, and with --out the answers, in a folder next to it until all are there."""
+    """Evaluate the files; only sums stay in memory, and with --out the answers, in a folder next to it until they are complete."""
     if arguments.scheduler is not None and arguments.engine != "dask":
         raise ContextError(Fault("--scheduler is the address of Dask's.", "--engine dask with it"))
     compiled = open_compiled(arguments.table)
     files = context_files(arguments.contexts)
     out = None if arguments.out is None else _out_file(Path(arguments.out), files)
-    with _folder_beside(out) as folder:
+    with _folder_parent(out) as folder:
         answered = _answered(arguments, compiled, files, folder)
         if out is not None and folder is not None:
             _write(answered, folder, out)
@@ -82,29 +82,29 @@ def run(arguments: argparse.Namespace) -> ExitCode:
 def _answered(
     arguments: argparse.Namespace, compiled: CompiledTable, files: Sequence[Path], folder: Path | None
 ) -> dict[Path, Answered]:
-    """What the contexts of each file found, in the order of the files. Raises ContextDBError where a file cannot be read, holds
+    """The answers to the contexts of each file, in the order of the files. Raises ContextDBError where a file cannot be read, holds
     facts that the table cannot use, or was not finished; then nothing is reported."""
     from contextdb.telemetry.engines import with_dask
     from contextdb.telemetry.evaluate_file import Question, evaluate_file
 
     question = Question(compiled, arguments.unknown, folder)
-    found: dict[Path, Answered] = {}
+    answers: dict[Path, Answered] = {}
     with bar("evaluating", has_many_bytes(files)) as tell:
 
         def tell_share(share: float) -> None:
             if tell is not None:
-                tell(len(found) + share, len(files))
+                tell(len(answers) + share, len(files))
 
         here = ((path, evaluate_file(question, path, tell_share)) for path in files)
         there = with_dask(evaluate_file, question, files, arguments.scheduler) if arguments.engine == "dask" else here
         for path, answered in there:
             if answered.faults and arguments.engine == "local":
                 raise _by_option(answered.faults)
-            found[path] = answered
+            answers[path] = answered
             tell_share(0.0)
-    if faults := [fault for path in files for fault in found[path].faults]:
+    if faults := [fault for path in files for fault in answers[path].faults]:
         raise _by_option(faults)
-    return {path: found[path] for path in files}
+    return {path: answers[path] for path in files}
 
 
 def _by_option(faults: Sequence[Fault]) -> ContextError:
@@ -116,18 +116,18 @@ def _by_option(faults: Sequence[Fault]) -> ContextError:
 
 
 @contextmanager
-def _folder_beside(out: Path | None) -> Iterator[Path | None]:
+def _folder_parent(out: Path | None) -> Iterator[Path | None]:
     """A folder for what is not finished, next to the file that it becomes; it goes, whatever happens."""
     if out is None:
         yield None
         return
-    beside = Path(tempfile.gettempdir()) if is_stream(out) else out.parent.resolve()
+    parent = Path(tempfile.gettempdir()) if is_stream(out) else real_path(out.parent)
     with ExitStack() as stack:
         with refused_writing(out, ()):
-            folder = stack.enter_context(temporary_folder(beside))
+            folder = stack.enter_context(temporary_folder(parent))
         try:
             yield folder
-        except ContextDBError as error:  # what is not finished has names that nobody asked for
+        except ContextDBError as error:  # what is not finished has names that mean nothing to the user
             raise type(error)(*(_of_out(fault, folder, out) for fault in error.faults)) from None
 
 
@@ -149,7 +149,7 @@ def _out_file(out: Path, files: Sequence[Path]) -> Path:
         raise FileError(
             Fault(f"there is no folder {path_in_quotes(out.parent)}.", "an existing folder", place=place, rule="no-such-path")
         )
-    if out.resolve() in [path.resolve() for path in files]:
+    if os.path.realpath(out) in map(os.path.realpath, files):
         raise FileError(Fault("the answers would be written over the contexts.", "another file", place=place))
     return out
 
@@ -182,8 +182,8 @@ def _document(compiled: CompiledTable, n_contexts: int, n_without: int, hits: Ro
 def _lines(compiled: CompiledTable, n_contexts: int, n_without: int, hits: Rows) -> Iterator[str]:
     colour = wants_colour(sys.stdout)
     yield f"{plural(n_contexts, 'context')} against {plural(compiled.n_rows, 'row')} of {printable(compiled.name)}"
-    said = f"{plural(n_without, 'context')} without a valid asset" + (f" ({share(n_without, n_contexts)})" if n_contexts else "")
-    yield styled(said, "yellow" if n_without else "green", colour)
+    summary = f"{plural(n_without, 'context')} without a valid asset" + (f" ({share(n_without, n_contexts)})" if n_contexts else "")
+    yield styled(summary, "yellow" if n_without else "green", colour)
     order = np.argsort(-hits, kind="stable")
     used = [r for r in order.tolist() if hits[r]]
     if used:

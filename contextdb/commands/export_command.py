@@ -28,15 +28,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("target", metavar="DST", help="the file to write; - for standard output")
     names = [name for name, one in FORMATS.items() if one.is_written]
     parser.add_argument("--as", dest="format", metavar="FORMAT", choices=names, help=f"the format of DST: {', '.join(names)}")
-    told = (
+    help_text = (
         "cells of CSV and TSV that a spreadsheet may run as formulas: report them, keep them, or put ' before each (default: tell)"
     )
-    parser.add_argument("--formulas", choices=("tell", "keep", "quote"), default="tell", help=told)
+    parser.add_argument("--formulas", choices=("tell", "keep", "quote"), default="tell", help=help_text)
     parser.add_argument("--force", action="store_true", help="overwrite an existing file")
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
-    """Write one table; what could not be kept is reported on standard error."""
+    """Write one table; what could not be written is reported on standard error."""
     is_standard = arguments.target == "-"
     if is_standard and arguments.format is None:
         raise FileError(Fault("standard output has no suffix that gives a format.", "--as with a format", "--as tsv"))
@@ -56,6 +56,6 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     print(printable(arguments.target))
     n_left_out = sum(remark.n_left_out for remark in remarks)
     written = f"{table.n_rows - n_left_out:,} of " if n_left_out else ""
-    said = f"{table.name}: {written}{plural(table.n_rows, 'row')} as {kind.about.split(';')[0]}, {len(raw):,} bytes"
-    print(printable(said), file=sys.stderr)
+    summary = f"{table.name}: {written}{plural(table.n_rows, 'row')} as {kind.about.split(';')[0]}, {len(raw):,} bytes"
+    print(printable(summary), file=sys.stderr)
     return ExitCode.OK

@@ -18,8 +18,8 @@ from contextdb.errors import plural
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     git_setup.add_arguments(parser)
-    told = "how git calls contextdb (default: contextdb, or the Python that runs now)"
-    parser.add_argument("--command", metavar="TEXT", dest="command_line", help=told)
+    help_text = "how git calls contextdb (default: contextdb, or the Python that runs now)"
+    parser.add_argument("--command", metavar="TEXT", dest="command_line", help=help_text)
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:

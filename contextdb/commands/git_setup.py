@@ -14,7 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from contextdb.console import ExitCode, output, printable
-from contextdb.disk import read_bytes, write_atomic
+from contextdb.disk import read_bytes, remove, write_atomic
+from contextdb.disk.boundary import inside
 from contextdb.errors import ContextDBError, Fault, FileError, Place
 
 ATTRIBUTES = ".gitattributes"
@@ -39,7 +40,7 @@ class Setup:
     @property
     def attributes(self) -> Path:
         """The file that says which files are tables."""
-        return self.folder / ATTRIBUTES
+        return inside(self.folder / ATTRIBUTES, self.folder)
 
     @property
     def settings(self) -> dict[str, str]:
@@ -75,8 +76,8 @@ class Setup:
 
     def value(self, key: str) -> str | None:
         """What the configuration says under a key."""
-        found = self.git("config", self.scope, "--get", "--null", key, accepts=(0, 1))
-        return found.removesuffix("\0") if found else None
+        output = self.git("config", self.scope, "--get", "--null", key, accepts=(0, 1))
+        return output.removesuffix("\0") if output else None
 
     @property
     def scope(self) -> str:
@@ -113,8 +114,7 @@ class Setup:
         if raw:
             write_atomic(self.attributes, raw)
         else:
-            with _placed(self.attributes):
-                self.attributes.unlink(missing_ok=True)
+            remove(self.attributes)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -136,7 +136,7 @@ def setup_of(arguments: argparse.Namespace) -> Setup:
 
 
 def own_command() -> str:
-    """How a shell calls this contextdb: by name where it is found so, else by its interpreter."""
+    """How a shell calls this contextdb: by name where that is on the path, else by its interpreter."""
     return "contextdb" if shutil.which("contextdb") else f"{shlex.quote(Path(sys.executable).as_posix())} -m contextdb"
 
 
@@ -147,29 +147,21 @@ def _git(folder: Path, *arguments: str, accepts: tuple[int, ...]) -> str:
         fault = Fault(f"git cannot be run: {error.strerror}.", "git on the search path", "to install git")
         raise FileError(fault, errno=error.errno) from None
     if done.returncode not in accepts:
-        said = done.stderr.decode(errors="replace").strip().splitlines()
+        messages = done.stderr.decode(errors="replace").strip().splitlines()
         raise ContextDBError(
             Fault(
-                f"git {arguments[0]} failed: {said[-1] if said else f'it ended with {done.returncode}.'}", place=Place(str(folder))
+                f"git {arguments[0]} failed: {messages[-1] if messages else f'exit code {done.returncode}.'}",
+                place=Place(str(folder)),
             )
         )
     return done.stdout.decode(errors="surrogateescape")
-
-
-@contextmanager
-def _placed(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        fault = Fault(f"the file cannot be written: {error.strerror}.", place=Place(str(path)))
-        raise FileError(fault, errno=error.errno) from None
 
 
 def changed(arguments: argparse.Namespace, steps: Sequence[Callable[[Setup], list[str]]], nothing: str) -> ExitCode:
     """Do some steps, all or none, and print what each did; `nothing` says why where none did anything."""
     setup = setup_of(arguments)
     with setup.all_or_nothing():
-        said = [line for step in steps for line in step(setup)] or [f"nothing to do: {nothing}"]
+        lines = [line for step in steps for line in step(setup)] or [f"nothing to do: {nothing}"]
     with output():
-        print(*map(printable, said), sep="\n")
+        print(*map(printable, lines), sep="\n")
     return ExitCode.OK

@@ -21,11 +21,11 @@ def run(arguments: argparse.Namespace) -> ExitCode:
 
 def _attributes(setup: Setup) -> list[str]:
     lines = setup.raw().splitlines(keepends=True)
-    kept = [line for line in lines if line.strip() not in LINES]
-    if len(kept) == len(lines):
+    remaining = [line for line in lines if line.strip() not in LINES]
+    if len(remaining) == len(lines):
         return []
-    setup.write(b"".join(kept))
-    return [f"{setup.attributes}: {plural(len(lines) - len(kept), 'line')} removed"]
+    setup.write(b"".join(remaining))
+    return [f"{setup.attributes}: {plural(len(lines) - len(remaining), 'line')} removed"]
 
 
 def _configuration(setup: Setup) -> list[str]:

@@ -19,7 +19,7 @@ from pathlib import Path
 
 from contextdb.cells.kinds import KINDS
 from contextdb.console import ExitCode, aligned, output, printable
-from contextdb.disk import TABLE_SUFFIXES, path_in_quotes, read_bytes
+from contextdb.disk import TABLE_SUFFIXES, is_stream, path_in_quotes, read_bytes
 from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, mend_for, nearest, plural, row_name
 from contextdb.exchange import importing
 from contextdb.exchange.formats import FORMATS, ReadOptions, read
@@ -74,8 +74,11 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     for remark in reading.remarks:
         print(printable(f"{name}: {remark}"), file=sys.stderr)
     plan = _plan(reading, target, arguments)
-    if arguments.names is None and (told := importing.whole_names_told(plan.columns, reading, "--names words")):
-        print(printable(f"{name}: {told}"), file=sys.stderr)
+    if arguments.names is None and (note := importing.whole_names_sentence(plan.columns, reading, "--names words")):
+        print(printable(f"{name}: {note}"), file=sys.stderr)
+    if arguments.decimal is None:
+        for message in importing.decimal_commas_reported(plan.columns, reading, plan.table.schema, "--decimal comma"):
+            print(printable(f"{name}: {message}"), file=sys.stderr)
     if not arguments.dry_run:
         if is_large:
             _say(name, f"writing {plan.path} …")
@@ -100,6 +103,8 @@ def _target(text: str, may_overwrite: bool) -> Path:
     if not os.path.isdir(target.parent):
         folder = path_in_quotes(target.parent)
         raise FileError(Fault(f"there is no folder {folder}.", "a folder of tables", place=place, rule="no-such-path"))
+    if is_stream(target):  # a table is a file; who writes into a pipe waits for its reader
+        raise FileError(Fault("this is not a regular file.", "a file", "to remove it", place))
     if os.path.exists(target) and not may_overwrite:
         raise FileError(Fault("the file already exists.", "a new name, or --force to write over it", place=place))
     return target
@@ -120,8 +125,8 @@ def _plan(reading: Reading, target: Path, arguments: argparse.Namespace) -> impo
     schema, settings = importing.project_of(target)
     mapped = propose(reading, schema, settings, _pairs(arguments.map, "--map", "COLUMN=NAME"))
     for name in importing.declared_differently(reading, schema):
-        told = f"the file declares {in_quotes(name)} differently from contextdb.toml, which takes precedence."
-        print(printable(told), file=sys.stderr)
+        message = f"the file declares {in_quotes(name)} differently from contextdb.toml, which takes precedence."
+        print(printable(message), file=sys.stderr)
     return importing.plan_import(reading, target, mapped=_typed(mapped, reading, _pairs(arguments.type, "--type", "NAME=TYPE")))
 
 
@@ -133,7 +138,7 @@ def _pairs(given: Sequence[str], option: str, form: str) -> dict[str, str]:
 
 
 def _typed(mapped: Sequence[Mapped], reading: Reading, types: dict[str, str]) -> list[Mapped]:
-    """The columns with the types that were asked for, by their names here or in the file."""
+    """The columns with the wanted types, by their names here or in the file."""
     names = {column.name: column for column in mapped} | {column.source: column for column in mapped}
     wanted: dict[str, Mapped] = {}
     for name, given in types.items():
@@ -158,7 +163,7 @@ def _typed(mapped: Sequence[Mapped], reading: Reading, types: dict[str, str]) ->
     return [wanted.get(column.source, column) for column in mapped]
 
 
-# ---- what is said
+# ---- what is printed
 
 
 def _lines(plan: importing.Plan, reading: Reading, name: str, is_dry: bool) -> list[str]:
@@ -194,6 +199,6 @@ def _fault_lines(plan: importing.Plan) -> list[str]:
     faults = plan.table.faults
     if not faults:
         return []
-    shown = [f"  {f.place.column}, {row_name(f.place.row or 0)}: {f.message}" for f in faults[:3]]
+    listed = [f"  {f.place.column}, {row_name(f.place.row or 0)}: {f.message}" for f in faults[:3]]
     more = f"  and {len(faults) - 3:,} more: contextdb check {plan.path}" if len(faults) > 3 else ""
-    return [f"{plural(len(faults), 'cell')} cannot be read:", *map(printable, shown), *([more] if more else [])]
+    return [f"{plural(len(faults), 'cell')} cannot be read:", *map(printable, listed), *([more] if more else [])]

@@ -1,4 +1,4 @@
-"""What is installed beside contextdb: the versions that a report of a fault should name."""
+"""What is installed with contextdb: the versions that a report of a fault should name."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from importlib import metadata
 
 NOT_FOR_USERS = {"dev", "bench", "site"}
 """Extras for those who build contextdb."""
-WITHOUT = {"numba": "not installed; large batches and searches of motion take several times longer"}
 _REQUIRED = re.compile(r"([\w.-]+)(?:\[.*?\])?[^;]*(?:;(.*))?")
 _EXTRA = re.compile(r"""extra == ['"]([\w-]+)['"]""")
 
@@ -17,10 +16,10 @@ _EXTRA = re.compile(r"""extra == ['"]([\w-]+)['"]""")
 def lines() -> Iterator[str]:
     """One for Python, one for each package that contextdb uses, and one for each that only an extra brings."""
     packages = dict(_packages())
-    shown = {"python": f"{platform.python_version()} on {platform.system()} {platform.machine()}".rstrip()}
-    shown |= {name: _version(name, extra) for name, extra in packages.items()}
-    width = max(map(len, shown))
-    yield from (f"  {name:<{width}}  {told}" for name, told in shown.items())
+    versions = {"python": f"{platform.python_version()} on {platform.system()} {platform.machine()}".rstrip()}
+    versions |= {name: _version(name, extra) for name, extra in packages.items()}
+    width = max(map(len, versions))
+    yield from (f"  {name:<{width}}  {version}" for name, version in versions.items())
 
 
 def _packages() -> Iterator[tuple[str, str]]:
@@ -30,14 +29,14 @@ def _packages() -> Iterator[tuple[str, str]]:
     except metadata.PackageNotFoundError:  # a folder of sources that was not installed
         return
     for line in required:
-        found = _REQUIRED.fullmatch(line.strip())
+        match = _REQUIRED.fullmatch(line.strip())
         extra = _EXTRA.search(line)
-        if found and not (extra and extra[1] in NOT_FOR_USERS):
-            yield found[1].lower(), extra[1] if extra else ""
+        if match and not (extra and extra[1] in NOT_FOR_USERS):
+            yield match[1].lower(), extra[1] if extra else ""
 
 
 def _version(name: str, extra: str) -> str:
     try:
         return metadata.version(name)
     except metadata.PackageNotFoundError:
-        return f'not installed; pip install "contextdb[{extra}]"' if extra else WITHOUT.get(name, "not installed")
+        return f'not installed; pip install "contextdb[{extra}]"' if extra else "not installed"

@@ -10,7 +10,7 @@ facts that changed, written as for the command `query`. Ctrl+C ends it.
   contextdb live game --record session.jsonl
 
 With --tables the command also asks the tables of a folder: it reports where their answers differ from the game's, and with
---explain which rows were nearest, and which of their cells fail. With --record FILE every question is kept, not only the
+--explain which rows were nearest, and which of their cells fail. With --record FILE every question is saved, not only the
 newest; the commands `evaluate` and `coverage --telemetry` read FILE, even while it grows.
 """
 
@@ -21,7 +21,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-from contextdb.commands.live_views import Changes
+from contextdb.commands.live_views import Changes, cut
 from contextdb.commands.numbers import whole_type
 from contextdb.compiled.table import CompiledTable
 from contextdb.console import ExitCode, aligned, note, output
@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--record", metavar="FILE", help="also write every line to a new file: .jsonl")
     parser.add_argument("--tables", metavar="FOLDER", help="a folder of tables to ask too; shows where their answers differ")
     parser.add_argument("--explain", action="store_true", help="with --tables: show the nearest rows, and which cells fail")
-    parser.add_argument("--most", type=whole_type("a number of lines, such as 10.", 1), metavar="N", help="end after so many lines")
+    parser.add_argument("--most", type=whole_type("a number of lines, such as 10.", 1), metavar="N", help="end after N lines")
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
@@ -76,12 +76,12 @@ def _game(name: str | None, wanted: Wanted) -> Hearing | Sequence[Game]:
     try:
         return hear(path, wanted)
     except OSError:
-        found = f"the game {in_quotes(path.stem)} does not answer: it is stopped, has ended, or has too many listeners."
-        raise ContextDBError(Fault(found)) from None
+        fault = f"the game {in_quotes(path.stem)} does not answer: it is stopped, has ended, or has too many listeners."
+        raise ContextDBError(Fault(fault)) from None
 
 
 def _list(running: Sequence[Game]) -> None:
-    rows = [(game.name, str(game.header["pid"]), ", ".join(map(str, game.header["tables"]))) for game in running]
+    rows = [(game.name, str(game.header["pid"]), cut(", ".join(game.header["tables"]))) for game in running]
     with output():
         print(*aligned([("game", "process", "tables"), *rows]), sep="\n")
 
@@ -102,10 +102,10 @@ def _show(hearing: Hearing, changes: Changes, file: FileListener | None, most: i
             has_ended = has_ended or line["line"] == END
             if file is not None:
                 file.offer(raw)
-            said = changes.of(line)
-            note(*said.notes)
-            if said.lines:
-                print(*said.lines, sep="\n", flush=True)
+            changed = changes.of(line, len(raw))
+            note(*changed.notes)
+            if changed.lines:
+                print(*changed.lines, sep="\n", flush=True)
                 n_lines += 1
             if most is not None and n_lines >= most:
                 return

@@ -13,6 +13,10 @@ from contextdb.errors import ContextDBError, in_quotes, plural
 from contextdb.telemetry.link.lines import ASK, DECISION, HEADER, LOST, PICK, TABLES, Line, fact_text, given_facts
 
 N_NEAREST = 3
+MOST_PRINTED = 4000
+"""Characters of a line that is printed."""
+MOST_KNOWN, MOST_KNOWN_BYTES = 1000, 1 << 24
+"""Characters of a game that are remembered at most, and bytes of their lines; the one that was remembered first is forgotten."""
 NO_PICK = "-"
 Facts = dict[str, object]
 
@@ -21,7 +25,7 @@ UNCHANGED = ("plays on", "loops")
 
 
 @dataclass(frozen=True)
-class Said:
+class Printed:
     """What a line of the game says: lines for the output, and notes for the user."""
 
     lines: Sequence[str] = ()
@@ -30,16 +34,17 @@ class Said:
 
 @dataclass
 class _Known:
-    """What was last shown of a character and a table."""
+    """What was last printed of a character and a table."""
 
     facts: Mapping[str, object] = field(default_factory=dict)
     rows: str | None = None
     valid: int | None = None
     pick: tuple[object, object] | None = None
+    n_bytes: int = 0
 
 
 class Changes:
-    """Finds what is new in each line. `own` are tables to ask too, by name."""
+    """Finds what is new in each line. `own` are tables that answer too, by name."""
 
     def __init__(self, own: Mapping[str, CompiledTable], explains: bool) -> None:
         self.own, self.explains = own, explains
@@ -47,35 +52,34 @@ class Changes:
         self._playing: dict[object, tuple[object, object]] = {}
         self._n_rows: dict[str, object] = {}
         self._noted: set[str] = set()
+        self._n_bytes = 0
 
     def versions(self, line: Line) -> list[str]:
-        """Notes on the tables that a header, or a line of new tables, tells of."""
+        """Notes on the tables that a header, or a line of new tables, names."""
         notes = []
-        for name, told in line["tables"].items():
-            self._n_rows[name] = told.get("rows")
-            if not self.own:
-                continue
-            version = told.get("version")
+        self._n_rows = {name: about.get("rows") for name, about in line["tables"].items()}
+        for name, about in line["tables"].items() if self.own else ():
+            version = about.get("version")
             if name not in self.own:
-                notes += self._note(f"{in_quotes(name)} is not one of your tables, so it is not asked.")
+                notes += self._note(f"{in_quotes(name)} is not one of your tables, so its answer is not compared.")
             elif version is not None and version != self.own[name].version:
                 here = self.own[name].version
                 notes += self._note(f"the game has another version of {in_quotes(name)}: {str(version)[:8]}, yours is {here[:8]}.")
         return notes
 
-    def of(self, line: Line) -> Said:
-        """What a line says that is new."""
+    def of(self, line: Line, n_bytes: int = 0) -> Printed:
+        """What is new in a line of `n_bytes` bytes."""
         kind = line["line"]
         if kind in (HEADER, TABLES):
-            return Said(notes=self.versions(line))
+            return Printed(notes=self.versions(line))
         if kind == LOST:
-            return Said(notes=[f"{plural(line['count'], 'line')} lost: the game told more than could be sent."])
+            return Printed(notes=[f"{plural(line['count'], 'line')} lost: the game produced more than could be sent."])
         if kind in (ASK, PICK):
-            return self._asked(line)
-        return Said(list(self._decided(line))) if kind == DECISION else Said()
+            return self._question_lines(line, n_bytes)
+        return Printed(list(self._decided(line))) if kind == DECISION else Printed()
 
-    def _asked(self, line: Line) -> Said:
-        known = self._known.setdefault((line["who"], line["table"]), _Known())
+    def _question_lines(self, line: Line, n_bytes: int) -> Printed:
+        known = self._remembered(line, n_bytes)
         facts = line.get("facts", known.facts)
         changed = {name: value for name, value in facts.items() if name not in known.facts or known.facts[name] != value}
         changed |= dict.fromkeys(name for name in known.facts if name not in facts)
@@ -87,9 +91,18 @@ class Changes:
         known.valid = line.get("valid", known.valid)
         known.pick = pick or known.pick
         if not is_new:
-            return Said()
+            return Printed()
         why, notes = self._why(line)
-        return Said([printable(self._line(line, known, changed, pick)), *map(printable, why)], notes)
+        return Printed([printable(cut(text)) for text in (self._line(line, known, changed, pick), *why)], notes)
+
+    def _remembered(self, line: Line, n_bytes: int) -> _Known:
+        known = self._known.setdefault((line["who"], line["table"]), _Known())
+        self._n_bytes += n_bytes - known.n_bytes
+        known.n_bytes = n_bytes
+        while len(self._known) > 1 and (len(self._known) > MOST_KNOWN or self._n_bytes > MOST_KNOWN_BYTES):
+            first = next(key for key in self._known if self._known[key] is not known)
+            self._n_bytes -= self._known.pop(first).n_bytes
+        return known
 
     def _line(self, line: Line, known: _Known, changed: Mapping[str, object], pick: tuple[object, object] | None) -> str:
         n_rows = self._n_rows.get(line["table"])
@@ -105,34 +118,36 @@ class Changes:
         try:
             facts, actors = _given(line)
         except ValueError as error:
-            return [], self._note(_not_asked(own, error))
+            return [], self._note(_refusal(own, error))
         try:
             explanation = own.explain(facts, unknown="any", actors=actors)
         except ContextDBError as error:
-            return [], self._note(_not_asked(own, error))
+            return [], self._note(_refusal(own, error))
         notes: list[str] = []
         if explanation.matches.bits != int(line["rows"], 16) and not any(None is v for v in line["facts"].values()):
-            notes = self._note(f"your {in_quotes(own.name)} answers otherwise than the game's.")
+            notes = self._note(f"your {in_quotes(own.name)} answers differently from the game's.")
         nearest = explanation.nearest(N_NEAREST) if self.explains else []
         return [f"{'':11}{row}" for row in nearest], notes
 
     def _decided(self, line: Line) -> Iterator[str]:
         decision: Mapping[str, Any] = line["decision"]
         choice, playing = _dict(decision.get("choice")), _dict(decision.get("playing"))
-        asset = playing.get("asset") if "action" in decision else _dict(choice.get("hit")).get("asset")
-        action = decision.get("action", choice.get("reason"))
-        before = self._playing.get(line["who"])
+        asset = _text(playing.get("asset") if "action" in decision else _dict(choice.get("hit")).get("asset"))
+        action = _text(decision.get("action", choice.get("reason")))
+        before = self._playing.pop(line["who"], None)
         self._playing[line["who"]] = now = (asset, action)
+        if len(self._playing) > MOST_KNOWN:
+            del self._playing[next(iter(self._playing))]
         if before == now or (before is not None and before[0] == asset and action in UNCHANGED):
             return
-        database = playing.get("database") or choice.get("database")
+        database, reason = _text(playing.get("database") or choice.get("database")), _text(decision.get("why"))
         where = f" of {database}" if database else ""
-        why = f": {decision['why']}" if decision.get("why") else ""
+        why = f": {reason}" if reason else ""
         yield printable(f"{line['t']:9.3f}  {_name(line['who'])}  {action} {asset or 'nothing'}{where}{why}")
 
     def _note(self, text: str) -> list[str]:
         """A note that was not given yet."""
-        if text in self._noted:
+        if text in self._noted or len(self._noted) >= MOST_KNOWN:
             return []
         self._noted.add(text)
         return [text]
@@ -145,8 +160,8 @@ def _given(line: Line) -> tuple[Facts, Mapping[str, list[Facts]] | None]:
     return given_facts(line["facts"]), given
 
 
-def _not_asked(own: CompiledTable, error: Exception) -> str:
-    return f"your {in_quotes(own.name)} cannot be asked that: {error}"
+def _refusal(own: CompiledTable, error: Exception) -> str:
+    return f"your {in_quotes(own.name)} cannot answer that: {error}"
 
 
 def _pick_of(picked: object) -> tuple[object, object] | None:
@@ -172,8 +187,17 @@ def _facts(changed: Mapping[str, object]) -> Iterator[str]:
         yield f"{name}=?" if text is None else shlex.quote(f"{name}={text}")
 
 
-def _name(who: str | None) -> str:
-    return "-" if who is None else who
+def _name(character_id: str | None) -> str:
+    return "-" if character_id is None else character_id
+
+
+def cut(text: str) -> str:
+    """A text that is not too long to be printed."""
+    return text if len(text) <= MOST_PRINTED else f"{text[: MOST_PRINTED - 1]}…"
+
+
+def _text(value: object) -> str | None:
+    return cut(value) if isinstance(value, str) else None
 
 
 def _dict(value: object) -> Mapping[str, Any]:

@@ -4,6 +4,8 @@ A contextdb.toml is merged key by key, notes (NAME.notes.csv) place by place. Th
 are written between git's marks, row by row, for a person or the editor to decide; a Parquet file then stays as it was. If one of
 the three files is not a table, its lines are merged as git does.
 
+A row that one side deleted is gone, even if the other side filled a new column in it; these cells are named on standard error.
+
 Exits with 0 if everything merged, with 1 if something is left to decide or lines were merged, with 2 if a file is missing or
 cannot be written.
 
@@ -33,7 +35,7 @@ from contextdb.edits.diffing.lines import merged_lines
 from contextdb.edits.diffing.markers import with_markers
 from contextdb.edits.diffing.notes_merging import merge_notes
 from contextdb.edits.diffing.toml_merging import merge_toml
-from contextdb.errors import ContextDBError, Fault, Place, SchemaError, TableError, in_quotes, plural, shown
+from contextdb.errors import ContextDBError, Fault, Place, SchemaError, TableError, in_quotes, plural, safe_text
 from contextdb.files.parquet import ParquetSource
 from contextdb.files.texts import is_parquet
 from contextdb.schema.settings import EMPTY, Schema, TableSettings
@@ -73,7 +75,10 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     except Exception as error:  # whatever it is: git would go on with ours alone
         if arguments.take:
             raise
-        return _merge_lines(path, raws, arguments, error)
+        code = _merge_lines(path, raws, arguments, error)
+        if not isinstance(error, ContextDBError):
+            raise
+        return code
     if raw is not None:
         write_atomic(Path(arguments.out or arguments.ours), raw)
     return tell()
@@ -81,58 +86,59 @@ def run(arguments: argparse.Namespace) -> ExitCode:
 
 def _merged_tables(path: Path, raws: Raws, arguments: argparse.Namespace) -> Merged:
     base, ours, theirs = _tables(path, raws, arguments)
-    found = merge(base, ours, theirs)
+    merged = merge(base, ours, theirs)
     if arguments.take:
-        found = _decided(found, arguments.take)
-    is_text = not isinstance(found.ours.source, ParquetSource)
-    raw = merged_bytes(found) if not found.conflicts else with_markers(found) if is_text else None
-    return raw, lambda: _told(found, path, is_text, arguments)
+        merged = _decided(merged, arguments.take)
+    is_text = not isinstance(merged.ours.source, ParquetSource)
+    raw = merged_bytes(merged) if not merged.conflicts else with_markers(merged) if is_text else None
+    return raw, lambda: _reported(merged, path, is_text, arguments)
 
 
-def _told(found: Merge[Table], path: Path, is_text: bool, arguments: argparse.Namespace) -> ExitCode:
-    _tell(found, path, is_text)
-    if found.conflicts:
+def _reported(merged: Merge[Table], path: Path, is_text: bool, arguments: argparse.Namespace) -> ExitCode:
+    _report_conflicts(merged, path, is_text)
+    if merged.conflicts:
         return ExitCode.FOUND
-    return ExitCode.FOUND if _tell_meaning(found, path) and arguments.strict else ExitCode.OK
+    return ExitCode.FOUND if _report_effects(merged, path) and arguments.strict else ExitCode.OK
 
 
-def _tell_meaning(found: Merge[Table], path: Path) -> bool:
+def _report_effects(merged: Merge[Table], path: Path) -> bool:
     """Tell what the merge brings that neither side had, and whether that is anything."""
-    if not names_a_table(path.name) or not (diff(found.base, found.ours) and diff(found.base, found.theirs)):
+    if not names_a_table(path.name) or not (diff(merged.base, merged.ours) and diff(merged.base, merged.theirs)):
         return False
     from contextdb.checks.effects import merge_effects
     from contextdb.covering import format_percent
 
     try:
         around = neighbours(path)
-        sides = (found.ours, found.theirs, found.table)
+        sides = (merged.ours, merged.theirs, merged.table)
         effects = merge_effects(*(replace(table, around=around, path=path) for table in sides))
     except ContextDBError as error:
         note(f"the meaning of the merge was not looked at: {error.faults[0]}")
         return False
-    said = [
-        f"a gap that neither side had: {shown(b.text, 400)} ({format_percent(b.share)} of the contexts)." for b in effects.opened
+    lines = [
+        f"a gap that neither side had: {safe_text(b.text, 400)} ({format_percent(b.share)} of the contexts)."
+        for b in effects.opened
     ]
-    said += [f"{shown(f.asset or '')}, as on neither side: {f.message}" for f in effects.findings]
-    _note_some([f"{Place(str(path))}: {text}" for text in said])
-    return bool(said)
+    lines += [f"{safe_text(f.asset or '')}, as on neither side: {f.message}" for f in effects.findings]
+    _note_some([f"{Place(str(path))}: {text}" for text in lines])
+    return bool(lines)
 
 
 def _merged_toml(path: Path, raws: Raws, arguments: argparse.Namespace) -> Merged:
     """Merge three versions of contextdb.toml, key by key."""
     base, ours, theirs = _names(path, arguments)
     texts = [_toml_text(raw, name) for raw, name in zip(raws, (base, ours, theirs), strict=True)]
-    found = merge_toml(texts[0], texts[1], texts[2], (base, ours, theirs))
-    if found.conflicts and arguments.take:
+    merged = merge_toml(texts[0], texts[1], texts[2], (base, ours, theirs))
+    if merged.conflicts and arguments.take:
         raise ContextDBError(Fault("--take decides conflicts of tables.", "a .csv or .parquet file", place=Place(str(path))))
 
     def tell() -> ExitCode:
-        for key in found.conflicts:
-            said = f"{in_quotes('.'.join(key))} changed on both sides."
-            note(Fault(said, mend="to keep one of the versions between the marks", place=Place(str(path))))
-        return ExitCode.FOUND if found.conflicts else ExitCode.OK
+        for key in merged.conflicts:
+            message = f"{in_quotes('.'.join(key))} changed on both sides."
+            note(Fault(message, mend="to keep one of the versions between the marks", place=Place(str(path))))
+        return ExitCode.FOUND if merged.conflicts else ExitCode.OK
 
-    return found.with_markers.encode(), tell
+    return merged.with_markers.encode(), tell
 
 
 def _merged_notes(path: Path, raws: Raws, arguments: argparse.Namespace) -> Merged:
@@ -142,17 +148,15 @@ def _merged_notes(path: Path, raws: Raws, arguments: argparse.Namespace) -> Merg
 def _merge_lines(path: Path, raws: Raws, arguments: argparse.Namespace, error: Exception) -> ExitCode:
     """Merge lines, as git does it, where the meaning cannot be merged: nothing of either side is left out without a mark."""
     place = Place(str(path))
-    unforeseen = Fault(f"the tables cannot be merged ({type(error).__name__}: {error}).", place=place)
-    faults = error.faults if isinstance(error, ContextDBError) else (unforeseen,)
-    _note_some(faults)
+    _note_some(error.faults if isinstance(error, ContextDBError) else ())
     if any(map(is_parquet, raws)):
-        said, mend = "the file stays as ours has it.", "to take one side with git checkout --ours or --theirs"
+        message, mend = "the file stays as ours has it.", "to take one side with git checkout --ours or --theirs"
     else:
         raw, n_conflicts = merged_lines(*raws)
         write_atomic(Path(arguments.out or arguments.ours), raw)
-        said = f"lines were merged instead of cells, with {plural(n_conflicts, 'place')} between marks."
+        message = f"lines were merged instead of cells, with {plural(n_conflicts, 'place')} between marks."
         mend = "to look at the file, and to correct what cannot be read"
-    note(Fault(said, mend=mend, place=place))
+    note(Fault(message, mend=mend, place=place))
     return ExitCode.FOUND
 
 
@@ -194,23 +198,24 @@ def _schema(path: Path) -> tuple[Schema, TableSettings]:
         return EMPTY, TableSettings(path.stem)
 
 
-def _decided(found: Merge[Table], side: Side) -> Merge[Table]:
-    while found.conflicts:  # a row that comes back can bring new ones
-        found = found.resolved(dict.fromkeys(range(len(found.conflicts)), side))
-    return found
+def _decided(merged: Merge[Table], side: Side) -> Merge[Table]:
+    while merged.conflicts:  # a row that comes back can bring new ones
+        merged = merged.resolved(dict.fromkeys(range(len(merged.conflicts)), side))
+    return merged
 
 
-def _tell(found: Merge[Table], path: Path, is_text: bool) -> None:
+def _report_conflicts(merged: Merge[Table], path: Path, is_text: bool) -> None:
     place = Place(str(path))
-    sides = [(one.place, {"ours": one.ours, "theirs": one.theirs, "before": one.base}) for one in found.conflicts]
-    _note_some([f"{place}: {at}: {', '.join(f'{name} {_said(text)}' for name, text in texts.items())}." for at, texts in sides])
-    if found.conflicts:
+    sides = [(one.place, {"ours": one.ours, "theirs": one.theirs, "before": one.base}) for one in merged.conflicts]
+    _note_some([f"{place}: {cell}" for cell in merged.lost])
+    _note_some([f"{place}: {at}: {', '.join(f'{name} {_quoted(text)}' for name, text in texts.items())}." for at, texts in sides])
+    if merged.conflicts:
         by_hand, by_option = (
             "to open the file with contextdb edit, or to keep one of each",
             "to decide with --take ours or --take theirs",
         )
-        said = f"{plural(len(found.conflicts), 'place')} changed on both sides."
-        note(Fault(said, mend=by_hand if is_text else by_option, place=place))
+        message = f"{plural(len(merged.conflicts), 'place')} changed on both sides."
+        note(Fault(message, mend=by_hand if is_text else by_option, place=place))
 
 
 def _note_some(lines: Sequence[object]) -> None:
@@ -219,5 +224,5 @@ def _note_some(lines: Sequence[object]) -> None:
         note(f"… and {len(lines) - MOST_TOLD:,} more.")
 
 
-def _said(text: str | None) -> str:
-    return "nothing" if text is None else f'"{shown(text)}"'
+def _quoted(text: str | None) -> str:
+    return "nothing" if text is None else f'"{safe_text(text)}"'

@@ -1,6 +1,6 @@
 """Show the bones of clips as a tree, with their channels and heights, and which are detected as hips, spine, head, feet and toes.
 
-Files of one rig are shown together; a folder means the BVH files in it and below. The settings of [features.NAME] and
+Files of one rig are listed together; a folder means the clips in it and below, in any format. The settings of [features.NAME] and
 [databases.NAME] name bones as they are listed here.
 
   contextdb motion bones clips/walk.bvh
@@ -15,40 +15,41 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
+from contextdb.authoring.clip_folder import clips_below
 from contextdb.commands.numbers import unit_of
 from contextdb.console import ExitCode, aligned, output, printable
 from contextdb.errors import plural
-from contextdb.motion.clips.clip import CENTIMETRE, UPS, Clip, load_clips
+from contextdb.motion.clips.clip import CENTIMETRE, UPS, Clip
 from contextdb.motion.clips.rig import Rig
+from contextdb.motion.clips.source import clips_by_file
 from contextdb.report.render_json import as_json
-from contextdb.tables.clip_folder import bvh_files
 
-HEADER = ("bone", "channels", "height m", "found as", "mirrored to")
+HEADER = ("bone", "channels", "height m", "role", "mirrored to")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("files", metavar="FILE", nargs="+", help="BVH files, or folders of them")
+    parser.add_argument("files", metavar="FILE", nargs="+", help="files of clips, or folders of them")
     parser.add_argument(
-        "--metres-per-unit", metavar="M", type=unit_of, default=CENTIMETRE, help="the unit of the files in metres (default: 0.01)"
+        "--metres-per-unit", metavar="M", type=unit_of, default=CENTIMETRE, help="the unit of BVH files in metres (default: 0.01)"
     )
-    parser.add_argument("--up", choices=UPS, default="y", help="the axis that points up (default: y)")
+    parser.add_argument("--up", choices=UPS, default="y", help="the axis of BVH files that points up (default: y)")
     parser.add_argument("--json", action="store_true", help="print a JSON document instead of trees")
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Show the rigs of some files."""
-    files = [file for each in arguments.files for file in (bvh_files(Path(each)) if os.path.isdir(each) else [each])]
-    clips = load_clips(files, metres_per_unit=arguments.metres_per_unit, up=arguments.up)
+    files = [file for each in arguments.files for file in (clips_below(Path(each), needs=True) if os.path.isdir(each) else [each])]
+    clips = clips_by_file(files, arguments.metres_per_unit, arguments.up)
     rigs: dict[tuple[object, ...], list[int]] = {}
-    for i, clip in enumerate(clips):
+    for i, (_, clip) in enumerate(clips):
         key = (clip.skeleton.names, tuple(clip.skeleton.parents.tolist()), clip.skeleton.channels)
         rigs.setdefault(key, []).append(i)
-    found = [([str(files[i]) for i in members], clips[members[0]]) for members in rigs.values()]
+    groups = [(list(dict.fromkeys(clips[i][0] for i in members)), clips[members[0]][1]) for members in rigs.values()]
     with output():
         if arguments.json:
-            print(as_json({"format": 1, "rigs": [_document(files, clip) for files, clip in found]}), end="")
+            print(as_json({"format": 1, "rigs": [_document(files, clip) for files, clip in groups]}), end="")
         else:
-            print("\n\n".join("\n".join(_lines(files, clip)) for files, clip in found))
+            print("\n\n".join("\n".join(_lines(files, clip)) for files, clip in groups))
     return ExitCode.OK
 
 
@@ -66,7 +67,7 @@ def _lines(files: list[str], clip: Clip) -> Iterator[str]:
     yield from (line.rstrip() for line in aligned(rows, right=(1, 2)))
     missing = [what for what, names in (("feet", rig.feet), ("toes", rig.toes), ("mirror pairs", rig.mirror)) if not names]
     if missing:
-        yield f"not found: {', '.join(missing)}; [features.NAME] can declare feet, heels, toes, facing and mirror"
+        yield f"no bone for: {', '.join(missing)}; [features.NAME] can declare feet, heels, toes, facing and mirror"
 
 
 def _document(files: list[str], clip: Clip) -> dict[str, object]:
@@ -85,6 +86,6 @@ def _document(files: list[str], clip: Clip) -> dict[str, object]:
         }
         for joint, (name, parent) in enumerate(zip(skeleton.names, skeleton.parents.tolist(), strict=True))
     ]
-    found = {"hips": rig.hips, "spine": rig.spine, "head": rig.head, "feet": rig.feet, "heels": rig.heels, "toes": rig.toes}
+    roles = {"hips": rig.hips, "spine": rig.spine, "head": rig.head, "feet": rig.feet, "heels": rig.heels, "toes": rig.toes}
     sides = {"facing": rig.facing, "mirror": [list(pair) for pair in rig.mirror]}
-    return {"files": files, "rate": clip.rate, "height_m": round(rig.height_m, 6), **found, **sides, "bones": bones}
+    return {"files": files, "rate": clip.rate, "height_m": round(rig.height_m, 6), **roles, **sides, "bones": bones}

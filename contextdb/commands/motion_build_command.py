@@ -1,6 +1,6 @@
 """Build the motion databases that contextdb.toml declares from their clips, and save them.
 
-Each becomes a memory-mapped file NAME.motion.safetensors; with --poses its clips' poses become NAME.poses.safetensors beside it.
+Each becomes a memory-mapped file NAME.motion.safetensors; with --poses its clips' poses become NAME.poses.safetensors next to it.
 The features of each clip are cached in .contextdb-cache, so the next build computes only changed clips.
 
   contextdb motion build tables/                       all databases, next to contextdb.toml
@@ -30,7 +30,7 @@ from contextdb.errors import ContextDBError, Fault, FileError, Place, plural, so
 from contextdb.files.tensors import other_layout
 from contextdb.motion.clips.doubts import grouped
 from contextdb.motion.storage import building
-from contextdb.motion.storage.build_inputs import told_once
+from contextdb.motion.storage.build_inputs import distinct_faults
 from contextdb.motion.storage.building import Built, saved_path
 from contextdb.motion.storage.clip_files import unmatched
 from contextdb.motion.storage.config import MotionConfig
@@ -98,14 +98,14 @@ def _build(arguments: argparse.Namespace) -> ExitCode:
 
 
 def _replaced(target: Path) -> Iterator[str]:
-    """What is said where a database of a layout that this version cannot read is replaced."""
+    """The message where a database of a layout that this version cannot read is replaced."""
     layout = other_layout(target, STORED)
     if layout is not None:
-        yield f"{target} was of layout {layout} and is replaced by one of layout {STORED.layout}. {STORED.since}"
+        yield f"{target} was of layout {layout} and is replaced by one of layout {STORED.layout}."
 
 
 def _save_poses(project: MotionProject, built: Mapping[str, Built], targets: Mapping[str, Path]) -> None:
-    """Save the poses of some databases beside them."""
+    """Save the poses of some databases next to them."""
     banks = poses_alone(project.config, project.folder, project.assets, names=list(targets))
     for name, bank in banks.items():
         save_poses(bank, poses_path(targets[name].parent, name), inputs=built[name].digest)
@@ -130,7 +130,9 @@ class LeftOut:
     @property
     def messages(self) -> list[str]:
         """Each fault, once."""
-        return [str(fault) for fault in told_once(fault for errors in self.errors.values() for e in errors for fault in e.faults)]
+        return [
+            str(fault) for fault in distinct_faults(fault for errors in self.errors.values() for e in errors for fault in e.faults)
+        ]
 
     def sentences(self) -> Iterator[str]:
         """Each fault, then what was left out."""
@@ -160,16 +162,16 @@ class MotionProject:
 
     def targets(self, out: str | None, names: list[str] | None) -> dict[str, Path]:
         """Where the databases of some names, or all, are saved."""
-        asked = None if names is None else {self.config.database(name).name for name in names}
-        wanted = [name for name in self.config.databases if asked is None or name in asked]
+        chosen = None if names is None else {self.config.database(name).name for name in names}
+        wanted = [name for name in self.config.databases if chosen is None or name in chosen]
         folder = self.folder if out is None else Path(out)
         targets = {name: saved_path(folder, name) for name in wanted}
         taken: dict[str, str] = {}
         for name, path in targets.items():
             other = taken.setdefault(path.name.casefold(), name)
             if other != name:
-                found = "two databases would be written to one file, on a disk that ignores case."
-                raise FileError(Fault(found, f"another name for {some([other, name])}", place=Place(str(path))))
+                fault = "two databases would be written to one file, on a disk that ignores case."
+                raise FileError(Fault(fault, f"another name for {some([other, name])}", place=Place(str(path))))
         return targets
 
     def warnings(self, built: Mapping[str, Built]) -> Iterator[str]:
@@ -206,8 +208,8 @@ def _as_json(project: MotionProject, name: str, built: Built, target: Path) -> d
 
 
 def _cells(project: MotionProject, name: str, built: Built, target: Path) -> list[str]:
-    told = _as_json(project, name, built, target)
-    numbers = [told[key] for key in ("assets", "clips", "frames", "features")]
+    values = _as_json(project, name, built, target)
+    numbers = [values[key] for key in ("assets", "clips", "frames", "features")]
     counts = ["" if number is None else f"{number:,}" for number in numbers]
     return [
         name,

@@ -17,6 +17,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from contextdb.authoring.clip_folder import clips_below
 from contextdb.commands import add_format_arguments
 from contextdb.commands.check_command import printed
 from contextdb.commands.progress import building_bar
@@ -27,7 +28,6 @@ from contextdb.motion.storage.building import CACHE_FOLDER
 from contextdb.motion.storage.checking import check_clips, check_motion
 from contextdb.motion.storage.config import MotionConfig
 from contextdb.report.results import CheckReport
-from contextdb.tables.clip_folder import clips_below
 from contextdb.tables.project import SCHEMA_FILE, Project, folder_of
 from contextdb.tables.table import leaf_assets
 
@@ -36,18 +36,18 @@ FORMATS = ("text", "json", "github", "junit", "markdown")
 
 @dataclass(frozen=True, slots=True)
 class MotionReport(CheckReport):
-    """What was found, and of each database how many clips can be used; "" is the database of clips that are in none."""
+    """The findings, and of each database how many clips can be used; "" is the database of clips that are in none."""
 
     n_clips: dict[str, int] = field(default_factory=dict)
 
     @property
     def summary(self) -> str:
         """How much was checked, and how many findings of each level there are."""
-        said = CheckReport((), self.findings).summary.partition(": ")[2]
+        counts = CheckReport((), self.findings).summary.partition(": ")[2]
         if self.n_clips.keys() == {""}:
-            return f"{plural(self.n_clips[''], 'clip')} checked: {said}"
+            return f"{plural(self.n_clips[''], 'clip')} checked: {counts}"
         databases, clips = plural(len(self.n_clips), "database"), plural(sum(self.n_clips.values()), "clip")
-        return f"{databases} and {clips} checked: {said}"
+        return f"{databases} and {clips} checked: {counts}"
 
     def condensed(self) -> MotionReport:
         """The report for people: what many clips have in common is reported for the first, with how many others have it."""
@@ -77,9 +77,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
-    found = check_path(arguments.path, cache=not arguments.no_cache)
+    report = check_path(arguments.path, cache=not arguments.no_cache)
     is_for_people = arguments.format in ("text", "markdown") and not arguments.all
-    return printed(found.condensed() if is_for_people else found, arguments)
+    return printed(report.condensed() if is_for_people else report, arguments)
 
 
 def check_path(path: str, *, cache: bool = True) -> MotionReport:
@@ -97,19 +97,19 @@ def check_path(path: str, *, cache: bool = True) -> MotionReport:
     if not config.databases:
         accepted = 'a section such as [databases.jog] with features and clips = "clips/*.bvh"'
         none = Fault("no motion database is declared.", accepted, place=Place(str(folder / SCHEMA_FILE)), rule="no-databases")
-        found = _of_clips(clips)
-        return replace(found, findings=(Finding.of(none), *found.findings))
+        findings = _of_clips(clips)
+        return replace(findings, findings=(Finding.of(none), *findings.findings))
     assets = {name: leaf_assets(table) for name, table in project.tables.items()}
     with building_bar() as progress:
         checked = check_motion(config, folder, assets, progress, cache=CACHE_FOLDER if cache else None)
-    return MotionReport((), checked.findings, checked.n_clips)
+    return MotionReport((), checked.findings, n_clips=checked.n_clips)
 
 
 def _of_clips(paths: list[Path]) -> MotionReport:
     """The report on clips that no database names."""
     with building_bar() as progress:
         checked = check_clips(paths, progress)
-    return MotionReport((), checked.findings, checked.n_clips)
+    return MotionReport((), checked.findings, n_clips=checked.n_clips)
 
 
 def _of_all(findings: list[Finding]) -> Finding:

@@ -1,8 +1,9 @@
 """Measure where in speed, turn and direction the clips have nothing, for each set of clips that a table lets play at once.
 
-Mirrored clips count, by mirrored facts. Also: which clip to capture next, clips that never play, and clips that are near another.
+Mirrored clips count, by mirrored facts. Also: which clip to capture next, clips that never play, and near-duplicates.
 
-Exits with 1 if --fail-under is missed, or if clips fill a movement in fewer contexts than in the --baseline; with 2 for bad use.
+Exits with 1 if --fail-under is missed, or if clips fill a movement in fewer contexts than in the --baseline; also if a table has no
+clips any more, is not in the baseline, or has other conditions: --gone, --new and --redefined accept that. With 2 for bad use.
 
   contextdb motion coverage game/
   contextdb motion coverage game/ --format html -o motion.html
@@ -15,22 +16,34 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
+from contextdb.authoring.motion_coverage import TableMotion, motion_coverage
 from contextdb.commands import add_format_arguments
-from contextdb.commands.coverage_command import earlier_report, percent
+from contextdb.commands.coverage_command import percent
+from contextdb.commands.gating import (
+    Accepted,
+    add_accepting_arguments,
+    earlier_report,
+    gone_gates,
+    require_baseline,
+    space_gates,
+)
 from contextdb.commands.motion_build_command import MotionProject
 from contextdb.commands.numbers import number_type
 from contextdb.commands.progress import building_bar
 from contextdb.console import ExitCode, note, output, terminal_width, wants_colour
-from contextdb.covering.motion import motion_coverage
+from contextdb.covering.declared import NOTHING, declared, differences
 from contextdb.disk import write_atomic
 from contextdb.errors import ContextError, Fault, in_quotes, mend_for, some
 from contextdb.motion.measuring.near_clips import NEAR_COST
 from contextdb.motion.measuring.transition_names import PATTERN
 from contextdb.motion.storage.building import open_or_build
 from contextdb.report import formats, render
+from contextdb.report.coverage_results import table_new
+from contextdb.report.document import as_text
+from contextdb.report.motion_coverage_document import context_document
 from contextdb.report.motion_coverage_results import (
     BASELINE,
     Earlier,
@@ -40,9 +53,7 @@ from contextdb.report.motion_coverage_results import (
     lost_since,
     no_loss,
     read_baseline,
-    table_gone,
 )
-from contextdb.report.motion_coverage_text import render_context
 from contextdb.tables.project import Project
 
 
@@ -52,21 +63,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--output", metavar="FILE", help="write the report to a file")
     parser.add_argument("--fail-under", type=percent, metavar="PCT", help="fail if the covered percentage of any table is lower")
     parser.add_argument("--baseline", metavar="FILE", help="compare with the JSON of an earlier run; a lost movement fails")
+    add_accepting_arguments(parser, ("gone", "new", "redefined"))
     parser.add_argument("--context", metavar="ID", help="show the maps of one set of contexts, by its id")
     parser.add_argument("--all", action="store_true", help="list every hole, every context, and every clip")
     parser.add_argument(
         "--axis", metavar="AXIS=CONDITION", action="append", help="what asks for speed, turn or direction; may be repeated"
     )
-    told = f"names of transitions, such as {PATTERN} (default: as the project says, else that)"
-    parser.add_argument("--transitions", metavar="PATTERN", help=told)
-    told = f"the cost under which a clip is near another (default: {NEAR_COST})"
+    help_text = f"names of transitions, such as {PATTERN} (default: as the project says, else that)"
+    parser.add_argument("--transitions", metavar="PATTERN", help=help_text)
+    help_text = f"the cost under which a clip is a near-duplicate of another (default: {NEAR_COST})"
     cost = number_type(f"a cost. Accepted: a number from 0 up, such as {NEAR_COST}.")
-    parser.add_argument("--near", metavar="COST", type=cost, default=NEAR_COST, help=told)
+    parser.add_argument("--near", metavar="COST", type=cost, default=NEAR_COST, help=help_text)
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
     if arguments.context is not None and (arguments.format != "text" or arguments.baseline or arguments.fail_under is not None):
         raise ContextError(Fault("--context is text about some contexts; other formats and bars do not go with it."))
+    require_baseline(arguments, bool(arguments.baseline))
     earlier = earlier_report(arguments.baseline, read_baseline, BASELINE) if arguments.baseline else None
     results = _results(arguments, earlier)
     colour, width = wants_colour(sys.stdout) and not arguments.output, terminal_width()
@@ -89,7 +102,7 @@ def _results(arguments: argparse.Namespace, earlier: Mapping[str, Earlier] | Non
     with building_bar("comparing clips") as progress:
         tables = Project.load(arguments.path)
         pattern = tables.schema.transitions or PATTERN if arguments.transitions is None else arguments.transitions
-        found = motion_coverage(
+        coverage = motion_coverage(
             tables,
             databases,
             axes=_axes(arguments.axis or []),
@@ -99,15 +112,44 @@ def _results(arguments: argparse.Namespace, earlier: Mapping[str, Earlier] | Non
         )
     if joint := [name for name, settings in project.config.databases.items() if settings.roles]:
         note(f"left out: the joint clips of {some(joint)}: they follow no stick.")
-    measured = []
-    for motion in found.tables:
-        gates = [] if arguments.fail_under is None else [fail_under(motion, arguments.fail_under)]
-        lost = lost_since(motion, earlier[motion.name]) if earlier is not None and motion.name in earlier else None
-        gates += [] if lost is None else [no_loss(lost)]
-        measured.append(MotionMeasured(motion, lost, tuple(gates)))
-    names = {motion.name for motion in found.tables}
-    gone = {name: table_gone(name) for name in earlier or {} if name not in names}
-    return MotionCoverageResults(tuple(measured), found.unlisted, gone)
+    accepted = Accepted.of(arguments)
+    names = [motion.name for motion in coverage.tables]
+    missing = [name for name in earlier or {} if name not in names]
+    measured = [_measured(motion, tables, arguments.fail_under, earlier, accepted, missing) for motion in coverage.tables]
+    gone = gone_gates(missing, [name for name in names if name not in (earlier or {})], accepted)
+    accepted.require_needed()
+    return MotionCoverageResults(tuple(measured), coverage.unlisted, dict(gone))
+
+
+def _measured(
+    motion: TableMotion,
+    tables: Project,
+    limit: float | None,
+    earlier: Mapping[str, Earlier] | None,
+    accepted: Accepted,
+    missing: Sequence[str],
+) -> MotionMeasured:
+    """One table with its gates."""
+    table = None if motion.coverage.table is None else tables[motion.coverage.table]
+    space = NOTHING if table is None else declared(table, {})
+    gates = [] if limit is None else [fail_under(motion, limit)]
+    if earlier is None:
+        return MotionMeasured(motion, None, tuple(gates), space)
+    if motion.name not in earlier:
+        gates.append(table_new(motion.name, accepted.holds("new", motion.name), missing))
+        return MotionMeasured(motion, None, tuple(gates), space)
+    before = earlier[motion.name]
+    changes = [*differences(before.space, space), *_other_axes(before.axes, motion.axes)]
+    gates += space_gates(motion.name, changes, accepted)
+    lost = None if changes else lost_since(motion, before)
+    gates += [] if lost is None else [no_loss(lost)]
+    return MotionMeasured(motion, lost, tuple(gates), space)
+
+
+def _other_axes(before: Mapping[str, str], now: Mapping[str, str]) -> Iterator[str]:
+    for axis in sorted({*before, *now}):
+        if before.get(axis) != now.get(axis):
+            yield f"{axis} was wanted by {before.get(axis, 'nothing')}, now by {now.get(axis, 'nothing')}"
 
 
 def _context(results: MotionCoverageResults, wanted: str, colour: bool, width: int) -> str:
@@ -115,16 +157,16 @@ def _context(results: MotionCoverageResults, wanted: str, colour: bool, width: i
     if wanted not in known:
         accepted = f"an id of the report, such as {some(list(known))}" if known else "none: no context has a valid clip"
         raise ContextError(Fault(f"there are no contexts {in_quotes(wanted)}.", accepted, mend_for(wanted, known)))
-    return render_context(*known[wanted], colour=colour, width=width)
+    return as_text(context_document(*known[wanted]), colour, width, shows_all=True)
 
 
 def _axes(given: list[str]) -> dict[str, str]:
-    found = {}
+    axes = {}
     for text in given:
         axis, equals, condition = text.partition("=")
         if not equals or not condition:
             raise ContextError(
                 Fault(f"--axis {in_quotes(text)} names no condition.", "speed=, turn= or direction= and a condition")
             )
-        found[axis.strip()] = condition.strip()
-    return found
+        axes[axis.strip()] = condition.strip()
+    return axes

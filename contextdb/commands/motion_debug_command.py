@@ -19,7 +19,7 @@ from __future__ import annotations
 import argparse
 import os
 
-from contextdb.commands.edit_command import require_terminal
+from contextdb.commands.edit_command import require_terminal, screens
 from contextdb.commands.motion_build_command import MotionProject
 from contextdb.commands.motion_replay_command import databases_of, project_of
 from contextdb.commands.progress import building_bar
@@ -57,16 +57,14 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     except ContextDBError as error:
         if arguments.folder is not None:
             raise
-        databases, why = {}, error.faults[0].message
+        databases, why = {}, str(error.faults[0])
     why = why or trace.use(databases)
     require_terminal(INSTEAD)
-    from tui.debug.run import debug
-
-    debug(arguments.file, trace, folder, databases, why)
+    screens("debug.run").debug(arguments.file, trace, folder, databases, why)
     return ExitCode.OK
 
 
-def _live(name: str | None, folder: str | None, who: str | None) -> ExitCode:
+def _live(name: str | None, folder: str | None, character_id: str | None) -> ExitCode:
     """Follow a running game; a folder alone is that of the project."""
     if folder is None and name is not None and os.path.isdir(name):
         name, folder = None, name
@@ -79,7 +77,5 @@ def _live(name: str | None, folder: str | None, who: str | None) -> ExitCode:
         with building_bar() as progress:
             databases = open_or_build(motion.config, motion.folder, motion.assets, progress)
     require_terminal('to use "contextdb live" in scripts')
-    from tui.debug.run import debug_live
-
-    debug_live(game, path, who, folder or "", databases)
+    screens("debug.run").debug_live(game, path, character_id, folder or "", databases)
     return ExitCode.OK

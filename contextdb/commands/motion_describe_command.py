@@ -21,9 +21,8 @@ import io
 from collections.abc import Sequence
 from pathlib import Path
 
-from contextdb.commands.motion_clips import add_clip_arguments, progress_of
-from contextdb.console import ExitCode, note, output, printable
-from contextdb.edits.described_table import (
+from contextdb.authoring.clip_folder import FolderClips
+from contextdb.authoring.described_table import (
     ASSET,
     ClipRows,
     DescribedTable,
@@ -33,18 +32,19 @@ from contextdb.edits.described_table import (
     filling,
     rows_for,
 )
+from contextdb.commands.motion_clips import add_clip_arguments, progress_of
+from contextdb.console import ExitCode, note, output, printable
 from contextdb.errors import ContextDBError, Fault, plural, some
 from contextdb.files.toml_text import as_toml
 from contextdb.motion.preparing.describing import COLUMNS, Described
 from contextdb.report.render_json import as_json
-from contextdb.tables.clip_folder import FolderClips
 from contextdb.tables.nesting.names import asset_text
 from contextdb.tables.project import load_table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_clip_arguments(parser)
-    parser.add_argument("--out", metavar="TABLE", help="write the table to this new file, with its contextdb.toml beside it")
+    parser.add_argument("--out", metavar="TABLE", help="write the table to this new file, with a contextdb.toml in its folder")
     parser.add_argument(
         "--into", metavar="TABLE", help="fill what is missing in this table, and report where it differs from the clips"
     )
@@ -59,7 +59,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         raise ContextDBError(Fault("--update replaces cells of a table.", "--into TABLE --update"))
     into = Path(arguments.into) if arguments.into else None
     clips = rows_for(arguments.path, into, progress_of, arguments.metres_per_unit, arguments.up)
-    found, rows = clips.found, clips.rows
+    folder_clips, rows = clips.source, clips.rows
     made, fills, is_playable = None, None, True
     if arguments.out or into is not None:
         fills = filling(empty_table(Path(arguments.out)) if into is None else load_table(into, strict=False), rows)
@@ -67,7 +67,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         is_playable = motion is not None
         made = described_table(fills, motion or {}, updates=arguments.update)
         made.write()
-    _tell(found, made, fills, is_playable, arguments)
+    _tell(folder_clips, made, fills, is_playable, arguments)
     with output():
         if arguments.json:
             print(as_json(_document(clips, made, fills)), end="")
@@ -76,14 +76,14 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         else:
             print("\n".join(printable(line) for line in _lines(made, fills, arguments)))
     differs = fills is not None and fills.differences and not arguments.update
-    return ExitCode.FOUND if found.left_out or differs or not is_playable else ExitCode.OK
+    return ExitCode.FOUND if folder_clips.left_out or differs or not is_playable else ExitCode.OK
 
 
 def _tell(
-    found: FolderClips, made: DescribedTable | None, fills: Filling | None, is_playable: bool, arguments: argparse.Namespace
+    folder_clips: FolderClips, made: DescribedTable | None, fills: Filling | None, is_playable: bool, arguments: argparse.Namespace
 ) -> None:
     """Say on standard error what was taken for granted or left out."""
-    lines = [*found.notes, *(f"left out: {message}" for message in found.left_out)]
+    lines = [*folder_clips.notes, *(f"left out: {message}" for message in folder_clips.left_out)]
     lines += [] if fills is None else fills.notes
     if fills is not None and fills.without_clip:
         lines.append(f"no clip for {plural(len(fills.without_clip), 'row')}: {some(fills.without_clip)}")
@@ -131,6 +131,6 @@ def _document(clips: ClipRows, made: DescribedTable | None, fills: Filling | Non
         "differences": differences,
         "added": [] if fills is None else [row.asset for row in fills.added],
         "without_clip": [] if fills is None else fills.without_clip,
-        "left_out": clips.found.left_out,
-        "notes": clips.found.notes,
+        "left_out": clips.source.left_out,
+        "notes": clips.source.notes,
     }

@@ -3,7 +3,8 @@
 The poses of a session are made again from the clips of its project, whose raw clips are measured too. A SESSION may also be a .npz
 file of poses, with --project for the clips.
 
-Exits with 1 if a measure is over its bar, or more than 1 % worse than in the baseline; with 2 if a bar cannot be judged.
+Exits with 1 if a measure is over its bar, more than 1 % worse than in the baseline, or not measured any more; with 2 if a bar
+cannot be judged, or the baseline is of other sessions.
 
   contextdb motion measure session.parquet
   contextdb motion measure session.parquet --max-skate 8 --max-jumps 1.5
@@ -22,7 +23,7 @@ from pathlib import Path
 
 from contextdb import report
 from contextdb.commands import add_format_arguments
-from contextdb.commands.coverage_command import earlier_report
+from contextdb.commands.gating import earlier_report
 from contextdb.commands.motion_build_command import MotionProject, warn
 from contextdb.commands.motion_replay_command import project_of
 from contextdb.commands.numbers import number_type
@@ -37,6 +38,9 @@ from contextdb.report.results import Gate, as_path
 
 BARS = {
     "skate": ("skate_cm_s", "CM_S", "the most that planted feet may slide, cm/s"),
+    "toe-skate": ("toe_skate_cm_s", "CM_S", "the most that toes may slide that are low and slow in their clips, cm/s"),
+    "dip": ("dip_cm", "CM", "the most that hips may be lower than in their clips, cm"),
+    "balance": ("balance_cm", "CM", "the most that hips may be off their place over the feet at rest, cm"),
     "jumps": ("jumps_per_s", "PER_S", "the most jumps a second"),
     "accel": ("accel_p99", "M_S2", "the most that 99 %% of joint accelerations may be, m/s²"),
     "path": ("path_rms_m", "M", "the most that the path error may be, RMS, m"),
@@ -61,8 +65,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> ExitCode:
     poses = arguments.poses or []
     if poses and len(poses) != len(arguments.sessions):
-        found = f"{plural(len(poses), 'file')} of poses for {plural(len(arguments.sessions), 'session')}."
-        raise ContextError(Fault(found, "--poses FILE once for each session, in their order"))
+        fault = f"{plural(len(poses), 'file')} of poses for {plural(len(arguments.sessions), 'session')}."
+        raise ContextError(Fault(fault, "--poses FILE once for each session, in their order"))
     results = _results(arguments, poses)
     colour = wants_colour(sys.stdout)
     text = report.render(arguments.format, results, colour=colour, width=terminal_width(), shows_all=arguments.all)
@@ -75,28 +79,39 @@ def _results(arguments: argparse.Namespace, poses: Sequence[str]) -> MeasureResu
     earlier: Mapping[str, Mapping[str, object]] = {}
     if arguments.baseline:
         earlier = earlier_report(arguments.baseline, read_baseline, BASELINE)
+    _require_same_sessions(earlier, arguments)
     clips: dict[str, Clips] = {}
     every = [
-        _measured(arguments, file, poses[i] if poses else None, clips, _before(earlier, file, arguments))
+        _measured(arguments, file, poses[i] if poses else None, clips, _before(earlier, file))
         for i, file in enumerate(arguments.sessions)
     ]
     return MeasureResults(tuple(every))
 
 
-def _before(earlier: Mapping[str, Mapping[str, object]], file: str, arguments: argparse.Namespace) -> Mapping[str, object]:
+def _require_same_sessions(earlier: Mapping[str, object], arguments: argparse.Namespace) -> None:
+    """Raise ContextError unless the baseline has the sessions that are measured, or one session and one is measured."""
+    names = list(map(as_path, arguments.sessions))
+    if not arguments.baseline or (len(earlier) == len(names) == 1):
+        return
+    faults = [
+        Fault(f"the baseline has no session {in_quotes(name)}.", "a report of the same sessions")
+        for name in names
+        if name not in earlier
+    ]
+    left = [name for name in earlier if name not in names]
+    faults += [Fault(f"the session {in_quotes(name)} of the baseline is not measured.", "the same sessions") for name in left]
+    if faults:
+        raise ContextError(*(fault.at(Place(arguments.baseline)) for fault in faults))
+
+
+def _before(earlier: Mapping[str, Mapping[str, object]], file: str) -> Mapping[str, object]:
     """The session of the baseline: of this name, or the only one where there is one only."""
-    name = as_path(file)
-    if not arguments.baseline or name in earlier:
-        return earlier.get(name, {})
-    if len(earlier) == len(arguments.sessions) == 1:
-        return next(iter(earlier.values()))
-    found = f"the baseline has no session {in_quotes(file)}."
-    raise ContextError(Fault(found, "a report of the same sessions", place=Place(arguments.baseline)))
+    return earlier.get(as_path(file)) or next(iter(earlier.values()), {})
 
 
 @dataclass(frozen=True)
 class Clips:
-    """The clips of a project: its databases and pose banks, opened or built when they are first asked for."""
+    """The clips of a project: its databases and pose banks, opened or built when they are first used."""
 
     project: MotionProject
 
@@ -119,7 +134,7 @@ def _measured(
     clips = known.setdefault(folder, Clips(MotionProject.load(folder))) if folder else None
     try:
         banks, databases = _of(clips, trace, file)
-        found = measure(
+        measures = measure(
             file if trace is None else trace,
             banks or None,
             poses=poses,
@@ -130,19 +145,20 @@ def _measured(
         raise type(error)(*(fault if fault.place.file else fault.at(Place(file)) for fault in error.faults)) from None
     if why:
         warn([f"{file}: without clips to compare with: {why}"])
-    gates = (*gates_of(arguments, found, file), *compared(before, found))
-    return SessionMeasures(file, found, before, gates)
+    gates = (*gates_of(arguments, measures, file), *compared(before, measures))
+    return SessionMeasures(file, measures, before, gates)
 
 
 def add_bars(parser: argparse.ArgumentParser) -> None:
-    for name, (_, unit, told) in BARS.items():
-        parser.add_argument(f"--max-{name}", metavar=unit, type=number_type("a bar. Accepted: a number from 0 up."), help=told)
+    """The options of the bars, `--max-NAME`."""
+    for name, (_, unit, meaning) in BARS.items():
+        parser.add_argument(f"--max-{name}", metavar=unit, type=number_type("a bar. Accepted: a number from 0 up."), help=meaning)
 
 
 def gates_of(arguments: argparse.Namespace, measures: Measures, file: str) -> list[Gate]:
     """The gate of each bar that the options set. Raises ContextError for one that cannot be judged."""
-    asked = {name: getattr(arguments, f"max_{name.replace('-', '_')}") for name in BARS}
-    bars = [Bar(f"max-{name}", BARS[name][0], most) for name, most in asked.items() if most is not None]
+    limits = {name: getattr(arguments, f"max_{name.replace('-', '_')}") for name in BARS}
+    bars = [Bar(f"max-{name}", BARS[name][0], most) for name, most in limits.items() if most is not None]
     return [held_to(bar, measures, file) for bar in bars]
 
 

@@ -39,8 +39,8 @@ class Played:
     def banks(self) -> dict[str, PoseBank]:
         names = [name for name in self.trace.about if name in self.project.config.databases]
         if not names:
-            found = "its poses cannot be made: the project has none of its databases."
-            raise MotionError(Fault(found, "--project FOLDER with the project that it was recorded with", place=Place(self.file)))
+            fault = "its poses cannot be made: the project has none of its databases."
+            raise MotionError(Fault(fault, "--project FOLDER with the project that it was recorded with", place=Place(self.file)))
         return open_or_build_poses(self.project.config, self.project.folder, self.project.assets, names=names)
 
     @property
@@ -49,13 +49,13 @@ class Played:
 
     @cached_property
     def measured(self) -> SessionMeasures:
-        found = measure(self.trace, self.banks, databases=self.databases or None, settings=self.settings)
-        return SessionMeasures(self.file, found, {}, ())
+        measures = measure(self.trace, self.banks, databases=self.databases or None, settings=self.settings)
+        return SessionMeasures(self.file, measures, {}, ())
 
-    def view(self, *, is_asked: bool = True) -> SessionView:
-        """What the page shows; without what there was to choose from where that is not asked."""
+    def view(self, *, with_candidates: bool = True) -> SessionView:
+        """What the page displays, with the candidates of each search or without."""
         rows = {label: (value, raw) for label, value, raw, _ in self.measured.rows()}
-        reasked = self.trace.reasked(self.databases) if self.databases and is_asked else None
+        reasked = self.trace.reasked(self.databases) if self.databases and with_candidates else None
         return view_of(os.path.basename(self.file), self.trace, self.banks, self.settings, reasked, rows)
 
 
@@ -65,8 +65,8 @@ def page_file(name: str, what: str = "a page", suffix: str = SUFFIX) -> Path:
     if path.suffix != suffix:
         raise FileError(Fault(f"{what} cannot be written to such a file.", f"a name that ends in {suffix}", place=place))
     if not os.path.isdir(path.parent):
-        found = f"there is no folder {path_in_quotes(path.parent)}."
-        raise FileError(Fault(found, "an existing folder", place=place, rule="no-such-path"))
+        fault = f"there is no folder {path_in_quotes(path.parent)}."
+        raise FileError(Fault(fault, "an existing folder", place=place, rule="no-such-path"))
     return path
 
 
@@ -82,11 +82,13 @@ def rerun_file(name: str) -> Path:
 
 
 def write_rerun(out: Path, session: Played) -> None:
+    """Write a session as a recording for the Rerun viewer."""
     times_s = [decision.time_s for decision in session.trace.brief()]
-    write_atomic(out, session_rerun.render(session.view(is_asked=False), times_s))
+    write_atomic(out, session_rerun.render(session.view(with_candidates=False), times_s))
 
 
 def comment_of(sessions: Sequence[Played], page: str | None) -> str:
+    """The sessions as Markdown, with the name of their page."""
     lists = [list(each.trace.brief()) for each in sessions]
     return session_markdown.render([each.measured for each in sessions], lists, parting_of(sessions), page)
 
@@ -96,10 +98,10 @@ def parting_of(sessions: Sequence[Played]) -> str:
     if len(sessions) < 2:
         return ""
     one, other = sessions
-    told = one.trace.diff(other.trace)
-    if told.parting is None:
-        return "Both play the same." if not told.longer else "Both play the same as long as both last."
-    where, names = told.parting, [os.path.basename(each.file) for each in sessions]
+    parting = one.trace.diff(other.trace)
+    if parting.parting is None:
+        return "Both play the same." if not parting.longer else "Both play the same as long as both last."
+    where, names = parting.parting, [os.path.basename(each.file) for each in sessions]
     plays = f"{names[0]} plays {where.one or 'nothing'}, {names[1]} {where.other or 'nothing'}"
-    others = f"Of {plural(told.updates, 'update')}, {told.other_assets:,} play another asset."
+    others = f"Of {plural(parting.updates, 'update')}, {parting.other_assets:,} play another asset."
     return f"They part at {where.time_s:.2f} s: {plays}. {others}"

@@ -4,7 +4,7 @@ The command proposes contacts of the feet, loops and the cuts that would make on
 starts and turns to play as a whole, and near-duplicates. If hips sway, it also proposes root_smooth_s for the features of the
 databases: a build then computes the body's path from the hips (forward) and the feet (sideways). No clip file changes. Existing
 marks stay, and nothing is proposed where there is one. In the folder, `patch -p1` applies the diff, and `patch -p1 -R` reverts it.
-With --write the results are kept in .contextdb-cache: the next run reads only changed clips, and replaces the marks that were
+With --write the results are cached in .contextdb-cache: the next run reads only changed clips, and replaces the marks that were
 written for their earlier versions, except those that were edited.
 
 Exits with 1 if a proposal is not written, or a clip could not be read.
@@ -27,11 +27,13 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
+from contextdb.authoring.clip_folder import MARKUP, FolderClips, below, clips_of
 from contextdb.commands.motion_clips import add_clip_arguments, progress_of
 from contextdb.commands.motion_prepared import BOM, Line, Prepared, line_of, with_marks, without
 from contextdb.commands.watched_work import watched
 from contextdb.console import ExitCode, note, output, printable
 from contextdb.disk import read_bytes
+from contextdb.disk.boundary import inside
 from contextdb.disk.together import NewFile, write_together
 from contextdb.errors import Fault, FileError, Place, plural
 from contextdb.motion.clips.clip import Clip
@@ -39,10 +41,9 @@ from contextdb.motion.markup.file import text_of
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.preparing.proposal import KINDS, Proposal
 from contextdb.motion.preparing.proposals import ROOT_SMOOTH_S, prepare_again
-from contextdb.motion.storage.clip_files import paths_of
+from contextdb.motion.storage.clip_files import named_takes
 from contextdb.report.render_json import as_json
 from contextdb.schema.toml_edit import set_key
-from contextdb.tables.clip_folder import MARKUP, FolderClips, below, clips_of
 from contextdb.tables.project import SCHEMA_FILE
 
 ROOT_KEY = "root_smooth_s"
@@ -52,8 +53,8 @@ JOINT_KINDS = ("roots", "contacts", "noise")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_clip_arguments(parser)
-    told = f"propose only this: {', '.join(KINDS)}; may be repeated"
-    parser.add_argument("--only", metavar="KIND", choices=KINDS, action="append", help=told)
+    help_text = f"propose only this: {', '.join(KINDS)}; may be repeated"
+    parser.add_argument("--only", metavar="KIND", choices=KINDS, action="append", help=help_text)
     parser.add_argument("--write", action="store_true", help="write the marks into the markup file")
     parser.add_argument("--watch", action="store_true", help="do it again whenever a clip, markup or contextdb.toml is saved")
     parser.add_argument("--json", action="store_true", help="print a JSON document instead of a diff")
@@ -90,32 +91,32 @@ class MarkupFile:
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
-    """Propose markup, and write it where that is asked for."""
+    """Propose markup, and write it with --write."""
     return watched(arguments.path, partial(_prepare, arguments)) if arguments.watch else _prepare(arguments)
 
 
 def _prepare(arguments: argparse.Namespace) -> ExitCode:
     with progress_of("reading clips") as tell:
-        found = clips_of(arguments.path, arguments.metres_per_unit, arguments.up, tell)
-    prepared = Prepared.load(found.folder)
+        folder_clips = clips_of(arguments.path, arguments.metres_per_unit, arguments.up, tell)
+    prepared = Prepared.load(folder_clips.folder)
     proposals, changes = [], []
     settings: dict[tuple[str, str, str], str | float] = {}
     done = 0
     with progress_of("preparing") as tell:
-        for file in _markup_files(found):
+        for file in _markup_files(folder_clips):
 
-            def told(i: int, _total: int, name: str, before: int = done) -> None:
-                tell(before + i, len(found.clips), name)
+            def report_progress(i: int, _total: int, name: str, before: int = done) -> None:
+                tell(before + i, len(folder_clips.clips), name)
 
             old, was = _text(file.path)
             if old:
-                Markup.parse(old, str(file.path))  # a fault is told with its line in the file as it is
+                Markup.parse(old, str(file.path))  # a fault is reported with its line in the file as it is
             kinds = _kinds(arguments.only, file)
             wanted = [(file.clips, kinds), (file.joint, [kind for kind in kinds if kind in JOINT_KINDS])]
             outdated = {mark: name for clips, each in wanted for mark, name in prepared.outdated(clips, each, old).items()}
             rest = without(old, outdated)
             markup = Markup.parse(rest, str(file.path)) if rest else Markup()
-            own = [prepare_again(clips, markup, each, told, prepared.kept) for clips, each in wanted]
+            own = [prepare_again(clips, markup, each, report_progress, prepared.cached) for clips, each in wanted]
             done += len(file.clips) + len(file.joint)
             marks = {line_of(each): each for listed in own for each in listed if each.tag is not None}
             for clips, each in wanted:
@@ -123,32 +124,32 @@ def _prepare(arguments: argparse.Namespace) -> ExitCode:
             added = {line: each for line, each in marks.items() if line not in outdated}
             proposals += [each for listed in own for each in listed if each.tag is None or line_of(each) in added]
             gone = {line: name for line, name in outdated.items() if line not in marks}
-            found.notes += _outdated(gone)
+            folder_clips.notes += _outdated(gone)
             if any(each.kind == "roots" for listed in own for each in listed):
                 settings |= dict.fromkeys((("features", name, ROOT_KEY) for name in file.features), ROOT_SMOOTH_S)
             if added or gone:
                 rest = without(old, gone)
                 changes.append(Change(file.path, was, old, with_marks(rest, added) if added else rest))
                 Markup.parse(changes[-1].new, str(file.path))
-                name = file.path.relative_to(found.folder).as_posix()
+                name = file.path.relative_to(folder_clips.folder).as_posix()
                 settings |= dict.fromkeys((("databases", database, "markup") for database in file.databases), name)
-    changes += _settings(found.folder, settings)
+    changes += _settings(folder_clips.folder, settings)
     if arguments.write:
-        _write(found, changes)
-        prepared.save(found.clips)
-    _report(found, proposals, changes, arguments)
+        _write(folder_clips, changes)
+        prepared.save(folder_clips.clips)
+    _report(folder_clips, proposals, changes, arguments)
     is_open = bool(changes) and not arguments.write
-    return ExitCode.FOUND if is_open or found.left_out else ExitCode.OK
+    return ExitCode.FOUND if is_open or folder_clips.left_out else ExitCode.OK
 
 
 def _outdated(marks: Mapping[Line, str]) -> Iterator[str]:
-    """What is said of marks that were written for clips as they were."""
+    """Messages about marks that were written for an earlier version of a clip."""
     for name, n_marks in Counter(marks.values()).items():
-        yield f"{name} changed since it was prepared: {plural(n_marks, 'mark')} of the clip as it was taken back."
+        yield f"{name} changed since it was prepared: {plural(n_marks, 'mark')} of the earlier clip removed."
 
 
-def _write(found: FolderClips, changes: Sequence[Change]) -> None:
-    if changes and not write_together(found.folder, [NewFile(each.path, each.data, each.was) for each in changes]):
+def _write(folder_clips: FolderClips, changes: Sequence[Change]) -> None:
+    if changes and not write_together(folder_clips.folder, [NewFile(each.path, each.data, each.was) for each in changes]):
         fault = Fault("a file was changed by somebody else in this moment.", mend="to do the same once more")
         raise FileError(fault.at(Place(str(changes[0].path))))
 
@@ -158,23 +159,25 @@ def _kinds(only: Sequence[str] | None, file: MarkupFile) -> list[str]:
     return [kind for kind in only or KINDS if kind != "roots" or not file.has_roots]
 
 
-def _markup_files(found: FolderClips) -> list[MarkupFile]:
-    """The markup file of each clip: that of the first database that holds it, else one beside the clips."""
-    at = dict(zip(found.paths, found.clips, strict=True))
-    if not found.config.databases:
-        return [MarkupFile(found.folder / MARKUP, list(found.clips), has_roots=True)]
+def _markup_files(folder_clips: FolderClips) -> list[MarkupFile]:
+    """The markup file of each clip: that of the first database that holds it, else one next to the clips."""
+    at: dict[Path, list[Clip]] = {}
+    for path, clip in zip(folder_clips.paths, folder_clips.clips, strict=True):
+        at.setdefault(path, []).append(clip)
+    if not folder_clips.config.databases:
+        return [MarkupFile(inside(folder_clips.folder / MARKUP, folder_clips.folder), list(folder_clips.clips), has_roots=True)]
     files: dict[Path, MarkupFile] = {}
-    said = _with_roots(found.folder)
-    for name, settings in found.config.databases.items():
-        paths = paths_of(settings, found.folder, found.config.file)
-        own = [at.pop(path) for path in paths if path in at]
+    roots = _with_roots(folder_clips.folder)
+    for name, settings in folder_clips.config.databases.items():
+        paths = [path for _, path, _ in named_takes(settings, folder_clips.folder, folder_clips.config.file)]
+        own = [clip for path in paths for clip in at.pop(path, [])]
         if not paths:
             continue
-        path = found.folder / settings.markup if settings.markup is not None else paths[0].parent / MARKUP
-        file = files.setdefault(path, MarkupFile(path))
+        path = folder_clips.folder / settings.markup if settings.markup is not None else paths[0].parent / MARKUP
+        file = files.setdefault(inside(path, folder_clips.folder), MarkupFile(path))
         (file.joint if settings.roles else file.clips).extend(own)
         file.databases += [] if settings.markup is not None else [name]
-        if settings.features not in said and settings.features not in file.features:
+        if settings.features not in roots and settings.features not in file.features:
             file.features.append(settings.features)
     for file in files.values():
         file.has_roots = not file.features
@@ -210,15 +213,17 @@ def _settings(folder: Path, settings: dict[tuple[str, str, str], str | float]) -
 # ---- what is printed
 
 
-def _report(found: FolderClips, proposals: Sequence[Proposal], changes: Sequence[Change], arguments: argparse.Namespace) -> None:
-    note(*found.notes, *(f"left out: {message}" for message in found.left_out))
+def _report(
+    folder_clips: FolderClips, proposals: Sequence[Proposal], changes: Sequence[Change], arguments: argparse.Namespace
+) -> None:
+    note(*folder_clips.notes, *(f"left out: {message}" for message in folder_clips.left_out))
     n_marks = sum(each.tag is not None for each in proposals)
     with output():
         if arguments.json:
-            print(as_json(_document(found, proposals, changes, arguments.write)), end="")
+            print(as_json(_document(folder_clips, proposals, changes, arguments.write)), end="")
         elif proposals:
             print("\n".join(map(printable, _reasons(proposals))))
-            print("".join(_diff(change, found.folder) for change in changes), end="")
+            print("".join(_diff(change, folder_clips.folder) for change in changes), end="")
     where = " and ".join(str(change.path) for change in changes)
     if arguments.write and changes:
         what = plural(n_marks, "mark") if n_marks else ROOT_KEY
@@ -267,12 +272,14 @@ def _line(line: str) -> str:
     return f"{printable(body)}{end}" if end else f"{printable(body)}\n\\ No newline at end of file\n"
 
 
-def _document(found: FolderClips, proposals: Sequence[Proposal], changes: Sequence[Change], is_written: bool) -> dict[str, object]:
+def _document(
+    folder_clips: FolderClips, proposals: Sequence[Proposal], changes: Sequence[Change], is_written: bool
+) -> dict[str, object]:
     return {
         "format": 1,
         "written": is_written and bool(changes),
         "proposals": [each.to_json() for each in proposals],
-        "files": [{"file": str(change.path), "diff": _diff(change, found.folder)} for change in changes],
-        "left_out": found.left_out,
-        "notes": found.notes,
+        "files": [{"file": str(change.path), "diff": _diff(change, folder_clips.folder)} for change in changes],
+        "left_out": folder_clips.left_out,
+        "notes": folder_clips.notes,
     }

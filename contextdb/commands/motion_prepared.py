@@ -1,6 +1,6 @@
-"""What `motion prepare --write` has written, kept with the digests of the clips, so that only clips that change are prepared again.
+"""What `motion prepare --write` has written, with the digests of the clips, so that only clips that change are prepared again.
 
-    .contextdb-cache/prepared.json     for each clip: its digest, what was found of it, and the marks that were written for it
+    .contextdb-cache/prepared.json     for each clip: its digest, its proposals, and the marks that were written for it
 
 When a clip changes, marks that were written for it as it was, and that nobody has edited since, are taken back. Without the file
 every clip is looked at, and nothing is taken back. An edge: this touches the disk.
@@ -20,13 +20,12 @@ from typing import Any
 
 import numpy as np
 
-from contextdb.disk import read_bytes, write_atomic
+from contextdb.disk.own_files import has_own, make_own_folder, read_own, write_own
 from contextdb.errors import FileError
 from contextdb.motion.clips.clip import Clip
 from contextdb.motion.markup.file import COLUMNS
-from contextdb.motion.preparing.proposal import N_SAMPLES, Kept, KeptClip, Proposal, key_of
+from contextdb.motion.preparing.proposal import N_SAMPLES, KeptClip, KnownProposals, Proposal, key_of
 from contextdb.motion.storage.building import CACHE_FOLDER
-from contextdb.motion.storage.feature_cache import make_cache_folder
 
 BOM = "\ufeff"
 FORMAT = 2
@@ -45,23 +44,23 @@ class Written:
 
 @dataclass
 class Prepared:
-    """What was found of a folder's clips, and by clip and kind what was written for them."""
+    """The proposals for a folder's clips, and by clip and kind what was written for them."""
 
     path: Path
-    kept: Kept = field(default_factory=Kept)
+    cached: KnownProposals = field(default_factory=KnownProposals)
     written: dict[str, dict[str, Written]] = field(default_factory=dict)
 
     @classmethod
     def load(cls, folder: Path) -> Prepared:
         """That of a folder; nothing where there is none that can be read."""
-        found = cls(folder / CACHE_FOLDER / FILE)
-        if found.path.is_file():
-            with suppress(FileError, ValueError, KeyError, TypeError, AttributeError):  # as if it were not there
-                said = json.loads(read_bytes(found.path))
-                if said["format"] == FORMAT:
-                    clips, written = dict(_clips(said["clips"])), dict(_written(said["clips"]))
-                    found.kept, found.written = Kept(clips), written
-        return found
+        prepared = cls(folder / CACHE_FOLDER / FILE)
+        with suppress(OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):  # as if it were not there
+            if has_own(prepared.path):
+                document = json.loads(read_own(prepared.path))
+                if document["format"] == FORMAT:
+                    clips, written = dict(_clips(document["clips"])), dict(_written(document["clips"]))
+                    prepared.cached, prepared.written = KnownProposals(clips), written
+        return prepared
 
     def outdated(self, clips: Iterable[Clip], kinds: Collection[str], text: str) -> dict[Line, str]:
         """The marks in a markup file that were written for clips that changed since, of some kinds, each with its asset.
@@ -69,7 +68,7 @@ class Prepared:
         Where somebody has edited marks of one tag of a clip, all of that tag stay.
         """
         lines = lines_of(text)
-        found = {
+        stale = {
             mark: clip.name
             for clip in clips
             for kind, written in self.written.get(clip.name, {}).items()
@@ -77,13 +76,13 @@ class Prepared:
             for mark in written.marks
             if mark in lines
         }
-        edited = {mark[:2] for mark in lines if mark not in found}
-        return {mark: name for mark, name in found.items() if mark[:2] not in edited}
+        edited = {mark[:2] for mark in lines if mark not in stale}
+        return {mark: name for mark, name in stale.items() if mark[:2] not in edited}
 
     def take(self, clips: Iterable[Clip], kinds: Collection[str], marks: Mapping[Line, Proposal]) -> None:
         """Take down the marks of some kinds that are written now for clips as they are."""
         for clip in clips:
-            key, own = self.kept.of(clip).key, self.written.setdefault(clip.name, {})
+            key, own = self.cached.of(clip).key, self.written.setdefault(clip.name, {})
             for kind in kinds:
                 new = [line for line, each in marks.items() if (each.asset, each.kind) == (clip.name, kind)]
                 before = own[kind].marks if kind in own and own[kind].key == key else []
@@ -92,30 +91,30 @@ class Prepared:
     def save(self, clips: Iterable[Clip]) -> None:
         """Keep it, as far as it is about these clips; where that cannot be written the next run looks at all of them."""
         names = {clip.name for clip in clips}
-        said = {
+        document = {
             name: {
-                "key": kept.key,
-                "found": {kind: [each.to_json() for each in found] for kind, found in kept.found.items()},
-                "shape": None if kept.shape is None else base64.b64encode(kept.shape.astype("<f4").tobytes()).decode(),
+                "key": cached.key,
+                "found": {kind: [each.to_json() for each in proposals] for kind, proposals in cached.found.items()},
+                "shape": None if cached.shape is None else base64.b64encode(cached.shape.astype("<f4").tobytes()).decode(),
                 "written": {kind: [each.key, each.marks] for kind, each in self.written.get(name, {}).items()},
             }
-            for name, kept in self.kept.clips.items()
+            for name, cached in self.cached.clips.items()
             if name in names
         }
         with suppress(FileError, OSError):
-            make_cache_folder(self.path.parent)
-            write_atomic(self.path, json.dumps({"format": FORMAT, "clips": said}).encode(), syncs=False)
+            make_own_folder(self.path.parent)
+            write_own(self.path, json.dumps({"format": FORMAT, "clips": document}).encode(), syncs=False)
 
 
-def _clips(said: Mapping[str, Any]) -> Iterator[tuple[str, KeptClip]]:
-    for name, clip in said.items():
-        found = {kind: [Proposal(**each) for each in listed] for kind, listed in clip["found"].items()}
+def _clips(document: Mapping[str, Any]) -> Iterator[tuple[str, KeptClip]]:
+    for name, clip in document.items():
+        proposals = {kind: [Proposal(**each) for each in listed] for kind, listed in clip["found"].items()}
         shape = None if clip["shape"] is None else np.frombuffer(base64.b64decode(clip["shape"]), "<f4")
-        yield name, KeptClip(str(clip["key"]), found, None if shape is None else shape.reshape(2, N_SAMPLES, -1, 3))
+        yield name, KeptClip(str(clip["key"]), proposals, None if shape is None else shape.reshape(2, N_SAMPLES, -1, 3))
 
 
-def _written(said: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Written]]]:
-    for name, clip in said.items():
+def _written(document: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Written]]]:
+    for name, clip in document.items():
         yield name, {kind: Written(str(key), [tuple(mark) for mark in marks]) for kind, (key, marks) in clip["written"].items()}
 
 

@@ -25,6 +25,7 @@ from contextdb.commands.motion_stage import Stage, context_text
 from contextdb.commands.numbers import number_type, rate_of
 from contextdb.console import ExitCode, aligned, note, output, progress
 from contextdb.disk import make_folder
+from contextdb.disk.boundary import inside
 from contextdb.errors import ContextDBError, Fault, FileError, Place, plural, some
 from contextdb.motion import Character, Measures, Pose, Trace, measure
 from contextdb.motion.characters.drives import Drive, drives, steered
@@ -37,7 +38,8 @@ COLUMNS = {
     "jumps_per_s": ("jumps/s", 2),
     "forced_jumps": ("forced", 0),
     "skate_cm_s": ("skate cm/s", 1),
-    "skate_raw_cm_s": ("clips'", 1),
+    "toe_skate_cm_s": ("toe down", 1),
+    "toe_skate_raw_cm_s": ("clips'", 1),
     "accel_p99": ("accel m/s²", 0),
     "accel_raw_p99": ("clips'", 0),
     "path_rms_m": ("path m", 2),
@@ -84,8 +86,8 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     note(*_chosen(plan))
     wanted = [(scene, drive) for scene in plan.scenes for drive in _drives(scene, arguments.drive)]
     if not wanted:
-        found = "no context of the tables lets the character move: nothing can be driven."
-        raise ContextDBError(Fault(found, "rows for moving clips; contextdb check says more"))
+        fault = "no context of the tables lets the character move: nothing can be driven."
+        raise ContextDBError(Fault(fault, "rows for moving clips; contextdb check says more"))
     folder = None if arguments.out is None else _folder(Path(arguments.out))
     rate = character.schema.rate if arguments.rate is None else arguments.rate
     probes = []
@@ -111,8 +113,8 @@ def _chosen(plan: Plan) -> Iterator[str]:
         speeds = ", ".join(f"{speed:g}" for speed in scene.speeds_mps)
         yield f"drives {scene.name or 'without a context'} at {speeds} m/s"
         for facts, served in scene.following:
-            told = " ".join(f"{name}={value}" for name, value in facts.items())
-            yield f"  {told} while the stick asks for about {served[0]:.1f} to {served[-1]:.1f} m/s"
+            facts_text = " ".join(f"{name}={value}" for name, value in facts.items())
+            yield f"  {facts_text} while the stick asks for about {served[0]:.1f} to {served[-1]:.1f} m/s"
     if plan.left_open:
         yield f"left open, as their values cannot be listed: {some(plan.left_open)}"
 
@@ -133,7 +135,7 @@ def _probe(character: Character, scene: Scene, drive: Drive, rate: float, folder
         poses.append(updated.pose)
         sticks.append(stick)
     words = f"{scene.name} {drive.name} {drive.speed_mps:g}".replace("=", "-").split()
-    file = "" if folder is None else str(folder / f"{'_'.join(words)}.parquet")
+    file = "" if folder is None else str(inside(folder / f"{'_'.join(words)}.parquet", folder))
     return Probe(scene, drive, file, _measured(driven, trace, poses, sticks)), trace
 
 

@@ -1,9 +1,9 @@
 """Show the decisions of a recorded session: what changed, when, and why; with --at, one decision in full.
 
 Without --at each change has a row, with the cost of playing on and how long the new animation played. --at accepts the tick of an
-update, shown in the first column, or a time such as 2.5s.
+update, the first column, or a time such as 2.5s.
 
-A session keeps what each search was asked. With --at, candidates and the costs of all assets with a --name are computed again from
+A session keeps the query of each search. With --at, candidates and the costs of all assets with a --name are computed again from
 the databases: those of the project that the session was recorded with, or of --project. --why says what it would have taken for an
 asset to be chosen, --what-if what other weights, biases and thresholds would have made of the session: "LeftFoot velocity=2",
 "continuing=-0.1" (or base, looping), "threshold jog_tired=3".
@@ -41,12 +41,15 @@ from contextdb.commands.numbers import number_of
 from contextdb.commands.progress import building_bar
 from contextdb.console import ExitCode, output, terminal_width
 from contextdb.disk import path_in_quotes, write_atomic
+from contextdb.disk.boundary import is_below, work_tree
 from contextdb.errors import ContextDBError, Fault, FileError, MotionError, Place, QueryError, in_quotes
-from contextdb.motion import MotionDatabase, open_database, open_or_build, saved_path
+from contextdb.motion import MotionDatabase, open_or_build
 from contextdb.motion.measuring.measure import warped_poses
 from contextdb.motion.selection.decision import Decision, Playing
+from contextdb.motion.storage.building import saved_path
 from contextdb.motion.storage.pose_files import saved_poses
-from contextdb.motion.trace.asked_views import diff_lines, stats_lines, what_if_lines, why_lines
+from contextdb.motion.storage.stored import open_database
+from contextdb.motion.trace.answer_views import diff_lines, stats_lines, what_if_lines, why_lines
 from contextdb.motion.trace.chrome_trace import chrome_trace
 from contextdb.motion.trace.cost_views import Ranked, View
 from contextdb.motion.trace.filter_rows import is_recorded
@@ -68,7 +71,7 @@ WARP_S = 10.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", help="a recorded session, a .parquet file")
     parser.add_argument("--at", metavar="N|TIME", help="show one decision in full: its tick, or a time such as 2.5s")
-    add_view(parser, "with --at: which costs are shown")
+    add_view(parser, "with --at: which costs to print")
     parser.add_argument("--name", metavar="TEXT", default="", help="only assets whose name contains this")
     parser.add_argument("--why", metavar="ASSET", help="with --at: why this asset was not chosen, and what would have to change")
     parser.add_argument("--stats", action="store_true", help="jumps, gains, causes, stay, and what never plays")
@@ -111,13 +114,13 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     if arguments.trace is not None:
         _write_trace(replay.trace, Path(arguments.trace))
     if place is not None:
-        parts.insert(0, _Shown.of(replay, place).part())
+        parts.insert(0, _FullDecision.of(replay, place).part())
     if not parts:
         parts.append(_session(replay) if page is None else ({}, [summary_line(replay.trace.brief())]))
     with output():
         if arguments.json:
-            told = {key: value for document, _ in parts for key, value in document.items()}
-            print(as_json({"format": 1, "file": arguments.file, **told}), end="")
+            merged = {key: value for document, _ in parts for key, value in document.items()}
+            print(as_json({"format": 1, "file": arguments.file, **merged}), end="")
         else:
             print(*("\n".join(lines) for _, lines in parts), sep="\n\n")
     return ExitCode.OK
@@ -129,67 +132,67 @@ Part = tuple[Json, list[str]]
 
 @dataclass(eq=False)
 class Replay:
-    """A session, what was asked about it, and, where that is needed, its databases."""
+    """A session, the options of the command, and, where that is needed, its databases."""
 
     trace: Trace
-    asked: argparse.Namespace
+    options: argparse.Namespace
     of_file: str = ""
     missing: str = field(default="", init=False)
 
     @property
     def file(self) -> str:
-        return self.of_file or str(self.asked.file)
+        return self.of_file or str(self.options.file)
 
     @cached_property
     def databases(self) -> dict[str, MotionDatabase]:
         """The databases of the session's project; `missing` says why some are not what was recorded."""
         try:
-            found, why = databases_of(self.trace, self.asked.project, self.file)
+            databases, why = databases_of(self.trace, self.options.project, self.file)
         except ContextDBError as error:
-            if self.asked.project is not None:
+            if self.options.project is not None:
                 raise
-            found, why = {}, error.faults[0].message
-        told = self.trace.use(found)
-        self.missing = why or told
-        return found
+            databases, why = {}, str(error.faults[0])
+        note = self.trace.use(databases)
+        self.missing = why or note
+        return databases
 
     def reasked(self, changes: Changes | None = None, *, with_tables: bool = False) -> Reasked:
-        """The session asked again of its databases, and of the project's tables."""
+        """The session searched again in its databases, and looked up again in the project's tables."""
         stock = Stock(self.databases)
-        folder, why = project_of(self.trace, self.asked.project, self.file)
+        folder, why = project_of(self.trace, self.options.project, self.file)
         if with_tables and not why:
             stock = Stock.with_tables(self.databases, Project.load(folder))
         return Reasked(self.trace, self.trace.about, stock, changes or {})
 
     def require_databases(self) -> None:
-        """Raise MotionError where the session cannot be asked again, with the reason."""
+        """Raise MotionError where the session cannot be searched again, with the reason."""
         if not self.databases or self.missing:
-            raise MotionError(Fault(f"the session cannot be asked again: {self.missing}", place=Place(self.asked.file)))
+            raise MotionError(Fault(f"the session cannot be searched again: {self.missing}", place=Place(self.options.file)))
 
 
 def _played(replay: Replay) -> Played:
-    folder, why = project_of(replay.trace, replay.asked.project, replay.file)
+    folder, why = project_of(replay.trace, replay.options.project, replay.file)
     if why:
         raise MotionError(Fault(f"its poses cannot be made: {why}", place=Place(replay.file)))
     databases = replay.databases
     if replay.missing:
-        warn([f"{replay.file}: no candidates are shown: {replay.missing}"])
+        warn([f"{replay.file}: no candidates are listed: {replay.missing}"])
     return Played(replay.file, replay.trace, folder, replay.trace.databases if databases else {})
 
 
 def _parts(replay: Replay, other: Trace | None) -> Iterator[Part]:
-    """What was asked of the whole session."""
-    asked, trace, width = replay.asked, replay.trace, terminal_width()
-    if asked.stats:
+    """The answers about the whole session."""
+    options, trace, width = replay.options, replay.trace, terminal_width()
+    if options.stats:
         stats = trace.stats()
         yield {"stats": stats.to_json()}, [summary_line(trace.brief()), "", *stats_lines(stats, width)]
-    if asked.what_if:
+    if options.what_if:
         replay.require_databases()
-        told = what_if(replay.reasked(), replay.reasked(changes_of(asked.what_if, replay.databases)))
-        yield {"what_if": told.to_json()}, list(what_if_lines(told, width))
+        comparison = what_if(replay.reasked(), replay.reasked(changes_of(options.what_if, replay.databases)))
+        yield {"what_if": comparison.to_json()}, list(what_if_lines(comparison, width))
     if other is not None:
         diff = trace.diff(other)
-        yield {"diff": {"file": asked.diff, **diff.to_json()}}, list(diff_lines(diff, width))
+        yield {"diff": {"file": options.diff, **diff.to_json()}}, list(diff_lines(diff, width))
 
 
 def _write_trace(trace: Trace, path: Path) -> None:
@@ -197,8 +200,8 @@ def _write_trace(trace: Trace, path: Path) -> None:
     if path.suffix != ".json":
         raise FileError(Fault("a Chrome trace cannot be written to such a file.", "a name that ends in .json", place=place))
     if not os.path.isdir(path.parent):
-        found = f"there is no folder {path_in_quotes(path.parent)}."
-        raise FileError(Fault(found, "an existing folder", place=place, rule="no-such-path"))
+        fault = f"there is no folder {path_in_quotes(path.parent)}."
+        raise FileError(Fault(fault, "an existing folder", place=place, rule="no-such-path"))
     write_atomic(path, (json.dumps(chrome_trace(trace.brief())) + "\n").encode())
 
 
@@ -223,21 +226,21 @@ def place_of(text: str, trace: Trace, file: str) -> int:
 
 
 def _session(replay: Replay) -> Part:
-    trace, asked = replay.trace, replay.asked
-    if asked.json:
-        told = [decision for decision in trace.brief() if _is_named(decision.playing, asked.name)]
-        return {"decisions": [_brief(decision_json(decision)) for decision in told]}, []
-    lines = list(session_lines(trace.brief(), name=asked.name, width=terminal_width()))
-    return {}, [summary_line(trace.brief()), "", *(lines or [_never_played(replay) if asked.name else "no decision"])]
+    trace, options = replay.trace, replay.options
+    if options.json:
+        decisions = [decision for decision in trace.brief() if _is_named(decision.playing, options.name)]
+        return {"decisions": [_brief(decision_json(decision)) for decision in decisions]}, []
+    lines = list(session_lines(trace.brief(), name=options.name, width=terminal_width()))
+    return {}, [summary_line(trace.brief()), "", *(lines or [_never_played(replay) if options.name else "no decision"])]
 
 
 def _never_played(replay: Replay) -> str:
     """What to say of a name that no playing asset holds, and of one that no asset of the databases holds."""
-    name, databases = replay.asked.name, replay.databases
+    name, databases = replay.options.name, replay.databases
     if not databases:
         return f"nothing whose name contains {in_quotes(name)} plays; {replay.missing}"
     try:
-        require_known(name, databases, replay.asked.file)
+        require_known(name, databases, replay.options.file)
     except MotionError as error:
         return error.faults[0].message
     return f"nothing whose name contains {in_quotes(name)} plays; --at N|TIME with --name shows what it would have cost"
@@ -253,45 +256,45 @@ def _brief(decision: Json) -> Json:
 
 
 @dataclass(frozen=True, eq=False)
-class _Shown:
-    """One decision, in full: with its candidates, what --name and --why ask of it, and why something cannot be computed again."""
+class _FullDecision:
+    """One decision, in full: with its candidates, the answers to --name and --why, and why something cannot be computed again."""
 
     replay: Replay
     place: int
     decision: Decision
     ranked: list[Ranked] | None
     why_not: WhyNot | None
-    not_asked: str
+    not_computed: str
 
     @classmethod
-    def of(cls, replay: Replay, place: int) -> _Shown:
+    def of(cls, replay: Replay, place: int) -> _FullDecision:
         """The decision at a place of the session."""
-        asked, trace, databases = replay.asked, replay.trace, replay.databases
+        options, trace, databases = replay.options, replay.trace, replay.databases
         decision = trace[place]
-        needs = bool(asked.name) or (
+        needs = bool(options.name) or (
             decision.searched and decision.together is None and trace.n_candidates > 0 and not decision.candidates
         )
-        not_asked = (replay.missing or why_not_asked(decision, trace.about, databases)) if needs else ""
+        not_computed = (replay.missing or why_not_asked(decision, trace.about, databases)) if needs else ""
         ranked, why_not = None, None
-        if asked.name and not not_asked:
-            require_known(asked.name, databases, asked.file)
-            ranked = replay.reasked()[place].best_of_assets(asked.name)
-        if asked.why is not None:
+        if options.name and not not_computed:
+            require_known(options.name, databases, options.file)
+            ranked = replay.reasked()[place].best_of_assets(options.name)
+        if options.why is not None:
             replay.require_databases()
-            why_not = replay.reasked(with_tables=True).why_not(place, asked.why)
-        return cls(replay, place, decision, ranked, why_not, not_asked)
+            why_not = replay.reasked(with_tables=True).why_not(place, options.why)
+        return cls(replay, place, decision, ranked, why_not, not_computed)
 
     def part(self) -> Part:
         """The decision as JSON, or as lines of text."""
-        return (self._json(), []) if self.replay.asked.json else ({}, list(self._lines()))
+        return (self._json(), []) if self.replay.options.json else ({}, list(self._lines()))
 
     def _json(self) -> Json:
-        asked, events = self.replay.asked, self.replay.trace.events(self.place)
+        options, events = self.replay.options, self.replay.trace.events(self.place)
         again: Json = {}
-        if asked.name:
+        if options.name:
             again["asked"] = None if self.ranked is None else ranked_json(self.ranked, events)
-        if asked.name or self.not_asked:
-            again["not_asked"] = self.not_asked or None
+        if options.name or self.not_computed:
+            again["not_asked"] = self.not_computed or None
         if self.why_not is not None:
             again["why_not"] = self.why_not.to_json()
         return {**decision_json(self.decision, events), "status": self._status().to_json(), **again}
@@ -304,9 +307,9 @@ class _Shown:
         return status_of(self.decision, last, known, self._warp(known) if known else None)
 
     def _warp(self, databases: Mapping[str, MotionDatabase]) -> tuple[float, float] | None:
-        """Those of the pose that was shown; what was longer ago than `WARP_S` has faded out of it."""
+        """Those of the pose that was displayed; what was longer ago than `WARP_S` has faded out of it."""
         trace = self.replay.trace
-        folder, _ = project_of(trace, self.replay.asked.project, self.replay.file)
+        folder, _ = project_of(trace, self.replay.options.project, self.replay.file)
         banks = saved_poses(folder, databases)
         if len(banks) < len(databases):
             return None
@@ -316,16 +319,18 @@ class _Shown:
         return deque((warp for _, warp in warped_poses(trace[first : self.place + 1], banks, settings)), 1)[0]
 
     def _lines(self) -> Iterator[str]:
-        asked, width = self.replay.asked, terminal_width()
+        options, width = self.replay.options, terminal_width()
         if self.why_not is not None:
             yield f"tick {self.decision.tick:,} at {self.decision.time_s:.2f} s: {self.decision.action}"
             yield from why_lines(self.why_not, width)
             return
-        view, events = View(asked.view or View.SUMMARY), self.replay.trace.events(self.place)
-        yield from decision_lines(self.decision, view, name=asked.name, events=events, width=width, asked=self.ranked)
-        if self.not_asked:
-            held = "of the candidates that the session keeps alone" if self.decision.candidates else "no candidates are shown"
-            yield from ("", f"{held}: {self.not_asked}")
+        view, events = View(options.view or View.SUMMARY), self.replay.trace.events(self.place)
+        yield from decision_lines(self.decision, view, name=options.name, events=events, width=width, ranked=self.ranked)
+        if self.not_computed:
+            held = (
+                "only the candidates that the session keeps are listed" if self.decision.candidates else "no candidates are listed"
+            )
+            yield from ("", f"{held}: {self.not_computed}")
 
 
 def databases_of(trace: Trace, project: str | None, file: str) -> tuple[dict[str, MotionDatabase], str]:
@@ -346,15 +351,23 @@ def databases_of(trace: Trace, project: str | None, file: str) -> tuple[dict[str
 
 
 def project_of(trace: Trace, project: str | None, file: str) -> tuple[str, str]:
-    """The folder of the project that a session was recorded with, or of the one that is given; or why there is none."""
+    """The folder of the project that a session was recorded with, or of the one that is given; or why there is none.
+
+    A session may come with a clone: the project that it names is used where it is in the same work tree of git; without git, in the
+    folder of the session, or in the project in which the session is.
+    """
     if project is not None:
         return project, ""
-    said = {str(about["project"]) for about in trace.about.values() if "project" in about}
-    if not said:
+    projects = {str(about["project"]) for about in trace.about.values() if "project" in about}
+    if not projects:
         return "", "the session does not say which project it was recorded with; give it with --project FOLDER."
-    folder = os.path.normpath(os.path.join(os.path.dirname(file), said.pop()))
-    if not os.path.isfile(os.path.join(folder, SCHEMA_FILE)):
+    own, named = os.path.dirname(file), projects.pop()
+    folder = os.path.normpath(os.path.join(own, named))
+    is_relative = not os.path.isabs(named)  # as they are written; an absolute one could name another machine
+    if is_relative and not os.path.isfile(os.path.join(folder, SCHEMA_FILE)):
         return "", f"its project is no longer at {path_in_quotes(folder)}; give it with --project FOLDER."
+    if not is_relative or not is_below(Path(os.path.realpath(folder)), work_tree(Path(own))):
+        return "", f"its project {path_in_quotes(folder)} is not in the folder of the session; give it with --project FOLDER."
     return folder, ""
 
 

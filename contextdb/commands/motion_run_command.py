@@ -44,7 +44,7 @@ from contextdb.tables.table import leaf_assets
 SUFFIX = ".parquet"
 _COUNT = whole_type("a number of candidates. Accepted: 0 to 1000, such as 12.", 0, 1000)
 _SEED = whole_type("a seed. Accepted: a whole number, such as 7.")
-K_HELP = "candidates of each search that replay shows; with 0, none, and no search can be asked again (default: 12)"
+K_HELP = "candidates of each search that replay lists; with 0, none, and no search can be repeated (default: 12)"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -116,7 +116,7 @@ def character_of(stage: Stage, name: str, seed: int = 0, unknown: Unknown = "err
 
 
 def steer(character: motion.Character, stick: Stick, moments: Sequence[Facts] | None, per_s: float) -> Iterator[motion.Updated]:
-    """Update a character from the stick's first moment to its last, so many times a second."""
+    """Update a character from the stick's first moment to its last, at a fixed rate."""
     n_updates = math.floor(stick.duration_s * per_s + 1e-6) + 1
     update = _over_ground if stick.is_velocity else _from_body
     for i in progress(range(n_updates), "steering"):
@@ -180,8 +180,8 @@ def _checked_file(out: Path, stick: Path, what: str) -> Path:
     """A file in a folder that there is, and not the stick."""
     place = Place(str(out))
     if not os.path.isdir(out.parent):
-        found = f"there is no folder {path_in_quotes(out.parent)}."
-        raise FileError(Fault(found, "an existing folder", place=place, rule="no-such-path"))
-    if out.resolve() == stick.resolve():
+        fault = f"there is no folder {path_in_quotes(out.parent)}."
+        raise FileError(Fault(fault, "an existing folder", place=place, rule="no-such-path"))
+    if os.path.realpath(out) == os.path.realpath(stick):
         raise FileError(Fault(f"{what} would be written over the stick.", "another file", place=place))
     return out

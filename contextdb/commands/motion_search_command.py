@@ -16,12 +16,13 @@ from dataclasses import replace
 import numpy as np
 
 from contextdb.cells.facts import Fact
-from contextdb.commands.motion_stage import Stage, add_asked, add_view, context_text
+from contextdb.commands.motion_stage import Stage, add_query_arguments, add_view, context_text
 from contextdb.compiled.matches import Matches
 from contextdb.console import ExitCode, output, printable, terminal_width
 from contextdb.errors import in_quotes, plural
-from contextdb.motion import Candidates, MotionDatabase
+from contextdb.motion import MotionDatabase
 from contextdb.motion.features.extraction import Features
+from contextdb.motion.search.candidates import Candidates
 from contextdb.motion.trace.cost_views import Ranked, View, candidate_lines
 from contextdb.motion.trace.json_form import candidates_json
 from contextdb.motion.trace.views import left_out_text
@@ -31,8 +32,8 @@ from contextdb.report.render_json import as_json
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("path", metavar="PATH", help="a folder of tables, or its contextdb.toml")
     parser.add_argument("database", metavar="DATABASE", help="the name of a [databases.NAME]")
-    add_asked(parser)
-    add_view(parser, "which costs are shown", View.SUMMARY)
+    add_query_arguments(parser)
+    add_view(parser, "which costs to print", View.SUMMARY)
     parser.add_argument("--name", metavar="TEXT", default="", help="only assets whose name contains this, chosen or not")
 
 
@@ -41,44 +42,44 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     name = stage.config.database(arguments.database).name
     valid, facts = stage.valid([name], arguments.facts, arguments.unknown)
     query = stage.query(arguments.query, [name], arguments)
-    found = _candidates(stage.databases[name], query, valid.get(name), arguments)
-    n_free = stage.databases[name].n_frames - sum(found.counts.values())
+    candidates = _candidates(stage.databases[name], query, valid.get(name), arguments)
+    n_free = stage.databases[name].n_frames - sum(candidates.counts.values())
     with output():
         if arguments.json:
-            document = {"format": 1, "context": context_text(facts), "frames": n_free, **_document(stage, name, found)}
+            document = {"format": 1, "context": context_text(facts), "frames": n_free, **_document(stage, name, candidates)}
             print(as_json(document), end="")
         else:
-            print(*_lines(stage, name, found, facts, valid.get(name), n_free, arguments), sep="\n")
+            print(*_lines(stage, name, candidates, facts, valid.get(name), n_free, arguments), sep="\n")
     return ExitCode.OK if n_free else ExitCode.FOUND
 
 
-def _candidates(database: MotionDatabase, query: Features, valid: Matches | None, asked: argparse.Namespace) -> Candidates:
+def _candidates(database: MotionDatabase, query: Features, valid: Matches | None, options: argparse.Namespace) -> Candidates:
     """The best frames; of assets whose name contains --name, those that may not be chosen too."""
-    if not asked.name:
-        return database.candidates(query, asked.k, valid, left_out=asked.left_out, tags=asked.tags)
-    counts = database.candidates(query, 0, valid, tags=asked.tags).counts
-    is_named = np.array([asked.name.casefold() in asset.casefold() for asset in database.assets], np.bool_)
-    others = np.where(is_named, 0.0, np.inf)  # no other frame comes before those that are asked for
-    found = database.candidates(query, asked.k, valid, left_out=True, tags=asked.tags, penalties=others)
-    return replace(found, rows=tuple(row for row in found if is_named[row.range]), counts=counts)
+    if not options.name:
+        return database.candidates(query, options.k, valid, left_out=options.left_out, tags=options.tags)
+    counts = database.candidates(query, 0, valid, tags=options.tags).counts
+    is_named = np.array([options.name.casefold() in asset.casefold() for asset in database.assets], np.bool_)
+    others = np.where(is_named, 0.0, np.inf)  # no other frame comes before the wanted ones
+    candidates = database.candidates(query, options.k, valid, left_out=True, tags=options.tags, penalties=others)
+    return replace(candidates, rows=tuple(row for row in candidates if is_named[row.range]), counts=counts)
 
 
-def _events(stage: Stage, name: str, found: Candidates) -> dict[tuple[str, int], tuple[str, ...]]:
-    return {(name, row.frame): stage.databases[name].marks.events(row.frame) for row in found}
+def _events(stage: Stage, name: str, candidates: Candidates) -> dict[tuple[str, int], tuple[str, ...]]:
+    return {(name, row.frame): stage.databases[name].marks.events(row.frame) for row in candidates}
 
 
-def _document(stage: Stage, name: str, found: Candidates) -> dict[str, object]:
-    return candidates_json(name, found, _events(stage, name, found))
+def _document(stage: Stage, name: str, candidates: Candidates) -> dict[str, object]:
+    return candidates_json(name, candidates, _events(stage, name, candidates))
 
 
 def _lines(
     stage: Stage,
     name: str,
-    found: Candidates,
+    candidates: Candidates,
     facts: dict[str, Fact],
     valid: Matches | None,
     n_free: int,
-    asked: argparse.Namespace,
+    options: argparse.Namespace,
 ) -> Iterator[str]:
     if valid is not None:
         table = printable(str(stage.config.databases[name].table))
@@ -86,13 +87,13 @@ def _lines(
         mirrored = f", {len(valid.mirrored):,} mirrored" if has_mirror else ""
         yield f"{len(valid):,} of {plural(valid.n_rows, 'row')} valid in {table}{mirrored}"
     yield f"{n_free:,} of {plural(stage.databases[name].n_frames, 'frame')} of {printable(name)} may play"
-    if found.counts:
-        yield f"left out: {left_out_text(found)}"
-    rows = [Ranked(rank, name, row) for rank, row in enumerate(found, 1)]
+    if candidates.counts:
+        yield f"left out: {left_out_text(candidates)}"
+    rows = [Ranked(rank, name, row) for rank, row in enumerate(candidates, 1)]
     yield ""
     if rows:
-        yield from candidate_lines(rows, View(asked.view), _events(stage, name, found), terminal_width())
-    elif asked.name:
-        yield f"no asset's name contains {in_quotes(asked.name)}"
+        yield from candidate_lines(rows, View(options.view), _events(stage, name, candidates), terminal_width())
+    elif options.name:
+        yield f"no asset's name contains {in_quotes(options.name)}"
     else:
         yield "nothing may play"

@@ -11,9 +11,9 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 
-from contextdb.commands.motion_stage import Stage, add_asked, add_view, context_text
+from contextdb.commands.motion_stage import Stage, add_query_arguments, add_view, context_text
 from contextdb.console import ExitCode, output, terminal_width
-from contextdb.motion import LeftOut
+from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.selection.controller import Controller
 from contextdb.motion.selection.decision import Decision
 from contextdb.motion.trace.cost_views import View
@@ -26,8 +26,8 @@ from contextdb.report.render_json import as_json
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("path", metavar="PATH", help="a folder of tables, or its contextdb.toml")
     parser.add_argument("selector", metavar="SELECTOR", help="the name of a [selectors.NAME]")
-    add_asked(parser)
-    add_view(parser, "which costs are shown", View.SUMMARY)
+    add_query_arguments(parser)
+    add_view(parser, "which costs to print", View.SUMMARY)
     parser.add_argument("--name", metavar="TEXT", default="", help="only candidates whose name contains this")
 
 
@@ -47,17 +47,16 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         if arguments.json:
             print(as_json({"format": 1, **decision_json(decision, trace.events(0))}), end="")
         else:
-            shown = decision_lines(
+            lines = decision_lines(
                 decision, View(arguments.view), name=arguments.name, events=trace.events(0), width=terminal_width()
             )
-            print(*shown, sep="\n")
+            print(*lines, sep="\n")
     return ExitCode.OK if decision.playing is not None else ExitCode.FOUND
 
 
 def _without_left_out(decision: Decision) -> Decision:
     """The same without the candidates that may not be chosen."""
     candidates = [
-        (name, replace(found, rows=tuple(row for row in found if row.left_out is LeftOut.NO)))
-        for name, found in decision.candidates
+        (name, replace(rows, rows=tuple(row for row in rows if row.left_out is LeftOut.NO))) for name, rows in decision.candidates
     ]
     return replace(decision, candidates=tuple(candidates))

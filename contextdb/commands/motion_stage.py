@@ -1,4 +1,4 @@
-"""What the commands `motion search`, `select` and `run` play with: a project, its databases and tables, and what is asked."""
+"""What the commands `motion search`, `select` and `run` play with: a project, its databases and tables, and the query."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from contextdb.motion import (
     MotionConfig,
     MotionDatabase,
     TagFilter,
-    load_bvh,
     open_or_build,
     query_from,
     steady_path,
     with_path,
 )
+from contextdb.motion.clips.source import ClipSource, take_at
 from contextdb.motion.features.extraction import Features
 from contextdb.motion.markup.reserved import MOST_COST
 from contextdb.motion.storage.config import JOINTLY
@@ -97,12 +97,12 @@ class Stage:
             return {}, {}
         for name in names:
             if self.config.databases[name].roles:
-                found = f"[databases.{name}] has roles: its clips are cast and chosen together, by facts of several actors."
-                raise ContextDBError(Fault(found, JOINTLY))
+                fault = f"[databases.{name}] has roles: its clips are cast and chosen together, by facts of several actors."
+                raise ContextDBError(Fault(fault, JOINTLY))
         tables = self.tables(names)
         if not tables:
-            found = f"no table says which assets of {some(names)} are valid, so facts change nothing."
-            raise ContextDBError(Fault(found, f"table = … in [databases.NAME] of {SCHEMA_FILE}"))
+            fault = f"no table says which assets of {some(names)} are valid, so facts change nothing."
+            raise ContextDBError(Fault(fault, f"table = … in [databases.NAME] of {SCHEMA_FILE}"))
         facts = facts_of(given, tables)
         with missing_facts_by_option():
             matches = {table: tables[table].query(facts[table], unknown=unknown) for table in tables}
@@ -114,9 +114,10 @@ class Stage:
         ContextDBError where there is no such clip (with the nearest), or no such moment of it."""
         clip, at_s = clip_at(text)
         schema = self.schema(names[0])
-        if clip.casefold().endswith(".bvh"):
+        file, take = take_at(clip)
+        if file is not None:
             settings = self.config.database(names[0])
-            loaded = load_bvh(clip, metres_per_unit=settings.metres_per_unit, up=settings.up)
+            loaded = ClipSource.of(file).clip(take, metres_per_unit=settings.metres_per_unit, up=settings.up)
             rig = Rig.of(settings, self.folder, self.config.file)
             loaded = loaded if rig is None else rig.clip(loaded)
             query = query_from(schema, loaded, frame_at(clip, at_s, loaded.duration_s, schema.rate))
@@ -143,11 +144,11 @@ class Stage:
                 return database.raw(frame).astype("float32")
         known = list(dict.fromkeys(asset for name in (*names, *others) for asset in self.databases[name].assets))
         near = nearest(clip, known)
-        accepted = f"{some(known)}, or a .bvh file" if known else "a .bvh file; the databases are empty"
+        accepted = f"{some(known)}, or a file of clips" if known else "a file of clips; the databases are empty"
         raise QueryError(Fault(f"there is no clip {in_quotes(clip)}.", accepted, in_quotes(f"{near}@{at_s:g}") if near else ""))
 
 
-def add_asked(parser: argparse.ArgumentParser) -> None:
+def add_query_arguments(parser: argparse.ArgumentParser) -> None:
     """The arguments that say what is searched for."""
     parser.add_argument("facts", metavar="FACT=VALUE", nargs="*", default=[], help="facts: only assets that are valid may play")
     parser.add_argument("--query", metavar=CLIP_AT, required=True, help="the pose: a moment of a clip, such as walk@1.5")
@@ -168,7 +169,7 @@ def add_asked(parser: argparse.ArgumentParser) -> None:
 
 
 def add_view(parser: argparse.ArgumentParser, what: str, default: View | None = None) -> None:
-    """The option that says which costs are shown."""
+    """The option for which costs to print."""
     views = list(map(str, View))
     parser.add_argument(
         "--view", metavar="VIEW", choices=views, default=default, help=f"{what}: {', '.join(views)} (default: summary)"

@@ -1,4 +1,4 @@
-"""A recorded stick: what a player asked for, moment by moment, read from a CSV or Parquet file.
+"""A recorded stick: what a player wanted, moment by moment, read from a CSV or Parquet file.
 
 Columns: `time_s`, ascending; then either `speed_mps` and, if wanted, `turn_dps` and `strafe_deg`, seen from the body as in
 `contextdb motion search`; or `x_mps` and `z_mps`, a velocity over the ground, and, if wanted, `facing_deg`. All other columns are
@@ -41,17 +41,17 @@ LONGEST_S = 24 * 3600.0
 
 @dataclass(frozen=True, eq=False)
 class Stick:
-    """What was asked for at some moments, `times_s` float64 [T], ascending from 0: `asked` float64 [T] by the column's name, NaN
+    """What was wanted at some moments, `times_s` float64 [T], ascending from 0: `wanted` float64 [T] by the column's name, NaN
     where it says nothing."""
 
     path: Path
     times_s: Floats
-    asked: Mapping[str, Floats]
+    wanted: Mapping[str, Floats]
 
     @property
     def is_velocity(self) -> bool:
         """Whether it asks for velocities over the ground, not for speeds."""
-        return "x_mps" in self.asked
+        return "x_mps" in self.wanted
 
     @property
     def duration_s(self) -> float:
@@ -63,8 +63,8 @@ class Stick:
 
     def value(self, name: str, moment: int, otherwise: float = 0.0) -> float:
         """What a column says at a moment, or something else where it says nothing."""
-        found = float(self.asked[name][moment]) if name in self.asked else float("nan")
-        return otherwise if np.isnan(found) else found
+        value = float(self.wanted[name][moment]) if name in self.wanted else float("nan")
+        return otherwise if np.isnan(value) else value
 
     @classmethod
     def read(cls, path: Path, conditions: Sequence[str]) -> Stick:
@@ -74,13 +74,13 @@ class Stick:
         faults = [_unknown(path, column.name, conditions) for column in columns if column.name not in (*STICK, *conditions)]
         by_name = {column.name: column for column in columns if column.name in STICK}
         faults += _missing(path, by_name)
-        asked = {name: _numbers(path, source, column, faults) for name, column in by_name.items()}
+        wanted = {name: _numbers(path, source, column, faults) for name, column in by_name.items()}
         if not faults:
-            _check_times(path, source, asked["time_s"], faults)
+            _check_times(path, source, wanted["time_s"], faults)
         if faults:
             raise TableError(*faults)
-        times_s = asked.pop("time_s")
-        return cls(path, times_s - times_s[0], asked)
+        times_s = wanted.pop("time_s")
+        return cls(path, times_s - times_s[0], wanted)
 
 
 def read_moments(
@@ -123,8 +123,8 @@ def conditions_of(tables: Mapping[str, CompiledTable]) -> list[str]:
     names = [name for table in tables.values() for name in table.asked]
     taken = [name for name in names if name in STICK]
     if taken:
-        found = f"the condition {in_quotes(taken[0])} has the name of a column of the stick's."
-        raise ContextDBError(Fault(found, f"other names for conditions than {some(STICK, len(STICK))}"))
+        fault = f"the condition {in_quotes(taken[0])} has the name of a column of the stick's."
+        raise ContextDBError(Fault(fault, f"other names for conditions than {some(STICK, len(STICK))}"))
     return list(dict.fromkeys(names))
 
 
@@ -133,8 +133,8 @@ def conditions_of(tables: Mapping[str, CompiledTable]) -> list[str]:
 
 def _unknown(path: Path, name: str, conditions: Sequence[str]) -> Fault:
     known = [*STICK, *conditions]
-    found = f"the column {in_quotes(name)} is neither the stick's nor a fact of the tables."
-    return Fault(found, some(known, len(known)), mend_for(name, known), Place(str(path)))
+    fault = f"the column {in_quotes(name)} is neither the stick's nor a fact of the tables."
+    return Fault(fault, some(known, len(known)), mend_for(name, known), Place(str(path)))
 
 
 def _missing(path: Path, columns: Mapping[str, TextColumn]) -> list[Fault]:
@@ -148,8 +148,10 @@ def _missing(path: Path, columns: Mapping[str, TextColumn]) -> list[Fault]:
             Fault(f"the file has {some([*by_speed, *by_velocity])}.", f"{some(BY_SPEED)}; or {some(BY_VELOCITY)}", place=place)
         )
     elif "speed_mps" not in columns and not {"x_mps", "z_mps"} <= columns.keys():
-        found = f"the file says nowhere where to go: it has no {in_quotes('speed_mps')}."
-        faults.append(Fault(found, "speed_mps, metres a second; or both x_mps and z_mps, a velocity over the ground", place=place))
+        message = f"no column says where to go: there is no {in_quotes('speed_mps')}."
+        faults.append(
+            Fault(message, "speed_mps, metres a second; or both x_mps and z_mps, a velocity over the ground", place=place)
+        )
     if columns and not next(iter(columns.values())).n_rows:
         faults.append(Fault("the file has no rows.", "a row for each moment", place=place))
     return faults
@@ -177,5 +179,5 @@ def _check_times(path: Path, source: AnySource, times_s: Floats, faults: list[Fa
         place = Place(str(path), source.line(row), "time_s", row)
         faults.append(Fault(f"{times_s[row]:g} s comes after {times_s[row - 1]:g} s.", "times that ascend", place=place))
     elif times_s[-1] - times_s[0] > LONGEST_S:
-        found = f"the file {path_in_quotes(path)} lasts {times_s[-1] - times_s[0]:g} s."
-        faults.append(Fault(found, f"at most {LONGEST_S:g} s", place=Place(str(path))))
+        fault = f"the file {path_in_quotes(path)} lasts {times_s[-1] - times_s[0]:g} s."
+        faults.append(Fault(fault, f"at most {LONGEST_S:g} s", place=Place(str(path))))

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 from contextdb.commands.numbers import number_of
 from contextdb.errors import Fault, QueryError, in_quotes, nearest, some
-from contextdb.motion import Biases, MotionDatabase
+from contextdb.motion import MotionDatabase
+from contextdb.motion.search.filters import Biases
 from contextdb.motion.trace.reasked import Changes
 
 BIASES = ("base", "continuing", "looping")
@@ -44,8 +45,8 @@ def _read(text: str, known: Sequence[str]) -> tuple[str, float]:
         raise QueryError(Fault(f"{in_quotes(text)} is not a change.", ACCEPTED))
     if name not in known:
         near = nearest(name, known)
-        found = f"there is no channel, bias or threshold {in_quotes(name)}."
-        raise QueryError(Fault(found, some(known), in_quotes(f"{near}={number}") if near else ""))
+        fault = f"there is no channel, bias or threshold {in_quotes(name)}."
+        raise QueryError(Fault(fault, some(known), in_quotes(f"{near}={number}") if near else ""))
     value = number_of(number)
     if value is None or abs(value) > MOST:
         raise QueryError(Fault(f"{in_quotes(number)} is not a number.", ACCEPTED))

@@ -10,17 +10,17 @@ from pathlib import Path
 from time import process_time
 from typing import Protocol
 
-from contextdb.console import PREPARING, printable
+from contextdb.console import printable
 from contextdb.tables.table import EitherTable
 
 MANY_CELLS = 20_000
-"""From so many cells of a table on, a log gets lines of progress."""
+"""A log gets lines of progress for tables of at least this many cells."""
 MANY_BYTES = 10_000_000
-"""From so many bytes of recorded contexts on, a log gets lines of progress."""
+"""The same for recorded contexts, in bytes."""
 LONG_S = 10.0
 """Other work gets them when the process has worked so long on it, in seconds of CPU: columns of a thousand tags have few cells."""
 MANY_CLIPS = 100
-"""From so many clips on, a log gets lines of progress."""
+"""The same for clips."""
 
 
 class Bar(Protocol):
@@ -48,26 +48,25 @@ def bar(label: str, is_long: bool) -> Iterator[Bar | None]:
     from rich.console import Console
     from rich.progress import Progress
 
-    with Progress(console=Console(stderr=True), transient=True) as shown:
-        task = shown.add_task(label, total=None)
-        yield lambda done, total, part="": shown.update(
+    with Progress(console=Console(stderr=True), transient=True) as display:
+        task = display.add_task(label, total=None)
+        yield lambda done, total, part="": display.update(
             task, completed=done, total=total, description=f"{label}: {part}" if part else label
         )
 
 
 def log_of(label: str, is_long: bool) -> Bar | None:
     """Tells of the work in plain lines on standard error, one for each tenth that is done; None for a terminal. Where the work is
-    not long, and does not get long, it tells only that loops are compiled."""
+    not long, and does not get long, it tells nothing."""
     if sys.stderr.isatty():
         return None
-    told: set[object] = set()
+    logged: set[int] = set()
     start = process_time()
 
     def tell(done: float, total: int, part: str = "") -> None:
         tenth = int(10 * done / total) if total else 0
-        mark = part if part == PREPARING else tenth
-        if mark not in told and (mark == PREPARING or is_long or process_time() - start > LONG_S):
-            told.add(mark)
+        if tenth not in logged and (is_long or process_time() - start > LONG_S):
+            logged.add(tenth)
             print(f"contextdb: {label}: {10 * tenth} % {part}".rstrip(), file=sys.stderr, flush=True)
 
     return tell

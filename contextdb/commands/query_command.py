@@ -21,13 +21,11 @@ from contextdb.cells.facts import UNKNOWN_MODES, Fact, no_condition, read_fact_t
 from contextdb.cells.output_types import OutputValue
 from contextdb.commands import missing_facts_by_option
 from contextdb.commands.numbers import whole_type
-from contextdb.compiled.casting.stage import CastMatches
 from contextdb.compiled.explain import Explanation, RowExplanation, describe_fact
 from contextdb.compiled.pick import Outcome
 from contextdb.compiled.table import CompiledTable, data_of
 from contextdb.console import ExitCode, aligned, output, printable, styled, terminal_width, wants_colour, width_of
 from contextdb.errors import ContextError, Fault, in_quotes, plural
-from contextdb.report.render_json import as_json
 from contextdb.tables.places import open_compiled
 
 ACTOR_FACT = re.compile(r"([^=]+?)\[([0-9]{1,6})\]\.([^=]+)=(.*)", re.DOTALL)
@@ -46,8 +44,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--explain", action="store_true", help="show the nearest rows that are not valid, their failing cells, and what to change"
     )
-    told = f"explain so many rows (default: {N_EXPLAINED})"
-    parser.add_argument("--most", type=whole_type("a number of rows, such as 10."), default=N_EXPLAINED, metavar="N", help=told)
+    help_text = f"how many rows to explain (default: {N_EXPLAINED})"
+    parser.add_argument(
+        "--most", type=whole_type("a number of rows, such as 10."), default=N_EXPLAINED, metavar="N", help=help_text
+    )
     parser.add_argument(
         "--prefer", metavar="FACT", help="cast the actors with the lowest FACT first; -FACT, as in --prefer=-speed: the highest"
     )
@@ -64,6 +64,8 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         explanation = compiled.explain(context, unknown=arguments.unknown, actors=actors, prefer=arguments.prefer)
     with output():
         if arguments.json:
+            from contextdb.report.render_json import as_json
+
             print(as_json(_document(compiled, explanation, arguments.explain, arguments.most)), end="")
         else:
             print(*_lines(compiled, explanation, arguments.explain, arguments.most), sep="\n")
@@ -92,7 +94,7 @@ def read_actors(given: list[str], compiled: CompiledTable) -> tuple[list[str], d
     """The arguments that are not facts of actors, and the actors of those that are, in the order of their numbers; None without.
     Raises ContextError for every fact that an actor cannot have or has twice, together."""
     plain: list[str] = []
-    found: dict[str, dict[int, dict[str, object]]] = {}
+    actors: dict[str, dict[int, dict[str, object]]] = {}
     faults: list[Fault] = []
     for text in given:
         match = ACTOR_FACT.match(text)
@@ -100,7 +102,7 @@ def read_actors(given: list[str], compiled: CompiledTable) -> tuple[list[str], d
             plain.append(text)
             continue
         role, number, name, value = match.groups()
-        actor = found.setdefault(role, {}).setdefault(int(number), {})
+        actor = actors.setdefault(role, {}).setdefault(int(number), {})
         try:
             if name in actor:
                 raise ContextError(Fault(f"the fact {in_quotes(f'{role}[{number}].{name}')} is given twice.", "each fact once"))
@@ -110,7 +112,7 @@ def read_actors(given: list[str], compiled: CompiledTable) -> tuple[list[str], d
             faults += error.faults
     if faults:
         raise ContextError(*faults)
-    return plain, {role: [by[n] for n in sorted(by)] for role, by in found.items()} or None
+    return plain, {role: [by[n] for n in sorted(by)] for role, by in actors.items()} or None
 
 
 def _free_value(text: str) -> object:
@@ -140,7 +142,7 @@ def _document(compiled: CompiledTable, explanation: Explanation, explains: bool,
     context = {n: _json_fact(f, n, compiled) for n, f in explanation.facts.items() if f is not None}
     outcome, undecided = Outcome(data_of(compiled), matches), explanation.undecided
     rows: list[dict[str, object]] = []
-    for r in matches:
+    for r in matches.rows.tolist():
         rows.append({"row": r, "asset": compiled.assets[r], "always": r in always})
         rows[-1] |= {"outputs": _json_outputs(compiled, r)} if len(compiled.outputs) else {}
         rows[-1] |= {"undecided": True} if undecided >> r & 1 else {}
@@ -148,9 +150,8 @@ def _document(compiled: CompiledTable, explanation: Explanation, explains: bool,
             rows[-1] |= (
                 {"chance": outcome.chances[r]} if r in outcome.chances else {"chance": 0.0, "not_picked": outcome.why_not(r)}
             )
-    if isinstance(matches, CastMatches):
-        for row in rows:
-            row["casting"] = {role: offer.label for role, offer in matches.cast(int(str(row["row"]))).items()}
+        if (roles := explanation.roles(r)) is not None:
+            rows[-1]["casting"] = roles
     document: dict[str, object] = {"format": 1, "table": compiled.name, "context": context, "count": len(matches), "matches": rows}
     if explains:
         document["explain"] = [_explained(r) for r in explanation.nearest(most)]
@@ -193,8 +194,8 @@ def _explained(row: RowExplanation) -> dict[str, object]:
 def _lines(compiled: CompiledTable, explanation: Explanation, explains: bool, most: int) -> Iterator[str]:
     colour = wants_colour(sys.stdout)
     matches = explanation.matches
-    said = f"{len(matches):,} of {plural(compiled.n_rows, 'row')} valid in {printable(compiled.name)}"
-    yield styled(said, "green" if matches else "yellow", colour)
+    summary = f"{len(matches):,} of {plural(compiled.n_rows, 'row')} valid in {printable(compiled.name)}"
+    yield styled(summary, "green" if matches else "yellow", colour)
     if matches:
         yield ""
         yield from aligned(list(_matching(compiled, explanation)), right=(0,))
@@ -211,18 +212,12 @@ def _matching(compiled: CompiledTable, explanation: Explanation) -> Iterator[tup
     matches, undecided = explanation.matches, explanation.undecided
     outcome = Outcome(data_of(compiled), matches)
     prefers_some = outcome.prefers_some  # looks at every valid row
-    cast = matches if isinstance(matches, CastMatches) else None
-    head = [
-        "row",
-        *(["matches"] if undecided else []),
-        "asset",
-        *(["cast"] if cast else []),
-        *(["pick"] if prefers_some else []),
-    ]
-    yield tuple(head)
-    for r in matches:
+    casts = {r: roles for r in matches.rows.tolist() if (roles := explanation.roles(r)) is not None}
+    columns = {"row": True, "matches": undecided, "asset": True, "cast": casts, "pick": prefers_some}
+    yield tuple(column for column, is_there in columns.items() if is_there)
+    for r in matches.rows.tolist():
         line = [str(r + 1), *(["may" if undecided >> r & 1 else "always"] if undecided else []), compiled.assets[r]]
-        line += [", ".join(f"{role}: {offer.label}" for role, offer in cast.cast(r).items())] if cast else []
+        line += [", ".join(f"{role}: {label}" for role, label in casts[r].items())] if casts else []
         line += [outcome.said_of([r])] if prefers_some else []
         yield tuple(line)
 

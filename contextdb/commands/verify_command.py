@@ -20,7 +20,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from contextdb.checks.verify import CHECKS, UNUSABLE, Verdict, files_under, verified
+from contextdb.authoring.verify import CHECKS, UNUSABLE, Verdict, files_under, verified
 from contextdb.console import ExitCode, aligned, output, progress, wants_colour
 from contextdb.errors import Fault, FileError, Place
 from contextdb.report.render_json import as_json
@@ -41,14 +41,14 @@ def run(arguments: argparse.Namespace) -> ExitCode:
 
 def _paths(texts: Sequence[str]) -> list[Path]:
     """The files that the arguments mean, each once."""
-    found: dict[Path, None] = {}
+    paths: dict[Path, None] = {}
     for text in texts:
         below = files_under(Path(text)) if os.path.isdir(text) else [Path(text)]
         if not below:
             fault = Fault("the folder holds no file of contextdb.", f"a folder with {', '.join(CHECKS)}", place=Place(text))
             raise FileError(fault)
-        found |= dict.fromkeys(below)
-    return list(found)
+        paths |= dict.fromkeys(below)
+    return list(paths)
 
 
 def _as_json(verdicts: Sequence[Verdict]) -> str:

@@ -14,12 +14,13 @@ from pathlib import Path
 from contextdb.console import ExitCode, note
 from contextdb.disk import TABLE_SUFFIXES
 from contextdb.errors import ContextDBError
+from contextdb.motion.clips.source import ENDINGS
 from contextdb.tables.project import SCHEMA_FILE, folder_of
 from contextdb.tables.watching.rest import Rest
 from contextdb.tables.watching.stamps import Stamps, look
 from contextdb.tables.watching.watcher import POLL_S, SETTLE_S, SHORTEST_WAIT_S
 
-SUFFIXES = (".bvh", *TABLE_SUFFIXES)
+SUFFIXES = (*ENDINGS, *TABLE_SUFFIXES)
 """What clips, tables and markup are in, next to contextdb.toml."""
 
 sleep, clock = time.sleep, time.monotonic
@@ -63,8 +64,8 @@ def _done(work: Callable[[], ExitCode]) -> None:
 
 def _files(folder: Path) -> list[Path]:
     """What the work may depend on, in the folder and below; hidden folders, such as that of the cache, are passed over."""
-    found = []
+    files = []
     for at, folders, names in os.walk(folder):
         folders[:] = [name for name in folders if not name.startswith(".")]
-        found += [Path(at) / name for name in names if name == SCHEMA_FILE or name.lower().endswith(SUFFIXES)]
-    return sorted(found)
+        files += [Path(at) / name for name in names if name == SCHEMA_FILE or name.lower().endswith(SUFFIXES)]
+    return sorted(files)

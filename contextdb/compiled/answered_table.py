@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
@@ -13,27 +12,25 @@ from contextdb import bitmask
 from contextdb.bitmask import Rows, read_only
 from contextdb.cells.arguments import require_many, require_row
 from contextdb.compiled.outputs import NO_OUTPUTS, Outputs
+from contextdb.core import Shared
 from contextdb.errors import ContextError, Fault, WrongType, in_quotes, mend_for, plural, some
 
 _OWN_ANSWER = "an answer of this compiled table"
 _ASK_AGAIN = "to query this table again: query(facts)"
-_INT64 = np.dtype(np.int64)
-
-FEW = 48
-"""Up to this many rows are read off the integer bit by bit; beyond, unpacking all bits at once is faster."""
-
-_PACK = [struct.Struct(f"={count}q").pack for count in range(FEW + 1)]
-"""For so many row numbers what makes bytes of them: an array over bytes is read-only, and made sooner than one of a list."""
 
 
-class AnsweredTable:
+def _as_rows(octets: bytes) -> Rows:
+    return np.frombuffer(octets, np.int64)
+
+
+class AnsweredTable(Shared):
     """What the answers of one table share: its assets, with their paths and without, and 0 … n_rows - 1 to cut row numbers from.
 
     Two are of the same table where name and `version` are equal; the version is worked out where two have to be compared.
     """
 
     __slots__ = (
-        "_of_asset", "_version", "ask_mirrored", "asked_of", "assets", "is_mirroring", "leaves", "name", "outputs", "row_numbers",
+        "_of_asset", "_version", "ask_mirrored", "asked_of", "assets", "is_mirroring", "leaves", "name", "outputs",
     )  # fmt: skip
 
     def __init__(
@@ -47,6 +44,7 @@ class AnsweredTable:
         outputs: Outputs = NO_OUTPUTS,
         asked_of: object = None,
     ) -> None:
+        super().__init__(read_only(np.arange(len(assets), dtype=np.int64)), _as_rows)
         self.assets = assets
         self.ask_mirrored = ask_mirrored
         """Asks with the facts as a mirror shows them; None for a table in which no fact changes there, and where it was pickled."""
@@ -57,7 +55,6 @@ class AnsweredTable:
         self.leaves = assets if leaves is None else leaves
         self.name = name
         self.outputs = outputs
-        self.row_numbers: Rows = read_only(np.arange(len(assets), dtype=np.int64))
         self._version = version
         self._of_asset: dict[str, int] = {}
         """The rows of each asset, with its path and without; read when they are first asked for."""
@@ -91,41 +88,17 @@ class AnsweredTable:
         return bits
 
     def _rows_by_asset(self) -> dict[str, int]:
-        found: dict[str, list[int]] = {}
+        numbers: dict[str, list[int]] = {}
         for row, names in enumerate(zip(self.assets, self.leaves, strict=True)):
             for name in dict.fromkeys(names):
-                found.setdefault(name, []).append(row)
-        return {name: bitmask.int_of(rows) for name, rows in found.items()}
+                numbers.setdefault(name, []).append(row)
+        return {name: bitmask.int_of(rows) for name, rows in numbers.items()}
 
     def no_asset(self, asset: str) -> ContextError:
         """The error for an asset that no row has, with the nearest that one has."""
         known = dict.fromkeys((*self.assets, *self.leaves))
-        found = f"the table {in_quotes(self.name)} has no asset {in_quotes(asset)}."
-        return ContextError(Fault(found, some(known) or "none: the table has no rows", mend_for(asset, known)))
-
-
-def rows_of(bits: int, numbers: Rows) -> Rows:
-    """The rows of an integer mask: int64 [count], read-only. One row or two, the usual answers, are a view of `numbers`."""
-    top = bits.bit_length() - 1
-    if top < 0:
-        return numbers[:0]
-    power = 1 << top
-    if bits == power:
-        return numbers[top : top + 1]
-    rest = bits ^ power
-    low = rest.bit_length() - 1
-    power = 1 << low
-    if rest == power:
-        return numbers[low : top + 1 : top - low]
-    found = [top]
-    while rest:
-        if len(found) == FEW:
-            return read_only(bitmask.rows(bitmask.from_int(bits, len(numbers))))
-        top = rest.bit_length() - 1
-        found.append(top)
-        rest ^= 1 << top
-    found.reverse()
-    return np.frombuffer(_PACK[len(found)](*found), _INT64)
+        problem = f"the table {in_quotes(self.name)} has no asset {in_quotes(asset)}."
+        return ContextError(Fault(problem, some(known) or "none: the table has no rows", mend_for(asset, known)))
 
 
 # ---- rows as a caller says them, read into bits
@@ -157,8 +130,8 @@ def bits_said(said: object, n_rows: int, of_assets: Callable[[Sequence[str]], in
 def bits_of_flags(flags: NDArray[np.bool_], n_rows: int) -> int:
     """The rows of a flag for each row, as bits; raises ContextError for another number of flags."""
     if flags.shape != (n_rows,):
-        found = f"there are flags of shape {flags.shape}, and {plural(n_rows, 'row')}."
-        raise ContextError(Fault(found, f"one bool for each row of the table: ({n_rows},)"))
+        problem = f"there are flags of shape {flags.shape}, and {plural(n_rows, 'row')}."
+        raise ContextError(Fault(problem, f"one bool for each row of the table: ({n_rows},)"))
     return bitmask.to_int(bitmask.pack(flags))
 
 

@@ -6,7 +6,8 @@ Tensors, R rows, W = ceil(R / 64) words, C conditions; every integer and double 
     priorities             int64 [R]
     row_weights            float64 [R]
     assets                 uint8                 JSON list of R texts
-    specificities          float64 [R]           where the policy is "specific": higher first, after the priority
+    ranks                  float64 [R]           what the policy ranks rows by before chance and costs, higher first
+    specificities          float64 [R]           where the policy looks at it: what the ranks say of the cells
     once                   bool [R]              where rows are played once at most
     cooldown_s             float64 [R]           where rows rest for seconds
     cooldown_turns         int64 [R]             where rows rest for picks
@@ -43,7 +44,7 @@ For a table with tables inside, D the depth, T the number of tables (`contextdb.
     ways.numbers           int32 [D, R]
     ways.rows              int32 [D, R]
     ways.leaves            uint8                 JSON list of R texts
-    ways.TTT.FIELD         priorities, row_weights and lines of table number TTT; specificities, once, cooldown_s and
+    ways.TTT.FIELD         priorities, ranks, row_weights and lines of table number TTT; specificities, once, cooldown_s and
                            cooldown_turns where it has them, which then are nowhere else
     CCC.layers             int32 [D, R]          which text each depth says
     CCC.said               uint8                 JSON list of those texts
@@ -52,18 +53,16 @@ For a table with tables inside, D the depth, T the number of tables (`contextdb.
 The metadata hold `contextdb` (the version of this layout), `about` (JSON: name, policy, fallback, conditions and the kind of each
 column; where facts are derived also the conditions that they are computed from; where rows have rules also their column and the
 conditions that they name and that are not columns) and `digest`, BLAKE2b-128 of `about` and of all
-tensors in the order of their names. Opening checks all of it. A table with rules has layout 2, so that what knows only masks does
-not answer without them, and so has one with tables inside and soft cells. One that is picked from by "specific" or "cheapest", at
-any depth, has layout 3. Any other has layout 1.
+tensors in the order of their names. Opening checks all of it. `about` names the policy of each table and says how
+it picks, so that a reader needs no names: `choose` and `by_cost` (`contextdb.schema.policies`).
 """
 
 from __future__ import annotations
 
 import json
 import math
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
@@ -72,13 +71,17 @@ from contextdb.columns import TextColumn
 from contextdb.compiled.classes import ColumnMasks, NumberMasks, TagMasks, ValueMasks, WideMasks
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.mask_bits import SoftMasks
-from contextdb.compiled.outputs_stored import outputs_from, outputs_to_tensors, ways_from, ways_to_json, ways_to_tensors
+from contextdb.compiled.outputs_stored import (
+    known_policy,
+    outputs_from,
+    outputs_to_tensors,
+    policy_to_json,
+    ways_from,
+    ways_to_json,
+    ways_to_tensors,
+)
 from contextdb.compiled.pick_columns import PickColumns
-from contextdb.compiled.programs import programs_to_tensors
-from contextdb.expressions import Derivation
-from contextdb.expressions.rules import WhenColumn, WhenRules
 from contextdb.files.tensors import (
-    SUFFIX,
     FileKind,
     Tensors,
     digest_of,
@@ -89,13 +92,13 @@ from contextdb.files.tensors import (
 )
 from contextdb.schema.settings import Schema, derivation_of
 
-__all__ = ["SUFFIX", "open_artefact", "save"]
+if TYPE_CHECKING:
+    from contextdb.expressions import Derivation
+    from contextdb.expressions.rules import WhenRules
 
 COMPILED = FileKind(
-    "contextdb", 1, "one that contextdb compiled", "a file that this version of contextdb compiled", "to compile the table again"
+    "contextdb", 4, "one that contextdb compiled", "a file that this version of contextdb compiled", "to compile the table again"
 )
-WITH_RULES = replace(COMPILED, layout=2, also=(COMPILED.layout,))
-WITH_RANKS = replace(COMPILED, layout=3, also=(COMPILED.layout, WITH_RULES.layout))
 
 
 def save(compiled: CompiledData, path: Path) -> None:
@@ -103,6 +106,7 @@ def save(compiled: CompiledData, path: Path) -> None:
     tensors: Tensors = {
         "enabled": compiled.enabled,
         "priorities": compiled.priorities,
+        "ranks": compiled.ranks,
         "row_weights": compiled.row_weights,
         "assets": texts_to_array(list(compiled.assets)),
         "declared": texts_to_array(sorted(compiled.declared)),
@@ -123,7 +127,7 @@ def save(compiled: CompiledData, path: Path) -> None:
     if compiled.when is not None:
         tensors["when.codes"] = compiled.when.texts.codes
         tensors["when.texts"] = texts_to_array(list(compiled.when.texts.texts))
-    tensors |= programs_to_tensors(compiled)
+    tensors |= _programs(compiled)
     tensors |= compiled.picking.arrays
     if compiled.ways is not None:
         tensors |= ways_to_tensors(compiled.ways)
@@ -131,7 +135,7 @@ def save(compiled: CompiledData, path: Path) -> None:
         {
             "name": compiled.name,
             "rows": compiled.n_rows,
-            "policy": compiled.policy,
+            **policy_to_json(compiled.policy),
             "fallback": compiled.fallback,
             "conditions": [_condition_to_json(c) for c in compiled.conditions],
             "columns": kinds,
@@ -141,26 +145,28 @@ def save(compiled: CompiledData, path: Path) -> None:
         | ({"when": _when_to_json(compiled)} if compiled.when else {})
         | ({"ways": ways_to_json(compiled.ways)} if compiled.ways else {})
     )
-    write_tensors(path, _kind_of(compiled), tensors, {"about": about, "digest": digest_of(tensors, about)})
+    write_tensors(path, COMPILED, tensors, {"about": about, "digest": digest_of(tensors, about, str(COMPILED.layout))})
 
 
-def _kind_of(compiled: CompiledData) -> FileKind:
-    """The layout that the table needs, so that what does not know it refuses the file."""
-    if not compiled.policies.isdisjoint(("specific", "cheapest")):
-        return WITH_RANKS
-    is_more = compiled.when is not None or (compiled.ways is not None and any(compiled.soft))
-    return WITH_RULES if is_more else COMPILED
+def _programs(compiled: CompiledData) -> Tensors:
+    if compiled.derivation is None and compiled.when is None:
+        return {}
+    from contextdb.compiled.programs import programs_of, programs_to_tensors
+
+    return programs_to_tensors(programs_of(compiled.derivation, compiled.when))
 
 
 def open_artefact(path: Path) -> CompiledData:
     """Open a compiled table by memory map, checked. Raises ArtefactError where the file is truncated, altered, of another layout,
     or no artefact at all; with the reason and the mend; FileError where the file cannot be read."""
-    tensors, metadata = read_tensors(path, WITH_RANKS)
+    tensors, metadata = read_tensors(path, COMPILED)
     with COMPILED.reading(path):
         about = metadata["about"]
-        if digest_of(tensors, about) != metadata.get("digest"):
+        if digest_of(tensors, about, metadata[COMPILED.key]) != metadata.get("digest"):
             raise COMPILED.refused(path, "the file was altered: its contents do not match its digest.")
-        return _table(json.loads(about), tensors)
+        compiled = _table(json.loads(about), tensors)
+        _ = compiled.core  # it checks that the arrays go together
+        return compiled
 
 
 def _table(about: dict[str, Any], tensors: Tensors) -> CompiledData:
@@ -180,7 +186,7 @@ def _table(about: dict[str, Any], tensors: Tensors) -> CompiledData:
             TextColumn(c.name, tuple(texts_from_array(tensors[f"{prefix}.texts"])), tensors[f"{prefix}.codes"])
             for c, (prefix, _) in zip(conditions, numbered, strict=True)
         ),
-        policy=about["policy"],
+        policy=known_policy(about["policy"]),
         fallback=about["fallback"],
         derivation=_derivation(about, conditions),
         slots=_slots(about, tensors),
@@ -200,6 +206,8 @@ def _when_to_json(compiled: CompiledData) -> dict[str, object]:
 def _when(about: dict[str, Any], conditions: tuple[Condition, ...], tensors: Tensors) -> WhenRules | None:
     if "when" not in about:
         return None
+    from contextdb.expressions.rules import WhenColumn, WhenRules
+
     known = {c.name: c for c in (*conditions, *map(_condition_from_json, about["when"]["conditions"]))}
     texts = TextColumn(about["when"]["name"], tuple(texts_from_array(tensors["when.texts"])), tensors["when.codes"])
     column = WhenColumn.read(texts, known)
@@ -220,9 +228,14 @@ def _slots(about: dict[str, Any], tensors: Tensors) -> tuple[TextColumn, ...] | 
 def _derivation(about: dict[str, Any], conditions: tuple[Condition, ...]) -> Derivation | None:
     if "computed_from" not in about:
         return None
+    from contextdb.expressions import ExpressionError
+
     others = [_condition_from_json(c) for c in (*about["computed_from"], *about.get("when", {"conditions": ()})["conditions"])]
     known = Schema(conditions={c.name: c for c in (*conditions, *others)})
-    return derivation_of(known, known.conditions)
+    try:
+        return derivation_of(known, known.conditions)
+    except ExpressionError as error:
+        raise ValueError(error.faults) from None
 
 
 def _computed_from(compiled: CompiledData) -> list[Condition]:

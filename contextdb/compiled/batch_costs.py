@@ -32,13 +32,13 @@ def costs_of_pairs(
             parts.append((mask_of(_soft_table(compiled, at, soft), given), soft[1]))
 
     def costs(contexts: Rows, rows: Rows) -> NDArray[np.float64]:
-        found = np.zeros((compiled.n_depths, len(rows)))
+        totals = np.zeros((compiled.n_depths, len(rows)))
         for masks, penalties in parts:
-            for depth in range(len(found)):
+            for depth in range(len(totals)):
                 at = depth * compiled.n_rows + rows
                 matches = masks[contexts, at >> 6] >> (at & 63).astype(np.uint64) & np.uint64(1)
-                found[depth] += np.where(matches, 0.0, penalties[at])
-        return found
+                totals[depth] += np.where(matches, 0.0, penalties[at])
+        return totals
 
     return costs
 

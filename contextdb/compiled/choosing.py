@@ -1,30 +1,37 @@
-"""How the policies choose among the valid rows of many contexts at once.
+"""What of a compiled table decides between its valid rows: the core chooses by it, for one character or for many.
 
-D = depth of tables inside tables (1 without), n rows, P pairs of a context and a row that is valid in it: context by context, the
-rows of each ascending. It is what `contextdb.compiled.pick` says of one context, without a loop over contexts.
+D = depth of tables inside tables (1 without), n rows.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.bitmask import Rows
+from contextdb import bitmask
+from contextdb.bitmask import Rows, Words
+from contextdb.columns import distinct
 from contextdb.compiled.data import CompiledData
-from contextdb.compiled.pick import Ranked, not_unique
-from contextdb.errors import Place, PolicyError
-from contextdb.schema.shapes import CHANCE
+from contextdb.compiled.matches import Matches, layered_penalties
+from contextdb.compiled.pick_columns import PickColumns
+from contextdb.core import Choices
+from contextdb.errors import Fault, PolicyError, in_quotes, some
+from contextdb.schema.policies import POLICIES, Policy, decided_by
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-MOST_PADDED = 1 << 20
-"""Weights are summed up for so many rows at once."""
+PickedArrays = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], Floats]
+"""What characters have picked, as `contextdb.compiled.picked` keeps it: turns [C], recent [C, k], rests, rest_turns, rest_s [C,
+r]."""
+MOST_RANKS = 16
+"""Of more ranks the highest is looked for row by row."""
 
 Key = tuple[str, str, int]
 """A row by what stays when the table is edited: the name of its table, its asset, and how many rows before it have that asset."""
@@ -45,6 +52,28 @@ class Limits:
     def needs_time(self) -> bool:
         """Whether some of them rest for seconds."""
         return bool((self.cooldown_s > 0.0).any())
+
+
+class Ranked(Protocol):
+    """What of a table says which of its rows is preferred: the table itself, or one of those in it."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def policy(self) -> Policy: ...
+
+    @property
+    def row_weights(self) -> NDArray[np.float64]: ...
+
+    @property
+    def ranks(self) -> NDArray[np.float64]: ...
+
+    @property
+    def priorities(self) -> NDArray[np.int64]: ...
+
+    @property
+    def picking(self) -> PickColumns: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,75 +106,118 @@ class Choosing:
         ranks, weights = np.zeros(taken.shape), np.ones(taken.shape)
         is_unique, is_cheapest = np.zeros(taken.shape, np.bool_), np.zeros(taken.shape, np.bool_)
         for number, table in enumerate(tables):
-            here = numbers == number
+            here = (numbers == number) if ways is not None else np.s_[:]
             rows = taken[here]
-            if table.policy in CHANCE:
-                ranks[here], weights[here] = table.ranks[rows], table.row_weights[rows]
-            elif table.policy == "first":
-                ranks[here] = -rows
-            is_unique[here] = table.policy == "unique"
-            is_cheapest[here] = table.policy == "cheapest"
+            policy = POLICIES[table.policy]
+            ranks[here] = table.ranks[rows]
+            if policy.choose == "chance":
+                weights[here] = table.row_weights[rows]
+            is_unique[here] = policy.choose == "refuse"
+            is_cheapest[here] = policy.by_cost
         pickable = np.logical_and.reduce(weights > 0.0)
         return cls(compiled, taken, _groups(taken), ranks, weights, is_unique, is_cheapest, pickable, _limits(compiled, taken))
 
-    @cached_property
+    @property
     def remembers(self) -> bool:
         """Whether chance decides anywhere, so that assets that were picked lately are left out."""
-        return not self.compiled.policies.isdisjoint(CHANCE)
+        return decided_by("chance", self.compiled.policies)
+
+    @property
+    def wants_costs(self) -> bool:
+        """Whether a policy looks at what soft cells cost."""
+        return bool(self.is_cheapest.any())
 
     @cached_property
-    def plain(self) -> tuple[list[float], list[float]]:
-        """The ranks and weights of a table without tables inside, for one context at a time."""
-        return self.ranks[0].tolist(), self.weights[0].tolist()
+    def _deciding(self) -> tuple[bool, tuple[NDArray[Any], ...]]:
+        """Whether all rows have one weight, and the first arrays that `Choices` are made of."""
+        n, able = self.compiled.n_rows, self.pickable
+        ranks = distinct(self.ranks[0, able])[::-1] if len(self.taken) == 1 else np.zeros(0)
+        levels = [bitmask.pack(able & (self.ranks[0] == rank)) for rank in ranks] if len(ranks) <= MOST_RANKS else []
+        if self.is_unique.any():
+            levels = []  # several rows are refused, which ranks do not tell
+        own = self.taken, self.groups, self.ranks, self.weights, self.is_unique, self.is_cheapest, bitmask.pack(self.pickable)
+        weights = self.weights[0, able]
+        is_even = len(self.taken) == 1 and (weights == weights[:1]).all()
+        return bool(is_even), (*own, np.array(levels, np.uint64).reshape(len(levels), bitmask.n_words(n)))
 
-    def may_be_picked(self, contexts: Rows, rows: Rows, costs: Floats | None, is_one: bool = False) -> Rows:
-        """Of P pairs those that the policies may pick: their places. `costs` [D, P] are needed where `is_cheapest` is True. Raises
-        PolicyError for several rows of a table whose policy is "unique"; with the number of the first such context, if not
-        `is_one`."""
-        kept = np.flatnonzero(self.pickable[rows])
-        for depth in range(len(self.taken)):
-            at = rows[kept]
-            starts = starts_of(contexts[kept], self.groups[depth, at])
-            if self.is_unique[depth].any():
-                self._refuse_several(depth, contexts[kept], at, starts, is_one)
-            kept = kept[highest(self.ranks[depth, at], starts)]
-            if costs is not None and self.is_cheapest[depth].any():
-                at = rows[kept]
-                own = np.where(self.is_cheapest[depth, at], -costs[depth, kept], 0.0)
-                kept = kept[highest(own, starts_of(contexts[kept], self.groups[depth, at]))]
-        return kept
+    def choices(self, assets: Rows, columns: Rows, n_columns: int) -> Choices:
+        """What the core picks with: `assets` are the numbers of the rows' assets, `columns` those of `limits` among so many."""
+        is_even, own = self._deciding
+        n_assets = int(assets.max(initial=-1)) + 1
+        starts = np.searchsorted(np.sort(assets), np.arange(n_assets + 1)).astype(np.int64)
+        of_asset = assets, np.argsort(assets, kind="stable"), starts
+        limits = self.limits
+        if limits is None or not len(columns):
+            none = np.zeros(0, np.int64)
+            rests = np.full(self.taken.shape, -1), none, np.zeros(1, np.int64), none.astype(np.bool_), none.astype(np.float64), none
+        else:
+            of, rows = limits.of_row[limits.of_row >= 0], np.nonzero(limits.of_row >= 0)[1]
+            order = np.argsort(of, kind="stable")
+            limit_starts = np.searchsorted(of[order], np.arange(len(limits.keys) + 1)).astype(np.int64)
+            rests = limits.of_row, rows[order], limit_starts, limits.once, limits.cooldown_s, limits.cooldown_turns
+        limit_of_column = np.full(n_columns, -1)
+        limit_of_column[columns] = np.arange(len(columns))
+        arrays = (*own, *of_asset, *rests, columns, limit_of_column, *self._shares)
+        return Choices(self.compiled.n_rows, self.remembers, is_even, tuple(map(np.ascontiguousarray, arrays)))
 
-    def drawn(self, contexts: Rows, rows: Rows, chance: Callable[[int, Rows], Floats]) -> Rows:
-        """One pair of each context, by weight: their places. `chance` gives numbers in [0, 1) for a depth and contexts."""
-        kept = np.arange(len(rows))
-        for depth in range(len(self.taken)):
-            taken = self.taken[depth, rows[kept]]
-            starts = starts_of(contexts[kept], taken)
-            of, at = contexts[kept][starts], rows[kept][starts]
-            counts = _lengths(starts_of(of), len(of))
-            if len(of) == len(counts):  # nothing to choose
-                continue
-            hit = np.zeros(len(of), np.bool_)
-            hit[_by_weight(self.weights[depth, at], counts, chance(depth, of[starts_of(of)]))] = True
-            kept = kept[np.repeat(hit, _lengths(starts, len(kept)))]
-        return kept
+    @cached_property
+    def _shares(self) -> tuple[Floats, Words]:
+        """Each weight over the highest, and the rows that have it; nothing for tables inside tables."""
+        if len(self.taken) > 1 or not self.pickable.any():
+            return np.zeros(0), np.zeros(bitmask.n_words(self.compiled.n_rows), np.uint64)
+        highest = self.weights[0].max()
+        return self.weights[0] / highest, bitmask.pack(self.weights[0] == highest)
 
-    def _refuse_several(self, depth: int, contexts: Rows, rows: Rows, starts: Rows, is_one: bool) -> None:
-        """Raise PolicyError where several rows of a table whose policy is "unique" are in one group."""
-        if not len(rows):
-            return
-        taken = self.taken[depth, rows]
-        several = np.maximum.reduceat(taken, starts) != np.minimum.reduceat(taken, starts)
-        wrong = np.flatnonzero(several & self.is_unique[depth, rows[starts]])
-        if len(wrong):
-            stop = [*starts.tolist(), len(rows)][wrong[0] + 1]
-            own = rows[starts[wrong[0]] : stop]
-            own = own[np.unique(taken[starts[wrong[0]] : stop], return_index=True)[1]]
-            table = self.compiled if self.compiled.ways is None else self.compiled.ways.table_at(int(own[0]), depth)
-            assert table is not None
-            error = not_unique(table.name, [self.compiled.way(row)[depth].asset for row in own.tolist()])
-            context = Place(row=int(contexts[starts[wrong[0]]]))
-            raise error if is_one else PolicyError(*(f.at(context) for f in error.faults))
+    @cached_property
+    def _without_memory(self) -> Choices:
+        return self.choices(np.zeros(self.compiled.n_rows, np.int64), np.zeros(0, np.int64), 0)
+
+    def candidates(self, matches: Matches) -> Rows:
+        """The valid rows that may be picked, whatever was picked before: int64 [count]. Raises PolicyError for several rows of a
+        table whose policy is "unique"."""
+        stages = np.zeros((3, bitmask.n_words(self.compiled.n_rows)), np.uint64)
+        none = np.zeros(1, np.int64)
+        refusal = self._without_memory.pick(
+            matches.mask[None], none, none, 0, 0.0, nothing_picked(), self.costs_of(matches), none.copy(), stages
+        )
+        if refusal is not None:
+            raise self.refused(refusal)
+        return bitmask.rows(stages[1])
+
+    def costs_of(self, matches: Matches) -> Floats | None:
+        """What the soft cells of the valid rows cost, where a policy asks for it: float64 [D, count]."""
+        if not (self.wants_costs and matches.has_penalties):
+            return None
+        return np.ascontiguousarray(layered_penalties(matches)[:, matches.indices])
+
+    def refused(self, refusal: tuple[int, ...]) -> PolicyError:
+        """The error of rows that a policy refuses, as `Choices.pick` gives them: a context, a depth, and the rows of one table."""
+        _, depth, *rows = refusal
+        own = [rows[i] for i in np.unique(self.taken[depth, rows], return_index=True)[1].tolist()]
+        table = self.compiled if self.compiled.ways is None else self.compiled.ways.table_at(own[0], depth)
+        assert table is not None
+        return _not_unique(table, [self.compiled.way(row)[depth].asset for row in own])
+
+
+def choose_as(compiled: CompiledData, older: CompiledData) -> None:
+    """Take over what decides between the rows of an older version of a table, where nothing of that has changed."""
+    parts = ("policy", "ways", "assets", "priorities", "row_weights", "picking")
+    if all(getattr(compiled, name) is getattr(older, name) for name in parts):
+        choosing = copy(older.once(Choosing.of))
+        object.__setattr__(choosing, "compiled", compiled)
+        compiled.__dict__.setdefault("_made", {})[Choosing.of] = choosing
+
+
+def nothing_picked() -> PickedArrays:
+    """The memory of one character that has picked nothing, and that remembers nothing."""
+    none = np.zeros((1, 0), np.int64)
+    return np.zeros(1, np.int64), none, none, none, np.zeros((1, 0))
+
+
+def _not_unique(table: Ranked, assets: list[str]) -> PolicyError:
+    """The error of several rows of a table that are valid at once and must not."""
+    problem = f"{len(assets)} rows of {in_quotes(table.name)} are valid at once: {some(assets)}."
+    return PolicyError(Fault(problem, f'one: the table\'s policy is "{table.policy}"', rule="not-unique"))
 
 
 def _groups(taken: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -195,55 +267,3 @@ def _names(compiled: CompiledData, taken: NDArray[np.int64], here: Flags) -> dic
         if row not in names:
             names[row] = compiled.way(flat)[depth].asset
     return names
-
-
-def starts_of(*numbers: Rows) -> Rows:
-    """Where a run of equal numbers begins."""
-    is_new = np.ones(len(numbers[0]), np.bool_)
-    is_new[1:] = np.logical_or.reduce([own[1:] != own[:-1] for own in numbers])
-    return np.flatnonzero(is_new)
-
-
-def highest(numbers: NDArray[Any], starts: Rows) -> Flags:
-    """Which of some numbers are the highest of their run."""
-    if not len(numbers):
-        return np.zeros(0, np.bool_)
-    highest = np.maximum.reduceat(numbers, starts)
-    return np.asarray(numbers == np.repeat(highest, _lengths(starts, len(numbers))))
-
-
-def _by_weight(weights: Floats, counts: Rows, chance: Floats) -> Rows:
-    """The place that chance hits in each run of so many weights, as a picker finds it for one."""
-    firsts = np.cumsum(counts) - counts
-    if len(counts) * int(counts.max(initial=0)) <= MOST_PADDED:
-        return np.asarray(firsts + _hits(weights, counts, chance))
-    found = np.empty(len(counts), np.int64)
-    order = np.argsort(counts, kind="stable")
-    while len(order):
-        most = max(1, MOST_PADDED // int(counts[order[-1]]))
-        own, order = order[-most:], order[:-most]
-        at = np.repeat(firsts[own] - (np.cumsum(counts[own]) - counts[own]), counts[own])
-        found[own] = firsts[own] + _hits(weights[at + np.arange(len(at))], counts[own], chance[own])
-    return found
-
-
-def _hits(weights: Floats, counts: Rows, chance: Floats) -> Rows:
-    """The same, counted from the beginning of each run. Sums are those of Python's own additions, one after the other."""
-    if not len(counts):
-        return counts
-    is_there = np.arange(int(counts.max())) < counts[:, None]
-    padded = np.zeros(is_there.shape)
-    padded[is_there] = weights
-    padded /= padded.max(axis=1, keepdims=True)
-    sums = np.cumsum(padded, axis=1)
-    hits = (sums <= (chance * sums[:, -1])[:, None]).sum(axis=1)
-    places: Rows = np.minimum(hits, counts - 1)
-    return places
-
-
-def _lengths(starts: Rows, stop: int) -> Rows:
-    """How long each run is, the last one up to `stop`."""
-    lengths = np.empty_like(starts)
-    lengths[:-1] = starts[1:] - starts[:-1]
-    lengths[-1:] = stop - starts[-1:]
-    return lengths

@@ -31,8 +31,8 @@ from contextdb.bitmask import Words
 from contextdb.cells import sets
 from contextdb.cells.domains import Domain
 from contextdb.cells.numbers import CellSpans, spans_of
-from contextdb.columns import Codes
-from contextdb.compiled.ruler import Ruler
+from contextdb.columns import Codes, distinct
+from contextdb.core import turn_rows
 
 FLAT_BYTES = 2 << 20
 """A number column whose masks would take more is kept in two digits."""
@@ -93,11 +93,6 @@ class NumberMasks:
         """Every mask as a Python integer, the missing one last."""
         return [bitmask.to_int(m) for m in self.masks]
 
-    @cached_property
-    def rulers(self) -> dict[bool, Ruler | None]:
-        """The rulers that look-ups have made, on a line and on a circle: a column that is compiled once more keeps them."""
-        return {}
-
     def codes(self, fact: float | None) -> tuple[int, ...]:
         """The number of the fact's mask; None is a missing fact."""
         return (len(self.masks) - 1 if fact is None else bisect_right(self.bound_list, fact),)
@@ -153,10 +148,10 @@ class WideMasks:
         if code == len(self.bounds) + 1:
             return bitmask.to_int(self.any_mask)
         g, f, n = code >> self.shift, code & ((1 << self.shift) - 1), self.n_coarse
-        found = 0
+        bits = 0
         for low, high in self.layers:
-            found |= (low[g] | low[n + g] & low[2 * n + f]) & (high[g] | high[n + g] & high[2 * n + f])
-        return found
+            bits |= (low[g] | low[n + g] & low[2 * n + f]) & (high[g] | high[n + g] & high[2 * n + f])
+        return bits
 
     def set_bits(self, accepts: sets.Accepted) -> tuple[int, int]:
         """Rows that accept some, and rows that accept all, of a set of numbers."""
@@ -248,29 +243,17 @@ def _flags(values: Sequence[bool]) -> NDArray[np.bool_]:
     return np.array(values, np.bool_)
 
 
-def _spread_pairs(pairs: Sequence[tuple[int, int]], codes: Codes) -> tuple[Pairs, Pairs]:
-    """`_spread` of (cell, mask number) pairs."""
-    cell, mask = np.array(pairs, np.int64).reshape(-1, 2).T
-    return _spread(cell, mask, codes)
+def _turned(pairs: Sequence[tuple[int, int]], codes: Codes, n_masks: int) -> Words:
+    """`_masks_of` of (cell, mask number) pairs."""
+    cells, numbers = np.ascontiguousarray(np.array(pairs, np.int64).reshape(-1, 2).T)
+    return _masks_of(cells, numbers, codes, n_masks)
 
 
-def _spread(cell: Pairs, mask: Pairs, codes: Codes) -> tuple[Pairs, Pairs]:
-    """For each cell and the number of a mask: (mask number, row) for every row that holds the cell."""
-    short = codes.astype(np.uint16) if codes.max(initial=0) < 1 << 16 else codes  # these numpy sorts by their digits
-    order = np.argsort(short, kind="stable")
-    counts = np.bincount(codes, minlength=int(cell.max(initial=-1)) + 1)
-    starts = (np.cumsum(counts) - counts)[cell]
-    counts = counts[cell]
-    within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    return np.repeat(mask, counts), order[np.repeat(starts, counts) + within]
-
-
-def _scatter(mask_numbers: Pairs, rows: Pairs, n_masks: int, n_rows: int) -> Words:
-    """Masks uint64 [n_masks, W] whose bits are turned over once for each (mask number, row)."""
-    width = bitmask.n_words(n_rows)
-    masks = np.zeros(n_masks * width, np.uint64)
-    np.bitwise_xor.at(masks, mask_numbers * width + (rows >> 6), np.uint64(1) << (rows & 63).astype(np.uint64))
-    return masks.reshape(n_masks, width)
+def _masks_of(cells: Pairs, numbers: Pairs, codes: Codes, n_masks: int) -> Words:
+    """Masks uint64 [n_masks, W] whose bit of a row is turned over once for each mask number of its cell."""
+    masks = np.zeros((n_masks, bitmask.n_words(len(codes))), np.uint64)
+    turn_rows(np.ascontiguousarray(codes, np.int32), cells, numbers, masks)
+    return masks
 
 
 def _value_masks(cells: Sequence[sets.Accepted | None], codes: Codes, domain: Domain) -> ValueMasks:
@@ -279,7 +262,7 @@ def _value_masks(cells: Sequence[sets.Accepted | None], codes: Codes, domain: Do
     class_of = {v: i for i, v in enumerate(values)}
     n_classes = len(values) + has_others
     pairs = [(i, class_of[v]) for i, c in enumerate(cells) if isinstance(c, sets.ValueSet) for v in c.values if v in class_of]
-    masks = _scatter(*_spread_pairs(pairs, codes), n_classes + 1, len(codes))
+    masks = _turned(pairs, codes, n_classes + 1)
     accepts_rest = _flags([c is None or (isinstance(c, sets.ValueSet) and c.is_complement) for c in cells])
     masks ^= bitmask.pack(accepts_rest[codes])
     masks[-1] = _any_rows(cells, codes)
@@ -298,7 +281,7 @@ def _number_masks(cells: Sequence[sets.Cell], codes: Codes, domain: Domain) -> N
     top = 180.0 if domain.type.is_circular else np.inf
     has_end = ends <= top if top == np.inf else ends < top
     has_end &= ~np.isnan(ends)
-    bounds = np.unique(np.concatenate([spans.lows[spans.lows > bottom], ends[has_end]]))
+    bounds = distinct(np.concatenate([spans.lows[spans.lows > bottom], ends[has_end]]))
     first = np.searchsorted(bounds, spans.lows, "right")
     stop = np.where(has_end, np.searchsorted(bounds, ends, "right"), len(bounds) + 1)
     is_flat = (len(bounds) + 2) * bitmask.n_words(len(codes)) * 8 <= FLAT_BYTES
@@ -317,7 +300,7 @@ def _flat_masks(bounds: NDArray[np.float64], spans: CellSpans, first: Pairs, sto
     n_classes = len(bounds) + 1
     cells, turns = np.concatenate([spans.owners, spans.owners]), np.concatenate([first, stop])
     inner = turns < n_classes
-    masks = _scatter(*_spread(cells[inner], turns[inner], codes), n_classes + 1, len(codes))
+    masks = _masks_of(cells[inner], turns[inner], codes, n_classes + 1)
     np.bitwise_xor.accumulate(masks, axis=0, out=masks)
     any_rows = bitmask.pack(spans.are_any[codes])
     masks |= any_rows
@@ -346,11 +329,9 @@ def _wide_masks(bounds: NDArray[np.float64], spans: CellSpans, first: Pairs, sto
 def _digit_masks(cell: Pairs, number: Pairs, codes: Codes, n_classes: int, shift: int, is_end: bool) -> Words:
     """Masks [2 G + F, W] of the rows whose number is <= k (or, for ends, > k), to be looked up by the two digits of k."""
     n_coarse, n_fine = (n_classes >> shift) + 1, 1 << shift
-    coarse, rows = _spread(cell, number >> shift, codes)
-    fine, fine_rows = _spread(cell, number & (n_fine - 1), codes)
-    at = _scatter(coarse, rows, n_coarse, len(codes))
+    at = _masks_of(cell, number >> shift, codes, n_coarse)
     upto = np.bitwise_or.accumulate(at, axis=0)
-    fine_upto = np.bitwise_or.accumulate(_scatter(fine, fine_rows, n_fine, len(codes)), axis=0)
+    fine_upto = np.bitwise_or.accumulate(_masks_of(cell, number & (n_fine - 1), codes, n_fine), axis=0)
     if is_end:
         return np.concatenate([upto[-1] ^ upto, at, fine_upto[-1] ^ fine_upto])
     return np.concatenate([upto ^ at, at, fine_upto])
@@ -370,7 +351,7 @@ def _tag_masks(cells: Sequence[sets.Accepted | None], codes: Codes) -> TagMasks:
     bans = [(i, 3 * slot_of[t] + 1) for i, c in plain for t in (c.needs if c.is_contradiction else c.bans)]
     fails = [(i, 3 * (len(tags) + n)) for n, (i, _) in enumerate(negated)]
     n_slots = len(tags) + len(negated)
-    masks = _scatter(*_spread_pairs(needs + bans + fails, codes), 3 * n_slots, len(codes))
+    masks = _turned(needs + bans + fails, codes, 3 * n_slots)
     masks ^= bitmask.full(len(codes))
     masks[2::3] = _any_rows(cells, codes)
     return TagMasks(len(codes), tags, tuple(c for _, c in negated), masks)

@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import Any, ClassVar, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,28 +27,35 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import Context, Fact, Unknown, check_mode, missing_error, misspelt, read_fact, require_context
 from contextdb.cells.grammar import parse_cell, reads
 from contextdb.cells.hysteresis import widened_fact, with_hysteresis
-from contextdb.cells.mirroring import changed_in_mirror, in_mirror, kept_facts, mirrored_facts
+from contextdb.cells.mirroring import changed_in_mirror, frozen_facts, in_mirror, mirrored_facts
 from contextdb.cells.notebook import one_line
 from contextdb.cells.sets import ANY, Cell
 from contextdb.columns import TextColumn
-from contextdb.compiled.classes import ColumnMasks
-from contextdb.compiled.lookup import UNUSUAL, SingleLookup, StraightAsk, build_ask, ruled_ask, single_lookup
+from contextdb.compiled.classes import ColumnMasks, NumberMasks, WideMasks
+from contextdb.compiled.codes import CodeSlots
+from contextdb.compiled.core_table import UNKNOWN, core_table
 from contextdb.compiled.mask_bits import SoftMasks, bits_of, costs_of, nbytes
 from contextdb.compiled.matches import Answering, Matches, with_mirrored, with_penalties, with_widened
 from contextdb.compiled.memory import Memory
+from contextdb.compiled.number_cells import NumberCells, number_cells
 from contextdb.compiled.outputs import NO_OUTPUTS, Outputs
-from contextdb.compiled.pick_columns import NOTHING, PickColumns, ranks_of
-from contextdb.compiled.stack import MaskStack
+from contextdb.compiled.pick_columns import NOTHING, PickColumns
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.compiled.versions import said_by, version_of
+from contextdb.compiled.watcher import Watcher
 from contextdb.compiled.ways import Step, Ways
+from contextdb.core import Table
 from contextdb.errors import ContextError, Fault, Place, in_quotes, plural
-from contextdb.expressions.derived import Derivation
-from contextdb.expressions.rules import WhenRules
-from contextdb.schema.shapes import Policy
+from contextdb.schema.policies import Policy, ranks_of
+
+if TYPE_CHECKING:
+    from contextdb.expressions import Derivation
+    from contextdb.expressions.rules import WhenRules
 
 Made = TypeVar("Made")
 Change = Callable[[Fact, Condition], Fact]
+StraightAsk = Callable[[Context], Matches | None]
+"""Answers a context; None where the careful way must decide."""
 
 
 def as_given(fact: Fact, condition: Condition) -> Fact:
@@ -91,12 +98,13 @@ class CompiledData(Unchanging):
     """What the rows give the game besides their assets; one without columns where the table has none."""
     picking: PickColumns = NOTHING
     """How specific the rows are, and how long they rest; nothing for a table with tables inside, whose `ways` say it."""
-    _ask: Callable[[Context], Matches] = field(init=False, repr=False)
-    heard: ClassVar[Any] = None
-    """Who hears of questions and picks, while somebody listens: the `Ears` of `contextdb.compiled.heard`."""
+    _ask: StraightAsk = field(init=False, repr=False)
+    _watcher: Watcher | None = field(init=False, repr=False)
+    """Learns of the questions that a game asks, and of its picks: set by the link that watches the table."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "_ask", self._build_and_ask)  # a plain attribute: the way of every query
+        object.__setattr__(self, "_watcher", None)
         read_only(self.priorities)
         read_only(self.row_weights)
 
@@ -147,38 +155,27 @@ class CompiledData(Unchanging):
         if unknown != "error":
             check_mode(unknown)
         try:
-            found = self._ask(context)
-            return found if unknown == "error" or not self.keeps_facts else self.with_others(found, context, unknown)
-        except UNUSUAL:
-            return self.query_with_care(context, unknown)
+            answer = self._ask(context)
+            if answer is None and unknown != "error":
+                answer = self.core.query(context, UNKNOWN[unknown])
+                return self.bound(answer, context, unknown) if answer is not None else self.query_with_care(context, unknown)
         except Exception:  # no mapping, which can raise anything, or a fault of ours
             require_context(context)
             raise
+        if answer is None:
+            return self.query_with_care(context, unknown)
+        return answer if unknown == "error" or not self.keeps_facts else self.with_others(answer, context, unknown)
 
     def query_with_care(self, context: Context, unknown: Unknown = "error") -> Matches:
         """What is unusual in a context read once more, slowly: this answers it or says what is wrong."""
-        found = self.matches(*self._bits_carefully(context, unknown))
-        if self.heard is not None:
-            self.heard.asked(context, found)
-        return self.bound(found, kept_facts(context), unknown) if self.is_bound else found
-
-    def encode(self, context: Context, unknown: Unknown = "error") -> NDArray[np.int32]:
-        """The class of every fact, as codes; see `CompiledTable.encode`."""
-        self.refuse_rules("codes do not keep the facts that its rules need")
-        facts = self.read_context(context, unknown)
-        local: list[tuple[int, ...] | None] = []
-        for name, masks in zip(facts, self.masks, strict=True):
-            fact = facts[name]
-            if isinstance(fact, Cell):
-                raise ContextError(Fault("a set of values has no single code.", "one value", place=Place(column=name)))
-            local.append(None if fact is None and unknown == "any" else masks.codes(fact))  # type: ignore[arg-type]
-        return self.stack.codes(local)
+        answer = self.matches(*self._bits_carefully(context, unknown))
+        return self.bound(answer, frozen_facts(context), unknown) if self.is_bound else answer
 
     @cached_property
     def ranks(self) -> NDArray[np.float64]:
         """What the policy ranks rows by before chance, apart from costs, higher first: float64 [n_rows]; for a table without tables
         inside."""
-        return ranks_of(self.policy, self.priorities, self.picking)
+        return read_only(ranks_of(self.policy, self.priorities, self.picking.specificities))
 
     @property
     def policies(self) -> frozenset[str]:
@@ -197,11 +194,15 @@ class CompiledData(Unchanging):
         """The same for the cells of each depth: float64 [D, n_rows]; D is 1 for a table without tables inside. `change` is what
         becomes of each fact before it is looked up."""
         costs = np.zeros((self.n_depths, self.n_rows))
-        if any(self.soft):
-            facts = self.read_context(context, unknown)
-            for at, condition in enumerate(self.conditions):
-                if self.soft[at] is not None:
-                    costs += self.column_penalties(at, change(facts[condition.name], condition), unknown)
+        if not self.is_soft:
+            return costs
+        check_mode(unknown)
+        if change is as_given and self.core.penalties(context, UNKNOWN[unknown], costs):
+            return costs
+        facts = self.read_context(context, unknown)
+        for at, condition in enumerate(self.conditions):
+            if self.soft[at] is not None:
+                costs += self.column_penalties(at, change(facts[condition.name], condition), unknown)
         return costs
 
     @property
@@ -229,11 +230,32 @@ class CompiledData(Unchanging):
     def query_widened(self, context: Context, unknown: Unknown = "error") -> Matches:
         """The answer to a context with its facts widened, see `contextdb.cells.hysteresis`. What is derived is computed from the
         facts themselves and then widened; rules see no widened facts."""
-        bits, always = self._bits_carefully(context, unknown, widened_fact)
-        found = self.matches(bits, always)
+        bits, always = self._bits_widened(context, unknown) or self._bits_carefully(context, unknown, widened_fact)
+        answer = self.matches(bits, always)
         if self.mirroring:
-            with_mirrored(found, lambda: self.query_widened(mirrored_facts(context, self.mirroring), unknown))
-        return with_penalties(found, partial(self.layered_penalties, context, unknown, widened_fact)) if self.is_soft else found
+            with_mirrored(answer, lambda: self.query_widened(mirrored_facts(context, self.mirroring), unknown))
+        return with_penalties(answer, partial(self.layered_penalties, context, unknown, widened_fact)) if self.is_soft else answer
+
+    def _bits_widened(self, context: Context, unknown: Unknown) -> tuple[int, int] | None:
+        """Rows that may and that always match with facts widened, where all facts are plain and none is computed; else None."""
+        rest: Matches | None = None if self.when or self.derivation else self._core_without_widened.query(context, UNKNOWN[unknown])
+        if rest is None:
+            return None
+        some = every = rest.bits
+        for name, condition in self.widening.items():
+            fact = read_fact(context.get(name), condition)
+            if fact is None and unknown == "error":
+                return None
+            one, all_ = self.condition_bits(self.places[name], widened_fact(fact, condition), unknown)
+            some &= one
+            every &= all_
+        return some, every
+
+    @cached_property
+    def _core_without_widened(self) -> Table:
+        """The table as the core has it, with none of the columns whose cells are widened."""
+        columns = [(c, m) for c, m in zip(self.conditions, self.masks, strict=True) if c.name not in self.widening]
+        return core_table(columns, self.enabled, self.answering, None, None)
 
     def query_mirrored(self, context: Context, unknown: Unknown = "error") -> Matches:
         """The answer to a context as a mirror shows it. What is derived is computed from mirrored facts."""
@@ -261,7 +283,7 @@ class CompiledData(Unchanging):
     @cached_property
     def keep(self) -> Callable[[Context], dict[str, object]]:
         """What copies a context, so that it stays as it is now."""
-        return kept_facts if any(c.domain.type.is_tags for c in self.asked.values()) else dict
+        return frozen_facts if any(c.domain.type.is_tags for c in self.asked.values()) else dict
 
     @cached_property
     def is_soft(self) -> bool:
@@ -301,9 +323,10 @@ class CompiledData(Unchanging):
         facts: dict[str, Fact] = {}
         faults: list[Fault] = []
         derived: Mapping[str, object] = {}
+        derivation = None if self.derivation is None else self.derivation if names is None else self.derivation.only(names)
         try:
-            if self.derivation:
-                derived = (self.derivation if names is None else self.derivation.only(names)).compute(context)
+            if derivation is not None:
+                derived = derivation.compute(context)
         except ContextError as error:
             faults += error.faults
         for condition in (*self.conditions, *self.ruled) if names is None else (self._condition_named(n) for n in names):
@@ -314,17 +337,18 @@ class CompiledData(Unchanging):
                 faults += [fault for fault in error.faults if fault not in faults]
         if faults:
             raise ContextError(*faults)
-        if missing := [name for name, fact in facts.items() if fact is None]:
+        missing = [name for name, fact in facts.items() if fact is None]
+        if derivation is not None:
+            missing += [name for name in derivation.missing(context) if name not in missing]
+        if missing:
             self.refuse_missing(missing, context, unknown)
         return facts
 
     def refuse_missing(self, missing: Sequence[str], context: Context, unknown: Unknown) -> None:
-        """Raise ContextError for missing facts of conditions, unless they are treated in another way; a misspelt one always."""
+        """Raise ContextError for missing facts of conditions and of what is computed, unless they are treated in another way; a
+        misspelt one always."""
         derivation = self.derivation
         plain = [name for name in missing if derivation is None or name not in derivation.names]
-        for name in missing:
-            if derivation is not None and name in derivation.names:
-                plain += [n for n in derivation.lacking(name, context) if n not in plain]
         extra = [name for name in context if name not in self.asked]
         if slip := misspelt(plain, [name for name in extra if name not in self.declared]):
             raise slip
@@ -333,34 +357,37 @@ class CompiledData(Unchanging):
         if unknown == "error":
             raise missing_error(plain, extra)
 
+    def accepting(self, facts: Mapping[str, Fact], unknown: Unknown) -> Words:
+        """The rows whose cell of a condition accepts some value of its fact: uint64 [conditions, W]. Facts are in canonical form,
+        computed ones too."""
+        words = np.empty((len(self.conditions), bitmask.n_words(self.n_rows)), np.uint64)
+        given = {name: facts[name] for name in self.asked if facts.get(name) is not None}
+        if self.derivation is not None or not self.core.accepting(given, UNKNOWN[unknown], words):
+            for at, condition in enumerate(self.conditions):
+                words[at] = bitmask.from_int(self.condition_bits(at, facts[condition.name], unknown)[0], self.n_rows)
+        return words
+
     def condition_bits(self, at: int, fact: Fact, unknown: Unknown = "error") -> tuple[int, int]:
         """Rows whose cell accepts some, and rows whose cell accepts every, value of a fact in canonical form."""
         return self._all_bits if fact is None and unknown == "any" else bits_of(self.masks[at], fact)
-
-    def fact_bits(self, name: str, value: object, unknown: Unknown) -> tuple[int, int, bool]:
-        """For one given fact: rows that accept some of it, rows that accept all of it, and whether it is missing."""
-        at = self.places[name]
-        fact = read_fact(value, self.conditions[at])
-        some_bits, every = self.condition_bits(at, fact, unknown)
-        return some_bits, every, fact is None
 
     def matches(self, bits: int, always: int | None = None) -> Matches:
         """An answer of this table from its rows as an integer."""
         return self.answering.answer(bits, bits if always is None else always)
 
     @cached_property
-    def single_lookups(self) -> dict[str, SingleLookup]:
-        """For each condition what finds the mask of a usual fact."""
-        return {c.name: single_lookup(c, m) for c, m in zip(self.conditions, self.masks, strict=True)}
-
-    @cached_property
     def places(self) -> dict[str, int]:
         return {c.name: at for at, c in enumerate(self.conditions)}
 
     @cached_property
-    def stack(self) -> MaskStack:
-        """Every mask of the table in one array, for the kernels."""
-        return MaskStack.of(self.masks, self.n_rows)
+    def codes(self) -> CodeSlots:
+        """Which codes the facts of a context have."""
+        return CodeSlots(self.masks, self.enabled, self.n_rows)
+
+    @cached_property
+    def number_cells(self) -> tuple[NumberCells | None, ...]:
+        """For each column of numbers what finds the classes of many; None for others, and where bounds lie too near each other."""
+        return tuple(number_cells(m.bounds) if isinstance(m, (NumberMasks, WideMasks)) else None for m in self.masks)
 
     @property
     def nbytes(self) -> int:
@@ -407,22 +434,32 @@ class CompiledData(Unchanging):
         everything = (1 << self.n_rows) - 1
         return everything, everything
 
-    def _build_and_ask(self, context: Context) -> Matches:
-        """The first question builds the function that answers all others."""
-        is_plain = self.is_bound and not (self.is_soft or self.when or self.derivation or self.widening)
+    @cached_property
+    def core(self) -> Table:
+        """The table as the core has it."""
         columns = list(zip(self.conditions, self.masks, strict=True))
-        ask = build_ask(columns, self.enabled_bits, self.answering, self.keep if is_plain else None)
-        if self.when is not None:
-            ask = ruled_ask(ask, self.when, self.answering)
-        if self.derivation is not None:
-            ask = _composed(ask, self.derivation.complete)
-        if self.is_bound and not is_plain:
-            ask = self._binding(ask)
+        core = core_table(columns, self.enabled, self.answering, self.derivation, self.when, self.soft)
+        core.is_watched = self._watcher is not None
+        return core
+
+    def watch(self, watcher: Watcher | None) -> None:
+        """Let a watcher learn of all questions and picks from now on; None for nobody."""
+        object.__setattr__(self, "_watcher", watcher)
+        if "core" in self.__dict__:
+            self.core.is_watched = watcher is not None
+
+    def _build_and_ask(self, context: Context) -> Matches | None:
+        """The first question makes what answers all others."""
+        ask: StraightAsk = self._binding(self.core.query) if self.is_bound else self.core.query
         object.__setattr__(self, "_ask", ask)
         return ask(context)
 
     def _binding(self, ask: StraightAsk) -> StraightAsk:
-        return lambda context: self.bound(ask(context), context)
+        def bound(context: Context) -> Matches | None:
+            answer = ask(context)
+            return None if answer is None else self.bound(answer, context)
+
+        return bound
 
     def _bits_carefully(self, context: Context, unknown: Unknown, change: Change = as_given) -> tuple[int, int]:
         facts = self.read_context(context, unknown)
@@ -443,7 +480,3 @@ class CompiledData(Unchanging):
         """Raise ContextError for a table with rules."""
         if self.when is not None:
             raise ContextError(Fault(f"the table {in_quotes(self.name)} has rules: {why}.", "query, query_many or live"))
-
-
-def _composed(ask: Callable[[Context], Matches], complete: Callable[[Context], Context]) -> Callable[[Context], Matches]:
-    return lambda context: ask(complete(context))

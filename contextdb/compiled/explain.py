@@ -10,15 +10,16 @@ import decimal
 import math
 import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import bitmask
-from contextdb.bitmask import Rows
+from contextdb.bitmask import Rows, Words
 from contextdb.cells import intervals
 from contextdb.cells.arguments import require_place, require_row, require_text, require_whole
 from contextdb.cells.conditions import Condition
@@ -28,16 +29,17 @@ from contextdb.cells.grammar import format_cell, parse_cell, reads
 from contextdb.cells.notebook import as_html, one_line
 from contextdb.cells.sets import Accepted, Cell, NumberSet, TagSet, ValueSet, covers, union
 from contextdb.cells.words import NUMBER_TEXT
-from contextdb.columns import TextColumn
 from contextdb.compiled.classes import ColumnMasks, NumberMasks, WideMasks, column_masks
 from contextdb.compiled.data import CompiledData
+from contextdb.compiled.layers import Layers
 from contextdb.compiled.mask_bits import bits_of
 from contextdb.compiled.matches import Matches
 from contextdb.compiled.ways import Step
 from contextdb.errors import plural
-from contextdb.expressions import Expression
-from contextdb.expressions.rules import WhenColumn, WhenRules, has_no_rule, told_facts
-from contextdb.expressions.rules.rules import Rule, values_of
+
+if TYPE_CHECKING:
+    from contextdb.compiled.failing_rules import RulePart
+    from contextdb.expressions.rules import WhenRules
 
 FEW_DIGITS = 12
 """A number of more characters than this is the work of rounding, not of a person: 29.990000000000002."""
@@ -102,7 +104,8 @@ class Explanation:
     """All rows for one context, in order: valid ones, then the nearest. Iterate, index, or ask for one row or asset."""
 
     def __init__(self, compiled: CompiledData, facts: dict[str, Fact], unknown: Unknown, matches: Matches) -> None:
-        self._compiled = compiled
+        self.compiled = compiled
+        """The table."""
         self.facts = facts
         """The facts in canonical form."""
         self.matches = matches
@@ -110,7 +113,7 @@ class Explanation:
         self._unknown = unknown
 
     def __len__(self) -> int:
-        return self._compiled.n_rows
+        return self.compiled.n_rows
 
     def __iter__(self) -> Iterator[RowExplanation]:
         return (self.row(r) for r in self._order.tolist())
@@ -123,18 +126,18 @@ class Explanation:
         row = require_row(row, len(self))
         at = np.flatnonzero(self._fails[:, row]).tolist()
         failures = [failure for i in at for failure in self._failures(i, row)]
-        if self._breaks_rule[row]:
+        if self.breaks_rule[row]:
             failures += self._rule_failures(row)
-        return RowExplanation(row, self._compiled.assets[row], bool(self._enabled[row]), tuple(failures))
+        return RowExplanation(row, self.compiled.assets[row], bool(self._enabled[row]), tuple(failures))
 
     def asset(self, asset: str) -> list[RowExplanation]:
         """Why the rows of this asset, with or without its path, are valid or not. Raises ContextError, with the nearest asset,
         where no row has it."""
         require_text(asset, "asset")
-        names = zip(self._compiled.assets, self._compiled.leaves, strict=True)
+        names = zip(self.compiled.assets, self.compiled.leaves, strict=True)
         found = [self.row(r) for r, (path, leaf) in enumerate(names) if asset in (path, leaf)]
         if not found:
-            raise self._compiled.answering.no_asset(asset)
+            raise self.compiled.answering.no_asset(asset)
         return found
 
     def nearest(self, most: int = 5) -> list[RowExplanation]:
@@ -151,38 +154,48 @@ class Explanation:
             rows = rows[self._n_failures[rows] <= limit]
         return [self.row(r) for r in self._sorted(rows)[:most].tolist()]
 
+    def roles(self, row: int) -> dict[str, str] | None:
+        """Who plays each role in the best casting of a valid row; None without actors. With actors, raises what `casting` of an
+        answer raises."""
+        return None
+
     @cached_property
     def undecided(self) -> int:
         """The valid rows that only may be so, as bits: they match for some values of set-valued facts only, or their rule is open
         for want of a fact."""
         always = bitmask.to_int(self.matches.always)
-        return self.matches.bits & ~self._decided(always)
+        return self.matches.bits & ~self.decided(always)
 
-    def _decided(self, always: int) -> int:
-        """Of rows whose cells match for every value those whose rule does too, and is not open."""
-        when = self._compiled.when
+    def decided(self, always: int) -> int:
+        """Of rows whose cells match for every value, as bits, those whose rule does too, and is not open."""
+        when = self.compiled.when
         return always if when is None else when.left_with_care(always, always, self.facts, "never")[1]
 
     @cached_property
     def _n_failures(self) -> NDArray[np.int64]:
-        """How many cells of each row fail: int64 [n_rows]; a rule counts as one, cells of one condition in tables inside each other
-        count as one, and a disabled row one more."""
-        return bitmask.read_only(np.asarray(self._fails.sum(axis=0, dtype=np.int64)) + self._breaks_rule + ~self._enabled)
+        """How many cells of each row fail: int64 [n_rows]; a rule counts as one, and a disabled row one more."""
+        totals = self._fails.sum(axis=0, dtype=np.int64) + self.breaks_rule + ~self._enabled
+        for at, layers in enumerate(() if self.compiled.ways is None else self.compiled.ways.layers):
+            if layers is not None and self._fails[at].any():
+                condition = self.compiled.conditions[at]
+                totals += np.where(self._fails[at], _n_failing(layers, self.facts[condition.name], condition.domain) - 1, 0)
+        if self.compiled.ways is not None and self.compiled.ways.rules is not None:
+            rows = np.flatnonzero(self.breaks_rule)
+            totals[rows] += [sum(1 for _ in self._rule_failures(row)) - 1 for row in rows.tolist()]
+        return bitmask.read_only(totals)
 
     @cached_property
     def _order(self) -> Rows:
         """Row numbers, valid ones first, then by failing cells, how far the facts are off, and place in the file: int64
         [n_rows]."""
-        return bitmask.read_only(self._sorted(np.arange(self._compiled.n_rows)))
+        return bitmask.read_only(self._sorted(np.arange(self.compiled.n_rows)))
 
     def __str__(self) -> str:
-        lines = [f"{len(self.matches)} of {plural(self._compiled.n_rows, 'row')} valid"]
+        lines = [f"{len(self.matches)} of {plural(self.compiled.n_rows, 'row')} valid"]
         return "\n".join(lines + [str(r) for r, _ in zip(self, range(10), strict=False)])
 
     def __repr__(self) -> str:
-        return one_line(
-            "Explanation", self._compiled.name, f"{len(self.matches):,} of {plural(self._compiled.n_rows, 'row')} valid"
-        )
+        return one_line("Explanation", self.compiled.name, f"{len(self.matches):,} of {plural(self.compiled.n_rows, 'row')} valid")
 
     def _repr_html_(self) -> str:
         rows = ((r.asset, "" if r.is_valid else str(r).removeprefix(f"{r.asset}: ")) for r in self)
@@ -190,22 +203,28 @@ class Explanation:
 
     @cached_property
     def _enabled(self) -> NDArray[np.bool_]:
-        return bitmask.unpack(self._compiled.enabled, self._compiled.n_rows)
+        return bitmask.unpack(self.compiled.enabled, self.compiled.n_rows)
+
+    def failing(self, rows: Rows) -> NDArray[np.bool_]:
+        """Which cells of some rows fail: bool [rows, conditions], the conditions in the order of the table."""
+        words, shifts = self.accepted[:, rows >> 6], (rows & 63).astype(np.uint64)
+        fails: NDArray[np.bool_] = ((words >> shifts) & np.uint64(1) == 0).T
+        return fails
+
+    @cached_property
+    def accepted(self) -> Words:
+        """The rows whose cell of a condition accepts some value of its fact: uint64 [conditions, W]."""
+        return self.compiled.accepting(self.facts, self._unknown)
 
     @cached_property
     def _fails(self) -> NDArray[np.bool_]:
         """Whether the cell of a condition fails: bool [conditions, n_rows]."""
-        compiled = self._compiled
-        fails = np.empty((len(compiled.conditions), compiled.n_rows), np.bool_)
-        for at, condition in enumerate(compiled.conditions):
-            bits, _ = compiled.condition_bits(at, self.facts[condition.name], self._unknown)
-            fails[at] = ~bitmask.unpack(bitmask.from_int(bits, compiled.n_rows), compiled.n_rows)
-        return fails
+        return ~bitmask.unpack(self.accepted, self.compiled.n_rows)
 
     @cached_property
-    def _breaks_rule(self) -> NDArray[np.bool_]:
+    def breaks_rule(self) -> NDArray[np.bool_]:
         """Whether each row has a rule that does not hold: bool [n_rows]; an open one only where it is not ignored."""
-        when = self._compiled.when
+        when = self.compiled.when
         return self._flags(0 if when is None else self._broken_rules(when))
 
     def _broken_rules(self, when: WhenRules) -> int:
@@ -213,15 +232,18 @@ class Explanation:
         return when.rows & ~left
 
     def _flags(self, bits: int) -> NDArray[np.bool_]:
-        return bitmask.read_only(bitmask.unpack(bitmask.from_int(bits, self._compiled.n_rows), self._compiled.n_rows))
+        return bitmask.read_only(bitmask.unpack(bitmask.from_int(bits, self.compiled.n_rows), self.compiled.n_rows))
 
     @property
     def _lenient(self) -> Unknown:
         return "any" if self._unknown == "any" else "never"
 
     def _rule_failures(self, row: int) -> Iterator[Failure]:
-        for is_open, part in rules_that_fail(self._compiled, row, self.facts, self._lenient):
-            yield part.failure(f"{'open' if is_open else 'false'} with {told_facts(part.rule, self.facts)}")
+        from contextdb.compiled.failing_rules import rules_that_fail
+        from contextdb.expressions.rules import facts_text
+
+        for is_open, part in rules_that_fail(self.compiled, row, self.facts, self._lenient):
+            yield rule_failure(part, f"{'open' if is_open else 'false'} with {facts_text(part.rule, self.facts)}")
 
     def _sorted(self, rows: Rows) -> Rows:
         return rows[np.lexsort((self._distances(rows), self._n_failures[rows]))]
@@ -230,26 +252,24 @@ class Explanation:
         """How far the failing facts are off, summed: float64 [len(rows)]; a number by its share of the domain, at most 1; others
         1."""
         far = np.zeros(len(rows))
-        for at, condition in enumerate(self._compiled.conditions):
+        for at, condition in enumerate(self.compiled.conditions):
             fails, fact = self._fails[at, rows], self.facts[condition.name]
             if fails.any():
                 far[fails] += self._column_distances(at, fact, rows[fails]) if isinstance(fact, float) else 1.0
-        return far + self._breaks_rule[rows]
+        return far + self.breaks_rule[rows]
 
     def _column_distances(self, at: int, fact: float, rows: Rows) -> NDArray[np.float64]:
-        column, condition = self._compiled.texts[at], self._compiled.conditions[at]
-        width = _width(condition, self._compiled.masks[at])
+        column, condition = self.compiled.texts[at], self.compiled.conditions[at]
+        width = _width(condition, self.compiled.masks[at])
         codes, which = np.unique(column.codes[rows], return_inverse=True)
-        is_single = self._compiled.ways is None  # of tables in tables no text need be one cell; all are read together
-        cells = [
-            parse_cell(column.texts[c], condition.domain) if is_single else self._compiled.cells(at)[c] for c in codes.tolist()
-        ]
+        is_single = self.compiled.ways is None  # of tables in tables no text need be one cell; all are read together
+        cells = [parse_cell(column.texts[c], condition.domain) if is_single else self.compiled.cells(at)[c] for c in codes.tolist()]
         return np.array([_distance(c.accepts, fact, width) for c in cells], np.float64)[which]
 
     def _failures(self, at: int, row: int) -> Iterator[Failure]:
-        condition = self._compiled.conditions[at]
+        condition = self.compiled.conditions[at]
         fact = self.facts[condition.name]
-        yield from cell_failures(self._compiled, at, row, fact, _with_unit(told_fact(self._compiled, at, fact), condition))
+        yield from cell_failures(self.compiled, at, row, fact, _with_unit(told_fact(self.compiled, at, fact), condition))
 
 
 def explain(compiled: CompiledData, context: Context, unknown: Unknown = "error") -> Explanation:
@@ -257,44 +277,9 @@ def explain(compiled: CompiledData, context: Context, unknown: Unknown = "error"
     return Explanation(compiled, compiled.read_context(context, unknown), unknown, compiled.query(context, unknown=unknown))
 
 
-@dataclass(frozen=True, slots=True)
-class RulePart:
-    """A row's own rule; where tables are in tables, that of one row of the way."""
-
-    column: str
-    text: str
-    rule: Expression
-    step: Step | None = None
-
-    def failure(self, fact: str) -> Failure:
-        """That it does not hold, with what is known of its facts."""
-        return Failure(self.column, self.text, fact, "Any", self.step)
-
-
-def rules_that_fail(
-    compiled: CompiledData, row: int, facts: Mapping[str, Fact], unknown: Unknown
-) -> Iterator[tuple[bool, RulePart]]:
-    """The rules of a row that do not hold with some facts, and whether each is open; all of them where only together they do
-    not."""
-    parts = _rule_parts(compiled, row)
-    truths = [Rule(p.rule, 0).truths(values_of(facts, p.rule.conditions), facts)[0] for p in parts]
-    failing = [truth is False or (truth is None and unknown == "never") for truth in truths]
-    for truth, part, fails in zip(truths, parts, failing, strict=True):
-        if fails or not any(failing):
-            yield truth is None, part
-
-
-def _rule_parts(compiled: CompiledData, row: int) -> list[RulePart]:
-    when, ways = compiled.when, compiled.ways
-    assert when is not None
-    whole = when.rules[int(when.of_row[row])].expression
-    if ways is None or ways.rules is None:
-        return [RulePart(when.name, when.texts[row], whole)]
-    steps = ways.steps(row)
-    said = [(steps[depth], text) for depth, text in ways.rules.said(row) if not has_no_rule(text)]
-    read = WhenColumn.read(TextColumn.of("", [text for _, text in said]), {c.name: c for c in whole.conditions})
-    rules = (read.rule(at) for at in range(len(said)))
-    return [RulePart(s.when or when.name, t, rule, s) for (s, t), rule in zip(said, rules, strict=True) if rule is not None]
+def rule_failure(part: RulePart, fact: str) -> Failure:
+    """That a rule does not hold, with what is known of its facts."""
+    return Failure(part.column, part.text, fact, "Any", part.step)
 
 
 def cell_failures(compiled: CompiledData, at: int, row: int, fact: Fact, told: str) -> Iterator[Failure]:
@@ -310,6 +295,15 @@ def cell_failures(compiled: CompiledData, at: int, row: int, fact: Fact, told: s
     failing = [(step, text) for step, text in said if not _lets_pass(text, fact, condition.domain)]
     for step, text in failing or said[1:]:  # where each holds some value of a set-valued fact, all but one must hold the set
         yield Failure(condition.name, text, told, mended(text, fact, condition.domain), step)
+
+
+def _n_failing(layers: Layers, fact: Fact, domain: Domain) -> NDArray[np.int64]:
+    """How many cells of each row's way do not accept a fact, for rows in which some do not: int64 [n_rows]; see `cell_failures`."""
+    fails = np.array([bool(text) and not _lets_pass(text, fact, domain) for text in layers.texts])
+    combinations, which = layers.combined
+    n_failing, n_said = fails[combinations].sum(axis=0), (combinations > 0).sum(axis=0)
+    totals: NDArray[np.int64] = np.where(n_failing > 0, n_failing, n_said - 1).astype(np.int64)[which]
+    return totals
 
 
 def _lets_pass(text: str, fact: Fact, domain: Domain) -> bool:

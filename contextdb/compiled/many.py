@@ -9,8 +9,9 @@ from abc import abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from operator import and_, or_, xor
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +21,17 @@ from contextdb.bitmask import Rows, Words, read_only
 from contextdb.cells.arguments import require_place
 from contextdb.cells.notebook import one_line
 from contextdb.cells.sequences import Made
+from contextdb.columns import Framed
 from contextdb.compiled.answered_table import SaidRows
 from contextdb.compiled.batch_costs import CostsOfPairs
 from contextdb.compiled.data import CompiledData
-from contextdb.compiled.matches import Join, Matches, layered_penalties, minus
+from contextdb.compiled.matches import Join, Matches, layered_penalties, minus, rows_frame
 from contextdb.compiled.unchanging import Unchanging
+from contextdb.core import list_rows
 from contextdb.errors import ContextError, Fault, Place, WrongType, plural
+
+if TYPE_CHECKING:
+    import polars as pl
 
 BLOCK = 2048
 """Contexts whose masks are worked out together."""
@@ -33,13 +39,23 @@ MOST_PAIRS = 2**18
 """Pairs of a context and a row whose costs are worked out together."""
 
 
-class ManyMatches(Unchanging, Made[Matches]):
+class ManyMatches(Framed, Unchanging, Made[Matches]):
     """The valid rows of many contexts: a sequence of `Matches`, each as `query` gives it, with or without actors. Results are
     computed on first use and kept; arrays are read-only. As with `Matches`, `&`, `|`, `-` and `^` join the answers for as many
     contexts, each with its own; `&` and `-` also take what `only` takes.
     """
 
     compiled: CompiledData
+
+    if not TYPE_CHECKING:  # a type checker takes every name for one that exists where it sees this
+
+        def __getattr__(self, name: str) -> object:
+            problem = f"ManyMatches has no attribute {name!r}"
+            if name == "indices":
+                problem += ": use rows and starts, or many[i].indices"
+            elif hasattr(Matches, name) and not name.startswith("_"):
+                problem += f": each of its answers has it, many[i].{name}"
+            raise AttributeError(problem, name=name, obj=self)
 
     @property
     @abstractmethod
@@ -92,42 +108,65 @@ class ManyMatches(Unchanging, Made[Matches]):
 
     @property
     def codes(self) -> NDArray[np.int32]:
-        """The codes of every context, as `CompiledTable.encode` gives them for one: int32 [N, P]."""
+        """The codes of every context, the class of each fact: int32 [N, P]; see `contextdb.compiled.codes`."""
         raise ContextError(Fault("these answers have no codes.", "an answer of query_many with one value for each fact"))
 
     @property
     def penalties(self) -> NDArray[np.float64]:
         """What each row's soft cells cost in each context: float64 [N, n_rows]; see `Matches.penalties`. Not kept."""
-        found = np.zeros((len(self), self.n_rows))
+        totals = np.zeros((len(self), self.n_rows))
         if self.compiled.is_soft:
             costs, rows = self._costs_of_pairs(), np.arange(self.n_rows)
             block = max(1, MOST_PAIRS // max(1, self.n_rows))
             for start in range(0, len(self), block):
                 contexts = np.arange(start, min(start + block, len(self)))
                 own = costs(np.repeat(contexts, len(rows)), np.tile(rows, len(contexts))).sum(axis=0)
-                found[contexts] = own.reshape(len(contexts), len(rows))
-        return read_only(found)
+                totals[contexts] = own.reshape(len(contexts), len(rows))
+        return read_only(totals)
 
     def _costs_of_pairs(self) -> CostsOfPairs:
         """What tells what soft cells cost in some rows of some contexts, which ascend; of a table with soft cells."""
 
         def costs(contexts: Rows, rows: Rows) -> NDArray[np.float64]:
-            found = np.empty((self.compiled.n_depths, len(rows)))
+            totals = np.empty((self.compiled.n_depths, len(rows)))
             for context in np.unique(contexts).tolist():
                 start, stop = np.searchsorted(contexts, [context, context + 1])
-                found[:, start:stop] = layered_penalties(self[context])[:, rows[start:stop]]
-            return found
+                totals[:, start:stop] = layered_penalties(self[context])[:, rows[start:stop]]
+            return totals
 
         return costs
 
+    @cached_property
+    def rows(self) -> Rows:
+        """The row numbers of all contexts, one context after the other: int64 [M]. Those of context i are
+        `rows[starts[i] : starts[i + 1]]`."""
+        parts = [rows_of(self._masks(start, min(start + BLOCK, len(self)))) for start in range(0, len(self), BLOCK)]
+        return read_only(np.concatenate([np.empty(0, np.int64), *parts]))
+
+    @cached_property
+    def starts(self) -> Rows:
+        """Where the rows of each context begin in `rows`, and where the last end: int64 [N + 1]."""
+        return read_only(np.append(0, np.cumsum(self.counts)))
+
+    @property
+    def assets(self) -> list[str]:
+        """The assets of the valid rows of all contexts, in the order of `rows`."""
+        assets = self.compiled.assets
+        return [assets[row] for row in self.rows.tolist()]
+
+    def outputs(self, name: str) -> NDArray[Any]:
+        """An output of the valid rows of all contexts, in the order of `rows`. Types are, and it raises,
+        as in `Matches.outputs`."""
+        return self.compiled.outputs.of_matches(self.rows, name)
+
     def lists(self) -> list[Rows]:
-        """The row numbers of each context: a list of int64 arrays."""
-        found: list[Rows] = []
-        for start in range(0, len(self), BLOCK):
-            flags = bitmask.unpack(self._masks(start, min(start + BLOCK, len(self))), self.n_rows)
-            contexts, rows = np.nonzero(flags)
-            found += np.split(read_only(rows), np.searchsorted(contexts, np.arange(1, len(flags))))
-        return found
+        """The row numbers of each context: a list of int64 arrays, parts of `rows`."""
+        rows, starts = self.rows, self.starts.tolist()
+        return [rows[begin:end] for begin, end in pairwise(starts)]
+
+    def to_polars(self) -> pl.DataFrame:
+        """The valid rows of all contexts as a DataFrame: the `context`, from 0, `row`, `asset`, and a column for each output."""
+        return rows_frame({"context": np.repeat(np.arange(len(self)), self.counts)}, self.compiled.answering, self.rows)
 
     def only(self, rows: SaidRows | NDArray[np.bool_] | Matches | ManyMatches) -> ManyMatches:
         """The same answers without the rows that are not among some: for all contexts alike, as `Matches.only` takes them, or for
@@ -141,10 +180,10 @@ class ManyMatches(Unchanging, Made[Matches]):
             return self._beside(rows).mask
         if isinstance(rows, np.ndarray) and rows.dtype == np.bool_ and rows.ndim == 2:
             if rows.shape != (len(self), self.n_rows):
-                found = (
+                problem = (
                     f"there are flags of shape {rows.shape}, for {plural(len(self), 'context')} of {plural(self.n_rows, 'row')}."
                 )
-                raise ContextError(Fault(found, f"one bool for each row of each context: ({len(self)}, {self.n_rows})"))
+                raise ContextError(Fault(problem, f"one bool for each row of each context: ({len(self)}, {self.n_rows})"))
             return read_only(bitmask.pack(rows.astype(np.bool_, copy=False)))
         return bitmask.from_int(self.compiled.answering.bits_of(rows), self.n_rows)[None]
 
@@ -165,16 +204,16 @@ class ManyMatches(Unchanging, Made[Matches]):
 
     def _joined(self, other: object, join: Join) -> ManyMatches:
         if not isinstance(other, ManyMatches):
-            found = f"the answers for many contexts cannot be joined with {type(other).__name__}."
-            raise WrongType(Fault(found, "as many answers of the same table"))
+            problem = f"the answers for many contexts cannot be joined with {type(other).__name__}."
+            raise WrongType(Fault(problem, "as many answers of the same table"))
         return JoinedMatches(self, self._beside(other), join)
 
     def _beside(self, other: ManyMatches) -> ManyMatches:
         """Other answers, which must be of the same table and for as many contexts."""
         self.compiled.answering.require(other.compiled.answering)
         if len(other) != len(self):
-            found = f"there are answers for {plural(len(other), 'context')}, and for {len(self):,}."
-            raise ContextError(Fault(found, "an answer for each context"))
+            problem = f"there are answers for {plural(len(other), 'context')}, and for {len(self):,}."
+            raise ContextError(Fault(problem, "an answer for each context"))
         return other
 
     def _at(self, context: int) -> Matches:
@@ -216,9 +255,6 @@ class ListedMatches(ManyMatches):
     @cached_property
     def always(self) -> Words:
         return read_only(self._stacked([m.always for m in self.answers]))
-
-    def lists(self) -> list[Rows]:
-        return [m.indices for m in self.answers]
 
     def __len__(self) -> int:
         return len(self.answers)
@@ -305,6 +341,13 @@ class JoinedMatches(ManyMatches):
     def _masks(self, start: int, stop: int) -> Words:
         masks: Words = self.join(self.first._masks(start, stop), self.second._masks(start, stop))
         return masks
+
+
+def rows_of(masks: Words) -> Rows:
+    """The rows that masks uint64 [N, W] hold, one mask after the other."""
+    rows = np.empty(int(bitmask.count(masks).sum()), np.int64)
+    list_rows(np.ascontiguousarray(masks), rows)
+    return rows
 
 
 def one_by_one(

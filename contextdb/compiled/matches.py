@@ -6,17 +6,22 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import copy
 from functools import partial
 from operator import and_, or_, xor
-from typing import Any, Protocol, Self, TypeVar, overload
+from typing import TYPE_CHECKING, Any, Protocol, Self, TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import bitmask
-from contextdb.bitmask import Flags, Rows, Words, read_only
+from contextdb.bitmask import Flags, Words, read_only
 from contextdb.cells.arguments import require_place
 from contextdb.cells.notebook import as_html, one_line
-from contextdb.compiled.answered_table import AnsweredTable, SaidRows, bits_said, rows_of
+from contextdb.columns import Framed, frame_of
+from contextdb.compiled.answered_table import AnsweredTable, SaidRows, bits_said
+from contextdb.core import Answer
 from contextdb.errors import ContextError, Fault, WrongType, plural
+
+if TYPE_CHECKING:
+    import polars as pl
 
 Bits = TypeVar("Bits", int, Words)
 Join = Callable[[Any, Any], Any]
@@ -68,9 +73,9 @@ Stages = tuple[tuple[int, Staged], ...]
 """For some rows, as bits, who plays what in them; the first that has a row counts."""
 
 
-class Matches:
-    """The valid rows for one context. True when there is at least one; its length is their number. Iteration gives row numbers;
-    `in` takes a row number or an asset; `m[0]` is the first row number.
+class Matches(Framed, Answer):
+    """The valid rows for one context. True when there is at least one; its length is their number. It is a sequence of their
+    assets: iteration gives them, `in` takes one, `m[0]` is the first. `rows` has their numbers.
 
     Answers of one version of one table are combined as sets of rows are: `&`, `|`, `-`, `^`. What belongs to a row, its casting and
     what its soft cells cost, is then that of the first of the two answers that holds the row. Answers in a mirror are combined in
@@ -78,7 +83,7 @@ class Matches:
 
     Attributes
     ----------
-    indices : int64 array
+    rows, indices : int64 array
         Row numbers, ascending, from 0. This and all other arrays of an answer are read-only.
     assets : list of str
         The assets of those rows; of a row in a table inside the table with its path, "hit_mid_air/dive/MidAir_Dive".
@@ -90,7 +95,9 @@ class Matches:
         The rows that accept *all* values of facts given as sets; the same as `mask` without such facts.
     """
 
-    __slots__ = ("_mirrored", "_penalties", "_rows", "_table", "_widened", "bits")
+    __slots__ = ("_mirrored", "_penalties", "_widened")
+
+    _table: Answering
 
     _mirrored: Matches | dict[str, object] | Callable[[], Matches]
     """Set for tables with conditions whose facts change in a mirror: the answer there, the facts to ask with, or what asks."""
@@ -101,24 +108,10 @@ class Matches:
 
     __array_ufunc__ = None  # else numpy would combine an array of flags with row numbers, one by one
 
-    def __init__(self, bits: int, table: Answering) -> None:
-        self.bits = bits
-        """The rows as one Python integer, row r as bit r."""
-        self._table = table
-        self._rows: Rows | None = None
-
     @property
     def n_rows(self) -> int:
         """The number of rows of the table, valid or not."""
         return len(self._table.row_numbers)
-
-    @property
-    def indices(self) -> Rows:
-        """Row numbers, ascending: int64 [count], read-only."""
-        rows = self._rows
-        if rows is None:
-            rows = self._rows = rows_of(self.bits, self._table.row_numbers)
-        return rows
 
     @property
     def assets(self) -> list[str]:
@@ -186,8 +179,8 @@ class Matches:
             return self
         known = getattr(self, "_mirrored", None)
         if known is None:
-            found = "this answer was computed without facts, so there are none to mirror."
-            raise ContextError(Fault(found, "an answer of query, query_many or live"))
+            problem = "this answer was computed without facts, so there are none to mirror."
+            raise ContextError(Fault(problem, "an answer of query, query_many or live"))
         if isinstance(known, dict):
             assert self._table.ask_mirrored is not None, "what was pickled has its answer"
             known = self._mirrored = self._table.ask_mirrored(known)
@@ -222,37 +215,34 @@ class Matches:
         """All castings of a valid row, best first; for an answer to a query with actors. Raises what `casting` raises."""
         return [self.casting(row)]
 
-    def __len__(self) -> int:
-        return self.bits.bit_count()
+    @property
+    def rows(self) -> NDArray[np.int64]:
+        """The numbers of the valid rows, as `indices`."""
+        return self.indices
 
-    def __bool__(self) -> bool:
-        return self.bits != 0
+    def to_polars(self) -> pl.DataFrame:
+        """The valid rows as a DataFrame: `row`, `asset`, and a column for each output of the table."""
+        return rows_frame({}, self._table, self.rows)
 
-    def __iter__(self) -> Iterator[int]:
-        return iter(self.indices.tolist())
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.assets)
 
-    def __contains__(self, row: object) -> bool:
-        if isinstance(row, str):
-            return any(row in (self._table.assets[r], self._table.leaves[r]) for r in self)
-        try:
-            number = int(row)  # type: ignore[call-overload]
-        except (TypeError, ValueError, OverflowError):
-            return False
-        return 0 <= number < self.n_rows and bool(number == row and self.bits >> number & 1)
+    def __contains__(self, asset: object) -> bool:
+        """Whether a row of an asset is valid; an asset in a table inside the table with its path, or without."""
+        return isinstance(asset, str) and (asset in self.assets or asset in self.leaves)
 
     @overload
-    def __getitem__(self, place: int) -> int: ...
+    def __getitem__(self, place: int) -> str: ...
 
     @overload
-    def __getitem__(self, place: slice) -> list[int]: ...
+    def __getitem__(self, place: slice) -> list[str]: ...
 
-    def __getitem__(self, place: int | slice) -> int | list[int]:
-        """The number of one valid row by its place among them, or of those of a slice; NoSuchPlace, also an IndexError, where none
+    def __getitem__(self, place: int | slice) -> str | list[str]:
+        """The asset of one valid row by its place among them, or those of a slice; NoSuchPlace, also an IndexError, where none
         is."""
         if isinstance(place, slice):
-            rows: list[int] = self.indices[place].tolist()
-            return rows
-        return int(self.indices[require_place(place, len(self), "valid row")])
+            return self.assets[place]
+        return self.assets[require_place(place, len(self), "valid row")]
 
     def only(self, rows: SaidRows | Matches) -> Self:
         """The same answer without the rows that are not among some rows.
@@ -285,7 +275,6 @@ class Matches:
 
     def _keep(self, bits: int) -> None:
         self.bits &= bits
-        self._rows = None
 
     @property
     def _always_bits(self) -> int:
@@ -320,23 +309,23 @@ class Matches:
         every = self._always_bits & other._always_bits if join is and_ else self._always_bits | other._always_bits
         tellers = (self,) if join is minus else (self, other)
         stages = tuple((rows & m.bits, stage) for m in tellers for rows, stage in m._stages)
-        found = self._table.answer(bits, every & bits, stages)
+        answer = self._table.answer(bits, every & bits, stages)
         if costs := [m for m in tellers if m.has_penalties]:
-            found._penalties = costs[0]._penalties if len(costs) == 1 or join is and_ else lambda: _costs_of_both(*costs)
+            answer._penalties = costs[0]._penalties if len(costs) == 1 or join is and_ else lambda: _costs_of_both(*costs)
         if self._table.is_mirroring:
-            found._mirrored = lambda: self.mirrored._joined(other.mirrored, join)
+            answer._mirrored = lambda: self.mirrored._joined(other.mirrored, join)
         if self.is_widening:
-            found._widened = lambda: self.widened._joined(other if join is minus else other.widened, join)
-        return found
+            answer._widened = lambda: self.widened._joined(other if join is minus else other.widened, join)
+        return answer
 
     def __copy__(self) -> Self:
         copied: Self = object.__new__(type(self))
-        copied._set(_slots(self))
+        copied._set(_state(self))
         return copied
 
     def __getstate__(self) -> dict[str, Any]:
         """What is pickled: what soft cells cost as numbers, the answer in a mirror itself, and not what can be worked out again."""
-        state = _slots(self) | {"_rows": None}
+        state = _state(self)
         if state.pop("_mirrored", None) is not None and (seen := self._mirrored_or_none()) is not None:
             state["_mirrored"] = seen
         if state.pop("_widened", None) is not None and (wide := self._widened_or_none()) is not None:
@@ -363,7 +352,8 @@ class Matches:
     def __setstate__(self, state: dict[str, Any]) -> None:
         self._set(state)
 
-    def _set(self, state: Mapping[str, Any]) -> None:
+    def _set(self, state: dict[str, Any]) -> None:
+        Answer.__init__(self, state.pop("bits"), state.pop("_table"))
         for name, value in state.items():
             setattr(self, name, value)
 
@@ -378,7 +368,7 @@ class Matches:
         return one_line("Matches", self._table.name, f"{len(self):,} of {plural(self.n_rows, 'row')}")
 
     def _repr_html_(self) -> str:
-        return as_html(repr(self), ("row", "asset"), ((row, self._table.assets[row]) for row in self))
+        return as_html(repr(self), ("row", "asset"), zip(self.rows.tolist(), self.assets, strict=True))
 
 
 class SetMatches(Matches):
@@ -430,6 +420,15 @@ def layered_penalties(answer: Matches) -> NDArray[np.float64]:
     return read_only(answer._penalties() if answer.has_penalties else np.zeros((1, answer.n_rows)))
 
 
+def rows_frame(first: Mapping[str, NDArray[Any]], table: Answering, rows: NDArray[np.int64]) -> pl.DataFrame:
+    """Some rows of a table as a DataFrame: some columns, then `row`, `asset`, and its outputs. An output of one of these names is
+    left out."""
+    columns: dict[str, object] = {**first, "row": rows, "asset": [table.assets[row] for row in rows.tolist()]}
+    outputs = {name: table.outputs.of_matches(rows, name) for name in table.outputs.names if name not in columns}
+    texts = {name: values.tolist() for name, values in outputs.items() if values.dtype == object}
+    return frame_of(columns | outputs | texts, ["asset", *texts])
+
+
 def minus(rows: Bits, others: Bits) -> Bits:
     """The rows that are not among others."""
     return rows & ~others
@@ -440,10 +439,10 @@ def _costs_of_both(first: Matches, second: Matches) -> NDArray[np.float64]:
     return np.where(second.flags & ~first.flags, layered_penalties(second), layered_penalties(first))
 
 
-def _slots(matches: Matches) -> dict[str, Any]:
+def _state(matches: Matches) -> dict[str, Any]:
     """All that an answer holds, by name."""
-    state: dict[str, Any] = object.__getstate__(matches)[1]  # type: ignore[index]
-    return state
+    own: dict[str, Any] = (object.__getstate__(matches) or (None, {}))[1]  # type: ignore[index]
+    return own | {"bits": matches.bits, "_table": matches._table}
 
 
 def _known(costs: NDArray[np.float64]) -> NDArray[np.float64]:

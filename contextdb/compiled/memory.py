@@ -56,8 +56,8 @@ class Memory:
         if isinstance(given, (int, np.integer)):
             return random.Random(int(given))
         if isinstance(given, type) or not callable(getattr(given, "random", None)):
-            found = f"rng is of type {type(given).__name__}."
-            raise ContextError(Fault(found, "a random.Random, a numpy.random.Generator, or a number to seed one with"))
+            problem = f"rng is of type {type(given).__name__}."
+            raise ContextError(Fault(problem, "a random.Random, a numpy.random.Generator, or a number to seed one with"))
         return given
 
     def last(self, rng: Rng) -> str | None:

@@ -6,7 +6,7 @@ else the default, else False, 0, NaN or "". So a row number of -1, as `pick_many
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, cast
@@ -20,7 +20,7 @@ from contextdb.cells.output_types import OutputValue
 from contextdb.cells.outputs import Output
 from contextdb.columns import TextColumn
 from contextdb.compiled.unchanging import Unchanging
-from contextdb.errors import ContextError, Fault, NoSuchOutput, NoSuchPlace, no_such, shown, some
+from contextdb.errors import ContextError, Fault, NoSuchOutput, NoSuchPlace, no_such, safe_text, some
 
 Column = NDArray[Any]
 OutputCells = Column | TextColumn
@@ -28,9 +28,10 @@ OutputCells = Column | TextColumn
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Outputs(Unchanging):
-    """The outputs of a compiled table: a table without outputs has none, which is not an error. `fallback` is the value of each
-    where no row is valid: what the table's fallback gives, else the default, else False, 0, NaN or ""."""
+class Outputs(Unchanging, Mapping[str, Column]):
+    """The outputs of a compiled table by name, each as `column` gives it: a table without outputs has none, which is not an error.
+    `fallback` is the value of each where no row is valid: what the table's fallback gives, else the default, else False, 0, NaN or
+    ""."""
 
     declared: tuple[Output, ...] = ()
     cells: tuple[OutputCells, ...] = ()
@@ -41,14 +42,26 @@ class Outputs(Unchanging):
         """The names of the outputs, in the order in which they are declared."""
         return tuple(output.name for output in self.declared)
 
+    def __getitem__(self, name: str) -> Column:
+        return self.column(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
+
     def __len__(self) -> int:
         return len(self.declared)
 
     def __contains__(self, name: object) -> bool:
         return name in self.names
 
+    def __eq__(self, other: object) -> bool:
+        return self is other
+
+    def __hash__(self) -> int:
+        return id(self)
+
     def __repr__(self) -> str:
-        return f"<Outputs: {', '.join(f'{shown(o.name)} ({o.kind})' for o in self.declared) or 'none'}>"
+        return f"<Outputs: {', '.join(f'{safe_text(o.name)} ({o.kind})' for o in self.declared) or 'none'}>"
 
     def column(self, name: str) -> Column:
         """The output of every row, read-only: bool, int64 or float64 [n_rows], for `numbers` float64 [n_rows, size], for enum and

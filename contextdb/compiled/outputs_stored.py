@@ -19,6 +19,7 @@ from contextdb.compiled.outputs import NO_OUTPUTS, OutputCells, Outputs
 from contextdb.compiled.pick_columns import PickColumns
 from contextdb.compiled.ways import Ways, WayTable
 from contextdb.files.tensors import Tensors, texts_from_array, texts_to_array
+from contextdb.schema.policies import POLICIES, Policy
 
 DECLARED = "outputs.declared"
 
@@ -112,10 +113,12 @@ def _number(value: Any) -> Any:
 
 
 def ways_to_tensors(ways: Ways) -> Tensors:
+    """The arrays of ways, as `contextdb.compiled.artefact` names them."""
     tensors: Tensors = {"ways.numbers": ways.numbers, "ways.rows": ways.rows, "ways.leaves": texts_to_array(list(ways.leaves))}
     for at, table in enumerate(ways.tables):
         lines = [-1 if (line := table.place(row).line) is None else line for row in range(len(table.priorities))]
         tensors[f"ways.{at:03d}.priorities"] = table.priorities
+        tensors[f"ways.{at:03d}.ranks"] = table.ranks
         tensors[f"ways.{at:03d}.row_weights"] = table.row_weights
         tensors[f"ways.{at:03d}.lines"] = np.array(lines, np.int64)
         tensors |= {f"ways.{at:03d}.{name}": array for name, array in table.picking.arrays.items()}
@@ -129,23 +132,37 @@ def ways_to_tensors(ways: Ways) -> Tensors:
     return tensors
 
 
+def policy_to_json(policy: Policy) -> dict[str, object]:
+    """A policy by name, and how it picks."""
+    return {"policy": policy, "choose": POLICIES[policy].choose, "by_cost": POLICIES[policy].by_cost}
+
+
+def known_policy(name: Any) -> Policy:
+    """A policy that was written. Raises ValueError for one that this version does not know."""
+    if name not in POLICIES:
+        raise ValueError(name)
+    return str(name)
+
+
 def ways_to_json(ways: Ways) -> list[dict[str, object]]:
     """What of each table is no array. Of its path only the file's name is kept: the folder is that of one machine."""
     files = [None if t.file is None else t.file.replace("\\", "/").rpartition("/")[2] for t in ways.tables]
     told: list[dict[str, object]] = []
     for table, file in zip(ways.tables, files, strict=True):
-        told.append({"name": table.name, "file": file, "policy": table.policy})
+        told.append({"name": table.name, "file": file, **policy_to_json(table.policy)})
         if table.when is not None:
             told[-1]["when"] = table.when
     return told
 
 
 def ways_from(about: list[dict[str, Any]], tensors: Tensors, n_conditions: int) -> Ways:
+    """The ways that were written; raises KeyError or ValueError where parts are missing or unknown."""
     tables = []
     for at, table in enumerate(about):
         priorities, weights, lines = (tensors[f"ways.{at:03d}.{part}"] for part in ("priorities", "row_weights", "lines"))
         when, picking = table.get("when"), PickColumns.of(partial(_of_table, tensors, at))
-        tables.append(WayTable(table["name"], table["file"], table["policy"], priorities, weights, lines, None, when, picking))
+        policy = known_policy(table["policy"])
+        tables.append(WayTable(table["name"], table["file"], policy, priorities, weights, lines, None, when, picking))
     layers = tuple(_layers(tensors, f"{at:03d}") for at in range(n_conditions))
     leaves = texts_from_array(tensors["ways.leaves"])
     return Ways(tuple(tables), tensors["ways.numbers"], tensors["ways.rows"], leaves, layers, _layers(tensors, "when"))

@@ -18,19 +18,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.bitmask import Rows
+from contextdb.compiled.choosing import Choosing, Ranked
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.matches import Matches, layered_penalties
 from contextdb.compiled.memory import Rng
-from contextdb.compiled.pick_columns import PickColumns
-from contextdb.compiled.ways import Ways, WayTable
-from contextdb.errors import ContextError, Fault, PolicyError, in_quotes, some
-from contextdb.schema.shapes import CHANCE, Policy
+from contextdb.compiled.ways import Ways
+from contextdb.errors import ContextError, Fault, PolicyError
+from contextdb.schema.policies import POLICIES, rank_columns
 
 Costs = NDArray[np.float64]
 """What the soft cells of each depth cost: [D, n]."""
@@ -73,31 +72,29 @@ def pick(compiled: CompiledData, matches: Matches, rng: Rng | int | None = None,
     """
     row = pick_row(compiled, matches, rng, last)
     asset = compiled.fallback if row is None else compiled.assets[row]
-    if compiled.heard is not None:
-        compiled.heard.picked(matches, row, asset)
+    if (watcher := compiled._watcher) is not None and watcher.feed.is_open:
+        watcher.picked(matches, row, asset)
     return asset
 
 
 def pick_row(compiled: CompiledData, matches: Matches, rng: Rng | int | None = None, last: str | None = None) -> int | None:
+    """The row that `pick` picks; None where it gives the fallback."""
     compiled.answering.require_own(matches)
     source = compiled.memory.rng(rng)
     if last is not None and not isinstance(last, str):
         raise ContextError(Fault(f"last is of type {type(last).__name__}.", "the name of an asset, or None"))
-    rows = matches.indices
-    if not len(rows):
+    if not matches:
         return None
     if compiled.ways is not None:
         return _through_tables(compiled, compiled.ways, matches, source, last)
-    if compiled.policy == "unique" and len(rows) > 1:
-        raise not_unique(compiled.name, matches.assets)
-    if compiled.policy not in CHANCE:
-        return int(rows[0])
-    return _weighted(compiled, matches, source, last)
+    if POLICIES[compiled.policy].choose == "chance":
+        return _weighted(compiled, matches, source, last)
+    return int(compiled.once(Choosing.of).candidates(matches)[0])
 
 
 def _through_tables(compiled: CompiledData, ways: Ways, matches: Matches, source: Rng, last: str | None) -> int | None:
     """The row that is picked where tables are in tables."""
-    possible = _possible(ways, _pickable(ways, matches.indices), 0, _costs(compiled, matches))
+    possible = compiled.once(Choosing.of).candidates(matches)
     if not len(possible):
         return None
     if not any(table.is_weighted for table in ways.tables):
@@ -109,42 +106,6 @@ def _through_tables(compiled: CompiledData, ways: Ways, matches: Matches, source
         row = _drawn(ways, fresh if len(fresh) else possible, 0, source)
         memory.remember(source, compiled.assets[row])
     return row
-
-
-def _pickable(ways: Ways, rows: Rows) -> Rows:
-    return rows[ways.pickable[rows]]
-
-
-def _costs(compiled: CompiledData, matches: Matches) -> Costs | None:
-    """What soft cells cost, where a policy asks for it."""
-    return layered_penalties(matches) if "cheapest" in compiled.policies and matches.has_penalties else None
-
-
-def _possible(ways: Ways, rows: Rows, depth: int, costs: Costs | None) -> Rows:
-    """Of rows whose ways are the same above a depth, those that the policies may pick."""
-    table = ways.table_at(int(rows[0]), depth) if len(rows) else None
-    if table is None:
-        return rows
-    parts = ways.parts(rows, depth)
-    parts = _best_parts(ways, table, parts, depth, costs)
-    return np.concatenate([_possible(ways, part, depth + 1, costs) for part in parts])
-
-
-def _best_parts(ways: Ways, table: WayTable, parts: list[Rows], depth: int, costs: Costs | None) -> list[Rows]:
-    """Of the rows of one table, each with the ways that go on from it, those that its policy may pick."""
-    if table.policy == "unique" and len(parts) > 1:
-        raise not_unique(table.name, [ways.steps(int(part[0]))[depth].asset for part in parts])
-    if not table.is_weighted:
-        return parts[:1]
-    parts = _least(parts, [-float(table.ranks[ways.rows[depth, part[0]]]) for part in parts])
-    if costs is None or table.policy != "cheapest":
-        return parts
-    return _least(parts, [float(costs[depth, part[0]]) for part in parts])
-
-
-def _least(parts: list[Rows], numbers: list[float]) -> list[Rows]:
-    least = min(numbers, default=0.0)
-    return [part for part, number in zip(parts, numbers, strict=True) if number == least]
 
 
 def _drawn(ways: Ways, rows: Rows, depth: int, source: Rng) -> int:
@@ -165,26 +126,8 @@ def _by_weight(weights: NDArray[np.float64], source: Rng) -> int:
     return min(int(np.searchsorted(sums, source.random() * sums[-1], "right")), len(weights) - 1)
 
 
-def not_unique(name: str, assets: list[str]) -> PolicyError:
-    """The error of several rows of a table that are valid at once and must not."""
-    found = f"{len(assets)} rows of {in_quotes(name)} are valid at once: {some(assets)}."
-    return PolicyError(Fault(found, 'one: the table\'s policy is "unique"', rule="not-unique"))
-
-
-def _ranked(compiled: CompiledData, matches: Matches) -> Rows:
-    """Of the valid rows those between which chance decides: those that the policy prefers, of those that have a weight."""
-    rows = matches.indices
-    rows = rows[compiled.row_weights[rows] > 0.0]
-    ranks = compiled.ranks[rows]
-    rows = rows[ranks == ranks.max()] if len(rows) else rows
-    if len(rows) < 2 or (costs := _costs(compiled, matches)) is None:
-        return rows
-    cheapest: Rows = rows[costs[0, rows] == costs[0, rows].min()]
-    return cheapest
-
-
 def _weighted(compiled: CompiledData, matches: Matches, source: Rng, last: str | None) -> int | None:
-    top = _ranked(compiled, matches).tolist()
+    top = compiled.once(Choosing.of).candidates(matches).tolist()
     if not top:
         return None
     memory = compiled.memory
@@ -216,7 +159,7 @@ class Outcome:
         self.candidates: Rows = self.rows[:0]
         """The rows that may be picked, ascending: int64 [count]."""
         try:
-            self.candidates = _candidates(compiled, matches)
+            self.candidates = compiled.once(Choosing.of).candidates(matches)
         except PolicyError as error:
             self.refusal = error
 
@@ -224,10 +167,10 @@ class Outcome:
     def chances(self) -> dict[int, float]:
         """The chance of each of `candidates`, 0...1."""
         if self.compiled.ways is not None:
-            found: dict[int, float] = {}
+            numbers: dict[int, float] = {}
             if len(self.candidates):
-                _share_out(self.compiled.ways, self.candidates, 0, 1.0, found)
-            return found
+                _share_out(self.compiled.ways, self.candidates, 0, 1.0, numbers)
+            return numbers
         return dict(zip(self.candidates.tolist(), self._shares_of_candidates.tolist(), strict=True))
 
     @cached_property
@@ -270,9 +213,9 @@ class Outcome:
         if self.refusal is not None:
             return f"none is picked: {self.refusal.faults[0].found.rstrip('.')}"
         if self.compiled.ways is not None:
-            return _why_not_through(self.compiled.ways, self.rows, row, self._costs)
+            return _why_not_through(self.compiled.ways, self.rows, self.candidates, row, self._costs)
         compiled = self.compiled
-        if compiled.policy in CHANCE and not compiled.row_weights[row] > 0.0:
+        if POLICIES[compiled.policy].choose == "chance" and not compiled.row_weights[row] > 0.0:
             return "weight 0: never picked"
         first = int(self.candidates[0])
         costs = None if self._costs is None else self._costs[0]
@@ -281,17 +224,8 @@ class Outcome:
 
     @cached_property
     def _costs(self) -> Costs | None:
-        return _costs(self.compiled, self._matches)
-
-
-def _candidates(compiled: CompiledData, matches: Matches) -> Rows:
-    """Of the valid rows those that may be picked; raises PolicyError as `pick` does."""
-    rows = matches.indices
-    if compiled.ways is not None:
-        return np.sort(_possible(compiled.ways, _pickable(compiled.ways, rows), 0, _costs(compiled, matches)))
-    if compiled.policy == "unique" and len(rows) > 1:
-        raise not_unique(compiled.name, [compiled.assets[r] for r in rows.tolist()])
-    return _ranked(compiled, matches) if compiled.policy in CHANCE else rows[:1]
+        wants_costs = any(POLICIES[policy].by_cost for policy in self.compiled.policies) and self._matches.has_penalties
+        return layered_penalties(self._matches) if wants_costs else None
 
 
 def _share_out(ways: Ways, rows: Rows, depth: int, share: float, found: dict[int, float]) -> None:
@@ -311,7 +245,7 @@ def _shares(weights: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(shares / shares.sum())
 
 
-def _why_not_through(ways: Ways, valid: Rows, row: int, costs: Costs | None) -> str:
+def _why_not_through(ways: Ways, valid: Rows, candidates: Rows, row: int, costs: Costs | None) -> str:
     """Why a valid row is not picked where tables are in tables: who outranks it where the ways part."""
     steps = ways.steps(row)
     if not ways.pickable[row]:
@@ -324,7 +258,7 @@ def _why_not_through(ways: Ways, valid: Rows, row: int, costs: Costs | None) -> 
         table = ways.table_at(row, depth)
         assert table is not None
         parts = ways.parts(group, depth)
-        best = _best_parts(ways, table, parts, depth, costs)
+        best = [part for part in parts if np.isin(part, candidates).any()]
         group = next(part for part in parts if row in part)
         if not any(part[0] == group[0] for part in best):
             first, taken = int(best[0][0]), ways.rows[depth]
@@ -338,38 +272,14 @@ def percent(share: float) -> str:
     return "<1 %" if share < 0.01 else ">99 %" if share > 0.99 else f"{100.0 * share:.0f} %"
 
 
-class Ranked(Protocol):
-    """What of a table says which of its rows is preferred: the table itself, or one of those in it."""
-
-    @property
-    def name(self) -> str: ...
-
-    @property
-    def policy(self) -> Policy: ...
-
-    @property
-    def row_weights(self) -> NDArray[np.float64]: ...
-
-    @property
-    def ranks(self) -> NDArray[np.float64]: ...
-
-    @property
-    def priorities(self) -> NDArray[np.int64]: ...
-
-    @property
-    def picking(self) -> PickColumns: ...
-
-
 def preferred(table: Ranked, winner: int, other: int, flat: int, costs: NDArray[np.float64] | None) -> str:
     """Why a row of a table is preferred to another; `flat` is a row of the flat table behind it, for `costs` [n]."""
-    if table.policy == "first":
-        return "an earlier row"
-    priority = int(table.priorities[winner])
-    if priority == table.priorities[other] and table.policy == "specific" and table.picking.specificities is not None:
-        return f"specificity {table.picking.specificities[winner]:g}"
-    if priority == table.priorities[other] and table.policy == "cheapest":
-        return f"penalty {0.0 if costs is None else costs[flat]:g}"
-    return f"priority {priority}"
+    words = ""
+    for key, values in rank_columns(table.policy, table.priorities, table.picking.specificities):
+        words = key.winning.format(values[winner])
+        if values[winner] != values[other]:
+            return words
+    return f"penalty {0.0 if costs is None else costs[flat]:g}" if POLICIES[table.policy].by_cost else words
 
 
 def _outranked(winner: str, n_winners: int, why: str) -> str:

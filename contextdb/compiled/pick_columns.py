@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from contextdb.bitmask import read_only
 from contextdb.cells.conditions import Condition
 from contextdb.cells.sets import Cell
-from contextdb.schema.shapes import Policy
 
 Numbers = NDArray[np.float64]
 
@@ -23,7 +22,7 @@ class PickColumns:
     """How specific the rows are, and how long they rest after they were picked. None for what the table does not say."""
 
     specificities: Numbers | None = None
-    """What the cells of each row count under the policy "specific": float64 [R]; None under another policy."""
+    """What the cells of each row count float64 [R]; None under a policy that does not look at it."""
     once: NDArray[np.bool_] | None = None
     """The rows that each character plays once at most: bool [R]."""
     cooldown_s: Numbers | None = None
@@ -38,8 +37,8 @@ class PickColumns:
     @property
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Those that there are, by name."""
-        found = {field.name: getattr(self, field.name) for field in fields(self)}
-        return {name: array for name, array in found.items() if array is not None}
+        totals = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {name: array for name, array in totals.items() if array is not None}
 
     @classmethod
     def of(cls, array_of: Callable[[str], NDArray[Any] | None]) -> PickColumns:
@@ -54,15 +53,6 @@ class PickColumns:
 
 
 NOTHING = PickColumns()
-
-
-def ranks_of(policy: Policy, priorities: NDArray[np.int64], picking: PickColumns) -> Numbers:
-    """What the policy ranks rows by before chance, apart from costs: higher first, float64 [R]. Under "specific" the place of
-    priority and specificity among those of all rows."""
-    if policy != "specific" or picking.specificities is None:
-        return read_only(priorities.astype(np.float64))
-    pairs = np.stack([priorities.astype(np.float64), picking.specificities], axis=1)
-    return read_only(np.unique(pairs, axis=0, return_inverse=True)[1].reshape(-1).astype(np.float64))
 
 
 def specificities(

@@ -1,7 +1,7 @@
 """What characters have picked: their turns, their last assets, and when they picked rows that rest.
 
-C characters, k assets that are remembered, L rows that rest. Assets and rows are kept by what stays when a table is edited, never
-by the number of a row, so that all of it goes on with the next version of a table.
+C characters, k assets that are remembered, r rows that rest at once. Assets and rows are kept by what stays when a table is edited,
+never by the number of a row, so that all of it goes on with the next version of a table. A rest that is over is forgotten.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.bitmask import Rows
-from contextdb.compiled.choosing import Key, Limits
+from contextdb.compiled.choosing import Key, Limits, PickedArrays
 
 NEVER = -1
 
@@ -32,13 +32,15 @@ class Picked:
         """How often each has picked, with and without success."""
         self.recent = np.zeros((0, memory), np.int64)
         """The numbers of the last assets, the latest first, `NEVER` for none: [C, k]."""
-        self.last_turn = np.zeros((0, 0), np.int64)
-        """The turn in which a row was picked, `NEVER` for none: [C, L]."""
-        self.last_s = np.zeros((0, 0), np.float64)
-        """The time at which it was, in seconds: [C, L]."""
+        self.rests = np.zeros((0, 0), np.int64)
+        """The rows that rest, by the numbers of `limits`, in any order; `NEVER` for none: [C, r]."""
+        self.rest_turns = np.zeros((0, 0), np.int64)
+        """The turn in which each was picked: [C, r]."""
+        self.rest_s = np.zeros((0, 0), np.float64)
+        """The time at which it was, in seconds: [C, r]."""
         self.assets: dict[str, int] = {}
         self.limits: dict[Key, int] = {}
-        """The column of each row that rests."""
+        """The number of each row that rests."""
         self._n_ordered = 0
         """So many characters are 0, 1, 2 … in the order of the arrays."""
         self._sorted: tuple[NDArray[np.int64], NDArray[np.int64]] | None = None
@@ -51,19 +53,26 @@ class Picked:
     def limit_columns(self, limits: Limits) -> Rows:
         """The columns of rows that rest, new ones where they are not known."""
         known = self.limits
-        columns = np.array([known.setdefault(key, len(known)) for key in limits.keys], np.int64)
-        n_more = len(known) - self.last_turn.shape[1]
-        self.last_turn = np.pad(self.last_turn, ((0, 0), (0, n_more)), constant_values=NEVER)
-        self.last_s = np.pad(self.last_s, ((0, 0), (0, n_more)))
-        return columns
+        return np.array([known.setdefault(key, len(known)) for key in limits.keys], np.int64)
+
+    @property
+    def arrays(self) -> PickedArrays:
+        """What the core takes."""
+        return self.turns, self.recent, self.rests, self.rest_turns, self.rest_s
+
+    def make_room(self, n_more: int) -> None:
+        """Let characters remember so many more rows that rest."""
+        more = ((0, 0), (0, max(n_more, self.rests.shape[1] // 2)))
+        self.rests = np.pad(self.rests, more, constant_values=NEVER)
+        self.rest_turns, self.rest_s = np.pad(self.rest_turns, more), np.pad(self.rest_s, more)
 
     def slot(self, who: int) -> int:
         """Where a character is in the arrays."""
-        found = self.slots.get(who)
-        if found is None:
+        bits = self.slots.get(who)
+        if bits is None:
             self._add([who])
-            found = self.slots[who]
-        return found
+            bits = self.slots[who]
+        return bits
 
     def slots_of(self, who: NDArray[np.int64]) -> Rows:
         n = len(who)
@@ -100,55 +109,41 @@ class Picked:
             more = max(self.n, 2 * len(self.turns)) - len(self.turns)
             self.turns = np.pad(self.turns, (0, more))
             self.recent = np.pad(self.recent, ((0, more), (0, 0)), constant_values=NEVER)
-            self.last_turn = np.pad(self.last_turn, ((0, more), (0, 0)), constant_values=NEVER)
-            self.last_s = np.pad(self.last_s, ((0, more), (0, 0)))
+            self.rests = np.pad(self.rests, ((0, more), (0, 0)), constant_values=NEVER)
+            self.rest_turns = np.pad(self.rest_turns, ((0, more), (0, 0)))
+            self.rest_s = np.pad(self.rest_s, ((0, more), (0, 0)))
 
     def forget(self, slots: Rows | slice) -> None:
         """What some characters picked counts no more; their chance goes on."""
         self.recent[slots] = NEVER
-        self.last_turn[slots] = NEVER
+        self.rests[slots] = NEVER
 
-    def ages(self, slots: Rows, assets: Rows) -> Rows:
-        """How many picks ago each character picked an asset, from 0; k where that is not remembered."""
-        found = np.full(len(slots), self.memory, np.int64)
-        for place in reversed(range(self.memory)):
-            found[self.recent[slots, place] == assets] = place
-        return found
+    def __getstate__(self) -> dict[str, Any]:
+        """What is pickled: what characters remember, in as few bytes as it needs."""
+        places = np.nonzero(self.rests[: self.n] >= 0)
+        times, which = np.unique(self.rest_s[places], return_inverse=True)
+        counts = np.bincount(places[0], minlength=self.n)
+        rests = [_short(array) for array in (counts, self.rests[places], self.rest_turns[places], which.reshape(-1))]
+        return {
+            "memory": self.memory,
+            "ids": _short(np.fromiter(self.slots, np.int64, self.n)),
+            "turns": _short(self.turns[: self.n]),
+            "recent": _short(self.recent[: self.n]),
+            "rests": (*rests, times),
+            "assets": self.assets,
+            "limits": self.limits,
+        }
 
-    def rests(self, limits: Limits, columns: Rows, slots: Rows, rows: Rows, time_s: float) -> NDArray[np.bool_]:
-        found = np.zeros(len(rows), np.bool_)
-        for of_row in limits.of_row:
-            of = of_row[rows]
-            (here,) = np.nonzero(of >= 0)
-            limit, slot, column = of[here], slots[here], columns[of[here]]
-            turn, time = self.last_turn[slot, column], self.last_s[slot, column]
-            seconds = limits.cooldown_s[limit]
-            is_early = (self.turns[slot] - turn <= limits.cooldown_turns[limit]) | ((seconds > 0.0) & (time_s < time + seconds))
-            found[here] |= (turn != NEVER) & (limits.once[limit] | is_early)
-        return found
-
-    def remember(self, slots: Rows, assets: Rows) -> None:
-        """Keep which assets some characters picked."""
-        if self.memory:
-            self.recent[slots, 1:] = self.recent[slots, :-1]
-            self.recent[slots, 0] = assets
-
-    def remember_one(self, slot: int, asset: int | None) -> None:
-        """Keep which asset one character picked, if it did, in a turn of its own."""
-        self.turns[slot] += 1
-        if asset is not None and self.memory:
-            recent = self.recent[slot]
-            if self.memory > 1:
-                recent[1:] = recent[:-1].copy()
-            recent[0] = asset
-
-    def rest(self, limits: Limits, columns: Rows, slots: Rows, rows: Rows, time_s: float) -> None:
-        """Let rows rest that some characters picked in this turn, each once."""
-        for of_row in limits.of_row:
-            of = of_row[rows]
-            (here,) = np.nonzero(of >= 0)
-            self.last_turn[slots[here], columns[of[here]]] = self.turns[slots[here]]
-            self.last_s[slots[here], columns[of[here]]] = time_s
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__init__(state["memory"])  # type: ignore[misc]
+        self.assets, self.limits = state["assets"], state["limits"]
+        self._add(state["ids"].tolist())
+        self.turns[: self.n], self.recent[: self.n] = state["turns"], state["recent"]
+        counts, numbers, turns, which, times = state["rests"]
+        self.make_room(int(counts.max(initial=0)))
+        slots = np.repeat(np.arange(self.n), counts)
+        at = np.arange(len(numbers)) - np.repeat(np.cumsum(counts.astype(np.int64)) - counts, counts)
+        self.rests[slots, at], self.rest_turns[slots, at], self.rest_s[slots, at] = numbers, turns, times[which]
 
     def __copy__(self) -> Self:
         new: Self = object.__new__(type(self))
@@ -158,3 +153,10 @@ class Picked:
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         return copy(self)
+
+
+def _short(numbers: NDArray[np.int64]) -> NDArray[np.signedinteger[Any]]:
+    """The same numbers in the shortest type that holds them."""
+    least, most = int(numbers.min(initial=0)), int(numbers.max(initial=0))
+    fits = (kind for kind in (np.int8, np.int16, np.int32) if np.iinfo(kind).min <= least and most <= np.iinfo(kind).max)
+    return numbers.astype(next(fits, np.int64))

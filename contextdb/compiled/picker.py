@@ -7,33 +7,28 @@ seed, on the character's number and on how often it has picked: characters that 
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import accumulate
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import bitmask
-from contextdb.bitmask import Rows, read_only
+from contextdb.bitmask import Rows, Words, read_only
 from contextdb.cells.arguments import require_kind, require_real, require_whole
 from contextdb.compiled.batch_costs import CostsOfPairs
 from contextdb.compiled.casting.stage import CastMatches
-from contextdb.compiled.chance import uniform, uniforms
-from contextdb.compiled.choosing import Choosing, highest, starts_of
-from contextdb.compiled.choosing_masks import EvenChoosing
+from contextdb.compiled.choosing import Choosing
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.many import ManyMatches
-from contextdb.compiled.matches import Matches, answering_of, layered_penalties
-from contextdb.compiled.pick import not_unique
+from contextdb.compiled.matches import Matches, answering_of
 from contextdb.compiled.picked import Picked
 from contextdb.compiled.why_picked import Left, why
-from contextdb.errors import ContextError, Fault, in_quotes, plural
-from contextdb.schema.shapes import CHANCE
+from contextdb.core import Choices
+from contextdb.errors import ContextError, Fault, Place, PolicyError, in_quotes, plural
 
 MOST_PAIRS = 1 << 20
 """So many rows of many answers are looked at together."""
@@ -98,21 +93,10 @@ class Pick:
 
 @dataclass(frozen=True, eq=False)
 class _Known:
-    """A version of the table, as a picker knows it: its assets and rows under the picker's numbers."""
+    """A version of the table, as a picker knows it: its assets and rows that rest have the picker's numbers."""
 
     choosing: Choosing
-    assets: Rows
-    """The number of each row's asset: int64 [n]."""
-    limits: Rows
-    """The column of each row that rests: int64 [L]."""
-    even: EvenChoosing | None
-    """What decides on masks; None where pairs of contexts and rows are to."""
-
-    @cached_property
-    def asset_list(self) -> list[int]:
-        """The same, for one context at a time."""
-        numbers: list[int] = self.assets.tolist()
-        return numbers
+    choices: Choices
 
 
 class Picker:
@@ -129,6 +113,8 @@ class Picker:
         if not 0 <= self._memory <= MOST_MEMORY:
             raise ContextError(Fault(f"memory is {self._memory}.", f"a number of picks, from 0 to {MOST_MEMORY}"))
         self._picked = Picked(self._memory)
+        self._time_s = -MOST_S
+        """The time of the last pick in a table whose rows rest for seconds."""
         self._known: _Known | None = None
 
     @property
@@ -157,33 +143,34 @@ class Picker:
         matches : Matches
             An answer of the table, in any version.
         time_s : float, optional
-            The time of the game in seconds; for tables in which rows rest for seconds.
+            The time of the game in seconds, which does not go back; for tables in which rows rest for seconds.
         who : int
             The character: its number in `pick_many`.
 
         Raises
         ------
         ContextError
-            The answer is of another table, or out of a pickle; the time is missing.
+            The answer is of another table, or out of a pickle; the time is missing, or before that of the last pick.
         PolicyError
             The policy is "unique" and several rows are valid. The turn does not count then.
         """
         require_kind(matches, Matches, "matches", "an answer of the table, from query or live")
         known = self._version(self._compiled_of(matches))
-        time = _time(known, time_s)
-        slot = self._picked.slot(_character(who))
-        compiled = known.choosing.compiled
-        if compiled.ways is None and known.choosing.limits is None:
-            left = self._one(known, matches, slot, who)
-            self._picked.remember_one(slot, None if left.picked is None else known.asset_list[left.picked])
-        else:
-            left = self._as_many(known, matches, slot, who, time)
-            self._keep(known, np.array([slot]), np.array([-1 if left.picked is None else left.picked]), time)
-        row = left.picked
+        time = self._time(known, time_s)
+        compiled, choosing = known.choosing.compiled, known.choosing
+        ids, slots = np.array([_character(who)]), np.array([self._picked.slot(_character(who))])
+        rows, stages = np.empty(1, np.int64), np.empty((3, bitmask.n_words(compiled.n_rows)), np.uint64)
+        refusal = known.choices.pick(
+            matches.mask[None], ids, slots, self._chance_seed, time, self._picked.arrays, choosing.costs_of(matches), rows, stages
+        )
+        if refusal is not None:
+            raise choosing.refused(refusal)
+        self._keep(known, slots, rows, time)
+        row = None if rows[0] < 0 else int(rows[0])
         asset = compiled.fallback if row is None else compiled.assets[row]
-        if compiled.heard is not None:
-            compiled.heard.picked(matches, row, asset)
-        return Pick(row, asset, left)
+        if (watcher := compiled._watcher) is not None and watcher.feed.is_open:
+            watcher.picked(matches, row, asset)
+        return Pick(row, asset, Left(choosing, matches, stages))
 
     def pick_many(
         self, many: ManyMatches, *, time_s: float | None = None, who: Sequence[int] | NDArray[np.integer[Any]] | None = None
@@ -215,31 +202,24 @@ class Picker:
         compiled: CompiledData = many.compiled
         self._require(compiled.name)
         known = self._version(compiled)
-        time = _time(known, time_s)
+        time = self._time(known, time_s)
         ids = _characters(who, len(many))
         slots = self._picked.slots_of(ids)
-        if known.even is not None:
-            fresh = known.even.fresh(many.mask, self._picked.recent[slots])
-            rows = known.even.drawn(fresh, uniforms(self._seed, ids, self._picked.turns[slots], 0))
-        else:
-            rows = self._drawn_by_pairs(known, many, ids, slots, time)
-        self._keep(known, slots, rows, time)
-        return read_only(rows)
-
-    def _drawn_by_pairs(self, known: _Known, many: ManyMatches, ids: Rows, slots: Rows, time_s: float) -> Rows:
-        """The row of each of many characters, -1 for none, by the pairs of a context and a row that is valid in it."""
-        compiled, masks = many.compiled, many.mask
-        rows = np.full(len(many), -1, np.int64)
-        costs = many._costs_of_pairs() if compiled.is_soft and "cheapest" in compiled.policies else None
+        rows = np.empty(len(many), np.int64)
+        costs = many._costs_of_pairs() if known.choosing.wants_costs and compiled.is_soft else None
         block = max(1, MOST_PAIRS // max(1, compiled.n_rows))
         for start in range(0, len(many), block):
-            contexts, valid = bitmask.places(masks[start : start + block])
-            contexts += start
-            *_, kept = self._left(known, contexts, valid, slots, costs, time_s)
-            of, at = contexts[kept], valid[kept]
-            drawn = known.choosing.drawn(of, at, lambda d, c: uniforms(self._seed, ids[c], self._picked.turns[slots[c]], d))
-            rows[of[drawn]] = at[drawn]
-        return rows
+            part = slice(start, start + block)
+            masks = many.mask[part]
+            own = None if costs is None else _costs_in(costs, masks, start)
+            refusal = known.choices.pick(
+                masks, ids[part], slots[part], self._chance_seed, time, self._picked.arrays, own, rows[part], None
+            )
+            if refusal is not None:
+                context = Place(row=start + refusal[0])
+                raise PolicyError(*(fault.at(context) for fault in known.choosing.refused(refusal).faults))
+        self._keep(known, slots, rows, time)
+        return read_only(rows)
 
     def forget(self, who: int | Sequence[int] | NDArray[np.integer[Any]] | None = None) -> None:
         """Forget what all characters picked, or some: nothing rests, and nothing was picked lately. Their chance goes on.
@@ -248,6 +228,7 @@ class Picker:
         """
         if who is None:
             self._picked.forget(slice(None))
+            self._time_s = -MOST_S
             return
         ids = [_character(who)] if isinstance(who, (int, np.integer)) else _characters(who, None).tolist()
         known = self._picked.slots
@@ -286,113 +267,52 @@ class Picker:
 
     def _require(self, name: str) -> None:
         if name != self._table:
-            found = f"the answer is of the table {in_quotes(name)}, and this picker is of {in_quotes(self._table)}."
-            raise ContextError(Fault(found, "an answer of its table, in any version"))
+            problem = f"the answer is of the table {in_quotes(name)}, and this picker is of {in_quotes(self._table)}."
+            raise ContextError(Fault(problem, "an answer of its table, in any version"))
 
     def _version(self, compiled: CompiledData) -> _Known:
         """The table as the picker knows it."""
         known = self._known
         if known is None or known.choosing.compiled is not compiled:
-            choosing = compiled.once(Choosing.of)
-            limits = np.empty(0, np.int64) if choosing.limits is None else self._picked.limit_columns(choosing.limits)
-            assets = self._picked.asset_numbers(compiled.assets)
-            known = self._known = _Known(choosing, assets, limits, EvenChoosing.of(choosing, assets, self._memory))
+            choosing, picked = compiled.once(Choosing.of), self._picked
+            columns = np.empty(0, np.int64) if choosing.limits is None else picked.limit_columns(choosing.limits)
+            choices = choosing.choices(picked.asset_numbers(compiled.assets), columns, len(picked.limits))
+            known = self._known = _Known(choosing, choices)
         return known
 
-    # ---- one pick, and many
-
-    def _one(self, known: _Known, matches: Matches, slot: int, who: int) -> Left:
-        """A pick in a table without tables inside and without rows that rest, row by row."""
-        choosing = known.choosing
-        compiled, valid = choosing.compiled, matches.indices.tolist()
-        if compiled.policy not in CHANCE:
-            if compiled.policy == "unique" and len(valid) > 1:
-                raise not_unique(compiled.name, matches.assets)
-            return Left(choosing, matches, valid, valid[:1], valid[:1], valid[0] if valid else None)
-        ranks, weights = choosing.plain
-        may = [row for row in valid if weights[row] > 0.0]
-        if len(may) > 1:
-            best = max(ranks[row] for row in may)
-            may = [row for row in may if ranks[row] == best]
-        if len(may) > 1 and compiled.policy == "cheapest" and matches.has_penalties:
-            costs = matches.penalties
-            least = costs[may].min()
-            may = [row for row in may if costs[row] == least]
-        fresh = may
-        if len(may) > 1 and self._memory:
-            recent, assets = self._picked.recent[slot].tolist(), known.asset_list
-            ages = [recent.index(assets[row]) if assets[row] in recent else self._memory for row in may]
-            oldest = max(ages)
-            fresh = [row for row, age in zip(may, ages, strict=True) if age == oldest]
-        picked = fresh[0] if fresh else None
-        if len(fresh) > 1:
-            picked = fresh[_hit([weights[r] for r in fresh], uniform(self._seed, who, int(self._picked.turns[slot]), 0))]
-        return Left(choosing, matches, valid, may, fresh, picked)
-
-    def _as_many(self, known: _Known, matches: Matches, slot: int, who: int, time_s: float) -> Left:
-        """A pick as one of many."""
-        valid = matches.indices
-        contexts, slots = np.zeros(len(valid), np.int64), np.array([slot])
-        costs = None if not matches.has_penalties else lambda _, rows: layered_penalties(matches)[:, rows]
-        awake, may, fresh = self._left(known, contexts, valid, slots, costs, time_s, is_one=True)
-        turns = self._picked.turns[slots]
-        drawn = known.choosing.drawn(contexts[fresh], valid[fresh], lambda d, _: uniforms(self._seed, np.array([who]), turns, d))
-        rows = (valid[places].tolist() for places in (awake, may, fresh))
-        awake_rows, may_rows, fresh_rows = rows
-        picked = fresh_rows[drawn[0]] if len(drawn) else None
-        return Left(known.choosing, matches, awake_rows, may_rows, fresh_rows, picked)
-
-    def _left(
-        self,
-        known: _Known,
-        contexts: Rows,
-        rows: Rows,
-        slots: Rows,
-        costs: CostsOfPairs | None,
-        time_s: float,
-        is_one: bool = False,
-    ) -> tuple[Rows, Rows, Rows]:
-        """The places of pairs of a context and a valid row that are left: those that do not rest; of these, those that the policies
-        may pick; of these, those that were picked least lately."""
-        choosing, limits = known.choosing, known.choosing.limits
-        awake = np.arange(len(rows))
-        if limits is not None:
-            awake = np.flatnonzero(~self._picked.rests(limits, known.limits, slots[contexts], rows, time_s))
-        of, at = contexts[awake], rows[awake]
-        own = costs(of, at) if costs is not None and choosing.is_cheapest.any() else None
-        may = awake[choosing.may_be_picked(of, at, own, is_one)]
-        if not (self._memory and choosing.remembers):
-            return awake, may, may
-        ages = self._picked.ages(slots[contexts[may]], known.assets[rows[may]])
-        return awake, may, may[highest(ages, starts_of(contexts[may]))]
+    def _time(self, known: _Known, time_s: float | None) -> float:
+        """The time of the game, where rows rest for seconds."""
+        limits, name = known.choosing.limits, known.choosing.compiled.name
+        needs_time = limits is not None and limits.needs_time
+        if time_s is None:
+            if needs_time:
+                problem = f"rows of the table {in_quotes(name)} rest for seconds after they were picked, and time_s is not given."
+                raise ContextError(Fault(problem, "the time of the game in seconds, such as pick(matches, time_s=12.5)"))
+            return 0.0
+        time = require_real(time_s, "time_s", -MOST_S, MOST_S)
+        if needs_time and time < self._time_s:
+            problem = f"time_s is {time}, and this picker last picked at {self._time_s}: rows would rest until the later time."
+            accepted = "a time that does not go back; after a rollback the copy of the picker from then, or forget()"
+            raise ContextError(Fault(problem, accepted))
+        return time
 
     def _keep(self, known: _Known, slots: Rows, rows: Rows, time_s: float) -> None:
         """Remember the picks of characters, each of which is there once: a row, or -1."""
-        (found,) = np.nonzero(rows >= 0)
-        own, picked, limits = slots[found], rows[found], known.choosing.limits
-        self._picked.remember(own, known.assets[picked])
-        if limits is not None:
-            self._picked.rest(limits, known.limits, own, picked, time_s)
-        self._picked.turns[slots] += 1
+        limits = known.choosing.limits
+        while n_more := known.choices.remember(slots, rows, time_s, self._picked.arrays):
+            self._picked.make_room(n_more)
+        self._time_s = time_s if limits is not None and limits.needs_time else self._time_s
+
+    @property
+    def _chance_seed(self) -> int:
+        """The lowest 64 bits of the seed, with a sign."""
+        return (self._seed + 2**63) % 2**64 - 2**63
 
 
-def _hit(weights: Sequence[float], chance: float) -> int:
-    """Which of some weights chance hits."""
-    most = max(weights)
-    sums = list(accumulate(weight / most for weight in weights))
-    return min(bisect_right(sums, chance * sums[-1]), len(weights) - 1)
-
-
-def _time(known: _Known, time_s: float | None) -> float:
-    """The time of the game, where rows rest for seconds."""
-    limits = known.choosing.limits
-    if time_s is None:
-        if limits is not None and limits.needs_time:
-            name = known.choosing.compiled.name
-            found = f"rows of the table {in_quotes(name)} rest for seconds after they were picked, and time_s is not given."
-            raise ContextError(Fault(found, "the time of the game in seconds, such as pick(matches, time_s=12.5)"))
-        return 0.0
-    return require_real(time_s, "time_s", -MOST_S, MOST_S)
+def _costs_in(costs: CostsOfPairs, masks: Words, first: int) -> NDArray[np.float64]:
+    """What the soft cells of the valid rows of some contexts cost, from number `first` on: float64 [D, pairs]."""
+    contexts, rows = bitmask.places(masks)
+    return np.ascontiguousarray(costs(contexts + first, rows))
 
 
 def _character(who: object) -> int:

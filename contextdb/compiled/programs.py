@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 from contextdb.cells.conditions import Condition
 from contextdb.cells.intervals import EVERYTHING
 from contextdb.cells.sets import Cell, NumberSet, TagMeet, TagSet, ValueSet
-from contextdb.compiled.data import CompiledData
+from contextdb.expressions.derived import Derivation
 from contextdb.expressions.functions import FUNCTIONS, NEGATIVE, OPERATORS, Function
 from contextdb.expressions.plan import Apply, Compare, Const, Given, Held, Link, Logic, Negation, Part, Select
+from contextdb.expressions.rules import WhenRules
 from contextdb.files.tensors import Tensors, texts_to_array
 
 
@@ -123,9 +124,28 @@ class Programs:
     numbers: list[float] = field(default_factory=list)
     texts: list[str] = field(default_factory=list)
     starts: list[int] = field(default_factory=lambda: [0])
+    derived: list[int] = field(default_factory=list)
+    """Which of `facts` each of the first programs computes."""
+    of_row: NDArray[np.int32] = field(default_factory=lambda: np.zeros(0, np.int32))
+    """The number of each row's rule, counted behind the derived facts, or -1; empty without rules."""
 
     def __post_init__(self) -> None:
         self._number_of = {name: number for number, name in enumerate(self.facts)}
+
+    @property
+    def code_array(self) -> NDArray[np.int32]:
+        """The instructions: int32 [n, 4]."""
+        return np.array(self.code, np.int32).reshape(-1, 4)
+
+    @property
+    def numbers_array(self) -> NDArray[np.float64]:
+        """The numbers that they name."""
+        return np.array(self.numbers, np.float64)
+
+    @property
+    def places(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int32]]:
+        """Where each program begins, what the first of them compute, and the rule of each row."""
+        return np.array(self.starts, np.int64), np.array(self.derived, np.int64), self.of_row
 
     def add(self, plan: Part) -> None:
         self.put(plan)
@@ -140,7 +160,7 @@ class Programs:
         raise AssertionError(plan)
 
     @put.register
-    def _(self, plan: Const) -> None:
+    def _of_const(self, plan: Const) -> None:
         if isinstance(plan.value, bool):
             self.emit(Op.TRUTH, plan.value)
         elif isinstance(plan.value, str):
@@ -149,11 +169,11 @@ class Programs:
             self.emit(Op.NUMBER, self._numbered([plan.value]))
 
     @put.register
-    def _(self, plan: Given) -> None:
+    def _of_given(self, plan: Given) -> None:
         self.emit(Op.FACT, self._number_of[plan.name])
 
     @put.register
-    def _(self, plan: Apply) -> None:
+    def _of_apply(self, plan: Apply) -> None:
         first, *others = plan.parts
         self.put(first)
         if plan.function.exponent is not None:
@@ -171,7 +191,7 @@ class Programs:
             self.emit(Op.SETTLE)
 
     @put.register
-    def _(self, plan: Compare) -> None:
+    def _of_compare(self, plan: Compare) -> None:
         self.put(plan.parts[0])
         for at, (link, part) in enumerate(zip(plan.links, plan.parts[1:], strict=True), 1):
             self.put(part)
@@ -179,7 +199,7 @@ class Programs:
             self.emit(_COMPARE[_type_of(part)], SIGNS.index(link.sign), _flags(link), chain)
 
     @put.register
-    def _(self, plan: Held) -> None:
+    def _of_held(self, plan: Held) -> None:
         accepts = plan.cell.accepts
         for at, part in enumerate(accepts.parts if isinstance(accepts, TagMeet) else (accepts,)):
             self.put(plan.part)
@@ -204,19 +224,19 @@ class Programs:
                 self.emit(Op.IN_TEXTS, self._listed(sorted(map(str, values.values))), len(values.values), values.is_complement)
 
     @put.register
-    def _(self, plan: Logic) -> None:
+    def _of_logic(self, plan: Logic) -> None:
         for at, part in enumerate(plan.parts):
             self.put(part)
             if at:
                 self.emit(Op.OR if plan.word == "or" else Op.AND)
 
     @put.register
-    def _(self, plan: Negation) -> None:
+    def _of_negation(self, plan: Negation) -> None:
         self.put(plan.part)
         self.emit(Op.NOT)
 
     @put.register
-    def _(self, plan: Select) -> None:
+    def _of_select(self, plan: Select) -> None:
         for part in (plan.condition, plan.then, plan.otherwise):
             self.put(part)
         self.emit(Op.IF, _type_of(plan))
@@ -248,35 +268,40 @@ def _type_of(part: Part) -> Values:
     return Values.NUMBERS if isinstance(part, Apply) else Values.TRUTHS
 
 
-def programs_to_tensors(compiled: CompiledData) -> Tensors:
-    """The programs of a table as arrays; none for a table without rules and derived facts.
-
-    See `contextdb.compiled.artefact` for their names. The programs of derived facts come first, each behind those that it needs.
-    """
-    steps = compiled.derivation.steps if compiled.derivation else ()
-    rules = compiled.when.rules if compiled.when else ()
+def programs_of(derivation: Derivation | None, when: WhenRules | None) -> Programs | None:
+    """The programs of derived facts, each behind those that it needs, then those of rules; None where there are none."""
+    steps = derivation.steps if derivation else ()
+    rules = when.rules if when else ()
     if not steps and not rules:
-        return {}
-    facts = {c.name: c for c in named_conditions(compiled)}
-    programs = Programs(facts)
+        return None
+    programs = Programs({c.name: c for c in named_conditions(derivation, when)})
     for expression in (*(step.expression for step in steps), *(rule.expression for rule in rules)):
         programs.add(expression.plan)
-    derived = [list(facts).index(step.condition.name) for step in steps]
-    of_row: NDArray[np.int32] = compiled.when.of_row if compiled.when else np.zeros(0, np.int32)
+    names = list(programs.facts)
+    programs.derived = [names.index(step.condition.name) for step in steps]
+    programs.of_row = when.of_row if when else programs.of_row
+    return programs
+
+
+def programs_to_tensors(programs: Programs | None) -> Tensors:
+    """Programs as arrays, see `contextdb.compiled.artefact` for their names; none for a table without rules and derived facts."""
+    if programs is None:
+        return {}
+    starts, derived, of_row = programs.places
     return {
-        "programs.code": np.array(programs.code, np.int32).reshape(-1, 4),
-        "programs.numbers": np.array(programs.numbers, np.float64),
+        "programs.code": programs.code_array,
+        "programs.numbers": programs.numbers_array,
         "programs.texts": texts_to_array(programs.texts),
-        "programs.starts": np.array(programs.starts, np.int64),
-        "programs.facts": texts_to_array(list(facts)),
-        "programs.types": texts_to_array([c.domain.kind for c in facts.values()]),
-        "programs.derived": np.array(derived, np.int64),
+        "programs.starts": starts,
+        "programs.facts": texts_to_array(list(programs.facts)),
+        "programs.types": texts_to_array([c.domain.kind for c in programs.facts.values()]),
+        "programs.derived": derived,
         "programs.of_row": of_row,
     }
 
 
-def named_conditions(compiled: CompiledData) -> tuple[Condition, ...]:
-    """Every condition that programs name or compute: those of rules and derived facts."""
-    derived = compiled.derivation.conditions if compiled.derivation else ()
-    ruled = compiled.when.conditions if compiled.when else ()
+def named_conditions(derivation: Derivation | None, when: WhenRules | None) -> tuple[Condition, ...]:
+    """Every condition that programs name or compute: those of derived facts and rules."""
+    derived = derivation.conditions if derivation else ()
+    ruled = when.conditions if when else ()
     return tuple({c.name: c for c in (*derived, *ruled)}.values())

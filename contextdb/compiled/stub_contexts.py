@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 
 from contextdb.compiled.casting.roles import role_of
-from contextdb.errors import shown
+from contextdb.errors import safe_text
 
 NUMBERS = """
 AnyNumber: TypeAlias = float | np.floating[Any] | np.integer[Any] | cdb.FactSet
@@ -56,7 +56,7 @@ def typed_dict(name: str, comment: str, fields: Mapping[str, str], is_total: boo
     """A TypedDict with keys that need not be names of Python."""
     lines = "".join(f"        {key!r}: {kind},\n" for key, kind in fields.items())
     total = "" if is_total else "    total=False,\n"
-    return f"# {shown(comment, 200)}\n{name} = TypedDict(\n    {name!r},\n    {{\n{lines}    }},\n{total})\n"
+    return f"# {safe_text(comment, 200)}\n{name} = TypedDict(\n    {name!r},\n    {{\n{lines}    }},\n{total})\n"
 
 
 def _live(table: str, facts: Mapping[str, str], name_of: NameOf, some: str, actors: str) -> Iterator[str]:
@@ -64,21 +64,30 @@ def _live(table: str, facts: Mapping[str, str], name_of: NameOf, some: str, acto
     lines = [f"class {name}(Protocol):"]
     if facts:
         fact = name_of(f"{table} fact")
-        yield f"# table {shown(table, 200)}, the names of its facts\n{fact}: TypeAlias = Literal[{_listed(facts)}]\n"
+        yield f"# table {safe_text(table, 200)}, the names of its facts\n{fact}: TypeAlias = Literal[{_listed(facts)}]\n"
         kinds = list(dict.fromkeys(facts.values()))
         for kind in kinds:
             lines += ["    @overload"] if len(kinds) > 1 else []
             named = _listed(own for own in facts if facts[own] == kind)
             lines.append(f"    def __setitem__(self, name: Literal[{named}], value: {kind} | None, /) -> None: ...")
-        lines.append(f"    def __getitem__(self, name: {fact}, /) -> object: ...")
+        for kind in kinds if len(kinds) > 1 else ():
+            named = _listed(own for own in facts if facts[own] == kind)
+            lines += ["    @overload", f"    def __getitem__(self, name: Literal[{named}], /) -> {kind}: ..."]
+        lines += ["    @overload"] if len(kinds) > 1 else []
+        lines.append(f"    def __getitem__(self, name: {fact}, /) -> {' | '.join(kinds)}: ...")
         lines.append(f"    def __delitem__(self, name: {fact}, /) -> None: ...")
+        lines.append(f"    def __iter__(self) -> Iterator[{fact}]: ...")
+        lines.append(f"    def keys(self) -> KeysView[{fact}]: ...")
+        lines += ["    def __len__(self) -> int: ...", "    def __contains__(self, name: object, /) -> bool: ..."]
     lines.append(f"    def update(self, facts: {some}, /) -> None: ...")
     if actors:
         lines.append(f"    def actors(self, actors: {actors} | None, *, prefer: cdb.Prefer = None) -> None: ...")
     lines.append("    def matches(self) -> cdb.Matches: ...")
+    lines.append("    def explain(self) -> cdb.Explanation: ...")
+    lines.append("    def pick(self, rng: cdb.Rng | int | None = None, last: str | None = None) -> str | None: ...")
     lines.append(f"    def copy(self) -> {name}: ...")
     lines += ["    @property", "    def facts(self) -> dict[str, object]: ..."]
-    yield f"# table {shown(table, 200)}, a live context\n" + "\n".join(lines) + "\n"
+    yield f"# table {safe_text(table, 200)}, a live context\n" + "\n".join(lines) + "\n"
 
 
 def _listed(names: Mapping[str, str] | Iterator[str]) -> str:

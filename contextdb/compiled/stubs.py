@@ -18,23 +18,24 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
 from contextdb.cells.outputs import Output
 from contextdb.cells.words import format_number
-from contextdb.compiled.c_header.naming import values_of
+from contextdb.compiled.core_table import values_of
 from contextdb.compiled.stub_contexts import NUMBERS, accepted, contexts_of
 from contextdb.compiled.table import CompiledTable
-from contextdb.errors import shown
+from contextdb.errors import safe_text
 
 _HEAD = '''"""The facts that each table asks for, as types. Written by `contextdb compile --stubs`: do not edit."""
 
 from __future__ import annotations
 
-{imports}from collections.abc import Mapping, Sequence
+{imports}from collections.abc import Iterator, KeysView, Mapping, Sequence
 from typing import Any, Literal, NotRequired, Protocol, TypeAlias, TypedDict, overload
 
 import contextdb as cdb
 import numpy as np
 {numbers}'''
 _TAKEN = (
-    "Any AnyNumber AnyWhole Literal Mapping NotRequired Protocol Sequence TypeAlias TypedDict annotations cdb datetime np overload"
+    "Any AnyNumber AnyWhole Iterator KeysView Literal Mapping NotRequired Protocol Sequence TypeAlias TypedDict annotations cdb"
+    " datetime np overload"
 )
 
 
@@ -77,7 +78,7 @@ class _Names:
 
 def _listed(name: str, of: str, values: Iterable[str]) -> str:
     listed = "".join(f"    {value!r},\n" for value in values)
-    return f"# {shown(of, 200)}\n{name}: TypeAlias = Literal[\n{listed}]\n"
+    return f"# {safe_text(of, 200)}\n{name}: TypeAlias = Literal[\n{listed}]\n"
 
 
 def _facts(name: str, table: CompiledTable, literals: Mapping[Condition, str]) -> str:
@@ -101,7 +102,7 @@ def _outputs(names: _Names, table: CompiledTable) -> str:
 
 def _typed_dict(name: str, table: CompiledTable, lines: Sequence[str]) -> str:
     fields = "{\n" + "".join(lines) + "    }" if lines else "{}"
-    return f"# table {shown(table.name, 200)}\n{name} = TypedDict(\n    {name!r},\n    {fields},\n)\n"
+    return f"# table {safe_text(table.name, 200)}\n{name} = TypedDict(\n    {name!r},\n    {fields},\n)\n"
 
 
 def _output_comment(output: Output) -> str:
@@ -126,7 +127,7 @@ def _comment(condition: Condition) -> str:
 
 def _said(bounds: str, unit: str, description: str) -> str:
     parts = [" ".join(part for part in (bounds, unit) if part), description]
-    said = shown(": ".join(part for part in parts if part), 200)
+    said = safe_text(": ".join(part for part in parts if part), 200)
     return f"  # {said}" if said else ""
 
 

@@ -9,39 +9,32 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Never, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.cells.arguments import by_name, require_path
+from contextdb.cells.arguments import require_path
 from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import Context, Unknown, check_mode, require_context
-from contextdb.compiled.artefact import open_artefact, save
-from contextdb.compiled.batch import query_codes, query_many
-from contextdb.compiled.casting.explaining import explain_with_actors
-from contextdb.compiled.casting.facts import Actors, Ask, Prefer
-from contextdb.compiled.casting.many import query_many_with_actors
-from contextdb.compiled.casting.stage import query_with_actors
 from contextdb.compiled.data import CompiledData
-from contextdb.compiled.explain import Explanation, explain
-from contextdb.compiled.live import LiveContext
-from contextdb.compiled.live_asking import live_context
-from contextdb.compiled.lookup import UNUSUAL
-from contextdb.compiled.many import ManyMatches
 from contextdb.compiled.matches import Matches
 from contextdb.compiled.memory import Rng
 from contextdb.compiled.outputs import Outputs
 from contextdb.compiled.pick import pick
-from contextdb.compiled.picker import Picker
-from contextdb.compiled.preparing import prepare
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.compiled.ways import Step
 from contextdb.errors import ContextError, Fault, WrongType
-from contextdb.schema.shapes import Policy
+from contextdb.schema.policies import Policy
 
 if TYPE_CHECKING:
     import polars as pl
+
+    from contextdb.compiled.casting.facts import Actors, Prefer
+    from contextdb.compiled.explain import Explanation
+    from contextdb.compiled.live import LiveContext
+    from contextdb.compiled.many import ManyMatches
+    from contextdb.compiled.picker import Picker
 
     ManyContexts = Mapping[str, Sequence[object] | NDArray[Any]] | pl.DataFrame
 
@@ -130,7 +123,7 @@ class CompiledTable(Unchanging):
         return self._data.way(row)
 
     def query(
-        self, context: Context, *old: Never, unknown: Unknown = "error", actors: Actors | None = None, prefer: Prefer = None
+        self, context: Context, *, unknown: Unknown = "error", actors: Actors | None = None, prefer: Prefer = None
     ) -> Matches:
         """Find the rows whose cells all accept their facts, and whose roles can be filled.
 
@@ -159,27 +152,31 @@ class CompiledTable(Unchanging):
         -----
         With set-valued facts the answer holds the rows that may match; `Matches.always` those that match for every value.
         """
-        if old:
-            return self.query(context, **by_name("query", old, unknown=unknown, actors=actors, prefer=prefer))
+        data = self._data
         if actors is not None:
-            cast = query_with_actors(self._data, context, Ask(actors, prefer, unknown))
-            if self._data.heard is not None:
-                self._data.heard.asked(context, cast, actors)
-            return cast
-        if unknown != "error":
-            return self._data.query(context, unknown)
-        try:  # as there, without a call more: the way of every question
-            return self._data._ask(context)
-        except UNUSUAL:
-            return self._data.query_with_care(context)
-        except Exception:  # no mapping, which can raise anything, or a fault of ours
-            require_context(context)
-            raise
+            from contextdb.compiled.casting.facts import Ask
+            from contextdb.compiled.casting.stage import query_with_actors
+
+            answer: Matches = query_with_actors(data, context, Ask(actors, prefer, unknown))
+        elif unknown != "error":
+            answer = data.query(context, unknown)
+        else:
+            try:  # as there, without a call more: the way of every question
+                plain = data._ask(context)
+                answer = data.query_with_care(context) if plain is None else plain
+                if not data.is_bound and "query" not in self.__dict__:
+                    object.__setattr__(self, "query", data.core.query_or(type(self)(data).query))  # comes before the method
+            except Exception:  # no mapping, which can raise anything, or a fault of ours
+                require_context(context)
+                raise
+        if (watcher := data._watcher) is not None and watcher.feed.is_open:
+            watcher.answered(context, answer, actors)
+        return answer
 
     def query_many(
         self,
         contexts: ManyContexts,
-        *old: Never,
+        *,
         unknown: Unknown = "error",
         actors: Actors | Sequence[Actors] | None = None,
         prefer: Prefer = None,
@@ -198,16 +195,19 @@ class CompiledTable(Unchanging):
         ContextError
             As `query`, naming the first contexts concerned.
         """
-        if old:
-            return self.query_many(contexts, **by_name("query_many", old, unknown=unknown, actors=actors, prefer=prefer))
         if actors is not None:
+            from contextdb.compiled.casting.facts import Ask
+            from contextdb.compiled.casting.many import query_many_with_actors
+
             return query_many_with_actors(self._data, contexts, Ask(actors, prefer, unknown))  # type: ignore[arg-type]
+        from contextdb.compiled.batch import query_many
+
         return query_many(self._data, contexts, unknown)
 
     def live(
         self,
         facts: Context | None = None,
-        *old: Never,
+        *,
         unknown: Unknown = "error",
         actors: Actors | None = None,
         prefer: Prefer = None,
@@ -215,10 +215,10 @@ class CompiledTable(Unchanging):
         """Keep a context between frames: `live["speed"] = 3.2`, then `live.matches()`. Actors are offered from then on, as with
         `LiveContext.actors`. Raises ContextError where a fact cannot be used, or its name looks misspelt. Facts may be missing
         until `matches()` is called."""
-        if old:
-            return self.live(facts, **by_name("live", old, unknown=unknown, actors=actors, prefer=prefer))
+        from contextdb.compiled.live import LiveContext
+
         check_mode(unknown)
-        live = live_context(self._data, unknown)
+        live = LiveContext(self._data, unknown)
         live.update({} if facts is None else facts)
         live.actors(actors, prefer=prefer)
         return live
@@ -227,40 +227,28 @@ class CompiledTable(Unchanging):
         """Do the work of the first queries now, while the game loads; answers stay the same, and nothing is raised: it asks without
         facts.
 
-        `casting` also does the work of the first query with actors; `batches` that of the first batches: numba is loaded, where it
-        is installed, and the kernels are compiled or read from its cache, which takes about a second.
+        `casting` also does the work of the first query with actors; `batches` that of the first batches.
         """
+        from contextdb.compiled.preparing import prepare
+
         prepare(self._data, casting, batches)
 
-    def encode(self, context: Context, *old: Never, unknown: Unknown = "error") -> NDArray[np.int32]:
-        """The class of every fact, as codes for `query_codes`: int32 [n_slots]; see `contextdb.compiled.stack`.
-
-        Raises
-        ------
-        ContextError
-            As `query`; a fact is a set of values; the table has rules, which have no codes.
-        """
-        if old:
-            return self.encode(context, **by_name("encode", old, unknown=unknown))
-        return self._data.encode(context, unknown)
-
-    def query_codes(self, codes: NDArray[np.int32]) -> Matches:
-        """The rows for codes that `encode` made; raises ContextError for other codes."""
-        return query_codes(self._data, codes)
-
     def explain(
-        self, context: Context, *old: Never, unknown: Unknown = "error", actors: Actors | None = None, prefer: Prefer = None
+        self, context: Context, *, unknown: Unknown = "error", actors: Actors | None = None, prefer: Prefer = None
     ) -> Explanation:
         """Why each row is valid or not: the cells that fail and the facts they fail with, nearest rows first. With actors also
         which role cannot be filled, and whose fact fails. Raises what `query` raises."""
-        if old:
-            return self.explain(context, **by_name("explain", old, unknown=unknown, actors=actors, prefer=prefer))
         if actors is not None:
+            from contextdb.compiled.casting.explaining import explain_with_actors
+            from contextdb.compiled.casting.facts import Ask
+
             return explain_with_actors(self._data, context, Ask(actors, prefer, unknown))
+        from contextdb.compiled.explain import explain
+
         return explain(self._data, context, unknown)
 
     def penalties(
-        self, context: Context, *old: Never, unknown: Unknown = "error", actors: Actors | None = None, prefer: Prefer = None
+        self, context: Context, *, unknown: Unknown = "error", actors: Actors | None = None, prefer: Prefer = None
     ) -> NDArray[np.float64]:
         """What each row's soft cells cost in a search: float64 [n_rows], the sum of the penalties of those that do not match.
 
@@ -268,8 +256,6 @@ class CompiledTable(Unchanging):
         nothing where some value of the set matches. With actors a row costs what it does with its best casting.
         Raises what `query` raises.
         """
-        if old:
-            return self.penalties(context, **by_name("penalties", old, unknown=unknown, actors=actors, prefer=prefer))
         if actors is not None:
             return self.query(context, unknown=unknown, actors=actors, prefer=prefer).penalties
         return self._data.plain_penalties(context, unknown)
@@ -279,7 +265,7 @@ class CompiledTable(Unchanging):
         context: Context | Matches,
         rng: Rng | int | None = None,
         last: str | None = None,
-        *old: Never,
+        *,
         unknown: Unknown = "error",
         actors: Actors | None = None,
         prefer: Prefer = None,
@@ -303,15 +289,17 @@ class CompiledTable(Unchanging):
         PolicyError
             The policy is "unique" and several rows are valid.
         """
-        if old:
-            return self.pick(context, rng, last, **by_name("pick", old, unknown=unknown, actors=actors, prefer=prefer))
-        if isinstance(context, ManyMatches):
-            raise WrongType(Fault("pick is given the answers for many contexts.", "a context, or the answer for one", "many[i]"))
+        if not isinstance(context, (dict, Matches)):
+            from contextdb.compiled.many import ManyMatches
+
+            if isinstance(context, ManyMatches):
+                problem = "pick is given the answers for many contexts."
+                raise WrongType(Fault(problem, "a context, or the answer for one", "many[i]"))
         if not isinstance(context, Matches):
             context = self.query(context, unknown=unknown, actors=actors, prefer=prefer)
         elif actors is not None:
-            found = "actors are for a query, and this is the answer to one."
-            raise ContextError(Fault(found, "facts with actors, or the answer to a query with actors"))
+            problem = "actors are for a query, and this is the answer to one."
+            raise ContextError(Fault(problem, "facts with actors, or the answer to a query with actors"))
         return pick(self._data, context, rng, last)
 
     def picker(self, seed: int = 0, memory: int = 1) -> Picker:
@@ -321,16 +309,22 @@ class CompiledTable(Unchanging):
         picked again while there is another choice. Raises ContextError where either is no whole number, or the memory is out of
         range.
         """
+        from contextdb.compiled.picker import Picker
+
         return Picker(self.name, seed, memory)
 
     def save(self, path: str | Path) -> None:
         """Write the compiled file for the game, a .safetensors file, atomically; raises FileError where it cannot be written."""
+        from contextdb.compiled.artefact import save
+
         save(self._data, require_path(path))
 
     @classmethod
     def open(cls, path: str | Path) -> Self:
         """Open a compiled file by memory map. Raises ArtefactError where the file is truncated, altered, of another program or of a
         later version; FileError where it is missing, or cannot be read."""
+        from contextdb.compiled.artefact import open_artefact
+
         return cls(open_artefact(require_path(path)))
 
 

@@ -26,10 +26,11 @@ def said_by(compiled: Any) -> tuple[object, ...]:
     own = [*compiled.conditions, *compiled.ruled]
     conditions = [(c.name, c.domain, c.expr, c.mirror, *((c.hysteresis,) if c.hysteresis else ())) for c in own]
     derived = [(step.condition.name, step.expression.text) for step in compiled.derivation.steps] if compiled.derivation else []
+    assets = compiled.assets if type(compiled.assets) is list else list(compiled.assets)
     ways = [] if compiled.ways is None else [compiled.ways.numbers, compiled.ways.rows]
     inner = () if compiled.ways is None else compiled.ways.tables
     return (
-        (compiled.name, compiled.policy, compiled.fallback, list(compiled.assets), conditions, derived),
+        (compiled.name, compiled.policy, compiled.fallback, assets, conditions, derived),
         *(compiled.enabled, compiled.priorities, compiled.row_weights, *compiled.texts, *(compiled.slots or ())),
         *((compiled.when.texts,) if compiled.when is not None else ()),
         *compiled.outputs.said,

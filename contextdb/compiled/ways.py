@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from contextdb.cells.words import MARK
 from contextdb.compiled.layers import Layers
-from contextdb.compiled.pick_columns import NOTHING, PickColumns, ranks_of
+from contextdb.compiled.pick_columns import NOTHING, PickColumns
 from contextdb.errors import Place
-from contextdb.schema.shapes import CHANCE, RANKED, Policy
+from contextdb.schema.policies import POLICIES, Policy, PolicyKind, ranks_of
 
 Numbers = NDArray[np.int32]
 Rows = NDArray[np.int64]
@@ -74,12 +74,12 @@ class WayTable:
     @property
     def is_weighted(self) -> bool:
         """Whether chance decides between its rows, so that one of weight 0 is never picked."""
-        return self.policy in CHANCE
+        return POLICIES[self.policy].choose == "chance"
 
     @cached_property
     def ranks(self) -> NDArray[np.float64]:
         """What its policy ranks rows by before chance, apart from costs, higher first: [R]."""
-        return ranks_of(self.policy, self.priorities, self.picking)
+        return ranks_of(self.policy, self.priorities, self.picking.specificities)
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,28 +126,33 @@ class Ways:
                     able[here] &= table.row_weights[rows[here]] > 0.0
         return able
 
+    @cached_property
+    def resting(self) -> NDArray[np.int64]:
+        """The rows that rest after they were picked, as a row of their way does, ascending."""
+        at = [(self.numbers == n) & np.isin(self.rows, table.picking.limited) for n, table in enumerate(self.tables)]
+        return np.flatnonzero(np.any(at, axis=(0, 1)))
+
     def preferred_to(self, row: int) -> NDArray[np.bool_]:
         """The rows that may be picked before a row, by the policy of the table where their ways part: bool [n]."""
-        found = np.zeros(self.rows.shape[1], np.bool_)
-        alike = np.ones(len(found), np.bool_)
+        totals = np.zeros(self.rows.shape[1], np.bool_)
+        alike = np.ones(len(totals), np.bool_)
         for depth, own in enumerate(self.rows[:, row].tolist()):
             table = self.table_at(row, depth)
             if table is None:
                 break
             others = self.rows[depth]
-            if table.policy == "first":
-                found |= alike & (others < own) & self.pickable
-            elif table.policy in RANKED:
+            if POLICIES[table.policy].is_order:
                 rows = np.flatnonzero(alike)
-                found[rows] |= (table.ranks[others[rows]] > table.ranks[own]) & self.pickable[rows]
+                totals[rows] |= (table.ranks[others[rows]] > table.ranks[own]) & self.pickable[rows]
             alike = alike & (others == own)
-        return found
+        return totals
 
-    def policy_between(self, one: int, other: int) -> Policy | None:
+    def policy_between(self, one: int, other: int) -> PolicyKind:
         """The policy of the table where the ways of two rows part."""
         parting = int(np.flatnonzero(self.rows[:, one] != self.rows[:, other])[0])
         table = self.table_at(one, parting)
-        return None if table is None else table.policy
+        assert table is not None
+        return POLICIES[table.policy]
 
     def _step(self, number: int, row: int, asset: str) -> Step:
         table = self.tables[number]

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from contextdb.compiled.choosing import Choosing
+from contextdb import bitmask
+from contextdb.bitmask import Words
+from contextdb.compiled.choosing import Choosing, Ranked
 from contextdb.compiled.matches import Matches, layered_penalties
-from contextdb.compiled.pick import Ranked, percent
+from contextdb.compiled.pick import percent
+from contextdb.schema.policies import POLICIES, rank_columns
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,13 +21,29 @@ class Left:
 
     choosing: Choosing
     matches: Matches
-    awake: Sequence[int]
-    """Those that did not rest."""
-    may: Sequence[int]
-    """Of these those that the policies may pick."""
-    fresh: Sequence[int]
-    """Of these those that were picked least lately: chance decided between them."""
-    picked: int | None
+    stages: Words
+    """Masks of those that did not rest, of these that the policies may pick, of these that were picked least lately: uint64 [3,
+    W]."""
+
+    @cached_property
+    def awake(self) -> list[int]:
+        """Those that did not rest."""
+        return _rows(self.stages[0])
+
+    @cached_property
+    def may(self) -> list[int]:
+        """Of these those that the policies may pick."""
+        return _rows(self.stages[1])
+
+    @cached_property
+    def fresh(self) -> list[int]:
+        """Of these those that were picked least lately: chance decided between them."""
+        return _rows(self.stages[2])
+
+
+def _rows(mask: Words) -> list[int]:
+    rows: list[int] = bitmask.rows(mask).tolist()
+    return rows
 
 
 def why(left: Left, row: int | None) -> str:
@@ -72,16 +91,14 @@ def _preferences(left: Left, row: int) -> list[str]:
 
 
 def _preference(table: Ranked, own: int, rows: np.ndarray[tuple[int], np.dtype[np.int64]], left: Left, row: int, depth: int) -> str:
-    if table.policy == "first":
-        return "first valid row"
-    priority = int(table.priorities[own])
-    equals = rows[table.priorities[rows] == priority]
-    specificities = table.picking.specificities
-    if table.policy == "specific" and specificities is not None and (specificities[equals] < specificities[own]).any():
-        return f"most specific: {specificities[own]:g}"
-    if table.policy == "cheapest" and len(equals) > 1 and left.matches.has_penalties:
+    words = ""
+    for key, values in rank_columns(table.policy, table.priorities, table.picking.specificities):
+        if not words or (values[rows] < values[own]).any():
+            words = key.won.format(values[own])
+        rows = rows[values[rows] == values[own]]
+    if POLICIES[table.policy].by_cost and len(rows) > 1 and left.matches.has_penalties:
         return f"least penalty {layered_penalties(left.matches)[depth, row]:g}"
-    return f"highest priority {priority}"
+    return words
 
 
 def _chance(left: Left, row: int) -> float:

@@ -68,17 +68,18 @@ def opened(
     if not assume and not ruled.rules:
         return Opened(compiled, table, _space(compiled, impossible, weights, progress, is_cut), None, ruled=ruled)
     assumed = assumptions_of(table if assume else replace(table, settings=replace(table.settings, assume=())))
-    space = _space(compiled, [*impossible, *assumed.boxes], weights, progress, is_cut)
+    nothing: list[CellBox] = [{}] if assumed.contradictions else []  # a box without cells: no context can happen
+    space = _space(compiled, [*impossible, *assumed.boxes, *nothing], weights, progress, is_cut)
     texts = tuple(expression.text for expression in assumed.expressions)
     restricted = _restricted(space)
-    drawn = [c for c in _drawn(table, assumed) if c.name in restricted]
+    drawn = [c for c in not_boxed(table, assumed) if c.name in restricted]
     named = [c.name for expression in assumed.unboxed for c in expression.conditions]
     derivation = derivation_of(table.schema, [*(c.name for c in compiled.conditions), *named])
     unboxed = _that_matter(assumed.unboxed, derivation, restricted)
     if not drawn and not unboxed:
         return Opened(compiled, table, space, None, texts, ruled=ruled)
-    told = (c.name if c.name in ruled.rules else f"{c.name} = {c.expr}" for c in drawn)
-    sampled = (*told, *(expression.text for expression in unboxed))
+    names = (c.name if c.name in ruled.rules else f"{c.name} = {c.expr}" for c in drawn)
+    sampled = (*names, *(expression.text for expression in unboxed))
     return Opened(compiled, table, space, Drawer(space, derivation, unboxed), texts, sampled, ruled)
 
 
@@ -99,12 +100,12 @@ def _restricted(space: Space) -> set[str]:
 def _that_matter(unboxed: Sequence[Expression], derivation: Derivation | None, restricted: Iterable[str]) -> tuple[Expression, ...]:
     """The assumptions that have to do with what rows restrict, if only through others; the rest changes no share."""
     linked = _with_inputs(restricted, derivation)
-    left, found = list(unboxed), set[str]()
+    left, names = list(unboxed), set[str]()
     while near := [e for e in left if not linked.isdisjoint(_with_inputs(e.names, derivation))]:
         left = [e for e in left if e not in near]
-        found |= {e.text for e in near}
+        names |= {e.text for e in near}
         linked |= _with_inputs((name for e in near for name in e.names), derivation)
-    return tuple(e for e in unboxed if e.text in found)
+    return tuple(e for e in unboxed if e.text in names)
 
 
 def _with_inputs(names: Iterable[str], derivation: Derivation | None) -> set[str]:
@@ -113,13 +114,13 @@ def _with_inputs(names: Iterable[str], derivation: Derivation | None) -> set[str
     return own if derivation is None else own | {n for step in derivation.only(own).steps for n in step.expression.names}
 
 
-def _drawn(table: EitherTable, assumed: Assumptions) -> Iterator[Condition]:
+def not_boxed(table: EitherTable, assumed: Assumptions) -> Iterator[Condition]:
     """The derived conditions of a table that no boxes over its conditions tell."""
     names = {column.condition.name for column in table.conditions}
-    told = {e.text for e in assumed.derived if all(box.keys() <= names for box in e.as_boxes(False) or ())}
+    texts = {e.text for e in assumed.derived if all(box.keys() <= names for box in e.as_boxes(False) or ())}
     for column in table.conditions:
         condition = column.condition
-        if condition.expr and f"{written_name(condition.name)} == ({condition.expr})" not in told:
+        if condition.expr and f"{written_name(condition.name)} == ({condition.expr})" not in texts:
             yield condition
 
 
@@ -133,7 +134,7 @@ def assumptions_of(table: EitherTable) -> Assumptions:
 
 
 def _definition(condition: Condition, declared: Mapping[str, Condition]) -> Expression | None:
-    """That a derived bool is what it is computed as; None where that is too long or too deep to be said."""
+    """That a derived bool is what it is computed as; None where that is too long or too deep to be written."""
     try:
         return read_expression(f"{written_name(condition.name)} == ({condition.expr})", declared, WANTS)
     except ExpressionError:

@@ -10,21 +10,21 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
 from contextdb.cells.domains import Domain
 from contextdb.cells.grammar import parse_cell
 from contextdb.cells.sets import Cell
 from contextdb.covering.assumed import Opened
+from contextdb.covering.declared import Declared, require_declared
 from contextdb.covering.report import CoverageReport, Gap
 from contextdb.covering.space import Box, Space
 from contextdb.covering.witness import BoxSet, OutOfSteps, Steps
 from contextdb.errors import ContextDBError, ContextError, Fault, Place
-from contextdb.files.reports import document_of
+from contextdb.files.reports import baseline_of
 from contextdb.findings import Finding
 
-FORMAT = 1
 DEAD_RULES = ("dead-row", "never-chosen")
 STEPS = 20_000
 """Search steps for one comparison."""
@@ -56,7 +56,31 @@ class Earlier:
     is_complete: bool
     dead: Counter[tuple[str, str]]
     """Rule and asset of each dead row."""
-    n_rows: int = 0
+    n_rows: int
+    space: Declared
+    """What its shares are shares of."""
+
+
+@dataclass(frozen=True)
+class CaseCounts:
+    """How many saved contexts of a table expect something, how many of these expect exactly some assets, and how many of the
+    table's rows are valid in one of them."""
+
+    count: int
+    exact: int
+    rows: int
+    rows_reached: int
+
+    def to_json(self) -> dict[str, int]:
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """What an earlier report says: of each measured table, and of the saved contexts of each table."""
+
+    tables: Mapping[str, Earlier]
+    cases: Mapping[str, CaseCounts]
 
 
 @dataclass(frozen=True)
@@ -74,28 +98,32 @@ class Change:
     is_complete: bool
     """Whether both reports list all their gaps; else a gap that was too small for the earlier list may seem new, as may one that
     names a rule that was rewritten."""
+    space: tuple[str, ...] = ()
+    """What is declared otherwise than before. With any of it the shares are of other contexts: nothing is compared."""
 
     def to_json(self) -> dict[str, object]:
         return {
             "before": self.before,
             "drop": self.drop,
             "complete": self.is_complete,
+            "space": list(self.space),
             "opened": [gap.id for gap in self.opened],
             "closed": [gap.to_json() for gap in self.closed],
             "dead": [finding.to_json() for finding in self.dead],
         }
 
 
-def read_baseline(text: str, file: str) -> dict[str, Earlier]:
-    """What an earlier report says, by table. Raises ContextError where it is no such report; the place names the file."""
+def read_baseline(text: str, file: str) -> Baseline:
+    """What an earlier report says. Raises ContextError where it is no such report, or has no tables; the place names the file."""
     try:
-        document = document_of(text)
-        if not isinstance(document, dict) or document.get("format") != FORMAT:
-            raise ValueError('it has no "format": 1')
-        return {_text(entry["table"]): _earlier(entry) for entry in document["tables"]}
+        document = baseline_of(text)
+        tables = {_text(entry["table"]): _earlier(entry) for entry in document["tables"]}
+        if not tables:
+            raise ValueError("it has no tables, so nothing would be compared")
+        return Baseline(tables, {_text(name): _case_counts(counts) for name, counts in document["cases"].items()})
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         why = f"{error} is missing" if isinstance(error, KeyError) else str(error)
-        raise ContextError(Fault(f"the baseline cannot be read: {why}.", ACCEPTED, place=Place(file))) from None
+        raise ContextError(Fault(f"the baseline cannot be read: {why}.", ACCEPTED, "to write it again", Place(file))) from None
 
 
 def _earlier(entry: Mapping[str, Any]) -> Earlier:
@@ -103,12 +131,20 @@ def _earlier(entry: Mapping[str, Any]) -> Earlier:
     items = [
         EarlierGap(_text(g["id"]), {_text(n): _text(c) for n, c in g["cells"].items()}, _share(g["share"])) for g in gaps["items"]
     ]
-    found = entry.get("findings", [])
-    dead = Counter((_text(f["rule"]), str(f.get("asset"))) for f in found if f["rule"] in DEAD_RULES)
-    n_rows = entry.get("rows", 0)
-    if isinstance(n_rows, bool) or not isinstance(n_rows, int):
-        raise TypeError(f"{n_rows!r:.60} is not a number of rows")
-    return Earlier(_share(entry["covered"]["lower"]), tuple(items), gaps["complete"] is True, dead, n_rows)
+    findings = entry.get("findings", [])
+    dead = Counter((_text(f["rule"]), str(f.get("asset"))) for f in findings if f["rule"] in DEAD_RULES)
+    lower, n_rows = _share(entry["covered"]["lower"]), _count(entry["rows"])
+    return Earlier(lower, tuple(items), gaps["complete"] is True, dead, n_rows, require_declared(entry["space"]))
+
+
+def _case_counts(counts: Mapping[str, Any]) -> CaseCounts:
+    return CaseCounts(**{field.name: _count(counts[field.name]) for field in fields(CaseCounts)})
+
+
+def _count(value: object) -> int:
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise TypeError(f"{value!r:.60} is not a whole number")
+    return value
 
 
 def _text(value: object) -> str:
@@ -124,7 +160,7 @@ def _share(value: object) -> float:
 
 
 def compared(ready: Opened, report: CoverageReport, earlier: Earlier) -> Change:
-    """What became of a table; `report` is that of the table that `ready` holds."""
+    """What became of a table; `report` is that of the table that `ready` holds, in the space of the earlier one."""
     now, before = [gap.cells for gap in report.gaps], [gap.cells for gap in earlier.gaps]
     exact = replace(ready.space, is_strict=True)
     excluded = [exact.cells(exact.sides_of(box)) for box in ready.space.impossible]
@@ -145,6 +181,12 @@ def compared(ready: Opened, report: CoverageReport, earlier: Earlier) -> Change:
     is_complete = report.gaps_complete and earlier.is_complete and is_told
     dead = tuple(_newly_dead(report.findings, earlier.dead))
     return Change(earlier.lower, earlier.lower - report.lower, tuple(opened), tuple(closed), dead, is_complete)
+
+
+def of_another_space(report: CoverageReport, earlier: Earlier, space: tuple[str, ...]) -> Change:
+    """What is known of a table whose space differs in `space`: which rows died."""
+    dead = tuple(_newly_dead(report.findings, earlier.dead))
+    return Change(earlier.lower, earlier.lower - report.lower, (), (), dead, False, space)
 
 
 def _boxes(ready: Opened, boxes: Sequence[Mapping[str, str]]) -> tuple[Space, list[Box | None]]:

@@ -7,17 +7,16 @@ that no context of any measure is left. The budget counts steps, never time: the
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from operator import and_
-from threading import Thread
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import bitmask
-from contextdb.console import was_compiled
+from contextdb.core import Boxes
 from contextdb.covering.progress import SILENT, Progress
 from contextdb.covering.space import Box, Sides, Space, runs_of
 from contextdb.covering.witness import BoxSet, OutOfSteps, Steps
@@ -33,16 +32,16 @@ STEP = 2000
 """A step of that search costs as much as so many of the count; it may take a few in any case."""
 EXACT_FIRST = 6
 """So many eighths of the work go to the exact share; when they do not do, the rest goes to better bounds."""
+MOST_DEPTH = 1000
+"""The count goes so deep at most."""
 WHOLE = 2.0**52
 """What all classes of a factor weigh together, nearly: whole numbers, whose sums are exact."""
-LOG2_KNOWN = 20
-"""How many parts are remembered, as a power of two; 32 bytes each."""
-MOST_DEPTH = 1000
-"""The loop calls itself so deep at most."""
 MANY_FACTORS = 100
 """Above so many factors boxes that share none are counted apart from the start."""
-POLL_S = 0.02
-"""How often a long count is looked at."""
+MOST_BYTES = 4 << 30
+"""So much memory the first part may take."""
+WORDS_A_STEP = 512
+"""So many words of bits, joined one after the other, take as long as a step of work, or less."""
 BOXES_A_CHECK = 10_000
 """How many boxes are read between two looks whether to stop."""
 
@@ -69,17 +68,17 @@ def uncovered_share(space: Space, boxes: Sequence[Box], work: int, progress: Pro
 def uncovered_within(space: Space, boxes: Sequence[Sides], within: Sides, work: int, progress: Progress = SILENT) -> Bounds:
     """The share of the box `within` that none of the others holds."""
     inside = (_inside(space, box, within) for box in boxes)
-    kept = [dict(items) for items in dict.fromkeys(tuple(box.items()) for box in inside if box is not None)]
-    if not kept:
+    distinct = [dict(items) for items in dict.fromkeys(tuple(box.items()) for box in inside if box is not None)]
+    if not distinct:
         return Bounds(1.0, 1.0)
-    if {} in kept:
+    if {} in distinct:
         return Bounds(0.0, 0.0)
-    used = sorted({f for box in kept for f in box})
+    used = sorted({f for box in distinct for f in box})
     full = {f: within.get(f, space.full[f]) for f in used}
     weights = {f: _within(space.factors[f].weights, full[f]) if within else space.factors[f].weights for f in used}
     if len(used) <= MANY_FACTORS:
-        return _count(*_of_factors(used, kept, full, weights), work, progress)
-    return _product(kept, full, weights, work, progress)
+        return _count(*_of_factors(used, distinct, full, weights), work, progress)
+    return _product(distinct, full, weights, work, progress)
 
 
 def _inside(space: Space, box: Sides, within: Sides) -> Sides | None:
@@ -113,10 +112,10 @@ def _product(
         progress.check()
         if len(own) == 1:
             share = 1.0 - math.prod(_share(own[0][f], weights[f]) for f in factors)
-            found = Bounds(share, share, 1)
+            bounds = Bounds(share, share, 1)
         else:
-            found = _count(*_of_factors(factors, own, full, weights), max(0, work - done), progress)
-        lower, upper, done = lower * found.lower, upper * found.upper, done + found.work
+            bounds = _count(*_of_factors(factors, own, full, weights), max(0, work - done), progress)
+        lower, upper, done = lower * bounds.lower, upper * bounds.upper, done + bounds.work
     return Bounds(lower, upper, done)
 
 
@@ -140,7 +139,7 @@ def _independent(boxes: Sequence[Sides]) -> list[tuple[list[int], list[Sides]]]:
     members: dict[int, list[Sides]] = {}
     for box in boxes:
         members.setdefault(head(next(iter(box))), []).append(box)
-    return [(factors[one], found) for one, found in members.items()]
+    return [(factors[one], members_of) for one, members_of in members.items()]
 
 
 def _within(weights: NDArray[np.float64], side: int) -> NDArray[np.float64]:
@@ -155,13 +154,44 @@ def _count(boxes: list[Box], full: Box, weights: list[NDArray[np.float64]], work
     if not boxes:
         return Bounds(1.0, 1.0)
     table = table_of(boxes, full, [len(own) for own in weights], progress)
-    low, high, done, is_cut = _run(table, np.concatenate([_whole(own) for own in weights]), work, progress)
+    whole = np.concatenate([_whole(own) for own in weights])
+    if _is_countable(table, work):
+        low, high, done, is_cut = _run(table, whole, work, progress)
+    else:
+        low, high, done, is_cut = *_by_measure(table, whole), 0, True
     if is_cut or high - low > EXACT:
         return Bounds(max(0.0, low - ROUNDING), min(1.0, high + ROUNDING), done)
     if high < TINY and high > 0.0:
         return _tiny(boxes, full, weights, max(0, work - done), low, high, done, progress)
     share = (low + high) / 2.0
     return Bounds(share, share, done)
+
+
+def _is_countable(table: tuple[NDArray[Any], ...], work: int) -> bool:
+    """Whether the first part, all boxes as bits, fits into memory, and is built, and boxes within others found, within the work. In
+    whole numbers: the same on every machine."""
+    cells, runs, _, hashes, edges = table
+    n_words, n_classes = (len(cells) + 63) // 64, [int(n) for n in np.diff(edges)]
+    n_masks = 2 * len(hashes) + sum(n_classes) + max(n_classes) + 2 * MOST_DEPTH
+    n_classes_of_sides = int((runs[:, 1] - runs[:, 0]).sum(dtype=np.int64)) if len(runs) else 0
+    n_joined = n_words * max(n_classes_of_sides, cells.size)
+    return 8 * n_words * n_masks + 4 * cells.size <= MOST_BYTES and n_joined <= work * WORDS_A_STEP
+
+
+def _by_measure(table: tuple[NDArray[Any], ...], weights: NDArray[np.float64]) -> tuple[float, float]:
+    """Bounds of the share that is left open, by the sum of the boxes' measures and the largest of them."""
+    cells, runs, first, _, edges = table
+    volumes = np.ones(len(cells))
+    for f in range(cells.shape[1]):
+        sums = np.cumsum([0.0, *weights[edges[f] : edges[f + 1]]])
+        numbers, of_box = np.unique(cells[:, f], return_inverse=True)
+        shares = np.ones(len(numbers))
+        for at, number in enumerate(numbers.tolist()):
+            if number >= 0:
+                own = runs[first[number] : first[number + 1]]
+                shares[at] = (sums[own[:, 1]] - sums[own[:, 0]]).sum() / sums[-1]
+        volumes *= shares[of_box]
+    return max(0.0, 1.0 - math.fsum(volumes)), 1.0 - float(volumes.max())
 
 
 def _tiny(
@@ -188,30 +218,13 @@ def _tiny(
     return Bounds(share, share, done)
 
 
-def is_prepared() -> bool:
-    """Whether the loop was compiled on this machine already, or runs as it is."""
-    from contextdb.covering.kernels import IS_COMPILED
-
-    if not IS_COMPILED:
-        return True
-    from contextdb.covering.count_kernels import uncovered
-
-    return was_compiled(uncovered)
-
-
-def prepare(progress: Progress) -> None:
-    """Compile the loop, if it is not compiled yet, by a count of two small boxes."""
-    progress.check()
-    _count([(1, 3), (3, 1)], (3, 3), [np.full(2, 0.5), np.full(2, 0.5)], 100, SILENT)
-
-
 def _share(side: int, weights: NDArray[np.float64]) -> float:
     inside = weights[bitmask.flags_of(side, len(weights))]
     return float(np.cumsum(inside)[-1]) if len(inside) else 0.0  # one after the other: `sum` rounds otherwise from Python 3.12 on
 
 
 def table_of(boxes: Sequence[Box], full: Box, n_classes: Sequence[int], progress: Progress = SILENT) -> tuple[NDArray[Any], ...]:
-    """The boxes as `part_kernels` wants them; `n_classes` are those of each factor. It can be stopped."""
+    """The boxes as the core takes them; `n_classes` are those of each factor. It can be stopped."""
     rng = np.random.default_rng(0)
     number: dict[tuple[int, int], int] = {}
     cells = np.full((len(boxes), len(full)), -1, np.int32)
@@ -248,83 +261,6 @@ def _run(
     table: tuple[NDArray[Any], ...], weights: NDArray[np.float64], work: int, progress: Progress
 ) -> tuple[float, float, int, bool]:
     """Bounds of the share, the work done, and whether it was cut short."""
-    from contextdb.covering.kernels import IS_COMPILED
-    from contextdb.covering.part_kernels import part_of
-
-    n_boxes, n_factors = table[0].shape
-    with np.errstate(over="ignore"):
-        part = part_of(np.arange(n_boxes), np.arange(n_factors), weights, np.zeros(n_factors, np.uint64), table)
-    return (_by_loops if IS_COMPILED else _by_integers)(part, table, weights, work, progress)
-
-
-def _by_integers(
-    part: tuple[NDArray[Any], ...], table: tuple[NDArray[Any], ...], _: NDArray[np.float64], work: int, progress: Progress
-) -> tuple[float, float, int, bool]:
-    from contextdb.covering.count_ints import Count
-
-    count = Count(part, table, 1 << LOG2_KNOWN, depth_of(part), progress)
-    low, high = 0.0, 1.0
-    for is_shared, limit in ((False, work * EXACT_FIRST // 8), (True, work)):
-        found = count.run(limit, work, is_shared)
-        low, high = max(low, found[0]), min(high, found[1])
-        if not count.cut or count.work >= work:
-            break
-    return low, high, count.work, bool(count.cut)
-
-
-def _by_loops(
-    part: tuple[NDArray[Any], ...], table: tuple[NDArray[Any], ...], weights: NDArray[np.float64], work: int, progress: Progress
-) -> tuple[float, float, int, bool]:
-    from contextdb.covering.count_kernels import CUT, LIMIT, SHARED, WORK, uncovered
-
-    salts = np.zeros(table[0].shape[1], np.uint64)
-    low, high = 0.0, 1.0
-    known = np.zeros((1 << LOG2_KNOWN, 2), np.uint64), np.zeros((1 << LOG2_KNOWN, 2))
-    state = np.zeros(5, np.int64)
-    for state[SHARED], state[LIMIT] in ((0, work * EXACT_FIRST // 8), (1, work)):
-        scratch = scratch_of(part, int(np.diff(table[4]).max()))
-        arguments = (part, 0, len(part[0]), weights, salts, table, scratch, known, state)
-        state[CUT] = 0
-        found = uncovered(*arguments) if progress.is_silent else _watched(uncovered, arguments, state, work, progress)
-        low, high = max(low, float(found[0])), min(high, float(found[1]))
-        if not state[CUT] or state[WORK] >= work:
-            break
-    return low, high, int(state[WORK]), bool(state[CUT])
-
-
-def depth_of(part: tuple[NDArray[Any], ...]) -> int:
-    """How deep the loop may go: as factors and boxes one after the other may lead."""
-    return min(6 * len(part[0]) + 160, MOST_DEPTH)
-
-
-def scratch_of(part: tuple[NDArray[Any], ...], n_classes: int) -> tuple[NDArray[Any], ...]:
-    """Room for the loop, every box of the part open at depth 0."""
-    (n_factors, n_words), n_boxes = part[1].shape, len(part[9])
-    depth = depth_of(part)
-    opened, kept = np.zeros((depth, n_words), np.uint64), np.zeros((depth, n_words), np.uint64)
-    listed = np.zeros((depth, n_factors), np.int64)
-    listed[0] = np.arange(n_factors)
-    opened[0] = np.uint64(0xFFFFFFFFFFFFFFFF)
-    if n_boxes % 64:
-        opened[0, -1] = np.uint64((1 << n_boxes % 64) - 1)
-    words = np.zeros(n_words, np.uint64)
-    chosen, shares = np.zeros((depth, n_classes), np.int64), np.zeros((depth, n_classes))
-    return opened, kept, listed, chosen, shares, np.zeros((n_boxes, 2), np.uint64), np.zeros(n_boxes), words, words.copy()
-
-
-def _watched(loop: Callable[..., Any], arguments: tuple[Any, ...], state: NDArray[np.int64], work: int, progress: Progress) -> Any:
-    """Run the loop on a thread of its own, so that it can be told of and stopped."""
-    from contextdb.covering.count_kernels import STOP, WORK
-
-    answer: list[Any] = []
-    thread = Thread(target=lambda: answer.append(loop(*arguments)), daemon=True)
-    thread.start()
-    try:
-        while thread.is_alive():
-            thread.join(POLL_S)
-            progress.at(int(state[WORK]) / max(1, work))
-    finally:
-        if thread.is_alive():
-            state[STOP] = 1
-            thread.join()
-    return answer[0]
+    counted = Boxes(*table).uncovered(weights, work * EXACT_FIRST // 8, work, lambda done: progress.at(done / max(1, work)))
+    low, high, done, is_cut = counted
+    return low, high, done, bool(is_cut)

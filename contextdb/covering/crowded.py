@@ -9,13 +9,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import islice
+from operator import and_
 
+from contextdb import bitmask
 from contextdb.covering.factors import TagFactor
 from contextdb.covering.progress import SILENT, Progress
 from contextdb.covering.space import Box, Space
 from contextdb.covering.witness import BoxSet, Point
 
 MOST_CROWDS = 10
+BOXES = 1 << 15
+"""So many boxes more make a look at a class twice as long."""
+MOST_CLASSES = 1_000_000
+"""About so many classes are looked at in one sweep of all contexts together; where boxes are very many, fewer."""
 SWEEPS = 20
 """So many times each factor may be moved; it takes two or three."""
 
@@ -32,16 +39,17 @@ def find_crowds(space: Space, seeds: Iterable[Point], most: int = MOST_CROWDS, p
     """The fullest boxes that climbing from the seeds leads to, most rows first; none lies within the rows of another."""
     rows = BoxSet.of(space.full, space.boxes, progress)
     impossible = BoxSet.of(space.full, space.impossible, progress)
-    found: dict[int, Point] = {}
-    for point in seeds:
+    crowds: dict[int, Point] = {}
+    n_looked_at = sum(len(factor.weights) for factor in space.factors) * (1 + len(space.boxes) // BOXES)
+    for point in islice(seeds, max(most, MOST_CLASSES // max(1, n_looked_at))):
         progress.check()
         top = _climbed(space, rows, impossible, point)
-        found[_holding(rows, list(top))] = top
-    kept: list[int] = []
-    for bits in sorted(found, key=lambda b: (-b.bit_count(), b)):
-        if bits.bit_count() > 1 and not any(bits & ~other == 0 for other in kept):
-            kept.append(bits)
-    return [CrowdBox(bits, _written(space, _shared(space, bits), found[bits])) for bits in kept[:most]]
+        crowds[_holding(rows, list(top))] = top
+    chosen: list[int] = []
+    for bits in sorted(crowds, key=lambda b: (-b.bit_count(), b)):
+        if bits.bit_count() > 1 and not any(bits & ~other == 0 for other in chosen):
+            chosen.append(bits)
+    return [CrowdBox(bits, _written(space, _shared(space, bits), crowds[bits])) for bits in chosen[:most]]
 
 
 def _climbed(space: Space, rows: BoxSet, impossible: BoxSet, start: Point) -> Point:
@@ -87,8 +95,6 @@ def _written(space: Space, box: Box, point: Point) -> Box:
 
 def _shared(space: Space, bits: int) -> Box:
     box = space.full
-    while bits:
-        lowest = bits & -bits
-        box = tuple(a & b for a, b in zip(box, space.boxes[lowest.bit_length() - 1], strict=True))
-        bits ^= lowest
+    for i in bitmask.rows_of(bits):
+        box = tuple(map(and_, box, space.boxes[i]))
     return box

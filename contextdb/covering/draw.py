@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from contextdb import bitmask
 from contextdb.cells.conditions import Condition
 from contextdb.cells.sets import covers
-from contextdb.covering.factors import Factor, NumberFactor, TagFactor, ValueFactor
+from contextdb.covering.factors import Factor, NumberFactor, TagFactor, ValueFactor, margin_of
 from contextdb.covering.space import Box, Space, factors_of
 from contextdb.expressions import Derivation, Expression
 
@@ -36,20 +36,22 @@ class Drawer:
     derivation: Derivation | None
     assumptions: tuple[Expression, ...]
     """Those that boxes cannot tell."""
+    premises: tuple[Expression, ...] = ()
+    """What must be known to hold, besides."""
 
     @cached_property
     def given(self) -> dict[str, Condition]:
         """The conditions whose facts are drawn: those of the table, and what is needed to compute and to assume."""
         derived = self.derivation.names if self.derivation else frozenset()
         inputs = self.derivation.inputs if self.derivation else ()
-        named = [c for expression in self.assumptions for c in expression.conditions]
+        named = [c for expression in (*self.assumptions, *self.premises) for c in expression.conditions]
         return {c.name: c for c in (*self.space.conditions, *inputs, *named) if c.name not in derived}
 
     @cached_property
     def _needed(self) -> frozenset[str]:
         """The facts that something is computed from, in values."""
         inputs = {c.name for c in self.derivation.inputs} if self.derivation else set()
-        return frozenset(inputs | {name for expression in self.assumptions for name in expression.names})
+        return frozenset(inputs | {name for expression in (*self.assumptions, *self.premises) for name in expression.names})
 
     @cached_property
     def _at(self) -> dict[str, int]:
@@ -57,6 +59,17 @@ class Drawer:
 
     def draw(self, n: int, rng: np.random.Generator, within: Box | None = None) -> Codes:
         """Contexts out of `n` draws as classes of the factors, int32 [N ≤ n, factors]; of a box, where one is given."""
+        codes, _, accepted = self._drawn(n, rng, within)
+        return codes[accepted]
+
+    def moments(self, n: int, rng: np.random.Generator, within: Box | None = None) -> tuple[Codes, dict[str, list[Any]]]:
+        """The same, and for each fact that something is computed from its values in these contexts."""
+        codes, columns, accepted = self._drawn(n, rng, within)
+        rows = np.flatnonzero(accepted).tolist()
+        return codes[accepted], {name: [column[i] for i in rows] for name, column in columns.items()}
+
+    def _drawn(self, n: int, rng: np.random.Generator, within: Box | None) -> tuple[Codes, dict[str, Any], NDArray[np.bool_]]:
+        """All draws: their classes, the values of facts that something is computed from, and which can happen."""
         codes = np.zeros((n, len(self.space.factors)), np.int32)
         columns: dict[str, Any] = {}
         for name, condition in self.given.items():
@@ -67,11 +80,11 @@ class Drawer:
                 values = self._draw_values(condition, numbers, n, rng, codes, within)
             if values is not None:
                 columns[name] = values
-        kept = self._compute(columns, codes, n)
+        accepted = self._compute(columns, codes, n)
         for f, side in enumerate(within or ()):
             if side != self.space.full[f]:
-                kept &= bitmask.flags_of(side, len(self.space.factors[f].weights))[codes[:, f]]
-        return codes[kept]
+                accepted &= bitmask.flags_of(side, len(self.space.factors[f].weights))[codes[:, f]]
+        return codes, columns, accepted
 
     def may_happen(self, box: Box, rng: np.random.Generator, n_tries: int = 4096) -> bool:
         """Whether a context of a box was found that can happen."""
@@ -102,7 +115,7 @@ class Drawer:
         assert isinstance(factor, ValueFactor)
         values: list[Any] = [*factor.values]
         if factor.has_others:
-            values.append(_other_than(factor.values))
+            values.append(other_than(factor.values))
         return [values[k] for k in drawn.tolist()]
 
     def _draw_tags(
@@ -125,16 +138,18 @@ class Drawer:
 
     def _compute(self, columns: Mapping[str, Any], codes: Codes, n: int) -> NDArray[np.bool_]:
         """Compute what is derived, and say which contexts can happen."""
-        kept = np.ones(n, np.bool_)
+        accepted = np.ones(n, np.bool_)
         if self.derivation is not None:
             needed = {c.name for c in self.derivation.inputs}
             inputs = {name: column for name, column in columns.items() if name in needed}
             columns = {**columns, **self.derivation.complete_frame(inputs, n)}
             for name in self.derivation.names & self._at.keys():
-                kept &= self._encode(self._at[name], columns[name], codes)
+                accepted &= self._encode(self._at[name], columns[name], codes)
         for expression in self.assumptions:
-            kept &= expression.flags(columns, n, missing=True)
-        return kept
+            accepted &= expression.flags(columns, n, missing=True)
+        for expression in self.premises:
+            accepted &= expression.flags(columns, n)
+        return accepted
 
     def _encode(self, at: int, column: Any, codes: Codes) -> NDArray[np.bool_]:
         """Write the classes of derived facts; say which of them are known and inside the domain."""
@@ -177,14 +192,14 @@ def _ends(span: tuple[float, float], factor: NumberFactor) -> tuple[float, float
     low, high = span
     if len(factor.spans) == 1:
         return max(low, min(-UNBOUNDED, high - 2 * UNBOUNDED)), min(high, max(UNBOUNDED, low + 2 * UNBOUNDED))
-    first, last = factor.spans[0][1], factor.spans[-1][0]
-    margin = max(1.0, min((last - first) / 2.0, 1e300))
+    margin = margin_of(factor.spans, factor.kind)
     if math.isinf(low):
         low = high if math.isinf(high) else high - margin
     return low, (low + margin if math.isinf(high) else high)
 
 
-def _other_than(values: Sequence[object]) -> str:
+def other_than(values: Sequence[object]) -> str:
+    """A text that is none of some values."""
     name = "other"
     while name in values:
         name += "_"

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contextdb import bitmask
 from contextdb.cells.arguments import require_callable
 from contextdb.compiled.table import CompiledTable
-from contextdb.console import PREPARING
 from contextdb.covering.assumed import Opened, opened
-from contextdb.covering.count import Bounds, is_prepared, prepare, uncovered_share
+from contextdb.covering.count import Bounds, uncovered_share
 from contextdb.covering.crowded import find_crowds
 from contextdb.covering.gaps import SHARE_WORK, Measure, described, find_gaps, share_of
 from contextdb.covering.judge import Judge
@@ -83,7 +83,7 @@ def coverage(
     progress : callable of (str, float), optional
         Called with what is being worked out and which share of the whole is done; the report is the same without it.
     should_stop : callable that gives bool, optional
-        Asked often, from the thread of the call; True ends the call with Cancelled.
+        Called often, from the thread of the call; True ends the call with Cancelled.
 
     Raises
     ------
@@ -106,16 +106,14 @@ def coverage(
     require_callable(progress, "progress")
     require_callable(should_stop, "should_stop")
     watcher = Progress(progress, should_stop)
-    found = opened(table, impossible, weights, assume, watcher.within("Reading the cells", 0.0, COUNT_AT))
-    report = _report(found, seed, work, samples, max_gaps, watcher)
-    return report if found.ruled is None else found.ruled.told(report)
+    drawn = opened(table, impossible, weights, assume, watcher.within("Reading the cells", 0.0, COUNT_AT))
+    report = _report(drawn, seed, work, samples, max_gaps, watcher)
+    return report if drawn.ruled is None else drawn.ruled.with_rules(report)
 
 
-def _report(opened: Opened, seed: int, work: int, asked: int | None, max_gaps: int, watcher: Progress) -> CoverageReport:
+def _report(opened: Opened, seed: int, work: int, max_samples: int | None, max_gaps: int, watcher: Progress) -> CoverageReport:
     space, compiled, drawer = opened.space, opened.compiled, opened.drawer
-    samples = samples_of(asked, SAMPLES, space)
-    if space.boxes and not is_prepared():
-        prepare(watcher.within(PREPARING, COUNT_AT, COUNT_AT))
+    samples = samples_of(max_samples, SAMPLES, space)
     possible = uncovered_share(space, space.impossible, work, watcher.within("Counting contexts", COUNT_AT, COUNT_AT))
     counting = watcher.within("Counting contexts", COUNT_AT, SAMPLES_AT)
     left = uncovered_share(space, space.boxes + space.impossible, work, counting)
@@ -127,11 +125,11 @@ def _report(opened: Opened, seed: int, work: int, asked: int | None, max_gaps: i
     covered = _covered(certain, counts, whole is None, sampler, possible, rng, samples)
     steps = search_steps(work, len(space.boxes))
     searching = watcher.within("Looking for gaps", GAPS_AT, SHARES_AT)
-    found = find_gaps(space, () if whole else counts.uncovered, 4 * max_gaps + 1, steps, searching)
+    gap_boxes = find_gaps(space, () if whole else counts.uncovered, 4 * max_gaps + 1, steps, searching)
     sizing = watcher.within("Measuring gaps", SHARES_AT, FINDINGS_AT)
     measure = _measure(opened, possible, work, samples, seed)
-    gaps = described(space, compiled, found.boxes, measure, max_gaps, sizing)
-    n_open = len(found.boxes)
+    gaps = described(space, compiled, gap_boxes.boxes, measure, max_gaps, sizing)
+    n_open = len(gap_boxes.boxes)
     if drawer is not None:
         gaps = [gap for gap in gaps if gap.share > 0.0]
     judging = watcher.within("Comparing rows", FINDINGS_AT, CROWDS_AT)
@@ -140,7 +138,7 @@ def _report(opened: Opened, seed: int, work: int, asked: int | None, max_gaps: i
     findings = judge.findings()
     middle = (possible.lower + possible.upper) / 2.0
     if middle == 0.0 and drawer is None:
-        covered = _of_nothing(found.is_complete and not found.boxes)
+        covered = _of_nothing(gap_boxes.is_complete and not gap_boxes.boxes)
     hits = _hits(space, counts, drawer is not None)
     crowding = watcher.within("Looking for crowded contexts", CROWDS_AT, 1.0)
     crowded = _crowded(space, counts, measure, crowding)
@@ -153,7 +151,7 @@ def _report(opened: Opened, seed: int, work: int, asked: int | None, max_gaps: i
         upper=covered.upper,
         method=covered.method,
         gaps=tuple(gaps),
-        gaps_complete=found.is_complete and n_open <= max_gaps and len(gaps) == n_open,
+        gaps_complete=gap_boxes.is_complete and n_open <= max_gaps and len(gaps) == n_open,
         findings=tuple(judge.gathered(findings)),
         needless=tuple(judge.needless(findings)),
         findings_complete=judge.is_complete,
@@ -234,7 +232,7 @@ def _of_nothing(is_all_covered: bool) -> Covered:
 def _crowded(space: Space, counts: Counts, measure: Measure, progress: Progress) -> tuple[Crowd, ...]:
     crowds = []
     for found in find_crowds(space, counts.fullest, progress=progress):
-        rows = tuple(row for i, row in enumerate(space.rows) if found.held_by >> i & 1)
+        rows = tuple(space.rows[i] for i in bitmask.rows_of(found.held_by))
         sides = space.sides_of(found.box)
         crowds.append(Crowd(rows, measure(sides, ())[0], space.cells(sides, is_label=True)))
     return tuple(crowd for crowd in crowds if crowd.share > 0.0 or not isinstance(measure, SampledShares))

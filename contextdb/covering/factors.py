@@ -271,14 +271,19 @@ def _measures(spans: Sequence[Span], kind: Kind) -> tuple[list[float], str]:
     """How much each span counts, and what was assumed for that."""
     if len(spans) == 1:
         return [1.0], ""
-    low = spans[1][0] if spans[0][0] == -math.inf else spans[0][0]
-    high = spans[-2][1] if spans[-1][1] == math.inf else spans[-1][1]
-    margin = max(1.0, min((high - low) / 2.0, 1e300))
-    margin = float(math.floor(margin)) if kind.is_whole else margin
+    margin = margin_of(spans, kind)
     lengths = [_length(spans, at, kind, margin) for at in range(len(spans))]
     endless = [s for s in (spans[0], spans[-1]) if math.inf in map(abs, s) and s[0] != s[1]]
     texts = [format_cell(Cell(NumberSet((s,))), Domain(kind.name)) for s in endless]
     return lengths, ", ".join(f"{text} counts {format_number(margin)}" for text in texts)
+
+
+def margin_of(spans: Sequence[Span], kind: Kind) -> float:
+    """How much counts beyond the outermost ends that cells name, where a domain of more than one span has no bound."""
+    low = spans[1][0] if spans[0][0] == -math.inf else spans[0][0]
+    high = spans[-2][1] if spans[-1][1] == math.inf else spans[-1][1]
+    margin = max(1.0, min((high - low) / 2.0, 1e300))
+    return float(math.floor(margin)) if kind.is_whole else margin
 
 
 def _length(spans: Sequence[Span], at: int, kind: Kind, margin: float) -> float:

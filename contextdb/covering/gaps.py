@@ -36,39 +36,39 @@ SHARE_WORK = 200_000
 
 
 @dataclass(frozen=True)
-class FoundGaps:
+class Gaps:
     """Maximal boxes without a row, and whether they hold every context that has none."""
 
     boxes: tuple[Box, ...]
     is_complete: bool
 
 
-def find_gaps(space: Space, seeds: Iterable[Point], most: int, steps: int, progress: Progress = SILENT) -> FoundGaps:
+def find_gaps(space: Space, seeds: Iterable[Point], most: int, steps: int, progress: Progress = SILENT) -> Gaps:
     """Gaps round the seeds, then by search, until there are no more, `most` are found, or the steps are used up."""
     rows = BoxSet.of(space.full, space.boxes, progress)
     seen = BoxSet.of(space.full, space.boxes + space.impossible, progress)
     order = sorted(range(len(rows.full)), key=lambda f: (rows.restricts[f].bit_count(), -f))
-    found: list[Box] = []
+    gaps: list[Box] = []
     sides: list[Sides] = []
     for point in seeds:
-        if len(found) >= most // 2:
+        if len(gaps) >= most // 2:
             break
-        progress.at(len(found) / most)
+        progress.at(len(gaps) / most)
         if not any(all(side >> point[f] & 1 for f, side in box.items()) for box in sides):
-            found.append(_add(seen, widened(space, rows, point, order)))
-            sides.append(space.sides_of(found[-1]))
+            gaps.append(_add(seen, widened(space, rows, point, order)))
+            sides.append(space.sides_of(gaps[-1]))
     left = Steps(steps, progress)
     is_complete = True
     try:
         for point_left in seen.points(space.full, left):
-            if len(found) >= most:
+            if len(gaps) >= most:
                 is_complete = False
                 break
-            progress.at(len(found) / most)
-            found.append(_add(seen, widened(space, rows, point_left, order)))
+            progress.at(len(gaps) / most)
+            gaps.append(_add(seen, widened(space, rows, point_left, order)))
     except OutOfSteps:
         is_complete = False
-    return FoundGaps(tuple(found), is_complete)
+    return Gaps(tuple(gaps), is_complete)
 
 
 def widened(space: Space, rows: BoxSet, point: Point, order: Sequence[int]) -> Box:
@@ -98,14 +98,14 @@ def _add(seen: BoxSet, box: Box) -> Box:
 def described(
     space: Space,
     compiled: CompiledData,
-    found: Sequence[Box],
+    boxes: Sequence[Box],
     measure: Measure,
     most: int,
     progress: Progress = SILENT,
 ) -> list[Gap]:
     """The gaps with their shares of the possible contexts, largest first."""
     sized = []
-    for sides in map(space.sides_of, found):
+    for sides in map(space.sides_of, boxes):
         progress.check()
         sized.append((measure(sides, ()), space.cells(sides), sides))
     sized.sort(key=lambda item: (-item[0][0], json.dumps(item[1], ensure_ascii=False)))
@@ -157,7 +157,7 @@ class NearRows:
         at = next(at for at in range(len(space.conditions)) if self._failing(at, gap) >> i & 1)
         n_changes, row, condition = int(n_failing[i]), space.rows[i], space.conditions[at]
         now = compiled.cells(at)[int(compiled.texts[at].codes[row])]
-        return Nearest(row, compiled.assets[row], n_changes, condition.name, _joined(now, space, at, gap))
+        return Nearest(row, compiled.assets[row], n_changes, condition.name, _cell_with(now, space, at, gap))
 
     @cached_property
     def _n_limited(self) -> NDArray[np.int64]:
@@ -178,7 +178,7 @@ class NearRows:
         return bitmask.flags_of(rows, self.rows.n_boxes)
 
 
-def _joined(cell: Cell, space: Space, at: int, gap: Sides) -> str:
+def _cell_with(cell: Cell, space: Space, at: int, gap: Sides) -> str:
     """The cell that holds what it held and the gap's contexts too."""
     more, domain = space.accepted(at, gap), space.conditions[at].domain
     old = cell.accepts
@@ -189,8 +189,8 @@ def _joined(cell: Cell, space: Space, at: int, gap: Sides) -> str:
     if isinstance(old, ValueSet) and isinstance(more, ValueSet):
         return _values_joined(old, more, space, at, gap)
     if isinstance(old, TagSet) and isinstance(more, TagSet) and not old.is_complement:
-        kept = TagSet(old.needs & more.needs, old.bans & more.bans)
-        return format_cell(Cell(kept), domain) if kept.needs | kept.bans else "Any"
+        tags = TagSet(old.needs & more.needs, old.bans & more.bans)
+        return format_cell(Cell(tags), domain) if tags.needs | tags.bans else "Any"
     return "Any"
 
 

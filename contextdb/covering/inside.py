@@ -66,7 +66,7 @@ def _value(accepts: ValueSet, domain: Domain) -> str:
 
 
 def _tags(accepts: TagSet) -> str:
-    """A set of tags with just those that are needed; one that is banned where only the complement of a ban is asked for."""
+    """A set of tags with just those that are needed; one that is banned where only the complement of a ban is requested."""
     tags = sorted(accepts.needs)
     if accepts.is_complement:
         tags = [] if accepts.needs else sorted(accepts.bans)[:1]

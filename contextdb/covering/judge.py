@@ -18,25 +18,25 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from itertools import groupby, islice
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import bitmask
+from contextdb.compiled.choosing import Choosing
 from contextdb.compiled.data import CompiledData
-from contextdb.console import PREPARING
 from contextdb.covering.draw import Drawer
 from contextdb.covering.progress import SILENT, Progress
-from contextdb.covering.questions import MANY, Questions, is_prepared
+from contextdb.covering.questions import MANY, Questions
 from contextdb.covering.space import Box, Space
 from contextdb.covering.witness import BoxSet, OutOfSteps, Steps
 from contextdb.errors import in_quotes, plural, row_name
 from contextdb.findings import Finding, Level
-from contextdb.schema.shapes import RANKED
+from contextdb.schema.policies import POLICIES, lets_choose, rank_columns
 from contextdb.tables.alike import identical_rows, named
 from contextdb.tables.table import EitherTable
-from contextdb.tables.variety import NEEDLESS, gathered, lets_choose, needless, softened
+from contextdb.tables.variety import NEEDLESS, gathered, needless, softened
 
 AHEAD = 0.2
 """This share of the work, where rows are many, is done for all of them before the first."""
@@ -51,7 +51,7 @@ QUESTIONS = 40
 QUICK, QUICK_BOXES = 50, 5000
 """Up to so many boxes a question is searched for so many steps first, which most need no more than; they count for nothing."""
 STEP, STEP_A_BOX = 100, 0.0625
-"""A step of the search takes as long as so many of the compiled loops, and more for each box."""
+"""A step of the search takes as long as so many of the core's, and more for each box."""
 
 
 @dataclass(eq=False)
@@ -82,10 +82,10 @@ class Judge:
             return [
                 self._whole("no-context", "error", "no context is possible under the assumptions; do they contradict each other?")
             ]
-        found = [*self._left_out(), *self._identical, *self._rows(), *self._policy()]
-        found = [f for f in found if not self._is_preferred(f)]
-        found = softened(found, self.compiled.assets) if lets_choose(self.compiled.policies) else found
-        return sorted(found, key=lambda f: (f.row is not None, f.row or 0))
+        findings = [*self._left_out(), *self._identical, *self._rows(), *self._policy()]
+        findings = [f for f in findings if not self._is_preferred(f)]
+        findings = softened(findings, self.compiled.assets) if lets_choose(self.compiled.policies) else findings
+        return sorted(findings, key=lambda f: (f.row is not None, f.row or 0))
 
     def _left_out(self) -> Iterator[Finding]:
         """That the last rows of a table that is too large are not compared."""
@@ -127,7 +127,7 @@ class Judge:
         return groups
 
     def _rows(self) -> Iterator[Finding]:
-        told = {f.row for f in self._identical}
+        rows = {f.row for f in self._identical}
         first_of: dict[tuple[int, str], int] = {}
         before = 0.0
         if self._questions is not None:
@@ -142,7 +142,7 @@ class Judge:
                 yield self._at(i, "dead-row", "warning", "the row is valid only in contexts that the assumptions exclude.")
                 continue
             if same[0] != i:
-                if self.space.rows[i] not in told:
+                if self.space.rows[i] not in rows:
                     first = same[0] if first_same == i else first_same
                     yield self._at(
                         i, "equal-row", "warning", f"is valid in exactly the contexts of {self._named(first, i)}.", 1 << first
@@ -165,14 +165,14 @@ class Judge:
             yield self._at(i, "redundant-row", "info", f"wherever it is valid, {by} is valid too.", causes)
 
     def _policy(self) -> Iterator[Finding]:
-        ways, policies = self.compiled.ways, self.compiled.policies
-        if "unique" in policies:
+        ways, policies = self.compiled.ways, [POLICIES[policy] for policy in self.compiled.policies]
+        if self.space.is_strict:
             yield from self._overlapping()
-        if not policies.isdisjoint(("first", *RANKED)):
+        if any(policy.is_order for policy in policies):
             for i, box in enumerate(self.space.boxes):
                 self.progress.check()
                 self._asked_of = i
-                before = self._before(i) & self._meeting(box)
+                before = self._before(i) & self._meeting(box) & ~self._resting
                 if before and self._covered(box, before | self._impossible) and self._is_possible(box):
                     why = "comes before it" if ways is not None else self._why_before
                     message = f"the row is never chosen: wherever it is valid, a valid row {why}."
@@ -183,11 +183,8 @@ class Judge:
     @property
     def _why_before(self) -> str:
         """Why the policy prefers a row."""
-        if self.compiled.policy == "first":
-            return "is above it"
-        if self.compiled.policy != "specific":
-            return "has a higher priority"
-        return "has a higher priority or is more specific" if self.compiled.priorities.any() else "is more specific"
+        columns = rank_columns(self.compiled.policy, self.compiled.priorities, self.compiled.picking.specificities)
+        return " or ".join(key.above for key, values in columns if values.min() < values.max())
 
     def _is_preferred(self, finding: Finding) -> bool:
         """Whether rows make a row redundant that is preferred to all of them for being more specific: that is the point of it."""
@@ -196,8 +193,8 @@ class Judge:
             return False
         ways, compiled = self.compiled.ways, self.compiled
         if ways is not None:
-            return all(ways.policy_between(row, by) == "specific" and ways.preferred_to(by)[row] for by in finding.by)
-        if compiled.policy != "specific" or not compiled.row_weights[row] > 0.0:
+            return all(ways.policy_between(row, by).is_narrowing and ways.preferred_to(by)[row] for by in finding.by)
+        if not (POLICIES[compiled.policy].is_narrowing and self._pickable[row]):
             return False
         return bool((compiled.ranks[list(finding.by)] < compiled.ranks[row]).all())
 
@@ -205,32 +202,37 @@ class Judge:
         """The rows that the policy prefers to row i."""
         if self.compiled.ways is not None:
             preferred = self.compiled.ways.preferred_to(self.space.rows[i])
-            return bitmask.to_int(bitmask.pack(preferred[list(self.space.rows)]))
-        if self.compiled.policy == "first":
-            return (1 << i) - 1
-        return self._higher[float(self.compiled.ranks[self.space.rows[i]])]
+        else:
+            preferred = (self.compiled.ranks > self.compiled.ranks[self.space.rows[i]]) & self._pickable
+        return bitmask.to_int(bitmask.pack(preferred[list(self.space.rows)]))
 
     @cached_property
-    def _higher(self) -> dict[float, int]:
-        """For each rank, by priority and specificity, the rows of a higher one that can be picked."""
-        own = [float(self.compiled.ranks[row]) for row in self.space.rows]
-        picked = [self.compiled.row_weights[row] > 0.0 for row in self.space.rows]
-        higher, so_far = {}, 0
-        for priority, group in groupby(sorted(range(len(own)), key=lambda i: (-own[i], i)), key=lambda i: own[i]):
-            higher[priority] = so_far
-            so_far |= bitmask.int_of([i for i in group if picked[i]])
-        return higher
+    def _resting(self) -> int:
+        """The rows that rest after they were picked, when those that they come before have their turn."""
+        ways = self.compiled.ways
+        limited = self.compiled.picking.limited if ways is None else ways.resting
+        return bitmask.int_of(np.flatnonzero(np.isin(self.space.rows, limited)).tolist())
+
+    @cached_property
+    def _pickable(self) -> NDArray[np.bool_]:
+        """Whether each row may be picked at all."""
+        return self.compiled.once(Choosing.of).pickable
 
     def _overlapping(self) -> Iterator[Finding]:
         for i, box in enumerate(self.space.boxes):
             self.progress.check()
             self._asked_of = i
-            others = list(islice(self._joint(i, _bits(self._meeting(box) & ((1 << i) - 1))), MOST_JOINT))
+            others = list(islice(self._joint(i, bitmask.rows_of(self._meeting(box) & ((1 << i) - 1))), MOST_JOINT))
             if others:
                 cells = self.space.cells(self.space.sides_of(self._shared(i, others[0])), is_label=True)
-                told = ", ".join(f"{name}: {cell}" for name, cell in cells.items()) or "every context"
-                message = f'the policy is "unique", and {self._named(others[0], i)} can be valid at the same time: {told}.'
+                cells_text = ", ".join(f"{name}: {cell}" for name, cell in cells.items()) or "every context"
+                other = self._named(others[0], i)
+                message = f'the policy is "{self._refusing}", and {other} can be valid at the same time: {cells_text}.'
                 yield self._at(i, "policy-overlap", "error", message, bitmask.int_of(others))
+
+    @property
+    def _refusing(self) -> str:
+        return next(policy for policy in sorted(self.compiled.policies) if POLICIES[policy].choose == "refuse")
 
     def _joint(self, i: int, others: Iterable[int]) -> Iterator[int]:
         """Those of some rows, which all share contexts with row i, that may be valid in one with it that can happen."""
@@ -240,7 +242,7 @@ class Judge:
                 self._leave_open()
                 return
             self._pairs_left -= 1
-            if ways is not None and ways.policy_between(rows[i], rows[j]) != "unique":
+            if ways is not None and ways.policy_between(rows[i], rows[j]).choose != "refuse":
                 continue
             if self.space.impossible or self.drawer is not None:
                 shared = self._shared(i, j)
@@ -262,7 +264,7 @@ class Judge:
         """Whether some boxes hold all of a box; "no" where that cannot be reported within the steps."""
         allowed = min(self.steps, max(200, self.steps // QUESTIONS))
         if self._questions is not None:
-            return self._asked(self._questions, box, by & self._meeting(box), allowed)
+            return self._answered(self._questions, box, by & self._meeting(box), allowed)
         steps = Steps(allowed, self.progress)
         try:
             answer = self.boxes.outside(by, box, steps) is None
@@ -280,15 +282,13 @@ class Judge:
 
     @cached_property
     def _questions(self) -> Questions | None:
-        """Compiled loops that answer where boxes are many."""
+        """The core answers where boxes are many."""
         boxes = self.space.boxes + self.space.impossible
         if len(boxes) < MANY or not self.space.full:
             return None
-        if not is_prepared():
-            self.progress.within(PREPARING, self.progress.start, self.progress.start)
         return Questions(boxes, self.space.full, self.progress)
 
-    def _asked(self, questions: Questions, box: Box, by: int, allowed: int) -> bool:
+    def _answered(self, questions: Questions, box: Box, by: int, allowed: int) -> bool:
         self.progress.check()
         if len(questions.boxes) <= QUICK_BOXES:
             try:
@@ -306,19 +306,19 @@ class Judge:
         """Boxes that together hold a box, without those that are not needed."""
         by &= self._meeting(box)
         if by.bit_count() <= MOST_CAUSES:
-            for j in reversed(_bits(by)):
+            for j in reversed(bitmask.rows_of(by)):
                 if self._covered(box, by & ~(1 << j)):
                     by &= ~(1 << j)
         return by
 
     def _meeting(self, box: Box) -> int:
-        found = self.boxes.all
+        holders = self.boxes.all
         for f, side in enumerate(box):
             if side != self.space.full[f]:
                 if (f, side) not in self._met:
                     self._met[f, side] = self.boxes.meeting(f, side)
-                found &= self._met[f, side]
-        return found
+                holders &= self._met[f, side]
+        return holders
 
     def _own_holder(self, i: int, box: Box) -> int | None:
         """The first row of the same asset that is valid wherever row i is, and elsewhere too; of very many the first few count."""
@@ -338,8 +338,8 @@ class Judge:
     def _first_holder(self, i: int, box: Box, equal: int) -> int | None:
         """The first row that is valid wherever row i is, and elsewhere too."""
         if self._questions is not None:
-            found = int(self._first_holders[i])
-            return None if found < 0 else found
+            holder = int(self._first_holders[i])
+            return None if holder < 0 else holder
         over = self.boxes.all & ~self._impossible & ~equal
         for f, side in enumerate(box):
             if (f, side) not in self._held:
@@ -352,8 +352,8 @@ class Judge:
     @cached_property
     def _first_holders(self) -> NDArray[np.int64]:
         assert self._questions is not None
-        told, size = self.progress, self.progress.stop - self.progress.start
-        ahead = told.within(told.part, told.start + size * AHEAD / 2, told.start + size * AHEAD)
+        progress, size = self.progress, self.progress.stop - self.progress.start
+        ahead = progress.within(progress.part, progress.start + size * AHEAD / 2, progress.start + size * AHEAD)
         return self._questions.holders(len(self.space.boxes), ahead)
 
     def _named(self, i: int, of: int) -> str:
@@ -366,7 +366,7 @@ class Judge:
         return named(self.table, row, of)
 
     def _at(self, i: int, rule: str, level: Level, message: str, by: int = 0) -> Finding:
-        return self._finding(rule, level, message, self.space.rows[i], tuple(self.space.rows[j] for j in _bits(by)))
+        return self._finding(rule, level, message, self.space.rows[i], tuple(self.space.rows[j] for j in bitmask.rows_of(by)))
 
     def _finding(self, rule: str, level: Level, message: str, row: int, by: tuple[int, ...] = ()) -> Finding:
         asset = self.compiled.assets[row]
@@ -382,8 +382,3 @@ class Judge:
 
 def _holds(outer: Box, inner: Box) -> bool:
     return all(side & ~around == 0 for around, side in zip(outer, inner, strict=True))
-
-
-def _bits(bits: int) -> list[int]:
-    """The numbers of the boxes in a set, ascending."""
-    return list(map(int, bitmask.rows(bitmask.from_int(bits, bits.bit_length()))))

@@ -169,8 +169,8 @@ def left_out(n_conditions: int) -> str:
     """That a report compares no pairs of so many conditions, as a sentence; "" where it compares them."""
     if n_conditions <= MOST_CONDITIONS:
         return ""
-    found = f"the table has {plural(n_conditions, 'condition')}, and at most {MOST_CONDITIONS} are"
-    return f"Pairs of conditions are not compared: {found}."
+    problem = f"the table has {plural(n_conditions, 'condition')}, and at most {MOST_CONDITIONS} are"
+    return f"Pairs of conditions are not compared: {problem}."
 
 
 def pairs(
@@ -192,30 +192,30 @@ def pairs(
     """
     require_counts(samples=SAMPLES if samples is None else samples, seed=seed)
     watcher = Progress(progress, should_stop).within("Comparing conditions", 0.0, 1.0)
-    found = opened(table, impossible, weights, assume, watcher)
-    space = found.space
+    drawn = opened(table, impossible, weights, assume, watcher)
+    space = drawn.space
     samples = samples_of(samples, SAMPLES, space)
-    rules = () if found.ruled is None else found.ruled.rules
-    shown = [at for at, condition in enumerate(space.conditions) if condition.name not in rules]
-    parts = [parts_of(space, at) for at in shown]
+    rules = () if drawn.ruled is None else drawn.ruled.rules
+    visible = [at for at, condition in enumerate(space.conditions) if condition.name not in rules]
+    parts = [parts_of(space, at) for at in visible]
     sides = [sides for own in parts for _, sides in own]
-    sampler = Sampler(space, watcher, found.drawer)
+    sampler = Sampler(space, watcher, drawn.drawer)
     every = sampler.every_context()
     is_exact = every is not None
     tally = _Tally(space, sides)
     for codes, weights_of in every or sampler.random_contexts(samples, np.random.default_rng(seed)):
         watcher.at(tally.n_contexts / max(1, samples))
         is_possible = sampler.is_possible(codes)
-        counts, _ = lookup(codes[is_possible], sampler.masks, len(space.boxes), True)
+        counts = lookup(codes[is_possible], sampler.masks, len(space.boxes)).counts
         tally.add(codes[is_possible], None if weights_of is None else weights_of[is_possible], counts)
     meets = _meeting(sampler, sides, watcher)
-    of_part = [at for at, own in zip(shown, parts, strict=True) for _ in own]
+    of_part = [at for at, own in zip(visible, parts, strict=True) for _ in own]
     return PairTable(
-        table=found.compiled.name,
+        table=drawn.compiled.name,
         method="exact" if is_exact else "estimate",
         seed=int(seed),
         n_samples=0 if is_exact else tally.n_contexts,
-        conditions=tuple(space.conditions[at].name for at in shown),
+        conditions=tuple(space.conditions[at].name for at in visible),
         parts=tuple(tuple(text for text, _ in own) for own in parts),
         shares=tally.inside / tally.total if tally.total else tally.inside,
         covered=tally.valid / tally.total if tally.total else tally.valid,
@@ -272,13 +272,13 @@ def _weight_in_both(flags: NDArray[np.bool_], weights: NDArray[np.float64] | Non
 
 def _meeting(sampler: Sampler, sides: Sequence[Sides], progress: Progress) -> NDArray[np.bool_]:
     """Which boxes accept some of each part: bool [parts, boxes]."""
-    found = np.ones((len(sides), len(sampler.space.boxes)), np.bool_)
+    flags = np.ones((len(sides), len(sampler.space.boxes)), np.bool_)
     for p, part in enumerate(sides):
         progress.check()
         for f, side in part.items():
             of_box, own = sampler.sides[f]
-            found[p] &= np.array([bool(one & side) for one in own], np.bool_)[of_box]
-    return found
+            flags[p] &= np.array([bool(one & side) for one in own], np.bool_)[of_box]
+    return flags
 
 
 def _restricted(sampler: Sampler, of_part: Sequence[int]) -> NDArray[np.bool_]:

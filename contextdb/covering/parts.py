@@ -60,18 +60,18 @@ def _span_sides(weights: NDArray[np.float64]) -> list[int]:
 
 def _tag_parts(space: Space, at: int) -> list[tuple[str, Sides]]:
     """With and without each tag that cells name; of many those that most rows restrict."""
-    found: list[tuple[int, str, Sides, Sides]] = []
+    placed: list[tuple[int, str, Sides, Sides]] = []
     for f in space.of_condition[at]:
         factor = space.factors[f]
         assert isinstance(factor, TagFactor)
         for tag in factor.tags:
             side = factor.classes(TagSet(frozenset((tag,)), frozenset()))
             n_rows = sum(not (box[f] & side and box[f] & ~side) for box in space.boxes)
-            found.append((n_rows, tag, {f: side}, {f: space.full[f] & ~side}))
-    found.sort(key=lambda item: -item[0])
+            placed.append((n_rows, tag, {f: side}, {f: space.full[f] & ~side}))
+    placed.sort(key=lambda item: -item[0])
     domain = space.conditions[at].domain
     parts: list[tuple[str, Sides]] = []
-    for _, tag, with_it, without in found[: MOST_PARTS // 2]:
+    for _, tag, with_it, without in placed[: MOST_PARTS // 2]:
         parts.append((format_cell(Cell(TagSet(frozenset((tag,)), frozenset())), domain), with_it))
         parts.append((format_cell(Cell(TagSet(frozenset(), frozenset((tag,)))), domain), without))
     return [(text, sides) for text, sides in parts if all(sides.values())]

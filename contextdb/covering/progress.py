@@ -1,4 +1,4 @@
-"""How far a long computation is, told to whoever waits, and a way to stop it. Neither changes what comes out."""
+"""How far a long computation is, reported to the caller, and a way to stop it. Neither changes what comes out."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from contextdb.errors import ContextDBError
 
 Tell = Callable[[str, float], None]
-"""Is told what is being worked out, and which share (0…1) of the whole is done."""
+"""Receives what is being worked out, and which share (0…1) of the whole is done."""
 Stops = Callable[[], bool]
 
 
 class Cancelled(ContextDBError):
-    """The computation was stopped by whoever asked for it."""
+    """The computation was stopped by whoever requested it."""
 
 
 @dataclass(frozen=True)
@@ -26,15 +26,11 @@ class Progress:
     start: float = 0.0
     stop: float = 1.0
 
-    @property
-    def is_silent(self) -> bool:
-        return self.tell is None and self.should_stop is None
-
     def within(self, part: str, start: float, stop: float) -> Progress:
         """The same for a part of the work, which begins now."""
-        found = Progress(self.tell, self.should_stop, part, start, stop)
-        found.at(0.0)
-        return found
+        progress = Progress(self.tell, self.should_stop, part, start, stop)
+        progress.at(0.0)
+        return progress
 
     def check(self) -> None:
         """Raise Cancelled when it is time to stop."""

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
 
 from contextdb.cells.notebook import as_html, one_line
-from contextdb.covering.shares import format_percent, told_apart
+from contextdb.columns import Framed, frame_of
+from contextdb.covering.shares import distinct_percents, format_percent
 from contextdb.errors import plural
 from contextdb.findings import Finding
+
+if TYPE_CHECKING:
+    import polars as pl
 
 Method = Literal["exact", "bounds", "estimate"]
 
@@ -92,7 +98,7 @@ class Crowd:
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class CoverageReport:
+class CoverageReport(Framed):
     """The context coverage of one table.
 
     `covered` is between `lower` and `upper`: all are equal when `method` is "exact"; with "bounds" it is their middle and they are
@@ -138,9 +144,17 @@ class CoverageReport:
         """The covered share in one sentence, with how it was computed."""
         if self.method == "exact":
             return f"{format_percent(self.covered)} of the contexts have a valid row (exact)."
-        ends = " and ".join(told_apart(self.lower, self.upper))
+        ends = " and ".join(distinct_percents(self.lower, self.upper))
         how = "certain bounds" if self.method == "bounds" else f"99 % interval, {self.n_samples:,} samples, seed {self.seed}"
         return f"Between {ends} of the contexts have a valid row ({how})."
+
+    def to_polars(self) -> pl.DataFrame:
+        """The gaps as a DataFrame: `gap` (its id), `share`, and a cell for each condition that one of them limits, else null.
+        A condition of the name "gap" or "share" is left out."""
+        limited = dict.fromkeys(name for gap in self.gaps for name in gap.cells)
+        columns: dict[str, object] = {name: [gap.cells.get(name) for gap in self.gaps] for name in limited}
+        columns |= {"gap": [gap.id for gap in self.gaps], "share": np.array([gap.share for gap in self.gaps], np.float64)}
+        return frame_of(columns, ["gap", *limited]).select("gap", "share", *(n for n in limited if n not in ("gap", "share")))
 
     def __repr__(self) -> str:
         return one_line("CoverageReport", self.table, f"{self.headline.rstrip('.')}, {plural(len(self.gaps), 'gap')}")

@@ -17,7 +17,7 @@ from contextdb.cells.grammar import format_cell
 from contextdb.cells.sets import Accepted, Cell, TagSet, meet_plainly
 from contextdb.columns import TextColumn
 from contextdb.covering.report import CoverageReport, Nearest
-from contextdb.errors import shown
+from contextdb.errors import safe_text
 from contextdb.expressions import constant_truth
 from contextdb.expressions.boxes import Box
 from contextdb.expressions.rules import Rule, WhenRules
@@ -46,7 +46,7 @@ class RuledTable:
     rows: int = 0
     """The rows that had a rule, as bits."""
 
-    def told(self, report: CoverageReport) -> CoverageReport:
+    def with_rules(self, report: CoverageReport) -> CoverageReport:
         """A report in which cells of columns that the table does not have are a rule."""
         if self.column is None:
             return report
@@ -151,7 +151,7 @@ class _Folder:
         return ConditionColumn.read(TextColumn.of(condition.name, texts), condition)
 
     def _name(self, text: str) -> str:
-        name = f"{self.when.name}: {shown(text, MOST_NAMED)}"
+        name = f"{self.when.name}: {safe_text(text, MOST_NAMED)}"
         while name in self.columns or name in self.table.schema.conditions:
             name += "_"
         return name

@@ -12,12 +12,14 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.bitmask import Words
+from contextdb.core import count_holders
 from contextdb.covering.draw import Drawer
 from contextdb.covering.progress import SILENT, Progress
 from contextdb.covering.shares import wilson
@@ -34,6 +36,8 @@ LITTLE = 0.1
 """Below this covered share contexts are drawn out of the rows."""
 MANY_FACTORS = 500
 """From so many factors on a sample is so dear that fewer are drawn."""
+MOST_WORDS = 1 << 36
+"""So many words of bits are gone through for the usual samples: half a minute."""
 MOST_CONTEXTS = 100_000
 """A space of so few classes is gone through whole, instead of sampled, for the overlap."""
 
@@ -48,6 +52,17 @@ class Counts:
     uncovered: tuple[Point, ...]
     fullest: tuple[Point, ...]
     """Contexts of some measure with most valid rows, the fullest first."""
+
+
+class Holders(NamedTuple):
+    """What boxes hold N contexts."""
+
+    counts: NDArray[np.int64]
+    """int64 [N]: how many boxes hold each."""
+    firsts: NDArray[np.int64]
+    """int64 [N]: the first of them; -1 where there is none."""
+    hits: NDArray[np.float64]
+    """float64 [boxes]: what the contexts in each box weigh together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,13 +141,10 @@ class Sampler:
             possible = self.is_possible(codes)
             codes = codes[possible]
             weights = np.ones(len(codes)) if shares is None else shares[possible]
-            counts, found = lookup(codes, self.masks, len(self.space.boxes), shares is None)
+            counts, _, held = lookup(codes, self.masks, len(self.space.boxes), weights)
             n_contexts += len(codes)
             histogram = _summed(histogram, np.bincount(counts, weights).astype(np.float64))
-            if isinstance(found, np.ndarray) and found.ndim == 1:
-                hits += found
-            else:
-                hits += weights @ found
+            hits += held
             for i in np.flatnonzero(counts == 0).tolist() if len(uncovered) < MOST_SEEDS else ():
                 uncovered[tuple(codes[i].tolist())] = None
             fullest = _fullest(fullest, codes, np.where(weights > 0.0, counts, 0))
@@ -142,7 +154,7 @@ class Sampler:
         """Which contexts are in no impossible box."""
         if not self.space.impossible:
             return np.ones(len(codes), np.bool_)
-        return np.equal(lookup(codes, self._impossible, len(self.space.impossible), True)[0], 0)
+        return np.equal(lookup(codes, self._impossible, len(self.space.impossible)).counts, 0)
 
     def out_of_rows(self, n_samples: int, rng: np.random.Generator) -> tuple[float, float, float]:
         """The covered and possible share of the whole space and its 99 % interval, by contexts drawn out of the rows."""
@@ -155,8 +167,8 @@ class Sampler:
             n = min(CHUNK, n_samples - at)
             drawn = _drawn(np.cumsum(volumes), rng.random(n))
             codes = self._draw_inside(drawn, rng)
-            words = intersected(codes, self.masks)
-            n_first += int((_first_box(words) == drawn)[self.is_possible(codes)].sum())
+            firsts = lookup(codes, self.masks, len(volumes)).firsts
+            n_first += int((firsts == drawn)[self.is_possible(codes)].sum())
         low, high = wilson(n_first, n_samples)
         return min(1.0, total * n_first / n_samples), min(1.0, total * low), min(1.0, total * high)
 
@@ -177,47 +189,28 @@ class Sampler:
 
 def samples_of(asked: int | None, usual: int, space: Space) -> int:
     """How many samples are drawn: as many as were asked for. When none were, the usual number, and of a space with more than
-    `MANY_FACTORS` factors as many fewer as it has more, since each sample takes longer."""
+    `MANY_FACTORS` factors as many fewer as it has more, since each sample takes longer; so too where boxes are very many."""
     if asked is not None:
         return asked
-    return usual if len(space.factors) <= MANY_FACTORS else usual * MANY_FACTORS // len(space.factors)
+    n_factors = max(1, len(space.factors))
+    most = MOST_WORDS // (n_factors * max(1, bitmask.n_words(len(space.boxes))))
+    return min(usual, usual * MANY_FACTORS // n_factors, most)
 
 
 def lookup(
-    codes: Codes, masks: tuple[Words, NDArray[np.int64]], n_boxes: int, has_equal_weights: bool
-) -> tuple[NDArray[np.int64], NDArray[np.float64] | NDArray[np.bool_]]:
-    """How many boxes hold each context, int64 [N], and how many contexts each box holds; else which, bool [N, boxes]."""
-    words, starts = masks
-    if not len(starts) or not n_boxes:
-        every = np.ones((len(codes), n_boxes), np.bool_)
-        return np.full(len(codes), n_boxes), every.sum(axis=0).astype(np.float64) if has_equal_weights else every
-    if not has_equal_weights:
-        flags = bitmask.unpack(intersected(codes, masks), n_boxes)
-        return flags.sum(axis=1), flags
-    from contextdb.covering.kernels import IS_COMPILED, count_rows
-
-    if not IS_COMPILED:
-        flags = bitmask.unpack(intersected(codes, masks), n_boxes)
-        return flags.sum(axis=1), flags.sum(axis=0).astype(np.float64)
-    counts, hits = np.zeros(len(codes), np.int64), np.zeros(n_boxes, np.int64)
-    count_rows(codes, starts, words, counts, hits)
-    return counts, hits.astype(np.float64)
-
-
-def intersected(codes: Codes, masks: tuple[Words, NDArray[np.int64]]) -> Words:
-    """The boxes that hold each context: uint64 [N, words]."""
-    words, starts = masks
-    found: Words = words[starts[0] + codes[:, 0]]
-    for f in range(1, codes.shape[1]):
-        found &= words[starts[f] + codes[:, f]]
-    return found
+    codes: Codes, masks: tuple[Words, NDArray[np.int64]], n_boxes: int, weights: NDArray[np.float64] | None = None
+) -> Holders:
+    """The boxes that hold each context, and what the contexts that each box holds weigh together, 1 each by default."""
+    holders = Holders(np.zeros(len(codes), np.int64), np.zeros(len(codes), np.int64), np.zeros(n_boxes))
+    count_holders(codes, masks[1], masks[0], weights, *holders)
+    return holders
 
 
 def _fullest(known: dict[Point, int], codes: Codes, counts: NDArray[np.int64]) -> dict[Point, int]:
     """The contexts with most valid rows, those known and more, the fullest first; of equals the earlier."""
     best = np.argsort(-counts, kind="stable")[:MOST_FULL]
-    found = known | {tuple(codes[i].tolist()): int(counts[i]) for i in best.tolist() if counts[i] > 1}
-    return dict(sorted(found.items(), key=lambda item: -item[1])[:MOST_FULL])
+    points = known | {tuple(codes[i].tolist()): int(counts[i]) for i in best.tolist() if counts[i] > 1}
+    return dict(sorted(points.items(), key=lambda item: -item[1])[:MOST_FULL])
 
 
 def _masks(space: Space, boxes: tuple[Box, ...], progress: Progress) -> tuple[Words, NDArray[np.int64]]:
@@ -254,10 +247,3 @@ def _drawn(sums: NDArray[np.float64], uniform: NDArray[np.float64]) -> NDArray[n
     """Where uniform numbers fall among weights whose sums are given; never on one of weight 0."""
     last = int(np.searchsorted(sums, sums[-1], "left"))
     return np.asarray(np.minimum(np.searchsorted(sums, uniform * sums[-1], "right"), last), np.int64)
-
-
-def _first_box(words: Words) -> NDArray[np.int64]:
-    at = (words != 0).argmax(axis=1)
-    word = words[np.arange(len(words)), at]
-    lowest = word & (~word + np.uint64(1))
-    return np.asarray(at * 64 + np.bitwise_count(lowest - np.uint64(1)), np.int64)

@@ -25,7 +25,7 @@ def format_percent(share: float, digits: int = 2) -> str:
     return "> 99.9999999999 %"
 
 
-def told_apart(one: float, other: float) -> tuple[str, str]:
+def distinct_percents(one: float, other: float) -> tuple[str, str]:
     """Two shares as percentages, with as many digits as it takes to tell them apart."""
     texts = [(format_percent(one, digits), format_percent(other, digits)) for digits in range(2, 9)]
     return next((pair for pair in texts if pair[0] != pair[1]), texts[0])

@@ -29,6 +29,7 @@ from contextdb.compiled.data import CompiledData
 from contextdb.covering.factors import Factor, NumberFactor, TagFactor, ValueFactor, tag_factors, weighted
 from contextdb.covering.progress import SILENT, Progress
 from contextdb.errors import ContextError, Fault, Place, TableError, in_quotes, no_such, plural
+from contextdb.schema.policies import decided_by
 
 _WEIGHTS = "a mapping of conditions to mappings of cells to numbers"
 
@@ -101,7 +102,7 @@ class Space:
             (),
             (),
             tuple(given),
-            is_strict="unique" in compiled.policies,
+            is_strict=decided_by("refuse", compiled.policies),
         )
         return space._with_boxes(compiled, excluded, progress, most_rows)
 
@@ -115,7 +116,7 @@ class Space:
             used = _codes_of(compiled, at, most_rows)
             columns.append({code: self.sides(at, None if cells[code].is_soft else cells[code].accepts) for code in used})
         codes = [compiled.texts[at].codes[:most_rows].tolist() for at in range(len(self.conditions))]
-        found: list[tuple[int, Box]] = []
+        added: list[tuple[int, Box]] = []
         n_factors = len(self.factors)  # a cell of tags that accepts nothing has one side too many
         enabled = np.flatnonzero(bitmask.unpack(compiled.enabled, compiled.n_rows))
         for row in enabled[: None if most_rows is None else int(np.searchsorted(enabled, most_rows))].tolist():
@@ -123,9 +124,9 @@ class Space:
             own = [columns[at][codes[at][row]] for at in range(len(columns))]
             box = tuple(chain.from_iterable(own))
             if 0 not in box and len(box) == n_factors:
-                found.append((row, box))
+                added.append((row, box))
         impossible = [self.box(cells) for cells in excluded]
-        rows, boxes = tuple(r for r, _ in found), tuple(b for _, b in found)
+        rows, boxes = tuple(r for r, _ in added), tuple(b for _, b in added)
         return Space(
             self.conditions,
             self.factors,
@@ -239,7 +240,7 @@ class Space:
 
     @cached_property
     def _weights(self) -> dict[tuple[int, int], float]:
-        """The shares of sides that were asked for."""
+        """The shares of sides that were requested."""
         return {}
 
     @property
@@ -264,9 +265,9 @@ def require_measurable(compiled: CompiledData) -> None:
     """Raise TableError where the bits of a table's rows would not fit into memory."""
     n_cells = _n_cells(compiled, compiled.n_rows)
     if compiled.n_rows * n_cells > MOST_HELD:
-        found = f"the table {in_quotes(compiled.name)} is too large for coverage: {plural(compiled.n_rows, 'row')} x "
+        problem = f"the table {in_quotes(compiled.name)} is too large for coverage: {plural(compiled.n_rows, 'row')} x "
         accepted = f"rows times different cells up to {MOST_HELD:,}, or contextdb check, which compares the first rows"
-        raise TableError(Fault(f"{found}{plural(n_cells, 'different cell')}.", accepted))
+        raise TableError(Fault(f"{problem}{plural(n_cells, 'different cell')}.", accepted))
 
 
 def _n_cells(compiled: CompiledData, n_rows: int) -> int:
@@ -282,12 +283,13 @@ def _codes_of(compiled: CompiledData, at: int, most_rows: int | None) -> Sequenc
 
 
 def tags_of(accepts: TagSet) -> frozenset[str]:
+    """Every tag that a set of sets of tags names."""
     parts = accepts.parts if isinstance(accepts, TagMeet) else (accepts,)
     return frozenset(tag for part in parts for tag in (*part.needs, *part.bans))
 
 
 def require_counts(**numbers: object) -> None:
-    """Raise ContextError unless every argument is a whole number from 0 up, and none that kernels cannot count to."""
+    """Raise ContextError unless every argument is a whole number from 0 up, and none that the core cannot count to."""
     for name, number in numbers.items():
         if isinstance(number, bool) or not isinstance(number, (int, np.integer)) or number < 0:
             raise ContextError(Fault(f"{name} is {number!r}.", "a whole number from 0 up"))
@@ -364,4 +366,5 @@ def runs_of(side: int) -> list[tuple[int, int]]:
 
 
 def used_factors(boxes: Iterable[Box], full: Box) -> list[int]:
+    """The factors that some box restricts, ascending."""
     return sorted({f for box in boxes for f, side in enumerate(box) if side != full[f]})

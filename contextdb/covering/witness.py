@@ -61,7 +61,7 @@ class _Node:
 
 @dataclass(eq=False)
 class BoxSet:
-    """Boxes as bits, to be asked; more can be added."""
+    """Boxes as bits, to be queried; more can be added."""
 
     full: Box
     rejects: list[list[int]] = field(default_factory=list)
@@ -134,10 +134,10 @@ class BoxSet:
     def behind(self, point: Sequence[int], order: Sequence[int] | None = None) -> list[int]:
         """The boxes that accept a point's classes of all factors in an order from each place on; the last are all boxes."""
         order = range(len(point)) if order is None else order
-        found = [self.all]
+        rows = [self.all]
         for f in reversed(order):
-            found.append(found[-1] & ~self.rejects[f][point[f]])
-        return found[::-1]
+            rows.append(rows[-1] & ~self.rejects[f][point[f]])
+        return rows[::-1]
 
     def outside(self, open_boxes: int, within: Box, steps: Steps) -> Point | None:
         """A context of `within` that is in none of the open boxes, or None when there is none.
@@ -153,7 +153,7 @@ class BoxSet:
     def points(self, within: Box, steps: Steps) -> Iterator[Point]:
         """Contexts of `within` that are in no box, one after the other, until there is none.
 
-        Before the next one is asked for, a box that holds the last one must be added. The search continues where it was: what was
+        Before the next one is requested, a box that holds the last one must be added. The search continues where it was: what was
         searched once is not searched again. Raises OutOfSteps when the steps, which count down, are used up.
         """
         open_boxes = self.all
@@ -204,7 +204,7 @@ class BoxSet:
         return open_boxes | added
 
     def _search(self, open_boxes: int, within: Box, free: list[int], steps: Steps) -> dict[int, int] | None:
-        found: dict[int, int] = {}
+        chosen: dict[int, int] = {}
         path: list[tuple[int, list[int], list[tuple[int, int]]]] = []
         while open_boxes:
             steps.take(len(free))
@@ -212,13 +212,13 @@ class BoxSet:
             if factor is not None:
                 path.append((factor, free, self._choices(open_boxes, factor, within[factor])))
             while path and not path[-1][2]:
-                found.pop(path.pop()[0], None)
+                chosen.pop(path.pop()[0], None)
             if not path:
                 return None
             factor, free, left = path[-1]
-            open_boxes, found[factor] = left.pop(0)
+            open_boxes, chosen[factor] = left.pop(0)
             free = [f for f in free if f != factor]
-        return found
+        return chosen
 
     def _next_factor(self, open_boxes: int, within: Box, free: list[int]) -> int | None:
         """The factor to fix: of a box that has only that one left, else the one that most boxes restrict; None when some box has
@@ -246,11 +246,11 @@ class BoxSet:
     def _choices(self, open_boxes: int, factor: int, side: int, searched: Collection[int] = ()) -> list[tuple[int, int]]:
         """What each class that is worth trying keeps open, and the class: fewest first. Of equal classes a searched one counts."""
         own = self.rejects[factor]
-        kept = {open_boxes & ~own[k]: k for k in searched}
+        choices = {open_boxes & ~own[k]: k for k in searched}
         for first, stop in runs_of(side):
             for k in range(first, stop):
-                kept.setdefault(open_boxes & ~own[k], k)
-        ordered = sorted(kept.items(), key=lambda item: (item[0].bit_count(), item[1]))
+                choices.setdefault(open_boxes & ~own[k], k)
+        ordered = sorted(choices.items(), key=lambda item: (item[0].bit_count(), item[1]))
         best: list[tuple[int, int]] = []
         for bits, k in ordered:
             if not any(fewer & ~bits == 0 for fewer, _ in best):
@@ -260,10 +260,10 @@ class BoxSet:
 
 def _completed(point: dict[int, int], firsts: Sequence[int]) -> Point:
     """The classes of a point, of the factors that it leaves open the first."""
-    found = list(firsts)
+    filled = list(firsts)
     for f, k in point.items():
-        found[f] = k
-    return tuple(found)
+        filled[f] = k
+    return tuple(filled)
 
 
 def _first(side: int) -> int:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import errno
 import fnmatch
 import os
+import re
 import stat
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
@@ -19,20 +20,24 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
+from contextdb.disk.boundary import ACTORS_SUFFIX as ACTORS_SUFFIX
+from contextdb.disk.boundary import CASES_SUFFIX as CASES_SUFFIX
+from contextdb.disk.boundary import NOTES_SUFFIX as NOTES_SUFFIX
+from contextdb.disk.boundary import inside, require_companion_inside
+from contextdb.disk.boundary import real_path as real_path
 from contextdb.disk.folder_lock import claim, folder_turn, sweep_in_turn, temporary_name
 from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, nearest
 
 TABLE_SUFFIXES = (".csv", ".parquet")
+TENSORS_SUFFIX = ".safetensors"
 CONTEXT_SUFFIXES = (*TABLE_SUFFIXES, ".jsonl")
 """What files of contexts end in: tables, and the lines of a link (see `contextdb.telemetry.link`)."""
-CASES_SUFFIX = ".cases.csv"
-"""What the file of a table's saved contexts ends in: no table itself."""
-NOTES_SUFFIX = ".notes.csv"
-"""What the file of the notes on a table ends in: no table itself, either."""
-ACTORS_SUFFIX = ".actors.json"
-"""What the file of the actors for a table's roles ends in."""
+MOST_PATTERNS = 64
+_CHOICE = re.compile(r"\{([^{}/]*,[^{}/]*)\}")
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _BINARY = getattr(os, "O_BINARY", 0)
+_AT_ONCE = getattr(os, "O_NONBLOCK", 0)
+"""To open a pipe does not wait for its other end."""
 
 Data = bytes | Iterable[bytes]
 
@@ -41,16 +46,15 @@ Was = bytes | Literal["any"] | None
 
 
 def read_bytes(path: str | Path) -> bytes:
-    """The bytes of a file. Raises FileError where it is missing (with the nearest name there is), a folder, no plain file, or may
-    not be read."""
+    """The bytes of a file. Raises FileError where it is missing (with the nearest name there is), a folder, no plain file, may not
+    be read, or is a companion of a table and a link out of its project."""
     file = Path(path)
     with _refused(file, _why_unread):
-        mode = file.stat().st_mode
-        if stat.S_ISDIR(mode):
-            raise FileError(_is_folder(file))
-        if not stat.S_ISREG(mode):  # reading a pipe could wait for ever
-            raise FileError(Fault("this is not a regular file.", "a file", place=Place(str(file))))
-        return file.read_bytes()
+        require_companion_inside(file)
+        _require_regular(file, file.stat())
+        with os.fdopen(os.open(file, os.O_RDONLY | _AT_ONCE | _BINARY), "rb") as opened:
+            _require_regular(file, os.fstat(opened.fileno()))
+            return opened.read()
 
 
 def names_a_table(name: str) -> bool:
@@ -69,6 +73,7 @@ def write_atomic(path: str | Path, data: Data, was: Was = "any", syncs: bool = T
     folder missing or not permitted, or the disk full; the old file is then whole, and no temporary file stays.
     """
     file = Path(path)
+    require_companion_inside(file)
     if is_stream(file):
         _write_into(file, data)
         return True
@@ -123,7 +128,7 @@ class Staged:
 def staged(file: Path, data: Data, syncs: bool = True, folder: Path | None = None) -> Iterator[Staged]:
     """New bytes next to a file, or in another folder, not yet under its name; gone at the end where they did not take it. Raises
     OSError or FileError where the file may not be replaced, or the disk refuses."""
-    target = Path(os.path.realpath(file))
+    target = real_path(file)
     old = target.stat() if target.exists() else None
     if old is not None:
         _require_writable(file, old)
@@ -154,12 +159,22 @@ def make_folder(folder: Path) -> None:
         raise FileError(fault, errno=error.errno) from None
 
 
+def remove(path: Path) -> None:
+    """Remove a file, or a link and not what it leads to; nothing where there is none. Raises FileError where the system refuses."""
+    with refused_writing(path, b""):
+        path.unlink(missing_ok=True)
+
+
+def _require_regular(file: Path, status: os.stat_result) -> None:
+    if stat.S_ISDIR(status.st_mode):
+        raise FileError(_is_folder(file))
+    if not stat.S_ISREG(status.st_mode):  # reading a pipe could wait for ever
+        raise FileError(Fault("this is not a regular file.", "a file", place=Place(str(file))))
+
+
 def _require_writable(file: Path, old: os.stat_result) -> None:
     """Refuse what a rename would replace all the same: a folder, a device, a file that is marked read-only."""
-    if stat.S_ISDIR(old.st_mode):
-        raise FileError(_is_folder(file))
-    if not stat.S_ISREG(old.st_mode):
-        raise FileError(Fault("this is not a regular file.", "a file", place=Place(str(file))))
+    _require_regular(file, old)
     if not old.st_mode & (stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH):
         mend = "to check it out of version control, or to make it writable"
         raise FileError(Fault("the file is marked read-only.", "a file that may be written", mend, Place(str(file))))
@@ -193,8 +208,8 @@ def _write_into(file: Path, data: Data) -> None:
     except BrokenPipeError:  # a reader that has seen enough, as `head`
         raise
     except OSError as error:
-        found = f"it cannot be written into: {error.strerror}."
-        raise FileError(Fault(found, "a file, or a pipe that is read", place=Place(str(file))), errno=error.errno) from None
+        problem = f"it cannot be written into: {error.strerror}."
+        raise FileError(Fault(problem, "a file, or a pipe that is read", place=Place(str(file))), errno=error.errno) from None
 
 
 def sync_folder(folder: int | None) -> None:
@@ -206,15 +221,34 @@ def sync_folder(folder: int | None) -> None:
 
 def matching(folder: Path, pattern: str) -> list[Path]:
     """The files below a folder that fit a pattern, sorted; the suffix of a file may be in capitals where the pattern's is not.
+    `{bvh,fbx}` in it fits each of these.
 
-    Raises ValueError or NotImplementedError where it is no pattern.
+    Raises ValueError or NotImplementedError where it is no pattern, FileError where a link leads out of the folder.
     """
-    return sorted(folder.glob(_of_any_case(pattern)))
+    paths: set[Path] = set()
+    for plain in patterns_of(pattern):
+        for n_parts in range(1, len(parts := Path(plain).parts)):
+            if "*" not in "".join(parts[:n_parts]):  # before what is behind a link is listed
+                inside(folder.joinpath(*parts[:n_parts]), folder)
+        paths.update(folder.glob(_of_any_case(plain)))
+    return [inside(path, folder) for path in sorted(paths)]
 
 
 def fits(name: str, pattern: str) -> bool:
     """Whether `matching` would find a file of this name by the last part of a pattern."""
-    return fnmatch.fnmatch(name, _of_any_case(pattern))
+    return any(fnmatch.fnmatch(name, _of_any_case(plain)) for plain in patterns_of(pattern))
+
+
+def patterns_of(pattern: str) -> list[str]:
+    """A pattern with `{one,other}` as one pattern for each; raises ValueError where that would be more than `MOST_PATTERNS`."""
+    choice = _CHOICE.search(pattern)
+    if choice is None:
+        return [pattern]
+    before, after = pattern[: choice.start()], patterns_of(pattern[choice.end() :])
+    patterns = [before + word + rest for word in choice[1].split(",") for rest in after]
+    if len(patterns) > MOST_PATTERNS:
+        raise ValueError("too many patterns")
+    return patterns
 
 
 def _of_any_case(pattern: str) -> str:
@@ -264,10 +298,10 @@ def _refused(file: Path, why: Callable[[OSError, Path], Fault]) -> Iterator[None
 def unnameable(error: UnicodeEncodeError, file: Path) -> Fault:
     """Why files cannot be named so here, and what to do."""
     encoding = "UTF-8" if error.encoding == "utf-8" else error.encoding
-    found = f"files are named in {encoding} here, which has no {in_quotes(error.object[error.start : error.end])}."
+    problem = f"files are named in {encoding} here, which has no {in_quotes(error.object[error.start : error.end])}."
     if encoding == "UTF-8":
-        return Fault(found, "names of characters that Unicode has", place=Place(str(file)))
-    return Fault(found, "an environment in UTF-8", "to set PYTHONUTF8=1", Place(str(file)))
+        return Fault(problem, "names of characters that Unicode has", place=Place(str(file)))
+    return Fault(problem, "an environment in UTF-8", "to set PYTHONUTF8=1", Place(str(file)))
 
 
 def _is_folder(folder: Path) -> Fault:
@@ -306,24 +340,24 @@ def _missing(file: Path) -> Fault:
 
 def why_unwritten(error: OSError, file: Path, size: int | None = None) -> Fault:
     """Why the system did not write a file, and what to do."""
-    place, folder = Place(str(file)), path_in_quotes(Path(os.path.realpath(file)).parent)
-    kept = " The old file is as it was." if os.path.exists(file) else ""
+    place, folder = Place(str(file)), path_in_quotes(real_path(file).parent)
+    note = " The old file is as it was." if os.path.exists(file) else ""
     if error.errno in _FULL:
         is_limit = error.errno == errno.EFBIG
         return Fault(
-            f"the file is larger than files may be here.{kept}" if is_limit else f"the disk is full.{kept}",
+            f"the file is larger than files may be here.{note}" if is_limit else f"the disk is full.{note}",
             "more room" if size is None else f"room for {size:,} bytes" if is_limit else f"{size:,} free bytes",
             'to raise the limit that "ulimit -f" shows' if is_limit else "to free some space and save again",
             place,
         )
     if error.errno == errno.EROFS:
-        return Fault(f"the folder {folder} is on a disk that cannot be written.{kept}", mend="to save elsewhere", place=place)
+        return Fault(f"the folder {folder} is on a disk that cannot be written.{note}", mend="to save elsewhere", place=place)
     if isinstance(error, (FileNotFoundError, NotADirectoryError)):
         return Fault(f"there is no folder {folder}.", "an existing folder", place=place, rule="no-such-path")
     if isinstance(error, PermissionError):
         busy = ", or another program has the file open" if os.name == "nt" else ""
-        return Fault(f"the folder {folder} may not be written in{busy}.{kept}", mend="to save elsewhere", place=place)
-    return Fault(f"the file cannot be written: {error.strerror or error}.{kept}", mend="to save elsewhere", place=place)
+        return Fault(f"the folder {folder} may not be written in{busy}.{note}", mend="to save elsewhere", place=place)
+    return Fault(f"the file cannot be written: {error.strerror or error}.{note}", mend="to save elsewhere", place=place)
 
 
 def path_in_quotes(path: str | Path) -> str:

@@ -10,10 +10,7 @@ closed, and a file that is open cannot be deleted. Where the disk cannot lock, s
 
 from __future__ import annotations
 
-import hashlib
 import os
-import platform
-import secrets
 import shutil
 import time
 from collections.abc import Iterator
@@ -40,12 +37,15 @@ _MOST_TURN_S = 20.0
 
 @cache
 def _machine() -> str:
+    import hashlib
+    import platform
+
     return hashlib.sha256(platform.node().encode()).hexdigest()[:8]
 
 
 def temporary_name() -> str:
     """A new name for a temporary file or folder of this machine."""
-    return f".contextdb-{_machine()}-{secrets.token_hex(8)}.tmp"
+    return f".contextdb-{_machine()}-{os.urandom(8).hex()}.tmp"
 
 
 def is_temporary(name: str) -> bool:
@@ -132,6 +132,19 @@ def temporary_folder(beside: Path) -> Iterator[Path]:
         shutil.rmtree(folder, ignore_errors=True)
 
 
+@contextmanager
+def growing_folder(growing: Path, whole: Path) -> Iterator[Path]:
+    """A new folder that takes the name `whole` at the end, unless somebody else has done so, and is gone otherwise. Raises OSError
+    where it cannot be made."""
+    try:
+        growing.mkdir()  # not the folders above: they are gone where the run has ended
+        yield growing
+        if not whole.exists():
+            os.rename(growing, whole)
+    finally:
+        shutil.rmtree(growing, ignore_errors=True)
+
+
 def _claimed_folder(folder: Path) -> int | None:
     try:
         if fcntl is None:
@@ -171,7 +184,7 @@ def _is_gone(path: Path) -> bool:
     if fcntl is None:
         return _is_gone_on_windows(path, is_folder)
     with suppress(OSError):
-        handle = os.open(path, os.O_RDONLY if is_folder else os.O_RDWR)
+        handle = os.open(path, (os.O_RDONLY if is_folder else os.O_RDWR) | os.O_NOFOLLOW | os.O_NONBLOCK)
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
             if is_folder:

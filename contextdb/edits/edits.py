@@ -9,27 +9,28 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, cast, get_args
+from typing import Any, cast
 
 import numpy as np
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.grammar import parse_cell
 from contextdb.columns import TextColumn
-from contextdb.errors import CellError, Fault, Place, SchemaError, TableError, in_quotes, plural, row_name, shown
+from contextdb.errors import CellError, Fault, Place, SchemaError, TableError, in_quotes, plural, row_name, safe_text
 from contextdb.expressions import assumption_faults
 from contextdb.expressions.rules import check_rule
 from contextdb.files.csv_source import name_faults
-from contextdb.schema.jobs import PlainJob
 from contextdb.schema.sections import condition_to_dict, differences, has_place, settings_to_dict, settings_with
 from contextdb.schema.settings import conditions_from_dict, with_outputs
+from contextdb.schema.table_settings import PLAIN_JOBS
 from contextdb.tables.changes import CameFrom, Cells, Change, Columns, Edit, Rows, Sections
 from contextdb.tables.data import known_conditions
 from contextdb.tables.merging.building import edit_to
 from contextdb.tables.plain_columns import plain_fault
 from contextdb.tables.table import Table
 
-Job = Literal["condition", "output", "when", PlainJob]
+JOBS = ("condition", "output", "when", *PLAIN_JOBS)
+"""What a new column may be."""
 
 
 # ---- what a person typed
@@ -46,7 +47,7 @@ def check_text(condition: Condition, text: str) -> Fault | None:
 
 def check_cell(table: Table, column: str, text: str) -> Fault | None:
     """The same for any column of a table: an asset and an output without a type may be any text. Whether a cell of an output may be
-    empty hangs on its row, so that is not said here."""
+    empty hangs on its row, so that is not stated here."""
     settings = table.settings
     for one in table.conditions:
         if one.condition.name == column:
@@ -55,7 +56,7 @@ def check_cell(table: Table, column: str, text: str) -> Fault | None:
         return check_rule(text, known_conditions(table)) or unwritable(text)
     if text.strip() and (output := settings.output(column)) is not None:
         return output.fault(text) or unwritable(text)
-    for job in get_args(PlainJob):
+    for job in PLAIN_JOBS:
         if column == getattr(settings, job):
             return plain_fault(job, column, text) or unwritable(text)
     return unwritable(text)
@@ -96,7 +97,7 @@ def _cells_name(table: Table, texts: Mapping[str, Mapping[int, str]]) -> str:
         return f"Change {plural(n_cells, 'cell')}"
     [(column, cells)] = texts.items()
     [row] = cells
-    return f"Type {shown(column)} of {shown(table.text(row, table.asset_column))}"
+    return f"Type {safe_text(column)} of {safe_text(table.text(row, table.asset_column))}"
 
 
 # ---- edits of rows
@@ -164,7 +165,7 @@ class NewColumn:
     """A column to insert: its name, what it is, and what every row holds in it."""
 
     name: str
-    job: Job = "condition"
+    job: str = "condition"
     declared: Mapping[str, object] | None = None
     """What `[conditions.NAME]` of contextdb.toml shall say of it; None: what it says already, else the cells decide."""
     text: str = ""
@@ -179,12 +180,12 @@ def insert_columns(table: Table, at: int, columns: Sequence[NewColumn]) -> Edit:
     if outputs := [c.name for c in columns if c.job == "output"]:
         settings["outputs"] = settings_to_dict(with_outputs(table.settings, [*table.settings.outputs, *outputs]))["outputs"]
     declared = {c.name: c.declared for c in columns if c.declared}
-    said = Sections(settings, {"conditions": declared} if declared else {})
+    sections = Sections(settings, {"conditions": declared} if declared else {})
     changes: list[Change] = [Columns(tuple(layout))]
-    changes += [] if said.is_empty else [said]
+    changes += [] if sections.is_empty else [sections]
     filled = {c.name: dict.fromkeys(range(table.n_rows), c.text) for c in columns if c.text and table.n_rows}
     changes += [Cells(filled)] if filled else []
-    what = f"the column {shown(columns[0].name)}" if len(columns) == 1 else plural(len(columns), "column")
+    what = f"the column {safe_text(columns[0].name)}" if len(columns) == 1 else plural(len(columns), "column")
     return Edit(f"Insert {what}", tuple(changes) if columns else ())
 
 
@@ -193,10 +194,10 @@ def delete_columns(table: Table, columns: Sequence[str]) -> Edit:
     for column in columns:
         table.text_column(column)
         if column == table.asset_column:
-            found = f"the column {in_quotes(column)} names the assets, so it cannot be deleted."
-            raise TableError(Fault(found, "any other column", place=Place(column=column)))
+            problem = f"the column {in_quotes(column)} names the assets, so it cannot be deleted."
+            raise TableError(Fault(problem, "any other column", place=Place(column=column)))
     left = tuple(pair for pair in _layout(table) if pair[0] not in columns)
-    what = f"the column {shown(columns[0])}" if len(columns) == 1 else plural(len(columns), "column")
+    what = f"the column {safe_text(columns[0])}" if len(columns) == 1 else plural(len(columns), "column")
     return Edit(f"Delete {what}", (Columns(left),))
 
 
@@ -207,7 +208,7 @@ def move_column(table: Table, column: str, to: int) -> Edit:
     if at != to:
         _require_place(table, to, len(layout), is_asset=column == table.asset_column)
     layout.insert(to - (to > at), layout.pop(at))
-    return Edit(f"Move the column {shown(column)}", (Columns(tuple(layout)),))
+    return Edit(f"Move the column {safe_text(column)}", (Columns(tuple(layout)),))
 
 
 def move_columns(table: Table, columns: Sequence[str], to: int) -> Edit:
@@ -234,15 +235,15 @@ def rename_column(table: Table, column: str, name: str, keep_declared: bool = Tr
         raise TableError(*faults)
     is_left = keep_declared or column not in table.schema.conditions or name == column
     undeclared = () if is_left else (Sections(parts={"conditions": {column: None}}),)
-    return Edit(f"Rename {shown(column)} to {shown(name)}", (Columns(layout), *undeclared))
+    return Edit(f"Rename {safe_text(column)} to {safe_text(name)}", (Columns(layout), *undeclared))
 
 
 # ---- edits of what contextdb.toml says
 
 
-def set_settings(table: Table, **said: Any) -> Edit:
+def set_settings(table: Table, **changes: Any) -> Edit:
     """Set keys of the table's section, such as `policy="first"` or `outputs=["Slots"]`; None takes a key away."""
-    after = settings_to_dict(settings_with(table.settings, said))
+    after = settings_to_dict(settings_with(table.settings, changes))
     changed = differences(settings_to_dict(table.settings), after)
     keys = ", ".join(changed)
     edit = Edit(f"Set {keys} of the table", (Sections(changed),) if changed else ())
@@ -271,19 +272,19 @@ def _require_known(table: Table, assume: Sequence[str]) -> None:
         raise SchemaError(*faults)
 
 
-def set_condition(table: Table, name: str, **said: Any) -> Edit:
+def set_condition(table: Table, name: str, **changes: Any) -> Edit:
     """Set keys of a condition's section, such as `min=0.0` or `values=["A"]`; None takes a key away.
 
     A condition whose type was inferred is declared by it. Keys that have no place under the type are taken away with it.
     """
     column = table.condition(name).condition
     before = condition_to_dict(column)
-    part = {key: value for key, value in (before | said).items() if value is not None}
-    part = {key: value for key, value in part.items() if key in said or has_place(key, part.get("type"))}
+    part = {key: value for key, value in (before | changes).items() if value is not None}
+    part = {key: value for key, value in part.items() if key in changes or has_place(key, part.get("type"))}
     if column.is_declared and conditions_from_dict({name: part})[name] == column:
-        return Edit(f"Declare {shown(name)}", ())
+        return Edit(f"Declare {safe_text(name)}", ())
     keys = ", ".join(differences(before, part))
-    what = f"Set {keys} of {shown(name)}" if column.is_declared and keys else f"Declare {shown(name)}"
+    what = f"Set {keys} of {safe_text(name)}" if column.is_declared and keys else f"Declare {safe_text(name)}"
     return _checked(table, Edit(what, (Sections(parts={"conditions": {name: part}}),)))
 
 
@@ -294,16 +295,7 @@ def set_blueprint(table: Table, name: str, conditions: Sequence[str] | None) -> 
     parts: dict[str, Mapping[str, Any]] = {"conditions": declared} if declared else {}
     parts["blueprints"] = {name: None if conditions is None else {"conditions": list(conditions)}}
     verb = "Remove" if conditions is None else "Keep"
-    return _checked(table, Edit(f"{verb} the blueprint {shown(name)}", (Sections(parts=parts),)))
-
-
-def set_selector(table: Table, name: str, order: Sequence[tuple[str, float | None]] | None, what: str = "") -> Edit:
-    """Set a selector's databases in order, each with its threshold (the last: None), or with None take the selector away."""
-    steps = [{"database": one} | ({} if threshold is None else {"threshold": threshold}) for one, threshold in order or ()]
-    part = None if order is None else {**table.schema.selectors.get(name, {}), "order": steps}
-    if table.schema.selectors.get(name) == part:
-        return Edit(what, ())
-    return _checked(table, Edit(what or f"Change the selector {shown(name)}", (Sections(parts={"selectors": {name: part}}),)))
+    return _checked(table, Edit(f"{verb} the blueprint {safe_text(name)}", (Sections(parts=parts),)))
 
 
 def _checked(table: Table, edit: Edit) -> Edit:
@@ -332,8 +324,8 @@ def _layout(table: Table) -> tuple[tuple[str, str | None], ...]:
 def _require_place(table: Table, at: int, n_columns: int, is_asset: bool = False) -> None:
     is_first_taken = table.settings.asset is None and (at == 0 or is_asset)
     if is_first_taken and n_columns:
-        found = f"the first column, {in_quotes(table.asset_column)}, names the assets, so it stays the first."
-        raise TableError(Fault(found, "any place behind it", "to name the column of the assets in contextdb.toml"))
+        problem = f"the first column, {in_quotes(table.asset_column)}, names the assets, so it stays the first."
+        raise TableError(Fault(problem, "any place behind it", "to name the column of the assets in contextdb.toml"))
     if not 0 <= at <= n_columns:
         raise TableError(Fault(f"there is no column {at}.", f"0 to {n_columns}"))
 
@@ -351,7 +343,7 @@ def _named(table: Table, rows: CameFrom) -> str:
     if len(rows) != 1:
         return plural(len(rows), "row")
     asset = table.text(int(rows[0]), table.asset_column)
-    return shown(asset) if asset.strip() else row_name(int(rows[0]))
+    return safe_text(asset) if asset.strip() else row_name(int(rows[0]))
 
 
 def _free_name(wanted: str, table: Table) -> str:

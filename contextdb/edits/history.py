@@ -1,7 +1,7 @@
 """Undo and redo: the tables that were, the edits between them, and which of them is on the disk.
 
 Tables share what an edit does not touch, so a step back is the table that was there, with its source: its bytes are those it had.
-Where tables are many and large only some are kept, and a step to one that is not starts from the nearest before it and makes the
+Where tables are many and large only some are retained, and a step to another starts from the nearest before it and makes the
 edits again. Nothing here touches the disk; whoever saves says so with `saved`.
 """
 
@@ -18,7 +18,7 @@ from contextdb.tables.table import Table
 
 MOST_BYTES = 256 << 20
 RECENT = 8
-"""So many tables next to the present one are kept whatever they take."""
+"""So many tables next to the present one are retained whatever they take."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class History:
         self._edits: list[Edit] = []
         self._n_rows = [table.n_rows]
         """How many rows each state has."""
-        self._kept = {0: table}
+        self._cached = {0: table}
         self._pinned = {0}
         """States that are no result of an edit alone: the first, and those that were saved."""
         self._every = 1
@@ -57,7 +57,7 @@ class History:
         self._edits.append(edit)
         self._n_rows.append(table.n_rows)
         self.position += 1
-        self.table = self._kept[self.position] = table
+        self.table = self._cached[self.position] = table
         self._thin_out()
         return self._step(self.position - 1, self.position)
 
@@ -109,12 +109,12 @@ class History:
 
     def saved(self, table: Table) -> None:
         """The present table is on the disk, and this is how `Table.save` gave it back. Its past stays."""
-        self.table = self._kept[self.position] = table
+        self.table = self._cached[self.position] = table
         self._pinned.add(self.position)
         self._saved = self.position
-        later = [p for p in self._kept if p > self.position]
+        later = [p for p in self._cached if p > self.position]
         for p in later:  # they were made of the source before
-            del self._kept[p]
+            del self._cached[p]
         self._pinned -= set(later)
 
     def based_on(self, table: Table, is_saved: bool) -> None:
@@ -124,31 +124,31 @@ class History:
             self._saved = None
 
     def renewed(self, change: Callable[[Table], Table]) -> None:
-        """Put every table that is kept, past ones too, under another schema."""
-        self._kept = {position: change(table) for position, table in self._kept.items()}
-        self.table = self._kept[self.position]
+        """Put every table that is retained, past ones too, under another schema."""
+        self._cached = {position: change(table) for position, table in self._cached.items()}
+        self.table = self._cached[self.position]
 
     def _step(self, start: int, stop: int) -> Step:
         forwards = range(start, stop) if stop > start else range(stop, start)
         name = self._edits[max(start, stop) - 1].name if stop != start else ""
         if not any(self._edits[i].moves_rows for i in forwards):
             return Step(name, None)
-        found = np.arange(self._n_rows[forwards[0]])
+        origins = np.arange(self._n_rows[forwards[0]])
         for i in forwards:
-            found = np.append(found, -1)[self._edits[i].came_from(self._n_rows[i])]
-        return Step(name, found if stop > start else where_now(found, self._n_rows[stop]))
+            origins = np.append(origins, -1)[self._edits[i].came_from(self._n_rows[i])]
+        return Step(name, origins if stop > start else where_now(origins, self._n_rows[stop]))
 
     def _table_at(self, position: int) -> Table:
-        nearest = max(p for p in self._kept if p <= position)
-        table = self._kept[nearest]
+        nearest = max(p for p in self._cached if p <= position)
+        table = self._cached[nearest]
         for edit in self._edits[nearest:position]:
             table = edit.apply(table)
-        self._kept[position] = table
+        self._cached[position] = table
         return table
 
     def _forget_future(self) -> None:
         del self._edits[self.position :], self._n_rows[self.position + 1 :]
-        self._kept = {p: t for p, t in self._kept.items() if p <= self.position}
+        self._cached = {p: t for p, t in self._cached.items() if p <= self.position}
         self._pinned = {p for p in self._pinned if p <= self.position}
         if self._saved is not None and self._saved > self.position:
             self._saved = None
@@ -157,21 +157,21 @@ class History:
         """Keep fewer tables of the past, and of those that are far back each second one less, until they take less."""
         while self._bytes > self._most_bytes and self._every <= len(self._edits):
             self._every *= 2
-            self._kept = {p: t for p, t in self._kept.items() if self._is_kept(p)}
-            tables = [self._kept[p] for p in sorted(self._kept)]
+            self._cached = {p: t for p, t in self._cached.items() if self._is_retained(p)}
+            tables = [self._cached[p] for p in sorted(self._cached)]
             self._bytes = sum(_own_bytes(b, a) for a, b in pairwise(tables))
-        if self._every > 1 and not self._is_kept(self.position - RECENT):
-            self._kept.pop(self.position - RECENT, None)
+        if self._every > 1 and not self._is_retained(self.position - RECENT):
+            self._cached.pop(self.position - RECENT, None)
 
-    def _is_kept(self, position: int) -> bool:
+    def _is_retained(self, position: int) -> bool:
         return position in self._pinned or position > self.position - RECENT or position % self._every == 0
 
 
 def where_now(came_from: CameFrom, n_before: int) -> CameFrom:
     """Where each row of before is now, -1 where it is gone; of a row that was copied, the first."""
-    found = np.full(n_before + 1, -1, np.int64)
-    found[came_from[::-1]] = np.arange(len(came_from))[::-1]
-    return found[:n_before]
+    places = np.full(n_before + 1, -1, np.int64)
+    places[came_from[::-1]] = np.arange(len(came_from))[::-1]
+    return places[:n_before]
 
 
 def _own_bytes(table: Table, before: Table) -> int:

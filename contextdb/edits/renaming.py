@@ -21,12 +21,13 @@ from typing import Any
 
 import numpy as np
 
+from contextdb.cells.words import says_any
 from contextdb.columns import TextColumn
-from contextdb.disk import ACTORS_SUFFIX, NOTES_SUFFIX, read_bytes, write_atomic
+from contextdb.disk import ACTORS_SUFFIX, NOTES_SUFFIX, read_bytes, real_path, write_atomic
+from contextdb.disk.together import putting_back
 from contextdb.edits.schema_file import schema_path
 from contextdb.errors import ContextDBError, Fault, FileError, Place, SchemaError, TableError, in_quotes, plural
 from contextdb.expressions.names import names_in, with_names
-from contextdb.expressions.rules import has_no_rule
 from contextdb.files.texts import AnySource, read_texts, written_over
 from contextdb.schema import toml_edit
 from contextdb.schema.settings import TableSettings, plain_names, read_schema
@@ -101,7 +102,8 @@ class Renaming:
                 write_atomic(file.path, file.after)
             except FileError:
                 for written in self.files[:at]:
-                    write_atomic(written.path, written.before)
+                    with putting_back(written.path, "to rename back once the disk can be written"):
+                        write_atomic(written.path, written.before)
                 raise
 
 
@@ -138,7 +140,7 @@ def uses_of(table: Table, condition: str) -> Uses:
         n_own_rules = _n_rules(table.text_column(table.when.name), condition)
     n_cases = n_own_cases = _n_cases(table.path, condition) if table.path is not None else 0
     for name, path in table_files(folder_of(table), schema) if table.path is not None else ():
-        if table.path is not None and path.resolve() == table.path.resolve():
+        if table.path is not None and real_path(path) == real_path(table.path):
             continue
         try:
             file = TableFile.read(name, path, schema.tables.get(name, TableSettings(name)))
@@ -150,8 +152,10 @@ def uses_of(table: Table, condition: str) -> Uses:
         n_cases += _n_cases(path, condition)
     derived = tuple(c.name for c in schema.conditions.values() if c.expr is not None and condition in names_in(c.expr))
     blueprints = tuple(name for name, names in schema.blueprints.items() if condition in names)
-    n_own_assumed = _n_naming(own.assume, condition)
-    assumed = n_own_assumed + sum(_n_naming(s.assume, condition) for s in schema.tables.values() if s.name != own.name)
+    premises = {t: [c.when for c in schema.contracts.values() if c.when and (c.table == own.name) == t] for t in (True, False)}
+    n_own_assumed = _n_naming((*own.assume, *premises[True]), condition)
+    elsewhere = [text for s in schema.tables.values() if s.name != own.name for text in s.assume]
+    assumed = n_own_assumed + _n_naming((*elsewhere, *premises[False]), condition)
     is_elsewhere = bool(others or derived or blueprints or n_rules or n_cases > n_own_cases or assumed > n_own_assumed)
     return Uses(tuple(others), derived, assumed, blueprints, n_rules + n_own_rules, n_cases, is_elsewhere)
 
@@ -168,12 +172,12 @@ def renaming(table: Table, old: str, new: str, only_here: bool = False) -> Renam
         raise SchemaError(Fault(f"the condition {in_quotes(new)} is declared already.", "a name that nothing has yet"))
     files: list[Rewrite] = []
     for name, path in table_files(folder, on_disk):
-        is_own = path.resolve() == table.path.resolve()
+        is_own = real_path(path) == real_path(table.path)
         if is_own or not only_here:
             files += _rewritten_with_actors(TableFile.read(name, path, on_disk.tables.get(name, TableSettings(name))), old, new)
-    own = next((n for n, p in table_files(folder, on_disk) if p.resolve() == table.path.resolve()), table.name)
+    own = next((n for n, p in table_files(folder, on_disk) if real_path(p) == real_path(table.path)), table.name)
     if raw:
-        change = (lambda said: only_here_in(said, {old: new}, own)) if only_here else (lambda said: everywhere_in(said, {old: new}))
+        change = (lambda d: only_here_in(d, {old: new}, own)) if only_here else (lambda d: everywhere_in(d, {old: new}))
         files += rewritten_toml(folder / SCHEMA_FILE, raw, change, {} if only_here else {old: new})
     return Renaming(old, new, tuple(files))
 
@@ -191,7 +195,7 @@ def _n_naming(texts: Sequence[str], condition: str) -> int:
 
 
 def _n_rules(column: TextColumn, condition: str) -> int:
-    naming = [code for code, text in enumerate(column.texts) if not has_no_rule(text) and condition in names_in(text)]
+    naming = [code for code, text in enumerate(column.texts) if not says_any(text) and condition in names_in(text)]
     return int(np.isin(column.codes, naming).sum())
 
 
@@ -217,10 +221,10 @@ def rewritten_table(
     yield from rewritten(file.path, file.source, file.columns, columns)
     cases, of_cases = cases_path(file.path), {old: new for old, new in names.items() if old not in CASE_COLUMNS}
     if cases.is_file() and of_cases:
-        source, found = read_texts(cases)
-        renamed = [c.renamed(of_cases[c.name]) if c.name in of_cases else c for c in found]
+        source, texts = read_texts(cases)
+        renamed = [c.renamed(of_cases[c.name]) if c.name in of_cases else c for c in texts]
         _require_free(cases, renamed)
-        yield from rewritten(cases, source, found, renamed)
+        yield from rewritten(cases, source, texts, renamed)
     yield from rewritten_notes(file.path, "Column", names)
 
 
@@ -228,8 +232,8 @@ def rewritten_notes(table: Path, column: str, names: Mapping[str, str]) -> Itera
     """The notes on a table with other names in one of their columns."""
     path = table.with_name(table.stem + NOTES_SUFFIX)
     if path.is_file():
-        source, found = read_texts(path)
-        yield from rewritten(path, source, found, [with_texts(c, names) if c.name == column else c for c in found])
+        source, texts = read_texts(path)
+        yield from rewritten(path, source, texts, [with_texts(c, names) if c.name == column else c for c in texts])
 
 
 def with_texts(column: TextColumn, texts: Mapping[str, str]) -> TextColumn:
@@ -259,22 +263,22 @@ def _rewritten_actors(path: Path, old: str, new: str) -> Iterator[Rewrite]:
         teams = json.loads(raw)
         names = {was: now, old: new}
         renamed = [{names.get(fact, fact): value for fact, value in actor.items()} for actor in teams.get(role, [])]
-    except (ValueError, AttributeError, TypeError):  # no file of actors: said where it is read
+    except (ValueError, AttributeError, TypeError):  # no file of actors: reported where it is read
         return
     if renamed != teams.get(role, []):
         yield Rewrite(path, raw, (json.dumps({**teams, role: renamed}, ensure_ascii=False, indent=2) + "\n").encode())
 
 
 def _with_rules(column: TextColumn, names: Mapping[str, str]) -> TextColumn:
-    texts = [text if has_no_rule(text) else with_names(text, names) for text in column.texts]
+    texts = [text if says_any(text) else with_names(text, names) for text in column.texts]
     return column if texts == list(column.texts) else TextColumn.of(column.name, [texts[code] for code in column.codes.tolist()])
 
 
 def _require_free(path: Path, columns: Sequence[TextColumn]) -> None:
     names = [c.name for c in columns]
     if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
-        found = f"the file would have two columns {in_quotes(twice[0])}."
-        raise TableError(Fault(found, "a name that no column has yet", place=Place(str(path))))
+        problem = f"the file would have two columns {in_quotes(twice[0])}."
+        raise TableError(Fault(problem, "a name that no column has yet", place=Place(str(path))))
 
 
 def rewritten(path: Path, source: AnySource, before: Sequence[TextColumn], after: Sequence[TextColumn]) -> Iterator[Rewrite]:
@@ -287,32 +291,42 @@ def rewritten(path: Path, source: AnySource, before: Sequence[TextColumn], after
 # ---- contextdb.toml
 
 
-def everywhere_in(said: dict[str, Any], names: Mapping[str, str]) -> None:
+def everywhere_in(document: dict[str, Any], names: Mapping[str, str]) -> None:
     """Change what the file says, as plain data."""
-    conditions = said.get("conditions", {})
+    conditions = document.get("conditions", {})
     if any(name in conditions for name in names):
-        said["conditions"] = {names.get(name, name): part for name, part in conditions.items()}
-    for part in said.get("conditions", {}).values():
+        document["conditions"] = {names.get(name, name): part for name, part in conditions.items()}
+    for part in document.get("conditions", {}).values():
         if isinstance(part.get("expr"), str):
             part["expr"] = with_names(part["expr"], names)
-    for part in said.get("tables", {}).values():
+    for part in document.get("tables", {}).values():
         _assume(part, names)
-    for part in said.get("blueprints", {}).values():
+    for part in document.get("contracts", {}).values():
+        _premise(part, names)
+    for part in document.get("blueprints", {}).values():
         part["conditions"] = [names.get(name, name) for name in part.get("conditions", [])]
 
 
-def only_here_in(said: dict[str, Any], names: Mapping[str, str], table: str) -> None:
+def only_here_in(document: dict[str, Any], names: Mapping[str, str], table: str) -> None:
     """Change what the file says of one table; new names are declared as the old ones are."""
-    conditions = said.get("conditions", {})
+    conditions = document.get("conditions", {})
     for old, new in names.items():
         if old in conditions and new not in conditions:
             conditions[new] = deepcopy(conditions[old])
-    _assume(said.get("tables", {}).get(table, {}), names)
+    _assume(document.get("tables", {}).get(table, {}), names)
+    for part in document.get("contracts", {}).values():
+        if part.get("table") == table:
+            _premise(part, names)
 
 
 def _assume(part: dict[str, Any], names: Mapping[str, str]) -> None:
     if "assume" in part:
         part["assume"] = [with_names(text, names) for text in part["assume"]]
+
+
+def _premise(part: dict[str, Any], names: Mapping[str, str]) -> None:
+    if isinstance(part.get("when"), str):
+        part["when"] = with_names(part["when"], names)
 
 
 def rewritten_toml(path: Path, raw: bytes, change: Callable[[dict[str, Any]], None], moved: Mapping[str, str]) -> Iterator[Rewrite]:
@@ -325,11 +339,11 @@ def rewritten_toml(path: Path, raw: bytes, change: Callable[[dict[str, Any]], No
         return
     for old, new in moved.items():
         text = toml_edit.rename_section(text, ("conditions", old), ("conditions", new)) or text
-    for section in ("conditions", "tables", "blueprints"):
+    for section in ("conditions", "tables", "blueprints", "contracts"):
         text = _with_section(text, section, tomllib.loads(text).get(section, {}), wanted.get(section, {}))
     if tomllib.loads(text) != wanted:
-        found = "this cannot be renamed without changing more of the file."
-        raise SchemaError(Fault(found, "sections such as [conditions.NAME]", "to rename it in a text editor", Place(str(path))))
+        problem = "this cannot be renamed without changing more of the file."
+        raise SchemaError(Fault(problem, "sections such as [conditions.NAME]", "to rename it in a text editor", Place(str(path))))
     read_schema(text, str(path))  # refuses what no project can be
     yield Rewrite(path, raw, bom + text.encode())
 

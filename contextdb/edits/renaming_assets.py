@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from contextdb.columns import TextColumn
-from contextdb.disk import matching, read_bytes
+from contextdb.disk import matching, read_bytes, real_path
 from contextdb.edits.renaming import Renaming, Rewrite, TableFile, folder_of, rewritten, rewritten_notes, rewritten_toml, with_texts
 from contextdb.edits.renaming_values import with_value
 from contextdb.errors import ContextDBError, Fault, TableError, in_quotes, plural
@@ -56,7 +56,7 @@ def asset_uses(table: Table, asset: str) -> AssetUses:
     folder, schema = folder_of(table), table.schema
     others, n_cases = [], 0
     for name, path in table_files(folder, schema):
-        is_own = path.resolve() == table.path.resolve()
+        is_own = real_path(path) == real_path(table.path)
         n_cases += sum(with_value(text, asset, f"{asset}_") != text for text in _expected(path))
         try:
             column = _assets(TableFile.read(name, path, schema.tables.get(name, TableSettings(name))))
@@ -85,7 +85,7 @@ def asset_renaming(table: Table, old: str, new: str, only_here: bool = False) ->
     files: list[Rewrite] = []
     own = table.name
     for name, path in table_files(folder, schema):
-        is_own = path.resolve() == table.path.resolve()
+        is_own = real_path(path) == real_path(table.path)
         own = name if is_own else own
         if is_own or not only_here:
             files += _rewritten_table(TableFile.read(name, path, schema.tables.get(name, TableSettings(name))), old, new)
@@ -93,7 +93,7 @@ def asset_renaming(table: Table, old: str, new: str, only_here: bool = False) ->
         for path in _markup(folder, schema):
             files += _rewritten_columns(path, "asset", {old: new})
     if raw:
-        files += rewritten_toml(folder / SCHEMA_FILE, raw, lambda said: _change(said, old, new, own if only_here else None), {})
+        files += rewritten_toml(folder / SCHEMA_FILE, raw, lambda part: _change(part, old, new, own if only_here else None), {})
     return Renaming(old, new, tuple(files))
 
 
@@ -126,8 +126,8 @@ def _read(path: Path) -> tuple[TextColumn, ...]:
 def _rewritten_table(file: TableFile, old: str, new: str) -> Iterator[Rewrite]:
     assets = _assets(file)
     if assets is not None and old in assets.texts and new in assets.texts:
-        found = f"{in_quotes(new)} is an asset of {file.name} already: the two would be one."
-        raise TableError(Fault(found, "a name that no asset has yet"))
+        problem = f"{in_quotes(new)} is an asset of {file.name} already: the two would be one."
+        raise TableError(Fault(problem, "a name that no asset has yet"))
     columns = [with_texts(c, {old: new}) if c is assets else c for c in file.columns]
     yield from rewritten(file.path, file.source, file.columns, columns)
     cases = cases_path(file.path)
@@ -138,15 +138,15 @@ def _rewritten_table(file: TableFile, old: str, new: str) -> Iterator[Rewrite]:
 
 def _rewritten_columns(path: Path, column: str, texts: Mapping[str, str] | None, old: str = "", new: str = "") -> Iterator[Rewrite]:
     """A file with other texts in one column: those of a mapping, or lists of names with one of them renamed."""
-    source, found = read_texts(path)
+    source, columns = read_texts(path)
     after = [
-        with_texts(c, texts or {text: with_value(text, old, new) for text in c.texts}) if c.name == column else c for c in found
+        with_texts(c, texts or {text: with_value(text, old, new) for text in c.texts}) if c.name == column else c for c in columns
     ]
-    yield from rewritten(path, source, found, after)
+    yield from rewritten(path, source, columns, after)
 
 
-def _change(said: dict[str, Any], old: str, new: str, only: str | None) -> None:
-    for name, part in said.get("tables", {}).items():
+def _change(document: dict[str, Any], old: str, new: str, only: str | None) -> None:
+    for name, part in document.get("tables", {}).items():
         fallback = part.get("fallback") if only in (None, name) else None
         if fallback == old:
             part["fallback"] = new

@@ -13,12 +13,12 @@ from pathlib import Path
 
 from contextdb.cells.outputs import SLOT_COLUMNS
 from contextdb.columns import TextColumn
-from contextdb.disk import read_bytes
+from contextdb.disk import read_bytes, real_path
 from contextdb.edits import renaming
 from contextdb.edits.renaming_values import with_value
 from contextdb.errors import Fault, SchemaError, in_quotes, plural
+from contextdb.files.toml_shapes import wrong_name
 from contextdb.schema.settings import Schema, TableSettings
-from contextdb.schema.shapes import wrong_name
 from contextdb.tables.project import SCHEMA_FILE, read_folder_schema, table_files
 from contextdb.tables.table import Table
 
@@ -54,22 +54,22 @@ def role_renaming(table: Table, old: str, new: str, only_here: bool = False) -> 
     raw = read_bytes(folder / SCHEMA_FILE) if (folder / SCHEMA_FILE).is_file() else b""
     schema = read_folder_schema(folder) if raw else table.schema
     read = {
-        path.resolve(): renaming.TableFile.read(name, path, schema.tables.get(name, TableSettings(name)))
+        real_path(path): renaming.TableFile.read(name, path, schema.tables.get(name, TableSettings(name)))
         for name, path in table_files(folder, schema)
     }
-    own = read[table.path.resolve()]
+    own = read[real_path(table.path)]
     files = [own] if only_here else list(read.values())
     names = _names(schema, files, old, new)
     _require_role(new, {*schema.conditions, *(c.name for file in files for c in file.columns)})
-    found = [rewrite for file in files for rewrite in _rewritten(file, names, old, new)]
+    rewrites = [rewrite for file in files for rewrite in _rewritten(file, names, old, new)]
     if raw:
         change = (
-            (lambda said: renaming.only_here_in(said, names, own.name))
+            (lambda document: renaming.only_here_in(document, names, own.name))
             if only_here
-            else (lambda said: renaming.everywhere_in(said, names))
+            else (lambda document: renaming.everywhere_in(document, names))
         )
-        found += renaming.rewritten_toml(folder / SCHEMA_FILE, raw, change, {} if only_here else names)
-    return renaming.Renaming(old, new, tuple(found))
+        rewrites += renaming.rewritten_toml(folder / SCHEMA_FILE, raw, change, {} if only_here else names)
+    return renaming.Renaming(old, new, tuple(rewrites))
 
 
 def _names(schema: Schema, files: list[renaming.TableFile], old: str, new: str) -> dict[str, str]:
@@ -107,7 +107,7 @@ def _rewritten_actors(path: Path, names: Mapping[str, str], old: str, new: str) 
             new if role == old else role: [{names.get(fact, fact): value for fact, value in actor.items()} for actor in team]
             for role, team in teams.items()
         }
-    except (ValueError, AttributeError, TypeError):  # no file of actors: said where it is read
+    except (ValueError, AttributeError, TypeError):  # no file of actors: reported where it is read
         return
     if renamed != teams:
         yield renaming.Rewrite(path, raw, (json.dumps(renamed, ensure_ascii=False, indent=2) + "\n").encode())

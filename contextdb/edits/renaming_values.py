@@ -12,14 +12,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from contextdb.cells.words import quoted
+from contextdb.cells.words import quoted, says_any
 from contextdb.columns import TextColumn
-from contextdb.disk import read_bytes
+from contextdb.disk import read_bytes, real_path
 from contextdb.edits.renaming import Renaming, Rewrite, TableFile, folder_of, rewritten, rewritten_toml, with_texts
 from contextdb.errors import ContextDBError, Fault, SchemaError, in_quotes, plural
 from contextdb.expressions.faults import Refusal
 from contextdb.expressions.names import names_in
-from contextdb.expressions.rules import has_no_rule
 from contextdb.expressions.tokens import tokens_of
 from contextdb.files.texts import read_texts
 from contextdb.schema.settings import Schema, TableSettings
@@ -66,7 +65,7 @@ def value_uses(table: Table, condition: str, value: str) -> ValueUses:
         return ValueUses()
     schema, others, n_cases, n_rules = table.schema, [], 0, 0
     for name, path in table_files(folder_of(table), schema):
-        is_own = path.resolve() == table.path.resolve()
+        is_own = real_path(path) == real_path(table.path)
         try:
             file = TableFile.read(name, path, schema.tables.get(name, TableSettings(name)))
         except ContextDBError:
@@ -76,8 +75,8 @@ def value_uses(table: Table, condition: str, value: str) -> ValueUses:
             others.append(name)
         n_cases += sum(with_value(text, value, f"{value}_") != text for text in _case_facts(path, condition))
         n_rules += sum(_speaks(text, condition, value) for text in (file.rules.to_list() if file.rules is not None else ()))
-    said = [(c.name, c.expr) for c in schema.conditions.values() if c.expr is not None]
-    n_derived = sum(_speaks(text, condition, value, is_own=name == condition) for name, text in said)
+    expressions = [(c.name, c.expr) for c in schema.conditions.values() if c.expr is not None]
+    n_derived = sum(_speaks(text, condition, value, is_own=name == condition) for name, text in expressions)
     n_assumed = sum(_speaks(text, condition, value) for settings in schema.tables.values() for text in settings.assume)
     return ValueUses(tuple(others), n_cases, n_rules + n_derived + n_assumed)
 
@@ -96,7 +95,7 @@ def value_renaming(table: Table, condition: str, old: str, new: str) -> Renaming
     for name, path in table_files(folder, schema):
         file = TableFile.read(name, path, schema.tables.get(name, TableSettings(name)))
         files += _rewritten_table(file, condition, old, new)
-    files += rewritten_toml(folder / SCHEMA_FILE, raw, lambda said: _change(said, condition, old, new), {})
+    files += rewritten_toml(folder / SCHEMA_FILE, raw, lambda document: _change(document, condition, old, new), {})
     return Renaming(old, new, tuple(files))
 
 
@@ -114,7 +113,7 @@ def _texts(text: str, condition: str, value: str, is_own: bool = False) -> list[
 
 
 def _speaks(text: str, condition: str, value: str, is_own: bool = False) -> bool:
-    return not has_no_rule(text) and bool(_texts(text, condition, value, is_own))
+    return not says_any(text) and bool(_texts(text, condition, value, is_own))
 
 
 def _with_text(text: str, condition: str, old: str, new: str, is_own: bool = False) -> str:
@@ -127,12 +126,13 @@ def _with_text(text: str, condition: str, old: str, new: str, is_own: bool = Fal
 def _require_plain(schema: Schema, condition: str, value: str) -> None:
     """Refuse where an expression names two conditions that both have the value: which one it means is not for us to say."""
     both = {c.name for c in schema.conditions.values() if c.name != condition and value in (c.domain.values or ())}
-    said = [c.expr for c in schema.conditions.values() if c.expr is not None]
-    said += [text for settings in schema.tables.values() for text in settings.assume]
-    for text in said:
+    expressions = [c.expr for c in schema.conditions.values() if c.expr is not None]
+    expressions += [text for settings in schema.tables.values() for text in settings.assume]
+    expressions += [contract.when for contract in schema.contracts.values() if contract.when is not None]
+    for text in expressions:
         if _texts(text, condition, value) and (other := next((name for name in names_in(text) if name in both), None)):
-            found = f"{in_quotes(text)} names {condition} and {other}, and both have the value {in_quotes(value)}."
-            raise SchemaError(Fault(found, "expressions in which the value is of one condition", "to rename it there first"))
+            problem = f"{in_quotes(text)} names {condition} and {other}, and both have the value {in_quotes(value)}."
+            raise SchemaError(Fault(problem, "expressions in which the value is of one condition", "to rename it there first"))
 
 
 # ---- files
@@ -167,22 +167,25 @@ def _rewritten_table(file: TableFile, condition: str, old: str, new: str) -> Ite
     yield from rewritten(file.path, file.source, file.columns, columns)
     cases = cases_path(file.path)
     if cases.is_file() and condition not in CASE_COLUMNS:
-        source, found = read_texts(cases)
-        after = [with_texts(c, {text: with_value(text, old, new) for text in c.texts}) if c.name == condition else c for c in found]
-        yield from rewritten(cases, source, found, after)
+        source, texts = read_texts(cases)
+        after = [with_texts(c, {text: with_value(text, old, new) for text in c.texts}) if c.name == condition else c for c in texts]
+        yield from rewritten(cases, source, texts, after)
 
 
-def _change(said: dict[str, Any], condition: str, old: str, new: str) -> None:
+def _change(document: dict[str, Any], condition: str, old: str, new: str) -> None:
     """Change what contextdb.toml says, as plain data."""
-    part = said.get("conditions", {}).get(condition, {})
+    part = document.get("conditions", {}).get(condition, {})
     if "values" in part:
         part["values"] = [new if value == old else value for value in part["values"]]
     if isinstance(part.get("mirror"), dict):
         names = {old: new}
         part["mirror"] = {names.get(a, a): names.get(b, b) for a, b in part["mirror"].items()}
-    for name, other in said.get("conditions", {}).items():
+    for name, other in document.get("conditions", {}).items():
         if isinstance(other.get("expr"), str):
             other["expr"] = _with_text(other["expr"], condition, old, new, is_own=name == condition)
-    for table in said.get("tables", {}).values():
+    for table in document.get("tables", {}).values():
         if "assume" in table:
             table["assume"] = [_with_text(text, condition, old, new) for text in table["assume"]]
+    for contract in document.get("contracts", {}).values():
+        if isinstance(contract.get("when"), str):
+            contract["when"] = _with_text(contract["when"], condition, old, new)

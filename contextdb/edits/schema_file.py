@@ -12,9 +12,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from contextdb.disk import read_bytes, write_atomic
+from contextdb.disk import read_bytes, real_path, write_atomic
 from contextdb.disk.together import NewFile
-from contextdb.errors import Fault, FileError, Place, SchemaError, shown, some
+from contextdb.errors import Fault, FileError, Place, SchemaError, safe_text, some
 from contextdb.files.file_names import alike
 from contextdb.files.toml_text import Path as KeyPath
 from contextdb.files.toml_text import as_toml, dotted, plain_numbers
@@ -50,8 +50,8 @@ class SchemaChange:
     @property
     def fault(self) -> Fault:
         """What is said when somebody has changed it meanwhile."""
-        found = "the file was changed by somebody else in this moment."
-        return Fault(found, mend="to do the same once more", place=Place(str(self.path)), rule="merge-conflict")
+        problem = "the file was changed by somebody else in this moment."
+        return Fault(problem, mend="to do the same once more", place=Place(str(self.path)), rule="merge-conflict")
 
     def write(self) -> None:
         """Replace the file in one step. Raises FileError where the disk refuses, or somebody has changed the file since it was
@@ -80,9 +80,9 @@ def schema_change(before: Table | None, after: Table) -> SchemaChange | None:
     bom = _BOM if raw.startswith(_BOM) else b""
     text = raw.removeprefix(_BOM).decode()
     if not path.is_file():
-        text = toml_edit.set_key("", ("project", "name"), path.parent.resolve().name or "tables")
+        text = toml_edit.set_key("", ("project", "name"), real_path(path.parent).name or "tables")
     now = _edited(text, wanted, after, _settings_name(after, path))
-    _require_said(now, wanted, theirs, path)
+    _require_changed(now, wanted, theirs, path)
     return SchemaChange(path, bom + now.encode(), raw if path.is_file() else None)
 
 
@@ -99,16 +99,16 @@ def schema_path(table: Table) -> Path:
 
 def _keys(table: Table, path: Path, only_own: bool = False) -> Keys:
     """What the table says in the file; with `only_own` of conditions those that it has, and nothing of the rest."""
-    said = schema_to_dict(table.schema)
+    document = schema_to_dict(table.schema)
     if only_own:
         own = {c.condition.name for c in table.conditions}
-        said = {"conditions": {name: part for name, part in said["conditions"].items() if name in own}}
-    found = _flat(said)
+        document = {"conditions": {name: part for name, part in document["conditions"].items() if name in own}}
+    keys = _flat(document)
     settings = settings_to_dict(table.settings)
     name = _settings_name(table, path)
     if settings or only_own:
         settings = {"file": None} | settings | {"file": _file(table, path)}
-    return found | {("tables", name, key): value for key, value in settings.items()}
+    return keys | {("tables", name, key): value for key, value in settings.items()}
 
 
 def _settings_name(table: Table, path: Path) -> str:
@@ -122,19 +122,19 @@ def _file(table: Table, path: Path) -> str:
     assert table.path is not None
     folder = path.parent
     is_below = table.path.is_relative_to(folder)
-    whole = table.path if is_below else table.path.parent.resolve() / table.path.name
-    file = whole.relative_to(folder if is_below else folder.resolve()).as_posix()
+    whole = table.path if is_below else real_path(table.path.parent) / table.path.name
+    file = whole.relative_to(folder if is_below else real_path(folder)).as_posix()
     return next((declared for declared in table.settings.files if alike(declared) == alike(file)), file)
 
 
 def _is_below(file: Path, folder: Path) -> bool:
-    return file.is_relative_to(folder) or (file.parent.resolve() / file.name).is_relative_to(folder.resolve())
+    return file.is_relative_to(folder) or (real_path(file.parent) / file.name).is_relative_to(real_path(folder))
 
 
-def _flat(said: Mapping[str, Mapping[str, Mapping[str, object]]]) -> Keys:
+def _flat(document: Mapping[str, Mapping[str, Mapping[str, object]]]) -> Keys:
     return {
         (section, name, key): value
-        for section, parts in said.items()
+        for section, parts in document.items()
         for name, part in parts.items()
         for key, value in part.items()
     }
@@ -149,25 +149,25 @@ def _changes(before: Keys, after: Keys) -> Changes:
 # ---- what the file says
 
 
-def _said_by(schema: Schema) -> Keys:
+def _keys_of(schema: Schema) -> Keys:
     tables = {name: settings_to_dict(settings) for name, settings in schema.tables.items()}
     return _flat(schema_to_dict(schema) | {"tables": tables})
 
 
 def _not_there_yet(wanted: Changes, theirs: Schema, path: Path) -> Changes:
     """The changes that the file does not have yet; SchemaError where somebody else changed the same key."""
-    said = _said_by(theirs)
-    faults, found = [], {}
+    theirs_by_key = _keys_of(theirs)
+    faults, changes = [], {}
     for key, (was, now) in wanted.items():
-        if said.get(key) == now or _is_file_by_default(key, now, theirs):
+        if theirs_by_key.get(key) == now or _is_file_by_default(key, now, theirs):
             continue
-        if said.get(key) == was:
-            found[key] = (was, now)
+        if theirs_by_key.get(key) == was:
+            changes[key] = (was, now)
         else:
-            faults.append(_conflict(key, said.get(key), now, path))
+            faults.append(_conflict(key, theirs_by_key.get(key), now, path))
     if faults:
         raise SchemaError(*faults)
-    return found
+    return changes
 
 
 def _is_file_by_default(key: KeyPath, file: object, theirs: Schema) -> bool:
@@ -178,15 +178,15 @@ def _is_file_by_default(key: KeyPath, file: object, theirs: Schema) -> bool:
 
 
 def _conflict(key: KeyPath, theirs: object, ours: object, path: Path) -> Fault:
-    said = "is gone from the file" if theirs is None else f"is {_short(theirs)} in the file"
+    state = "is gone from the file" if theirs is None else f"is {_short(theirs)} in the file"
     wanted = "to be removed" if ours is None else f"to be {_short(ours)}"
     where = f"[{dotted(key[:-1])}] {key[-1]}"
-    found = f"{where} {said}, where somebody else changed it, and was {wanted} here."
-    return Fault(found, "a key that one of the two changed", "to reload the table, or to undo the change", Place(str(path)))
+    problem = f"{where} {state}, where somebody else changed it, and was {wanted} here."
+    return Fault(problem, "a key that one of the two changed", "to reload the table, or to undo the change", Place(str(path)))
 
 
 def _short(value: object) -> str:
-    return shown(as_toml(value))
+    return safe_text(as_toml(value))
 
 
 # ---- the text
@@ -218,7 +218,7 @@ def _finest(wanted: Changes) -> Iterator[tuple[KeyPath, object]]:
     for key, (was, now) in wanted.items():
         if key[0] == "tables" and isinstance(was, Mapping) and isinstance(now, Mapping):
             inner = {(*key, name): (was.get(name), now.get(name)) for name in {**was, **now}}
-            yield from _finest({path: said for path, said in inner.items() if repr(said[0]) != repr(said[1])})  # false is not 0
+            yield from _finest({path: pair for path, pair in inner.items() if repr(pair[0]) != repr(pair[1])})  # false is not 0
         else:
             yield key, plain_numbers(now)
 
@@ -234,7 +234,7 @@ def _with_keys(text: str, part: KeyPath, keys: Mapping[str, object], behind: Seq
     for key, now in keys.items():
         path = (*part, key)
         if now is None and key == "policy" and toml_edit.has_comment(text, path):
-            text = toml_edit.set_key(text, path, TableSettings("").policy)  # what is said of it stays
+            text = toml_edit.set_key(text, path, TableSettings("").policy)  # its comment stays
         else:
             text = toml_edit.drop_key(text, path) if now is None else toml_edit.set_key(text, path, now, behind)
     return text
@@ -257,14 +257,14 @@ def _behind(part: KeyPath, table: Table, name: str) -> list[KeyPath]:
     return [("tables", name), *(("conditions", c.condition.name) for c in table.conditions)]
 
 
-def _require_said(text: str, wanted: Changes, theirs: Schema, path: Path) -> None:
+def _require_changed(text: str, wanted: Changes, theirs: Schema, path: Path) -> None:
     """Raise SchemaError unless the text says what is wanted, and all else as before."""
     now = read_schema(text, str(path))
-    before, after = _said_by(theirs), _said_by(now)
+    before, after = _keys_of(theirs), _keys_of(now)
     expected = {key: value for key, value in before.items() if key not in wanted}
     expected |= {key: value for key, (_, value) in wanted.items() if value is not None}
     same = ("features", "databases", "controllers", "output")
     if after != expected or any(getattr(now, section) != getattr(theirs, section) for section in same):
         keys = [f"[{dotted(key[:-1])}] {key[-1]}" for key in wanted]
-        found = f"{some(keys)} cannot be changed without changing more of the file."
-        raise SchemaError(Fault(found, "sections such as [tables.NAME]", "to change it in a text editor", Place(str(path))))
+        problem = f"{some(keys)} cannot be changed without changing more of the file."
+        raise SchemaError(Fault(problem, "sections such as [tables.NAME]", "to change it in a text editor", Place(str(path))))

@@ -21,9 +21,9 @@ def require_no_conflicts(text: str, file: str) -> None:
     after a mend that was not finished, is named too."""
     unified = text.replace("\r\n", "\n").replace("\r", "\n")
     marks, line, at = list[tuple[int, str]](), 1, 0
-    for found in _MARK.finditer(unified):
-        line, at = line + unified.count("\n", at, found.start()), found.start()
-        marks.append((line, found[0][0]))
+    for match in _MARK.finditer(unified):
+        line, at = line + unified.count("\n", at, match.start()), match.start()
+        marks.append((line, match[0][0]))
     starts = [line for line, mark in marks if mark == "<"]
     if not starts and not any(mark == ">" for _, mark in marks):
         return

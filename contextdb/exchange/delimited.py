@@ -1,7 +1,7 @@
 """Texts with delimiters, in the dialects that Excel and other programs write: which one a file is in, and its grid.
 
 Commas, semicolons, tabs or vertical bars; fields in double quotes with quotes doubled; "sep=;" as the first line, which Excel
-obeys. Numbers with decimal commas are told from pairs (centre, tolerance) by what else the file holds. What was decided, and why,
+obeys. Decimal commas are distinguished from pairs (centre, tolerance) by the rest of the file. What was decided, and why,
 is in the remarks.
 """
 
@@ -10,16 +10,16 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections import Counter
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import islice
 
 from contextdb.columns import TextColumn
 from contextdb.errors import Fault, Place, TableError, in_quotes, plural
 from contextdb.exchange.conflicts import require_no_conflicts
+from contextdb.exchange.decimal_commas import with_points
 from contextdb.exchange.grid import MOST_ABOVE, Block, columns_of, is_header
-from contextdb.exchange.reading import Reading, Remark, listed
+from contextdb.exchange.reading import Reading, Remark
 from contextdb.files.csv_faults import MOST_CHARACTERS
 
 DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "vertical bars"}
@@ -30,9 +30,6 @@ LEAST_BELOW_TITLE = 3
 """Columns of a table below a title; with two, a comma in a text could make the header."""
 
 _SEP_LINE = re.compile(r'"?sep=(.)"?\r?\n?', re.IGNORECASE)
-_DECIMAL_COMMA = re.compile(r"(?<=\d),(?=\d)")
-_DECIMAL_POINT = re.compile(r"(?<!\.)\.(?!\.)\d")
-_NUMERIC = re.compile(r"(?:not\b|[\d\s.,+\-±<>=()\[\]|~])+", re.IGNORECASE)
 _BROKEN = {
     "unexpected end of data": "a quoted field is never closed",
     "'\"' expected after '\"'": "a field continues after its closing quote",
@@ -66,22 +63,22 @@ def read_delimited(
 
 
 def dialect_of(text: str, wanted: str | None = None) -> Dialect:
-    """The dialect of a text; the remarks say what it was told from."""
+    """The dialect of a text; the remarks say how it was inferred."""
     if wanted is not None:
         return Dialect(wanted)
-    if found := _SEP_LINE.match(text):
-        named = DELIMITERS.get(found[1], in_quotes(found[1]))
+    if match := _SEP_LINE.match(text):
+        named = DELIMITERS.get(match[1], in_quotes(match[1]))
         return Dialect(
-            found[1], found.end(), (Remark(f"{named} between the fields, as the line {in_quotes(found[0].strip())} says."),)
+            match[1], match.end(), (Remark(f"{named} between the fields, as the line {in_quotes(match[0].strip())} says."),)
         )
     counts = {mark: _field_counts(text, mark) for mark in DELIMITERS}
     best = max(DELIMITERS, key=lambda mark: _fitness(counts[mark]))
     if _fitness(counts[best])[0] == 0:
         return Dialect(",", 0, (Remark("one column: the first line has no delimiter."),))
     header, agreeing, total = _fit(counts[best])
-    told = f"{DELIMITERS[best]} between the fields: {header} in the first line and in {agreeing:,} of the next {total:,}."
+    sentence = f"{DELIMITERS[best]} between the fields: {header} in the first line and in {agreeing:,} of the next {total:,}."
     return Dialect(
-        best, 0, (Remark(told),) if total else (Remark(f"{DELIMITERS[best]} between the fields: {header} in the first line."),)
+        best, 0, (Remark(sentence),) if total else (Remark(f"{DELIMITERS[best]} between the fields: {header} in the first line."),)
     )
 
 
@@ -126,10 +123,10 @@ def _records(text: str, delimiter: str, file: str) -> tuple[list[list[str]], lis
     while grid and not any(grid[-1]):
         grid.pop()
     titles = _titles(grid)
-    said = [(at, next(filter(None, grid[at]), "")) for at in titles]
-    told = [Remark(f"left out above the header: {in_quotes(text)}.", f"line {lines[at]}") for at, text in said if text]
+    titles_above = [(at, next(filter(None, grid[at]), "")) for at in titles]
+    remarks = [Remark(f"left out above the header: {in_quotes(text)}.", f"line {lines[at]}") for at, text in titles_above if text]
     grid, short = _evened(grid[len(titles) :], lines[len(titles) :], file)
-    return grid, [*told, *short]
+    return grid, [*remarks, *short]
 
 
 def _titles(grid: Sequence[Sequence[str]]) -> range:
@@ -161,58 +158,17 @@ def _evened(grid: list[list[str]], lines: Sequence[int], file: str) -> tuple[lis
 
 
 def _too_wide(n_fields: int, width: int, place: Place) -> Fault:
-    found = f"found {plural(n_fields, 'field')}, the first line has {width}."
-    return Fault(found, "a field with the delimiter in it in double quotes", "to name the delimiter with --delimiter", place)
+    problem = f"found {plural(n_fields, 'field')}, the first line has {width}."
+    return Fault(problem, "a field with the delimiter in it in double quotes", "to name the delimiter with --delimiter", place)
 
 
 def _broken(why: str, text: str, line: int, file: str) -> Fault:
     if "field limit" in why:
         return Fault(f"a field has more than {MOST_CHARACTERS:,} characters.", "a shorter one", place=Place(file, line))
-    said = next((told for part, told in _BROKEN.items() if part in why), why)
+    reason = next((sentence for part, sentence in _BROKEN.items() if part in why), why)
     shown_line = next(islice(io.StringIO(text), line - 1, None), "").rstrip("\r\n")
     accepted = "a field in double quotes from its start to its end, each quote in it doubled"
-    return Fault(f"{said}: {in_quotes(shown_line)}.", accepted, place=Place(file, line))
-
-
-# ---- decimal commas
-
-
-def with_points(
-    columns: Iterable[TextColumn], delimiter: str, is_decimal_comma: bool | None
-) -> tuple[list[TextColumn], list[Remark]]:
-    """Columns with decimal points for decimal commas, and what was decided.
-
-    Left to itself, a comma between two digits is a decimal one in a file with semicolons or bars where no number has a point: "3,5"
-    in a file with "3.5" is a pair, centre and tolerance, and so it is in a file with tabs, which contextdb writes too.
-    """
-    columns = list(columns)
-    if is_decimal_comma is False or (delimiter == "," and not is_decimal_comma):
-        return columns, []
-    numeric = [[text for text in column.texts if text and _NUMERIC.fullmatch(text)] for column in columns]
-    has_comma = [any(_DECIMAL_COMMA.search(text) for text in texts) for texts in numeric]
-    if not any(has_comma):
-        return columns, []
-    pointed = next((text for texts in numeric for text in texts if _DECIMAL_POINT.search(text)), None)
-    where = listed([c.name for c, has in zip(columns, has_comma, strict=True) if has])
-    example = next(text for texts in numeric for text in texts if _DECIMAL_COMMA.search(text))
-    if is_decimal_comma is None and (pointed is not None or delimiter == "\t"):
-        why = (
-            f": other numbers have points, such as {in_quotes(pointed)}."
-            if pointed is not None
-            else "; say so if it is a decimal comma."
-        )
-        return columns, [Remark(f"{in_quotes(example)} is read as centre and tolerance{why}", f"column {where}")]
-    changed = [_pointed(column, texts) if has else column for column, texts, has in zip(columns, numeric, has_comma, strict=True)]
-    told = f"decimal commas became points: {in_quotes(example)} is now {in_quotes(_DECIMAL_COMMA.sub('.', example))}."
-    return changed, [Remark(told, f"column {where}")]
-
-
-def _pointed(column: TextColumn, numeric: Sequence[str]) -> TextColumn:
-    new = {text: _DECIMAL_COMMA.sub(".", text) for text in numeric}
-    texts = [new.get(text, text) for text in column.texts]
-    if len(Counter(texts)) < len(texts):  # two texts became one
-        return TextColumn.of(column.name, (texts[code] for code in column.codes.tolist()))
-    return replace(column, texts=tuple(texts))
+    return Fault(f"{reason}: {in_quotes(shown_line)}.", accepted, place=Place(file, line))
 
 
 # ---- tab-separated text

@@ -18,13 +18,13 @@ def described(table: Table) -> list[str]:
     """The sections of contextdb.toml that a table needs: its own, and those of the conditions that it has and are declared."""
     declared = [c.condition for c in table.conditions if c.condition.is_declared]
     lines = [line for condition in declared for line in _section("conditions", condition.name, condition_to_dict(condition))]
-    said = {"asset": table.asset_column} | {key: value for key, value in settings_to_dict(table.settings).items() if key != "file"}
-    return [FIRST_LINE, *lines, *_section("tables", table.name, said)]
+    own = {key: value for key, value in settings_to_dict(table.settings).items() if key != "file"}
+    return [FIRST_LINE, *lines, *_section("tables", table.name, {"asset": table.asset_column} | own)]
 
 
-def _section(section: str, name: str, said: Mapping[str, object]) -> Iterator[str]:
+def _section(section: str, name: str, values: Mapping[str, object]) -> Iterator[str]:
     yield f"[{dotted((section, name))}]"
-    for key, value in said.items():
+    for key, value in values.items():
         line = f"{key} = {as_toml(value)}"
         if isinstance(value, list) and len(line) > LONG_LINE:
             yield from (f"{key} = [", *(f"  {as_toml(item)}," for item in value), "]")

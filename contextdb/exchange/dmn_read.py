@@ -22,7 +22,7 @@ from contextdb.cells.domains import TEXT, Domain
 from contextdb.cells.output_types import OUTPUT_TYPES, OutputValue
 from contextdb.cells.outputs import Output
 from contextdb.columns import TextColumn
-from contextdb.errors import Fault, Place, TableError, in_quotes, no_such, plural, shown, some
+from contextdb.errors import Fault, Place, TableError, in_quotes, no_such, plural, safe_text, some
 from contextdb.exchange.conflicts import require_no_conflicts
 from contextdb.exchange.dmn_types import InputType, Types, children_of, domain_of, tag_of, text_of
 from contextdb.exchange.encodings import decoded
@@ -33,9 +33,10 @@ from contextdb.exchange.reading import Reading, Remark, capped, listed
 from contextdb.expressions.rules import check_rule
 from contextdb.files.csv_source import name_faults
 from contextdb.schema.outputs import outputs_faults, outputs_to_toml
+from contextdb.schema.policies import POLICIES
 from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict
 
-POLICIES: dict[str, Any] = {"UNIQUE": "unique", "FIRST": "first", "PRIORITY": "priority", "ANY": "collect", "COLLECT": "collect"}
+OF_LETTERS = {letters: policy for policy, kind in POLICIES.items() for letters in kind.dmn}
 PRIORITY = "Priority"
 """The column that holds what DMN tells by the order of the output's values."""
 WHEN = "When"
@@ -116,9 +117,9 @@ def read_dmn(raw: bytes, file: str, decision: str | None = None) -> Reading:
         fallback_outputs=given,
     )
     schema = Schema(conditions={**declared, **rules_of_rows.facts}, tables={name: settings})
-    told = [*_version(root), *policy_remarks, *_expressions(element), *_results(root, inputs)]
-    told += [*lost_types, *lost_outputs, *lost_defaults, *rules_of_rows.remarks()]
-    remarks = (*told, *capped([*lost, *lost_values, *_notes_on_entries(rules)], "such entries"))
+    all_remarks = [*_version(root), *policy_remarks, *_expressions(element), *_results(root, inputs)]
+    all_remarks += [*lost_types, *lost_outputs, *lost_defaults, *rules_of_rows.remarks()]
+    remarks = (*all_remarks, *capped([*lost, *lost_values, *_notes_on_entries(rules)], "such entries"))
     return Reading(tuple(columns), "dmn", remarks, schema, outputs=plain)
 
 
@@ -136,27 +137,27 @@ def _parsed(raw: bytes, file: str) -> Element:
         root = ElementTree.fromstring(re.sub(r"^\s*<\?xml[^>]*\?>", "", text))
     except (ElementTree.ParseError, ValueError, RecursionError) as error:
         line = error.position[0] if isinstance(error, ElementTree.ParseError) else None
-        raise TableError(Fault(f"this is not readable XML: {shown(str(error))}.", _ACCEPTED, place=Place(file, line))) from None
+        raise TableError(Fault(f"this is not readable XML: {safe_text(str(error))}.", _ACCEPTED, place=Place(file, line))) from None
     if tag_of(root) != "definitions":
-        raise TableError(Fault(f"this is not DMN: its root is <{shown(tag_of(root))}>.", _ACCEPTED, place=Place(file)))
+        raise TableError(Fault(f"this is not DMN: its root is <{safe_text(tag_of(root))}>.", _ACCEPTED, place=Place(file)))
     return root
 
 
 def _chosen(root: Element, wanted: str | None, file: str) -> tuple[Element, str]:
-    """The decision table that is asked for, and its decision's name."""
-    found = list(_tables(root))
-    names = [one.get("name") or one.get("id") or "decision" for one, _ in found]
+    """The decision table that is requested, and its decision's name."""
+    tables = list(_tables(root))
+    names = [one.get("name") or one.get("id") or "decision" for one, _ in tables]
     if wanted is not None:
-        for (one, table), name in zip(found, names, strict=True):
+        for (one, table), name in zip(tables, names, strict=True):
             if wanted in (name, one.get("id")):
                 return table, name
         raise TableError(no_such("decision table", wanted, names, some(names) or "none", Place(file)))
-    if not found:
+    if not tables:
         raise TableError(Fault("the file has no decision table.", _ACCEPTED, place=Place(file)))
-    if len(found) > 1:
-        said = f"the file has {len(found)} decision tables: {listed(names)}."
-        raise TableError(Fault(said, "one of them", f"to name it: --sheet {in_quotes(names[0])}", Place(file)))
-    return found[0][1], names[0]
+    if len(tables) > 1:
+        problem = f"the file has {len(tables)} decision tables: {listed(names)}."
+        raise TableError(Fault(problem, "one of them", f"to name it: --sheet {in_quotes(names[0])}", Place(file)))
+    return tables[0][1], names[0]
 
 
 def _tables(root: Element) -> Iterator[tuple[Element, Element]]:
@@ -183,7 +184,7 @@ def _entries(rules: Sequence[Element], tag: str) -> list[list[str]]:
 
 def _at(entries: Sequence[Sequence[str]], at: int) -> list[str]:
     """The entries of one column, empty where a rule has too few."""
-    return [found[at] if at < len(found) else "" for found in entries]
+    return [texts[at] if at < len(texts) else "" for texts in entries]
 
 
 # ---- columns
@@ -191,9 +192,9 @@ def _at(entries: Sequence[Sequence[str]], at: int) -> list[str]:
 
 def _input(element: Element, at: int, entries: Sequence[str], types: Types) -> _Column:
     expression = next(iter(children_of(element, "inputExpression")), None)
-    said, label = text_of(expression), (element.get("label") or "").strip()
-    name = said if _NAME.fullmatch(said) else label or said or f"input {at + 1}"
-    kind = types.of_input(expression, said)
+    expression_text, label = text_of(expression), (element.get("label") or "").strip()
+    name = expression_text if _NAME.fullmatch(expression_text) else label or expression_text or f"input {at + 1}"
+    kind = types.of_input(expression, expression_text)
     allowed = text_of(next(iter(children_of(element, "inputValues")), None)) or kind.allowed
     return _Column(name, InputType(kind.kind, allowed), entries)
 
@@ -201,10 +202,10 @@ def _input(element: Element, at: int, entries: Sequence[str], types: Types) -> _
 def _output(element: Element, at: int, entries: Sequence[str], decision: str, types: Types) -> _Column:
     name = element.get("name") or element.get("label") or (decision if at == 0 else f"output {at + 1}")
     values = text_of(next(iter(children_of(element, "outputValues")), None))
-    found = tuple(strings_of(values))
+    strings = tuple(strings_of(values))
     default = text_of(next(iter(children_of(element, "defaultOutputEntry")), None))
     kind = types.named(element.get("typeRef") or "")
-    return _Column(name, InputType(kind.kind, values or kind.allowed), entries, found, default)
+    return _Column(name, InputType(kind.kind, values or kind.allowed), entries, strings, default)
 
 
 def _annotation(element: Element, at: int, entries: Sequence[str]) -> _Column:
@@ -225,8 +226,8 @@ def _conditions(inputs: Sequence[_Column], rules: Rules) -> tuple[list[TextColum
         for rule, (entry, cell) in enumerate(zip(one.entries, one.cells, strict=True), 1):
             is_rule = cell is None and rules.add(rule - 1, one.name, entry)
             if cell is None and not is_rule:
-                told = f"{in_quotes(entry)} is not a test that a cell or a rule can express; it is kept as unreadable text."
-                lost.append(Remark(told, _place(rule, one.name), True))
+                problem = f"{in_quotes(entry)} is not a test that a cell or a rule can express; it is kept as unreadable text."
+                lost.append(Remark(problem, _place(rule, one.name), True))
             texts.append("-" if is_rule else f"= {entry}" if cell is None else cell)
         columns.append(TextColumn.of(one.name, texts))
     return columns, lost
@@ -252,10 +253,10 @@ class Rules:
 
     def add(self, row: int, name: str, test: str) -> bool:
         """Make a test of an input a rule of its row; gives whether an expression can say it."""
-        found = rule_of(test, name, self.known)
-        if found is None:
+        read = rule_of(test, name, self.known)
+        if read is None:
             return False
-        rule, named = found
+        rule, named = read
         new = {other: self._condition(other, self.conditions[name]) for other in named if other not in self.conditions}
         together = [*self.rules[row], rule]
         text = together[0] if len(together) == 1 else " and ".join(f"({one})" for one in together)
@@ -309,10 +310,10 @@ def _expressions(element: Element) -> list[Remark]:
     """Inputs that are worked out of others: the game must give such a fact itself."""
     remarks = []
     for one in children_of(element, "input"):
-        said, label = text_of(next(iter(children_of(one, "inputExpression")), None)), one.get("label")
-        if said and not _NAME.fullmatch(said) and said != label:
-            told = f"{in_quotes(said)} is an expression; as a column it is a fact that the game supplies."
-            remarks.append(Remark(told, f"input {in_quotes(label or said)}", True))
+        expression_text, label = text_of(next(iter(children_of(one, "inputExpression")), None)), one.get("label")
+        if expression_text and not _NAME.fullmatch(expression_text) and expression_text != label:
+            message = f"{in_quotes(expression_text)} is an expression; as a column it is a fact that the game supplies."
+            remarks.append(Remark(message, f"input {in_quotes(label or expression_text)}", True))
     return remarks
 
 
@@ -325,19 +326,19 @@ def _declared(inputs: Sequence[_Column]) -> tuple[dict[str, Condition], list[Rem
         lost += remarks
         if domain is not None:
             declared[one.name] = Condition(one.name, domain)
-        elif len(entries) < len(one.entries) or _said(one) is None:  # by its cells the column would be data
+        elif len(entries) < len(one.entries) or _proposed_type(one) is None:  # by its cells the column would be data
             declared[one.name] = _judged(one)
     return declared, lost
 
 
-def _said(one: _Column) -> Mapping[str, object] | None:
+def _proposed_type(one: _Column) -> Mapping[str, object] | None:
     """The type that the cells of an input tell of; None where they would be data."""
     return propose_type(TextColumn.of(one.name, (cell for cell in one.cells if cell is not None))).declared
 
 
 def _judged(one: _Column) -> Condition:
     """An input of no type that a column has, such as a date: what its cells say, and never data."""
-    return conditions_from_dict({one.name: _said(one) or {"type": "text"}})[one.name]
+    return conditions_from_dict({one.name: _proposed_type(one) or {"type": "text"}})[one.name]
 
 
 def _typed(outputs: Sequence[_Column]) -> tuple[tuple[Output, ...], list[Remark]]:
@@ -350,11 +351,11 @@ def _typed(outputs: Sequence[_Column]) -> tuple[tuple[Output, ...], list[Remark]
             continue
         output = Output(one.name, domain.kind, None, domain.minimum, domain.maximum, domain.values or ())
         wrong = next((entry for entry in one.entries if not output.reads(value_of(entry) or "")), None)
-        said = outputs_to_toml([one.name], [output])
+        declared = outputs_to_toml([one.name], [output])
         if wrong is not None:
-            told = f"{in_quotes(wrong)} is not a value of its type" if wrong else "an entry is empty"
-            remarks.append(Remark(f"{told}, so it is read as text.", place))
-        elif not any(outputs_faults({"outputs": said})):
+            problem = f"{in_quotes(wrong)} is not a value of its type" if wrong else "an entry is empty"
+            remarks.append(Remark(f"{problem}, so it is read as text.", place))
+        elif not any(outputs_faults({"outputs": declared})):
             typed.append(output)
     return tuple(typed), remarks
 
@@ -380,8 +381,8 @@ def _results(root: Element, inputs: Sequence[_Column]) -> Iterator[Remark]:
     results = {one.get(key) for decision in decisions for one in (decision, *children_of(decision, "variable")) for key in _NAMES}
     for one in inputs:
         if one.name in results:
-            told = "another decision of the file computes it; as a column it is a fact that the game supplies."
-            yield Remark(told, f"input {in_quotes(one.name)}", True)
+            message = "another decision of the file computes it; as a column it is a fact that the game supplies."
+            yield Remark(message, f"input {in_quotes(one.name)}", True)
 
 
 def _notes_on_entries(rules: Sequence[Element]) -> Iterator[Remark]:
@@ -397,17 +398,17 @@ def _notes_on_entries(rules: Sequence[Element]) -> Iterator[Remark]:
 
 
 def _policy(element: Element) -> tuple[Any, list[Remark]]:
-    said = (element.get("hitPolicy") or "UNIQUE").upper().strip()
-    said = _LETTERS.get(said, said)
-    policy = POLICIES.get(said, "collect")
-    remarks = [Remark(f"the hit policy {said} becomes the policy {in_quotes(policy)}.")]
-    if said not in POLICIES:
+    letters = (element.get("hitPolicy") or "UNIQUE").upper().strip()
+    letters = _LETTERS.get(letters, letters)
+    policy = OF_LETTERS.get(letters, "collect")
+    remarks = [Remark(f"the hit policy {letters} becomes the policy {in_quotes(policy)}.")]
+    if letters not in OF_LETTERS:
         order = {
             "RULE ORDER": "all valid rows come, in the order of the table",
             "OUTPUT ORDER": "the order of the outputs is not kept",
         }
         remarks = [
-            Remark(f"the hit policy {said} becomes {in_quotes(policy)}: {order.get(said, 'it is not known')}.", is_loss=True)
+            Remark(f"the hit policy {letters} becomes {in_quotes(policy)}: {order.get(letters, 'it is not known')}.", is_loss=True)
         ]
     if aggregation := element.get("aggregation"):
         remarks.append(Remark(f"the aggregation {in_quotes(aggregation)} is not kept: assets are not added up.", is_loss=True))

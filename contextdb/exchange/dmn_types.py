@@ -60,8 +60,8 @@ def children_of(element: Element, tag: str) -> list[Element]:
 
 def text_of(element: Element | None) -> str:
     """The text of the <text> in an element."""
-    found = next(iter(children_of(element, "text")), None) if element is not None else None
-    return (found.text or "").strip() if found is not None else ""
+    element_text = next(iter(children_of(element, "text")), None) if element is not None else None
+    return (element_text.text or "").strip() if element_text is not None else ""
 
 
 @dataclass(frozen=True)
@@ -80,18 +80,18 @@ class Types:
         facts = {(one.get("name") or ""): variable.get("typeRef") or "" for one, variable in variables if variable is not None}
         return cls(items, facts)
 
-    def of_input(self, expression: Element | None, said: str) -> InputType:
+    def of_input(self, expression: Element | None, text: str) -> InputType:
         """The type of an input, by its own reference or by that of the datum that it names."""
         own = expression.get("typeRef") if expression is not None else None
-        return self.named(own or self._type_of_path(said))
+        return self.named(own or self._type_of_path(text))
 
     def paths(self) -> list[str]:
         """The names of all facts, and of the parts of those that are structures: Applicant.age."""
-        found = list(self.facts)
+        paths = list(self.facts)
         for fact, kind in self.facts.items():
             start = f"{_plain(kind)}."
-            found += [f"{fact}.{name[len(start) :]}" for name in self.items if name.startswith(start)]
-        return [name for name in found if name]
+            paths += [f"{fact}.{name[len(start) :]}" for name in self.items if name.startswith(start)]
+        return [name for name in paths if name]
 
     def _type_of_path(self, path: str) -> str:
         name, _, rest = path.partition(".")
@@ -142,7 +142,7 @@ def _is_string_test(test: str) -> bool:
 
 def _bounded(domain: Domain, allowed: str, place: str) -> tuple[Domain, list[Remark]]:
     """A domain of numbers, with the bounds that allowed values give where they are closed."""
-    ends = next((found for pattern in _BOUNDS if (found := pattern.fullmatch(allowed))), None)
+    ends = next((ends_match for pattern in _BOUNDS if (ends_match := pattern.fullmatch(allowed))), None)
     if ends is not None:
         low, high = (None if end is None else _read(end, domain) for end in map(ends.groupdict().get, ("low", "high")))
         is_fitting = not any(end is not None and (end != end or (domain.type.is_whole and end % 1)) for end in (low, high))

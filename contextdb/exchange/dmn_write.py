@@ -20,6 +20,7 @@ from contextdb.console import printable
 from contextdb.errors import Fault, Place, TableError, in_quotes, row_name
 from contextdb.exchange.feel import feel_number, feel_type, literal, unary_tests
 from contextdb.exchange.reading import Remark, capped
+from contextdb.schema.policies import POLICIES
 from contextdb.tables.condition_column import ConditionColumn
 from contextdb.tables.data import output_columns_of, require_readable
 from contextdb.tables.table import Table
@@ -28,8 +29,6 @@ NAMESPACE = "https://www.omg.org/spec/DMN/20191111/MODEL/"
 _HEAD = '<?xml version="1.0" encoding="UTF-8" standalone="yes"?>'
 _NEVER = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff\ud800-\udfff]")
 """Characters that XML cannot hold."""
-_POLICIES = {"unique": "UNIQUE", "first": "FIRST", "priority": "PRIORITY"}
-"""The hit policies of those that DMN has; the others are COLLECT, which prefers none."""
 
 
 def write_dmn(table: Table) -> tuple[bytes, tuple[Remark, ...]]:
@@ -48,15 +47,16 @@ def write_dmn(table: Table) -> tuple[bytes, tuple[Remark, ...]]:
         *(_rule(table, row, inputs, outputs, tags) for row in rows),
     ]
     body = "\n      ".join(parts)
+    hit_policy = (*POLICIES[table.settings.policy].dmn, "COLLECT")[0]
     text = (
         f'{_HEAD}\n<definitions xmlns="{NAMESPACE}" id="definitions" name="{_attribute(table.name)}" namespace="contextdb">\n'
         f'  <decision id="decision" name="{_attribute(table.name)}">\n'
-        f'    <decisionTable id="table" hitPolicy="{_POLICIES.get(table.settings.policy, "COLLECT")}">\n      {body}\n'
+        f'    <decisionTable id="table" hitPolicy="{hit_policy}">\n      {body}\n'
         "    </decisionTable>\n  </decision>\n</definitions>\n"
     )
-    if found := _NEVER.search(text):
-        said = f"contextdb.toml declares a text with {in_quotes(found[0])}, a character that XML cannot hold."
-        raise TableError(Fault(said, "text without it"))
+    if match := _NEVER.search(text):
+        problem = f"contextdb.toml declares a text with {in_quotes(match[0])}, a character that XML cannot hold."
+        raise TableError(Fault(problem, "text without it"))
     return text.encode(), (*remarks, *_about(table, tags))
 
 
@@ -64,8 +64,8 @@ def _require_xml(table: Table) -> None:
     for column in table.columns:
         for text in (column.name, *column.texts):
             if _NEVER.search(text):
-                found = f"{in_quotes(text)} has a character that XML cannot hold."
-                raise TableError(Fault(found, "text without it", place=Place(column=printable(column.name))))
+                problem = f"{in_quotes(text)} has a character that XML cannot hold."
+                raise TableError(Fault(problem, "text without it", place=Place(column=printable(column.name))))
 
 
 def _plain(table: Table) -> list[str]:
@@ -160,13 +160,13 @@ def _rule(
 def _about(table: Table, tags: Sequence[ConditionColumn]) -> Iterator[Remark]:
     """What DMN has no words for in the whole table."""
     for column in tags:
-        said = "tags become an annotation, which excludes nothing: DMN has no tests of sets."
-        yield Remark(said, f"column {in_quotes(column.condition.name)}", True)
+        message = "tags become an annotation, which excludes nothing: DMN has no tests of sets."
+        yield Remark(message, f"column {in_quotes(column.condition.name)}", True)
     if any(column.condition.domain.type.is_circular for column in table.conditions):
         yield Remark("angles are written from -180 to 180; give the decision angles in this range.")
-    if table.settings.policy in ("specific", "cheapest"):
-        said = f"the policy {in_quotes(table.settings.policy)} becomes COLLECT: DMN has none that prefers such rows."
-        yield Remark(said, is_loss=True)
+    if not POLICIES[table.settings.policy].dmn:
+        message = f"the policy {in_quotes(table.settings.policy)} becomes COLLECT: DMN has none that prefers such rows."
+        yield Remark(message, is_loss=True)
     for job in ("once", "cooldown_s", "cooldown_turns"):
         if name := getattr(table.settings, job):
             yield Remark("becomes an output: a decision does not remember what was picked.", f"column {in_quotes(name)}", True)
@@ -174,8 +174,8 @@ def _about(table: Table, tags: Sequence[ConditionColumn]) -> Iterator[Remark]:
     if table.settings.policy == "priority":
         yield Remark("the priorities are an output; DMN orders by the list of output values instead.", is_loss=True)
     if table.settings.when:
-        said = "its rules become an output, which excludes nothing: a cell of a decision table looks at one fact."
-        yield Remark(said, f"column {in_quotes(table.settings.when)}", True)
+        message = "its rules become an output, which excludes nothing: a cell of a decision table looks at one fact."
+        yield Remark(message, f"column {in_quotes(table.settings.when)}", True)
     if table.settings.assume:
         yield Remark("assume is not kept: a decision table has no equivalent.", is_loss=True)
 

@@ -23,11 +23,11 @@ def decoded(raw: bytes, file: str, encoding: str | None = None) -> tuple[str, li
     was understood. Raises TableError where the bytes are not text of that encoding, with the line, or no text at all."""
     if encoding is not None:
         return _decoded_as(raw, file, _known(encoding, file)), []
-    for mark, name, told in BOMS:
+    for mark, name, remark in BOMS:
         if raw.startswith(mark):
-            return _decoded_as(raw[len(mark) :], file, name), [Remark(f"the text is {told}.")] if name != "utf-8" else []
-    if found := _utf16(raw):
-        return _decoded_as(raw, file, found), [Remark("the text is UTF-16 without a byte order mark.")]
+            return _decoded_as(raw[len(mark) :], file, name), [Remark(f"the text is {remark}.")] if name != "utf-8" else []
+    if detected := _utf16(raw):
+        return _decoded_as(raw, file, detected), [Remark("the text is UTF-16 without a byte order mark.")]
     if b"\0" in raw:
         fault = Fault("not a text file: it contains NUL bytes.", "a text file", place=Place(line=line_of(raw, raw.find(0))))
         raise _refusal(other_kind(raw) or fault, file)
@@ -47,9 +47,9 @@ def _old_windows(raw: bytes, file: str, error: UnicodeDecodeError) -> tuple[str,
     """Text that is not UTF-8 is most likely that of an old Windows program in the west; the message shows a word to judge by."""
     text = _decoded_as(raw, file, "cp1252")
     word = raw[max(error.start - 12, 0) : error.start + 12].decode("cp1252", "replace")
-    said = f"byte 0x{raw[error.start]:02X} is not UTF-8; the file is read as Windows-1252: {in_quotes(word.strip())}."
-    said += " If that is wrong, name another encoding."
-    return text, [Remark(said, f"line {line_of(raw, error.start)}", is_loss=True)]
+    message = f"byte 0x{raw[error.start]:02X} is not UTF-8; the file is read as Windows-1252: {in_quotes(word.strip())}."
+    message += " If that is wrong, name another encoding."
+    return text, [Remark(message, f"line {line_of(raw, error.start)}", is_loss=True)]
 
 
 def _decoded_as(raw: bytes, file: str, encoding: str) -> str:
@@ -57,9 +57,9 @@ def _decoded_as(raw: bytes, file: str, encoding: str) -> str:
         return raw.decode(encoding).removeprefix("\ufeff")
     except UnicodeError as error:
         start = error.start if isinstance(error, UnicodeDecodeError) else 0
-        found = f"byte 0x{raw[start]:02X} on this line is not text in {encoding}." if raw else f"the text is not {encoding}."
+        problem = f"byte 0x{raw[start]:02X} on this line is not text in {encoding}." if raw else f"the text is not {encoding}."
         mend = "to name its encoding with --encoding"
-        raise TableError(Fault(found, "UTF-8 or UTF-16, or the encoding named", mend, Place(file, line_of(raw, start)))) from None
+        raise TableError(Fault(problem, "UTF-8 or UTF-16, or the encoding named", mend, Place(file, line_of(raw, start)))) from None
 
 
 def _known(encoding: str, file: str) -> str:

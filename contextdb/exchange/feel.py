@@ -50,14 +50,15 @@ MOST_NOTS = 8
 
 
 def strings_of(text: str) -> list[str]:
+    """The values of the string literals of a text, in order."""
     return [string_of(part) for part in _PART.findall(text) if len(part) > 1 and STRING.fullmatch(part)]
 
 
 def cell_of(test: str) -> str | None:
     """The cell that unary tests mean; None for what no cell can say."""
     text, n_nots = test.strip(), 0
-    while n_nots <= MOST_NOTS and (found := _NOT.fullmatch(text)):
-        text, n_nots = found[1].strip(), n_nots + 1
+    while n_nots <= MOST_NOTS and (match := _NOT.fullmatch(text)):
+        text, n_nots = match[1].strip(), n_nots + 1
     cell = None if n_nots > MOST_NOTS else _plain_cell(text)
     return None if cell is None or (n_nots and cell == "-") else "not " * n_nots + cell
 
@@ -89,15 +90,15 @@ def _split(text: str) -> Iterator[str]:
 def _number_part(part: str) -> str | None:
     if "inf" in part.casefold():  # a name like any other to FEEL
         return None
-    if found := _COMPARED.fullmatch(part):
-        return f"{found[1] or ''}{number_in(found[2])}"
-    found = _RANGE.fullmatch(part)
-    if not found:
+    if match := _COMPARED.fullmatch(part):
+        return f"{match[1] or ''}{number_in(match[2])}"
+    match = _RANGE.fullmatch(part)
+    if not match:
         return None
-    low, high = number_in(found[2]), number_in(found[3])
+    low, high = number_in(match[2]), number_in(match[3])
     if any(_is_descending(low, high, kind) for kind in KINDS.values() if kind.is_numeric):
         return None
-    left, right = "[" if found[1] == "[" else "(", "]" if found[4] == "]" else ")"
+    left, right = "[" if match[1] == "[" else "(", "]" if match[4] == "]" else ")"
     body = f"{low}..{high}"
     return body if (left, right) == ("[", "]") else f"{left}{body}{right}"
 
@@ -120,7 +121,7 @@ def _is_descending(low: str, high: str, kind: Kind) -> bool:
 
 def string_of(literal: str) -> str:
     """The text that a string of FEEL means."""
-    text = _ESCAPE.sub(lambda found: _unescaped(found[1]), literal[1:-1])
+    text = _ESCAPE.sub(lambda match: _unescaped(match[1]), literal[1:-1])
     return text.encode("utf-16", "surrogatepass").decode("utf-16", "replace")  # two halves of a pair are one character
 
 
@@ -144,6 +145,7 @@ def value_of(expression: str) -> str | None:
 
 
 def feel_type(kind: Kind) -> str:
+    """The type of FEEL for facts of a kind."""
     return kind.name if kind.is_spelt else "number" if kind.is_numeric else "boolean" if kind.is_truth else "string"
 
 
@@ -180,10 +182,10 @@ def _written(text: str, kind: Kind) -> str:
 
 def _number_test(part: str, kind: Kind) -> str | None:
     number = kind.spelling.number
-    found = re.fullmatch(rf"([\[(]?)({number})?\.\.({number})?([\])]?)", part)
-    if not found:
+    match = re.fullmatch(rf"([\[(]?)({number})?\.\.({number})?([\])]?)", part)
+    if not match:
         return _written(part, kind) if re.fullmatch(number, part) and "inf" not in part else None
-    left, low, high, right = found[1], *(text and _written(text, kind) for text in (found[2], found[3])), found[4]
+    left, low, high, right = match[1], *(text and _written(text, kind) for text in (match[2], match[3])), match[4]
     if "inf" in part:
         return None
     if low is None or high is None:
@@ -198,5 +200,6 @@ def _values_test(accepts: ValueSet) -> str | None:
 
 
 def literal(text: str) -> str:
+    """A text as a string literal of FEEL."""
     plain = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n").replace("\r", "\\r").replace("\t", "\\t")
     return f'"{plain}"'

@@ -38,7 +38,7 @@ _LEFT, _RIGHT = {"[": ">=", "(": ">", "]": ">"}, {"]": "<=", ")": "<", "[": "<"}
 class _Token:
     """A word of FEEL: as it is written, and as an expression has it."""
 
-    said: str
+    source: str
     written: str
     is_sign: bool = False
 
@@ -66,30 +66,30 @@ def _tokens(text: str, known: Sequence[str], named: list[str]) -> Iterator[_Toke
     while at < end:
         at += len(text[at:]) - len(text[at:].lstrip())
         n += 1
-        found = _TOKEN.match(text, at)
+        match = _TOKEN.match(text, at)
         name = next((one for one in known if _stands_at(text, at, one)), None)
-        if n > MOST_TOKENS or (found is None and name is None):
+        if n > MOST_TOKENS or (match is None and name is None):
             raise _NoRuleError
         if name is not None:
             named.append(name)
             at += len(name)
             yield _Token(name, written_name(name))
             continue
-        assert found is not None
-        at = found.end()
-        yield _token(found)
+        assert match is not None
+        at = match.end()
+        yield _token(match)
 
 
-def _token(found: re.Match[str]) -> _Token:
-    if (text := found["text"]) is not None:
+def _token(match: re.Match[str]) -> _Token:
+    if (text := match["text"]) is not None:
         return _Token(text, written_text(string_of(text)))
-    if (number := found["number"]) is not None:
+    if (number := match["number"]) is not None:
         return _Token(number, number)
-    if (sign := found["sign"]) is not None:
+    if (sign := match["sign"]) is not None:
         return _Token(sign, "==" if sign == "=" else sign, True)
-    if found["word"] not in _WORDS:  # a name that nobody gives, or a function
+    if match["word"] not in _WORDS:  # a name that nobody gives, or a function
         raise _NoRuleError
-    return _Token(found["word"], _WORDS[found["word"]], True)
+    return _Token(match["word"], _WORDS[match["word"]], True)
 
 
 def _stands_at(text: str, at: int, name: str) -> bool:
@@ -108,41 +108,41 @@ def _tests(tokens: Sequence[_Token], fact: str) -> str:
 def _split(tokens: Sequence[_Token]) -> Iterator[Sequence[_Token]]:
     depth, start = 0, 0
     for at, token in enumerate(tokens):
-        depth += (token.said == "(" and token.is_sign) - (token.said == ")" and token.is_sign)
-        if token.said == "," and token.is_sign and depth <= 0:
+        depth += (token.source == "(" and token.is_sign) - (token.source == ")" and token.is_sign)
+        if token.source == "," and token.is_sign and depth <= 0:
             yield tokens[start:at]
             start = at + 1
     yield tokens[start:]
 
 
 def _test(tokens: Sequence[_Token], fact: str) -> str:
-    said = [token.said if token.is_sign else "" for token in tokens]
+    signs = [token.source if token.is_sign else "" for token in tokens]
     if not tokens:
         raise _NoRuleError
-    if said[:2] == ["not", "("] and said[-1] == ")" and _closes(said, 1) == len(said) - 1:
+    if signs[:2] == ["not", "("] and signs[-1] == ")" and _closes(signs, 1) == len(signs) - 1:
         return f"not ({_tests(tokens[2:-1], fact)})"
-    if "?" in said:
+    if "?" in signs:
         return f"({_written(tokens, fact)})"
-    if said[0] in _COMPARED:
+    if signs[0] in _COMPARED:
         return f"{fact} {tokens[0].written} {_written(tokens[1:])}"
-    if ".." in said:
-        return _interval(tokens, said, fact)
+    if ".." in signs:
+        return _interval(tokens, signs, fact)
     return f"{fact} == {_written(tokens)}"
 
 
-def _interval(tokens: Sequence[_Token], said: Sequence[str], fact: str) -> str:
-    if said.count("..") != 1 or said[0] not in _LEFT or said[-1] not in _RIGHT:
+def _interval(tokens: Sequence[_Token], signs: Sequence[str], fact: str) -> str:
+    if signs.count("..") != 1 or signs[0] not in _LEFT or signs[-1] not in _RIGHT:
         raise _NoRuleError
-    at = said.index("..")
+    at = signs.index("..")
     low, high = _written(tokens[1:at]), _written(tokens[at + 1 : -1])
-    return f"{fact} {_LEFT[said[0]]} {low} and {fact} {_RIGHT[said[-1]]} {high}"
+    return f"{fact} {_LEFT[signs[0]]} {low} and {fact} {_RIGHT[signs[-1]]} {high}"
 
 
-def _closes(said: Sequence[str], at: int) -> int:
+def _closes(signs: Sequence[str], at: int) -> int:
     """Where the bracket that opens at a place is closed."""
     depth = 0
-    for place in range(at, len(said)):
-        depth += (said[place] == "(") - (said[place] == ")")
+    for place in range(at, len(signs)):
+        depth += (signs[place] == "(") - (signs[place] == ")")
         if depth == 0:
             return place
     return -1
@@ -150,8 +150,8 @@ def _closes(said: Sequence[str], at: int) -> int:
 
 def _written(tokens: Sequence[_Token], fact: str | None = None) -> str:
     """An expression of FEEL as one of ours, with the fact for each `?`; whether it reads is for the caller to check."""
-    if not tokens or any(token.is_sign and token.said in (",", "[", "]", "..") for token in tokens):
+    if not tokens or any(token.is_sign and token.source in (",", "[", "]", "..") for token in tokens):
         raise _NoRuleError
-    if fact is None and any(token.is_sign and token.said in (*_COMPARED, "?", "and", "or", "not") for token in tokens):
+    if fact is None and any(token.is_sign and token.source in (*_COMPARED, "?", "and", "or", "not") for token in tokens):
         raise _NoRuleError
-    return " ".join((fact or "") if token.is_sign and token.said == "?" else token.written for token in tokens)
+    return " ".join((fact or "") if token.is_sign and token.source == "?" else token.written for token in tokens)

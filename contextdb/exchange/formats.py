@@ -62,7 +62,7 @@ class ReadOptions:
 
     @property
     def says_how(self) -> bool:
-        """Whether it is said how a text is to be read."""
+        """Whether it is specified how a text is to be read."""
         return (self.encoding, self.delimiter, self.is_decimal_comma) != (None, None, None)
 
 
@@ -77,18 +77,18 @@ def format_of(name: str, wanted: str | None = None, raw: bytes = b"", for_writin
     if sign := _BINARY_SIGNS.get(seems_to_be(raw[:10_000]) or ""):
         return known[sign]
     suffix = PurePath(name).suffix.lower()
-    found = next((one for one in known.values() if suffix in one.suffixes), None)
-    if found and not (for_writing and suffix not in found.suffixes[:1] and found.name == "xlsx"):
-        return found
+    match = next((one for one in known.values() if suffix in one.suffixes), None)
+    if match and not (for_writing and suffix not in match.suffixes[:1] and match.name == "xlsx"):
+        return match
     suffixes = [one.suffixes[0] for one in known.values() if one.suffixes]
     near = ".xlsx" if suffix in _OTHER_WORKBOOKS else nearest(suffix, suffixes)
     mend = SAVE_AS_XLSX if suffix in _OTHER_WORKBOOKS and not for_writing else in_quotes(near) if near else ""
-    said = (
+    problem = (
         f"a file that ends in {in_quotes(suffix)} is of no known format."
         if suffix
         else "the name has no suffix that gives a format."
     )
-    raise FileError(Fault(said, f"{', '.join(suffixes)}, or --as with a format", mend, Place(name)))
+    raise FileError(Fault(problem, f"{', '.join(suffixes)}, or --as with a format", mend, Place(name)))
 
 
 def read(raw: bytes, name: str, options: ReadOptions = ReadOptions()) -> Reading:
@@ -102,12 +102,17 @@ def read(raw: bytes, name: str, options: ReadOptions = ReadOptions()) -> Reading
         from contextdb.exchange.grid import doubts
 
         reading = replace(reading, remarks=(*reading.remarks, *doubts(reading.columns)))
+    if options.is_decimal_comma and kind.name not in ("csv", "tsv", "unreal-csv"):
+        from contextdb.exchange.decimal_commas import with_points
+
+        columns, remarks = with_points(reading.columns, "", True)
+        reading = replace(reading, columns=tuple(columns), remarks=(*reading.remarks, *remarks), source=None)
     if options.has_whole_names is not None:
         reading = replace(reading, has_whole_names=options.has_whole_names)
     suffix = PurePath(name).suffix.lower()
     if options.format is None and suffix and suffix not in kind.suffixes:
-        told = Remark(f"by its first bytes this is {kind.about}, though its name ends in {suffix}.")
-        return replace(reading, remarks=(told, *reading.remarks))
+        remark = Remark(f"by its first bytes this is {kind.about}, though its name ends in {suffix}.")
+        return replace(reading, remarks=(remark, *reading.remarks))
     return reading
 
 
@@ -197,11 +202,11 @@ def write(table: Table, kind: Format, formulas: Formulas = "tell") -> tuple[byte
 
 def _written(table: Table, kind: str, formulas: Formulas) -> tuple[bytes, tuple[Remark, ...]]:
     columns: Sequence[TextColumn] = table.columns
-    told: tuple[Remark, ...] = ()
+    remarks: tuple[Remark, ...] = ()
     if kind in ("csv", "tsv"):
-        from contextdb.exchange.formulas import formulas_told, quoted_formulas
+        from contextdb.exchange.formulas import formula_remarks, quoted_formulas
 
-        told = formulas_told(columns) if formulas == "tell" else ()
+        remarks = formula_remarks(columns) if formulas == "tell" else ()
         columns = quoted_formulas(columns) if formulas == "quote" else columns
     if kind == "xlsx":
         from contextdb.exchange.xlsx_write import write_xlsx
@@ -210,11 +215,11 @@ def _written(table: Table, kind: str, formulas: Formulas) -> tuple[bytes, tuple[
     if kind in ("csv", "parquet"):
         from contextdb.files.texts import written_over
 
-        return written_over(table.source, columns, table.origin, as_parquet=kind == "parquet").raw, told
+        return written_over(table.source, columns, table.origin, as_parquet=kind == "parquet").raw, remarks
     if kind == "tsv":
         from contextdb.exchange.delimited import write_tab_text
 
-        return write_tab_text(columns), told
+        return write_tab_text(columns), remarks
     if kind in ("json", "jsonl"):
         from contextdb.exchange.json_rows import write_json, write_json_lines
 

@@ -40,24 +40,24 @@ def _quoted(text: str) -> str:
 def _distinct(column: TextColumn) -> tuple[str, ...]:
     """The texts with their apostrophes, as different from each other as before."""
     known = set(column.texts)
-    found = []
+    columns = []
     for text in column.texts:
         new = _quoted(text)
         while new != text and new in known:
             new = f"'{new}"
         known.add(new)
-        found.append(new)
-    return tuple(found)
+        columns.append(new)
+    return tuple(columns)
 
 
-def formulas_told(columns: Sequence[TextColumn]) -> tuple[Remark, ...]:
+def formula_remarks(columns: Sequence[TextColumn]) -> tuple[Remark, ...]:
     """How many cells a spreadsheet may compute, and the first of them; nothing where there is none."""
-    found = [(column, [is_formula(text) for text in column.texts]) for column in columns]
-    rows = [(np.flatnonzero(np.array(flags, np.bool_)[column.codes]), column) for column, flags in found if any(flags)]
+    flagged = [(column, [is_formula(text) for text in column.texts]) for column in columns]
+    rows = [(np.flatnonzero(np.array(flags, np.bool_)[column.codes]), column) for column, flags in flagged if any(flags)]
     n_cells = sum(len(where) for where, _ in rows) + sum(is_formula(column.name) for column in columns)
     first = next((f"{in_quotes(column[int(where[0])])} in {in_quotes(column.name)}" for where, column in rows if len(where)), None)
     if not n_cells:
         return ()
     first = first or in_quotes(next(column.name for column in columns if is_formula(column.name)))
-    said = f"{plural(n_cells, 'cell')} may run as a formula in a spreadsheet, first {first}; --formulas quote puts ' before each."
-    return (Remark(said),)
+    text = f"{plural(n_cells, 'cell')} may run as a formula in a spreadsheet, first {first}; --formulas quote puts ' before each."
+    return (Remark(text),)

@@ -77,11 +77,11 @@ def column_number(letters: str) -> int:
 
 def parse_block(text: str) -> Block | None:
     """A range as a spreadsheet writes it, such as A10:F20; None for another text."""
-    found = _RANGE.fullmatch(text.strip())
-    if not found:
+    match = _RANGE.fullmatch(text.strip())
+    if not match:
         return None
-    columns = [column_number(found[i]) - 1 for i in (1, 3)]
-    rows = [int(found[i]) for i in (2, 4)]
+    columns = [column_number(match[i]) - 1 for i in (1, 3)]
+    rows = [int(match[i]) for i in (2, 4)]
     return Block(max(min(rows), 1) - 1, min(columns), max(rows), max(columns) + 1)
 
 
@@ -102,7 +102,7 @@ def columns_of(
     one, columns without a name or with one name twice, or a text that is too long.
     """
     if block is None:
-        block, remarks = _found(grid, file, wide)
+        block, remarks = _table_block(grid, file, wide)
     else:
         remarks = list[Remark]()
         block = Block(block.top, block.left, min(block.bottom, len(grid)), min(block.right, len(grid[0]) if grid else 0))
@@ -111,17 +111,17 @@ def columns_of(
         raise TableError(
             Fault("there is nothing to read.", "a row with the names of the columns, then one for each asset", place=Place(file))
         )
-    kept = [row for row in rows[1:] if any(row)]
-    if len(kept) < len(rows) - 1:
+    filled = [row for row in rows[1:] if any(row)]
+    if len(filled) < len(rows) - 1:
         first = next(at for at, row in enumerate(rows[1:], block.top + 2) if not any(row))
-        remarks.append(Remark(f"{plural(len(rows) - 1 - len(kept), f'blank {row_noun}')} left out.", f"{row_noun} {first}"))
+        remarks.append(Remark(f"{plural(len(rows) - 1 - len(filled), f'blank {row_noun}')} left out.", f"{row_noun} {first}"))
     above = grid[block.top - 1][block.left : block.right] if block.top - 1 in wide else ()
     names = _with_groups(above, rows[0])
-    told = next(((old.strip(), new) for old, new in zip(rows[0], names, strict=True) if old.strip() != new), None)
-    if told:
-        remarks.append(Remark("names that appear twice have their group in front: {} is now {}.".format(*map(in_quotes, told))))
-    _require_names(names, kept, block, Place(file, block.top + 1), _mend(rows, block, sheet))
-    columns = [TextColumn.of(n, t) for n, t in zip(names, zip(*kept, strict=True) if kept else [()] * len(names), strict=True)]
+    renamed = next(((old.strip(), new) for old, new in zip(rows[0], names, strict=True) if old.strip() != new), None)
+    if renamed:
+        remarks.append(Remark("names that appear twice have their group in front: {} is now {}.".format(*map(in_quotes, renamed))))
+    _require_names(names, filled, block, Place(file, block.top + 1), _mend(rows, block, sheet))
+    columns = [TextColumn.of(n, t) for n, t in zip(names, zip(*filled, strict=True) if filled else [()] * len(names), strict=True)]
     _require_short(columns, file)
     return columns, remarks
 
@@ -130,8 +130,8 @@ def _require_names(names: Sequence[str], rows: Grid, block: Block, place: Place,
     nameless = [at for at, name in enumerate(names) if not name]
     if len(nameless) > MOST_NAMELESS:
         letters = ", ".join(column_letters(block.left + at) for at in nameless[:MOST_NAMELESS])
-        found = f"{len(nameless):,} of {plural(len(names), 'column')} have no name: {letters}, …"
-        raise TableError(Fault(found, "a name in the first row of each column", mend, place))
+        problem = f"{len(nameless):,} of {plural(len(names), 'column')} have no name: {letters}, …"
+        raise TableError(Fault(problem, "a name in the first row of each column", mend, place))
     faults = []
     for at in nameless:
         held = next((row[at] for row in rows if row[at].strip()), None)
@@ -179,7 +179,7 @@ def is_title(row: Sequence[str]) -> bool:
 def _is_groups(rows: Grid) -> bool:
     """Whether the first of two rows groups the columns of the second: its first cell is blank, or merged with the next one."""
     first, *_ = rows
-    return first[0] in ("", first[1], rows[-1][0]) and len(rows) > 1
+    return len(rows) > 1 and len(first) > 1 and first[0] in ("", first[1], rows[-1][0])
 
 
 def _with_groups(groups: Sequence[str], row: Sequence[str]) -> list[str]:
@@ -194,32 +194,32 @@ def _with_groups(groups: Sequence[str], row: Sequence[str]) -> list[str]:
 
 def doubts(columns: Sequence[TextColumn]) -> list[Remark]:
     """What a person should look at: names that look like values, as where a header is missing; a last row that sums up others."""
-    found = []
+    remarks = []
     odd = next((c for c in columns if _is_value(c.name) or (c.name and c.name in c.texts)), None)
     if odd is not None:
-        why = "also appears among its cells" if odd.name in odd.texts else "looks like a value"
-        found.append(Remark(f"is the header missing? The column name {in_quotes(odd.name)} {why}. The first row is read as names."))
+        why = "is also one of its cells" if odd.name in odd.texts else "looks like a value"
+        remarks.append(Remark(f"is the header missing? The name {in_quotes(odd.name)} {why}. The first row is read as names."))
     last = columns[0].n_rows - 1 if columns else -1
     first = next((c[last] for c in columns if c[last].strip()), "") if last > 0 else ""
     if first.strip().rstrip(":").casefold() in _SUMS:
-        found.append(Remark(f"a row that begins with {in_quotes(first)} is read as an asset like others.", "the last row"))
-    return found
+        remarks.append(Remark(f"a row that begins with {in_quotes(first)} is read as an asset like others.", "the last row"))
+    return remarks
 
 
 def _require_short(columns: Sequence[TextColumn], file: str) -> None:
     for column in columns:
         longest = max(column.texts, key=len, default="")
         if len(longest) > MOST_CHARACTERS:
-            found = f"a cell has {len(longest):,} characters: {in_quotes(longest)}."
+            problem = f"a cell has {len(longest):,} characters: {in_quotes(longest)}."
             raise TableError(
-                Fault(found, f"at most {MOST_CHARACTERS:,} characters in a cell", place=Place(file, column=column.name))
+                Fault(problem, f"at most {MOST_CHARACTERS:,} characters in a cell", place=Place(file, column=column.name))
             )
 
 
 # ---- where the table is
 
 
-def _found(grid: Grid, file: str, wide: Collection[int]) -> tuple[Block, list[Remark]]:
+def _table_block(grid: Grid, file: str, wide: Collection[int]) -> tuple[Block, list[Remark]]:
     try:
         blocks = blocks_of(grid)
     except TableError as error:
@@ -234,8 +234,8 @@ def _found(grid: Grid, file: str, wide: Collection[int]) -> tuple[Block, list[Re
     if len(tables) > 1:
         places = ", ".join(map(str, tables[:MOST_BLOCKS]))
         more = f" and {len(tables) - MOST_BLOCKS} more" if len(tables) > MOST_BLOCKS else ""
-        found = f"the sheet holds {len(tables)} tables: {places}{more}."
-        raise TableError(Fault(found, "one of them", f'to name its cells, as in --sheet "SHEET!{tables[0]}"', Place(file)))
+        problem = f"the sheet holds {len(tables)} tables: {places}{more}."
+        raise TableError(Fault(problem, "one of them", f'to name its cells, as in --sheet "SHEET!{tables[0]}"', Place(file)))
     left = [block for block in blocks if block is not tables[0]]
     notes = [
         Remark(f"left out because it is not a table: {in_quotes(_first_text(grid, block))}.", f"cells {block}") for block in left
@@ -245,23 +245,24 @@ def _found(grid: Grid, file: str, wide: Collection[int]) -> tuple[Block, list[Re
 
 def _without_titles(blocks: Sequence[Block], grid: Grid, wide: Collection[int]) -> tuple[list[Block], list[Remark]]:
     """The blocks without the rows of a title, or of groups, right above a header, and blocks that are titles alone as one row."""
-    found, remarks = [], []
+    without, remarks = [], []
     for block in blocks:
         rows = [row[block.left : block.right] for row in grid[block.top : block.bottom]]
         above = [not any(row) or is_title(row) for row in rows[:MOST_ABOVE]]
         above = [one or (at + block.top in wide and _is_groups(rows[at : at + 2])) for at, one in enumerate(above)]
         n_titles = above.index(False) if False in above else len(above)
         if n_titles == len(rows):  # a title of several lines
-            found.append(Block(block.top, block.left, block.top + 1, block.right))
+            first = next(at for at, row in enumerate(rows, block.top) if any(row))
+            without.append(Block(first, block.left, first + 1, block.right))
         elif n_titles and is_header(_with_groups(rows[n_titles - 1] if block.top + n_titles - 1 in wide else (), rows[n_titles])):
-            found.append(Block(block.top + n_titles, block.left, block.bottom, block.right))
+            without.append(Block(block.top + n_titles, block.left, block.bottom, block.right))
         else:
-            found.append(block)
+            without.append(block)
             continue
-        for at, row in enumerate(grid[block.top : found[-1].top], block.top + 1):
+        for at, row in enumerate(grid[block.top : without[-1].top], block.top + 1):
             if text := ", ".join(dict.fromkeys(filter(None, row[block.left : block.right]))):
                 remarks.append(Remark(f"left out above the header: {in_quotes(text)}.", f"sheet row {at}"))
-    return found, remarks
+    return without, remarks
 
 
 def _first_text(grid: Grid, block: Block) -> str:
@@ -282,8 +283,8 @@ def blocks_of(grid: Grid) -> list[Block]:
         for left, right in _runs(np.asarray(is_filled[top:bottom].any(axis=0))):
             _add(blocks, Block(top, left, bottom, right), is_filled)
             if len(blocks) > MOST_LOOKED_AT:
-                found = f"the sheet holds more than {MOST_LOOKED_AT:,} blocks of cells apart from each other."
-                raise TableError(Fault(found, "one table", 'to name its cells, as in --sheet "SHEET!A1:F20"'))
+                problem = f"the sheet holds more than {MOST_LOOKED_AT:,} blocks of cells apart from each other."
+                raise TableError(Fault(problem, "one table", 'to name its cells, as in --sheet "SHEET!A1:F20"'))
     return blocks
 
 

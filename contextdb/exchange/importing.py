@@ -12,11 +12,12 @@ import numpy as np
 from contextdb.cells.conditions import Condition
 from contextdb.cells.words import quoted
 from contextdb.columns import TextColumn
-from contextdb.disk import TABLE_SUFFIXES, write_atomic
+from contextdb.disk import TABLE_SUFFIXES, real_path, write_atomic
 from contextdb.disk.together import NewFile, write_together
 from contextdb.edits.schema_file import SchemaChange, schema_change
 from contextdb.errors import ContextDBError, Fault, FileError, Place, TableError, in_quotes
-from contextdb.exchange.mapping import PLAIN_JOBS, Mapped, propose
+from contextdb.exchange.decimal_commas import commas_in_numbers
+from contextdb.exchange.mapping import COLUMN_JOBS, Mapped, propose
 from contextdb.exchange.reading import Reading, listed
 from contextdb.files.texts import AnySource, new_source
 from contextdb.schema.sections import condition_to_dict, job_faults
@@ -43,11 +44,11 @@ def _is_of_a_project(path: Path) -> bool:
         folder, schema = schema_for(path)
     except ContextDBError:  # it is no concern of this import
         return False
-    said = (path.parent.resolve() / path.name).relative_to(folder.resolve()).as_posix()
-    return any(said in settings.files for settings in schema.tables.values())
+    name = (real_path(path.parent) / path.name).relative_to(real_path(folder)).as_posix()
+    return any(name in settings.files for settings in schema.tables.values())
 
 
-def whole_names_told(columns: Sequence[Mapped], reading: Reading, other_way: str) -> str:
+def whole_names_sentence(columns: Sequence[Mapped], reading: Reading, other_way: str) -> str:
     """Which columns have texts that became one name each though blanks part names in a cell, with the first such text.
 
     `other_way` says how to read each word as a name; the sentence is empty where there is no such text.
@@ -59,6 +60,17 @@ def whole_names_told(columns: Sequence[Mapped], reading: Reading, other_way: str
         return ""
     where = "column" if len(names) == 1 else "columns"
     return f"{where} {listed(names)}: each text is one name, such as {in_quotes(example)}; {other_way} reads each word as a name."
+
+
+def decimal_commas_reported(columns: Sequence[Mapped], reading: Reading, schema: Schema, other_way: str) -> list[str]:
+    """What a person should know of numbers with commas, a sentence for each column; `other_way` reads them as decimals."""
+    messages = list[str]()
+    for column, cells in zip(columns, reading.columns, strict=True):
+        condition = schema.conditions.get(column.name)
+        kind = column.declared["type"] if column.declared else condition.domain.kind if condition is not None else None
+        if column.job == "condition" and kind is not None:
+            messages += commas_in_numbers(column.source, str(kind), column.cells or cells, other_way)
+    return messages
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,31 +128,31 @@ def table_of(
     """The table that columns become, and the column of the reading that each came from. Raises TableError where no column
     names the assets, or two do, or a column has no place under its name; SchemaError for a new condition that
     contextdb.toml could not hold."""
-    kept = [(at, column) for at, column in enumerate(mapped) if column.job != "left out"]
-    assets = [column for _, column in kept if column.job == "asset"]
+    retained = [(at, column) for at, column in enumerate(mapped) if column.job != "left out"]
+    assets = [column for _, column in retained if column.job == "asset"]
     if len(assets) != 1:
-        found = "no column names the assets." if not assets else f"{len(assets)} columns name the assets."
-        raise TableError(Fault(found, "one column of names", place=Place(str(path) if path else None)))
-    declared = {c.name: c.declared for _, c in kept if c.is_new and c.job == "condition" and c.declared is not None}
-    beside = _named_beside(reading, [column for _, column in kept], schema)
+        problem = "no column names the assets." if not assets else f"{len(assets)} columns name the assets."
+        raise TableError(Fault(problem, "one column of names", place=Place(str(path) if path else None)))
+    declared = {c.name: c.declared for _, c in retained if c.is_new and c.job == "condition" and c.declared is not None}
+    beside = _named_beside(reading, [column for _, column in retained], schema)
     schema = replace(schema, conditions={**schema.conditions, **conditions_from_dict(declared), **beside})
-    settings = _settings(settings, kept, reading)
-    faults = list(job_faults(settings, [column.name for _, column in kept], schema))
+    settings = _settings(settings, retained, reading)
+    faults = list(job_faults(settings, [column.name for _, column in retained], schema))
     if faults:
         raise TableError(*(fault.at(Place(str(path) if path else None)) for fault in faults))
-    texts = [_renamed(column.cells or reading.columns[at], column.name) for at, column in kept]
-    source, field_of = _source(reading, path), tuple(at for at, _ in kept)
+    texts = [_renamed(column.cells or reading.columns[at], column.name) for at, column in retained]
+    source, field_of = _source(reading, path), tuple(at for at, _ in retained)
     table = Table.build(settings.name, texts, schema, settings, path, source)
     return replace(table, origin=np.arange(table.n_rows) if source else np.full(table.n_rows, -1)), field_of if source else (
         -1,
-    ) * len(kept)
+    ) * len(retained)
 
 
-def _named_beside(reading: Reading, kept: Sequence[Mapped], schema: Schema) -> dict[str, Condition]:
+def _named_beside(reading: Reading, retained: Sequence[Mapped], schema: Schema) -> dict[str, Condition]:
     """Conditions that the file declares and that are not columns: facts that its rules name, where those come in."""
-    if not any(column.job == "when" for column in kept):
+    if not any(column.job == "when" for column in retained):
         return {}
-    taken = {*reading.names, *(column.name for column in kept), *schema.conditions}
+    taken = {*reading.names, *(column.name for column in retained), *schema.conditions}
     return {name: condition for name, condition in reading.schema.conditions.items() if name not in taken}
 
 
@@ -156,16 +168,16 @@ def _source(reading: Reading, path: Path | None) -> AnySource | None:
 
 def _settings(settings: TableSettings, placed: Sequence[tuple[int, Mapped]], reading: Reading) -> TableSettings:
     """The settings under the jobs of the columns; what the file itself keeps of fallback, policy and assumptions is taken over."""
-    kept = [column for _, column in placed]
-    said: dict[str, Any] = {"asset": next(column.name for column in kept if column.job == "asset")}
-    for job in PLAIN_JOBS:
-        said[job] = next((column.name for column in kept if column.job == job), None)
+    retained = [column for _, column in placed]
+    values: dict[str, Any] = {"asset": next(column.name for column in retained if column.job == "asset")}
+    for job in COLUMN_JOBS:
+        values[job] = next((column.name for column in retained if column.job == job), None)
     own = next(iter(reading.schema.tables.values()), None)
     if own is not None and settings == TableSettings(settings.name, settings.file):
-        said |= {"fallback": own.fallback, "policy": own.policy, "assume": own.assume}
+        values |= {"fallback": own.fallback, "policy": own.policy, "assume": own.assume}
         named = settings_renamed(own, {reading.columns[at].name: column.name for at, column in placed}.get)
-        said |= {"typed": named.typed, "fallback_outputs": named.fallback_outputs}
-    return with_outputs(replace(settings, **said), (column.name for column in kept if column.job == "output"))
+        values |= {"typed": named.typed, "fallback_outputs": named.fallback_outputs}
+    return with_outputs(replace(settings, **values), (column.name for column in retained if column.job == "output"))
 
 
 def declared_differently(reading: Reading, schema: Schema) -> list[str]:

@@ -45,11 +45,11 @@ def read_json(text: str, file: str, format_name: str = "json") -> Reading:
 
 def _sets(rows: Sequence[Mapping[str, Any]], n_rows: int) -> dict[str, NDArray[np.bool_]]:
     """The rows in which each column holds a list, which is a set of names."""
-    found: dict[str, NDArray[np.bool_]] = {}
+    flags_by_name: dict[str, NDArray[np.bool_]] = {}
     for at, row in enumerate(rows):
         for name in _lists(row):
-            found.setdefault(name, np.zeros(n_rows, np.bool_))[at] = True
-    return found
+            flags_by_name.setdefault(name, np.zeros(n_rows, np.bool_))[at] = True
+    return flags_by_name
 
 
 def _lists(row: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
@@ -77,12 +77,12 @@ def parsed_rows(text: str, file: str) -> tuple[list[dict[str, Any]], list[int | 
     if inner is not None:
         return _objects(inner, [None] * len(inner), file)
     if isinstance(document, dict) or isinstance(_tried(lines[0][1]), dict):
-        found = (
+        problem = (
             [_loaded(line, file, number) for number, line in lines]
             if len(lines) > 1 and document is None
             else [_loaded(text, file)]
         )
-        return _objects(found, [number for number, _ in lines][: len(found)], file)
+        return _objects(problem, [number for number, _ in lines][: len(problem)], file)
     document = _loaded(text, file)
     raise TableError(Fault(f"the document is {what(document)} without one list of rows.", _ACCEPTED, place=Place(file)))
 
@@ -129,12 +129,12 @@ class _TwinError(ValueError):
 
 
 def _without_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    found = dict(pairs)
-    if len(found) < len(pairs):
+    members = dict(pairs)
+    if len(members) < len(pairs):
         seen = set[str]()
         twin = next(key for key, _ in pairs if key in seen or seen.add(key))  # type: ignore[func-returns-value]
         raise _TwinError(f"the key {in_quotes(twin)} appears twice in one object")
-    return found
+    return members
 
 
 def _objects(rows: Sequence[Any], lines: Sequence[int | None], file: str) -> tuple[list[dict[str, Any]], list[int | None]]:
@@ -151,22 +151,22 @@ def _objects(rows: Sequence[Any], lines: Sequence[int | None], file: str) -> tup
 def _flat(row: Mapping[str, Any], place: Place, prefix: str = "", level: int = 1) -> dict[str, str]:
     if level > MOST_LEVELS:
         raise TableError(Fault("objects are nested too deeply.", f"at most {MOST_LEVELS} levels", place=place))
-    found: dict[str, str] = {}
+    texts_by_name: dict[str, str] = {}
     for key, value in row.items():
         name = prefix + key
         texts = _flat(value, place, f"{name}.", level + 1) if isinstance(value, dict) else {name: _text(value, name, place)}
-        for twin in texts.keys() & found.keys():
+        for twin in texts.keys() & texts_by_name.keys():
             raise TableError(Fault(f"the key {in_quotes(twin)} appears twice in one row.", "each key once", place=place))
-        found |= texts
-    return found
+        texts_by_name |= texts
+    return texts_by_name
 
 
 def _text(value: object, name: str, place: Place) -> str:
     if isinstance(value, list) and all(isinstance(item, dict) and [*item] == [_TAG] for item in value):
         value = [item[_TAG] for item in value]
     if isinstance(value, list) and any(isinstance(item, (list, dict)) for item in value):
-        found = f"{in_quotes(name)} holds a list with lists or objects in it."
-        raise TableError(Fault(found, "texts, numbers, true, false, null, and lists of texts", place=place))
+        problem = f"{in_quotes(name)} holds a list with lists or objects in it."
+        raise TableError(Fault(problem, "texts, numbers, true, false, null, and lists of texts", place=place))
     if isinstance(value, list) and not value:
         return ""
     text = text_of_value(value)

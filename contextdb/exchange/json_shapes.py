@@ -69,8 +69,8 @@ def _split(names: object, data: object) -> Rows | Fault:
 def _lists(columns: dict[str, list[Any]]) -> Rows | Fault:
     lengths = {name: len(column) for name, column in columns.items()}
     if len(set(lengths.values())) > 1:
-        told = ", ".join(f"{in_quotes(name)} {length:,}" for name, length in [*lengths.items()][:3])
-        return Fault(f"the document is lists of several lengths: {told}.", _ACCEPTED)
+        lengths_text = ", ".join(f"{in_quotes(name)} {length:,}" for name, length in [*lengths.items()][:3])
+        return Fault(f"the document is lists of several lengths: {lengths_text}.", _ACCEPTED)
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 

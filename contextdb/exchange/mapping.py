@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
 
 import numpy as np
 
@@ -16,16 +15,16 @@ from contextdb.cells.kinds import KINDS
 from contextdb.columns import TextColumn
 from contextdb.edits.edits import check_cell
 from contextdb.errors import ContextDBError, Fault, in_quotes, mend_for, nearest, plural, some
-from contextdb.exchange.proposals import as_lists, as_numbers, n_unreadable, names_of, pair_in, propose_type, rewritten
+from contextdb.exchange.decimal_commas import pair_in
+from contextdb.exchange.proposals import as_lists, as_numbers, n_unreadable, names_of, propose_type, rewritten
 from contextdb.exchange.reading import Reading
-from contextdb.schema.jobs import PlainJob
 from contextdb.schema.sections import condition_to_dict
 from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict, settings_renamed
+from contextdb.schema.table_settings import PLAIN_JOBS
 from contextdb.tables.table import Table
 
-Job = Literal["asset", "condition", "output", PlainJob, "when", "left out"]
-JOBS: tuple[Job, ...] = get_args(Job)
-PLAIN_JOBS: tuple[Job, ...] = (*get_args(PlainJob), "when")
+COLUMN_JOBS = (*PLAIN_JOBS, "when")
+JOBS = ("asset", "condition", "output", *COLUMN_JOBS, "left out")
 _NEVER_GUESSED = ("when",)
 """Jobs whose word is too common a name to go by."""
 
@@ -42,7 +41,7 @@ class Mapped:
     source: str
     """Its name in the file."""
     name: str
-    job: Job
+    job: str
     why: str
     """Why, in a few words for a person."""
     declared: Mapping[str, object] | None = None
@@ -72,8 +71,8 @@ def propose(
     where it speaks of a column that is missing, or two columns would have one name."""
     renames = renames or {}
     _require_known(renames, reading.names)
-    kept = next(iter(reading.schema.tables.values()), None)
-    merged = _merged(settings, kept, renames)
+    earlier = next(iter(reading.schema.tables.values()), None)
+    merged = _merged(settings, earlier, renames)
     asset = _asset(reading, merged, renames)
     known = _Known.of(schema, len(reading.columns))
     mapped = tuple(_mapped(column, asset, reading, known, merged, renames) for column in reading.columns)
@@ -117,7 +116,7 @@ def as_type(mapped: Mapped, column: TextColumn, kind: str) -> Mapped:
     return replace(mapped, job="condition", declared=declared, is_new=True, why="chosen", n_unreadable=n_wrong, cells=cells)
 
 
-def as_job(mapped: Mapped, job: Job) -> Mapped:
+def as_job(mapped: Mapped, job: str) -> Mapped:
     """The same column with another job."""
     return replace(mapped, job=job, why="chosen", declared=None, is_new=False, n_unreadable=0, near=None, cells=None)
 
@@ -168,18 +167,18 @@ def _require_different(mapped: Sequence[Mapped]) -> None:
         if column.job == "left out":
             continue
         if column.name in seen:
-            found = (
+            problem = (
                 f"the columns {in_quotes(seen[column.name])} and {in_quotes(column.source)} would both be {in_quotes(column.name)}."
             )
-            raise ContextDBError(Fault(found, "one column for each name", f'to leave one out: --map "{column.source}="'))
+            raise ContextDBError(Fault(problem, "one column for each name", f'to leave one out: --map "{column.source}="'))
         seen[column.name] = column.source
 
 
-def _merged(settings: TableSettings, kept: TableSettings | None, renames: Mapping[str, str]) -> TableSettings:
+def _merged(settings: TableSettings, known: TableSettings | None, renames: Mapping[str, str]) -> TableSettings:
     """What the project says of the table, and where it says nothing, what the file itself keeps, under the new names."""
-    if kept is None or settings != TableSettings(settings.name, settings.file):
+    if known is None or settings != TableSettings(settings.name, settings.file):
         return settings
-    return replace(settings_renamed(kept, lambda name: renames.get(name, name) or None), name=settings.name, file=settings.file)
+    return replace(settings_renamed(known, lambda name: renames.get(name, name) or None), name=settings.name, file=settings.file)
 
 
 def _asset(reading: Reading, settings: TableSettings, renames: Mapping[str, str]) -> str:
@@ -204,28 +203,28 @@ def _mapped(
         is_first = not settings.asset and source == reading.names[0]
         return Mapped(source, wanted, "asset", "the first column" if is_first else "names the assets")
     if job := _plain_job(name, column, settings):
-        said = getattr(settings, job) if job in PLAIN_JOBS else None
-        return Mapped(source, said or name, job, "by its name")
+        declared = getattr(settings, job) if job in COLUMN_JOBS else None
+        return Mapped(source, declared or name, job, "by its name")
     return _condition(column, name, reading, known)
 
 
-def _plain_job(name: str, column: TextColumn, settings: TableSettings) -> Job | None:
+def _plain_job(name: str, column: TextColumn, settings: TableSettings) -> str | None:
     """The job of a column that is not a condition: what the settings say, or its name where they say nothing."""
     if name in settings.outputs:
         return "output"
-    for job in PLAIN_JOBS:
-        said = getattr(settings, job)
-        if said is not None and (name == said or _folded(name) == _folded(said)):
+    for job in COLUMN_JOBS:
+        declared = getattr(settings, job)
+        if declared is not None and (name == declared or _folded(name) == _folded(declared)):
             return job
-        if said is None and _folded(name) == job and job not in _NEVER_GUESSED and _fits(column, job):
+        if declared is None and _folded(name) == job and job not in _NEVER_GUESSED and _fits(column, job):
             return job
     return None
 
 
-def _fits(column: TextColumn, job: Job) -> bool:
+def _fits(column: TextColumn, job: str) -> bool:
     """Whether every cell of a column can be read for a job."""
 
-    settings = replace(TableSettings("table", asset="asset"), **{str(job): column.name})  # type: ignore[arg-type]
+    settings = replace(TableSettings("table", asset="asset"), **{job: column.name})  # type: ignore[arg-type]
     empty = Table.build("table", [TextColumn.of("asset", ()), TextColumn.of(column.name, ())], settings=settings)
     return all(check_cell(empty, column.name, text) is None for text in column.texts)
 
@@ -238,11 +237,11 @@ def _condition(column: TextColumn, name: str, reading: Reading, known: _Known) -
     if alike is not None:
         return _as_declared(column, known.conditions[alike], f"declared as {in_quotes(alike)}", names)
     near = known.near(name)
-    kept = reading.schema.conditions.get(column.name)
-    if kept is not None:
-        declared = condition_to_dict(kept)
+    earlier = reading.schema.conditions.get(column.name)
+    if earlier is not None:
+        declared = condition_to_dict(earlier)
         return Mapped(
-            column.name, name, "condition", "the file keeps its type", declared, True, n_unreadable(column, kept.domain)[0], near
+            column.name, name, "condition", "the file keeps its type", declared, True, n_unreadable(column, earlier.domain)[0], near
         )
     if column.name in reading.outputs:
         return Mapped(column.name, name, "output", "data, as the file says")
@@ -270,8 +269,8 @@ def _fitting(column: TextColumn, names: TextColumn, domain: Domain) -> TextColum
     """The texts as they are where the grammar of cells reads them, else as whole names where those are read."""
     pairs = np.column_stack((column.codes, names.codes))
     each, which = np.unique(pairs, axis=0, return_inverse=True)
-    said = [(column.texts[text], names.texts[name]) for text, name in each.tolist()]
-    chosen = [name if not reads(text, domain) and reads(name, domain) else text for text, name in said]
+    spellings = [(column.texts[text], names.texts[name]) for text, name in each.tolist()]
+    chosen = [name if not reads(text, domain) and reads(name, domain) else text for text, name in spellings]
     return TextColumn.of(column.name, (chosen[at] for at in which.ravel().tolist()))
 
 

@@ -17,8 +17,9 @@ from contextdb.cells.sets import Cell, TagSet, ValueSet
 from contextdb.cells.words import quoted, says_any
 from contextdb.columns import TextColumn
 from contextdb.errors import CellError, in_quotes, plural
+from contextdb.exchange.decimal_commas import DECIMAL_COMMA, pair_in
 from contextdb.exchange.reading import ERRORS, listed
-from contextdb.schema.shapes import wrong_name
+from contextdb.files.toml_shapes import wrong_name
 from contextdb.tables.condition_column import READABLE_SHARE
 
 MOST_ENUM_VALUES = 40
@@ -29,7 +30,6 @@ _ANGLE_NAME = re.compile(
     r"angle|direction|facing|heading|bearing|orientation|azimuth|yaw|rotation|degrees|°(?![CF])|(?:^|_)(?:dir|deg|rot)(?:_|$)",
     re.IGNORECASE,
 )
-_PAIR = re.compile(r"\s*[+-]?[\d.]+,\d+\s*")
 _SHORT = re.compile(r"[^\s,;!?]+(?: +[^\s,;!?]+){0,3}")
 _WHOLE = re.compile(r"\s*=?\s*[+-]?\d+\s*(?:\|\s*=?\s*[+-]?\d+\s*)*")
 """Whole numbers that a fact must be equal to, as only something that is counted is."""
@@ -45,7 +45,6 @@ _DEGREES = re.compile(r"(?<=\d)\s*°(?!\s*[CF])")
 _NUMBER = r"[+-]?\d+(?:[.,]\d+)?"
 _SURE = re.compile(rf"\s*(?:(?:[<>]=?|[≤≥])\s*{_NUMBER}|{_NUMBER}\s*(?:\.\.|[-–—]|to)\s*{_NUMBER})\s*")
 """A comparison or a range: a comma in one of its numbers can only be a decimal one."""
-_DECIMAL_COMMA = re.compile(r"(?<=\d),(?=\d)")
 _TICKS = {"x": "True", "✓": "True", "✔": "True"}
 _BETWEEN_NAMES = re.compile(r"\s*[,;/|]\s*")
 _AROUND = re.compile(r"^\s*±\s*(?=[\d.])")
@@ -65,7 +64,7 @@ class Proposal:
 
 
 @dataclass(frozen=True)
-class _Said:
+class _CountedTexts:
     """The texts of a column that say something, the commonest first, and how many rows hold each."""
 
     texts: Sequence[str]
@@ -75,19 +74,19 @@ class _Said:
     """Rows with an error of Excel, which say nothing of the type and can be read as none."""
 
     @classmethod
-    def by(cls, column: TextColumn) -> _Said:
+    def by(cls, column: TextColumn) -> _CountedTexts:
         counts = np.bincount(column.codes, minlength=len(column.texts)).tolist()
-        said = [(t, n) for t, n in zip(column.texts, counts, strict=True) if n and not says_any(t)]
-        n_errors = sum(n for t, n in said if t.strip() in ERRORS)
-        said = sorted((item for item in said if item[0].strip() not in ERRORS), key=lambda item: -item[1])
-        return cls([t for t, _ in said], [n for _, n in said], sum(n for _, n in said), n_errors)
+        counted = [(t, n) for t, n in zip(column.texts, counts, strict=True) if n and not says_any(t)]
+        n_errors = sum(n for t, n in counted if t.strip() in ERRORS)
+        counted = sorted((item for item in counted if item[0].strip() not in ERRORS), key=lambda item: -item[1])
+        return cls([t for t, _ in counted], [n for _, n in counted], sum(n for _, n in counted), n_errors)
 
     def reads(self, domain: Domain) -> Iterator[tuple[bool, int]]:
         """Whether a domain reads each text, and how many rows hold it. No text is left out, however many there are."""
         rest = doubtful(self.texts, domain)  # of many number cells nearly all are surely read
-        asked = None if rest is None else frozenset(rest.tolist())
+        included = None if rest is None else frozenset(rest.tolist())
         for at, (text, n) in enumerate(zip(self.texts, self.counts, strict=True)):
-            yield (asked is not None and at not in asked) or reads(text, domain), n
+            yield (included is not None and at not in included) or reads(text, domain), n
 
     def n_unread(self, domain: Domain) -> int:
         """How many rows cannot be read as a domain."""
@@ -127,30 +126,30 @@ def propose_type(column: TextColumn, names: TextColumn | None = None) -> Proposa
         proposal = propose_type(replace(numbers, name=f"{column.name} (°)") if has_degrees else numbers)
         if proposal.declared is not None and KINDS[str(proposal.declared["type"])].is_numeric:
             return replace(proposal, why=proposal.why + rewritten(column, numbers), cells=numbers)
-    said = _Said.by(column)
-    if not said.texts:
-        return _with_unread("no cell says anything but Any", said, TEXT)
-    if all(text.strip() in ("0", "1") for text in said.texts):
+    counted = _CountedTexts.by(column)
+    if not counted.texts:
+        return _with_unread("no cell says anything but Any", counted, TEXT)
+    if all(text.strip() in ("0", "1") for text in counted.texts):
         if _is_measure(column.name):
-            return _number(column.name, said)
-        return _with_unread("the cells are 0 and 1; bool, if they mean False and True", said, INT)
+            return _number(column.name, counted)
+        return _with_unread("the cells are 0 and 1; bool, if they mean False and True", counted, INT)
     if (truths := _as_truths(column)) is not None:
-        why = f"{plural(said.n_rows, 'cell')} of True and False{rewritten(column, truths)}"
-        return replace(_with_unread(why, _Said.by(truths), BOOL), cells=truths)
-    if said.mostly(BOOL):
-        return _with_unread(f"{plural(said.n_rows, 'cell')} of True and False", said, BOOL)
-    if said.mostly(NUMBER) or said.is_numeric:
-        return _number(column.name, said)
-    if said.mostly(DATE):
-        return _with_unread(f"{plural(said.n_rows, 'cell')} of dates", said, DATE)
-    if said.mostly(TAGS):
-        return _with_unread("every word has a + or a - before it", said, _tags(said))
+        why = f"{plural(counted.n_rows, 'cell')} of True and False{rewritten(column, truths)}"
+        return replace(_with_unread(why, _CountedTexts.by(truths), BOOL), cells=truths)
+    if counted.mostly(BOOL):
+        return _with_unread(f"{plural(counted.n_rows, 'cell')} of True and False", counted, BOOL)
+    if counted.mostly(NUMBER) or counted.is_numeric:
+        return _number(column.name, counted)
+    if counted.mostly(DATE):
+        return _with_unread(f"{plural(counted.n_rows, 'cell')} of dates", counted, DATE)
+    if counted.mostly(TAGS):
+        return _with_unread("every word has a + or a - before it", counted, _tags(counted))
     if (lists := as_lists(column)) is not None:
-        proposal = _names(_Said.by(lists), True)
+        proposal = _names(_CountedTexts.by(lists), True)
         return replace(proposal, why=proposal.why + rewritten(column, lists), cells=lists)
     if names is None:
-        return _names(said, said.mostly(TEXT))
-    proposal = _names(_Said.by(names), said.are_mostly(_is_short))
+        return _names(counted, counted.mostly(TEXT))
+    proposal = _names(_CountedTexts.by(names), counted.are_mostly(_is_short))
     return proposal if proposal.declared is None else replace(proposal, cells=names)
 
 
@@ -160,12 +159,12 @@ def as_numbers(column: TextColumn, is_measure: bool = True) -> TextColumn | None
     and no name."""
     plain = [_AROUND.sub("0 ± ", _DEGREES.sub("", text)) for text in column.texts]
     if any("," in text and _SURE.fullmatch(text) for text in plain):
-        plain = [_DECIMAL_COMMA.sub(".", text) for text in plain]
-    found = [_RANGE.fullmatch(text) for text in plain]
-    ranges = [one for one in found if one]
+        plain = [DECIMAL_COMMA.sub(".", text) for text in plain]
+    matches = [_RANGE.fullmatch(text) for text in plain]
+    ranges = [one for one in matches if one]
     if any(float(one[1]) > float(one[3]) or not (one[2] or is_measure) for one in ranges):
         return None
-    texts = [f"{one[1]}..{one[3]}" if one else text for one, text in zip(found, plain, strict=True)]
+    texts = [f"{one[1]}..{one[3]}" if one else text for one, text in zip(matches, plain, strict=True)]
     return None if texts == list(column.texts) else TextColumn.of(column.name, (texts[code] for code in column.codes.tolist()))
 
 
@@ -197,28 +196,28 @@ def rewritten(column: TextColumn, cells: TextColumn) -> str:
     return f"; {in_quotes(column[row])} is read as {cells[row]}"
 
 
-def _with_unread(why: str, said: _Said, domain: Domain) -> Proposal:
+def _with_unread(why: str, counted: _CountedTexts, domain: Domain) -> Proposal:
     declared: dict[str, object] = {"type": domain.kind} | ({} if domain.values is None else {"values": list(domain.values)})
-    n_unread = said.n_unread(domain)
+    n_unread = counted.n_unread(domain)
     return Proposal(declared, f"{why}; {plural(n_unread, 'cell')} cannot be read so" if n_unread else why, n_unread)
 
 
-def _number(name: str, said: _Said) -> Proposal:
-    proposal = _number_type(name, said)
-    return replace(proposal, why=proposal.why + pair_in(said.texts))
+def _number(name: str, counted: _CountedTexts) -> Proposal:
+    proposal = _number_type(name, counted)
+    return replace(proposal, why=proposal.why + pair_in(counted.texts))
 
 
-def _number_type(name: str, said: _Said) -> Proposal:
-    texts = said.read_as(NUMBER)
+def _number_type(name: str, counted: _CountedTexts) -> Proposal:
+    texts = counted.read_as(NUMBER)
     backwards = next((t for t in texts if _runs_backwards(t)), None)
     is_angle = _ANGLE_NAME.search(name) is not None or backwards is not None
     if is_angle and all(_is_within_turn(text) and reads(text, ANGLE) for text in texts):
         why = f'"{backwards}" runs through 180' if backwards else "the name suggests an angle, and no number is above 360"
-        return _with_unread(why, said, ANGLE)
+        return _with_unread(why, counted, ANGLE)
     measured = _measured(name, texts)
     if measured is None:
-        return _with_unread("whole numbers alone, as counts are", said, INT)
-    return _with_unread(measured, said, NUMBER)
+        return _with_unread("whole numbers alone, as counts are", counted, INT)
+    return _with_unread(measured, counted, NUMBER)
 
 
 def _measured(name: str, texts: Sequence[str]) -> str | None:
@@ -238,9 +237,9 @@ def _is_measure(name: str) -> bool:
 
 def _runs_backwards(text: str) -> bool:
     """Whether an interval ends below where it starts, as only one on the circle does."""
-    found = re.fullmatch(r"\s*[\[(]?\s*(-?[\d.]+?)\s*\.\.\s*(-?[\d.]+)\s*[\])]?\s*", text)
+    match = re.fullmatch(r"\s*[\[(]?\s*(-?[\d.]+?)\s*\.\.\s*(-?[\d.]+)\s*[\])]?\s*", text)
     try:
-        return found is not None and float(found[1]) > float(found[2])
+        return match is not None and float(match[1]) > float(match[2])
     except ValueError:
         return False
 
@@ -249,12 +248,12 @@ def _is_within_turn(text: str) -> bool:
     return all(abs(float(number)) <= 360 for number in re.findall(r"\d+(?:\.\d+)?", text))
 
 
-def _tags(said: _Said) -> Domain:
-    found: dict[str, None] = {}
-    for cell in _cells(said, TAGS):
+def _tags(counted: _CountedTexts) -> Domain:
+    tags: dict[str, None] = {}
+    for cell in _cells(counted, TAGS):
         if isinstance(cell.accepts, TagSet):
-            found |= dict.fromkeys(sorted(cell.accepts.needs | cell.accepts.bans))
-    return replace(TAGS, values=tuple(sorted(found))) if found and _can_be_declared(found) else TAGS
+            tags |= dict.fromkeys(sorted(cell.accepts.needs | cell.accepts.bans))
+    return replace(TAGS, values=tuple(sorted(tags))) if tags and _can_be_declared(tags) else TAGS
 
 
 def _can_be_declared(names: Iterable[str]) -> bool:
@@ -267,29 +266,29 @@ def _is_short(text: str) -> bool:
     return _SHORT.fullmatch(text.strip()) is not None
 
 
-def _names(said: _Said, are_names: bool) -> Proposal:
+def _names(counted: _CountedTexts, are_names: bool) -> Proposal:
     """An enum of the names there are, where those are few and come back; a text; or, of whole sentences, no condition at all."""
     if not are_names:
         return Proposal(None, "the cells are not names, numbers or tags: data for the game, or a note")
     names: dict[str, None] = {}
-    for cell in _cells(said, TEXT):
+    for cell in _cells(counted, TEXT):
         if isinstance(cell.accepts, ValueSet):
             names |= dict.fromkeys(_in_order(cell.accepts))
-    if len(names) <= MOST_ENUM_VALUES and _can_be_declared(names) and (len(names) < said.n_rows or said.n_rows < FEW_ROWS):
-        why = f"{plural(len(names), 'name')} in {plural(said.n_rows, 'cell')}: {listed(list(names), 4)}"
-        return _with_unread(why, said, Domain("enum", tuple(names)))
-    if len(names) == said.n_rows:
+    if len(names) <= MOST_ENUM_VALUES and _can_be_declared(names) and (len(names) < counted.n_rows or counted.n_rows < FEW_ROWS):
+        why = f"{plural(len(names), 'name')} in {plural(counted.n_rows, 'cell')}: {listed(list(names), 4)}"
+        return _with_unread(why, counted, Domain("enum", tuple(names)))
+    if len(names) == counted.n_rows:
         return Proposal(None, "every row has a different name: data for the game, or a note")
-    return _with_unread(f"{plural(len(names), 'different name')}", said, TEXT)
+    return _with_unread(f"{plural(len(names), 'different name')}", counted, TEXT)
 
 
 def _in_order(accepts: ValueSet) -> list[str]:
     return sorted(str(value) for value in accepts.values)
 
 
-def _cells(said: _Said, domain: Domain) -> list[Cell]:
+def _cells(counted: _CountedTexts, domain: Domain) -> list[Cell]:
     cells = []
-    for text in said.texts:
+    for text in counted.texts:
         try:
             cells.append(parse_cell(text, domain, wants_mend=False))
         except CellError:
@@ -299,15 +298,9 @@ def _cells(said: _Said, domain: Domain) -> list[Cell]:
 
 def names_of(column: TextColumn) -> list[str]:
     """The names in a column's cells that contextdb.toml takes as values, in order."""
-    cells = _cells(_Said.by(column), TEXT)
+    cells = _cells(_CountedTexts.by(column), TEXT)
     names = {name for cell in cells if isinstance(cell.accepts, ValueSet) for name in _in_order(cell.accepts)}
     return sorted(name for name in names if not wrong_name(name))
-
-
-def pair_in(texts: Iterable[str]) -> str:
-    """What is said of a number with a comma and no blank behind it, which could be meant as 1.5; empty where there is none."""
-    found = next((text for text in texts if _PAIR.fullmatch(text)), None)
-    return "" if found is None else f"; {in_quotes(found)} is read as centre and tolerance"
 
 
 def n_unreadable(column: TextColumn, domain: Domain) -> tuple[int, str]:

@@ -6,13 +6,14 @@ import datetime
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.cells.words import format_number, quoted, says_any
 from contextdb.columns import TextColumn
-from contextdb.errors import TableError, shown
+from contextdb.errors import TableError, safe_text
 from contextdb.files.texts import AnySource
 from contextdb.schema.settings import EMPTY, Schema
 
@@ -92,7 +93,12 @@ class Reading:
 
     def column(self, name: str) -> TextColumn:
         """A column by its name."""
-        return next(column for column in self.columns if column.name == name)
+        return self._by_name[name]
+
+    @cached_property
+    def _by_name(self) -> Mapping[str, TextColumn]:
+        """The first column of each name."""
+        return {column.name: column for column in reversed(self.columns)}
 
     def whole_names(self, column: TextColumn) -> TextColumn | None:
         """A column as cells in which each text is one name, quoted where need be; None where that changes nothing."""
@@ -123,7 +129,7 @@ def capped(remarks: Sequence[Remark], what: str) -> tuple[Remark, ...]:
 
 def listed(names: Sequence[str], most: int = 6) -> str:
     """Names for a remark, the first few of them."""
-    head = ", ".join(f'"{shown(name)}"' for name in names[:most])
+    head = ", ".join(f'"{safe_text(name)}"' for name in names[:most])
     return head if len(names) <= most else f"{head} and {len(names) - most} more"
 
 

@@ -78,8 +78,8 @@ def _cells(column: TextColumn) -> tuple[list[str], tuple[Remark, ...]]:
 
 
 def _cell(text: str) -> str:
-    if text.lstrip().startswith(_LOCALISED) and (said := _localised(text)) is not None:
-        return said
+    if text.lstrip().startswith(_LOCALISED) and (plain := _localised(text)) is not None:
+        return plain
     if text == "()":
         return ""
     if _are_tags(text):
@@ -148,11 +148,11 @@ def _require_unique(table: Table) -> None:
     faults, rows = [], dict[str, int]()
     for row, asset in enumerate(table.assets):
         if not asset.strip() or asset in rows:
-            said = (
+            problem = (
                 f"the asset {in_quotes(asset)} is also in {row_name(rows[asset])}." if asset in rows else "the row names no asset."
             )
             faults.append(
-                Fault(said, "a different name for each row, as Unreal requires", place=Place(row=row, column=table.asset_column))
+                Fault(problem, "a different name for each row, as Unreal requires", place=Place(row=row, column=table.asset_column))
             )
         rows.setdefault(asset, row)
     if faults:

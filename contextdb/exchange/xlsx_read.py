@@ -14,7 +14,7 @@ from typing import Any
 import python_calamine as calamine
 
 from contextdb.columns import TextColumn
-from contextdb.errors import ContextDBError, Fault, Place, TableError, in_quotes, mend_for, plural, shown, some
+from contextdb.errors import ContextDBError, Fault, Place, TableError, in_quotes, mend_for, plural, safe_text, some
 from contextdb.exchange.described import FIRST_LINE, TYPES_SHEET
 from contextdb.exchange.grid import Block, column_letters, columns_of, parse_block
 from contextdb.exchange.reading import DATES, ERRORS, Reading, Remark, SheetWanted, capped, listed, text_of_value
@@ -33,24 +33,24 @@ def read_workbook(raw: bytes, file: str, sheet: str | None = None) -> Reading:
     names = [name for name in book.sheet_names if name.casefold() != TYPES_SHEET]
     name, block = _wanted(sheet, names, file)
     sheets = {each: _Sheet.read(book, each, file) for each in ([name] if name else names)}
-    name, told = (name, []) if name else _only(sheets, _hidden_sheets(book), file)
+    name, sheet_remarks = (name, []) if name else _only(sheets, _hidden_sheets(book), file)
     values, marks = sheets[name].values, marks_of(raw, name)
-    kept, remarks = _kept_types(book, file)
+    types, remarks = _types_of_sheet(book, file)
     remarks = [*remarks, *_dates(values), *_formulas(marks.formulas)]
     grid = [list(row) if {*map(type, row)} == _TEXT else [text_of_value(value) for value in row] for row in values]
     remarks += _fill_errors(grid, marks, is_old(raw))
     remarks += _fill_merged(grid, sheets[name].merged, file)
     remarks += _hidden(grid, marks)
     wide = {top for (top, left), (bottom, right) in sheets[name].merged if left < right and top == bottom}
-    own = _own_block(grid) if kept is not None and block is None else None
+    own = _own_block(grid) if types is not None and block is None else None
     columns, more = (
         (_own_columns(grid, own), [])
         if own
         else columns_of(grid, f"{file}, sheet {in_quotes(name)}", block, "sheet row", name, wide)
     )
-    told += [Remark(f"the sheet {in_quotes(name)} of {len(names)}.")] if len(names) > 1 else []
-    told = [*told, *remarks, *more]
-    return Reading(tuple(columns), "xlsx", tuple(told), kept or EMPTY, sheets=tuple(names), has_whole_names=kept is None)
+    sheet_remarks += [Remark(f"the sheet {in_quotes(name)} of {len(names)}.")] if len(names) > 1 else []
+    sheet_remarks = [*sheet_remarks, *remarks, *more]
+    return Reading(tuple(columns), "xlsx", tuple(sheet_remarks), types or EMPTY, sheets=tuple(names), has_whole_names=types is None)
 
 
 def sheets_of(raw: bytes, file: str) -> list[str]:
@@ -70,18 +70,18 @@ def _opened(raw: bytes, file: str) -> calamine.CalamineWorkbook:
 
 
 def _damaged(error: BaseException, file: str) -> Fault:
-    """What is said of a workbook that calamine cannot read; an interruption is passed on."""
-    if isinstance(error, (KeyboardInterrupt, SystemExit)):
+    """What is said of a workbook that calamine cannot read; an interruption and a want of memory are passed on."""
+    if isinstance(error, (KeyboardInterrupt, SystemExit, MemoryError)):
         raise error
-    found = f"the workbook is broken: {shown(str(error), 200)}."
-    return Fault(found, "a workbook as Excel saves it", "to open it in Excel and save it again", Place(file))
+    problem = f"the workbook is broken: {safe_text(str(error), 200)}."
+    return Fault(problem, "a workbook as Excel saves it", "to open it in Excel and save it again", Place(file))
 
 
 # ---- which sheet
 
 
 def _wanted(sheet: str | None, names: Sequence[str], file: str) -> tuple[str | None, Block | None]:
-    """The sheet and the cells that are asked for, as far as they are."""
+    """The sheet and the cells that are requested, as far as they are."""
     if not names:
         raise TableError(Fault("the workbook has no sheet.", "a sheet with a table", place=Place(file)))
     if sheet is None or sheet in names:
@@ -101,12 +101,12 @@ def _hidden_sheets(book: calamine.CalamineWorkbook) -> frozenset[str]:
 
 
 def _only(sheets: dict[str, _Sheet], hidden: frozenset[str], file: str) -> tuple[str, list[Remark]]:
-    """The only sheet that has cells in it, and what is said of hidden ones: these are left out where another can be seen."""
+    """The only sheet that has cells in it, and a remark about hidden ones: these are left out where another can be seen."""
     filled = [name for name, sheet in sheets.items() if any(value != "" for row in sheet.values for value in row)]
     seen = [name for name in filled if name not in hidden]
     if len(seen or filled) > 1:
-        found = f"{len(seen or filled)} sheets hold cells: {listed(seen or filled)}."
-        raise SheetWanted(Fault(found, "one of them", f"to name it: --sheet {in_quotes((seen or filled)[0])}", Place(file)))
+        problem = f"{len(seen or filled)} sheets hold cells: {listed(seen or filled)}."
+        raise SheetWanted(Fault(problem, "one of them", f"to name it: --sheet {in_quotes((seen or filled)[0])}", Place(file)))
     if not filled:
         return next(iter(sheets)), []
     if not seen:
@@ -135,7 +135,7 @@ class _Sheet:
 # ---- a workbook of our own
 
 
-def _kept_types(book: calamine.CalamineWorkbook, file: str) -> tuple[Schema | None, list[Remark]]:
+def _types_of_sheet(book: calamine.CalamineWorkbook, file: str) -> tuple[Schema | None, list[Remark]]:
     """What the sheet of types says, nothing where that cannot be used; None where there is no such sheet."""
     name = next((name for name in book.sheet_names if name.casefold() == TYPES_SHEET), None)
     if name is None:
@@ -193,26 +193,26 @@ def _dates(values: Sequence[Sequence[Any]]) -> Sequence[Remark]:
 
 
 def _date(value: object, row: int, column: int) -> Remark:
-    told = f"a date, {text_of_value(value)}, as Excel makes of texts such as 1-2; write it as text there, unless a day is meant."
-    return Remark(told, f"cell {column_letters(column)}{row}", is_loss=True)
+    message = f"a date, {text_of_value(value)}, as Excel makes of texts such as 1-2; write it as text there, unless a day is meant."
+    return Remark(message, f"cell {column_letters(column)}{row}", is_loss=True)
 
 
 def _fill_errors(grid: list[list[str]], marks: Marks, is_old: bool) -> Sequence[Remark]:
     """Write the errors of Excel into their cells, which the reader of workbooks leaves empty, and say where they are."""
     if is_old:
-        told = "Excel errors in an .xls file look like empty cells, which mean Any; in an .xlsx file they are reported."
-        return [Remark(told, is_loss=True)]
+        message = "Excel errors in an .xls file look like empty cells, which mean Any; in an .xlsx file they are reported."
+        return [Remark(message, is_loss=True)]
     for row, column, error in marks.errors:
         if row < len(grid) and column < len(grid[row]):
             grid[row][column] = error
-    found = [
+    remarks = [
         Remark(f"an error of Excel, {text}; no type reads it.", f"cell {column_letters(column)}{at}", is_loss=True)
         for at, row in enumerate(grid, 1)
         if not ERRORS.isdisjoint(row)
         for column, text in enumerate(row)
         if text in ERRORS
     ]
-    return capped(found, "errors")
+    return capped(remarks, "errors")
 
 
 def _hidden(grid: Sequence[Sequence[str]], marks: Marks) -> list[Remark]:
@@ -222,23 +222,23 @@ def _hidden(grid: Sequence[Sequence[str]], marks: Marks) -> list[Remark]:
     columns = sorted(
         {at for some in marks.hidden_columns for at in range(some.start, min(some.stop, width)) if any(row[at] for row in grid)}
     )
-    found = []
+    remarks = []
     if rows:
-        found.append(Remark(f"{plural(len(rows), 'hidden row')} read like all others.", f"sheet row {rows[0] + 1}"))
+        remarks.append(Remark(f"{plural(len(rows), 'hidden row')} read like all others.", f"sheet row {rows[0] + 1}"))
     if columns:
         letters = ", ".join(map(column_letters, columns[:8])) + (", …" if len(columns) > 8 else "")
-        found.append(Remark(f"{plural(len(columns), 'hidden column')} read like all others.", f"column {letters}"))
-    return found
+        remarks.append(Remark(f"{plural(len(columns), 'hidden column')} read like all others.", f"column {letters}"))
+    return remarks
 
 
-def _formulas(found: Iterable[tuple[str, str, bool]]) -> list[Remark]:
-    found = list(found)
+def _formulas(formulas: Iterable[tuple[str, str, bool]]) -> list[Remark]:
+    formulas = list(formulas)
     without = [
-        Remark(f"the formula ={shown(text)} has no value saved with it: the cell is empty.", f"cell {cell}", True)
-        for cell, text, has in found
+        Remark(f"the formula ={safe_text(text)} has no value saved with it: the cell is empty.", f"cell {cell}", True)
+        for cell, text, has in formulas
         if not has
     ]
-    n_read = len(found) - len(without)
-    example = next((f"cell {cell}, ={shown(text)}" for cell, text, has in found if has and text), "")
-    said = f"{plural(n_read, 'formula')} read as the values that they had when the file was saved."
-    return ([Remark(said, example)] if n_read else []) + list(capped(without, "formulas without a value"))
+    n_read = len(formulas) - len(without)
+    example = next((f"cell {cell}, ={safe_text(text)}" for cell, text, has in formulas if has and text), "")
+    message = f"{plural(n_read, 'formula')} read as the values that they had when the file was saved."
+    return ([Remark(message, example)] if n_read else []) + list(capped(without, "formulas without a value"))

@@ -83,8 +83,8 @@ def _bomb(archive: zipfile.ZipFile) -> Fault | None:
         return Fault(f"the workbook would unpack to {total:,} bytes.", f"at most {MOST_BYTES:,}")
     if not steep:
         return None
-    found = f"{steep[0].filename} would unpack from {steep[0].compress_size:,} bytes to {steep[0].file_size:,}, as a bomb does."
-    return Fault(found, f"parts that unpack to at most {MOST_RATIO:,} times their size")
+    problem = f"{steep[0].filename} would unpack from {steep[0].compress_size:,} bytes to {steep[0].file_size:,}, as a bomb does."
+    return Fault(problem, f"parts that unpack to at most {MOST_RATIO:,} times their size")
 
 
 def _other_kind(archive: zipfile.ZipFile) -> Fault | None:
@@ -125,9 +125,9 @@ def _far_cell(xml: bytes) -> Fault | None:
     most = min(MOST_CELLS, FEW_CELLS + MOST_EMPTY * (xml.count(b"<c ") + xml.count(b":c ")))
     if n_cells <= most:
         return None
-    found = f"the sheet reaches to cell {column}{row}, {n_cells:,} cells in all."
+    problem = f"the sheet reaches to cell {column}{row}, {n_cells:,} cells in all."
     return Fault(
-        found,
+        problem,
         f"at most {most:,}, as so few are filled" if most < MOST_CELLS else f"at most {most:,}",
         "to delete the rows and columns beyond the table, and save it again",
     )
@@ -136,8 +136,8 @@ def _far_cell(xml: bytes) -> Fault | None:
 def _last_of_rows(xml: bytes) -> list[tuple[bytes, bytes]]:
     """The last cell of each row, which is the one farthest to the right; all cells of a large sheet take seconds to look at."""
     rows = xml.split(b"</row>")
-    found = (_REFERENCE.match(row, end) for row in rows if (end := row.rfind(b"<c ")) >= 0)
-    return [(ref[1], ref[2]) for ref in found if ref]
+    matches = (_REFERENCE.match(row, end) for row in rows if (end := row.rfind(b"<c ")) >= 0)
+    return [(ref[1], ref[2]) for ref in matches if ref]
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,30 +171,30 @@ def marks_of(raw: bytes, sheet: str) -> Marks:
     errors = list(_errors(xml)) if _IS_ERROR.search(xml) else []
     if not _IS_HIDDEN.search(xml):
         return Marks(formulas, errors)
-    rows = [said[b"r"] - 1 for said in _hidden(_ROW, xml) if b"r" in said]
-    columns = [range(said[b"min"] - 1, said[b"max"]) for said in _hidden(_COLUMN, xml) if b"min" in said and b"max" in said]
+    rows = [mark[b"r"] - 1 for mark in _hidden(_ROW, xml) if b"r" in mark]
+    columns = [range(mark[b"min"] - 1, mark[b"max"]) for mark in _hidden(_COLUMN, xml) if b"min" in mark and b"max" in mark]
     return Marks(formulas, errors, rows, columns)
 
 
 def _formulas(xml: bytes) -> Iterator[tuple[str, str, bool]]:
-    for found in _FORMULA.finditer(xml):
-        if cell := _CELL.search(found[1]):
-            has_value = bool(found[3] and b"<v/>" not in found[3])
-            yield (cell[1] + cell[2]).decode(), (found[2] or b"").decode(errors="replace"), has_value
+    for match in _FORMULA.finditer(xml):
+        if cell := _CELL.search(match[1]):
+            has_value = bool(match[3] and b"<v/>" not in match[3])
+            yield (cell[1] + cell[2]).decode(), (match[2] or b"").decode(errors="replace"), has_value
 
 
 def _errors(xml: bytes) -> Iterator[tuple[int, int, str]]:
-    for found in _ERROR.finditer(xml):
-        cell = _CELL.search(found[1])
-        if cell and _IS_ERROR.search(found[1]):
-            yield int(cell[2]) - 1, column_number(cell[1].decode()) - 1, found[2].decode(errors="replace").strip()
+    for match in _ERROR.finditer(xml):
+        cell = _CELL.search(match[1])
+        if cell and _IS_ERROR.search(match[1]):
+            yield int(cell[2]) - 1, column_number(cell[1].decode()) - 1, match[2].decode(errors="replace").strip()
 
 
 def _hidden(tag: re.Pattern[bytes], xml: bytes) -> Iterator[dict[bytes, int]]:
     """The numbers that the hidden ones of some tags say."""
-    for found in tag.finditer(xml):
-        if _IS_HIDDEN.search(found[1]):
-            yield {name: int(number) for name, number in _NUMBER.findall(found[1])}
+    for match in tag.finditer(xml):
+        if _IS_HIDDEN.search(match[1]):
+            yield {name: int(number) for name, number in _NUMBER.findall(match[1])}
 
 
 def _path_of(archive: zipfile.ZipFile, sheet: str) -> str | None:
@@ -203,10 +203,10 @@ def _path_of(archive: zipfile.ZipFile, sheet: str) -> str | None:
 
     listed = archive.read("xl/workbook.xml").decode("utf-8", "replace")
     relations = archive.read("xl/_rels/workbook.xml.rels").decode("utf-8", "replace")
-    targets = {said.get("Id"): said.get("Target", "") for said in map(_attributes, _RELATION.findall(relations))}
-    for said in map(_attributes, _SHEET.findall(listed)):
-        if unescape(said.get("name", "")) == sheet:
-            target = next((targets[value] for key, value in said.items() if key.endswith(":id") and value in targets), None)
+    targets = {attributes.get("Id"): attributes.get("Target", "") for attributes in map(_attributes, _RELATION.findall(relations))}
+    for attributes in map(_attributes, _SHEET.findall(listed)):
+        if unescape(attributes.get("name", "")) == sheet:
+            target = next((targets[value] for key, value in attributes.items() if key.endswith(":id") and value in targets), None)
             return None if target is None else target.lstrip("/") if target.startswith("/") else normpath(join("xl", target))
     return None
 

@@ -92,8 +92,8 @@ def _is_unfit(text: str) -> bool:
 def _unfit(text: str) -> Fault:
     if NEVER.search(text):
         return Fault(f"{in_quotes(text)} has a character that no workbook holds.", "text without it")
-    found = f"{in_quotes(text)} takes {_n_characters(text):,} characters in a workbook."
-    return Fault(found, f"at most {MOST_CHARACTERS:,}, as a cell of Excel has")
+    problem = f"{in_quotes(text)} takes {_n_characters(text):,} characters in a workbook."
+    return Fault(problem, f"at most {MOST_CHARACTERS:,}, as a cell of Excel has")
 
 
 def _place(column: TextColumn, text: str) -> Place:
@@ -110,8 +110,8 @@ def _n_characters(text: str) -> int:
 def sheet_name(name: str) -> str:
     """A name that a sheet may have, as near to a table's as can be."""
     fit = _UNFIT_IN_NAMES.sub("_", name).strip(" '")
-    kept = fit.encode("utf-16-le")[: 2 * MOST_OF_NAME].decode("utf-16-le", "ignore").strip(" '") or "table"
-    return f"{kept}_" if kept.casefold() in (TYPES_SHEET, "history") else kept
+    shortened = fit.encode("utf-16-le")[: 2 * MOST_OF_NAME].decode("utf-16-le", "ignore").strip(" '") or "table"
+    return f"{shortened}_" if shortened.casefold() in (TYPES_SHEET, "history") else shortened
 
 
 # ---- cells

@@ -87,6 +87,7 @@ def highest(*values: float) -> float:
 
 
 def all_lowest(*values: Doubles) -> Doubles:
+    """The least of some columns, context by context; NaN where one is."""
     least = values[0]
     for other in values[1:]:
         least = np.minimum(least, other)
@@ -94,6 +95,7 @@ def all_lowest(*values: Doubles) -> Doubles:
 
 
 def all_highest(*values: Doubles) -> Doubles:
+    """The greatest of some columns, context by context; NaN where one is."""
     most = values[0]
     for other in values[1:]:
         most = np.maximum(most, other)
@@ -118,6 +120,7 @@ def length(x: float, y: float) -> float:
 
 
 def lengths(x: Doubles, y: Doubles) -> Doubles:
+    """What `length` gives, for columns: float64 [N]."""
     most = np.maximum(np.abs(x), np.abs(y))
     scale = np.where(most > _FAR, SCALE_DOWN, np.where(most < _NEAR, SCALE_UP, 1.0))
     a, b = x * scale, y * scale
@@ -135,4 +138,5 @@ def heading(y: float, x: float) -> float:
 
 
 def headings(y: Doubles, x: Doubles) -> Doubles:
+    """Angles of vectors in degrees, -180 to 180: float64 [N]."""
     return wrap_angles(trigonometry.directions(y, x))

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,9 @@ from contextdb.cells.sets import NumberSet, ValueSet
 from contextdb.errors import Fault, in_quotes
 from contextdb.expressions.boxes import Box, NoBoxes, Sets, all_of
 from contextdb.expressions.expression import Expression, read_expression
-from contextdb.expressions.faults import ExpressionError
+from contextdb.expressions.faults import ExpressionError, Refusal
+from contextdb.expressions.parse import parse
+from contextdb.expressions.tokens import tokens_of
 
 WANTS = Condition("", BOOL)
 
@@ -40,18 +43,21 @@ class Assumptions:
 
         A box that also restricts a condition which the table does not have is left out: some context in its shadow can happen.
         """
-        names = {condition.name for condition in self.conditions}
         ruled_out = [*self._ruled_out, *(expression.as_boxes(False) for expression in self.derived)]
-        return [box for found in ruled_out for box in found or () if box.keys() <= names]
+        return [box for boxes in ruled_out for box in boxes or () if self._is_of_the_table(box)]
 
     @cached_property
     def unboxed(self) -> tuple[Expression, ...]:
-        """The assumptions that no boxes can tell exactly; `holds` knows them."""
-        return tuple(e for e, found in zip(self.expressions, self._ruled_out, strict=True) if found is None)
+        """The assumptions that no boxes over the conditions of the table can tell exactly; `holds` knows them."""
+        pairs = zip(self.expressions, self._ruled_out, strict=True)
+        return tuple(e for e, boxes in pairs if boxes is None or not all(map(self._is_of_the_table, boxes)))
+
+    def _is_of_the_table(self, box: Box) -> bool:
+        return box.keys() <= {condition.name for condition in self.conditions}
 
     @cached_property
     def _ruled_out(self) -> list[list[Box] | None]:
-        return [expression.as_boxes(False) for expression in self.expressions]
+        return [expression.ruled_out() for expression in self.expressions]
 
     def holds(self, columns: Mapping[str, Any], n_contexts: int) -> NDArray[np.bool_]:
         """Whether each of N contexts can happen: bool [N]. One where facts are missing can, unless those it has rule it out.
@@ -85,6 +91,26 @@ class Assumptions:
         return faults
 
 
+def conjuncts(text: str) -> tuple[str, ...]:
+    """What `and` joins in an expression, which is true where all of these are; the text itself where it joins nothing, or cannot be
+    read."""
+    try:
+        tokens = tokens_of(text)[:-1]
+        parse(text)
+    except Refusal:
+        return (text,)
+    depths = list(accumulate((t.text in "([") - (t.text in ")]") if t.kind == "sign" else 0 for t in tokens))
+    if tokens[0].text == "(" and 0 not in depths[:-1]:
+        return conjuncts(text[tokens[0].stop : tokens[-1].start])
+    outer = [t for t, depth in zip(tokens, depths, strict=True) if depth == 0 and t.is_bare]
+    if any(t.text in ("or", "if") for t in outer):
+        return (text,)
+    joints = [t for t in outer if t.text == "and"]
+    starts, stops = [0, *(t.stop for t in joints)], [*(t.start for t in joints), len(text)]
+    parts = [text[start:stop].strip() for start, stop in zip(starts, stops, strict=True)]
+    return tuple(parts) if len(parts) == 1 else tuple(part for one in parts for part in conjuncts(one))
+
+
 def constant_truth(expression: Expression) -> bool | None:
     """The truth that a bool expression has in every context of the declared values and bounds; None where it has both, or where
     boxes cannot tell."""
@@ -103,10 +129,10 @@ def constant_truth(expression: Expression) -> bool | None:
 
 def _contradiction(text: str, holds_alone: bool) -> Fault:
     if holds_alone:
-        found = f"{in_quotes(text)} contradicts the assumptions before it: no context satisfies them all."
-        return Fault(found, "assumptions that hold together in some context")
-    found = f"{in_quotes(text)} holds in no context of the declared values and bounds."
-    return Fault(found, "an assumption that holds in some context")
+        problem = f"{in_quotes(text)} contradicts the assumptions before it: no context satisfies them all."
+        return Fault(problem, "assumptions that hold together in some context")
+    problem = f"{in_quotes(text)} holds in no context of the declared values and bounds."
+    return Fault(problem, "an assumption that holds in some context")
 
 
 def _sets_of(expression: Expression) -> list[Sets] | None:

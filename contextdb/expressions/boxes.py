@@ -41,14 +41,32 @@ class NoBoxes(Exception):
 def boxes_of(plan: Part, conditions: Mapping[str, Condition], truth: bool) -> list[Box] | None:
     """The boxes in which a bool plan is `truth`; None where there are none to tell exactly."""
     try:
-        found = _Boxes(conditions).of(plan, truth)
+        boxes = _Boxes(conditions).of(plan, truth)
     except NoBoxes:
         return None
-    return [{name: Cell(accepts) for name, accepts in box.items()} for box in found]
+    return [{name: Cell(accepts) for name, accepts in box.items()} for box in boxes]
+
+
+def false_half_turns(plan: Part, conditions: Mapping[str, Condition]) -> list[Box]:
+    """The boxes of contexts with an angle at half a turn in which a bool plan is false, be that -180 or 180 throughout.
+
+    Each comparison alone takes the one of the two for which it holds: `-90 <= a <= 90` is true there. Where that takes too
+    many boxes they are left out.
+    """
+    half_turns: list[Box] = []
+    for name, condition in conditions.items():
+        if condition.domain.type.is_circular:
+            half_turn = Cell(NumberSet(((-180.0, -180.0),), is_circular=True))
+            try:
+                boxes = all_of(_Boxes(conditions, name, end).of(plan, False) for end in (-180.0, 180.0))
+            except NoBoxes:
+                continue
+            half_turns += [{name: half_turn, **{n: Cell(accepts) for n, accepts in box.items()}} for box in boxes]
+    return half_turns
 
 
 def meets(boxes: Iterable[Box], facts: Mapping[str, Fact]) -> bool:
-    """Whether some values of set-valued facts lie in one of the boxes, the others as they are; True where that cannot be told."""
+    """Whether some values of set-valued facts lie in one of the boxes, the others as they are; True where that is not known."""
     return any(all(_meets(cell.accepts, facts[name]) for name, cell in box.items()) for box in boxes)
 
 
@@ -62,8 +80,11 @@ def _meets(accepts: Accepted | None, fact: Fact) -> bool:
 
 
 class _Boxes:
-    def __init__(self, conditions: Mapping[str, Condition]) -> None:
+    def __init__(self, conditions: Mapping[str, Condition], turned: str = "", half_turn: float = 180.0) -> None:
         self.conditions = conditions
+        self.turned = turned
+        """An angle that is at half a turn, if any: -180 or 180."""
+        self.half_turn = Const(half_turn)
 
     def of(self, plan: Part, truth: bool) -> list[Sets]:
         if isinstance(plan, Const):
@@ -73,8 +94,8 @@ class _Boxes:
         if isinstance(plan, Negation):
             return self.of(plan.part, not truth)
         if isinstance(plan, Logic):
-            found = [self.of(part, truth) for part in plan.parts]
-            return all_of(found) if (plan.word == "and") is truth else any_of(found)
+            alternatives = [self.of(part, truth) for part in plan.parts]
+            return all_of(alternatives) if (plan.word == "and") is truth else any_of(alternatives)
         if isinstance(plan, Held):
             return self._held(plan.part, plan.cell, truth)
         if isinstance(plan, Select):
@@ -82,11 +103,12 @@ class _Boxes:
             return any_of([yes, all_of([self.of(plan.condition, False), self.of(plan.otherwise, truth)])])
         if isinstance(plan, Compare):
             links = zip(plan.parts, plan.links, plan.parts[1:], strict=False)
-            found = [self._link(left, link, right, truth) for left, link, right in links]
-            return all_of(found) if truth else any_of(found)
+            alternatives = [self._link(left, link, right, truth) for left, link, right in links]
+            return all_of(alternatives) if truth else any_of(alternatives)
         raise NoBoxes
 
     def _held(self, part: Part, cell: Cell, truth: bool) -> list[Sets]:
+        part = self.half_turn if self._is_turned(part) else part
         if isinstance(part, Const):
             return [{}] if cell.holds(part.value) is truth else []
         if _is_truth(part):
@@ -99,6 +121,9 @@ class _Boxes:
 
     def _link(self, left: Part, link: Link, right: Part, truth: bool) -> list[Sets]:
         """The boxes of one comparison of a chain."""
+        if self._is_turned(left) or self._is_turned(right):
+            left, right = (self.half_turn if self._is_turned(part) else part for part in (left, right))
+            link = replace(link, left_is_high=False, right_is_high=False)
         if isinstance(left, Const) and isinstance(right, Const):
             return [{}] if runner(Compare((left, right), (link,)))({}) is truth else []
         if _is_truth(left):
@@ -113,6 +138,9 @@ class _Boxes:
             raise NoBoxes
         accepts, is_other = _compared(left.kind, link.sign, right.value)
         return _alternatives(left.name, accepts, self.conditions[left.name].domain, truth is not is_other)
+
+    def _is_turned(self, part: Part) -> bool:
+        return isinstance(part, Given) and part.name == self.turned
 
 
 def _is_truth(plan: Part) -> bool:
@@ -136,13 +164,14 @@ def _alternatives(name: str, accepts: Accepted, domain: Domain, truth: bool) -> 
     """The boxes that hold what a set of one condition accepts, or what it does not."""
     if isinstance(accepts, TagSet):
         return [{name: tags} for tags in plain_parts(accepts, truth) if not tags.is_empty]
-    found = accepts if truth else complement(accepts, domain, is_bounded=False)
-    return [] if found.is_empty else [{name: found}]
+    sets = accepts if truth else complement(accepts, domain, is_bounded=False)
+    return [] if sets.is_empty else [{name: sets}]
 
 
-def all_of(found: Iterable[list[Sets]]) -> list[Sets]:
+def all_of(alternatives: Iterable[list[Sets]]) -> list[Sets]:
+    """The boxes of what lies in a box of each list. Raises NoBoxes where they are too many."""
     common: list[Sets] = [{}]
-    for boxes in found:
+    for boxes in alternatives:
         pairs = product(common, boxes)
         common = any_of([[both] for a, b in islice(pairs, MOST_PAIRS) if (both := _intersection(a, b)) is not None])
         if next(pairs, None) is not None:
@@ -150,11 +179,11 @@ def all_of(found: Iterable[list[Sets]]) -> list[Sets]:
     return common
 
 
-def any_of(found: Iterable[list[Sets]]) -> list[Sets]:
+def any_of(alternatives: Iterable[list[Sets]]) -> list[Sets]:
     """The boxes of some lists together; those on the same single condition are joined where one set can tell them."""
     single: dict[str, NumberSet | ValueSet] = {}
     others: dict[tuple[tuple[str, Accepted], ...], Sets] = {}
-    for box in chain.from_iterable(found):
+    for box in chain.from_iterable(alternatives):
         if not box:
             return [{}]
         (name, accepts), *more = sorted(box.items(), key=_first)

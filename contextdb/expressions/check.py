@@ -16,7 +16,7 @@ from contextdb.cells.words import format_number
 from contextdb.errors import in_quotes, nearest, plural, some
 from contextdb.expressions.faults import Refusal, UnknownName
 from contextdb.expressions.functions import FUNCTIONS, MOST_POWER, NEGATIVE, OPERATORS, Function, power_of
-from contextdb.expressions.membership import SPELT, holding, require_value, spelt, spelt_alike
+from contextdb.expressions.membership import SPELT, holding, matching, require_value, spelt, spelt_alike
 from contextdb.expressions.plan import Apply, Compare, Const, Given, Link, Logic, Negation, Part, Select, Type
 from contextdb.expressions.scalar import constant
 from contextdb.expressions.tokens import written_name, written_text
@@ -25,6 +25,7 @@ from contextdb.expressions.tree import (
     Call,
     Comparison,
     Conditional,
+    Likeness,
     Membership,
     Name,
     Node,
@@ -56,19 +57,19 @@ class Checker:
         raise AssertionError(node)
 
     @check.register
-    def _(self, node: Number) -> Checked:
+    def _check_number(self, node: Number) -> Checked:
         return Const(node.value), Type(INT.type if node.value.is_integer() else NUMBER.type)
 
     @check.register
-    def _(self, node: Text) -> Checked:
+    def _check_text(self, node: Text) -> Checked:
         return Const(node.value), Type(TEXT.type, frozenset((node.value,)))
 
     @check.register
-    def _(self, node: Truth) -> Checked:
+    def _check_truth(self, node: Truth) -> Checked:
         return Const(node.value), _TRUTH
 
     @check.register
-    def _(self, node: Name) -> Checked:
+    def _check_name(self, node: Name) -> Checked:
         condition = self.conditions.get(node.name)
         if condition is None:
             raise self._no_condition(node)
@@ -80,30 +81,30 @@ class Checker:
         return Given(node.name, domain.type), Type(domain.type, values, unit)
 
     @check.register
-    def _(self, node: Unary) -> Checked:
-        part, found = self.check(node.part)
+    def _check_unary(self, node: Unary) -> Checked:
+        part, part_type = self.check(node.part)
         if node.sign == "not":
-            self._need_truth(node.part, found, '"not"')
+            self._need_truth(node.part, part_type, '"not"')
             return self._folded(node, Negation(part)), _TRUTH
-        self._need_number(node.part, found, in_quotes(node.sign))
-        kind = INT.type if found.kind.is_whole else NUMBER.type
+        self._need_number(node.part, part_type, in_quotes(node.sign))
+        kind = INT.type if part_type.kind.is_whole else NUMBER.type
         plan = part if node.sign == "+" else self._folded(node, Apply(NEGATIVE, (part,)))
-        return plan, Type(kind, None, found.unit)
+        return plan, Type(kind, None, part_type.unit)
 
     @check.register
-    def _(self, node: Arithmetic) -> Checked:
+    def _check_arithmetic(self, node: Arithmetic) -> Checked:
         if node.sign == "**":
             return self._power(node)
         function = OPERATORS[node.sign]
         parts = [self.check(part) for part in node.parts]
-        for part, (_, found) in zip(node.parts, parts, strict=True):
-            self._need_number(part, found, in_quotes(node.sign))
+        for part, (_, part_type) in zip(node.parts, parts, strict=True):
+            self._need_number(part, part_type, in_quotes(node.sign))
         if node.sign in ("/", "//", "%") and parts[1][0] == Const(0.0):
             raise Refusal(node.right.start, node.right.stop, "nothing can be divided by 0", "a divisor that is not always 0")
         return self._applied(node, function, parts)
 
     @check.register
-    def _(self, node: Call) -> Checked:
+    def _check_call(self, node: Call) -> Checked:
         if node.name in SPELT:
             return self._literal(node, SPELT[node.name])
         function = FUNCTIONS.get(node.name)
@@ -111,11 +112,11 @@ class Checker:
             raise self._no_function(node)
         n_given = len(node.arguments)
         if n_given < function.least or (function.most is not None and n_given > function.most):
-            told = plural(n_given, "argument")
-            raise Refusal(node.start, node.stop, f"{in_quotes(node.name)} is given {told}", function.form)
+            given = plural(n_given, "argument")
+            raise Refusal(node.start, node.stop, f"{in_quotes(node.name)} is given {given}", function.form)
         parts = [self.check(part) for part in node.arguments]
-        for part, (_, found) in zip(node.arguments, parts, strict=True):
-            self._need_number(part, found, in_quotes(node.name))
+        for part, (_, part_type) in zip(node.arguments, parts, strict=True):
+            self._need_number(part, part_type, in_quotes(node.name))
         return self._applied(node, function, parts)
 
     def _literal(self, node: Call, kind: Kind) -> Checked:
@@ -126,16 +127,16 @@ class Checker:
         return spelt(text, kind)
 
     @check.register
-    def _(self, node: LogicNode) -> Checked:
+    def _check_logic(self, node: LogicNode) -> Checked:
         plans = []
         for operand in node.operands:
-            plan, found = self.check(operand)
-            self._need_truth(operand, found, in_quotes(node.word))
+            plan, part_type = self.check(operand)
+            self._need_truth(operand, part_type, in_quotes(node.word))
             plans.append(plan)
         return self._folded(node, Logic(node.word, tuple(plans))), _TRUTH
 
     @check.register
-    def _(self, node: Comparison) -> Checked:
+    def _check_comparison(self, node: Comparison) -> Checked:
         parts = spelt_alike([(part, *self.check(part)) for part in node.operands])
         links = []
         for i, sign in enumerate(node.signs):
@@ -143,16 +144,22 @@ class Checker:
         return self._folded(node, Compare(tuple(plan for plan, _ in parts), tuple(links))), _TRUTH
 
     @check.register
-    def _(self, node: Membership) -> Checked:
+    def _check_membership(self, node: Membership) -> Checked:
         item = self.check(node.item)
         choices = node.choices if isinstance(node.choices, tuple) else (node.choices,)
         held = holding(node, item, [(choice, *self.check(choice)) for choice in choices], self.conditions)
         return self._folded(node, Negation(held) if node.is_negated else held), _TRUTH
 
     @check.register
-    def _(self, node: Conditional) -> Checked:
-        condition, found = self.check(node.condition)
-        self._need_truth(node.condition, found, '"if"')
+    def _check_likeness(self, node: Likeness) -> Checked:
+        plan, _ = self.check(node.item)
+        held = matching(node, plan, self.conditions)
+        return self._folded(node, Negation(held) if node.is_negated else held), _TRUTH
+
+    @check.register
+    def _check_conditional(self, node: Conditional) -> Checked:
+        condition, part_type = self.check(node.condition)
+        self._need_truth(node.condition, part_type, '"if"')
         (then, a), (otherwise, b) = self.check(node.then), self.check(node.otherwise)
         kind = _common_kind(a, b)
         if kind is None:
@@ -187,34 +194,34 @@ class Checker:
 
     # ---- types
 
-    def _need_number(self, node: Node, found: Type, who: str) -> None:
-        if found.is_number:
+    def _need_number(self, node: Node, node_type: Type, role: str) -> None:
+        if node_type.is_number:
             return
         meant = None
-        if found.kind.is_truth and isinstance(node, Name):
+        if node_type.kind.is_truth and isinstance(node, Name):
             meant = f"(1 if {written_name(node.name)} else 0)"
         elif isinstance(node, Text) and node.value in self.conditions:
             meant = written_name(node.value)
-        raise Refusal(node.start, node.stop, f"{who} takes numbers, and this is {found.kind.value}", "a number", meant)
+        raise Refusal(node.start, node.stop, f"{role} takes numbers, and this is {node_type.kind.value}", "a number", meant)
 
-    def _need_truth(self, node: Node, found: Type, who: str) -> None:
-        if found.kind.is_truth:
+    def _need_truth(self, node: Node, node_type: Type, role: str) -> None:
+        if node_type.kind.is_truth:
             return
         meant = {Number: {0.0: "False", 1.0: "True"}.get(node.value)} if isinstance(node, Number) else {}
         accepted = 'True or False: a bool, a comparison such as speed > 0, or such as "InAir" in Tags'
         raise Refusal(
-            node.start, node.stop, f"{who} takes True or False, and this is {found.kind.value}", accepted, meant.get(Number)
+            node.start, node.stop, f"{role} takes True or False, and this is {node_type.kind.value}", accepted, meant.get(Number)
         )
 
-    def _common_unit(self, node: Node, found: list[Type]) -> str | None:
-        units = list(dict.fromkeys(t.unit for t in found if t.unit))
+    def _common_unit(self, node: Node, types: list[Type]) -> str | None:
+        units = list(dict.fromkeys(t.unit for t in types if t.unit))
         if len(units) > 1:
             why = f"{in_quotes(units[0])} and {in_quotes(units[1])} are two units"
             raise Refusal(node.start, node.stop, why, "one unit; a factor, as in * 3.6, takes a number out of its unit")
         return units[0] if units else None
 
     def _applied(self, node: Node, function: Function, parts: list[Checked]) -> Checked:
-        types = [found for _, found in parts]
+        types = [part_type for _, part_type in parts]
         unit = self._common_unit(node, types) if function.keeps_unit else None
         is_whole = all(t.kind.is_whole for t in types)
         kind = ANGLE.type if function.gives == "angle" else NUMBER.type
@@ -224,8 +231,8 @@ class Checker:
 
     def _power(self, node: Arithmetic) -> Checked:
         parts = [self.check(part) for part in node.parts]
-        for part, (_, found) in zip(node.parts, parts, strict=True):
-            self._need_number(part, found, '"**"')
+        for part, (_, part_type) in zip(node.parts, parts, strict=True):
+            self._need_number(part, part_type, '"**"')
         exponent = parts[1][0]
         if not (isinstance(exponent, Const) and exponent.value in range(MOST_POWER + 1)):
             why = f'"**" accepts only a whole number from 0 to {MOST_POWER}, written out'
@@ -246,8 +253,8 @@ class Checker:
     def _link(self, sign: str, left: Node, a: Checked, right: Node, b: Checked) -> Link:
         if a[1].is_number and b[1].is_number:
             return self._number_link(sign, left, a, right, b)
-        for node, (_, found) in ((left, a), (right, b)):
-            if found.kind.is_tags:
+        for node, (_, part_type) in ((left, a), (right, b)):
+            if part_type.kind.is_tags:
                 accepted = '"InAir" in Tags, or Tags in "+InAir -Stunned"'
                 raise Refusal(node.start, node.stop, f"a set of tags is not compared with {in_quotes(sign)}", accepted)
         if a[1].is_number or b[1].is_number or a[1].is_text is not b[1].is_text:
@@ -279,9 +286,9 @@ class Checker:
             return Link(sign)
         for node, (plan, _) in ((left, a), (right, b)):
             if isinstance(plan, Const) and not -180.0 <= float(plan.value) <= 180.0:
-                told = format_number(float(plan.value))
+                number = format_number(float(plan.value))
                 raise Refusal(
-                    node.start, node.stop, f"an angle is from -180 to 180, and {told} is outside", 'heading in "170..190"'
+                    node.start, node.stop, f"an angle is from -180 to 180, and {number} is outside", 'heading in "170..190"'
                 )
         is_upper = sign in (">", ">=")
         return Link(sign, left_is_high=is_upper and a[1].kind.is_circular, right_is_high=not is_upper and b[1].kind.is_circular)

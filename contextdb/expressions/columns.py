@@ -11,10 +11,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import polars as pl
 from numpy.typing import NDArray
 
 from contextdb.cells.angles import wrap_angles
@@ -24,6 +23,11 @@ from contextdb.cells.facts import read_fact
 from contextdb.cells.kinds import Kind
 from contextdb.cells.sets import Cell
 from contextdb.errors import ContextError, Fault, Place
+
+if TYPE_CHECKING:
+    import polars as pl
+else:
+    from contextdb.columns import polars as pl
 
 Doubles = NDArray[np.float64]
 Truths = NDArray[np.int8]
@@ -68,7 +72,7 @@ def _plain_numbers(given: Any, kind: Kind) -> Doubles | None:
 
 
 def _plain_truths(given: Any) -> Truths | None:
-    series = as_series(given, pl.Boolean())
+    series = as_series(given, "Boolean")
     if series is None or series.dtype != pl.Boolean:
         return None
     truths: Truths = (series.cast(pl.Int8) * 2).fill_null(int(UNKNOWN)).to_numpy()
@@ -77,7 +81,7 @@ def _plain_truths(given: Any) -> Truths | None:
 
 def _texts(given: Any, condition: Condition) -> Coded:
     """A column of texts; only the distinct ones are read."""
-    series = as_series(given, pl.String())
+    series = as_series(given, "String")
     if series is not None and isinstance(series.dtype, (pl.Categorical, pl.Enum)):
         series = series.cast(pl.String)
     if series is None or series.dtype != pl.String:
@@ -165,12 +169,13 @@ def _text_series(column: Coded) -> pl.Series:
     return texts.gather(np.where(column.codes < 0, len(column.values), column.codes))
 
 
-def is_missing_in(column: Column, row: int) -> bool:
-    """Whether a column has no value in one context."""
+def missing_rows(column: Column) -> NDArray[np.int64]:
+    """The contexts in which a column has no value: int64 [n ≤ N]."""
     if isinstance(column, Coded):
-        return bool(column.codes[row] < 0)
-    return bool(column[row] == UNKNOWN) if column.dtype == np.int8 else bool(np.isnan(column[row]))
+        return np.flatnonzero(column.codes < 0)
+    return np.flatnonzero(column == UNKNOWN if column.dtype == np.int8 else np.isnan(column))
 
 
 def taken(column: Column, contexts: NDArray[np.int64]) -> Column:
+    """The values of a column in some contexts."""
     return Coded(column.codes[contexts], column.values) if isinstance(column, Coded) else column[contexts]

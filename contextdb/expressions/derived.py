@@ -23,16 +23,15 @@ from contextdb.cells.angles import wrap_angles
 from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import describe, read_fact
 from contextdb.cells.sets import ANY, Cell
-from contextdb.errors import ContextError, Fault, Place, in_quotes, plural, shown, some
+from contextdb.errors import ContextError, Fault, Place, in_quotes, plural, safe_text, some
 from contextdb.expressions.arithmetic import settled, wrapped
-from contextdb.expressions.columns import Coded, Column, as_facts, is_missing_in, read_column
+from contextdb.expressions.columns import Coded, Column, as_facts, missing_rows, read_column
 from contextdb.expressions.expression import Expression, check_length, read_expression
 from contextdb.expressions.faults import ExpressionError
 from contextdb.expressions.frame import run_frame
 from contextdb.expressions.scalar import Value, is_missing
 
 NAN = math.nan
-_GIVE = 'a value for each of these, or unknown="any" or "never"'
 _GIVE_OTHERS = 'facts that it can be computed with, or unknown="any" or "never"'
 
 
@@ -92,17 +91,17 @@ class Derivation:
             if isinstance(fact, Cell):
                 open_names.add(name)
             values[name] = absent if fact is None or isinstance(fact, Cell) else fact  # type: ignore[assignment]
-        found: dict[str, object] = {}
+        computed: dict[str, object] = {}
         for name, condition, run, needs in self._running:
             value = values[name] = _fitted(run(values), condition)
             if not is_missing(value):
-                found[name] = condition.domain.type.given(value) if isinstance(value, float) else value
+                computed[name] = condition.domain.type.given(value) if isinstance(value, float) else value
             elif open_names and _is_open(needs, values, open_names):
                 open_names.add(name)
-                found[name] = ANY
+                computed[name] = ANY
             else:
-                found[name] = None
-        return found
+                computed[name] = None
+        return computed
 
     def complete(self, facts: Mapping[str, object]) -> dict[str, object]:
         """The facts of one context with the derived ones next to them; raises as `compute` does."""
@@ -117,11 +116,12 @@ class Derivation:
     def _running(self) -> tuple[tuple[str, Condition, Any, tuple[str, ...]], ...]:
         return tuple((s.condition.name, s.condition, s.expression.run, s.expression.names) for s in self.steps)
 
-    def complete_frame(self, columns: Mapping[str, Any], n_contexts: int) -> dict[str, Any]:
+    def complete_frame(self, columns: Mapping[str, Any], n_contexts: int, needs_all: bool = False) -> dict[str, Any]:
         """The columns of N contexts with the derived ones next to them, as `query_many` takes them.
 
         Derived numbers are float64 arrays with NaN where missing, bools and texts polars series, sets of tags lists, with null
-        where missing. The same values as `complete` gives. Raises ContextError as `complete`, and where a column is not N long.
+        where missing. The same values as `complete` gives. Raises ContextError as `complete`, and where a column is not N long;
+        with `needs_all` also where a column is there and a fact of it is missing.
         """
         self.refuse(name for name in self.names if name in columns)
         read: dict[str, Column] = {}
@@ -129,45 +129,43 @@ class Derivation:
             given = columns.get(condition.name)
             check_length(given, condition, n_contexts)
             read[condition.name] = read_column(given, condition, n_contexts)
+            if needs_all and given is not None and len(rows := missing_rows(read[condition.name])):
+                raise missing_in_contexts(condition.name, rows)
         for step in self.steps:
             own = {name: read[name] for name in step.expression.names}
             read[step.condition.name] = _all_fitted(run_frame(step.expression.plan, own, n_contexts), step.condition)
         return {**columns, **{step.condition.name: as_facts(read[step.condition.name]) for step in self.steps}}
 
-    def lacking(self, name: str, facts: Mapping[str, object]) -> list[str]:
-        """The facts that a derived one is computed from and that are missing."""
-        return [c.name for c in self.only([name]).inputs if read_fact(facts.get(c.name), c) is None]
+    def missing(self, facts: Mapping[str, object]) -> list[str]:
+        """The facts that something is computed from and that are missing."""
+        return [c.name for c in self.inputs if read_fact(facts.get(c.name), c) is None]
 
     def no_value(self, name: str, facts: Mapping[str, object]) -> ContextError:
-        """The error for a derived fact that a query needs and that is missing: says what to give."""
-        found = f"the fact {in_quotes(name)} cannot be computed"
-        if lacking := self.lacking(name, facts):
-            found += f": {plural(len(lacking), 'fact')} missing: {some(lacking)}."
-            return ContextError(Fault(found, _GIVE, rule="missing-fact"))
+        """The error for a derived fact that a query needs and that has no finite value, though nothing is missing."""
         used = self.only([name]).steps[-1].expression
         known = {**facts, **self.compute(facts)}
-        told = ", ".join(f"{c.name} = {describe(read_fact(known.get(c.name), c), c.domain)}" for c in used.conditions[:6])
-        found += f": {in_quotes(used.text)} has no finite value with {told}."
-        return ContextError(Fault(found, _GIVE_OTHERS, rule="missing-fact"))
+        values = ", ".join(f"{c.name} = {describe(read_fact(known.get(c.name), c), c.domain)}" for c in used.conditions[:6])
+        problem = f"the fact {in_quotes(name)} cannot be computed: {in_quotes(used.text)} has no finite value with {values}."
+        return ContextError(Fault(problem, _GIVE_OTHERS, rule="missing-fact"))
 
-    def no_values(self, name: str, columns: Mapping[str, Any], rows: NDArray[np.int64]) -> ContextError:
-        """The error for a derived fact that is missing in some of many contexts: says what was not given in the first of them."""
-        row = int(rows[0])
-        inputs = self.only([name]).inputs
-        read = {c.name: read_column(columns.get(c.name), c, len(columns.get(c.name, range(row + 1)))) for c in inputs}
-        lacking = [n for n, column in read.items() if is_missing_in(column, row)]
-        found = f"the fact cannot be computed in {plural(len(rows), 'context')}"
-        found += f": {some(lacking)} missing." if lacking else ": its expression has no finite value there."
-        accepted = _GIVE if lacking else _GIVE_OTHERS
-        return ContextError(Fault(found, accepted, place=Place(row=row, column=name), rule="missing-fact"))
+    def no_values(self, name: str, rows: NDArray[np.int64]) -> ContextError:
+        """The error for a derived fact that has no finite value in some of many contexts, though nothing is missing."""
+        problem = f"the fact cannot be computed in {plural(len(rows), 'context')}: its expression has no finite value there."
+        return ContextError(Fault(problem, _GIVE_OTHERS, place=Place(row=int(rows[0]), column=name), rule="missing-fact"))
 
     def refuse(self, given: Iterable[str]) -> None:
         """Raise ContextError when a derived fact is among those given."""
         for name in given:
             if name in self.names:
-                found = "this fact is derived, and never given."
+                problem = "this fact is derived, and never given."
                 accepted = f"the facts that it is computed from: {some(c.name for c in self.only([name]).inputs)}"
-                raise ContextError(Fault(found, accepted, place=Place(column=name), rule="wrong-fact"))
+                raise ContextError(Fault(problem, accepted, place=Place(column=name), rule="wrong-fact"))
+
+
+def missing_in_contexts(name: str, rows: NDArray[np.int64]) -> ContextError:
+    """The error for a fact that is missing in some of many contexts."""
+    problem, accepted = f"the fact is missing in {plural(len(rows), 'context')}.", 'a value, or unknown="any" or "never"'
+    return ContextError(Fault(problem, accepted, place=Place(row=int(rows[0]), column=name), rule="missing-fact"))
 
 
 def _is_open(needs: Iterable[str], values: Mapping[str, Value], open_names: set[str]) -> bool:
@@ -218,7 +216,7 @@ def derivation_faults(conditions: Mapping[str, Condition]) -> Iterator[tuple[str
         except ExpressionError as error:
             yield from ((name, fault) for fault in error.faults)
     while cycle := _cycle(needs):
-        path = " → ".join(shown(name) for name in (cycle if len(cycle) < 9 else [*cycle[:7], "…", cycle[-1]]))
+        path = " → ".join(safe_text(name) for name in (cycle if len(cycle) < 9 else [*cycle[:7], "…", cycle[-1]]))
         yield cycle[0], Fault(f"{in_quotes(cycle[0])} is computed from itself: {path}.", "facts that are not computed from it")
         for name in cycle:
             needs.pop(name, None)
@@ -229,8 +227,8 @@ def _cycle(needs: Mapping[str, list[str]]) -> list[str] | None:
     try:
         TopologicalSorter(needs).prepare()
     except CycleError as error:
-        found: list[str] = error.args[1]
-        turned = found[::-1][:-1]
+        names: list[str] = error.args[1]
+        turned = names[::-1][:-1]
         first = turned.index(min(turned))
         return [*turned[first:], *turned[: first + 1]]
     return None

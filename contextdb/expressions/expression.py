@@ -15,7 +15,7 @@ from contextdb.cells.facts import read_fact
 from contextdb.cells.kinds import Kind
 from contextdb.cells.sets import Cell
 from contextdb.errors import ContextError, Fault, Place, in_quotes, nearest, plural, some
-from contextdb.expressions.boxes import Box, boxes_of
+from contextdb.expressions.boxes import Box, boxes_of, false_half_turns
 from contextdb.expressions.check import Checker
 from contextdb.expressions.columns import UNKNOWN, YES, Column, as_array, read_column
 from contextdb.expressions.faults import ExpressionError, Refusal, fault_of
@@ -87,6 +87,12 @@ class Expression:
         """
         return boxes_of(self.plan, {c.name: c for c in self.conditions}, truth) if self.type.kind.is_truth else None
 
+    def ruled_out(self) -> list[Box] | None:
+        """The contexts in which an assumption is false, as `as_boxes(False)` gives them; also those in which it is so for an angle
+        at half a turn, be that -180 or 180 throughout."""
+        boxes = self.as_boxes(False)
+        return boxes and [*boxes, *false_half_turns(self.plan, {c.name: c for c in self.conditions})]
+
     @cached_property
     def run(self) -> Run:
         """Computes the value from facts in canonical form: NaN for a missing number, None for another missing fact."""
@@ -116,10 +122,10 @@ def read_expression(
     def read(text: str) -> Expression:
         tree = parse(text)
         checker = Checker(known)
-        plan, found = checker.check(tree)
+        plan, result = checker.check(tree)
         if wants is not None:
-            require_result(tree, found, wants)
-        return Expression(text, tuple(known[name] for name in checker.names), found, plan)
+            require_result(tree, result, wants)
+        return Expression(text, tuple(known[name] for name in checker.names), result, plan)
 
     try:
         return read(text)
@@ -141,39 +147,39 @@ def canonical(value: object, condition: Condition) -> Value:
 def check_length(given: Any, condition: Condition, n_contexts: int) -> None:
     """Raise ContextError unless a column, where it is given, is so long."""
     if given is not None and len(given) != n_contexts:
-        told = f"the column has {plural(len(given), 'fact')}."
-        raise ContextError(Fault(told, plural(n_contexts, "fact"), place=Place(column=condition.name)))
+        problem = f"the column has {plural(len(given), 'fact')}."
+        raise ContextError(Fault(problem, plural(n_contexts, "fact"), place=Place(column=condition.name)))
 
 
 # ---- whether a result fits its condition
 
 
-def require_result(tree: Node, found: Type, wants: Condition) -> None:
+def require_result(tree: Node, tree_type: Type, wants: Condition) -> None:
     """Raise Refusal when the values of a whole expression cannot be those of a condition.
 
-    A number outside the condition's bounds is compared as it is, like a given one, so bounds are not asked for. An angle takes any
+    A number outside the condition's bounds is compared as it is, like a given one, so bounds are not needed. An angle takes any
     number and wraps it. A text whose values are not known is taken for an enum.
     """
     kind = wants.domain.type
-    if not _fits(found.kind, kind):
-        raise _wrong_kind(tree, found, wants)
-    if kind.needs_values and found.values is not None:
-        for value in sorted(found.values - wants.domain.known):
+    if not _fits(tree_type.kind, kind):
+        raise _wrong_kind(tree, tree_type, wants)
+    if kind.needs_values and tree_type.values is not None:
+        for value in sorted(tree_type.values - wants.domain.known):
             raise _undeclared(tree, value, wants)
-    if kind.has_unit and found.unit and wants.unit and found.unit != wants.unit:
-        why = f"this is in {in_quotes(found.unit)}, and {in_quotes(wants.name)} in {in_quotes(wants.unit)}"
+    if kind.has_unit and tree_type.unit and wants.unit and tree_type.unit != wants.unit:
+        why = f"this is in {in_quotes(tree_type.unit)}, and {in_quotes(wants.name)} in {in_quotes(wants.unit)}"
         raise Refusal(tree.start, tree.stop, why, "one unit; a factor, as in * 3.6, takes a number out of its unit")
 
 
-def _fits(found: Kind, wants: Kind) -> bool:
+def _fits(kind: Kind, wants: Kind) -> bool:
     if wants.is_numeric:
-        return found.is_whole or (found.is_numeric and not wants.is_whole)
-    return found.family is wants.family and found.is_truth is wants.is_truth
+        return kind.is_whole or (kind.is_numeric and not wants.is_whole)
+    return kind.family is wants.family and kind.is_truth is wants.is_truth
 
 
-def _wrong_kind(tree: Node, found: Type, wants: Condition) -> Refusal:
+def _wrong_kind(tree: Node, tree_type: Type, wants: Condition) -> Refusal:
     kind = wants.domain.type
-    what = "not whole" if kind.is_whole and found.is_number else found.kind.value
+    what = "not whole" if kind.is_whole and tree_type.is_number else tree_type.kind.value
     meant = None
     if kind.is_truth and isinstance(tree, Number):
         meant = {0.0: "False", 1.0: "True"}.get(tree.value)

@@ -50,14 +50,14 @@ class UnknownName(Refusal):
 
 def fault_of(text: str, refusal: Refusal, read: Callable[[str], object]) -> ExpressionFault:
     """The fault of a refusal. Its mend is the whole text when all of its slips can be mended so that `read` takes it."""
-    found = f"{_excerpt(text, refusal.start)}, character {refusal.start + 1}: {refusal.why}."
+    problem = f"{_excerpt(text, refusal.start)}, character {refusal.start + 1}: {refusal.why}."
     whole = _mended(text, refusal, read)
     mend = ""
     if whole is not None and len(whole) <= SHOWN_CHARACTERS:
         mend = in_quotes(whole)
     elif refusal.meant is not None and refusal.meant.strip():
         mend = in_quotes(refusal.meant.strip())
-    return ExpressionFault(found, refusal.accepted, mend, rule=refusal.rule, text=text, start=refusal.start, stop=refusal.stop)
+    return ExpressionFault(problem, refusal.accepted, mend, rule=refusal.rule, text=text, start=refusal.start, stop=refusal.stop)
 
 
 def _excerpt(text: str, start: int) -> str:

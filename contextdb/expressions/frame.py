@@ -28,13 +28,14 @@ _COMPARE = {
 
 
 def run_frame(plan: Part, columns: Columns, n_contexts: int) -> Column:
+    """The values of a plan in N contexts, from the columns of the facts that it names."""
     blocks: list[Column] = []
     with np.errstate(all="ignore"):
         for start in range(0, max(n_contexts, 1), BLOCK):
             stop = min(start + BLOCK, n_contexts)
             part = {name: _cut(column, start, stop) for name, column in columns.items()}
             blocks.append(_spread(_run(plan, part), stop - start))
-    return _joined(blocks)
+    return _concatenated(blocks)
 
 
 def _cut(column: Column, start: int, stop: int) -> Column:
@@ -50,7 +51,7 @@ def _spread(value: Any, n_contexts: int) -> Column:
     return spread
 
 
-def _joined(blocks: Sequence[Column]) -> Column:
+def _concatenated(blocks: Sequence[Column]) -> Column:
     """The blocks as one column. What values a text can have is the plan's, so it is the same in every block."""
     first = blocks[0]
     if isinstance(first, Coded):
@@ -64,24 +65,24 @@ def _run(plan: Part, columns: Columns) -> Any:
 
 
 @_run.register
-def _(plan: Const, columns: Columns) -> Any:
+def _run_const(plan: Const, columns: Columns) -> Any:
     if isinstance(plan.value, bool):
         return np.asarray(YES if plan.value else NO)
     return Coded(np.array(0, np.int32), (plan.value,)) if isinstance(plan.value, str) else np.asarray(plan.value)
 
 
 @_run.register
-def _(plan: Given, columns: Columns) -> Any:
+def _run_given(plan: Given, columns: Columns) -> Any:
     return columns[plan.name]
 
 
 @_run.register
-def _(plan: Apply, columns: Columns) -> Any:
+def _run_apply(plan: Apply, columns: Columns) -> Any:
     return settled(plan.function.many(*[_run(part, columns) for part in plan.parts]))
 
 
 @_run.register
-def _(plan: Compare, columns: Columns) -> Any:
+def _run_compare(plan: Compare, columns: Columns) -> Any:
     values = [_run(part, columns) for part in plan.parts]
     answer: Any = YES
     for i, link in enumerate(plan.links):
@@ -118,7 +119,7 @@ def _recoded(column: Coded, like: Coded) -> NDArray[np.int32]:
 
 
 @_run.register
-def _(plan: Held, columns: Columns) -> Any:
+def _run_held(plan: Held, columns: Columns) -> Any:
     value, cell = _run(plan.part, columns), plan.cell
     if isinstance(value, Coded):
         return value.looked_up([YES if cell.holds(v) else NO for v in value.values], UNKNOWN, np.int8)
@@ -140,7 +141,7 @@ def _held(cell: Cell, values: Doubles) -> NDArray[np.bool_]:
 
 
 @_run.register
-def _(plan: Logic, columns: Columns) -> Any:
+def _run_logic(plan: Logic, columns: Columns) -> Any:
     join = np.minimum if plan.word == "and" else np.maximum
     answer = _run(plan.parts[0], columns)
     for part in plan.parts[1:]:
@@ -149,12 +150,12 @@ def _(plan: Logic, columns: Columns) -> Any:
 
 
 @_run.register
-def _(plan: Negation, columns: Columns) -> Any:
+def _run_negation(plan: Negation, columns: Columns) -> Any:
     return YES - _run(plan.part, columns)
 
 
 @_run.register
-def _(plan: Select, columns: Columns) -> Any:
+def _run_select(plan: Select, columns: Columns) -> Any:
     truth, then, otherwise = (_run(part, columns) for part in (plan.condition, plan.then, plan.otherwise))
     if isinstance(then, Coded):
         return _chosen_values(truth, then, otherwise)

@@ -1,11 +1,13 @@
-"""What may be after `in`: a list of constants, the tags of a fact, or the text of a cell. Each becomes a cell that is asked.
+"""What may be after `in`: a list of constants, the tags of a fact, or the text of a cell; and after `like`: a pattern. Each becomes
+a cell that is asked.
 
-gait in ["Walk", "Run"]      "InAir" in Defender.Tags      heading in "170..-170"
+gait in ["Walk", "Run"]      "InAir" in Defender.Tags      heading in "170..-170"      gait like "Walk*"
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from fnmatch import fnmatchcase
 
 from contextdb.cells import intervals
 from contextdb.cells.angles import wrap_angle
@@ -18,7 +20,7 @@ from contextdb.errors import CellError, in_quotes, nearest, some
 from contextdb.expressions.faults import Refusal
 from contextdb.expressions.plan import Const, Given, Held, Part, Type
 from contextdb.expressions.tokens import written_text
-from contextdb.expressions.tree import Membership, Node, Text
+from contextdb.expressions.tree import Likeness, Membership, Node, Text
 
 Choice = tuple[Node, Part, Type]
 
@@ -38,14 +40,29 @@ def holding(node: Membership, item: tuple[Part, Type], choices: Sequence[Choice]
     """The plan of `item in choices`. Raises Refusal where what is after `in` does not fit the item."""
     if isinstance(node.choices, tuple):
         return Held(item[0], Cell(_listed(node, item[1], choices)))
-    choice, plan, found = choices[0]
-    if found.kind.is_tags:
+    choice, plan, choice_type = choices[0]
+    if choice_type.kind.is_tags:
         return Held(plan, Cell(_tag(node.item, item[0], plan, conditions)))
     if not isinstance(choice, Text):
-        raise Refusal(choice.start, choice.stop, f'after "in" is {found.kind.value}', _AFTER_IN)
+        raise Refusal(choice.start, choice.stop, f'after "in" is {choice_type.kind.value}', _AFTER_IN)
     if isinstance(item[0], Const):
         raise Refusal(node.start, node.stop, 'there is no fact before or after "in"', 'a fact: speed in "0..5", "InAir" in Tags')
     return Held(item[0], _cell(choice, _domain(*item, conditions)))
+
+
+def matching(node: Likeness, item: Part, conditions: Mapping[str, Condition]) -> Held:
+    """The plan of `item like pattern`: the values that match, as names of files do. Raises Refusal where they are not known."""
+    domain = conditions[item.name].domain if isinstance(item, Given) else None
+    if domain is None or domain.values is None or domain.type.is_tags:
+        why = 'before "like" is nothing whose values are known'
+        raise Refusal(node.item.start, node.item.stop, why, 'a fact of type enum, or in a contract asset: asset like "carry*"')
+    if not isinstance(node.pattern, Text):
+        raise Refusal(node.pattern.start, node.pattern.stop, 'after "like" is no text', 'a pattern in quotes: "carry*"')
+    values = frozenset(value for value in domain.values if fnmatchcase(value, node.pattern.value))
+    if domain.type.needs_values and not values:
+        why = f"no declared value is like {in_quotes(node.pattern.value)}"
+        raise Refusal(node.pattern.start, node.pattern.stop, why, some(domain.values))
+    return Held(item, Cell(ValueSet(values)))
 
 
 def spelt(node: Text, kind: Kind) -> tuple[Part, Type]:
@@ -59,13 +76,13 @@ def spelt(node: Text, kind: Kind) -> tuple[Part, Type]:
 
 def spelt_alike(parts: Sequence[Choice]) -> list[tuple[Part, Type]]:
     """Parts that are compared; texts beside numbers that are spelt as texts become numbers."""
-    kind = next((found.kind for _, _, found in parts if found.kind.is_spelt), None)
-    return [spelt(n, kind) if kind and isinstance(n, Text) else (plan, found) for n, plan, found in parts]
+    kind = next((part_type.kind for _, _, part_type in parts if part_type.kind.is_spelt), None)
+    return [spelt(n, kind) if kind and isinstance(n, Text) else (plan, part_type) for n, plan, part_type in parts]
 
 
 def _listed(node: Membership, item: Type, choices: Sequence[Choice]) -> Accepted:
     if item.kind.is_spelt:
-        choices = [(n, *(spelt(n, item.kind) if isinstance(n, Text) else (plan, found))) for n, plan, found in choices]
+        choices = [(n, *(spelt(n, item.kind) if isinstance(n, Text) else (plan, choice_type))) for n, plan, choice_type in choices]
     if item.kind.is_tags or not choices:
         what = "a set of tags is in no list" if choices else "the list is empty"
         raise Refusal(node.start, node.stop, what, '"InAir" in Tags' if choices else 'gait in ["Walk", "Run"]')
@@ -79,11 +96,11 @@ def _listed(node: Membership, item: Type, choices: Sequence[Choice]) -> Accepted
     return NumberSet(item.kind.fitted(spans), item.kind.is_circular)
 
 
-def _constant(item: Type, choice: Node, plan: Part, found: Type) -> float | str | bool:
-    is_alike = (item.is_number and found.is_number) or (item.is_text and found.is_text) or item.kind is found.kind
+def _constant(item: Type, choice: Node, plan: Part, choice_type: Type) -> float | str | bool:
+    is_alike = (item.is_number and choice_type.is_number) or (item.is_text and choice_type.is_text) or item.kind is choice_type.kind
     if not is_alike:
         raise Refusal(
-            choice.start, choice.stop, f"{item.kind.value} is looked for, and this is {found.kind.value}", item.kind.value
+            choice.start, choice.stop, f"{item.kind.value} is looked for, and this is {choice_type.kind.value}", item.kind.value
         )
     if not isinstance(plan, Const):
         raise Refusal(choice.start, choice.stop, "a list holds constants", "a == b or a == c for facts")
@@ -106,10 +123,10 @@ def _undeclared(node: Node, value: str, known: Sequence[str], what: str) -> Refu
     return Refusal(node.start, node.stop, why, some(known), written_text(near) if near else None)
 
 
-def _domain(item: Part, found: Type, conditions: Mapping[str, Condition]) -> Domain:
+def _domain(item: Part, item_type: Type, conditions: Mapping[str, Condition]) -> Domain:
     if isinstance(item, Given):
         return conditions[item.name].domain
-    return TEXT if found.is_text else Domain(found.kind.name)
+    return TEXT if item_type.is_text else Domain(item_type.kind.name)
 
 
 def _cell(node: Text, domain: Domain, accepted: str = "") -> Cell:

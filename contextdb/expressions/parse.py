@@ -6,7 +6,7 @@ From loose to tight, as in Python:
     or
     and
     not
-    == != < <= > >=  in  not in       a < b < c is a < b and b < c
+    == != < <= > >=  in  not in  like  not like       a < b < c is a < b and b < c
     + -
     * / // %
     -x +x
@@ -27,6 +27,7 @@ from contextdb.expressions.tree import (
     Call,
     Comparison,
     Conditional,
+    Likeness,
     Logic,
     Membership,
     Name,
@@ -48,9 +49,9 @@ _BINDING = {
     **dict.fromkeys(("*", "/", "//", "%"), _MULTIPLY),
     "**": _POWER,
 }
-_WORDS = {"if": _CHOICE, "or": _OR, "and": _AND, "in": _COMPARE, "not": _COMPARE}
+_WORDS = {"if": _CHOICE, "or": _OR, "and": _AND, "in": _COMPARE, "like": _COMPARE, "not": _COMPARE}
 _TRUTHS = {"True": True, "False": False}
-_SLIPS = {"and": "and", "or": "or", "not": "not", "in": "in", "if": "if", "else": "else", "is": "==", "xor": "!=", "mod": "%"}
+_SLIPS = {word: word for word in ("and", "or", "not", "in", "like", "if", "else")} | {"is": "==", "xor": "!=", "mod": "%"}
 _REFUSED = {
     "for": "there are no loops",
     "lambda": "functions cannot be defined",
@@ -94,7 +95,7 @@ class _Parser:
             raise self._too_deep(self.token.start, self.token.stop)
         left = self._value(depth)
         while (binding := self._binding()) >= least:
-            left = self._joined(left, binding, depth)
+            left = self._continued(left, binding, depth)
             if left.depth > MOST_NESTED:
                 raise self._too_deep(left.start, left.stop)
         return left
@@ -108,16 +109,16 @@ class _Parser:
         if token.kind == "sign":
             return _BINDING.get(token.text, 0)
         if token.text == "not":
-            return _COMPARE if self.sees("not", "in") else 0
+            return _COMPARE if self.sees("not", "in") or self.sees("not", "like") else 0
         return _WORDS.get(token.text, 0) if token.is_bare else 0
 
-    def _joined(self, left: Node, binding: int, depth: int) -> Node:
+    def _continued(self, left: Node, binding: int, depth: int) -> Node:
         if binding == _CHOICE:
             return self._conditional(left, depth)
         if binding in (_OR, _AND):
             return self._logic(left, binding, depth)
         if binding == _COMPARE:
-            return self._membership(left, depth) if self.token.text in ("in", "not") else self._comparison(left, depth)
+            return self._comparison(left, depth) if self.token.kind == "sign" else self._chosen(left, depth)
         sign = self.take()
         right = self.expression(_SIGNED if binding == _POWER else binding + 1, depth + 1)
         return Arithmetic(left.start, right.stop, sign.text, sign.start, left, right)
@@ -147,10 +148,19 @@ class _Parser:
             raise self._no_chain()
         return Comparison(first.start, operands[-1].stop, tuple(operands), tuple(signs))
 
-    def _membership(self, item: Node, depth: int) -> Node:
-        is_negated = self.take().text == "not"
+    def _chosen(self, item: Node, depth: int) -> Node:
+        """What `in` or `like` asks of an item."""
+        is_negated = self.token.text == "not"
         if is_negated:
             self.take()
+        if self.take().text == "in":
+            return self._membership(item, is_negated, depth)
+        pattern = self.expression(_ADD, depth + 1)
+        if self._binding() == _COMPARE:
+            raise self._no_chain()
+        return Likeness(item.start, pattern.stop, item, pattern, is_negated)
+
+    def _membership(self, item: Node, is_negated: bool, depth: int) -> Node:
         if self.sees("["):
             self.take()
             choices: Node | tuple[Node, ...] = self._list("]", depth)
@@ -164,7 +174,10 @@ class _Parser:
 
     def _no_chain(self) -> Refusal:
         return Refusal(
-            self.token.start, self.token.stop, '"in" and other comparisons do not chain', "brackets, or two parts joined by and"
+            self.token.start,
+            self.token.stop,
+            '"in", "like" and other comparisons do not chain',
+            "brackets, or two parts joined by and",
         )
 
     def _list(self, end: str, depth: int) -> tuple[Node, ...]:

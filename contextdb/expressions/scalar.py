@@ -45,22 +45,23 @@ def _parts(plan: Part) -> tuple[Part, ...]:
 
 @singledispatch
 def runner(plan: Part) -> Run:
+    """The function of the facts that computes a plan."""
     raise AssertionError(plan)
 
 
 @runner.register
-def _(plan: Const) -> Run:
+def _runner_const(plan: Const) -> Run:
     value = plan.value
     return lambda facts: value
 
 
 @runner.register
-def _(plan: Given) -> Run:
+def _runner_given(plan: Given) -> Run:
     return operator.itemgetter(plan.name)
 
 
 @runner.register
-def _(plan: Apply) -> Run:
+def _runner_apply(plan: Apply) -> Run:
     one, parts = plan.function.one, [runner(part) for part in plan.parts]
 
     def run(facts: Facts) -> Value:
@@ -71,7 +72,7 @@ def _(plan: Apply) -> Run:
 
 
 @runner.register
-def _(plan: Compare) -> Run:
+def _runner_compare(plan: Compare) -> Run:
     first, *rest = [runner(part) for part in plan.parts]
     links = [(_test(link), part) for link, part in zip(plan.links, rest, strict=True)]
 
@@ -115,7 +116,7 @@ def _high(value: Value) -> Value:
 
 
 @runner.register
-def _(plan: Held) -> Run:
+def _runner_held(plan: Held) -> Run:
     part, holds = runner(plan.part), plan.cell.holds
 
     def run(facts: Facts) -> Value:
@@ -126,7 +127,7 @@ def _(plan: Held) -> Run:
 
 
 @runner.register
-def _(plan: Logic) -> Run:
+def _runner_logic(plan: Logic) -> Run:
     parts, decides = [runner(part) for part in plan.parts], plan.word == "or"
 
     def run(facts: Facts) -> Value:
@@ -142,7 +143,7 @@ def _(plan: Logic) -> Run:
 
 
 @runner.register
-def _(plan: Negation) -> Run:
+def _runner_negation(plan: Negation) -> Run:
     part = runner(plan.part)
 
     def run(facts: Facts) -> Value:
@@ -153,7 +154,7 @@ def _(plan: Negation) -> Run:
 
 
 @runner.register
-def _(plan: Select) -> Run:
+def _runner_select(plan: Select) -> Run:
     condition, then, otherwise = runner(plan.condition), runner(plan.then), runner(plan.otherwise)
     missing = float("nan") if is_number(plan) else None
 
@@ -165,6 +166,7 @@ def _(plan: Select) -> Run:
 
 
 def is_number(plan: Part) -> bool:
+    """Whether the value of a plan is a number, so that a missing one is NaN."""
     if isinstance(plan, Select):
         return is_number(plan.then)
     if isinstance(plan, Const):

@@ -19,7 +19,7 @@ from contextdb.expressions.faults import Refusal
 MOST_CHARACTERS = 4000
 """A longer expression is refused: nobody could read it, and the work on it stays bounded."""
 
-RESERVED = frozenset(("and", "or", "not", "in", "if", "else", "True", "False"))
+RESERVED = frozenset(("and", "or", "not", "in", "like", "if", "else", "True", "False"))
 """Words of the language; a condition of such a name is in backquotes."""
 
 TokenKind = Literal["number", "text", "name", "sign", "end"]
@@ -78,13 +78,13 @@ def tokens_of(text: str) -> list[Token]:
     in an expression."""
     if len(text) > MOST_CHARACTERS:
         raise Refusal(0, len(text), f"the expression has {len(text):,} characters", f"at most {MOST_CHARACTERS:,}")
-    found: list[Token] = []
+    tokens: list[Token] = []
     at = _next(text, 0)
     while at < len(text):
         token = _token(text, at)
-        found.append(token)
+        tokens.append(token)
         at = _next(text, token.stop)
-    return [*found, Token("end", "", len(text.rstrip()))]
+    return [*tokens, Token("end", "", len(text.rstrip()))]
 
 
 def _next(text: str, at: int) -> int:
@@ -120,15 +120,15 @@ def _number(text: str, number: re.Match[str]) -> Token:
 
 
 def _slip(text: str, at: int) -> Refusal:
-    found = _SLIP.match(text, at)
-    sign = found[0] if found else text[at]
+    match = _SLIP.match(text, at)
+    sign = match[0] if match else text[at]
     if sign in ('"', "'", "`"):
         return Refusal(
             at, len(text), f"the quote {sign} is not closed", "a text in quotes; a quote inside is doubled", text[at:] + sign
         )
     why = _WHY.get(sign, f"{in_quotes(sign)} is not a sign of an expression")
     meant = _MEANT.get(sign)
-    accepted = _ACCEPTED.get(sign[:2], "" if meant else "+ - * / // % ** == != < <= > >= and or not in if else")
+    accepted = _ACCEPTED.get(sign[:2], "" if meant else "+ - * / // % ** == != < <= > >= and or not in like if else")
     return Refusal(at, at + len(sign), why, accepted, meant)
 
 

@@ -117,6 +117,19 @@ class Membership(Node):
 
 
 @dataclass(frozen=True)
+class Likeness(Node):
+    """`item like pattern`, or `not like`."""
+
+    item: Node
+    pattern: Node
+    is_negated: bool
+
+    @property
+    def parts(self) -> tuple[Node, ...]:
+        return (self.item, self.pattern)
+
+
+@dataclass(frozen=True)
 class Conditional(Node):
     """`then if condition else otherwise`."""
 

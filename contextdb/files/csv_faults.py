@@ -24,7 +24,7 @@ MOST_FAULTS = 20
 CONFLICT, CONFLICT_END = b"<<<<<<<", b">>>>>>>"
 """What git writes at the start of the lines round two versions of a file that disagree."""
 
-Found = tuple[int | None, Fault]
+PlacedFault = tuple[int | None, Fault]
 """A fault, and the byte that it is about."""
 
 _PAIR = re.compile(rb"[+-]?[\d.]+, *[\d.]+")
@@ -32,14 +32,14 @@ _PAIR = re.compile(rb"[+-]?[\d.]+, *[\d.]+")
 
 def record_faults(raw: bytes, records: Records, strays: list[Stray], file: str) -> list[Fault]:
     """Every fault in the form of the records, in the order of lines."""
-    found = list(_conflict_faults(raw, records))
-    if not found:
-        found = [*_stray_faults(raw, strays), *_ragged_faults(raw, records), *_long_faults(raw, records)]
-    placed = [fault.at(Place(file, None if at is None else line_of(raw, at))) for at, fault in found]
+    faults = list(_conflict_faults(raw, records))
+    if not faults:
+        faults = [*_stray_faults(raw, strays), *_ragged_faults(raw, records), *_long_faults(raw, records)]
+    placed = [fault.at(Place(file, None if at is None else line_of(raw, at))) for at, fault in faults]
     return sorted(placed, key=lambda fault: fault.place.line or math.inf)
 
 
-def _conflict_faults(raw: bytes, records: Records) -> Iterator[Found]:
+def _conflict_faults(raw: bytes, records: Records) -> Iterator[PlacedFault]:
     """Unresolved git conflicts. Nothing else is reported with them: which rows there are is not decided yet."""
     firsts = np.frombuffer(raw, np.uint8)[records.starts]
     at = records.starts[(firsts == CONFLICT[0]) | (firsts == CONFLICT_END[0])]
@@ -55,7 +55,7 @@ def _conflict_faults(raw: bytes, records: Records) -> Iterator[Found]:
             yield start, Fault("this line is a conflict mark of git.", "one version of each row", "to delete the line")
 
 
-def _stray_faults(raw: bytes, strays: list[Stray]) -> Iterator[Found]:
+def _stray_faults(raw: bytes, strays: list[Stray]) -> Iterator[PlacedFault]:
     for stray in strays[:MOST_STRAYS]:
         yield stray.opening, _stray_fault(raw, stray)
     if len(strays) > MOST_STRAYS:
@@ -72,11 +72,11 @@ def _stray_fault(raw: bytes, stray: Stray) -> Fault:
         return Fault(f"the quoted field that opens here is never closed: {line}.", accepted, "to close it on this line")
     n_lines = line_of(raw, stray.closing) - line_of(raw, stray.opening)
     if n_lines:
-        found = f"the quoted field that opens here runs on for {plural(n_lines, 'line')} and past the next quote: {line}."
-        return Fault(found, accepted, "to close it on this line")
+        problem = f"the quoted field that opens here runs on for {plural(n_lines, 'line')} and past the next quote: {line}."
+        return Fault(problem, accepted, "to close it on this line")
     field = raw[stray.opening : stray.closing].decode() + _line_at(raw, stray.closing).split(",", 1)[0]
-    found = f"the field {in_quotes(field)} continues after its closing quote."
-    return Fault(found, accepted, _doubled(field[1:].removesuffix('"')))
+    problem = f"the field {in_quotes(field)} continues after its closing quote."
+    return Fault(problem, accepted, _doubled(field[1:].removesuffix('"')))
 
 
 def _field_start(raw: bytes, position: int) -> int:
@@ -93,7 +93,7 @@ def _doubled(text: str) -> str:
     return as_field(text, is_quoted=True).decode() if len(text) <= 60 else ""
 
 
-def _ragged_faults(raw: bytes, records: Records) -> Iterator[Found]:
+def _ragged_faults(raw: bytes, records: Records) -> Iterator[PlacedFault]:
     """Rows with more or fewer fields than the header; those with stray quotes cannot be counted and have their fault already."""
     rows = 1 + np.flatnonzero(records.is_sound[1:])
     if not records.is_sound[0] or not len(rows):
@@ -102,14 +102,14 @@ def _ragged_faults(raw: bytes, records: Records) -> Iterator[Found]:
     usual = _usual(counts, header)
     if usual != header:
         agree = f"{np.count_nonzero(counts == usual):,} of {plural(len(counts), 'row')}"
-        found = f"the header has {plural(header, 'field')}, but {agree} have {usual:,}."
-        yield int(records.starts[0]), Fault(found, "one name for each field of a row")
+        problem = f"the header has {plural(header, 'field')}, but {agree} have {usual:,}."
+        yield int(records.starts[0]), Fault(problem, "one name for each field of a row")
     wrong = rows[counts != usual]
-    said = f"the header has {usual:,}" if usual == header else f"most rows have {usual:,}"
+    usual_text = f"the header has {usual:,}" if usual == header else f"most rows have {usual:,}"
     for record in wrong[:MOST_FAULTS].tolist():
-        yield int(records.starts[record]), _ragged_fault(raw, records, record, usual, said)
+        yield int(records.starts[record]), _ragged_fault(raw, records, record, usual, usual_text)
     if len(wrong) > MOST_FAULTS:
-        yield None, Fault(f"{plural(len(wrong) - MOST_FAULTS, 'more row')} of another length; {said}.")
+        yield None, Fault(f"{plural(len(wrong) - MOST_FAULTS, 'more row')} of another length; {usual_text}.")
 
 
 def _usual(counts: Positions, header: int) -> int:
@@ -118,13 +118,13 @@ def _usual(counts: Positions, header: int) -> int:
     return int(values[times.argmax()]) if len(counts) >= 3 and 2 * times.max() > len(counts) else header
 
 
-def _ragged_fault(raw: bytes, records: Records, record: int, usual: int, said: str) -> Fault:
+def _ragged_fault(raw: bytes, records: Records, record: int, usual: int, usual_text: str) -> Fault:
     start, stop, n_fields = int(records.starts[record]), int(records.stops[record]), int(records.n_fields[record])
-    found = f"found {plural(n_fields, 'field')}, {said}."
+    problem = f"found {plural(n_fields, 'field')}, {usual_text}."
     if n_fields < usual:
-        return Fault(found, "a field for each column, empty ones for Any")
+        return Fault(problem, "a field for each column, empty ones for Any")
     fields = fields_of(raw[start:stop], n_fields) if stop - start <= MOST_CHARACTERS else []
-    return Fault(found, "a cell with a comma in it in double quotes", _pair_in_quotes(fields))
+    return Fault(problem, "a cell with a comma in it in double quotes", _pair_in_quotes(fields))
 
 
 def _pair_in_quotes(fields: list[bytes]) -> str:
@@ -133,7 +133,7 @@ def _pair_in_quotes(fields: list[bytes]) -> str:
     return next((f'"{pair.decode()}", in quotes' for pair in pairs if _PAIR.fullmatch(pair)), "")
 
 
-def _long_faults(raw: bytes, records: Records) -> Iterator[Found]:
+def _long_faults(raw: bytes, records: Records) -> Iterator[PlacedFault]:
     is_long = records.is_sound & (records.stops - records.starts > MOST_CHARACTERS)
     for record in np.flatnonzero(is_long)[:MOST_FAULTS].tolist():
         start, stop = int(records.starts[record]), int(records.stops[record])
@@ -142,5 +142,5 @@ def _long_faults(raw: bytes, records: Records) -> Iterator[Found]:
         for at in np.flatnonzero(lasts[0] - firsts[0] > MOST_CHARACTERS).tolist():
             size = len(text_of(line[firsts[0, at] : lasts[0, at]]))
             if size > MOST_CHARACTERS:
-                found = f"field {at + 1:,} has {size:,} characters."
-                yield start, Fault(found, f"at most {MOST_CHARACTERS:,} characters in a cell")
+                problem = f"field {at + 1:,} has {size:,} characters."
+                yield start, Fault(problem, f"at most {MOST_CHARACTERS:,} characters in a cell")

@@ -193,8 +193,8 @@ def _has_strays(quotes: Words, inside: Words, edges: Words) -> bool:
 def _settled_quotes(octets: Octets, quotes: Positions, line_ends: Positions) -> tuple[Positions, list[Stray]]:
     """The quotes without those of faulty fields, and these fields. After a fault, reading starts from scratch on the next line."""
     settled, strays, rest = [], list[Stray](), quotes
-    while (found := _first_stray(octets, rest)) is not None:
-        first, last = found
+    while (stray := _first_stray(octets, rest)) is not None:
+        first, last = stray
         opening, closing = int(rest[first]), int(rest[last]) if last < len(rest) else None
         strays.append(Stray(opening, closing, not _EDGE[octets[opening - 1]]))
         line_end = line_ends[np.searchsorted(line_ends, opening)]

@@ -9,17 +9,24 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
-import polars as pl
 
 from contextdb.columns import TextColumn
 from contextdb.errors import Fault, Place, TableError, in_quotes
 from contextdb.files.csv_faults import record_faults
-from contextdb.files.csv_records import CR, LF, Positions, Records, fields_of, find_records, line_ends, text_of
+from contextdb.files.csv_records import CR, LF, Positions, Records, field_bounds, fields_of, find_records, line_ends, text_of
 from contextdb.files.strangers import UTF8_BOM, line_of, require_text, seems_json
 
+if TYPE_CHECKING:
+    import polars as pl
+else:
+    from contextdb.columns import polars as pl
+
 MOST_NAME_FAULTS = 20
+FEW_CELLS = 50_000
+"""A file of so many cells is read by Python: it takes no longer than to load polars."""
 FEW_ROWS = 1000
 """Columns of so few rows are gone through by Python, which takes less time than to ask polars about a column."""
 FEW_TEXTS = 8
@@ -84,7 +91,8 @@ def read_csv(raw: bytes, file: str) -> tuple[Source, list[TextColumn]]:
     """
     records, names = find_rows(raw, file)
     starts, stops = records.starts[1:], records.stops[1:]
-    columns = text_columns(read_rows(raw, starts, stops, names), names) if len(starts) else [TextColumn.of(n, ()) for n in names]
+    is_small = len(starts) * len(names) <= FEW_CELLS
+    columns = _read_few(raw, starts, stops, names) if is_small else text_columns(read_rows(raw, starts, stops, names), names)
     return Source(raw, np.append(records.starts, len(raw)), records.stops, tuple(columns)), columns
 
 
@@ -102,6 +110,16 @@ def find_rows(raw: bytes, file: str) -> tuple[Records, list[str]]:
         hint = [Fault("not a CSV file: looks like JSON.", "CSV text in UTF-8", place=Place(file))] if seems_json(raw) else []
         raise TableError(*hint, *faults)
     return records, names
+
+
+def _read_few(raw: bytes, starts: Positions, stops: Positions, names: Sequence[str]) -> list[TextColumn]:
+    """The columns of a small file, without polars, which takes longer to load."""
+    chunk = b"".join(raw[a:b] for a, b in zip(starts.tolist(), stops.tolist(), strict=True))
+    begins, ends = (each.T.tolist() for each in field_bounds(chunk, stops - starts, len(names)))
+    return [
+        TextColumn.of(name, [text_of(chunk[a:b]) for a, b in zip(*fields, strict=True)])
+        for name, *fields in zip(names, begins, ends, strict=True)
+    ]
 
 
 def read_rows(
@@ -122,8 +140,8 @@ def name_faults(names: Sequence[str]) -> Iterator[Fault]:
     faults = list(_name_faults(names))
     yield from faults[:MOST_NAME_FAULTS]
     if len(faults) > MOST_NAME_FAULTS:
-        found = f"there are {len(faults) - MOST_NAME_FAULTS:,} more such column names."
-        yield Fault(found, "a name for each column, each name once")
+        problem = f"there are {len(faults) - MOST_NAME_FAULTS:,} more such column names."
+        yield Fault(problem, "a name for each column, each name once")
 
 
 def _name_faults(names: Sequence[str]) -> Iterator[Fault]:

@@ -14,20 +14,24 @@ FORMAT = 1
 
 
 def line_of(record: Record) -> bytes:
+    """A record as a line: the CRC-32 of its JSON, then the JSON."""
     body = json.dumps(record, ensure_ascii=True, separators=(",", ":")).encode()
     return b"%08x %s\n" % (zlib.crc32(body), body)
 
 
 def read_records(raw: bytes) -> tuple[list[Record], int]:
-    """The records of a journal up to the first line that is cut or altered, and how many bytes they take."""
-    records, at = [], 0
+    """The records of a journal up to the first line that is cut, altered or no record, and how many bytes they take."""
+    records: list[Record] = []
+    at = 0
     for line in raw.splitlines(keepends=True):
         body = line[9:-1]
         try:
             if not line.endswith(b"\n") or line[:9] != b"%08x " % zlib.crc32(body):
                 break
             record = json.loads(body)
-        except ValueError:
+        except (ValueError, RecursionError):
+            break
+        if not isinstance(record, dict):
             break
         records.append(record)
         at += len(line)

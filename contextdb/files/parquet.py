@@ -14,28 +14,34 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
+from typing import TYPE_CHECKING
 
 import numpy as np
-import polars as pl
 from numpy.typing import NDArray
 
 from contextdb.bitmask import Flags
 from contextdb.cells.words import NUMBER_TEXT, quoted, says_any, truth_of
 from contextdb.columns import TextColumn
-from contextdb.errors import Fault, Place, TableError, row_name, shown
+from contextdb.errors import Fault, Place, TableError, plural, row_name, safe_text
 from contextdb.files.csv_faults import MOST_CHARACTERS
 from contextdb.files.csv_rewrite import Origin, changed_rows, source_fields
 from contextdb.files.csv_source import name_faults, text_columns
 from contextdb.files.parquet_frame import MAGIC, UNSEALED, DamagedFrame, require_whole, sealed
 from contextdb.files.strangers import seems_to_be
 
+if TYPE_CHECKING:
+    import polars as pl
+else:
+    from contextdb.columns import polars as pl
+
 _ACCEPTED = "strings, categories, bools, numbers, dates, and lists of strings"
+MOST_ROWS, MOST_CELLS = 10_000_000, 100_000_000
+"""Of a table. Equal cells take no room in a file, and some 60 bytes each in memory."""
 _WHOLE = re.compile(r"[+-]?\d{1,40}")
 _NUMBER = re.compile(NUMBER_TEXT)
 _NAME = re.compile(r'(?:"((?:[^"]|"")*)"|([^\s"]+))(?:\s+|\Z)')
 _UNFIT = object()
 """The mark of a text that has no value in a type."""
-_STRINGS = (pl.String, pl.Categorical, pl.Enum)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,12 +113,18 @@ def _frame(raw: bytes, file: str) -> pl.DataFrame:
     if fault:
         raise TableError(fault.at(Place(file)))
     try:
-        require_whole(raw)
+        about = require_whole(raw)
+        if about.n_rows > MOST_ROWS or about.n_rows * about.n_columns > MOST_CELLS:
+            problem = f"the file has {plural(about.n_rows, 'row')} of {plural(about.n_columns, 'column')}."
+            accepted = f"at most {MOST_ROWS:,} rows and {MOST_CELLS:,} cells"
+            raise TableError(Fault(problem, accepted, place=Place(file), rule="too-many-rows"))
         return pl.read_parquet(io.BytesIO(raw))
     except DamagedFrame as error:
         reason = str(error)
     except pl.exceptions.PolarsError as error:
-        reason = shown(str(error).split("\n")[0], 200)
+        reason = safe_text(str(error).split("\n")[0], 200)
+    except (TableError, MemoryError):
+        raise
     except (Exception, pl.exceptions.PanicException):  # some damage makes polars panic instead of raise
         reason = "its parts contradict each other"
     raise TableError(Fault(f"the file is damaged: {reason}.", "a Parquet file as it was written", place=Place(file)))
@@ -134,9 +146,13 @@ def _no_parquet(raw: bytes) -> Fault | None:
     return None
 
 
+def _strings() -> tuple[type[pl.DataType], ...]:
+    return pl.String, pl.Categorical, pl.Enum
+
+
 def _type_faults(series: pl.Series) -> Iterator[Fault]:
     dtype = series.dtype
-    if isinstance(dtype, pl.List) and isinstance(dtype.inner, _STRINGS):
+    if isinstance(dtype, pl.List) and isinstance(dtype.inner, _strings()):
         if series.list.len().eq(0).any():
             yield Fault("a list without names in it, which would match nothing.", "null for Any, or at least one name")
         if series.list.eval(pl.element().is_null()).list.any().any():
@@ -147,7 +163,7 @@ def _type_faults(series: pl.Series) -> Iterator[Fault]:
             yield Fault(
                 f"the column has {has}.", "days: dates, or midnights without a time zone", "to write it as dates or strings"
             )
-    elif not (isinstance(dtype, (*_STRINGS, pl.Boolean, pl.Date, pl.Null)) or dtype.is_integer() or dtype.is_float()):
+    elif not (isinstance(dtype, (*_strings(), pl.Boolean, pl.Date, pl.Null)) or dtype.is_integer() or dtype.is_float()):
         yield Fault(f"the column is of type {dtype}.", _ACCEPTED, "to write it as strings")
 
 
@@ -263,7 +279,7 @@ def _float(text: str, dtype: pl.DataType) -> object:
 def _names(text: str) -> object:
     """The names of a plain enum set."""
     names, at = [], 0
-    while found := _NAME.match(text, at):
-        names.append(found[2] if found[1] is None else found[1].replace('""', '"'))
-        at = found.end()
+    while match := _NAME.match(text, at):
+        names.append(match[2] if match[1] is None else match[1].replace('""', '"'))
+        at = match.end()
     return names if at == len(text) and " ".join(map(quoted, names)) == text else _UNFIT

@@ -4,8 +4,9 @@ The frame is the footer, the column chunks and the page headers. A damaged count
 memory than there is, and that ends the whole process: no Python handler sees it. So nothing is decoded whose counts and sizes
 contradict each other. Only the frame is read, a few dozen bytes a page.
 
-The metadata of a sealed file hold the BLAKE2b-128 digest of all its bytes, those of the digest itself taken as zeros. A program
-that edits the file and keeps its metadata leaves its own name as the writer, and the seal no longer counts.
+The metadata of a sealed file hold the BLAKE2b-128 digest of all its bytes, those of the digest itself taken as zeros. Two entries
+mark a file as ours, so that one damaged bit cannot make it a file of another program. A program that edits the file and keeps its
+metadata leaves its own name as the writer, and the seal no longer counts.
 
 Source: apache/parquet-format, README and parquet.thrift; the Thrift compact protocol, apache/thrift doc/specs.
 """
@@ -21,8 +22,13 @@ from typing import Any
 
 MAGIC = b"PAR1"
 SEAL = "contextdb.seal"
-UNSEALED = {SEAL: "0" * 32}
+UNSEALED = {"contextdb.file": "sealed", SEAL: "0" * 32}
 """The metadata with which a file is written that is then sealed."""
+_SEAL_HEAD = b"\x18%c%s\x18\x20" % (len(SEAL), SEAL.encode())
+_MARK = b"\x18%c%s\x18\x06sealed" % (len("contextdb.file"), b"contextdb.file")
+"""The entries of `UNSEALED` as the file has them: in Thrift each text follows the head of its field and its length."""
+_WRITER = b"Polars"
+_N_DIGITS = 32
 MOST_VALUES = 1 << 31
 """So many values, nulls included, may a file hold that is read as a whole; polars numbers rows with 32 bits."""
 _MOST_DEPTH = 32
@@ -49,11 +55,10 @@ class Frame:
     """The program that wrote the file, with its version."""
     start: int
     """Where the end begins."""
-
-    @property
-    def is_sealed(self) -> bool:
-        """Whether the file holds the digest of its bytes."""
-        return SEAL in self.metadata and self.writer.startswith("Polars")
+    is_sealed: bool
+    """Whether the file is one of ours, which holds the digest of its bytes."""
+    n_rows: int
+    n_columns: int
 
 
 def require_whole(raw: bytes | memoryview, most_values: int | None = MOST_VALUES) -> Frame:
@@ -61,7 +66,7 @@ def require_whole(raw: bytes | memoryview, most_values: int | None = MOST_VALUES
     hold; None where it is read a batch at a time. Raises DamagedFrame where counts and sizes do not agree with each other or with
     the file's length, or the digest is another."""
     frame = _checked(raw, most_values)
-    if frame.is_sealed and _digest(raw, frame) != frame.metadata[SEAL]:
+    if frame.is_sealed and _digest(raw, at := _seal_at(raw, frame)) != bytes(raw[at : at + _N_DIGITS]):
         raise DamagedFrame("it was altered after it was saved: its contents do not match its digest")
     return frame
 
@@ -78,26 +83,31 @@ def require_whole_file(path: str | PathLike[str]) -> Frame:
 
 def sealed(raw: bytes) -> bytes:
     """A file that was written with the metadata `UNSEALED`, with its digest."""
-    frame = _checked(raw, None)
-    at = _seal_at(raw, frame)
-    return raw[:at] + _digest(raw, frame).encode() + raw[at + len(UNSEALED[SEAL]) :]
+    at = _seal_at(raw, _checked(raw, None))
+    return raw[:at] + _digest(raw, at) + raw[at + _N_DIGITS :]
 
 
 def _seal_at(raw: bytes | memoryview, frame: Frame) -> int:
     """Where the digest is in the file."""
-    digest, end = frame.metadata[SEAL], bytes(raw[frame.start :])
-    at = end.rfind(digest.encode())
-    if at < 0 or len(digest) != len(UNSEALED[SEAL]):
-        raise DamagedFrame("its digest cannot be read")
-    return frame.start + at
+    at = bytes(raw[frame.start :]).rfind(_SEAL_HEAD)
+    if at < 0:
+        raise DamagedFrame("it was altered after it was saved: its digest is missing")
+    return frame.start + at + len(_SEAL_HEAD)
 
 
-def _digest(raw: bytes | memoryview, frame: Frame) -> str:
-    at = _seal_at(raw, frame)
+def _digest(raw: bytes | memoryview, at: int) -> bytes:
+    """The digest of a file whose own digest begins at `at`."""
     digest = hashlib.blake2b(raw[:at], digest_size=16)
-    digest.update(b"0" * len(frame.metadata[SEAL]))
-    digest.update(raw[at + len(frame.metadata[SEAL]) :])
-    return digest.hexdigest()
+    digest.update(b"0" * _N_DIGITS)
+    digest.update(raw[at + _N_DIGITS :])
+    return digest.hexdigest().encode()
+
+
+def _is_sealed(end: bytes, writer: bytes) -> bool:
+    """Whether one of the two marks is in the end of a file, and the writer is that of our files or one damaged bit from it."""
+    n_other_bits = sum((one ^ other).bit_count() for one, other in zip(writer, _WRITER, strict=False))
+    is_writer = len(writer) >= len(_WRITER) and n_other_bits < 2
+    return (_SEAL_HEAD in end or _MARK in end) and (is_writer or _WRITER in end)
 
 
 def _checked(raw: bytes | memoryview, most_values: int | None) -> Frame:
@@ -119,7 +129,10 @@ def _checked(raw: bytes | memoryview, most_values: int | None) -> Frame:
         for chunk, is_flat in zip(chunks, leaves, strict=True):
             _check_chunk(raw, body, _field(chunk, 3, dict), _count(group, 3) if is_flat else None)
     pairs = _structs(footer, 5) if 5 in footer else []
-    return Frame({_text(pair, 1): _text(pair, 2) for pair in pairs if 2 in pair}, _text(footer, 6) if 6 in footer else "", body)
+    metadata = {_text(pair, 1): _text(pair, 2) for pair in pairs if 2 in pair}
+    writer: bytes = _field(footer, 6, bytes) if 6 in footer else b""
+    is_sealed = _is_sealed(bytes(raw[body:]), writer)
+    return Frame(metadata, writer.decode("utf-8", "replace"), body, is_sealed, n_rows, len(leaves))
 
 
 def _leaves(schema: Sequence[Struct]) -> list[bool]:
@@ -215,8 +228,6 @@ class _Reader:
 
     def struct(self, depth: int = 0) -> dict[int, Any]:
         """The fields by number."""
-        if depth > _MOST_DEPTH:
-            raise DamagedFrame("its description is nested too deep")
         fields: dict[int, Any] = {}
         number = 0
         while head := self._byte():
@@ -226,6 +237,8 @@ class _Reader:
         return fields
 
     def _value(self, kind: int, depth: int) -> Any:
+        if depth > _MOST_DEPTH:
+            raise DamagedFrame("its description is nested too deep")
         match kind:
             case 1 | 2:  # in a list a bool takes a byte of its own
                 return self._byte() == 1
@@ -238,9 +251,9 @@ class _Reader:
             case 8:
                 return self._bytes(self._varint())
             case 9 | 10:
-                return list(self._items(depth))
+                return list(self._items(depth + 1))
             case 11:
-                return self._pairs(depth)
+                return self._pairs(depth + 1)
             case 12:
                 return self.struct(depth + 1)
             case _:
@@ -252,7 +265,7 @@ class _Reader:
         if size > self.stop - self.at:
             raise DamagedFrame("a list in its description is longer than the file")
         for _ in range(size):
-            yield self._value(head & 15, depth + 1)
+            yield self._value(head & 15, depth)
 
     def _pairs(self, depth: int) -> None:
         size = self._varint()
@@ -260,8 +273,8 @@ class _Reader:
         if size > self.stop - self.at:
             raise DamagedFrame("a list in its description is longer than the file")
         for _ in range(size):
-            self._value(kinds >> 4, depth + 1)
-            self._value(kinds & 15, depth + 1)
+            self._value(kinds >> 4, depth)
+            self._value(kinds & 15, depth)
 
     def _byte(self) -> int:
         if self.at >= self.stop:

@@ -89,8 +89,8 @@ def other_delimiter(line: bytes) -> tuple[int, str] | None:
 def _empty(raw: bytes) -> Fault | None:
     if _LINE.search(raw, len(UTF8_BOM) if raw.startswith(UTF8_BOM) else 0):
         return None
-    found = "the file is empty." if not raw else "the file holds blank lines only."
-    return Fault(found, "a header line with the names of the columns, then one line for each asset")
+    problem = "the file is empty." if not raw else "the file holds blank lines only."
+    return Fault(problem, "a header line with the names of the columns, then one line for each asset")
 
 
 def _binary(raw: bytes) -> Fault | None:
@@ -103,8 +103,8 @@ def _binary(raw: bytes) -> Fault | None:
         return None
     if fault := other_kind(raw):
         return fault
-    found = f"not a text file: it contains {plural(raw.count(0), 'NUL byte')}, the first on this line."
-    return Fault(found, "CSV text in UTF-8", place=Place(line=line_of(raw, nul)))
+    problem = f"not a text file: it contains {plural(raw.count(0), 'NUL byte')}, the first on this line."
+    return Fault(problem, "CSV text in UTF-8", place=Place(line=line_of(raw, nul)))
 
 
 def looks_utf16(raw: bytes) -> bool:
@@ -130,16 +130,16 @@ def _not_utf8(raw: bytes) -> Fault | None:
         byte = raw[error.start : error.start + 1]
         read = byte.decode("cp1252", "ignore")
         hint = f" (in Windows-1252 it would be {in_quotes(read)})" if read else ""
-        found = f"byte 0x{byte[0]:02X} on this line is not UTF-8{hint}."
-        return Fault(found, "UTF-8, with or without BOM", _SAVE_AS_UTF8, Place(line=line_of(raw, error.start)))
+        problem = f"byte 0x{byte[0]:02X} on this line is not UTF-8{hint}."
+        return Fault(problem, "UTF-8, with or without BOM", _SAVE_AS_UTF8, Place(line=line_of(raw, error.start)))
     return None
 
 
 def _delimited_otherwise(raw: bytes) -> Fault | None:
     header = _LINE.search(raw, len(UTF8_BOM) if raw.startswith(UTF8_BOM) else 0)
-    found = header and other_delimiter(header[0])
-    if not header or not found:
+    delimiter = header and other_delimiter(header[0])
+    if not header or not delimiter:
         return None
     line = line_of(raw, header.start())
-    said = f"the header has no comma but {plural(*found)}."
-    return Fault(said, "commas between fields", "to save it with commas", Place(line=line))
+    problem = f"the header has no comma but {plural(*delimiter)}."
+    return Fault(problem, "commas between fields", "to save it with commas", Place(line=line))

@@ -23,10 +23,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.disk import read_bytes, write_atomic
+from contextdb.disk import TENSORS_SUFFIX, read_bytes, write_atomic
 from contextdb.errors import ArtefactError, ContextDBError, Fault, Place
 
-SUFFIX = ".safetensors"
+SUFFIX = TENSORS_SUFFIX
 
 Tensors = dict[str, NDArray[Any]]
 
@@ -38,17 +38,14 @@ _BROKEN = (ValueError, KeyError, TypeError, IndexError, UnicodeDecodeError, Attr
 
 @dataclass(frozen=True)
 class FileKind:
-    """A sort of file. The metadata hold the version of its layout under `key`: `layout` is written and read, those in `also` are
-    read too. Messages about a file that cannot be used name what it is not (`found`, such as "one that contextdb compiled"), what
-    is `accepted`, the mend and, for an older file, what has changed `since`."""
+    """A sort of file. The metadata hold the version of its layout under `key`. Messages about a file that cannot be used name what
+    it is not (`noun`, such as "one that contextdb compiled"), what is `accepted`, and the mend."""
 
     key: str
     layout: int
-    found: str
+    noun: str
     accepted: str
     mend: str
-    also: tuple[int, ...] = ()
-    since: str = ""
 
     def metadata(self, others: Mapping[str, str]) -> dict[str, str]:
         """The metadata of a file of this kind, and others."""
@@ -98,17 +95,15 @@ def read_tensors(path: Path, kind: FileKind, *, writeable: bool = False) -> tupl
     Raises ArtefactError where the file is truncated, of another kind or of another layout; FileError where it cannot be read.
     """
     if kind.key not in metadata_of(path, kind):
-        raise kind.refused(path, f"a .safetensors file, but not {kind.found}.")
+        raise kind.refused(path, f"a .safetensors file, but not {kind.noun}.")
     with path.open("rb") as file:
         mapped = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_COPY if writeable else mmap.ACCESS_READ)
     with kind.reading(path):
         start = 8 + int.from_bytes(mapped[:8], "little")
         header = json.loads(mapped[8:start])
         metadata = header.pop(_METADATA)
-        known = [str(layout) for layout in sorted((kind.layout, *kind.also))]
-        if metadata[kind.key] not in known:
-            since = f" {kind.since}" if kind.since else ""
-            raise kind.refused(path, f"layout {metadata[kind.key]}; this version reads layout {' or '.join(known)}.{since}")
+        if metadata[kind.key] != str(kind.layout):
+            raise kind.refused(path, f"layout {metadata[kind.key]}; this version reads layout {kind.layout}.")
         return {name: _view(mapped, start, entry) for name, entry in header.items()}, metadata
 
 
@@ -134,6 +129,7 @@ def texts_to_array(texts: list[str]) -> NDArray[np.uint8]:
 
 
 def texts_from_array(octets: NDArray[np.uint8]) -> list[str]:
+    """The texts that `texts_to_array` made an array of."""
     texts: list[str] = json.loads(octets.tobytes().decode("utf-8", "surrogatepass"))
     return texts
 
@@ -159,7 +155,7 @@ def other_layout(path: Path, kind: FileKind) -> str | None:
         layout = metadata_of(path, kind).get(kind.key)
     except ContextDBError:
         return None
-    return None if layout in [str(known) for known in (kind.layout, *kind.also)] else layout
+    return None if layout == str(kind.layout) else layout
 
 
 def _view(mapped: mmap.mmap, start: int, entry: Mapping[str, Any]) -> NDArray[Any]:

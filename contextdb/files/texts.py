@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import polars as pl
 
 from contextdb.columns import TextColumn
 from contextdb.console import announce_file
@@ -17,6 +17,11 @@ from contextdb.files.csv_rewrite import Origin, rewritten
 from contextdb.files.csv_source import Source, read_csv
 from contextdb.files.parquet import ParquetSource, read_parquet, rewritten_parquet
 from contextdb.files.parquet_frame import MAGIC, DamagedFrame, require_whole_file
+
+if TYPE_CHECKING:
+    import polars as pl
+else:
+    from contextdb.columns import polars as pl
 
 AnySource = Source | ParquetSource
 """What a table's texts came from."""
@@ -77,7 +82,7 @@ def written_over(
     field_of: Sequence[int] | None = None,
     as_parquet: bool | None = None,
 ) -> AnySource:
-    """Texts written over the bytes they came from; from scratch where another format than theirs is asked for."""
+    """Texts written over the bytes they came from; from scratch where another format than theirs is requested."""
     kind = type(source) if as_parquet is None else ParquetSource if as_parquet else Source
     write: Callable[..., AnySource] = rewritten_parquet if kind is ParquetSource else rewritten
     return write(columns, source, origin, field_of) if isinstance(source, kind) else write(columns, None, np.full(len(origin), -1))
@@ -107,5 +112,5 @@ def _require_table(path: str | Path) -> None:
         return
     near = nearest(suffix, TABLE_SUFFIXES)
     mend = "to save it as CSV" if suffix.lower() in _OTHER_TABLES else path_in_quotes(Path(path).with_suffix(near)) if near else ""
-    found = f"a table file does not end in {in_quotes(suffix)}." if suffix else "the name has no suffix."
-    raise FileError(Fault(found, " or ".join(TABLE_SUFFIXES), mend, Place(str(path))))
+    problem = f"a table file does not end in {in_quotes(suffix)}." if suffix else "the name has no suffix."
+    raise FileError(Fault(problem, " or ".join(TABLE_SUFFIXES), mend, Place(str(path))))

@@ -1,23 +1,23 @@
-"""What a key of contextdb.toml accepts, the faults of those that hold something else, and the values of the others.
-
-A `Shape` is of one key. A `Section` reads keys by their shapes: a value that cannot be used becomes None and leaves a fault behind,
-so that the caller reads on, and raises once at the end with every fault.
-"""
+"""What a value of contextdb.toml may be: in words, as a check, what a wrong one was likely meant to be, and as Python has it."""
 
 from __future__ import annotations
 
 import json
 import numbers
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import PurePosixPath, PureWindowsPath
 from typing import Any
 
-from contextdb.cells.arguments import as_number
-from contextdb.errors import SHOWN_CHARACTERS, Fault, Place, in_quotes, nearest, shown, some
+from contextdb.cells.arguments import as_number, text_of
+from contextdb.disk import patterns_of
+from contextdb.errors import SHOWN_CHARACTERS, Fault, in_quotes, nearest, safe_text, some
 from contextdb.files.toml_text import as_toml, plain_numbers, what
 
 Mapped = Mapping[str, object]
 
+MOST = 1e30
+"""A bound so far away is none to speak of."""
 MOST_WORDS = 12
 """So many words are all listed in a message; of more, some."""
 FLAG_WORDS = {**dict.fromkeys(("true", "yes", "on", "1"), True), **dict.fromkeys(("false", "no", "off", "0"), False)}
@@ -28,13 +28,23 @@ def nothing(value: object) -> None:
     return None
 
 
+def as_it_is(value: Any) -> Any:
+    return value
+
+
 @dataclass(frozen=True)
 class Shape:
-    """What a key accepts. `wrong` says what is wrong with a value, or None; `meant` is the value that was likely meant, or None."""
+    """What a key accepts. `wrong` says what is wrong with a value, or None; `meant` is the value that was likely meant, or None;
+    `read` makes of an accepted value what Python has."""
 
     accepted: str
     wrong: Callable[[object], str | None]
     meant: Callable[[object], object] = nothing
+    read: Callable[[Any], Any] = as_it_is
+    bounds: str = ""
+    """Of a number: `accepted` without its example."""
+    words: tuple[str, ...] = ()
+    """All that is accepted, where that is a list of words."""
 
     def mend(self, value: object) -> object:
         """What was likely meant, if that is accepted."""
@@ -47,12 +57,13 @@ class Shape:
         if wrong is None:
             return None
         meant = self.mend(value)
-        mend = "" if meant is None else said_of(key, meant, most)
-        return Fault(f"{about} {said_of(key, value, most)}: {wrong}.".lstrip(), self.accepted, mend)
+        mend = "" if meant is None else key_value(key, meant, most)
+        return Fault(f"{about} {key_value(key, value, most)}: {wrong}.".lstrip(), self.accepted, mend)
 
 
-def said_of(key: str, value: object, most: int = SHOWN_CHARACTERS) -> str:
-    return shown(f"{key} = {as_toml(value)}", most)
+def key_value(key: str, value: object, most: int = SHOWN_CHARACTERS) -> str:
+    """A key with its value as TOML writes it, cut to so many characters."""
+    return safe_text(f"{key} = {as_toml(value)}", most)
 
 
 def near_key(key: str, keys: Iterable[str], synonyms: Mapping[str, str]) -> str | None:
@@ -76,7 +87,22 @@ def wrong_text(value: object) -> str | None:
     return None if isinstance(value, str) else f"this is {what(value)}, not text"
 
 
+def wrong_name(value: object) -> str | None:
+    """What is wrong with a name: of a condition, a table, a column, a value."""
+    if not isinstance(value, str) or not value.strip():
+        return wrong_text(value) or "this is empty"
+    return None if value == value.strip() else "a space is before or after it"
+
+
+def meant_text(value: object) -> object:
+    """The text that a text or a number was likely meant as; None for other values."""
+    if isinstance(value, bool) or not isinstance(value, (str, int, float)):
+        return None
+    return text_of(value).strip()
+
+
 def meant_number(value: object) -> object:
+    """The value that a text was likely meant as; None where it reads as none."""
     try:
         return json.loads(value) if isinstance(value, str) else None
     except (ValueError, RecursionError):
@@ -97,11 +123,13 @@ def one_of(words: Sequence[str], noun: str, synonyms: Mapping[str, str] | None =
     def meant(value: object) -> object:
         return (synonyms or {}).get(value.strip().casefold()) or nearest(value, words) if isinstance(value, str) else None
 
-    return Shape(some(words, MOST_WORDS) or f"the name of a {noun}; there is none", wrong, meant)
+    return Shape(some(words, MOST_WORDS) or f"the name of a {noun}; there is none", wrong, meant, words=tuple(words))
 
 
-def between(accepted: str, least: float, most: float, *, is_whole: bool = False) -> Shape:
-    """A finite number from `least` to `most`."""
+def between(
+    unit: str, least: float = -MOST, most: float = MOST, such_as: float | None = None, note: str = "", *, is_whole: bool = False
+) -> Shape:
+    """A finite number of a unit, from `least` to `most`; `note` says what a number of it means."""
 
     def wrong(value: object) -> str | None:
         number = as_number(value)
@@ -111,11 +139,22 @@ def between(accepted: str, least: float, most: float, *, is_whole: bool = False)
             return "this is not whole"
         return None if least <= number <= most else "this is out of range"
 
-    return Shape(accepted, wrong, lambda value: plain_numbers(meant_number(value)))
+    bounds = unit + _range(least, most)
+    example = "" if such_as is None else f", such as {such_as:g}"
+    note = f"; {note}" if note else ""
+    return Shape(
+        bounds + example + note, wrong, lambda value: plain_numbers(meant_number(value)), int if is_whole else float, bounds + note
+    )
 
 
-def numbers_within(accepted: str, most: float) -> Shape:
-    """A list of different numbers, none farther from 0 than `most`; one number alone is a list of one."""
+def _range(least: float, most: float) -> str:
+    if most < MOST:
+        return f" from {least:g} to {most:{',.0f' if most >= 10_000 else 'g'}}"
+    return f" of {least:g} or more" if least > -MOST else ""
+
+
+def numbers_within(unit: str, most: float, such_as: str) -> Shape:
+    """A list of different numbers of a unit, none farther from 0 than `most`; one number alone is a list of one."""
 
     def wrong(value: object) -> str | None:
         listed = _listed(value)
@@ -124,18 +163,70 @@ def numbers_within(accepted: str, most: float) -> Shape:
         known = [as_number(item) for item in listed]
         if None in known:
             item = listed[known.index(None)]
-            return f"{shown(as_toml(item))} is {_no_number(item)}"
+            return f"{safe_text(as_toml(item))} is {_no_number(item)}"
         is_wrong = any(abs(number) > most for number in known if number is not None) or len(set(known)) < len(known)
         return "a number is out of range or appears twice" if is_wrong else None
 
-    return Shape(accepted, wrong)
+    accepted = f"{unit}, at most {most:g} away"
+    return Shape(f"{accepted}, such as {such_as}", wrong, read=lambda value: tuple(map(float, _listed(value))), bounds=accepted)
+
+
+def listed(accepted: str, wrong_item: Callable[[object], str | None]) -> Shape:
+    """A list that is not empty; `wrong_item` says what is wrong with what it holds."""
+
+    def wrong(value: object) -> str | None:
+        if not isinstance(value, (list, tuple)):
+            return f"this is {what(value)}, not a list"
+        messages = ((i, wrong_item(item)) for i, item in enumerate(value))
+        return next(
+            (f"entry {i + 1} is {safe_text(as_toml(value[i]))}: {why}" for i, why in messages if why),
+            None if value else "the list is empty",
+        )
+
+    return Shape(accepted, wrong, read=tuple)
+
+
+def any_table(accepted: str) -> Shape:
+    """A table, whose keys are looked at elsewhere."""
+    return Shape(accepted, lambda value: None if isinstance(value, Mapping) else f"this is {what(value)}, not a table", read=dict)
+
+
+def file_below(a_file: str, kind: str, suffixes: Collection[str], such_as: str = "") -> Shape:
+    """A file of a kind, or a pattern of files, in the folder of contextdb.toml or below it."""
+
+    def wrong(value: object) -> str | None:
+        if not isinstance(value, str) or wrong_name(value):
+            return wrong_name(value)
+        path = PureWindowsPath(value)
+        if path.drive or path.root:
+            return "it names a place on one machine"
+        if ".." in path.parts:
+            return "it leaves the folder of contextdb.toml"
+        if "\\" in value:
+            return 'folders are separated by "/" on every system'
+        try:
+            endings = {PureWindowsPath(plain).suffix.casefold() for plain in patterns_of(value)}
+        except ValueError:
+            return "it has too many choices in braces"
+        return None if endings <= {*suffixes} else f"its ending is that of no {kind}"
+
+    def meant(value: object) -> object:
+        if not isinstance(value, str):
+            return None
+        path = PureWindowsPath(value.strip())
+        if path.drive or path.root:
+            return path.name
+        inside = PurePosixPath(*(part for part in path.parts if part != ".."))
+        return str(inside) if inside.suffix else f"{inside}{next(iter(suffixes))}" if inside.name else None
+
+    return Shape(f"{a_file} in the folder of contextdb.toml or below it{such_as and ', such as '}{such_as}", wrong, meant)
 
 
 def _wrong_filled(value: object) -> str | None:
     return wrong_text(value) or (None if str(value).strip() else "this is empty")
 
 
-def _listed(value: object) -> Sequence[object]:
+def _listed(value: object) -> Sequence[Any]:
     return value if isinstance(value, (list, tuple)) else [value]
 
 
@@ -148,73 +239,5 @@ def _no_number(value: object) -> str:
 FLAG = Shape(
     "true or false",
     lambda value: None if isinstance(value, bool) else f"this is {what(value)}, neither true nor false",
-    lambda value: FLAG_WORDS.get(str(value).strip().casefold()),
+    lambda value: FLAG_WORDS.get(text_of(value).strip().casefold()),
 )
-
-# ---- reading
-
-
-class Section:
-    """One section, or one table inside it, being read."""
-
-    def __init__(self, where: str, part: Mapped, keys: Sequence[str], faults: list[Fault], file: str | None = None) -> None:
-        self.where = where
-        self.part = part
-        self.faults = faults
-        self.file = file
-        self._keep(*(no_key(where, key, keys, nearest(str(key), keys)) for key in part if key not in keys))
-
-    def inside(self, where: str, part: Mapped, keys: Sequence[str]) -> Section:
-        """A table inside it, which is named by `where`."""
-        return Section(f"{self.where} {where}", part, keys, self.faults, self.file)
-
-    def _keep(self, *faults: Fault) -> None:
-        self.faults.extend(fault.at(Place(self.file)) for fault in faults)
-
-    def add(self, found: str, accepted: str = "", mend: str = "") -> None:
-        self._keep(Fault(found, accepted, mend))
-
-    def wrong(self, key: str, why: str, accepted: str, mend: str = "") -> None:
-        """Keep a fault of a key's value."""
-        self.add(f"{self.where} {said_of(key, self.part.get(key))}: {why}.", accepted, mend)
-
-    def has(self, key: str, accepted: str) -> bool:
-        """Whether a key that must be there is there."""
-        if key not in self.part:
-            self.add(f"{self.where} has no {in_quotes(key)}.", accepted)
-        return key in self.part
-
-    def read(self, key: str, shape: Shape) -> Any:
-        """The value of a key, or None."""
-        value = self.part.get(key)
-        fault = shape.fault(self.where, key, value)
-        if fault is None:
-            return value
-        self._keep(fault)
-        return None
-
-    def number(self, key: str, accepted: str, least: float, most: float) -> float | None:
-        return as_number(self.read(key, between(accepted, least, most)))
-
-    def whole(self, key: str, accepted: str, least: int, most: int) -> int | None:
-        number = self.read(key, between(accepted, least, most, is_whole=True))
-        return None if number is None else int(number)
-
-    def numbers(self, key: str, accepted: str, most: float) -> tuple[float, ...] | None:
-        """A list of different numbers, none farther from 0 than `most`; one number alone is a list of one."""
-        value = self.read(key, numbers_within(accepted, most))
-        return None if value is None else tuple(float(each) for each in _listed(value))  # type: ignore[arg-type]
-
-    def text(self, key: str, accepted: str) -> str | None:
-        """Text that is not empty."""
-        text: str | None = self.read(key, filled(accepted))
-        return text
-
-    def one_of(self, key: str, words: Sequence[str], noun: str, synonyms: Mapping[str, str] | None = None) -> str | None:
-        """One of some words; of the names of a project when `noun` says what they name."""
-        word: str | None = self.read(key, one_of(words, noun, synonyms))
-        return word
-
-    def flag(self, key: str) -> bool | None:
-        flag: bool | None = self.read(key, FLAG)
-        return flag

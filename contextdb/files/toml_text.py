@@ -1,4 +1,4 @@
-"""Values as TOML writes them, in contextdb.toml and in messages; a message shortens a long one with `shown`."""
+"""Values as TOML writes them, in contextdb.toml and in messages; a message shortens a long one with `safe_text`."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import json
 import numbers
 import re
 from collections.abc import Mapping
+
+from contextdb.cells.arguments import text_of
 
 Path = tuple[str, ...]
 
@@ -21,7 +23,7 @@ def as_toml(value: object) -> str:
         return f"[ {inner} ]" if any(isinstance(item, Mapping) for item in value) else f"[{inner}]"
     if isinstance(value, (str, bool)):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    return value.isoformat() if isinstance(value, (datetime.date, datetime.time)) else str(value)
+    return value.isoformat() if isinstance(value, (datetime.date, datetime.time)) else text_of(value)
 
 
 def plain_numbers(value: object) -> object:

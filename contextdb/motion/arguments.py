@@ -5,31 +5,20 @@ from __future__ import annotations
 import numbers
 from collections.abc import Callable, Sequence
 from types import NoneType
-from typing import NamedTuple, Protocol, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from contextdb.cells.arguments import require_many
 from contextdb.errors import Fault, MotionError, QueryError, in_quotes, plural, some
+from contextdb.motion.answers import Answer, Answers, are_answers, is_answer
 from contextdb.motion.clips.quaternions import Floats
 
 Flags = NDArray[np.bool_]
 NO_BIASES: Floats = np.empty(0)
 SURELY_FINITE = 1e70
 """Numbers whose squares sum to less are finite as float32 too."""
-
-
-class HasAssets(Protocol):
-    """What a table's query answers: something with the names of the valid assets.
-
-    Where it has an attribute `mirrored`, that is the same for animations that are played mirrored; one `widened` is the same for
-    the animation that plays already.
-    """
-
-    @property
-    def assets(self) -> Sequence[str]:
-        """The valid assets."""
 
 
 class ValidRanges(NamedTuple):
@@ -41,8 +30,8 @@ class ValidRanges(NamedTuple):
     """Gives the same for what plays already, as `valid` of a search; None where that is nothing else."""
 
 
-Valid: TypeAlias = HasAssets | ArrayLike | ValidRanges
-ValidForMany: TypeAlias = Valid | Sequence["Valid | None"]
+Valid: TypeAlias = Answer | ArrayLike | ValidRanges
+ValidForMany: TypeAlias = Valid | Answers | Sequence["Valid | None"]
 """One for all queries, or one for each."""
 Currents: TypeAlias = Sequence[int | None] | NDArray[np.integer]
 
@@ -68,7 +57,7 @@ def flags_of(values: object, wanted: int | tuple[int, int], what: str, of: str) 
     shape = (wanted,) if isinstance(wanted, int) else wanted
     each = f"one bool for each of {plural(shape[-1], of)}{', for each query' if len(shape) > 1 else ''}"
     accepted = f"Matches, or {each}" if what == "valid" else each
-    if hasattr(values, "lists"):  # a table's answers for many contexts
+    if are_answers(values):
         raise QueryError(Fault(f"{what} holds the answers for many contexts.", accepted, "to give that of one: many[i]"))
     try:
         array = np.asarray(values)
@@ -90,14 +79,14 @@ def query_of(query: object, names: Sequence[str]) -> Floats:
     return array
 
 
-def refuse_infinite(values: Floats, told: Floats, names: Sequence[str]) -> None:
-    """Refuse a query whose `values` are not all finite as float32; the message shows what was given, `told`."""
+def refuse_infinite(values: Floats, named_values: Floats, names: Sequence[str]) -> None:
+    """Refuse a query whose `values` are not all finite as float32; the message shows what was given, `named_values`."""
     if np.vdot(values, values) < SURELY_FINITE:  # as dot, without its warning of an overflow
         return
     with np.errstate(over="ignore", invalid="ignore"):
         wrong = np.flatnonzero(~np.isfinite(values.astype(np.float32))).tolist()
     if wrong:
-        listed = ", ".join(f"{in_quotes(names[i])} is {told[i]:g}" for i in wrong[:3])
+        listed = ", ".join(f"{in_quotes(names[i])} is {named_values[i]:g}" for i in wrong[:3])
         more = f" and {len(wrong) - 3} more" if len(wrong) > 3 else ""
         raise QueryError(Fault(f"no frame can be compared with the query: {listed}{more}.", "finite numbers that fit a float32"))
 
@@ -137,8 +126,8 @@ def bias_of(bias: object, n_frames: int) -> Floats:
         raise QueryError(Fault(f"the bias has shape {array.shape}.", f"one number for each of {plural(n_frames, 'frame')}"))
     wrong = np.flatnonzero(np.isnan(array) | np.isneginf(array))
     if len(wrong):
-        found = f"the bias of frame {wrong[0]} is {array[wrong[0]]}."
-        raise QueryError(Fault(found, "a number; positive infinity forbids a frame"))
+        problem = f"the bias of frame {wrong[0]} is {array[wrong[0]]}."
+        raise QueryError(Fault(problem, "a number; positive infinity forbids a frame"))
     return array
 
 
@@ -164,16 +153,15 @@ def widened_of(valid: Valid | None) -> Valid | None:
     """What may play for what plays already, if that is anything else than what may play for all."""
     if isinstance(valid, ValidRanges):
         return None if valid.widened is None else valid.widened()
-    wide = getattr(valid, "widened", None)
-    return None if wide is valid else wide
+    return valid.widened if is_answer(valid) and valid.widened is not valid else None
 
 
 def is_one_for_each(valid: object) -> bool:
     """Whether there is one mask for each query, and not one for all."""
     if isinstance(valid, np.ndarray):
         return valid.ndim == 2
-    if hasattr(valid, "lists"):  # a table's answers for many contexts
+    if are_answers(valid):
         return True
-    if not isinstance(valid, (list, tuple)) or hasattr(valid, "assets"):
+    if not isinstance(valid, (list, tuple)) or isinstance(valid, ValidRanges):
         return False
-    return not valid or any(mask is None or hasattr(mask, "assets") or np.ndim(mask) for mask in valid)
+    return not valid or any(mask is None or is_answer(mask) or np.ndim(mask) for mask in valid)

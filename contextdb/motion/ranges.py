@@ -34,8 +34,8 @@ def check_ranges(starts: ArrayLike, stops: ArrayLike, assets: Sequence[str], n_f
     wrong = np.flatnonzero((first < 0) | (last < first) | (last > n_frames))
     if len(wrong):
         i = int(wrong[0])
-        found = f"range {i}, asset {in_quotes(names[i])}, is [{first[i]}, {last[i]})."
-        raise MotionError(Fault(found, f"0 <= start <= stop <= {n_frames:,}, the number of frames"))
+        problem = f"range {i}, asset {in_quotes(names[i])}, is [{first[i]}, {last[i]})."
+        raise MotionError(Fault(problem, f"0 <= start <= stop <= {n_frames:,}, the number of frames"))
     _check_overlap(first, last, names)
     return first, last, names
 
@@ -46,8 +46,8 @@ def _check_overlap(starts: Ints, stops: Ints, names: Sequence[str]) -> None:
     wrong = np.flatnonzero(starts[order][1:] < stops[order][:-1])
     if len(wrong):
         i, j = order[wrong[0]], order[wrong[0] + 1]
-        told = " and ".join(f"range {k} of {in_quotes(names[k])}, [{starts[k]}, {stops[k]})," for k in (i, j))
-        raise MotionError(Fault(f"{told} overlap.", "each frame in one range at most"))
+        ranges_text = " and ".join(f"range {k} of {in_quotes(names[k])}, [{starts[k]}, {stops[k]})," for k in (i, j))
+        raise MotionError(Fault(f"{ranges_text} overlap.", "each frame in one range at most"))
 
 
 def _whole(values: ArrayLike, what: str) -> Ints:

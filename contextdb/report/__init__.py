@@ -1,5 +1,7 @@
-"""What a check found, and what is measured of coverage and motion, as text for people and for machines: one module a format,
-imported when it is asked for."""
+"""The findings of a check, and measured coverage and motion, as text for people and for machines.
+
+A format is one module, imported when it is used.
+"""
 
 from __future__ import annotations
 
@@ -23,18 +25,25 @@ RENDERERS: Mapping[tuple[Subject, str], tuple[str, tuple[str, ...]]] = {
     ("coverage", "junit"): ("coverage_junit", ()),
     ("coverage", "sarif"): ("render_sarif", ("shows_all",)),
     ("coverage", "markdown"): ("coverage_markdown", ("shows_all",)),
-    ("coverage", "html"): ("coverage_html", ()),
-    ("measures", "text"): ("measure_text", ("colour", "width", "shows_all")),
+    ("coverage", "html"): ("document_html:as_html", ()),
+    ("measures", "text"): ("document:as_text", ("colour", "width", "shows_all")),
     ("measures", "json"): ("render_json", ()),
     ("measures", "junit"): ("motion_junit:measures", ()),
-    ("measures", "markdown"): ("measure_markdown", ()),
-    ("motion coverage", "text"): ("motion_coverage_text", ("colour", "width", "shows_all")),
+    ("measures", "markdown"): ("document:as_markdown", ()),
+    ("measures", "html"): ("document_html:as_html", ()),
+    ("motion coverage", "text"): ("document:as_text", ("colour", "width", "shows_all")),
     ("motion coverage", "json"): ("render_json", ()),
-    ("motion coverage", "markdown"): ("motion_coverage_markdown", ()),
-    ("motion coverage", "html"): ("motion_coverage_html", ()),
+    ("motion coverage", "markdown"): ("document:as_markdown", ()),
+    ("motion coverage", "html"): ("document_html:as_html", ()),
     ("motion coverage", "junit"): ("motion_junit:motion_coverage", ()),
 }
-"""For each subject and format the module that renders it, by `render` or as said, and the options that it takes."""
+"""For each subject and format the module that renders it, by `render` or by the function after the colon, and its options."""
+DOCUMENTS: Mapping[Subject, str] = {
+    "coverage": "coverage_document",
+    "measures": "measure_document",
+    "motion coverage": "motion_coverage_document",
+}
+"""The module that writes the document of a subject, by `document`."""
 ERRORS: tuple[Level, ...] = ("error",)
 
 
@@ -65,5 +74,8 @@ def render(
     options = {"colour": colour, "width": width, "shows_all": shows_all, "failing": failing}
     module, _, function = module.partition(":")
     rendered = getattr(import_module(f"contextdb.report.{module}"), function or "render")
+    if module.startswith("document"):
+        written_by = import_module(f"contextdb.report.{DOCUMENTS[report.subject]}")
+        report = written_by.document(report, shows_all, is_page=format_name == "html")
     text: str = rendered(report, **{name: options[name] for name in taken})
     return text

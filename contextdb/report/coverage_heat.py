@@ -7,11 +7,11 @@ from html import escape
 
 from contextdb.console import printable
 from contextdb.covering import PairTable, Slice, format_percent
-from contextdb.report.coverage_words import covered_text
+from contextdb.report.coverage_words import covered_text, slice_cells
 from contextdb.report.html_parts import embedded
 
 MOST_CONDITIONS = 24
-"""The map shows so many conditions, those whose own values are covered least."""
+"""The most conditions in the map: those whose own values are covered least."""
 FEW_SAMPLES = 50
 MOST_TOLD = 5
 EDGES = (0.1, 0.25, 0.5, 0.75, 0.9, 1.0)
@@ -53,10 +53,10 @@ def heat_map(pairs: PairTable, number: int) -> str:
 def _square(pairs: PairTable, one: int, other: int, number: int) -> str:
     worst = pairs.worst(one, other)
     names = pairs.conditions[one] if one == other else f"{pairs.conditions[one]} with {pairs.conditions[other]}"
-    told = escape(printable(f"{names}: {_sentence(worst) if worst else 'nothing was measured'}"))
+    label_text = escape(printable(f"{names}: {_sentence(worst) if worst else 'nothing was measured'}"))
     label, colour = ("·", "none") if worst is None else (short_percent(worst), colour_of(worst))
     button = f'<button type="button" class="{colour}" data-pair="{number}" aria-pressed="false"'
-    return f'<td>{button} title="{told}" aria-label="{escape(label)} · {told}">{escape(label)}</button></td>'
+    return f'<td>{button} title="{label_text}" aria-label="{escape(label)} · {label_text}">{escape(label)}</button></td>'
 
 
 def _data(pairs: PairTable, order: list[int], squares: list[tuple[int, int]]) -> str:
@@ -71,33 +71,33 @@ def _slices(slices: list[Slice]) -> Iterator[list[object]]:
     """For each slice its colour, the text of its square, its sentence, and whether it is among the worst."""
     measured = sorted((s for s in slices if s.covered is not None and s.covered < 1.0), key=lambda s: s.rank)
     worst = [id(s) for s in measured[:MOST_TOLD]]
-    for found in slices:
-        yield [colour_of(found), short_percent(found), printable(_sentence(found)), id(found) in worst]
+    for each in slices:
+        yield [colour_of(each), short_percent(each), printable(_sentence(each)), id(each) in worst]
 
 
-def _sentence(found: Slice) -> str:
-    cells = ", ".join(f"{name}: {cell}" for name, cell in found.cells.items())
-    if found.covered is None:
+def _sentence(each: Slice) -> str:
+    cells = slice_cells(each)
+    if each.covered is None:
         return f"{cells}: no context of it is possible, or none was tried"
-    named = "" if found.is_named else "; no row names it explicitly"
-    few = f"; {found.n_samples} samples only" if 0 < found.n_samples < FEW_SAMPLES else ""
-    return f"{cells}: {covered_text(found)} covered, {format_percent(found.share)} of the contexts{named}{few}"
+    named = "" if each.is_named else "; no row names it explicitly"
+    few = f"; {each.n_samples} samples only" if 0 < each.n_samples < FEW_SAMPLES else ""
+    return f"{cells}: {covered_text(each)} covered, {format_percent(each.share)} of the contexts{named}{few}"
 
 
-def short_percent(found: Slice) -> str:
+def short_percent(each: Slice) -> str:
     """The covered share of a slice in a few characters: 0 and 100 are certain, <1 and >99 nearly that."""
-    if found.covered is None:
+    if each.covered is None:
         return "·"
-    percent = 100.0 * (found.covered if found.is_exact else found.lower if found.covered == 1.0 else found.covered)
-    if found.is_exact and found.covered in (0.0, 1.0):
-        return "0" if found.covered == 0.0 else "100"
-    if not found.is_exact and found.covered == 1.0:
+    percent = 100.0 * (each.covered if each.is_exact else each.lower if each.covered == 1.0 else each.covered)
+    if each.is_exact and each.covered in (0.0, 1.0):
+        return "0" if each.covered == 0.0 else "100"
+    if not each.is_exact and each.covered == 1.0:
         return f">{min(99, int(percent))}"
     return "<1" if percent < 1.0 else ">99" if percent > 99.0 else f"{percent:.0f}"
 
 
-def colour_of(found: Slice) -> str:
+def colour_of(each: Slice) -> str:
     """The colour of a square, from orange (nothing is covered) to blue (all is)."""
-    if found.covered is None:
+    if each.covered is None:
         return "none"
-    return f"c{sum(found.covered >= edge for edge in EDGES)}"
+    return f"c{sum(each.covered >= edge for edge in EDGES)}"

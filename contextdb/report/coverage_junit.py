@@ -12,12 +12,12 @@ MOST_GAPS = 20
 
 
 def render(results: CoverageResults) -> str:
-    gone = (bars_of(name, [gate], "", "coverage", with_kept=True) for name, gate in results.gone.items())
+    others = (bars_of(name, [gate], "", "coverage", in_passed=True) for name, gate in results.others)
     measured = (
-        bars_of(each.report.table, each.gates, "\n".join(_lines(each)), "coverage", each.file, with_kept=True)
+        bars_of(each.report.table, each.gates, "\n".join(_lines(each)), "coverage", each.file, in_passed=True)
         for each in results.tables
     )
-    return document("contextdb coverage", [*gone, *measured])
+    return document("contextdb coverage", [*others, *measured])
 
 
 def _lines(measured: Measured) -> list[str]:

@@ -1,4 +1,4 @@
-"""What `contextdb coverage` hands to its renderers: measured tables, the bars they are held to, what changed. Data only."""
+"""What `contextdb coverage` hands to its renderers: measured tables, their thresholds, what changed. Data only."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ from functools import cached_property
 from typing import ClassVar
 
 from contextdb.covering import CoverageReport, Gap, PairTable, Slice, format_percent
-from contextdb.covering.baseline import Change
+from contextdb.covering.baseline import CaseCounts, Change
+from contextdb.covering.declared import Declared
 from contextdb.covering.pairs import left_out
-from contextdb.covering.shares import told_apart
+from contextdb.covering.shares import distinct_percents
 from contextdb.errors import in_quotes, plural, row_name, some
-from contextdb.files.reports import sealed
+from contextdb.files.reports import with_marks
 from contextdb.findings import Finding
 from contextdb.report.results import CheckReport, Gate, Subject, TableSummary
 from contextdb.telemetry.observed import Observed, SeenGap
@@ -38,6 +39,8 @@ class Measured:
     gates: tuple[Gate, ...] = ()
     inside: Mapping[int, str] = field(default_factory=dict)
     """For the rows of inner tables that are in other files: the file, from the folder of the table."""
+    space: Declared = field(default_factory=dict)
+    """What the shares are shares of."""
 
     @property
     def summary(self) -> TableSummary:
@@ -76,11 +79,12 @@ class Measured:
     def to_json(self) -> dict[str, object]:
         """One entry of `tables` in the JSON document."""
         report = self.report.to_json()
-        shown = [s.to_json() for s in self.worst_pairs(20)]
+        worst = [s.to_json() for s in self.worst_pairs(20)]
         return report | {
             "file": self.file,
+            "space": dict(self.space),
             "hits": list(self.report.hits),
-            "pairs": shown,
+            "pairs": worst,
             "pairs_left_out": bool(self.left_out),
             "telemetry": None if self.telemetry is None else self.telemetry.to_json(),
             "baseline": None if self.change is None else self.change.to_json(),
@@ -94,21 +98,23 @@ class CoverageResults:
 
     subject: ClassVar[Subject] = "coverage"
     tables: tuple[Measured, ...]
-    gone: Mapping[str, Gate] = field(default_factory=dict)
-    """For each table of the baseline that no longer exist the bar that this misses, or keeps where it is intended."""
+    others: tuple[tuple[str, Gate], ...] = ()
+    """Names and gates of tables that are not measured by themselves: gone since the baseline, or inside another table."""
+    cases: Mapping[str, CaseCounts] = field(default_factory=dict)
+    """How much the saved contexts of each table expect."""
 
     @property
     def gates(self) -> list[Gate]:
-        return [*self.gone.values(), *(gate for measured in self.tables for gate in measured.gates)]
+        return [*(gate for _, gate in self.others), *(gate for measured in self.tables for gate in measured.gates)]
 
     @property
     def passed(self) -> bool:
-        """Whether every bar is kept."""
+        """Whether every threshold is met."""
         return all(gate.passed for gate in self.gates)
 
     @property
     def verdict(self) -> str:
-        """Whether the bars are kept, in one sentence; "" where there are none."""
+        """Whether the thresholds are met, in one sentence; "" where there are none."""
         gates = self.gates
         n_failed = sum(not gate.passed for gate in gates)
         if n_failed:
@@ -116,35 +122,36 @@ class CoverageResults:
         return f"{plural(len(gates), 'threshold')} met." if gates else ""
 
     def to_json(self) -> dict[str, object]:
-        return sealed(
+        return with_marks(
             {
                 "format": 1,
                 "passed": self.passed,
                 "tables": [measured.to_json() for measured in self.tables],
-                "gone": list(self.gone),
-                "gates": [gate.to_json() for gate in self.gone.values()],
+                "gone": [name for name, gate in self.others if gate.rule == "table-gone"],
+                "gates": [gate.to_json() for _, gate in self.others],
+                "cases": {name: counts.to_json() for name, counts in self.cases.items()},
             }
         )
 
     def as_check(self) -> CheckReport:
-        """Missed bars, findings and the largest gaps as findings, for formats that know nothing else."""
-        gone = [Finding(gate.rule or gate.name, "error", gate.message, name) for name, gate in self.gone.items() if not gate.passed]
-        return CheckReport(tuple(m.summary for m in self.tables), (*gone, *(f for m in self.tables for f in _findings(m))))
+        """Missed thresholds, findings and the largest gaps as findings, for formats that know nothing else."""
+        others = (finding for name, gate in self.others for finding in gate.findings(name))
+        return CheckReport(tuple(m.summary for m in self.tables), (*others, *(f for m in self.tables for f in _findings(m))))
 
 
 def reaches(value: float, limit: float) -> bool:
-    """Whether a share reaches a bar; 100 % is reached by 100 % alone."""
+    """Whether a share reaches a threshold; 100 % is reached by 100 % alone."""
     return value >= limit or (limit < 1.0 and value >= limit - ROUNDING)
 
 
 def fail_under(report: CoverageReport, limit: float) -> Gate:
-    """Hold the lower bound of the covered share to a bar."""
+    """The gate of a least covered share; an estimate counts with its lower bound."""
     at_least = "" if report.method == "exact" else "at least "
     return bar("fail-under", report.lower, limit, f"{at_least}{{}} of the contexts are covered", rule="coverage-below")
 
 
 def max_drop(change: Change, limit: float) -> Gate:
-    """Hold the fall of the covered share since the baseline to a bar."""
+    """The gate of the largest fall of the covered share since the baseline."""
     passed = change.drop <= limit + ROUNDING
     if change.drop <= ROUNDING:
         return Gate("max-drop", limit, change.drop, passed, "the covered share did not fall.", rule="coverage-dropped")
@@ -161,34 +168,69 @@ def max_drop(change: Change, limit: float) -> Gate:
     )
 
 
-def table_gone(name: str, is_intended: bool, new: Sequence[str] = ()) -> Gate:
+def table_gone(name: str, is_accepted: bool, new: Sequence[str] = ()) -> Gate:
     """Require that a table of the baseline is still there; `new` are the tables that the baseline does not have."""
-    found = f"the table {in_quotes(name)} of the baseline no longer exists"
+    sentence = f"the table {in_quotes(name)} of the baseline no longer exists"
     renamed = f" New since the baseline: {some(new)}." if new else ""
-    return _still_there(name, found, is_intended, renamed)
+    return _accepted_by("gone", name, sentence, is_accepted, renamed, rule="table-gone")
 
 
-def table_emptied(name: str, n_rows: int, is_intended: bool) -> Gate:
+def table_emptied(name: str, n_rows: int, is_accepted: bool) -> Gate:
     """Require that a table that had rows in the baseline still has some."""
-    return _still_there(name, f"the table had {plural(n_rows, 'row')} in the baseline and has none now", is_intended)
+    sentence = f"the table had {plural(n_rows, 'row')} in the baseline and has none now"
+    return _accepted_by("gone", name, sentence, is_accepted, rule="table-gone")
 
 
-def _still_there(name: str, found: str, is_intended: bool, more: str = "") -> Gate:
-    how = f"--gone={name}" if re.fullmatch(r"[\w.-]+", name) else f"--gone={in_quotes(name)}"
-    message = f"{found}, as --gone says." if is_intended else f"{found}.{more} Where that is intended: {how}."
-    return Gate("gone", 0.0, 1.0, is_intended, message, rule="table-gone")
+def table_new(name: str, is_accepted: bool, gone: Sequence[str] = ()) -> Gate:
+    """Require that a table is compared with something; `gone` are the tables of the baseline that are missing."""
+    sentence = f"the table {in_quotes(name)} is not in the baseline, so it is compared with nothing"
+    renamed = f" Missing since the baseline: {some(gone)}." if gone else ""
+    return _accepted_by("new", name, sentence, is_accepted, renamed, rule="table-new")
+
+
+def space_changed(name: str, changes: Sequence[str], is_accepted: bool) -> Gate:
+    """Require that the shares of a table are shares of the same contexts as before."""
+    sentence = f"other contexts are possible than in the baseline, so that shares are not compared: {'; '.join(changes)}"
+    return _accepted_by("redefined", name, sentence, is_accepted, rule="space-changed")
+
+
+def fewer_cases(name: str, before: CaseCounts, now: CaseCounts, is_accepted: bool) -> list[Gate]:
+    """Require that the saved contexts of a table expect no less than before; no gate where there were none. Rows that were deleted
+    need not be reached."""
+    if not before.count:
+        return []
+    expected = max(0, before.rows_reached - max(0, before.rows - now.rows))
+    changes = [
+        *([f"{now.count:,} saved contexts, before {before.count:,}"] if now.count < before.count else []),
+        *([f"{now.exact:,} that expect exactly their assets, before {before.exact:,}"] if now.exact < before.exact else []),
+        *([f"{now.rows_reached:,} rows reached, before {before.rows_reached:,}"] if now.rows_reached < expected else []),
+    ]
+    if not changes:
+        words = f"{plural(now.count, 'saved context')}, {plural(now.rows_reached, 'row')} reached; no fewer than in the baseline."
+        return [Gate("fewer-cases", 0.0, 0.0, True, words, rule="cases-fewer")]
+    sentence = f"the saved contexts of {in_quotes(name)} expect less than in the baseline: {'; '.join(changes)}"
+    return [_accepted_by("fewer-cases", name, sentence, is_accepted, rule="cases-fewer")]
+
+
+def _accepted_by(option: str, name: str, sentence: str, is_accepted: bool, more: str = "", *, rule: str) -> Gate:
+    """The gate of what fails unless an option of the command names the table."""
+    how = f"--{option}={name}" if re.fullmatch(r"[\w.-]+", name) else f"--{option}={in_quotes(name)}"
+    message = f"{sentence}, as --{option} accepts." if is_accepted else f"{sentence}.{more} Where that is intended: {how}."
+    return Gate(option, 0.0, 1.0, is_accepted, message, rule=rule, is_accepted=is_accepted)
 
 
 def fail_under_telemetry(telemetry: Observed, limit: float) -> Gate:
-    """Hold the covered share of recorded moments to a bar."""
+    """The gate of a least covered share of the recorded moments; without a moment it fails."""
+    if not telemetry.moments:
+        return Gate("fail-under-telemetry", limit, None, False, "no moment was recorded.", rule="telemetry-below")
     return bar("fail-under-telemetry", telemetry.covered, limit, "{} of the recorded moments are covered", rule="telemetry-below")
 
 
-def bar(name: str, value: float, limit: float, said: str, rule: str | None = None) -> Gate:
-    """The gate of a share that is to reach a bar; `said` is what it is, with {} for it."""
+def bar(name: str, value: float, limit: float, sentence: str, rule: str | None = None) -> Gate:
+    """The gate of a share that must reach a threshold; `sentence` is what it is, with {} for it."""
     passed = reaches(value, limit)
-    found, wanted = told_apart(value, limit) if not passed else (format_percent(value), format_percent(limit))
-    message = f"{said.format(found)}, which {'reaches' if passed else 'is below'} the threshold of {wanted}."
+    reached, wanted = distinct_percents(value, limit) if not passed else (format_percent(value), format_percent(limit))
+    message = f"{sentence.format(reached)}, which {'reaches' if passed else 'is below'} the threshold of {wanted}."
     return Gate(name, limit, value, passed, message, rule)
 
 
@@ -210,8 +252,7 @@ def has_moments(report: CoverageReport) -> bool:
 def _findings(measured: Measured) -> Iterator[Finding]:
     report = measured.report
     for gate in measured.gates:
-        if not gate.passed:
-            yield Finding(gate.rule or gate.name, "error", gate.message, report.table, measured.file)
+        yield from gate.findings(report.table, measured.file)
     yield from report.findings
     if measured.change is not None:
         for gap in measured.change.opened[:MOST_GAP_FINDINGS]:

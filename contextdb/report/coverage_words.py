@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from contextdb.covering import CoverageReport, Gap, Slice, format_percent
 from contextdb.covering.baseline import Change
 from contextdb.covering.report import share_at_once
-from contextdb.covering.shares import told_apart
+from contextdb.covering.shares import distinct_percents
 from contextdb.errors import in_quotes, joined, nearest, plural
 from contextdb.findings import Finding
 from contextdb.report.coverage_results import Measured, has_moments
@@ -43,10 +43,11 @@ def rows_words(measured: Measured, finding: Finding) -> str:
 
 
 def gaps_sentence(report: CoverageReport) -> str:
+    """How many gaps there are, whether these are all, and in which order."""
     if not report.gaps:
         if report.gaps_complete:
             return "No gap: every context has a valid row"
-        return "No gap was found, but it is not proved that there is none"
+        return "No gap is known, but it is not proved that there is none"
     listed = "all of them" if report.gaps_complete else "there are more"
     moments = [gap.telemetry or 0.0 for gap in report.gaps]
     is_by_moments = has_moments(report) and moments == sorted(moments, reverse=True)  # not where rules are part of the gaps
@@ -68,40 +69,53 @@ def nearest_sentence(measured: Measured, gap: Gap) -> str:
 def overlap_sentence(report: CoverageReport) -> str:
     """How many rows are valid at once."""
     histogram = report.overlap.histogram
-    told = [f"{n or 'none'}: {share_at_once(report, n)}" for n, share in enumerate(histogram[:MOST_COUNTS]) if share > 0.0]
+    counts = [f"{n or 'none'}: {share_at_once(report, n)}" for n, share in enumerate(histogram[:MOST_COUNTS]) if share > 0.0]
     rest = sum(histogram[MOST_COUNTS:])
-    told += [f"{MOST_COUNTS} or more: {format_percent(rest)}"] if rest > 0.0 else []
+    counts += [f"{MOST_COUNTS} or more: {format_percent(rest)}"] if rest > 0.0 else []
     about = "" if report.overlap.method == "exact" else f" (estimated from {report.n_samples:,} samples)"
-    return f"on average {report.overlap.mean:.3g}{about}; " + ", ".join(told) if told else "nothing was measured"
+    return f"on average {report.overlap.mean:.3g}{about}; " + ", ".join(counts) if counts else "nothing was measured"
 
 
-def slice_sentence(found: Slice) -> str:
+def histogram_lines(report: CoverageReport) -> Iterator[str]:
+    """How much of the contexts has so many valid rows, a line each."""
+    for n, share in enumerate(report.overlap.histogram):
+        if share > 0.0:
+            yield f"  {n:>3}   {share_at_once(report, n):>9}  {'█' * round(40 * share)}".rstrip()
+
+
+def slice_cells(each: Slice) -> str:
+    return ", ".join(f"{name}: {cell}" for name, cell in each.cells.items())
+
+
+def slice_sentence(each: Slice) -> str:
     """A pair of values with how much of it is covered."""
-    cells = ", ".join(f"{name}: {cell}" for name, cell in found.cells.items())
-    named = "" if found.is_named else "; no row names both"
-    return f"{covered_text(found)} of {cells} (which is {format_percent(found.share)} of the contexts{named})"
+    named = "" if each.is_named else "; no row names both"
+    return f"{covered_text(each)} of {slice_cells(each)} (which is {format_percent(each.share)} of the contexts{named})"
 
 
 def cells_text(cells: Mapping[str, str], most: int = MOST_TOLD) -> str:
     """Some cells on one line; of many conditions the first few, and how many there are more."""
-    told = [f"{name}: {cell}" for name, cell in list(cells.items())[:most]]
+    texts = [f"{name}: {cell}" for name, cell in list(cells.items())[:most]]
     more = f" and {plural(len(cells) - most, 'more condition')}" if len(cells) > most else ""
-    return ", ".join(told) + more or "every context"
+    return ", ".join(texts) + more or "every context"
 
 
-def covered_text(found: Slice) -> str:
+def covered_text(each: Slice) -> str:
     """The covered share of a slice, with its bounds where it is an estimate."""
-    if found.covered is None:
+    if each.covered is None:
         return "unknown"
-    if found.is_exact:
-        return format_percent(found.covered)
-    return " to ".join(told_apart(found.lower, found.upper))
+    if each.is_exact:
+        return format_percent(each.covered)
+    return " to ".join(distinct_percents(each.lower, each.upper))
 
 
 def change_sentence(measured: Measured, change: Change) -> str:
     """What became of the covered share and of the gaps since the baseline."""
     at_least = "" if measured.report.method == "exact" else "at least "
-    now, before = told_apart(measured.report.lower, change.before)
+    now, before = distinct_percents(measured.report.lower, change.before)
+    if change.space:
+        changes = "; ".join(change.space)
+        return f"covered {at_least}{now}; before {before}, of other contexts: {changes}"
     share = f"covered {at_least}{now}, before {before}" if change.drop else f"covered {at_least}{now}, as before"
     sure = "" if change.is_complete else "; not all gaps could be compared, so some may have been there"
     return f"{share}; {plural(len(change.opened), 'new gap')}, {len(change.closed):,} closed{sure}"
@@ -110,9 +124,9 @@ def change_sentence(measured: Measured, change: Change) -> str:
 def facts_sentences(seen: Observed) -> Iterator[str]:
     """What is wrong with recorded facts."""
     for word, notes in (("missing", seen.missing), ("outside the domain", seen.outside)):
-        told = [f"{note.condition} in {plural(note.moments, 'moment')}{_examples(note) or _meant(note, seen)}" for note in notes]
-        if told:
-            yield f"{word}: {joined(told, MOST_TOLD)}"
+        texts = [f"{note.condition} in {plural(note.moments, 'moment')}{_examples(note) or _meant(note, seen)}" for note in notes]
+        if texts:
+            yield f"{word}: {joined(texts, MOST_TOLD)}"
     if seen.unknown_columns:
         yield f"columns that the table does not use: {joined(seen.unknown_columns, MOST_TOLD)}"
     if seen.unread:

@@ -31,19 +31,20 @@ def case_in(suite: ET.Element, name: str, file: str | None = None) -> ET.Element
 
 
 def bars_of(
-    what: str, bars: Sequence[Gate], said: str, otherwise: str, file: str | None = None, *, with_kept: bool = False
+    what: str, bars: Sequence[Gate], reached: str, otherwise: str, file: str | None = None, *, in_passed: bool = False
 ) -> ET.Element:
-    """The bars of one table or session as a suite: `said` stands in a broken bar, and `with_kept` in a kept one too.
+    """The thresholds of one table or session as a suite: `reached` is the text of a missed one, and with
+    `in_passed` of a met one too.
 
-    Without a bar `said` is in a case that is called `otherwise`.
+    Without a threshold `reached` is in a case that is called `otherwise`.
     """
     suite = ET.Element("testsuite", name=printable(what))
     for bar in bars:
         case, message = case_in(suite, bar.name, file), printable(bar.message)
         if bar.passed:
-            ET.SubElement(case, "system-out").text = f"{message}\n{said}" if with_kept and said else message
+            ET.SubElement(case, "system-out").text = f"{message}\n{reached}" if in_passed and reached else message
         else:
-            ET.SubElement(case, "failure", type=bar.name, message=message).text = said
+            ET.SubElement(case, "failure", type=bar.name, message=message).text = reached
     if not bars:
-        ET.SubElement(case_in(suite, otherwise, file), "system-out").text = said
+        ET.SubElement(case_in(suite, otherwise, file), "system-out").text = reached
     return suite

@@ -1,4 +1,4 @@
-"""What `motion measure` hands to its renderers: the measures of each session, the bars that it is held to, and an earlier report.
+"""What `motion measure` hands to its renderers: the measures of each session, their thresholds, and an earlier report.
 
 Data only; the same results give the same bytes.
 """
@@ -12,14 +12,14 @@ from typing import ClassVar
 
 from contextdb.covering import format_percent
 from contextdb.errors import ContextError, Fault, Place, in_quotes, plural
-from contextdb.files.reports import document_of, sealed
+from contextdb.files.reports import baseline_of, with_marks
 from contextdb.findings import Finding
 from contextdb.motion.measuring.measures import Measures
-from contextdb.motion.measuring.parts import NO_CHANGE, NO_FORCED, NO_JUMP
+from contextdb.motion.measuring.parts import NO_CHANGE, NO_FORCED, NO_JUMP, NO_REST
 from contextdb.report.results import CheckReport, Gate, Subject, as_path
 
-NOTHING_TO_EXCEED = (NO_FORCED, NO_JUMP, NO_CHANGE)
-"""A measure that is missing for such a reason keeps every bar."""
+NOTHING_TO_EXCEED = (NO_FORCED, NO_JUMP, NO_CHANGE, NO_REST)
+"""A measure that is missing for such a reason meets every threshold."""
 SLACK = 0.01
 """A measure is worse than before when it is larger by more than this share."""
 _AGAIN = "to write the baseline again"
@@ -46,16 +46,25 @@ class Line:
 LINES = (
     Line("jumps a second", "jumps_per_s", decimals=2, is_worse_when_larger=True),
     Line("forced jumps", "forced_jumps", decimals=0, is_worse_when_larger=True),
-    Line("dearest forced jump", "forced_cost", decimals=3, is_worse_when_larger=True),
+    Line("most expensive forced jump", "forced_cost", decimals=3, is_worse_when_larger=True),
     Line("jump, cm", "jump_cm", is_worse_when_larger=True),
     Line("jump, worst joint, 95 %, cm", "jump_worst_cm", is_worse_when_larger=True),
     Line("jump, velocity, m/s", "jump_mps", decimals=2, is_worse_when_larger=True),
     Line("skate, cm/s", "skate_cm_s", "skate_raw_cm_s", is_worse_when_larger=True),
     Line("of it in the clips' frames, cm/s", "skate_played_cm_s"),
+    Line("skate, worst second, cm/s", "skate_worst_cm_s"),
+    Line("skate, toe down in the clip, cm/s", "toe_skate_cm_s", "toe_skate_raw_cm_s", is_worse_when_larger=True),
+    Line("that in the worst second, cm/s", "toe_skate_worst_cm_s"),
     Line("skate, m/min", "skate_m_min", "skate_raw_m_min", is_worse_when_larger=True),
     Line("skate, weighted, cm/s", "skate_weighted_cm_s", "skate_weighted_raw_cm_s"),
     Line("skate, ratio, %", "skate_ratio", "skate_ratio_raw", decimals=-1),
+    Line("feet below the floor, cm", "penetration_cm", "penetration_raw_cm"),
+    Line("knees at their limit, %", "knee_limit_share", "knee_limit_raw_share", decimals=-1),
+    Line("deepest dip of the hips, cm", "dip_cm", is_worse_when_larger=True),
+    Line("hips off the feet at rest, cm", "balance_cm", is_worse_when_larger=True),
+    Line("lean at rest, degrees", "lean_deg", "lean_raw_deg"),
     Line("acceleration, 99 %, m/s²", "accel_p99", "accel_raw_p99", is_worse_when_larger=True),
+    Line("acceleration, worst second", "accel_worst"),
     Line("snaps, %", "snap_share", decimals=-1, is_worse_when_larger=True),
     Line("path error, RMS, m", "path_rms_m", decimals=3, is_worse_when_larger=True),
     Line("path error, 95 %, m", "path_p95_m", decimals=3),
@@ -98,16 +107,16 @@ class SessionMeasures:
         return f"{self.measures.seconds:.2f} s, {plural(self.measures.updates, 'update')}, {plural(self.measures.jumps, 'jump')}"
 
     def rows(self) -> Iterator[tuple[str, str, str, str]]:
-        """Of each measure that there is its name, its value, that of the raw clips, and that of the baseline."""
-        told = self.measures.to_json()
+        """Each measure that exists: its name, its value, that of the raw clips, and that of the baseline."""
+        values = self.measures.to_json()
         for line in LINES:
-            value, raw = told[line.key], told.get(line.raw)
+            value, raw = values[line.key], values.get(line.raw)
             if value is not None or raw is not None:
                 before = line.text(self.before[line.key]) if self.before.get(line.key) is not None else ""
                 yield line.label, line.text(value), "" if raw is None else line.text(raw), before
 
     def not_measured(self) -> Iterator[str]:
-        """Why measures are missing, a sentence a reason; that there was nothing of a kind is none."""
+        """Why measures are missing, one sentence a reason; that there was nothing to measure is no reason."""
         of: dict[str, list[str]] = {}
         for key, why in self.measures.missing.items():
             if why not in NOTHING_TO_EXCEED and key in OF_KEY:
@@ -127,56 +136,57 @@ class MeasureResults:
 
     @property
     def passed(self) -> bool:
-        """Whether every bar is kept and nothing is worse than in the baseline."""
+        """Whether every threshold is met and nothing is worse than in the baseline."""
         return all(gate.passed for session in self.sessions for gate in session.gates)
 
     def to_json(self) -> dict[str, object]:
-        return sealed({"format": 1, "sessions": [session.to_json() for session in self.sessions]})
+        return with_marks({"format": 1, "sessions": [session.to_json() for session in self.sessions]})
 
     def as_check(self) -> CheckReport:
-        """The bars that are broken, as findings."""
+        """The missed thresholds, as findings."""
         broken = ((session.file, gate) for session in self.sessions for gate in session.gates if not gate.passed)
         return CheckReport((), tuple(Finding(gate.name, "error", gate.message, file=file) for file, gate in broken))
 
 
 def held_to(bar: Bar, measures: Measures, file: str) -> Gate:
-    """The gate of a bar. Raises ContextError where the measure is missing, so that nobody knows."""
+    """The gate of a threshold. Raises ContextError where the measure is missing and the answer therefore unknown."""
     value, line = getattr(measures, bar.key), OF_KEY[bar.key]
     limit = line.text(bar.most)
     if value is None:
         why = measures.missing.get(bar.key, "")
         if why not in NOTHING_TO_EXCEED:
-            found = f"--{bar.option} cannot be judged: {why}."
-            raise ContextError(Fault(found, "a session of a project, or --poses and --project with it", place=Place(file)))
+            fault = f"--{bar.option} cannot be judged: {why}."
+            raise ContextError(Fault(fault, "a session of a project, or --poses and --project with it", place=Place(file)))
         return Gate(bar.option, bar.most, None, True, f"{line.label}: {why}.")
     passed = bool(value <= bar.most)
-    told = f"{line.label}: {line.text(value)}, {'within' if passed else 'more than'} {limit}."
-    return Gate(bar.option, bar.most, float(value), passed, told)
+    message = f"{line.label}: {line.text(value)}, {'within' if passed else 'more than'} {limit}."
+    return Gate(bar.option, bar.most, float(value), passed, message)
 
 
 def compared(before: Mapping[str, object], measures: Measures) -> Iterator[Gate]:
-    """A gate for each measure that an earlier report has too: it is worse when it is larger by more than 1 %."""
+    """A gate for each measure of an earlier report: it is worse when it is larger by more than 1 %, or not measured any more."""
     for line in COMPARED:
         old, new = before.get(line.key), getattr(measures, line.key)
-        if isinstance(old, (int, float)) and new is not None:
-            passed = bool(new <= old + SLACK * abs(old) + 1e-9)
-            verdict = "no worse" if passed else "worse"
-            told = f"{line.label}: {line.text(new)}, {verdict} than {line.text(old)} before."
-            yield Gate(f"baseline {line.key}", float(old), float(new), passed, told)
+        if not isinstance(old, (int, float)):
+            continue
+        name, why = f"baseline {line.key}", measures.missing.get(line.key, "")
+        if new is None:
+            passed = why in NOTHING_TO_EXCEED
+            yield Gate(name, float(old), None, passed, f"{line.label}: not measured, before {line.text(old)}: {why}.")
+            continue
+        passed = bool(new <= old + SLACK * abs(old) + 1e-9)
+        verdict = "no worse" if passed else "worse"
+        yield Gate(name, float(old), float(new), passed, f"{line.label}: {line.text(new)}, {verdict} than {line.text(old)} before.")
 
 
 def read_baseline(text: str, file: str) -> dict[str, Mapping[str, object]]:
     """The sessions of an earlier report, by file. Raises ContextError for what is none."""
     try:
-        document = document_of(text)
-        version = document["format"]
+        document = baseline_of(text)
         sessions: list[tuple[str, dict[str, object]]] = [(as_path(str(each["file"])), dict(each)) for each in document["sessions"]]
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         why = str(error) if type(error) is ValueError else "it has no format and sessions"
         raise ContextError(Fault(f"the baseline is not a report of measures: {why}.", BASELINE, place=Place(file))) from None
-    if version != 1:
-        found = f"the baseline has format {in_quotes(str(version))}; this version reads format 1."
-        raise ContextError(Fault(found, BASELINE, place=Place(file)))
     found_in = dict[str, Mapping[str, object]]()
     for name, session in sessions:
         if why := "is there twice" if name in found_in else _no_measure(session):

@@ -1,4 +1,4 @@
-"""What `motion coverage` hands to its renderers: each table's motion, its bars, and an earlier report. Data only."""
+"""What `motion coverage` hands to its renderers: each table's motion, its thresholds, and an earlier report. Data only."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from contextdb.authoring.motion_coverage import TableMotion
 from contextdb.covering import format_percent
-from contextdb.covering.motion import TableMotion
+from contextdb.covering.declared import NOTHING, Declared, require_declared
 from contextdb.errors import ContextError, Fault, Place, in_quotes, plural, some
-from contextdb.files.reports import document_of, sealed
-from contextdb.findings import Finding
+from contextdb.files.reports import baseline_of, with_marks
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.measuring.coverage import ContextCoverage, ToCapture, about_bins
 from contextdb.motion.measuring.moves import DIRECTION, MAPS, Counts, Map
@@ -22,7 +22,7 @@ from contextdb.motion.measuring.near_clips import Near
 from contextdb.report.coverage_results import bar
 from contextdb.report.results import CheckReport, Gate, Subject
 
-AHEAD_ALONE = "No clip goes another way than ahead, and none is wanted to."
+AHEAD_ALONE = "Every clip moves straight ahead, and no other direction is wanted."
 BASELINE = "the document that `contextdb motion coverage --format json` writes"
 EXACT, DRAWN = 1e-9, 0.02
 """A share of contexts fell when it is less by more than this: by roundings, or where contexts are drawn by chance."""
@@ -50,61 +50,71 @@ class Lost:
 
 @dataclass(frozen=True, eq=False)
 class MotionMeasured:
-    """One table with its bars, and what it lost since the baseline; None without one."""
+    """One table with its thresholds, and what it lost since the baseline; None without one."""
 
     motion: TableMotion
     lost: tuple[Lost, ...] | None = None
     gates: tuple[Gate, ...] = ()
+    space: Declared = field(default_factory=lambda: NOTHING)
+    """What its shares of contexts are shares of."""
 
     @property
     def headline(self) -> str:
         """The covered share in words."""
-        found = self.motion.coverage
+        coverage = self.motion.coverage
         about = "about " if not self.motion.is_exact else ""
-        return f"{about}{format_percent(found.covered, 1)} of the wanted movements have a valid clip"
+        return f"{about}{format_percent(coverage.covered, 1)} of the wanted movements have a valid clip"
 
     @property
     def size(self) -> str:
         """How much there is of what."""
-        found = self.motion.coverage
-        parts = [plural(len(found.clips), "clip"), plural(found.n_frames, "frame")]
-        parts += ["mirrored too"] if found.is_mirrored else []
-        return ", ".join([*parts, f"of {plural(len(found.databases), 'database')}: {some(found.databases)}"])
+        coverage = self.motion.coverage
+        parts = [plural(len(coverage.clips), "clip"), plural(coverage.n_frames, "frame")]
+        parts += ["mirrored too"] if coverage.is_mirrored else []
+        return ", ".join([*parts, f"of {plural(len(coverage.databases), 'database')}: {some(coverage.databases)}"])
 
     def notes(self) -> Iterator[str]:
         """What shares are of, and what they leave out, in sentences."""
-        found, contexts = self.motion.coverage, self.motion.contexts
+        coverage, contexts = self.motion.coverage, self.motion.contexts
         if contexts is None:
             yield "No table says when these clips are valid: they are measured together."
             return
-        n = len(found.contexts)
-        told = f"{plural(n, 'set')} of valid clips, in {format_percent(1.0 - contexts.without, 1)} of the contexts"
-        without = f"; in the others no clip is valid (see contextdb coverage {found.table})" if contexts.without else ""
-        yield f"{told}{without}."
+        n = len(coverage.contexts)
+        sets = f"{plural(n, 'set')} of valid clips, in {format_percent(1.0 - contexts.without, 1)} of the contexts"
+        without = f"; in the others no clip is valid (see contextdb coverage {coverage.table})" if contexts.without else ""
+        yield f"{sets}{without}."
         if contexts.n_samples:
             yield f"Shares are of {contexts.n_samples:,} contexts drawn, as {contexts.why}."
         if self.motion.axes:
-            asked = ", ".join(f"{axis} by {in_quotes(name)}" for axis, name in self.motion.axes.items())
-            yield f"Asked for: {asked}."
+            axes = ", ".join(f"{axis} by {in_quotes(name)}" for axis, name in self.motion.axes.items())
+            yield f"Wanted movements come from: {axes}."
         if contexts.not_mirrored:
-            yield f"Mirrored clips are not held to {some(contexts.not_mirrored)}, computed from facts that a mirror changes."
+            yield f"Mirrored clips ignore {some(contexts.not_mirrored)}: computed from facts that mirroring changes."
 
     def asides(self) -> Iterator[tuple[str, str, list[str]]]:
         """What else there is to say of clips: a title, a sentence, and its items."""
-        found = self.motion.coverage
-        yield "never valid", "no context lets these clips play", list(found.never_valid)
+        coverage = self.motion.coverage
+        yield "never valid", "no context lets these clips play", list(coverage.never_valid)
         yield "no clip", "rows whose asset no database has a clip of", list(self.motion.without_clip)
-        dead = [f"{clip.asset} {format_percent(clip.n_dead / clip.n_frames, 0)}" for clip in found.dead]
+        dead = [f"{clip.asset} {format_percent(clip.n_dead / clip.n_frames, 0)}" for clip in coverage.dead]
         yield "dead frames", "the markup never lets these shares of clips play", dead
-        yield "near another", "95 % of the frames cost no more than this with the other clip", list(_near_words(found.near))
-        transitions = found.transitions
+        yield (
+            "near-duplicates",
+            "95 % of the frames of the first clip are within this cost of the other",
+            list(_near_words(coverage.near)),
+        )
+        transitions = coverage.transitions
         missing = [transitions.name_of(pair) for pair in transitions.missing]
         yield "no transition", f"states of {transitions.pattern} without a clip", missing
 
     def to_json(self) -> dict[str, Any]:
         """One entry of `tables` in the JSON document."""
         lost = None if self.lost is None else {"lost": [each.to_json() for each in self.lost]}
-        return self.motion.to_json() | {"baseline": lost, "gates": [gate.to_json() for gate in self.gates]}
+        return self.motion.to_json() | {
+            "space": dict(self.space),
+            "baseline": lost,
+            "gates": [gate.to_json() for gate in self.gates],
+        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +125,7 @@ class MotionCoverageResults:
     tables: tuple[MotionMeasured, ...]
     unlisted: tuple[str, ...] = ()
     gone: Mapping[str, Gate] = field(default_factory=dict)
-    """For each table of the baseline that has no clips now the bar that this misses."""
+    """For each table of the baseline that has no clips now the gate of that."""
 
     @property
     def gates(self) -> list[Gate]:
@@ -123,19 +133,19 @@ class MotionCoverageResults:
 
     @property
     def passed(self) -> bool:
-        """Whether every bar is kept."""
+        """Whether every threshold is met."""
         return all(gate.passed for gate in self.gates)
 
     @property
     def verdict(self) -> str:
-        """Whether the bars are kept, in one sentence; "" where there are none."""
+        """Whether the thresholds are met, in one sentence; "" where there are none."""
         n_missed = sum(not gate.passed for gate in self.gates)
         if n_missed:
-            return f"{n_missed} of {plural(len(self.gates), 'bar')} missed."
-        return f"{plural(len(self.gates), 'bar')} kept." if self.gates else ""
+            return f"{n_missed} of {plural(len(self.gates), 'threshold')} missed."
+        return f"{plural(len(self.gates), 'threshold')} met." if self.gates else ""
 
     def to_json(self) -> dict[str, object]:
-        return sealed(
+        return with_marks(
             {
                 "format": 1,
                 "passed": self.passed,
@@ -147,18 +157,18 @@ class MotionCoverageResults:
         )
 
     def as_check(self) -> CheckReport:
-        """The bars that are missed, as findings."""
+        """The thresholds that are missed, or met by an option, as findings."""
         named = [(name, gate) for name, gate in self.gone.items()]
         named += [(measured.motion.name, gate) for measured in self.tables for gate in measured.gates]
-        return CheckReport((), tuple(Finding(gate.name, "error", gate.message, name) for name, gate in named if not gate.passed))
+        return CheckReport((), tuple(finding for name, gate in named for finding in gate.findings(name)))
 
 
 def _near_words(near: Iterable[Near]) -> Iterator[str]:
-    """Clips that are near another; of two that are near each other the nearer."""
-    told = set()
+    """Near-duplicates; of two clips that are near each other one pair."""
+    listed = set()
     for each in near:
-        if (each.other, each.asset) not in told:
-            told.add((each.asset, each.other))
+        if (each.other, each.asset) not in listed:
+            listed.add((each.asset, each.other))
             cost = "<0.0001" if each.cost < 0.0001 else f"{each.cost:.4f}"
             yield f"{each.asset} ~ {each.other}{' mirrored' if each.is_mirrored else ''} ({cost})"
 
@@ -167,7 +177,7 @@ def _near_words(near: Iterable[Near]) -> Iterator[str]:
 
 
 def fail_under(motion: TableMotion, limit: float) -> Gate:
-    """Hold the covered share to a bar."""
+    """The gate of a least covered share."""
     value = motion.coverage.covered if motion.is_exact else max(0.0, motion.coverage.covered - DRAWN)
     at_least = "" if motion.is_exact else "at least "
     return bar("fail-under", value, limit, f"{at_least}{{}} of the wanted movements have a valid clip")
@@ -177,12 +187,8 @@ def no_loss(lost: tuple[Lost, ...]) -> Gate:
     """Require that no movement was lost since the baseline."""
     if not lost:
         return Gate("baseline", 0.0, 0.0, True, "no movement was lost since the baseline.")
-    told = f"{plural(len(lost), 'movement')} lost since the baseline: {some([each.words for each in lost])}."
-    return Gate("baseline", 0.0, float(len(lost)), False, told)
-
-
-def table_gone(name: str) -> Gate:
-    return Gate("gone", 0.0, 1.0, False, f"{in_quotes(name)} of the baseline has no clips any more.")
+    message = f"{plural(len(lost), 'movement')} lost since the baseline: {some([each.words for each in lost])}."
+    return Gate("baseline", 0.0, float(len(lost)), False, message)
 
 
 # ---- an earlier report
@@ -194,21 +200,24 @@ class Earlier:
 
     filled: Mapping[str, Floats]
     is_exact: bool
+    space: Declared
+    axes: Mapping[str, str]
+    """The conditions that defined which movements are wanted."""
 
 
 def read_baseline(text: str, file: str) -> dict[str, Earlier]:
     """What an earlier report says, by the name of each table. Raises ContextError where it is no such report, or its bins are
     others."""
     try:
-        document = document_of(text)
-        if not isinstance(document, dict) or document.get("format") != 1:
-            raise ValueError('it has no "format": 1')
+        document = baseline_of(text)
         if document["bins"] != json.loads(json.dumps(about_bins())):
             raise ValueError("its bins are others, of another version")
+        if not document["tables"]:
+            raise ValueError("it has no tables, so nothing would be compared")
         return {_name(entry): _earlier(entry) for entry in document["tables"]}
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         why = f"{error} is missing" if isinstance(error, KeyError) else str(error)
-        raise ContextError(Fault(f"the baseline cannot be read: {why}.", BASELINE, place=Place(file))) from None
+        raise ContextError(Fault(f"the baseline cannot be read: {why}.", BASELINE, "to write it again", Place(file))) from None
 
 
 def _name(entry: Mapping[str, Any]) -> str:
@@ -222,21 +231,23 @@ def _earlier(entry: Mapping[str, Any]) -> Earlier:
             math.isfinite(share) and 0 <= share <= 1 for share in shares.ravel().tolist()
         ):
             raise ValueError(f'"filled" of the map {in_quotes(name)} are no shares from 0 to 1')
-    return Earlier(filled, entry["contexts"]["method"] == "exact")
+    contexts = entry["contexts"]
+    axes = {str(axis): str(name) for axis, name in contexts["asked_by"].items()}
+    return Earlier(filled, contexts["method"] == "exact", require_declared(entry["space"]), axes)
 
 
 def lost_since(motion: TableMotion, earlier: Earlier) -> tuple[Lost, ...]:
-    """The bins that are filled in a smaller share of the contexts than they were; those that lost most first. What goes ahead is
-    told of in the map of turns."""
+    """The bins that are filled in a smaller share of the contexts than they were; those that lost most first. Movement ahead is
+    reported in the map of turns."""
     slack = EXACT if motion.is_exact and earlier.is_exact else DRAWN
-    found = []
+    lost = []
     for name, before in earlier.filled.items():
         now = motion.coverage.filled_shares[name]
         for row, column in np.argwhere(now < before - slack).tolist():
             if name == DIRECTION and column == MAPS[name].centre:
                 continue
-            found.append(Lost(name, row, column, float(before[row, column]), float(now[row, column])))
-    return tuple(sorted(found, key=lambda each: (each.now - each.before, each.map, each.row, each.column)))
+            lost.append(Lost(name, row, column, float(before[row, column]), float(now[row, column])))
+    return tuple(sorted(lost, key=lambda each: (each.now - each.before, each.map, each.row, each.column)))
 
 
 # ---- words that several formats share
@@ -260,8 +271,8 @@ def capture_sentence(each: ToCapture) -> str:
 
 def worst_contexts(measured: MotionMeasured) -> list[ContextCoverage]:
     """The contexts with holes, those first in which most is missing: share times the holes' share of what is wanted."""
-    found = [each for each in measured.motion.coverage.contexts if each.n_holes]
-    return sorted(found, key=lambda each: (-each.contexts.share * (1.0 - each.covered), each.contexts.id))
+    with_holes = [each for each in measured.motion.coverage.contexts if each.n_holes]
+    return sorted(with_holes, key=lambda each: (-each.contexts.share * (1.0 - each.covered), each.contexts.id))
 
 
 def context_words(each: ContextCoverage) -> str:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from contextdb.console import printable
 from contextdb.findings import Finding, Level
-from contextdb.report.results import Report, as_path, told, worst_first
+from contextdb.report.results import Report, as_path, message_of, worst_first
 
 COMMANDS: dict[Level, str] = {"error": "error", "warning": "warning", "info": "notice"}
 
@@ -26,7 +26,7 @@ def _annotation(finding: Finding) -> str:
         place = {"file": as_path(finding.file)} | ({"line": str(finding.line)} if finding.line is not None else {})
         properties = place | properties
     written = ",".join(f"{key}={_as_property(value)}" for key, value in properties.items())
-    return f"::{COMMANDS[finding.level]} {written}::{_as_data(told(finding))}"
+    return f"::{COMMANDS[finding.level]} {written}::{_as_data(message_of(finding))}"
 
 
 def _as_data(text: str) -> str:

@@ -8,13 +8,16 @@ from __future__ import annotations
 import json
 import re
 
+from contextdb.files.reports import DIGEST, sealed
 from contextdb.report.results import Report
 
 _UNSAFE = re.compile("[\x7f-\x9f\u2028\u2029\ud800-\udfff]")
 
 
 def render(report: Report) -> str:
-    return as_json(report.to_json())
+    document = report.to_json()
+    text = as_json(document)
+    return sealed(text) if DIGEST in document else text
 
 
 def as_json(document: object) -> str:
@@ -23,6 +26,6 @@ def as_json(document: object) -> str:
     return _UNSAFE.sub(_escaped, json.dumps(document, ensure_ascii=False, indent=2)) + "\n"
 
 
-def _escaped(found: re.Match[str]) -> str:
-    code = ord(found[0])
+def _escaped(match: re.Match[str]) -> str:
+    code = ord(match[0])
     return f"\\\\u{code:04x}" if code >= 0xD800 else f"\\u{code:04x}"

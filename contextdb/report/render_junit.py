@@ -7,23 +7,25 @@ the same findings give the same bytes.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from xml.etree import ElementTree as ET
 
 from contextdb.checks.rules import TABLE_RULES
 from contextdb.console import printable
+from contextdb.covering.contracts import Proof
 from contextdb.errors import plural
 from contextdb.findings import Finding, Level
 from contextdb.report.junit_parts import case_in, document
-from contextdb.report.results import CheckReport, Group, place_of, told
+from contextdb.report.results import CheckReport, Group, message_of, place_of
 
 MOST_LISTED = 200
-"""A case lists so many findings, then says how many more there are: CI systems refuse reports that grow without end."""
+"""The most findings that a case lists before it says how many more there are: CI systems refuse reports that grow without end."""
 
 
 def render(report: CheckReport, failing: Collection[Level], shows_all: bool = False) -> str:
     """The findings as a JUnit document; levels in `failing` make a case fail."""
     suites = [_suite(group, failing, shows_all) for group in report.groups()]
+    suites += [_contracts(report.contracts, failing)] if report.contracts else []
     return document(
         "contextdb check", suites or [_suite_of_nothing()]
     )  # some CI systems take a report without a case for a broken one
@@ -43,6 +45,18 @@ def _suite(group: Group, failing: Collection[Level], shows_all: bool) -> ET.Elem
     return suite
 
 
+def _contracts(proofs: Sequence[Proof], failing: Collection[Level]) -> ET.Element:
+    """A case for each contract, which fails where some context breaks it."""
+    suite = ET.Element("testsuite", name="contracts")
+    for proof in proofs:
+        case = case_in(suite, printable(proof.contract.name))
+        if proof.holds is False and "error" in failing:
+            ET.SubElement(case, "failure", type="broken-contract", message=printable(proof.sentence))
+        else:
+            ET.SubElement(case, "system-out").text = printable(proof.sentence)
+    return suite
+
+
 def _suite_of_nothing() -> ET.Element:
     suite = ET.Element("testsuite", name="contextdb check")
     case_in(suite, "nothing found")
@@ -50,11 +64,11 @@ def _suite_of_nothing() -> ET.Element:
 
 
 def _by_rule(group: Group) -> dict[str, list[Finding]]:
-    """The findings of each rule; of a table that was read also the rules that found nothing."""
-    found: dict[str, list[Finding]] = {rule: [] for rule in TABLE_RULES} if group.table else {}
+    """The findings of each rule; of a table that was read also the rules without a finding."""
+    findings: dict[str, list[Finding]] = {rule: [] for rule in TABLE_RULES} if group.table else {}
     for finding in group.findings:
-        found.setdefault(finding.rule, []).append(finding)
-    return found
+        findings.setdefault(finding.rule, []).append(finding)
+    return findings
 
 
 def _headline(findings: list[Finding]) -> str:
@@ -72,4 +86,4 @@ def _lines(findings: list[Finding], shows_all: bool) -> Iterator[str]:
 
 def _placed(finding: Finding) -> str:
     place = place_of(finding)
-    return f"{place}: {told(finding)}" if place else told(finding)
+    return f"{place}: {message_of(finding)}" if place else message_of(finding)

@@ -49,9 +49,9 @@ def render(report: CheckReport, shows_all: bool = False) -> str:
 
 def escaped(text: str) -> str:
     """Text that Markdown shows as it is, on one line, and that names and links nobody."""
-    cut = _LIVE.sub(lambda found: f"{found[0]}\0", printable(text))
-    cut = _HASH.sub(lambda found: _HASH_PART.sub(r"\g<0>\0", found[0]), cut)
-    return _MARKUP.sub(lambda found: f"\\{found[0]}", cut).replace("\0", DEAD)
+    cut = _LIVE.sub(lambda match: f"{match[0]}\0", printable(text))
+    cut = _HASH.sub(lambda match: _HASH_PART.sub(r"\g<0>\0", match[0]), cut)
+    return _MARKUP.sub(lambda match: f"\\{match[0]}", cut).replace("\0", DEAD)
 
 
 def _n_bytes(section: str) -> int:

@@ -20,7 +20,7 @@ from contextdb.console import __version__, printable
 from contextdb.files.texts import is_parquet
 from contextdb.findings import Finding, Level
 from contextdb.report.render_json import as_json
-from contextdb.report.results import Report, told, worst_first
+from contextdb.report.results import Report, message_of, worst_first
 
 Json = dict[str, object]
 
@@ -34,13 +34,13 @@ LEVEL_NAMES: dict[Level, str] = {"error": "error", "warning": "warning", "info":
 def render(report: Report, shows_all: bool = False) -> str:
     """The findings as a SARIF log of one run; the worst ones where there are more than `MOST_RESULTS`."""
     ordered = worst_first(report.as_check().findings)
-    shown = ordered if shows_all else ordered[:MOST_RESULTS]
-    rules = list(dict.fromkeys(f.rule for f in shown))
-    driver = {"name": "contextdb", "semanticVersion": __version__, "rules": [_rule(name, shown) for name in rules]}
+    listed = ordered if shows_all else ordered[:MOST_RESULTS]
+    rules = list(dict.fromkeys(f.rule for f in listed))
+    driver = {"name": "contextdb", "semanticVersion": __version__, "rules": [_rule(name, listed) for name in rules]}
     run: Json = {
         "tool": {"driver": driver},
-        "invocations": [_invocation(len(ordered) - len(shown))],
-        "results": list(_results(shown, rules)),
+        "invocations": [_invocation(len(ordered) - len(listed))],
+        "results": list(_results(listed, rules)),
     }
     return as_json({"$schema": SCHEMA, "version": "2.1.0", "runs": [run]})
 
@@ -75,7 +75,7 @@ def _results(findings: list[Finding], rules: list[str]) -> Iterator[Json]:
             "ruleId": printable(finding.rule),
             "ruleIndex": index[finding.rule],
             "level": LEVEL_NAMES[finding.level],
-            "message": {"text": _as_message(told(finding))},
+            "message": {"text": _as_message(message_of(finding))},
             "locations": _locations(finding),
             "partialFingerprints": {"contextdbFinding/v1": f"{digest}:{seen[digest]}"},
             "properties": _properties(finding),
@@ -113,5 +113,5 @@ def _digest(finding: Finding) -> str:
 
 
 def _properties(finding: Finding) -> Json:
-    said = {"table": finding.table, "row": finding.row, "asset": finding.asset, "column": finding.column}
-    return {key: value for key, value in said.items() if value is not None} | ({"by": list(finding.by)} if finding.by else {})
+    properties = {"table": finding.table, "row": finding.row, "asset": finding.asset, "column": finding.column}
+    return {key: value for key, value in properties.items() if value is not None} | ({"by": list(finding.by)} if finding.by else {})

@@ -1,5 +1,4 @@
-"""Findings for people in a terminal: by table, then by rule, each with its `file:line`; about 40 lines, unless all are asked
-for."""
+"""Findings for people in a terminal: by table, then by rule, each with its `file:line`; about 40 lines, unless `shows_all`."""
 
 from __future__ import annotations
 
@@ -9,7 +8,7 @@ from collections.abc import Iterator
 from contextdb.console import printable, styled, width_of
 from contextdb.errors import plural
 from contextdb.findings import Finding, Level
-from contextdb.report.results import Block, CheckReport, Group, fitted, n_hidden, place_of, told
+from contextdb.report.results import Block, CheckReport, Group, fitted, message_of, n_hidden, place_of
 
 MOST_LINES = 40
 MOST_CLEAN = 8
@@ -18,6 +17,7 @@ MOST_CLEAN = 8
 LEAST_ROOM = 40
 """With fewer terminal cells next to its place, a message is under it."""
 
+INDENT = "   "
 STYLES: dict[Level, str] = {"error": "red", "warning": "yellow", "info": "cyan"}
 
 
@@ -65,7 +65,7 @@ def _block(block: Block, most: int, place_width: int, width: int, colour: bool) 
 
 
 def _finding_lines(finding: Finding, place_width: int, width: int) -> Iterator[str]:
-    place, message = place_of(finding), told(finding, names_asset=False)
+    place, message = place_of(finding), message_of(finding, names_asset=False)
     indent = 4 + place_width + 2 if place_width else 4
     if width - indent < LEAST_ROOM:
         yield f"    {place}"
@@ -96,6 +96,17 @@ def wrapped(text: str, width: int) -> list[str]:
         *full, line = _cut(word, width) if room > width else [word]
         lines, used = lines + full, width_of(line)
     return [*lines, line]
+
+
+def hanging(head: str, text: str, width: int) -> Iterator[str]:
+    """A text next to a head, wrapped in its own column; where that would be narrow, under it."""
+    text, indent = printable(text), width_of(head)
+    if width - indent < 30:
+        yield head.rstrip()
+        yield from (f"{INDENT}{INDENT}{line}" for line in wrapped(text, max(20, width - 2 * len(INDENT))))
+        return
+    for i, line in enumerate(wrapped(text, width - indent)):
+        yield (head if i == 0 else " " * indent) + line
 
 
 def _cut(word: str, width: int) -> list[str]:

@@ -1,4 +1,4 @@
-"""What a check hands to its renderers: the tables that were read and what was found. Data only.
+"""What a check hands to its renderers: the tables that were read, and their findings. Data only.
 
 A renderer is a pure function of a `Report` that gives text: the same report gives the same bytes.
 """
@@ -13,6 +13,7 @@ from pathlib import PurePath
 from typing import ClassVar, Literal, Protocol
 
 from contextdb.console import printable
+from contextdb.covering.contracts import Proof
 from contextdb.errors import plural, row_name
 from contextdb.findings import LEVELS, Finding, Level, worst
 
@@ -42,7 +43,7 @@ class TableSummary:
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """All that was found in one table, or in one file that is not a table: contextdb.toml, or a file that could not be read."""
+    """The findings of one table, or of one file that is not a table: contextdb.toml, or a file that could not be read."""
 
     label: str
     """The table's name, with its file where another table has the same name; the file where there is no name."""
@@ -51,17 +52,17 @@ class Group:
     findings: tuple[Finding, ...]
 
     def blocks(self) -> list[Block]:
-        """The findings by level and rule: errors first, else in the order found."""
-        found: dict[tuple[Level, str], list[Finding]] = {}
+        """The findings by level and rule: errors first, else in their order."""
+        blocks: dict[tuple[Level, str], list[Finding]] = {}
         for finding in self.findings:
-            found.setdefault((finding.level, finding.rule), []).append(finding)
-        ordered = sorted(found, key=lambda key: LEVELS.index(key[0]))
-        return [(level, rule, tuple(found[level, rule])) for level, rule in ordered]
+            blocks.setdefault((finding.level, finding.rule), []).append(finding)
+        ordered = sorted(blocks, key=lambda key: LEVELS.index(key[0]))
+        return [(level, rule, tuple(blocks[level, rule])) for level, rule in ordered]
 
 
 @dataclass(frozen=True, slots=True)
 class Gate:
-    """A bar that a table or a session is held to, or a comparison with the baseline."""
+    """A threshold of a table or a session, or a comparison with the baseline."""
 
     name: str
     """The option, such as fail-under."""
@@ -71,13 +72,20 @@ class Gate:
     message: str
     rule: str | None = None
     """The rule that a table breaks which misses the bar, where it has a name of its own."""
+    is_accepted: bool = False
+    """Whether it passes only because an option of the command says so."""
+
+    def findings(self, table: str, file: str | None = None) -> Iterator[Finding]:
+        """What a gate that fails, or that passes by an option, is in formats that know only findings."""
+        if not self.passed or self.is_accepted:
+            yield Finding(self.rule or self.name, "info" if self.passed else "error", self.message, table, file)
 
     def to_json(self) -> dict[str, object]:
         return {"name": self.name, "limit": self.limit, "value": self.value, "passed": self.passed, "message": self.message}
 
 
 class Report(Protocol):
-    """What can be rendered: what a check found, or what coverage measured."""
+    """What can be rendered: the findings of a check, or measurements."""
 
     subject: ClassVar[Subject]
 
@@ -95,23 +103,27 @@ class CheckReport:
     subject: ClassVar[Subject] = "check"
     tables: tuple[TableSummary, ...]
     findings: tuple[Finding, ...]
+    contracts: tuple[Proof, ...] = ()
 
     @property
     def summary(self) -> str:
-        """How many findings of each level there are, in one sentence."""
+        """How many findings of each level there are, and how many contracts hold, in one sentence each."""
+        n_held = sum(proof.holds is True for proof in self.contracts)
+        held = f" {n_held} of {plural(len(self.contracts), 'contract')} proved." if self.contracts else ""
         counts = Counter(f.level for f in self.findings)
-        said = ", ".join(plural(counts[level], level) for level in LEVELS if counts[level])
-        return f"{plural(len(self.tables), 'table')} checked: {said or 'nothing found'}."
+        totals = ", ".join(plural(counts[level], level) for level in LEVELS if counts[level])
+        return f"{plural(len(self.tables), 'table')} checked: {totals or 'nothing found'}.{held}"
 
     def to_json(self) -> dict[str, object]:
         findings = [finding.to_json() for finding in self.findings]
-        return {"format": 1, "findings": findings, "tables": [table.to_json() for table in self.tables]}
+        contracts = [proof.to_json() for proof in self.contracts]
+        return {"format": 1, "findings": findings, "tables": [table.to_json() for table in self.tables], "contracts": contracts}
 
     def as_check(self) -> CheckReport:
         return self
 
     def groups(self) -> list[Group]:
-        """What was found, by table and file: the worst first, else in the order given; tables without a finding last."""
+        """The findings, by table and file: the worst first, else in the order given; tables without a finding last."""
         members: list[tuple[TableSummary | None, list[Finding]]] = [(table, []) for table in self.tables]
         at: dict[tuple[str, str | None], int] = {}
         for i, table in enumerate(self.tables):
@@ -123,8 +135,8 @@ class CheckReport:
                 at[key] = len(members)
                 members.append((None, []))
             members[at[key]][1].append(finding)
-        found = [_group(table, findings) for table, findings in members]
-        return sorted(_with_labels(found), key=_rank)
+        groups = [_group(table, findings) for table, findings in members]
+        return sorted(_with_labels(groups), key=_rank)
 
 
 def place_of(finding: Finding) -> str:
@@ -134,7 +146,7 @@ def place_of(finding: Finding) -> str:
     return as_path(finding.file) if finding.line is None else f"{as_path(finding.file)}:{finding.line}"
 
 
-def told(finding: Finding, names_asset: bool = True) -> str:
+def message_of(finding: Finding, names_asset: bool = True) -> str:
     """The message on one printable line, after what it is about: the row where no line is known, the asset, the column."""
     about = [row_name(finding.row)] if finding.line is None and finding.row is not None else []
     if names_asset and finding.asset:
@@ -150,7 +162,7 @@ def as_path(file: str) -> str:
 
 
 def worst_first(findings: Iterable[Finding]) -> list[Finding]:
-    """The findings with errors first, else in the order found; CI systems show the first ones only."""
+    """The findings with errors first, else in their order; CI systems show the first ones only."""
     return sorted(findings, key=lambda f: LEVELS.index(f.level))
 
 
@@ -180,18 +192,18 @@ def _with_labels(groups: list[Group]) -> Iterator[Group]:
         yield replace(group, label=label)
 
 
-# ---- how a report for people is kept short: the first findings of each rule, then how many more there are
+# ---- how a report for people stays short: the first findings of each rule, then how many more there are
 
 
 FINDING_STEPS = (20, 10, 5, 3, 2, 1)
-"""How many findings of one rule are shown; the first that fits."""
+"""How many findings of one rule are listed: the first that fits."""
 
 
 def fitted(sections_at: Callable[[int], Sequence[str]], size: Callable[[str], int], room: int) -> tuple[list[str], int]:
-    """The sections of the longest form of a report that fits into `room`, and how many findings of one rule they show.
+    """The sections of the longest form of a report that fits into `room`, and that number.
 
-    `sections_at` gives the sections with at most so many findings of one rule, `size` how much room a section takes. Where not even
-    one finding of each rule fits, the last sections are left out; the first one never is.
+    `sections_at` gives the sections with at most a number of findings of one rule, `size` how much room a section takes. Where not
+    even one finding of each rule fits, the last sections are left out; the first one never is.
     """
     sections: Sequence[str] = ()
     for most in FINDING_STEPS:
@@ -202,7 +214,7 @@ def fitted(sections_at: Callable[[int], Sequence[str]], size: Callable[[str], in
     return list(sections[: max(1, n_fitting)]), FINDING_STEPS[-1]
 
 
-def n_hidden(groups: Sequence[Group], n_shown: int, most: int) -> int:
-    """How many findings are not shown, with the first `n_shown` groups and at most so many findings of each rule."""
-    cut = sum(max(0, len(findings) - most) for group in groups[:n_shown] for _, _, findings in group.blocks())
-    return cut + sum(len(group.findings) for group in groups[n_shown:])
+def n_hidden(groups: Sequence[Group], n_listed: int, most: int) -> int:
+    """How many findings are left out: of the first `n_listed` groups those past `most` of each rule, of the others all."""
+    cut = sum(max(0, len(findings) - most) for group in groups[:n_listed] for _, _, findings in group.blocks())
+    return cut + sum(len(group.findings) for group in groups[n_listed:])

@@ -18,7 +18,7 @@ from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
 
 SHOWN_HZ = 30.0
-"""So many poses a second are in the page at most."""
+"""The most poses a second in the page."""
 SEARCHED, JUMPED, FORCED, MIRRORED = 1, 2, 4, 8
 MAY_NOT, MAY = 1, 128
 """A bar of the landscape: 0 without a frame, from 1 one that may not play, from 128 one that may; the higher, the cheaper."""
@@ -40,7 +40,7 @@ class Detail:
 
     @staticmethod
     def most_first() -> Iterator[Detail]:
-        """From all that is shown to what a page cannot do without."""
+        """From everything to what a page cannot do without."""
         yield Detail(3, 0.7, 64, 64, 12, True)
         yield Detail(3, 0.7, 64, 40, 12, False)
         yield Detail(2, 0.5, 32, 24, 8, False)
@@ -50,7 +50,7 @@ class Detail:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Ghost:
-    """A pose that could have played, moving: joints [F, J, 3] in metres, relative to the root on the ground, so many a second."""
+    """A pose that could have played, moving: joints [F, J, 3] in metres, relative to the root on the ground, at `rate` a second."""
 
     asset: str
     positions: Floats
@@ -171,27 +171,27 @@ def document_of(sessions: Sequence[SessionView], detail: Detail) -> dict[str, ob
 
 def _session(session: SessionView, detail: Detail) -> dict[str, object]:
     step = max(1, round(session.rate / SHOWN_HZ))
-    shown = np.arange(0, len(session.positions), step)
+    sampled = np.arange(0, len(session.positions), step)
     names = _Names()
     asset = np.array([names.of(playing[0]) for playing in session.playing], np.int16)
-    local = session.positions[shown] - _on_ground(session.roots[shown])[:, None]
+    local = session.positions[sampled] - _on_ground(session.roots[sampled])[:, None]
     columns = {
-        "positions": _packed(_whole(local, 1000.0, np.int16).reshape(len(shown), -1), is_delta=True),
-        "root": _packed(_root(session.roots[shown]), is_delta=True),
-        "asset": _packed(asset[shown]),
-        "at": _packed(np.array([round(1000 * session.playing[i][1]) for i in shown.tolist()], np.int32)),
+        "positions": _packed(_whole(local, 1000.0, np.int16).reshape(len(sampled), -1), is_delta=True),
+        "root": _packed(_root(session.roots[sampled]), is_delta=True),
+        "asset": _packed(asset[sampled]),
+        "at": _packed(np.array([round(1000 * session.playing[i][1]) for i in sampled.tolist()], np.int32)),
         "flags": _packed(_gathered(session.flags, step)),
-        "contacts": _packed((session.contacts[shown] << np.arange(session.contacts.shape[1])).sum(axis=1).astype(np.uint8)),
+        "contacts": _packed((session.contacts[sampled] << np.arange(session.contacts.shape[1])).sum(axis=1).astype(np.uint8)),
     }
     if session.bodies is not None:
-        columns["body"] = _packed(_root(session.bodies[shown]), is_delta=True)
+        columns["body"] = _packed(_root(session.bodies[sampled]), is_delta=True)
     for name, values in session.strips.items():
         columns[name] = _packed(_peaks(values, step).astype(np.float32))
     moments = [_moment(each, names, step, session.rate, detail) for each in session.moments if each.is_change or detail.searches]
     return {
         "name": session.name,
         "rate": session.rate / step,
-        "n": len(shown),
+        "n": len(sampled),
         "bones": list(session.bones),
         "parents": session.parents.tolist(),
         "sides": list(session.sides),
@@ -248,9 +248,9 @@ def _candidate(each: Candidate, names: _Names) -> dict[str, object]:
 
 def _ghost(ghost: Ghost, shown_hz: float, detail: Detail) -> dict[str, object]:
     moments = np.arange(max(1, round(detail.ghost_s * shown_hz))) / shown_hz
-    shown = ghost.positions[np.minimum(np.round(moments * ghost.rate).astype(np.int64), len(ghost.positions) - 1)]
-    packed = _packed(_whole(shown, 1000.0, np.int16).reshape(len(shown), -1), is_delta=True)
-    return {**packed, "asset": ghost.asset, "plays_on": ghost.plays_on, "frames": len(shown)}
+    sampled = ghost.positions[np.minimum(np.round(moments * ghost.rate).astype(np.int64), len(ghost.positions) - 1)]
+    packed = _packed(_whole(sampled, 1000.0, np.int16).reshape(len(sampled), -1), is_delta=True)
+    return {**packed, "asset": ghost.asset, "plays_on": ghost.plays_on, "frames": len(sampled)}
 
 
 def _landscape(rows: Sequence[AssetCosts], names: _Names, bins: int) -> dict[str, object]:
@@ -267,15 +267,15 @@ def _landscape(rows: Sequence[AssetCosts], names: _Names, bins: int) -> dict[str
 
 
 def _bars(each: AssetCosts, bins: int, least: float, most: float) -> NDArray[np.uint8]:
-    found = np.zeros(bins, np.uint8)
+    binned = np.zeros(bins, np.uint8)
     parts = np.minimum(np.arange(len(each.costs)) * bins // max(1, len(each.costs)), bins - 1)
     for kind, among in ((MAY_NOT, ~each.may_play), (MAY, each.may_play)):
         lowest = np.full(bins, np.inf)
         np.minimum.at(lowest, parts[among], each.costs[among])
         share = 1.0 - np.clip((lowest - least) / max(most - least, 1e-12), 0.0, 1.0)
         has = np.isfinite(lowest)
-        found[has] = kind + np.round(share[has] * (BAR_STEPS - 1)).astype(np.uint8)
-    return found
+        binned[has] = kind + np.round(share[has] * (BAR_STEPS - 1)).astype(np.uint8)
+    return binned
 
 
 def _on_ground(roots: Floats) -> Floats:
@@ -295,31 +295,31 @@ def _whole(values: Floats, scale: float, kind: type[np.signedinteger]) -> NDArra
 
 
 def _gathered(flags: NDArray[np.uint8], step: int) -> NDArray[np.uint8]:
-    """The flags of each shown update and of those before it that are not shown."""
-    found = flags[::step].copy()
+    """The flags of each sampled update and of those left out before it."""
+    sampled = flags[::step].copy()
     for before in range(1, step):
-        found[1:] |= flags[step - before :: step][: len(found) - 1]
-    return found
+        sampled[1:] |= flags[step - before :: step][: len(sampled) - 1]
+    return sampled
 
 
 def _peaks(values: Floats, step: int) -> Floats:
-    """The largest of each shown update and of those before it that are not shown; what is not known is 0."""
+    """The largest of each sampled update and of those left out before it; an unknown value is 0."""
     known = np.nan_to_num(np.asarray(values, np.float64), nan=0.0, posinf=0.0, neginf=0.0)
-    found = known[::step].copy()
+    peaks = known[::step].copy()
     for before in range(1, step):
-        found[1:] = np.maximum(found[1:], known[step - before :: step][: len(found) - 1])
-    return found
+        peaks[1:] = np.maximum(peaks[1:], known[step - before :: step][: len(peaks) - 1])
+    return peaks
 
 
 def _packed(values: NDArray[np.generic], *, is_delta: bool = False) -> dict[str, object]:
     """An array as the script reads it, little-endian."""
-    kept = values
+    packed = values
     width = values.shape[1] if values.ndim == 2 else 1
     if is_delta and len(values) > 1:
-        kept = np.concatenate((values[:1], np.diff(values, axis=0)))  # wraps around as the script's own numbers do
-    raw = np.ascontiguousarray(kept.astype(kept.dtype.newbyteorder("<"))).tobytes()
+        packed = np.concatenate((values[:1], np.diff(values, axis=0)))  # wraps around as the script's own numbers do
+    raw = np.ascontiguousarray(packed.astype(packed.dtype.newbyteorder("<"))).tobytes()
     data = base64.b64encode(zlib.compress(raw, 9)).decode()
-    return {"type": f"{kept.dtype.kind}{kept.dtype.itemsize}", "delta": width if is_delta else 0, "data": data}
+    return {"type": f"{packed.dtype.kind}{packed.dtype.itemsize}", "delta": width if is_delta else 0, "data": data}
 
 
 def _short(value: float) -> float | None:

@@ -42,10 +42,10 @@ def render(sessions: Sequence[SessionView], *, parting: str = "") -> str:
 def _page(sessions: Sequence[SessionView], detail: Detail, parting: str) -> str:
     names = [printable(session.name) for session in sessions]
     title = f"Session {names[0]}" if len(names) == 1 else f"Sessions {' and '.join(names)}"
-    said = f"<p>{escape(parting)}</p>\n" if parting else ""
+    parted = f"<p>{escape(parting)}</p>\n" if parting else ""
     changes = "".join(_changes(session, name) for session, name in zip(sessions, names, strict=True))
     body = (
-        f"<header><h1>{escape(title)}</h1>\n{said}</header>\n<main>\n"
+        f"<header><h1>{escape(title)}</h1>\n{parted}</header>\n<main>\n"
         f"{_player(names)}{_measures(sessions, names)}{changes}</main>\n"
         f'<footer><p class="muted">contextdb {__version__}</p></footer>\n'
         f'<script type="application/json" id="session">{embedded(document_of(sessions, detail))}</script>\n'

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from contextdb.motion.measuring.shown import is_forced
+from contextdb.motion.measuring.displayed import is_forced
 from contextdb.motion.selection.decision import Action, Decision
 from contextdb.motion.trace.cost_views import cost_text
 from contextdb.report.measure_results import SessionMeasures
@@ -14,7 +14,7 @@ CHANGES = (Action.START, Action.JUMP)
 
 
 def render(sessions: Sequence[SessionMeasures], decisions: Sequence[Sequence[Decision]], parting: str, page: str | None) -> str:
-    """The comment; `page` is the name of the page beside it."""
+    """The comment; `page` is the name of its HTML page."""
     names = [session.file for session in sessions]
     parts = [f"## Session {' and '.join(map(escaped, names))}", *(f"{escaped(s.file)}: {s.headline}" for s in sessions)]
     if parting:
@@ -47,13 +47,13 @@ def _changes(name: str, decisions: Sequence[Decision], room: int) -> str:
     head += "| time | what | asset | cost | why |\n| ---: | --- | --- | ---: | --- |\n"
     end, left = "\n</details>\n", "\nThe rest is in the page.\n"
     room -= len((head + end + left).encode())
-    kept: list[str] = []
+    retained: list[str] = []
     for line in lines:
         room -= len(line.encode())
         if room < 0:
-            return head + "".join(kept) + left + end if kept else ""
-        kept.append(line)
-    return head + "".join(kept) + end
+            return head + "".join(retained) + left + end if retained else ""
+        retained.append(line)
+    return head + "".join(retained) + end
 
 
 def _line(decision: Decision) -> str:

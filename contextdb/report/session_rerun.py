@@ -26,9 +26,9 @@ def require_rerun() -> None:
     try:
         import rerun  # noqa: F401
     except ImportError:
-        found = "a recording for Rerun cannot be written: rerun-sdk is not installed."
+        fault = "a recording for Rerun cannot be written: rerun-sdk is not installed."
         raise MotionError(
-            Fault(found, "--html and --trace, which need nothing more", 'to install it: pip install "contextdb[rerun]"')
+            Fault(fault, "--html and --trace, which need nothing more", 'to install it: pip install "contextdb[rerun]"')
         ) from None
 
 

@@ -1,4 +1,4 @@
-"""A recorded session as its page shows it: its poses made again, its searches asked again, its measures moment by moment."""
+"""A recorded session as its page shows it: its poses made again, its searches repeated, its measures moment by moment."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from contextdb.errors import Fault, MotionError
 from contextdb.motion.clips.bone_names import side_and_core
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.markup.left_out import LeftOut
-from contextdb.motion.measuring import measure, shown
+from contextdb.motion.measuring import displayed, measure
+from contextdb.motion.measuring.displayed import strips_of
 from contextdb.motion.measuring.raw_clips import Clips, toe_of
-from contextdb.motion.measuring.shown import strips_of
-from contextdb.motion.output.bank import PoseBank, loops
+from contextdb.motion.output.bank import PoseBank
 from contextdb.motion.output.settings import PoseSettings
 from contextdb.motion.output.stream import Pose
 from contextdb.motion.selection.decision import Action, Decision, Playing
@@ -28,7 +28,7 @@ from contextdb.report import session_data
 
 MOST_CANDIDATES = 12
 GHOST_S = 0.7
-"""For so long the poses are kept that could have played."""
+"""For how long the poses that could have played are included."""
 MOST_GHOSTS = 3
 """Beside what plays: what would have played on, and two others."""
 CHANGES = (Action.START, Action.JUMP)
@@ -48,16 +48,16 @@ def view_of(
     """A session as the page shows it.
 
     `banks` are the poses of its databases, by name, and `settings` how its poses are made; `poses` are those that were shown, one
-    for each decision, such as on ground that is not flat (None: they are made again). `reasked` is the session asked again: without
-    it the page shows no candidates. `measured` are measures by name: of the session, and of the raw clips. Raises MotionError where
-    the session has no decision, or the banks have no poses of what it plays.
+    for each decision, such as on ground that is not flat (None: they are made again). `reasked` is the session searched again:
+    without it the page shows no candidates. `measured` are measures by name: of the session, and of the raw clips. Raises
+    MotionError where the session has no decision, or the banks have no poses of what it plays.
     """
     decisions = list(trace.brief())
     if not decisions:
         raise MotionError(Fault("the session has no decision.", "one with at least an update"))
     warped = list(measure.warped_poses(decisions, banks, settings))
     poses = [pose for pose, _ in warped] if poses is None else poses
-    played = shown.with_poses(shown.of_decisions(decisions), shown.of_poses(poses, 1.0)).with_contacts(Clips.of(banks))
+    played = displayed.with_poses(displayed.of_decisions(decisions), displayed.of_poses(poses, 1.0)).with_contacts(Clips.of(banks))
     assert played.positions is not None, "was just made"
     assert played.roots is not None, "was just made"
     rig = next(iter(banks.values()))
@@ -85,23 +85,23 @@ def view_of(
 
 def _flags(decision: Decision) -> int:
     playing = decision.playing
-    found = (
+    flags = (
         session_data.SEARCHED * decision.searched
         + session_data.JUMPED * (decision.action in CHANGES)
-        + session_data.FORCED * shown.is_forced(decision)
+        + session_data.FORCED * displayed.is_forced(decision)
     )
-    return found + session_data.MIRRORED * (playing is not None and playing.mirrored)
+    return flags + session_data.MIRRORED * (playing is not None and playing.mirrored)
 
 
 def _costs(decisions: Sequence[Decision]) -> Floats:
     """What plays cost when it was last searched for."""
-    found = np.array([np.nan if each.cost is None else each.cost for each in decisions], np.float64)
-    known = np.maximum.accumulate(np.where(np.isnan(found), -1, np.arange(len(found))))
-    return np.where(known < 0, np.nan, found[known])
+    costs = np.array([np.nan if each.cost is None else each.cost for each in decisions], np.float64)
+    known = np.maximum.accumulate(np.where(np.isnan(costs), -1, np.arange(len(costs))))
+    return np.where(known < 0, np.nan, costs[known])
 
 
 def _change(decision: Decision) -> session_data.ChangeLine:
-    action = "jumps, forced" if shown.is_forced(decision) else str(decision.action)
+    action = "jumps, forced" if displayed.is_forced(decision) else str(decision.action)
     asset = "" if decision.playing is None else _named(decision.playing.asset, decision.playing.mirrored)
     return session_data.ChangeLine(
         decision.time_s, (action, asset, "" if decision.cost is None else cost_text(decision.cost), decision.why)
@@ -126,30 +126,30 @@ def _moments(
         if not decision.searched:
             continue
         is_change = decision.action in CHANGES
-        told = session_data.Moment(i, decision.why, is_change, shown.is_forced(decision), _facts(decision), (), (), ())
-        asked = _asked(trace, reasked, i) if is_change else None
-        if asked is not None and reasked is not None:
+        moment = session_data.Moment(i, decision.why, is_change, displayed.is_forced(decision), _facts(decision), (), (), ())
+        reasked_decision = _reasked_at(trace, reasked, i) if is_change else None
+        if reasked_decision is not None and reasked is not None:
             pose, warp = warped[i]
-            status = status_of(asked.decision, decisions[i - 1] if i else None, reasked.databases, warp)
-            told = replace(told, status=tuple(status.lines()))
-            yield _in_full(told, asked, decision, _Ghosts(banks, pose.root[2]))
+            status = status_of(reasked_decision.decision, decisions[i - 1] if i else None, reasked.databases, warp)
+            moment = replace(moment, status=tuple(status.lines()))
+            yield _in_full(moment, reasked_decision, decision, _Ghosts(banks, pose.root[2]))
         else:
-            yield told
+            yield moment
 
 
 def _facts(decision: Decision) -> tuple[tuple[str, str], ...]:
     return tuple((name, fact_text(value)) for name, value in sorted((decision.context or {}).items()))
 
 
-def _asked(trace: Trace, reasked: Reasked | None, at: int) -> ReaskedDecision | None:
-    """A decision asked again; None where it cannot be."""
+def _reasked_at(trace: Trace, reasked: Reasked | None, at: int) -> ReaskedDecision | None:
+    """A decision searched again; None where that is impossible."""
     if reasked is None or why_not_asked(trace[at], trace.about, reasked.databases):
         return None
     return reasked[at]
 
 
-def _in_full(moment: session_data.Moment, asked: ReaskedDecision, decision: Decision, ghosts: _Ghosts) -> session_data.Moment:
-    best = asked.best_of_assets()
+def _in_full(moment: session_data.Moment, reasked: ReaskedDecision, decision: Decision, ghosts: _Ghosts) -> session_data.Moment:
+    best = reasked.best_of_assets()
     ordered = sorted(best, key=lambda each: (each.row.left_out is not LeftOut.NO, each.row.cost))
     channels = tuple(ordered[0].row.channels) if ordered else ()
     shown_first = ordered[:MOST_CANDIDATES]
@@ -158,26 +158,26 @@ def _in_full(moment: session_data.Moment, asked: ReaskedDecision, decision: Deci
         channels=(*channels, "biases"),
         candidates=[_candidate(each, channels) for each in sorted(shown_first, key=lambda each: each.row.cost)],
         ghosts=list(ghosts.of(decision, ordered)),
-        assets=list(_assets(asked, best)),
+        assets=list(_assets(reasked, best)),
     )
 
 
 def _candidate(each: Ranked, channels: Sequence[str]) -> session_data.Candidate:
     row = each.row
     parts = (*(row.channels.get(channel, 0.0) for channel in channels), sum(row.biases.values()))
-    said = "" if row.left_out is LeftOut.NO else row.left_out.text
-    return session_data.Candidate(row.asset, row.time_s or 0.0, row.mirrored, row.cost, parts, said, each.role == "chosen")
+    reason = "" if row.left_out is LeftOut.NO else row.left_out.text
+    return session_data.Candidate(row.asset, row.time_s or 0.0, row.mirrored, row.cost, parts, reason, each.role == "chosen")
 
 
-def _assets(asked: ReaskedDecision, best: Sequence[Ranked]) -> Iterator[session_data.AssetCosts]:
+def _assets(reasked: ReaskedDecision, best: Sequence[Ranked]) -> Iterator[session_data.AssetCosts]:
     """The costs of every range that was searched, by asset."""
     for each in best:
-        search = asked.searched[each.database]
+        search = reasked.searched[each.database]
         own = slice(int(search.database.starts[each.row.range]), int(search.database.stops[each.row.range]))
-        said = "" if each.row.left_out is LeftOut.NO else each.row.left_out.text
+        reason = "" if each.row.left_out is LeftOut.NO else each.row.left_out.text
         may_play = search.left_out[own] == LeftOut.NO
         permutation = "" if each.row.permutation_s is None else f" +{each.row.permutation_s:g} s"
-        yield session_data.AssetCosts(_named(each.row.asset, each.row.mirrored) + permutation, search.costs[own], may_play, said)
+        yield session_data.AssetCosts(_named(each.row.asset, each.row.mirrored) + permutation, search.costs[own], may_play, reason)
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,12 +208,5 @@ class _Ghosts:
         number = bank.range_of(playing.asset, playing.mirrored)
         steps = np.arange(round(GHOST_S * bank.rate) + 1) / bank.rate
         times_s = np.minimum(playing.time_s + steps, bank.last_s(number)).tolist()
-        positions = np.stack([self._placed(bank, number, time_s) for time_s in times_s])
+        positions = np.stack([bank.joints_at(number, time_s, self.heading) for time_s in times_s])
         yield session_data.Ghost(_named(playing.asset, playing.mirrored), positions, bank.rate, plays_on)
-
-    def _placed(self, bank: PoseBank, number: int, time_s: float) -> Floats:
-        sample = bank.sample_of(number, time_s)
-        positions, world = np.empty((bank.n_joints, 3)), np.empty((bank.n_joints, 4))
-        translations = bank.translations(sample.positions)
-        loops().place(bank.skeleton.parents, translations, sample.rotations, 0.0, 0.0, self.heading, positions, world)
-        return positions

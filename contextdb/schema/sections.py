@@ -7,18 +7,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
 from contextdb.errors import Fault, SchemaError, in_quotes, mend_for, nearest, some
-from contextdb.files.toml_shapes import no_key
-from contextdb.schema.faults import KINDS_WITH
-from contextdb.schema.jobs import columns_checked
+from contextdb.files.toml_shapes import no_key, wrong_name
 from contextdb.schema.outputs import fallback_to_toml, outputs_faults, outputs_to_toml
+from contextdb.schema.parts import PLAIN, keys_of
 from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict, settings_fields
-from contextdb.schema.shapes import NAMES, SECTIONS, wrong_name
+from contextdb.schema.shapes import CONDITION, NAMES
+from contextdb.schema.table_settings import columns_checked
 
 Part = dict[str, object]
 """The keys of one named section, such as `[conditions.speed]`, and their values as TOML has them."""
@@ -31,19 +31,14 @@ def condition_to_dict(condition: Condition) -> Part:
     """What `[conditions.NAME]` says of a condition."""
     domain = condition.domain
     bounds = {"min": domain.minimum, "max": domain.maximum}
-    said: Part = {"type": domain.kind}
-    said |= {key: _bound(bound, domain) for key, bound in bounds.items() if math.isfinite(bound)}
+    part: Part = {"type": domain.kind}
+    part |= {key: _bound(bound, domain) for key, bound in bounds.items() if math.isfinite(bound)}
     if domain.values is not None:
-        said["values"] = list(domain.values)
-    texts = {"unit": condition.unit, "description": condition.description, "expr": condition.expr}
-    said |= {key: text for key, text in texts.items() if text}
+        part["values"] = list(domain.values)
     if condition.mirror is not None:
-        said["mirror"] = dict(condition.mirror) if isinstance(condition.mirror, tuple) else condition.mirror
-    if condition.weight != 1.0:
-        said["weight"] = condition.weight
-    if condition.hysteresis:
-        said["hysteresis"] = condition.hysteresis
-    return said
+        part["mirror"] = dict(condition.mirror) if isinstance(condition.mirror, tuple) else condition.mirror
+    part |= {key: value for key in PLAIN if (value := getattr(condition, key)) not in ("", CONDITION[key].default)}
+    return {key: part[key] for key in CONDITION if key in part}
 
 
 def _bound(bound: float, domain: Domain) -> object:
@@ -52,20 +47,20 @@ def _bound(bound: float, domain: Domain) -> object:
 
 def has_place(key: str, kind: object) -> bool:
     """Whether a key of a condition has a place under a type."""
-    return kind in KINDS_WITH.get(key, (kind,))
+    return key not in CONDITION or CONDITION[key].has_place(kind)
 
 
 def settings_to_dict(settings: TableSettings) -> Part:
     """What `[tables.NAME]` says of a table."""
     plain = TableSettings(settings.name)
-    said = {field.name: getattr(settings, field.name) for field in fields(settings) if field.name in (SECTIONS["tables"] or ())}
-    said = {key: value for key, value in said.items() if value != getattr(plain, key)}
-    said = {key: list(value) if isinstance(value, tuple) else value for key, value in said.items()}
-    if "outputs" in said:
-        said["outputs"] = outputs_to_toml(settings.outputs, settings.typed)
-    if "fallback" in said:
-        said["fallback"] = fallback_to_toml(settings.fallback, settings.fallback_outputs)
-    return said
+    part = {key: getattr(settings, key) for key in keys_of("tables")}
+    part = {key: value for key, value in part.items() if value != getattr(plain, key)}
+    part = {key: list(value) if isinstance(value, tuple) else value for key, value in part.items()}
+    if "outputs" in part:
+        part["outputs"] = outputs_to_toml(settings.outputs, settings.typed)
+    if "fallback" in part:
+        part["fallback"] = fallback_to_toml(settings.fallback, settings.fallback_outputs)
+    return part
 
 
 def schema_to_dict(schema: Schema) -> dict[str, dict[str, Part]]:
@@ -89,34 +84,29 @@ def differences(before: Mapping[str, object], after: Mapping[str, object]) -> di
 def schema_with(schema: Schema, parts: Mapping[str, Mapping[str, Mapping[str, object] | None]]) -> Schema:
     """The schema with some parts changed; None removes one. Raises SchemaError for a part that contextdb.toml could not hold, with
     what is accepted."""
-    said: dict[str, Any] = {
+    document: dict[str, Any] = {
         section: _with(getattr(schema, section), parts[section]) for section in EDITED_SECTIONS if section in parts
     }
     if "conditions" in parts:
         new = conditions_from_dict({name: part for name, part in parts["conditions"].items() if part is not None})
-        said["conditions"] = {name: new.get(name, kept) for name, kept in said["conditions"].items()}
+        document["conditions"] = {name: new.get(name, condition) for name, condition in document["conditions"].items()}
     if "blueprints" in parts:
-        said["blueprints"] = {name: _names(name, part) for name, part in said["blueprints"].items()}
-    now = replace(schema, **said)
-    if "selectors" in parts:
-        from contextdb.motion.storage.config import MotionConfig
-
-        MotionConfig.from_dict(now.motion, file=schema.file)
-    return now
+        document["blueprints"] = {name: _names(name, part) for name, part in document["blueprints"].items()}
+    return replace(schema, **document)
 
 
-def settings_with(settings: TableSettings, said: Mapping[str, Any]) -> TableSettings:
+def settings_with(settings: TableSettings, changes: Mapping[str, Any]) -> TableSettings:
     """The settings with some keys changed; None removes one. Raises SchemaError for a key or a value that `[tables.NAME]` could not
     hold, with what is accepted."""
-    shapes, plain = SECTIONS["tables"] or {}, TableSettings(settings.name)
+    keys, plain = keys_of("tables"), TableSettings(settings.name)
     faults = []
-    for key, value in said.items():
-        if key not in shapes:
-            faults.append(no_key("a table", key, shapes, nearest(str(key), shapes), "setting"))
-        elif value is not None and (fault := shapes[key].fault("", key, value)):
+    for key, value in changes.items():
+        if key not in keys:
+            faults.append(no_key("a table", key, keys, nearest(str(key), keys), "setting"))
+        elif value is not None and (fault := keys[key].shape.fault("", key, value)):
             faults.append(fault)
     if not faults:
-        together = {key: value for key, value in {**settings_to_dict(settings), **said}.items() if value is not None}
+        together = {key: value for key, value in {**settings_to_dict(settings), **changes}.items() if value is not None}
         faults = [fault for _, fault in outputs_faults(together)]
     if faults:
         raise SchemaError(*faults)
@@ -132,8 +122,8 @@ def job_faults(settings: TableSettings, columns: Sequence[str], schema: Schema) 
         elif twice:
             yield twice
         elif column in schema.conditions:
-            found = f"{key} names {in_quotes(column)}, which contextdb.toml declares as a condition."
-            yield Fault(found, "a column that is not a condition")
+            problem = f"{key} names {in_quotes(column)}, which contextdb.toml declares as a condition."
+            yield Fault(problem, "a column that is not a condition")
 
 
 def blueprint_faults(schema: Schema) -> Iterator[Fault]:
@@ -141,12 +131,12 @@ def blueprint_faults(schema: Schema) -> Iterator[Fault]:
     for name, conditions in schema.blueprints.items():
         for condition in conditions:
             if condition not in schema.conditions:
-                found = f"the blueprint {in_quotes(name)} names the condition {in_quotes(condition)}, which is not declared."
-                yield Fault(found, some(schema.conditions), mend_for(condition, schema.conditions))
+                problem = f"the blueprint {in_quotes(name)} names the condition {in_quotes(condition)}, which is not declared."
+                yield Fault(problem, some(schema.conditions), mend_for(condition, schema.conditions))
 
 
-def _with(parts: Mapping[str, Any], said: Mapping[str, Any]) -> dict[str, Any]:
-    now = {**parts, **said}
+def _with(parts: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    now = {**parts, **changes}
     return {name: part for name, part in now.items() if part is not None}
 
 

@@ -1,8 +1,8 @@
 """What contextdb.toml says, as frozen data.
 
-`contextdb.schema.shapes` describes what each key accepts, `contextdb.schema.faults` what is wrong in a file. All is checked before
-anything is used, so that every fault of the file is reported at once. `features`, `databases`, `selectors`, `controllers` and
-`output` are kept as plain data, for `contextdb.motion` to read. Nothing here reads a file.
+`contextdb.schema.shapes` and `contextdb.schema.table_settings` declare the keys, `contextdb.schema.faults` says what is wrong in a
+file. All is checked before anything is used, so that every fault of the file is reported at once. `features`, `databases`,
+`selectors`, `controllers` and `output` are kept as plain data, for `contextdb.motion` to read. Nothing here reads a file.
 """
 
 from __future__ import annotations
@@ -11,17 +11,15 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from pathlib import PurePosixPath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from contextdb.cells.arguments import require_text
 from contextdb.cells.conditions import Condition
 from contextdb.cells.notebook import one_line
-from contextdb.cells.output_types import OutputValue
-from contextdb.cells.outputs import Output
 from contextdb.columns import TextColumn
 from contextdb.errors import Fault, Place, SchemaError, plural
-from contextdb.expressions import Derivation, derive
 from contextdb.files.file_names import composed
+from contextdb.schema.contracts import Contract
 from contextdb.schema.faults import (
     column_faults,
     document_faults,
@@ -30,61 +28,15 @@ from contextdb.schema.faults import (
     part_faults,
     section_faults,
 )
-from contextdb.schema.jobs import JOBS, columns_with_jobs
 from contextdb.schema.outputs import declared_outputs, fallback_of
-from contextdb.schema.parts import Said, condition_of, fitting_of, parts_of, table_files
-from contextdb.schema.shapes import Policy
+from contextdb.schema.parts import Part, condition_of, fitting_of, parts_of
+from contextdb.schema.table_settings import JOBS, TableSettings
 from contextdb.schema.toml_lines import key_lines, line_of, read_toml
 
+if TYPE_CHECKING:
+    from contextdb.expressions import Derivation
 
-@dataclass(frozen=True)
-class TableSettings:
-    """What `[tables.NAME]` says: the table's file, and which of its columns are not conditions."""
-
-    name: str
-    file: str | None = None
-    """Below the folder of contextdb.toml; None: NAME.csv or NAME.parquet."""
-    asset: str | None = None
-    """The column that names the asset; None: the first one."""
-    outputs: tuple[str, ...] = ()
-    enabled: str | None = None
-    priority: str | None = None
-    weight: str | None = None
-    once: str | None = None
-    """The column of rows that each character plays once at most."""
-    cooldown_s: str | None = None
-    """The column of the seconds for which a row rests after it was picked."""
-    cooldown_turns: str | None = None
-    """The column of the picks for which a row rests after it was picked."""
-    fallback: str | None = None
-    policy: Policy = "collect"
-    assume: tuple[str, ...] = ()
-    when: str | None = None
-    """The column of each row's own rule."""
-    typed: tuple[Output, ...] = ()
-    """What is declared of outputs; one without a say here is a text."""
-    fallback_outputs: tuple[tuple[str, OutputValue], ...] = ()
-    """Names and values of the outputs that `fallback` gives."""
-
-    @property
-    def declared_outputs(self) -> tuple[Output, ...]:
-        """The outputs, in the order of `outputs`."""
-        typed = {output.name: output for output in self.typed}
-        return tuple(typed.get(name) or Output(name) for name in self.outputs)
-
-    def output(self, name: str) -> Output | None:
-        """What is declared of an output; None for a column of another kind, or one of which nothing is. Raises nothing."""
-        return next((output for output in self.typed if output.name == name), None)
-
-    @property
-    def jobs(self) -> list[tuple[str, str]]:
-        """Each job with a column that has it, as far as columns are named."""
-        return columns_with_jobs(vars(self))
-
-    @property
-    def files(self) -> tuple[str, ...]:
-        """The files that may hold the table, the most wanted first."""
-        return table_files(self.name, self.file)
+__all__ = ["EMPTY", "Schema", "TableSettings", "read_schema"]
 
 
 def plain_names(settings: TableSettings, columns: Sequence[TextColumn]) -> set[str]:
@@ -107,7 +59,7 @@ def settings_renamed(settings: TableSettings, name_of: Callable[[str], str | Non
 
 
 def with_outputs(settings: TableSettings, names: Iterable[str]) -> TableSettings:
-    """Settings with other outputs; what is said of those that stay is kept."""
+    """Settings with other outputs; the types of those that stay are retained."""
     outputs = tuple(names)
     typed = tuple(output for output in settings.typed if output.name in outputs)
     given = tuple(output for output in settings.fallback_outputs if output[0] in outputs)
@@ -130,6 +82,8 @@ class Schema:
     file: str | None = None
     transitions: str = ""
     """How clips that lead from one state to another are named, such as "{from}_to_{to}"; "" where that is not declared."""
+    contracts: Mapping[str, Contract] = field(default_factory=dict)
+    """What must hold of the tables."""
 
     def __repr__(self) -> str:
         return one_line("Schema", self.name, f"{plural(len(self.conditions), 'condition')}, {plural(len(self.tables), 'table')}")
@@ -143,6 +97,8 @@ class Schema:
         """How the conditions with an `expr` are computed from the others; None where there are none."""
         if not any(condition.expr for condition in self.conditions.values()):
             return None
+        from contextdb.expressions import derive
+
         return derive(self.conditions)
 
     @property
@@ -177,16 +133,16 @@ EMPTY = Schema()
 
 @lru_cache(maxsize=8)
 def read_schema(text: str, file: str) -> Schema:
-    """What the text of a contextdb.toml says; `file` is its name in messages. The last few are kept: one text is read often. Raises
+    """What the text of a contextdb.toml says; `file` is its name in messages. The last few are cached. Raises
     SchemaError with every fault: its line, what was found, what is accepted and the nearest mend."""
     text = text.removeprefix("\ufeff")
     document = read_toml(text, file)
-    found = list(document_faults(document))
-    if not any(path[0] == "conditions" for path, _ in found):
-        found += expression_faults_in(document)
-    if found:
+    faults = list(document_faults(document))
+    if not any(path[0] == "conditions" for path, _ in faults):
+        faults += expression_faults_in(document)
+    if faults:
         lines = key_lines(text)
-        placed = (fault.at(Place(file, line_of(path, lines))) for path, fault in found)
+        placed = (fault.at(Place(file, line_of(path, lines))) for path, fault in faults)
         raise SchemaError(*sorted(placed, key=lambda fault: fault.place.line or 0))
     return _schema(document, file)
 
@@ -197,8 +153,8 @@ def conditions_from_dict(mapping: Mapping[str, Mapping[str, object]]) -> dict[st
     What an `expr` says is not looked at: it may name conditions that are elsewhere. Raises SchemaError with every fault, as from a
     file but without a line.
     """
-    if found := list(section_faults("conditions", mapping)):
-        raise SchemaError(*(fault for _, fault in found))
+    if faults := list(section_faults("conditions", mapping)):
+        raise SchemaError(*(fault for _, fault in faults))
     return {name: condition_of(name, section) for name, section in mapping.items()}
 
 
@@ -206,8 +162,8 @@ def settings_from_dict(name: str, mapping: Mapping[str, object], conditions: Set
     """Settings of a table from what `[tables.NAME]` of contextdb.toml would hold: `{"priority": "Prio"}`. Raises SchemaError with
     every fault, as from a file but without a line; also for a column that is among the declared `conditions`."""
     path, part = ("tables", name), {key: list(value) if isinstance(value, tuple) else value for key, value in mapping.items()}
-    if found := [*part_faults(path, part), *column_faults(path, fitting_of("tables", part), conditions)]:
-        raise SchemaError(*(fault for _, fault in found))
+    if faults := [*part_faults(path, part), *column_faults(path, fitting_of("tables", part), conditions)]:
+        raise SchemaError(*(fault for _, fault in faults))
     return _settings(name, part)
 
 
@@ -220,7 +176,7 @@ def expression_faults(schema: Schema) -> Iterator[Fault]:
 # ---- from checked data
 
 
-def _schema(document: Said, file: str) -> Schema:
+def _schema(document: Part, file: str) -> Schema:
     return Schema(
         document.get("project", {}).get("name", ""),
         {name: condition_of(name, part) for name, part in parts_of(document, "conditions").items()},
@@ -233,19 +189,20 @@ def _schema(document: Said, file: str) -> Schema:
         parts_of(document, "output"),
         file,
         document.get("project", {}).get("transitions", ""),
+        {name: Contract(name, **part) for name, part in parts_of(document, "contracts").items()},
     )
 
 
-def _settings(name: str, part: Said) -> TableSettings:
+def _settings(name: str, part: Part) -> TableSettings:
     return replace(TableSettings(name), **settings_fields(part))
 
 
-def settings_fields(part: Said) -> dict[str, Any]:
+def settings_fields(part: Part) -> dict[str, Any]:
     """What the keys of a sound `[tables.NAME]` are in a `TableSettings`."""
-    found: dict[str, Any] = {key: tuple(value) if isinstance(value, (list, tuple)) else value for key, value in part.items()}
+    fields: dict[str, Any] = {key: tuple(value) if isinstance(value, (list, tuple)) else value for key, value in part.items()}
     declared = declared_outputs(part.get("outputs", ()))
     if "outputs" in part:
-        found["outputs"], found["typed"] = tuple(o.name for o in declared), tuple(o for o in declared if not o.is_plain)
+        fields["outputs"], fields["typed"] = tuple(o.name for o in declared), tuple(o for o in declared if not o.is_plain)
     if "fallback" in part:
-        found["fallback"], found["fallback_outputs"] = fallback_of(part["fallback"], declared)
-    return found
+        fields["fallback"], fields["fallback_outputs"] = fallback_of(part["fallback"], declared)
+    return fields

@@ -1,6 +1,6 @@
-"""What the keys of contextdb.toml accept: in words, as a check, and what a wrong value was likely meant to be.
+"""What the keys of contextdb.toml accept, and the settings of `[project]`, `[conditions.NAME]` and `[blueprints.NAME]`.
 
-`SECTIONS` describes the file. How the keys of a section go together is for `contextdb.schema.settings` to check.
+How the keys of a section go together is for `contextdb.schema.faults` to check.
 """
 
 from __future__ import annotations
@@ -10,28 +10,15 @@ import math
 import numbers
 import re
 from collections.abc import Callable, Mapping
-from pathlib import PurePosixPath, PureWindowsPath
-from typing import Literal, get_args
 
-from contextdb.cells.kinds import KINDS
+from contextdb.cells.kinds import KINDS, names_where
 from contextdb.disk import TABLE_SUFFIXES
 from contextdb.errors import in_quotes, nearest
-from contextdb.files.toml_shapes import Shape, meant_number, one_of, wrong_text
+from contextdb.files.settings import Setting, Settings
+from contextdb.files.toml_shapes import Shape, file_below, meant_number, meant_text, one_of, wrong_name, wrong_text
 from contextdb.files.toml_text import as_toml, what
 
-Policy = Literal["collect", "first", "unique", "priority", "specific", "cheapest"]
-POLICIES: tuple[Policy, ...] = get_args(Policy)
-
 KIND_SYNONYMS = {synonym: name for name, kind in KINDS.items() for synonym in kind.synonyms}
-POLICY_SYNONYMS = {
-    **{"all": "collect", "any": "collect", "single": "unique", "highest": "priority"},
-    **dict.fromkeys(("most specific", "specificity", "score", "best"), "specific"),
-    **dict.fromkeys(("cost", "least cost", "least penalty", "lowest"), "cheapest"),
-}
-RANKED: tuple[Policy, ...] = ("priority", "specific", "cheapest")
-"""The policies that are there to prefer some rows; a row that they never choose is worth a warning."""
-CHANCE: tuple[Policy, ...] = ("collect", "priority", "specific", "cheapest")
-"""The policies under which chance decides, by weight, between the rows that are left, so that one of weight 0 is never picked."""
 MIRRORS = ("negate", "none")
 MIRROR_SYNONYMS = {
     **dict.fromkeys(("negative", "sign", "flip", "invert", "minus", "true"), "negate"),
@@ -43,15 +30,9 @@ KEY_SYNONYMS = {
     **{"desc": "description", "help": "description", "comment": "description", "path": "file", "columns": "conditions"},
     **dict.fromkeys(("mirrored", "swap", "mirroring"), "mirror"),
     **{"default": "fallback", "assumptions": "assume", "hit_policy": "policy"},
+    **{"premise": "when", "if": "when", "any": "some", "all": "every", "forbid": "none", "because": "why"},
     **{"say_once": "once", "matchonce": "once", "cooldown": "cooldown_s", "norepeat": "cooldown_turns"},
 }
-
-
-def wrong_name(value: object) -> str | None:
-    """What is wrong with a name: of a condition, a table, a column, a value."""
-    if not isinstance(value, str) or not value.strip():
-        return wrong_text(value) or "this is empty"
-    return None if value == value.strip() else "a space is before or after it"
 
 
 def _wrong_number(value: object) -> str | None:
@@ -92,7 +73,7 @@ def _wrong_values(value: object) -> str | None:
 
 
 def _wrong_outputs(value: object) -> str | None:
-    """What is wrong with the names of outputs; what is said of each is for `contextdb.schema.outputs` to check."""
+    """What is wrong with the names of outputs; the settings of each are for `contextdb.schema.outputs` to check."""
     if not isinstance(value, Mapping):
         return _wrong_list(value)
     return next((f"the name {as_toml(name)} cannot be used: {wrong}" for name in value if (wrong := wrong_name(name))), None)
@@ -102,35 +83,6 @@ def _wrong_fallback(value: object) -> str | None:
     return None if isinstance(value, Mapping) else wrong_name(value)
 
 
-def _wrong_file(value: object) -> str | None:
-    if not isinstance(value, str) or wrong_name(value):
-        return wrong_name(value)
-    path = PureWindowsPath(value)
-    if path.drive or path.root:
-        return "it names a place on one machine"
-    if ".." in path.parts:
-        return "it leaves the folder of contextdb.toml"
-    if "\\" in value:
-        return 'folders are separated by "/" on every system'
-    return None if path.suffix.casefold() in TABLE_SUFFIXES else "its ending is that of no table file"
-
-
-def _meant_file(value: object) -> object:
-    if not isinstance(value, str):
-        return None
-    path = PureWindowsPath(value.strip())
-    if path.drive or path.root:
-        return path.name
-    inside = PurePosixPath(*(part for part in path.parts if part != ".."))
-    return str(inside) if inside.suffix else f"{inside}.csv" if inside.name else None
-
-
-def _meant_text(value: object) -> object:
-    if isinstance(value, bool) or not isinstance(value, (str, int, float)):
-        return None
-    return str(value).strip()
-
-
 def _meant_names(separators: str) -> Callable[[object], object]:
     """What a list of names was meant to be; text is taken apart at `separators`, a pattern."""
 
@@ -138,7 +90,7 @@ def _meant_names(separators: str) -> Callable[[object], object]:
         parts = re.split(separators, value) if isinstance(value, str) else value
         if not isinstance(parts, (list, tuple)):
             return None
-        names = [_meant_text(part) for part in parts]
+        names = [meant_text(part) for part in parts]
         return list(dict.fromkeys(name for name in names if name)) if None not in names else None
 
     return meant
@@ -178,13 +130,13 @@ def _wrong_transitions(value: object) -> str | None:
     return None if is_pattern else "this is not a pattern for names of transitions"
 
 
-TEXT = Shape('text, such as "m/s"', wrong_text, _meant_text)
-NAME = Shape('a name, such as "Asset Name"', wrong_name, _meant_text)
-EXPRESSION = Shape('an expression as text, such as "speed - target_speed"', wrong_name, _meant_text)
+TEXT = Shape('text, such as "m/s"', wrong_text, meant_text)
+COLUMN = Shape('a name, such as "Asset Name"', wrong_name, meant_text)
+EXPRESSION = Shape('an expression as text, such as "speed - target_speed"', wrong_name, meant_text)
 EXPRESSIONS = Shape('a list of expressions, such as ["not (IsRunning and IsIdle)"]', _wrong_list, _meant_names(r"\A|\Z"))
 NUMBER = Shape("a number, such as -1.5", _wrong_number, meant_number)
-WEIGHT = Shape("a number from 0 up, such as 2.0", _wrong_weight, meant_number)
-HYSTERESIS = Shape("a number from 0 up, such as 0.2", _wrong_weight, meant_number)
+WEIGHT = Shape("a number from 0 up, such as 2.0", _wrong_weight, meant_number, float)
+HYSTERESIS = Shape("a number from 0 up, such as 0.2", _wrong_weight, meant_number, float)
 BOUND = Shape("a number, such as -1.5", _wrong_bound, meant_number)
 """A number as its type writes it; whether that fits is for the type to say."""
 NAMES = Shape('a list of different names, such as ["A", "B"]', _wrong_list, _meant_names(","))
@@ -193,9 +145,9 @@ OUTPUTS = Shape(
     _wrong_outputs,
     _meant_names(","),
 )
-FALLBACK = Shape('a name, such as "idle", or { asset = "idle", outputs = { damage = 3 } }', _wrong_fallback, _meant_text)
+FALLBACK = Shape('a name, such as "idle", or { asset = "idle", outputs = { damage = 3 } }', _wrong_fallback, meant_text)
 VALUES = Shape('a list of different names, such as ["A", "B"]', _wrong_values, _meant_names(r"[,;|\s]+"))
-FILE = Shape("a .csv or .parquet file in the folder of contextdb.toml or below it", _wrong_file, _meant_file)
+FILE = file_below("a .csv or .parquet file", "table file", TABLE_SUFFIXES)
 
 MIRROR = Shape(
     '"negate" (the other sign), "none", or names that change places, such as { Left = "Right" }', _wrong_mirror, _meant_mirror
@@ -207,40 +159,42 @@ TRANSITIONS = Shape(
     lambda value: "{from}_to_{to}",
 )
 
-SECTIONS: dict[str, Mapping[str, Shape] | None] = {
-    "project": {"name": TEXT, "transitions": TRANSITIONS},
-    "conditions": {
-        "type": one_of(tuple(KINDS), "type", KIND_SYNONYMS),
-        "min": BOUND,
-        "max": BOUND,
-        "values": VALUES,
-        "unit": TEXT,
-        "description": TEXT,
-        "expr": EXPRESSION,
-        "mirror": MIRROR,
-        "weight": WEIGHT,
-        "hysteresis": HYSTERESIS,
-    },
-    "tables": {
-        "file": FILE,
-        "asset": NAME,
-        "outputs": OUTPUTS,
-        "enabled": NAME,
-        "priority": NAME,
-        "weight": NAME,
-        "once": NAME,
-        "cooldown_s": NAME,
-        "cooldown_turns": NAME,
-        "fallback": FALLBACK,
-        "policy": one_of(POLICIES, "policy", POLICY_SYNONYMS),
-        "assume": EXPRESSIONS,
-        "when": NAME,
-    },
-    "blueprints": {"conditions": NAMES},
-    "features": None,
-    "databases": None,
-    "selectors": None,
-    "controllers": None,
-    "output": None,
+PROJECT: Settings = {
+    "name": Setting(TEXT, "The name of the project.", "", without="none"),
+    "transitions": Setting(TRANSITIONS, "How clips that lead from one state to another are named.", None, without="not declared"),
 }
-"""The sections and their keys; None: kept as they are. All but `project` hold named tables."""
+_BOUNDED = names_where(lambda kind: kind.is_bounded)
+_BEYOND = 'A date is written `"2026-01-01"`. Facts beyond are still compared; `check` reports cells beyond.'
+CONDITION: Settings = {
+    "type": Setting(one_of(tuple(KINDS), "type", KIND_SYNONYMS), "What a fact of it is.", label="Type"),
+    "min": Setting(BOUND, "The least number. Empty: no bound.", None, _BEYOND, "no bound", "Least", types=_BOUNDED),
+    "max": Setting(BOUND, "The greatest number. Empty: no bound.", None, _BEYOND, "no bound", "Most", types=_BOUNDED),
+    "values": Setting(
+        VALUES, "The possible names, in the order in which they are shown.", None, "Required for `enum`.", "none", "Values",
+        "The names there are, with spaces between them; one with a space in it in quotes.",
+        types=names_where(lambda kind: kind.has_values),
+    ),
+    "unit": Setting(TEXT, "Such as m/s: shown in the header.", "", without="none", label="Unit"),
+    "description": Setting(TEXT, "One sentence for whoever fills cells.", "", without="none", label="Description"),
+    "expr": Setting(
+        EXPRESSION, "An [expression](#expressions) over other conditions.", None,
+        "The fact is *derived*: every query computes it, and you never supply it.", "the fact is given",
+    ),
+    "mirror": Setting(
+        MIRROR, "For clips played mirrored: negate, none, or names that change places, such as Left = Right.", None,
+        'See [facts in a mirror](choosing.md#facts-in-a-mirror). Without it only angles are negated.', "none", "Mirror",
+    ),
+    "weight": Setting(
+        WEIGHT, 'What a cell counts where the policy is "specific": 2 as much as two other cells, 0 nothing.', 1.0,
+        without="1", label="Weight",
+    ),
+    "hysteresis": Setting(
+        HYSTERESIS, "How far beyond the edges of its cells a row stays valid while its animation plays, in its unit.", 0.0,
+        types=names_where(lambda kind: kind.is_decimal),
+    ),
+}  # fmt: skip
+BLUEPRINT: Settings = {
+    "conditions": Setting(
+        NAMES, "Declared conditions that tables share.", (), more="The editor inserts those that a table lacks.", without="none"
+    )
+}

@@ -41,35 +41,38 @@ def statements(text: str) -> list[Statement]:
 
 def set_key(text: str, path: Path, value: object, behind: Sequence[Path] = ()) -> str:
     """The text with a key set. A section that is missing yet is put behind the last of those of `behind`, else at the end."""
-    found = statements(text)
-    for one in found:
+    present = statements(text)
+    for one in present:
         if one.value and one.path == path[: len(one.path)]:
             return _replaced(text, one.value, merged(text[slice(*one.value)], path[len(one.path) :], value))
     part = path[:-1]
-    below = [one for one in found if one.path[: len(path)] == path]
+    below = [one for one in present if one.path[: len(path)] == path]
     if below:  # an array of tables, [[a.b]], or a table of its own, [a.b] or a.b.key = …: one value in its place
         return set_key(_without(text, below), path, value, behind)
-    inside = [one for one in found if one.path[: len(part)] == part and len(one.section) <= len(part)]
+    inside = [one for one in present if one.path[: len(part)] == part and len(one.section) <= len(part)]
     if inside:
         last = inside[-1]
         key = path[len(last.section) :] if last.value else path[len(last.path) :]
         return _inserted(text, last.stop, [_indent(text, last) + f"{dotted(key)} = {as_toml(value)}"])
-    at = _end_of_section(text, found, behind)
+    if not part:  # before the first header, above which no key is
+        at = present[0].start if present else len(text)
+        return _inserted(text, at, [f"{dotted(path)} = {as_toml(value)}", *([""] if present else [])])
+    at = _end_of_section(text, present, behind)
     blank = [""] if text[:at].strip() else []
     return _inserted(text, at, [*blank, f"[{dotted(part)}]", f"{dotted(path[-1:])} = {as_toml(value)}"])
 
 
 def set_in_list(text: str, path: Path, place: int, key: str, value: object) -> str:
     """The text with a key set in one of a list of tables, however the list is written: in one value, or as [[a.b]]."""
-    found = statements(text)
-    heads = [i for i, one in enumerate(found) if one.path == path and one.value is None]
+    present = statements(text)
+    heads = [i for i, one in enumerate(present) if one.path == path and one.value is None]
     if not heads:
         items: Any = tomllib.loads(text)
         for name in path:
             items = items[name]
         return set_key(text, path, [{**item, key: value} if i == place else item for i, item in enumerate(items)])
-    inside = [found[heads[place]]]
-    for one in found[heads[place] + 1 :]:
+    inside = [present[heads[place]]]
+    for one in present[heads[place] + 1 :]:
         if one.value is None:
             break
         inside.append(one)
@@ -91,19 +94,19 @@ def add_sections(text: str, sections: Mapping[Path, Mapping[str, object]], behin
 
 def absent(text: str, paths: Sequence[Path]) -> list[Path]:
     """Those of some sections of which nothing is in the text, in whichever form."""
-    found = statements(text)
-    said = {one.path[:depth] for one in found for depth in range(1, len(one.path) + 1)}
-    whole = {one.path for one in found if one.value}
-    return [path for path in paths if path not in said and not any(path[:depth] in whole for depth in range(1, len(path)))]
+    present = statements(text)
+    prefixes = {one.path[:depth] for one in present for depth in range(1, len(one.path) + 1)}
+    whole = {one.path for one in present if one.value}
+    return [path for path in paths if path not in prefixes and not any(path[:depth] in whole for depth in range(1, len(path)))]
 
 
 def drop_key(text: str, path: Path) -> str:
     """The text without a key, or without a whole section."""
-    found = statements(text)
-    for one in found:
+    present = statements(text)
+    for one in present:
         if one.value and len(one.path) < len(path) and one.path == path[: len(one.path)]:
             return _replaced(text, one.value, merged(text[slice(*one.value)], path[len(one.path) :], None))
-    return _without(text, [one for one in found if one.path[: len(path)] == path])
+    return _without(text, [one for one in present if one.path[: len(path)] == path])
 
 
 def drop_empty_section(text: str, path: Path) -> str:
@@ -165,14 +168,14 @@ def _statement(tokens: Sequence[tuple[str, int]], section: Path, start: int, sto
     return Statement(section + keys_of("".join(words[:equals])), section, start, stop, span, (tokens[equals + 1][1], end))
 
 
-def _end_of_section(text: str, found: Sequence[Statement], paths: Sequence[Path]) -> int:
+def _end_of_section(text: str, present: Sequence[Statement], paths: Sequence[Path]) -> int:
     """Where the last of some sections ends: before the next header, or with the last statement. Without one of them, at the end."""
     wanted, depths = set(paths), {len(path) for path in paths}
-    anchors = [i for i, one in enumerate(found) if any(one.path[:depth] in wanted for depth in depths)]
-    last = anchors[-1] if anchors else len(found) - 1
-    while last + 1 < len(found) and found[last + 1].value is not None:
+    anchors = [i for i, one in enumerate(present) if any(one.path[:depth] in wanted for depth in depths)]
+    last = anchors[-1] if anchors else len(present) - 1
+    while last + 1 < len(present) and present[last + 1].value is not None:
         last += 1
-    return found[last].stop if found else len(text)
+    return present[last].stop if present else len(text)
 
 
 # ---- lines

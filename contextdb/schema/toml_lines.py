@@ -11,9 +11,8 @@ import re
 import tomllib
 from collections.abc import Mapping, Sequence
 
-from contextdb.errors import Fault, Place, SchemaError, in_quotes, shown
+from contextdb.errors import Fault, Place, SchemaError, in_quotes, safe_text
 from contextdb.files.toml_text import Path as Path
-from contextdb.schema.toml_edit import statements
 
 CONFLICT_MARKS = ("<<<<<<<", "|||||||", "=======", ">>>>>>>")
 MOST_PARTS = 256
@@ -63,18 +62,20 @@ def _require_short_keys(text: str, file: str) -> None:
     line = 1
     for chunk in re.split(r"([=,\[\]{}\n])", _STRING_OR_COMMENT.sub(_bare, text)):
         if chunk.count(".") >= MOST_PARTS:
-            found = f"a key has {chunk.count('.') + 1:,} parts."
-            raise SchemaError(Fault(found, f"at most {MOST_PARTS}, as in [section.name]", place=Place(file, line)))
+            problem = f"a key has {chunk.count('.') + 1:,} parts."
+            raise SchemaError(Fault(problem, f"at most {MOST_PARTS}, as in [section.name]", place=Place(file, line)))
         line += chunk == "\n"
 
 
-def _bare(found: re.Match[str]) -> str:
+def _bare(match: re.Match[str]) -> str:
     """A string or a comment, replaced by what keeps its lines."""
-    return "\n" * found[0].count("\n") or "q"
+    return "\n" * match[0].count("\n") or "q"
 
 
 def key_lines(text: str) -> dict[Path, int]:
     """The line (from 1) on which each key, and each section, of a document that reads first stands."""
+    from contextdb.schema.toml_edit import statements
+
     lines: dict[Path, int] = {}
     line, at = 1, 0
     for one in statements(text):
@@ -91,18 +92,18 @@ def line_of(path: Path, lines: Mapping[Path, int]) -> int | None:
 
 
 def _syntax_fault(error: str, text: str, file: str) -> Fault:
-    found = _PLACE.fullmatch(error)
-    if not found:
+    match = _PLACE.fullmatch(error)
+    if not match:
         return Fault("a whole number has too many digits to be read.", "a number, such as -1.5", place=Place(file))
-    number = int(found[2]) if found[2] else text.rstrip().count("\n") + 1
+    number = int(match[2]) if match[2] else text.rstrip().count("\n") + 1
     lines, place = text.split("\n"), Place(file, number)
     line = lines[number - 1].strip()
     if line.startswith(CONFLICT_MARKS):
         return _conflict_fault(lines[number - 1 :], place)
-    if _TWICE.fullmatch(found[1]):
+    if _TWICE.fullmatch(match[1]):
         return Fault(f"{in_quotes(line)} appears twice.", "each section once, and each key once in it", place=place)
-    character = f"at character {found[3]}" if found[2] else "the file ends here"
-    why = f"{found[1][:1].lower()}{found[1][1:]}, {character}"
+    character = f"at character {match[3]}" if match[2] else "the file ends here"
+    why = f"{match[1][:1].lower()}{match[1][1:]}, {character}"
     return Fault(f"cannot read {in_quotes(line)} as TOML: {why}.", _ACCEPTED, _line_mend(line[:1000]), place)
 
 
@@ -121,7 +122,7 @@ def _line_mend(line: str) -> str:
     if _reads(line):
         return ""
     mended = (re.sub(pattern, replacement, line) for pattern, replacement in _LINE_MENDS)
-    return next((shown(m) for m in mended if m != line and _reads(m)), "")
+    return next((safe_text(m) for m in mended if m != line and _reads(m)), "")
 
 
 def _reads(line: str) -> bool:

@@ -20,11 +20,15 @@ TOKEN = re.compile(
     r"|#[^\n]*|[\[\]{},=\n]|[^\s\[\]{},=#\"']+|[^\S\n]+",
     re.DOTALL,
 )
+BARE = re.compile(r"[A-Za-z0-9_-]+(?:\.[A-Za-z0-9_-]+)*")
+"""A dotted key without quotes."""
 
 
 @lru_cache(4096)
 def keys_of(dotted: str) -> Path:
     """The path that a dotted key says: `conditions."Defender.Tags"`."""
+    if BARE.fullmatch(dotted):
+        return tuple(dotted.split("."))
     value: object = tomllib.loads(f"{dotted} = 0")
     path: list[str] = []
     while isinstance(value, dict):
@@ -34,6 +38,7 @@ def keys_of(dotted: str) -> Path:
 
 
 def end_of_line(text: str) -> str:
+    """The line end that a text uses first."""
     first = text.partition("\n")
     return "\r\n" if first[1] and first[0].endswith("\r") else "\n"
 
@@ -64,15 +69,15 @@ def _inline(old: str, keys: Path, value: object) -> str:
         if one.path == keys[: len(one.path)] and (len(one.path) < len(keys) or value is not None):
             inner = merged(old[one.value : one.stop], keys[len(one.path) :], value)
             return old[: one.value] + inner + old[one.stop :]
-    kept = [one for one in entries if one.path[: len(keys)] != keys]
-    if len(kept) < len(entries):
-        texts = [old[one.start : one.stop] for one in kept]
+    rest = [one for one in entries if one.path[: len(keys)] != keys]
+    if len(rest) < len(entries):
+        texts = [old[one.start : one.stop] for one in rest]
         old = f"{{ {', '.join(texts)} }}" if texts else "{}"
     if value is None:
         return old
-    end = list(_entries(old))[-1].stop if kept else 0
+    end = list(_entries(old))[-1].stop if rest else 0
     new = f"{dotted(keys)} = {as_toml(value)}"
-    return f"{old[:end]}, {new}{old[end:]}" if kept else f"{{ {new} }}"
+    return f"{old[:end]}, {new}{old[end:]}" if rest else f"{{ {new} }}"
 
 
 def _entries(text: str) -> Iterator[_Entry]:
@@ -106,7 +111,7 @@ class _Item:
     behind: str = ""
 
     @property
-    def said(self) -> Any:
+    def parsed(self) -> Any:
         return tomllib.loads(f"x = {self.text}")["x"]
 
 
@@ -129,25 +134,25 @@ def _list(old: str, values: Sequence[object]) -> str:
 
 def _taken(items: list[_Item], value: Any) -> _Item:
     """The item that says this, or of tables the one whose first key says it, with the rest changed; else a new one."""
-    item = next((item for item in items if type(item.said) is type(value) and item.said == value), None)
+    item = next((item for item in items if type(item.parsed) is type(value) and item.parsed == value), None)
     if item is None and isinstance(value, Mapping):
-        item = next((item for item in items if _is_like(item.said, value)), None)
+        item = next((item for item in items if _is_like(item.parsed, value)), None)
     if item is None:
         return _Item(as_toml(value))
     items.remove(item)
-    said, text = item.said, item.text
-    if said == value:
+    entry, text = item.parsed, item.text
+    if entry == value:
         return item
-    if not said.keys() <= value.keys():
+    if not entry.keys() <= value.keys():
         return replace(item, text=as_toml(value))
-    for key in (key for key in value if key not in said or said[key] != value[key]):
+    for key in (key for key in value if key not in entry or entry[key] != value[key]):
         text = _inline(text, (key,), value[key])
     return replace(item, text=text)
 
 
-def _is_like(said: object, value: Mapping[str, object]) -> bool:
+def _is_like(item: object, value: Mapping[str, object]) -> bool:
     first = next(iter(value), None)
-    return first is not None and isinstance(said, Mapping) and said.get(first) == value[first]
+    return first is not None and isinstance(item, Mapping) and item.get(first) == value[first]
 
 
 def _items(old: str) -> tuple[list[_Item], list[str]]:

@@ -99,8 +99,8 @@ class Columns:
         schema = replace(table.schema, conditions=conditions)
         settings, known = settings_renamed(table.settings, renamed.get), {c.condition.name: c for c in table.conditions}
         moved = {new: known[old] for new, old in self.layout if old in known}
-        found = conditions_of(columns, schema, settings, moved)
-        return replace(table, columns=tuple(columns), conditions=found, settings=settings, schema=schema)
+        by_condition = conditions_of(columns, schema, settings, moved)
+        return replace(table, columns=tuple(columns), conditions=by_condition, settings=settings, schema=schema)
 
     def to_json(self) -> dict[str, object]:
         return {"change": "columns", "layout": self.layout}
@@ -182,11 +182,11 @@ class Edit:
 
     def came_from(self, n_rows: int) -> CameFrom:
         """For each row after the edit the row it was before, -1 for a new one: int64; `n_rows` is how many there were before."""
-        found = np.arange(n_rows)
+        origins = np.arange(n_rows)
         for change in self.changes:
             if isinstance(change, Rows):
-                found = np.append(found, -1)[change.came_from]
-        return found
+                origins = np.append(origins, -1)[change.came_from]
+        return origins
 
     def to_json(self) -> dict[str, object]:
         """The edit as plain data, for a journal."""

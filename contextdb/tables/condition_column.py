@@ -76,9 +76,9 @@ class ConditionColumn:
         others = tuple(text for text in texts.texts if text not in read)
         cells, faults = _read_cells(others, condition)
         read |= {text: (cells[i], faults.get(i)) for i, text in enumerate(others)}
-        found = [read[text] for text in texts.texts]
-        wrong = {i: fault for i, (_, fault) in enumerate(found) if fault is not None}
-        return ConditionColumn(condition, texts, tuple(cell for cell, _ in found), wrong)
+        column = [read[text] for text in texts.texts]
+        wrong = {i: fault for i, (_, fault) in enumerate(column) if fault is not None}
+        return ConditionColumn(condition, texts, tuple(cell for cell, _ in column), wrong)
 
     def cell(self, row: int) -> Cell:
         return self.cells[int(self.texts.codes[row])]
@@ -128,30 +128,30 @@ def infer_condition(column: TextColumn) -> Condition:
     flags = are_plain(column.texts)
     if flags is not None and _is_number_column(column.texts, counts, flags):
         return Condition(column.name, NUMBER, is_declared=False)
-    said = _said(column.texts, counts)
-    domains = [BOOL, NUMBER, DATE, TAGS] if {t.strip() for t in said} - _DIGITS else [NUMBER]
-    domain = next((d for d in domains if said and _mostly_reads(said, d)), TEXT)
+    counted = _text_counts(column.texts, counts)
+    domains = [BOOL, NUMBER, DATE, TAGS] if {t.strip() for t in counted} - _DIGITS else [NUMBER]
+    domain = next((d for d in domains if counted and _mostly_reads(counted, d)), TEXT)
     return Condition(column.name, domain, is_declared=False)
 
 
-def _said(texts: Sequence[str], counts: NDArray[np.int64]) -> dict[str, int]:
+def _text_counts(texts: Sequence[str], counts: NDArray[np.int64]) -> dict[str, int]:
     """How many rows say each text that is not Any."""
     return {t: n for t, n in zip(texts, counts.tolist(), strict=True) if not says_any(t)}
 
 
 def _is_number_column(texts: Sequence[str], counts: NDArray[np.int64], are_numbers: NDArray[np.bool_]) -> bool:
     """Whether so many rows say plain numbers, which no bool does, that the column is one of numbers: tags are asked after those."""
-    rest = _said([texts[i] for i in np.flatnonzero(~are_numbers).tolist()], counts[~are_numbers])
+    rest = _text_counts([texts[i] for i in np.flatnonzero(~are_numbers).tolist()], counts[~are_numbers])
     n_others = sum(rest.values())
     n_rows = int(counts[are_numbers].sum()) + n_others
     return n_rows > n_others and n_others <= n_rows - READABLE_SHARE * n_rows
 
 
-def _mostly_reads(said: dict[str, int], domain: Domain) -> bool:
+def _mostly_reads(counted: dict[str, int], domain: Domain) -> bool:
     """Whether most rows read as a domain, the commonest texts first; stops at the row that decides it is not so."""
-    total = sum(said.values())
+    total = sum(counted.values())
     may_fail = total - READABLE_SHARE * total
-    for text, n_rows in sorted(said.items(), key=lambda item: -item[1]):
+    for text, n_rows in sorted(counted.items(), key=lambda item: -item[1]):
         may_fail -= 0 if reads(text, domain) else n_rows
         if may_fail < 0:
             return False

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Self, TypeVar
+from typing import TYPE_CHECKING, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,31 +20,38 @@ from numpy.typing import NDArray
 from contextdb.cells.arguments import (
     require_many,
     require_mapping,
+    require_place,
     require_row,
     require_text,
     require_whole,
 )
 from contextdb.cells.conditions import Condition
 from contextdb.cells.notebook import as_html, one_line
-from contextdb.columns import TextColumn
+from contextdb.columns import Framed, TextColumn, frame_of
 from contextdb.compiled.outputs import Outputs
 from contextdb.compiled.pick_columns import PickColumns, specificities
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.compiled.ways import Ways
 from contextdb.errors import ContextError, Fault, NoSuchRow, Place, TableError, in_quotes, no_such, plural, some
-from contextdb.expressions.rules import WhenColumn
 from contextdb.files.texts import AnySource
+from contextdb.schema.policies import POLICIES
 from contextdb.schema.settings import EMPTY, Schema, TableSettings, plain_names
+from contextdb.schema.table_settings import PLAIN_JOBS, missing_job
 from contextdb.tables.condition_column import ConditionColumn
 from contextdb.tables.nesting.names import inner_name
 from contextdb.tables.output_columns import OutputColumn, output_columns, outputs_of
 from contextdb.tables.plain_columns import PlainColumns
 
+if TYPE_CHECKING:
+    import polars as pl
+
+    from contextdb.expressions.rules import WhenColumn
+
 AnyTable = TypeVar("AnyTable", bound="TableData")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class TableData(Unchanging):
+class TableData(Framed, Unchanging):
     """Assets against conditions, as texts and as the cells they mean; `Table` has what a table can do besides."""
 
     name: str
@@ -91,6 +98,19 @@ class TableData(Unchanging):
     def __len__(self) -> int:
         return self.n_rows
 
+    def __getitem__(self, row: int) -> dict[str, str]:
+        """The texts of a row by column; NoSuchPlace, also an IndexError, for a row that the table does not have."""
+        at = require_place(row, self.n_rows, "row")
+        return {column.name: column[at] for column in self.columns}
+
+    def __iter__(self) -> Iterator[dict[str, str]]:
+        return (self[row] for row in range(self.n_rows))
+
+    def to_polars(self) -> pl.DataFrame:
+        """The texts of all cells as a DataFrame, which `Table.from_columns` takes."""
+        texts = {column.name: column.to_list() for column in self.columns}
+        return frame_of(texts, texts)
+
     def __repr__(self) -> str:
         size = f"{plural(self.n_rows, 'row')} x {plural(len(self.conditions), 'condition')}"
         return one_line(type(self).__name__, self.name, size)
@@ -100,10 +120,10 @@ class TableData(Unchanging):
         rows = ([column[row] for column in self.columns] for row in range(self.n_rows))
         return as_html(repr(self), heads, rows, self.n_rows)
 
-    @cached_property
+    @property
     def assets(self) -> list[str]:
         """The asset of each row."""
-        return self.text_column(self.asset_column).to_list() if self.columns else []
+        return self.text_column(self.asset_column).once(TextColumn.to_list) if self.columns else []
 
     @property
     def asset_column(self) -> str:
@@ -142,16 +162,21 @@ class TableData(Unchanging):
 
     def _in_order(self, more: Iterable[Fault]) -> list[Fault]:
         """The faults of cells, and others that have their places already, in the order of rows."""
-        found = [(row, at, fault) for at, column in enumerate(self.conditions) for row, fault in column.faulty_rows()]
-        found += [
+        faults = [
+            (row, at, replace(fault, mend=mend) if mend else fault)
+            for at, column in enumerate(self.conditions)
+            for mend in ["" if column.condition.is_declared else missing_job(column.condition.name, vars(self.settings))]
+            for row, fault in column.faulty_rows()
+        ]
+        faults += [
             (row, -1, fault.at(self.place(row, fault.place.column))) for row, fault in (*self._plain.faults, *self._output_faults)
         ]
         if self.when is not None:
-            found += [(row, -1, fault.at(self.place(row, self.when.name))) for row, fault in self.when.faulty_rows()]
-        found += [(fault.place.row or 0, -1, fault) for fault in more]
+            faults += [(row, -1, fault.at(self.place(row, self.when.name))) for row, fault in self.when.faulty_rows()]
+        faults += [(fault.place.row or 0, -1, fault) for fault in more]
         names = [c.condition.name for c in self.conditions]
-        found.sort(key=lambda item: item[:2])
-        return [f if at < 0 else f.at(self.place(row, names[at])) for row, at, f in found]
+        faults.sort(key=lambda item: item[:2])
+        return [f if at < 0 else f.at(self.place(row, names[at])) for row, at, f in faults]
 
     def with_cell(self, row: int, column: str, text: str) -> Self:
         """The table with one cell changed; every other column is shared. Raises what `with_cells` raises."""
@@ -218,7 +243,7 @@ class TableData(Unchanging):
     @cached_property
     def _picking(self) -> PickColumns:
         """How specific the rows are, where the policy asks for it, and how long they rest after they were picked."""
-        if self.settings.policy != "specific":
+        if not POLICIES[self.settings.policy].needs_specificities:
             return self._plain.resting
         columns = [(c.condition, c.cells, c.texts.codes) for c in self.conditions]
         has_rule = None if self.when is None else self.when.has_rule
@@ -248,6 +273,8 @@ class TableData(Unchanging):
         """The rows' own rules; None without a `when` column."""
         if self.settings.when is None:
             return None
+        from contextdb.expressions.rules import WhenColumn
+
         return WhenColumn.read(self.text_column(self.settings.when), known_conditions(self))
 
     @cached_property
@@ -304,6 +331,9 @@ def with_columns(table: AnyTable, columns: Sequence[TextColumn], origin: NDArray
     now = {c.name: c for c in columns}
     conditions = tuple(c if now[c.condition.name] is c.texts else c.with_texts(now[c.condition.name]) for c in table.conditions)
     after = replace(table, columns=tuple(columns), conditions=conditions, origin=origin)
+    jobs = [name for job in PLAIN_JOBS if (name := getattr(table.settings, job)) is not None]
+    if after.n_rows == table.n_rows and all(now[name] is table.text_column(name) for name in jobs):
+        after.__dict__["_plain"] = table._plain
     after.__dict__["_output_columns"] = tuple(column.with_texts(now[column.output.name]) for column in table._output_columns)
     return after
 

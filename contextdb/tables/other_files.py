@@ -40,7 +40,7 @@ def other_form(path: Path, conditions: Collection[str]) -> str | None:
             head = file.read(HEAD)
         rows = _rows(head.decode("utf-8-sig", "replace"))
         names = [name.strip() for name in rows[0]] if rows else []
-        return next((told for is_one, told in _forms(conditions) if names and is_one(names, rows[1 : FEW_ROWS + 1])), None)
+        return next((form for is_one, form in _forms(conditions) if names and is_one(names, rows[1 : FEW_ROWS + 1])), None)
     return None
 
 
@@ -54,6 +54,7 @@ def notes_path(table: Path) -> Path:
 
 
 def stray_sentence(path: Path, form: str) -> str:
+    """What to write in contextdb.toml so that a file is read which looks like none of a table."""
     name = path.stem
     section = name if name.isidentifier() and name.isascii() else f'"{name}"'
     declared = f"[tables.{section}] file = {in_quotes(path.name)}"
@@ -79,13 +80,13 @@ def _are_numbers(rows: Rows) -> bool:
 
 def _rows(text: str) -> list[list[str]]:
     """The first rows of a CSV text; as many as can be read."""
-    found: list[list[str]] = []
+    records: list[list[str]] = []
     with suppress(csv.Error):
         for row in csv.reader(io.StringIO(text, newline="")):
-            found.append(row)
-            if len(found) > FEW_ROWS:
+            records.append(row)
+            if len(records) > FEW_ROWS:
                 break
-    return found
+    return records
 
 
 def _footer(path: Path) -> bytes:

@@ -67,10 +67,10 @@ class OutputColumn:
         """The column with other texts; those that were read before are not read again."""
         if texts is self.texts:
             return self
-        found, known = OutputColumn(self.output, texts), len(self.texts.texts)
+        column, known = OutputColumn(self.output, texts), len(self.texts.texts)
         if "_read" in self.__dict__ and texts.texts[:known] == self.texts.texts:
-            found.__dict__["_read"] = self._read_on(texts.texts[known:], *self._read)
-        return found
+            column.__dict__["_read"] = self._read_on(texts.texts[known:], *self._read)
+        return column
 
     def faulty_rows(self, may_be_empty: Set[int]) -> Iterator[tuple[int, Fault]]:
         """Each row whose cell cannot be read, and why; some rows may be empty."""
@@ -91,10 +91,10 @@ def output_columns(columns: Sequence[TextColumn], settings: TableSettings) -> tu
 
 def outputs_of(columns: Iterable[OutputColumn], settings: TableSettings) -> Outputs:
     """The outputs of a table, to be read by row."""
-    found = list(columns)
-    if not found:
+    outputs = list(columns)
+    if not outputs:
         return NO_OUTPUTS
-    return outputs_of_cells([c.output for c in found], [c.cells for c in found], dict(settings.fallback_outputs))
+    return outputs_of_cells([c.output for c in outputs], [c.cells for c in outputs], dict(settings.fallback_outputs))
 
 
 def layered(
@@ -114,9 +114,9 @@ def layered(
         for numbers_here, rows_here in zip(numbers, rows, strict=True):
             for number, column, start in placed:
                 here = np.flatnonzero(numbers_here == number)
-                found = column.texts.codes[rows_here[here]]
+                own = column.texts.codes[rows_here[here]]
                 if is_said:
-                    says = np.array([bool(text.strip()) for text in column.texts.texts], np.bool_)[found]
-                    here, found = here[says], found[says]
-                codes[here] = found + start
+                    says = np.array([bool(text.strip()) for text in column.texts.texts], np.bool_)[own]
+                    here, own = here[says], own[says]
+                codes[here] = own + start
     return values, codes

@@ -5,10 +5,9 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from contextdb.compiled.artefact import SUFFIX
 from contextdb.compiled.table import CompiledTable
-from contextdb.disk import TABLE_SUFFIXES, path_in_quotes
-from contextdb.errors import Fault, FileError, Place, TableError, nearest, plural, shown
+from contextdb.disk import TABLE_SUFFIXES, TENSORS_SUFFIX, path_in_quotes
+from contextdb.errors import Fault, FileError, Place, TableError, nearest, plural, safe_text
 from contextdb.files.file_names import composed
 from contextdb.tables.project import SCHEMA_FILE, load_table, read_folder_schema, table_files, twice_named
 
@@ -19,7 +18,7 @@ MOST_NAMED = 6
 def open_compiled(text: str) -> CompiledTable:
     """The compiled table that TABLE means: a .safetensors artefact opened, or a table read and compiled."""
     path = table_path(text)
-    return CompiledTable.open(path) if path.suffix == SUFFIX else load_table(path).compile()
+    return CompiledTable.open(path) if path.suffix == TENSORS_SUFFIX else load_table(path).compile()
 
 
 def table_path(text: str) -> Path:
@@ -59,10 +58,10 @@ def _tables_in(folder: Path) -> list[tuple[str, Path]]:
 
 def _no_table(path: Path, known: list[str]) -> FileError:
     beside = [path.parent / name for name in _files_in(path.parent)]
-    files = [str(p) for p in beside if p.name.endswith((*TABLE_SUFFIXES, SUFFIX)) or (p / SCHEMA_FILE).is_file()]
+    files = [str(p) for p in beside if p.name.endswith((*TABLE_SUFFIXES, TENSORS_SUFFIX)) or (p / SCHEMA_FILE).is_file()]
     near = nearest(str(path), [*known, *files])
     accepted = "a file, a folder of one table, or the name of a table of the project"
-    place = Place(shown(str(path), most=4096))
+    place = Place(safe_text(str(path), most=4096))
     return FileError(Fault("there is no such table.", accepted, path_in_quotes(near) if near else "", place, "no-such-path"))
 
 

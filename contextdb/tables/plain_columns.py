@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +13,8 @@ from contextdb.cells.words import truth_of
 from contextdb.columns import TextColumn
 from contextdb.compiled.pick_columns import NOTHING, PickColumns
 from contextdb.errors import Fault, Place, in_quotes
-from contextdb.schema.jobs import PlainJob
 from contextdb.schema.settings import TableSettings
+from contextdb.schema.table_settings import PLAIN_JOBS
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,10 +33,10 @@ class PlainColumns:
     def read(cls, columns: Sequence[TextColumn], settings: TableSettings) -> PlainColumns:
         """Read those of some columns that the settings give these jobs."""
         faults: list[tuple[int, Fault]] = []
-        of: dict[str, NDArray[np.float64] | None] = {job: _read(columns, settings, job, faults) for job in get_args(PlainJob)}
+        of: dict[str, NDArray[np.float64] | None] = {job: _read(columns, settings, job, faults) for job in PLAIN_JOBS}
         n_rows = columns[0].n_rows if columns else 0
 
-        def filled(job: PlainJob) -> NDArray[np.float64]:
+        def filled(job: str) -> NDArray[np.float64]:
             values = of[job]
             return np.full(n_rows, READERS[job].empty) if values is None else values
 
@@ -70,14 +69,14 @@ class Reader:
         return Fault(f"cannot read {in_quotes(text)}.", self.accepted, place=Place(column=column), rule="unreadable-cell")
 
 
-def plain_fault(job: PlainJob, column: str, text: str) -> Fault | None:
+def plain_fault(job: str, column: str, text: str) -> Fault | None:
     """Why a cell of a column with a job cannot be read."""
     reader = READERS[job]
     return reader.fault(column, text) if reader.number(text) is None else None
 
 
 def _read(
-    columns: Sequence[TextColumn], settings: TableSettings, job: PlainJob, faults: list[tuple[int, Fault]]
+    columns: Sequence[TextColumn], settings: TableSettings, job: str, faults: list[tuple[int, Fault]]
 ) -> NDArray[np.float64] | None:
     """What the cells of the column with a job say; None where no column has it."""
     name: str | None = getattr(settings, job)
@@ -111,7 +110,7 @@ def _weight(text: str) -> float | None:
     return value if 0.0 <= value < math.inf else None
 
 
-READERS: dict[PlainJob, Reader] = {
+READERS: dict[str, Reader] = {
     "enabled": Reader(truth_of, True, '"True" or "False"'),
     "priority": Reader(_priority, 0, "a whole number"),
     "weight": Reader(_weight, 1.0, "a number from 0 up"),

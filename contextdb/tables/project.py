@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
@@ -13,7 +14,9 @@ from contextdb.cells.arguments import require_kind, require_path
 from contextdb.cells.notebook import one_line
 from contextdb.compiled.table import CompiledTable
 from contextdb.compiled.unchanging import Unchanging
-from contextdb.disk import names_a_table, path_in_quotes, read_bytes
+from contextdb.disk import TABLE_SUFFIXES, names_a_table, path_in_quotes, read_bytes, real_path
+from contextdb.disk.boundary import SCHEMA_FILE as SCHEMA_FILE
+from contextdb.disk.boundary import inside, why_outside
 from contextdb.disk.together import finish
 from contextdb.errors import (
     ContextDBError,
@@ -37,7 +40,6 @@ from contextdb.tables.nesting.links import Neighbours, inner_tables, is_nested, 
 from contextdb.tables.other_files import other_form, stray_sentence
 from contextdb.tables.table import Table
 
-SCHEMA_FILE = "contextdb.toml"
 T = TypeVar("T")
 
 
@@ -89,13 +91,13 @@ class Project(Unchanging, ByName[Table]):
         schema = read_folder_schema(folder)
         tables: dict[str, Table] = {}
         faults: list[Fault] = []
-        found = list(table_files(folder, schema))
-        for name, file in found:
+        files = list(table_files(folder, schema))
+        for name, file in files:
             try:
                 tables[name] = _read_table(file, schema, folder, strict)
             except ContextDBError as error:
                 faults += error.faults
-        faults += twice_named(found)
+        faults += twice_named(files)
         if faults:
             raise TableError(*faults)
         project = cls(folder, schema, around_each_other(tables))
@@ -155,7 +157,15 @@ def load(path: str | Path, strict: bool = True) -> Table:
     FileError, SchemaError, TableError
         Each with every fault, its place, what is accepted and the nearest correction.
     """
-    return load_table(require_path(path), strict)
+    file = require_path(path)
+    place = Place(str(path))
+    if file.is_dir():
+        raise FileError(Fault("this is a folder.", "one .csv or .parquet file", f"contextdb.Project.load({str(path)!r})", place))
+    if not file.suffix and not file.exists():
+        named = (folder / f"{file.name}{suffix}" for folder in (file.parent, file.parent / "tables") for suffix in TABLE_SUFFIXES)
+        near = next((path_in_quotes(one) for one in named if one.is_file()), "")
+        raise FileError(Fault("there is no such file.", "the path of a .csv or .parquet file", near, place), errno=errno.ENOENT)
+    return load_table(file, strict)
 
 
 def load_table(path: Path, strict: bool = True) -> Table:
@@ -169,7 +179,7 @@ def load_table(path: Path, strict: bool = True) -> Table:
 
 
 def neighbours(path: Path) -> Neighbours[Table]:
-    """The tables that the rows of a table file may refer to: those of its folder, each read when it is first asked for."""
+    """The tables that the rows of a table file may refer to: those of its folder, each read when it is first used."""
     return Neighbours(_Folder(*schema_for(path)))
 
 
@@ -182,7 +192,7 @@ def around_each_other(tables: Mapping[str, Table], before: Mapping[str, Table] |
 
 
 class _Folder(Mapping[str, Table]):
-    """The tables of a folder, each read when it is first asked for."""
+    """The tables of a folder, each read when it is first used."""
 
     def __init__(self, folder: Path, schema: Schema) -> None:
         self._folder, self._schema = folder, schema
@@ -215,10 +225,9 @@ class _Folder(Mapping[str, Table]):
 def schema_for(path: Path) -> tuple[Path, Schema]:
     """The folder and the schema that a table file belongs to."""
     finish(path.parent)
-    beside = path.parent / SCHEMA_FILE
-    if beside.is_file():
+    if os.path.lexists(path.parent / SCHEMA_FILE):
         return path.parent, read_folder_schema(path.parent)
-    for folder in path.resolve().parent.parents:
+    for folder in real_path(path).parent.parents:
         if (folder / SCHEMA_FILE).is_file():
             schema = read_folder_schema(folder)
             if settings_of(path, folder, schema) in schema.tables.values():
@@ -230,7 +239,7 @@ def schema_for(path: Path) -> tuple[Path, Schema]:
 def read_folder_schema(folder: Path) -> Schema:
     """What the folder's contextdb.toml says; nothing where there is none."""
     finish(folder)
-    path = folder / SCHEMA_FILE
+    path = inside(folder / SCHEMA_FILE, folder)
     if not path.is_file():
         return EMPTY
     return schema_of(read_bytes(path), path)
@@ -247,27 +256,44 @@ def schema_of(raw: bytes, path: Path) -> Schema:
 
 
 def table_files(folder: Path, schema: Schema) -> Iterator[tuple[str, Path]]:
-    """Name and file of every table: those that contextdb.toml declares, then others that lie in the folder and may be tables."""
-    declared = list(_declared_files(folder, schema))
+    """Name and file of every table: those that contextdb.toml declares, then others that lie in the folder and may be tables.
+
+    Raises FileError with every file that a link brings from elsewhere.
+    """
+    declared, others = _files_in(folder, schema)
     yield from declared
-    for path in _undeclared_files(folder, declared):
+    for path in others:
         if other_form(path, schema.conditions) is None:
             yield composed(path.stem), path
 
 
 def stray_files(folder: Path, schema: Schema) -> Iterator[tuple[Path, str]]:
-    """The files that lie next to the tables and look like something else, each with a sentence that says so."""
-    for path in _undeclared_files(folder, list(_declared_files(folder, schema))):
+    """The files that lie next to the tables and look like something else, each with a sentence that says so. Raises FileError as
+    `table_files` does."""
+    for path in _files_in(folder, schema)[1]:
         form = other_form(path, schema.conditions)
         if form is not None:
             yield path, stray_sentence(path, form)
+
+
+def _files_in(folder: Path, schema: Schema) -> tuple[list[tuple[str, Path]], list[Path]]:
+    """The declared tables of a folder, and the other files that may be tables."""
+    declared = list(_declared_files(folder, schema))
+    others = list(_undeclared_files(folder, declared))
+    paths = [*(path for _, path in declared), *others]
+    if faults := [fault for path in paths if (fault := why_outside(path, folder)) is not None]:
+        raise FileError(*faults)
+    return declared, others
 
 
 def _declared_files(folder: Path, schema: Schema) -> Iterator[tuple[str, Path]]:
     names: dict[Path, list[str]] = {}
     for settings in schema.tables.values():
         candidates = [folder / f for f in settings.files]
-        yield settings.name, next((found for p in candidates if (found := _on_disk(p, names)) is not None), candidates[0])
+        if any(why_outside(candidate.parent, folder) for candidate in candidates):  # nothing is listed there
+            yield settings.name, candidates[0]
+            continue
+        yield settings.name, next((match for p in candidates if (match := _on_disk(p, names)) is not None), candidates[0])
 
 
 def _undeclared_files(folder: Path, declared: Iterable[tuple[str, Path]]) -> Iterator[Path]:
@@ -281,10 +307,10 @@ def _on_disk(path: Path, names: dict[Path, list[str]]) -> Path | None:
     if path.parent not in names:
         names[path.parent] = _names_in(path.parent)
     present = names[path.parent]
-    found = spelled(path.name, present)
-    if found is None and path.is_file():  # a disk that does not tell capitals, or a folder that cannot be listed
-        found = next((name for name in present if alike(name) == alike(path.name)), path.name)
-    return path.with_name(found) if found is not None and path.with_name(found).is_file() else None
+    spelling = spelled(path.name, present)
+    if spelling is None and path.is_file():  # a disk that does not tell capitals, or a folder that cannot be listed
+        spelling = next((name for name in present if alike(name) == alike(path.name)), path.name)
+    return path.with_name(spelling) if spelling is not None and path.with_name(spelling).is_file() else None
 
 
 def _names_in(folder: Path) -> list[str]:
@@ -313,11 +339,11 @@ def _is_same_file(one: Path, other: Path) -> bool:
     return False
 
 
-def twice_named(found: Iterable[tuple[str, Path]]) -> list[Fault]:
+def twice_named(files: Iterable[tuple[str, Path]]) -> list[Fault]:
     """A fault for every file whose table has the name of one before it: nobody could say which of the two is meant."""
     first: dict[str, Path] = {}
     faults = []
-    for name, path in found:
+    for name, path in files:
         if first.setdefault(name, path) != path:
             stands = f"table {in_quotes(name)} is also defined in {path_in_quotes(first[name])}."
             faults.append(Fault(stands, "one file for each table", place=Place(str(path))))
@@ -331,11 +357,11 @@ def folder_of(path: Path, accepted: str = f"a folder of tables, or its {SCHEMA_F
     if path.name == SCHEMA_FILE and os.path.isfile(path):
         return path.parent
     noun = "file" if path.name == SCHEMA_FILE else "folder"
-    found = "not a folder." if os.path.exists(path) else f"there is no such {noun}."
+    problem = "not a folder." if os.path.exists(path) else f"there is no such {noun}."
     siblings = [p.name for p in path.parent.iterdir() if p.is_dir()] if os.path.isdir(path.parent) else []
     near = nearest(path.name, siblings)
     mend = path_in_quotes(path.parent / near) if near else ""
-    raise FileError(Fault(found, accepted, mend, Place(str(path)), "no-such-path"))
+    raise FileError(Fault(problem, accepted, mend, Place(str(path)), "no-such-path"))
 
 
 def _read_table(path: Path, schema: Schema, folder: Path, strict: bool, around: Mapping[str, Table] | None = None) -> Table:
@@ -351,5 +377,5 @@ def _below(path: Path, folder: Path) -> str:
     """The path of a file below a folder, as contextdb.toml has it; links on the way to the file stay what they are named."""
     if path.is_relative_to(folder):
         return path.relative_to(folder).as_posix()
-    whole, root = path.parent.resolve() / path.name, folder.resolve()
+    whole, root = real_path(path.parent) / path.name, real_path(folder)
     return whole.relative_to(root).as_posix() if whole.is_relative_to(root) else path.name

@@ -6,20 +6,23 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-
-import polars as pl
+from typing import TYPE_CHECKING
 
 from contextdb.cells.arguments import require_kind, require_many, require_mapping, require_path, require_text
+from contextdb.cells.fact_columns import is_frame
 from contextdb.columns import TextColumn
 from contextdb.compiled.table import CompiledTable
 from contextdb.errors import Fault, SchemaError, TableError, in_quotes
-from contextdb.files.parquet import columns_of_frame
 from contextdb.schema.settings import EMPTY, Schema, TableSettings, conditions_from_dict, expression_faults, settings_from_dict
 from contextdb.tables.compiling import compile_table
 from contextdb.tables.data import TableData, require_readable
 from contextdb.tables.nesting.flat import FlatTable, flatten
 from contextdb.tables.nesting.links import inner_rows, is_nested, nesting_faults
-from contextdb.tables.saving import save_table
+
+if TYPE_CHECKING:
+    import polars as pl
+else:
+    from contextdb.columns import polars as pl
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -28,6 +31,14 @@ class Table(TableData):
 
     around: Mapping[str, Table] | None = field(default=None, repr=False)
     """The tables of its folder by name, for rows that refer to another table; None where they are not known."""
+
+    if not TYPE_CHECKING:  # a type checker takes every name for one that exists where it sees this
+
+        def __getattr__(self, name: str) -> object:
+            problem = f"Table has no attribute {name!r}"
+            if hasattr(CompiledTable, name) and not name.startswith("_"):
+                problem += f": a compiled table has it. Did you mean table.compile().{name}?"
+            raise AttributeError(problem, name=name, obj=self)
 
     @classmethod
     def from_columns(
@@ -102,6 +113,8 @@ class Table(TableData):
         target = require_path(path) if path is not None else self.path
         if target is None:
             raise TableError(Fault(f"the table {in_quotes(self.name)} has no file yet.", "save(path)"))
+        from contextdb.tables.saving import save_table
+
         return save_table(self, target, overwrite)
 
     def compile(self, tables: Mapping[str, Table] | None = None) -> CompiledTable:
@@ -137,8 +150,8 @@ def flat_table(table: Table, tables: Mapping[str, Table] | None) -> FlatTable:
     inner = inner_rows(table)
     if tables is None and inner:
         name, rows = next(iter(inner.items()))
-        found = f"{in_quotes('@' + name)} refers to a table, but no other tables are given."
-        fault = Fault(found, f'compile(tables={{"{name}": ...}}), or a table out of a folder', rule="no-such-table")
+        problem = f"{in_quotes('@' + name)} refers to a table, but no other tables are given."
+        fault = Fault(problem, f'compile(tables={{"{name}": ...}}), or a table out of a folder', rule="no-such-table")
         raise TableError(fault.at(table.place(rows[0], table.asset_column)))
     return flatten(table, tables or {})
 
@@ -158,17 +171,19 @@ ACCEPTED = 'a mapping: {"Asset Name": [...], "speed": [...]}, a list of such map
 def columns_given(given: object) -> list[TextColumn]:
     """The texts of each column; what is None, or left out of a row, is empty. Raises ContextError where what is given, or a part of
     it, is of another type; TableError for columns of unequal length, or columns of a DataFrame of a type that no cell has."""
-    if isinstance(given, pl.DataFrame):
+    if is_frame(given):
+        from contextdb.files.parquet import columns_of_frame
+
         return columns_of_frame(given)
     columns = given if isinstance(given, Mapping) else _of_rows(require_many(given, "columns", ACCEPTED))
-    found = []
+    listed = []
     for name, values in columns.items():
         require_many(values, f"the column {in_quotes(require_text(name, 'a name of columns'))}", "a list of texts")
-        found.append(TextColumn.of(name, map(_text, values)))
-    lengths = {column.name: column.n_rows for column in found}
+        listed.append(TextColumn.of(name, map(_text, values)))
+    lengths = {column.name: column.n_rows for column in listed}
     if len(set(lengths.values())) > 1:
         raise TableError(Fault(f"the columns are not equally long: {lengths}.", "one text for each row in every column"))
-    return found
+    return listed
 
 
 def _of_rows(rows: Iterable[object]) -> Mapping[str, Sequence[object]]:

@@ -16,8 +16,6 @@ from contextdb.findings import Finding
 
 VARIETY = "variety"
 """The rule of the gathered findings."""
-ONE_CHOICE = ("first", "unique")
-"""The policies under which one row at most may play."""
 NEEDLESS = ("identical-rows", "equal-row", "subsumed-row", "redundant-row")
 """The rules that tell of a row which others make redundant."""
 MOST_NAMED = 3
@@ -26,11 +24,6 @@ Named = Callable[[int, int], str]
 """How a sentence about the second row names the first."""
 PlaceOf = Callable[[int], Finding]
 """The finding `variety` of a row, without its message."""
-
-
-def lets_choose(policies: Iterable[str]) -> bool:
-    """Whether the game chooses among several valid rows, under the policies of a table and of those inside it."""
-    return not any(policy in ONE_CHOICE for policy in policies)
 
 
 def softened(findings: Iterable[Finding], assets: Sequence[str]) -> list[Finding]:
@@ -44,7 +37,7 @@ def gathered(findings: Sequence[Finding], assets: Sequence[str], at: PlaceOf, na
     Rows that are valid in the same contexts are a group; rows within one row and that row are another; rows that several others
     make redundant are the last. What one row holds, a row that holds this row holds too, so a group is at the outermost.
     """
-    told: list[Finding] = []
+    gathered_findings: list[Finding] = []
     same: dict[int, list[int]] = {}
     within: dict[int, list[int]] = {}
     by_many: list[int] = []
@@ -52,7 +45,7 @@ def gathered(findings: Sequence[Finding], assets: Sequence[str], at: PlaceOf, na
     for finding in findings:
         row = finding.row
         if row is None or not _is_variety(finding, assets):
-            told.append(finding)
+            gathered_findings.append(finding)
         elif finding.rule == "redundant-row" and len(finding.by) > 1:
             by_many.append(row)
         elif finding.rule in ("subsumed-row", "redundant-row"):
@@ -62,8 +55,8 @@ def gathered(findings: Sequence[Finding], assets: Sequence[str], at: PlaceOf, na
         else:
             same.setdefault(finding.by[0], []).append(row)
     sentences = (*_same(same, named), *_within(within, named), *_by_many(by_many, named))
-    told += [replace(at(row), message=message, by=by) for row, message, by in sentences]
-    return sorted(told, key=lambda f: (f.row is not None, f.row or 0))
+    gathered_findings += [replace(at(row), message=message, by=by) for row, message, by in sentences]
+    return sorted(gathered_findings, key=lambda f: (f.row is not None, f.row or 0))
 
 
 def needless(findings: Iterable[Finding], assets: Sequence[str]) -> list[Finding]:

@@ -27,7 +27,7 @@ BYTES = 1 << 24
 
 @dataclass(frozen=True, eq=False)
 class Chunk:
-    """Some rows of a file: the columns that were asked for."""
+    """Some rows of a file: the columns that were requested."""
 
     n_rows: int
     frame: pl.DataFrame
@@ -51,8 +51,8 @@ def chunks_of(path: Path, wanted: Collection[str], table: str) -> Iterator[tuple
     several tables those rows are read that are of this one. Raises TableError or FileError where the file cannot be read, with its
     faults."""
     if path.suffix.lower() not in CONTEXT_SUFFIXES:
-        found = f"a file of contexts does not end in {in_quotes(path.suffix)}."
-        raise FileError(Fault(found, " or ".join(CONTEXT_SUFFIXES), place=Place(str(path))))
+        problem = f"a file of contexts does not end in {in_quotes(path.suffix)}."
+        raise FileError(Fault(problem, " or ".join(CONTEXT_SUFFIXES), place=Place(str(path))))
     if is_recording(path):
         yield from _recorded_chunks(path, wanted, table)
     else:
@@ -71,16 +71,16 @@ def _parquet_chunks(path: Path, wanted: Collection[str]) -> Iterator[tuple[Seque
     with scanned_parquet(path) as scan:
         names = tuple(scan.collect_schema().names())
         n_rows = int(scan.select(pl.len()).collect().item())
-        asked = [name for name in names if name in wanted]
-        chosen = scan.select(by_name(asked))
+        given = [name for name in names if name in wanted]
+        chosen = scan.select(by_name(given))
         done = 0
         if not n_rows:
             yield names, Chunk(0, pl.DataFrame(), 0, False)
-        if not asked:
+        if not given:
             for start in range(0, n_rows, ROWS):
                 stop = min(start + ROWS, n_rows)
                 yield names, Chunk(stop - start, pl.DataFrame(), start, False, stop / n_rows)
-        if not n_rows or not asked:
+        if not n_rows or not given:
             return
         for batch in _batches(chosen, n_rows):
             for start in range(0, len(batch), ROWS):
@@ -107,7 +107,7 @@ def _csv_chunks(path: Path, wanted: Collection[str]) -> Iterator[tuple[Sequence[
         try:
             records, names = find_rows(raw, str(path))
         except TableError:
-            raise _told(path) from None
+            raise _csv_error(path) from None
         starts, stops = records.starts[1:], records.stops[1:]
         n_bytes += len(piece)
         if len(starts):
@@ -118,7 +118,7 @@ def _csv_chunks(path: Path, wanted: Collection[str]) -> Iterator[tuple[Sequence[
         n_rows += len(starts)
         head = head or raw[: int(starts[0]) if len(starts) else len(raw)]
     if not names:
-        raise _told(path)
+        raise _csv_error(path)
     if not n_rows:
         yield names, Chunk(0, pl.DataFrame(), 0, True)
 
@@ -155,7 +155,7 @@ def _cut(raw: bytes) -> int:
     return cut
 
 
-def _told(path: Path) -> TableError:
+def _csv_error(path: Path) -> TableError:
     """What is wrong with a CSV, found by reading it whole."""
     try:
         read_csv(path.read_bytes(), str(path))

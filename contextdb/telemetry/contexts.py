@@ -12,6 +12,7 @@ from pathlib import Path
 import polars as pl
 
 from contextdb.cells.conditions import Condition
+from contextdb.cells.fact_columns import column_type
 from contextdb.cells.facts import Unknown, read_fact_text
 from contextdb.cells.sets import Cell
 from contextdb.compiled.batch import query_encoded
@@ -55,11 +56,11 @@ def context_files(pattern: str) -> list[Path]:
     """The files that a path or a glob means, in the order of their names. Raises FileError where there is none."""
     if os.path.isfile(pattern):
         return [Path(pattern)]
-    found = sorted(Path(p) for p in glob.glob(pattern, recursive=True) if os.path.isfile(p))
-    if not found:
+    files = sorted(Path(p) for p in glob.glob(pattern, recursive=True) if os.path.isfile(p))
+    if not files:
         accepted = "a .csv, .parquet or .jsonl file, or a glob"
         raise FileError(Fault("no file of contexts is there.", accepted, _near(Path(pattern)), Place(pattern), "no-such-path"))
-    return found
+    return files
 
 
 def _near(path: Path) -> str:
@@ -133,5 +134,5 @@ def as_given(fact: object, condition: Condition) -> object:
 
 
 def fact_type(condition: Condition) -> pl.DataType:
-    dtype: pl.DataType = condition.domain.type.dtype
+    dtype: pl.DataType = column_type(condition.domain.type)
     return dtype

@@ -61,16 +61,16 @@ def _run(job: bytes, path: str) -> Any:
 
 @lru_cache(maxsize=1)
 def _unpickled(job: bytes) -> tuple[Callable[[Any, Path], Any], Any]:
-    found: tuple[Callable[[Any, Path], Any], Any] = pickle.loads(job)
-    return found
+    job_and_data: tuple[Callable[[Any, Path], Any], Any] = pickle.loads(job)
+    return job_and_data
 
 
 def _unfinished(lost: dict[Path, str], mend: str) -> EngineError:
     files = sorted(lost)
     named = ", ".join(path_in_quotes(path) for path in files[:20])
     more = f" and {len(files) - 20} more" if len(files) > 20 else ""
-    found = f"{plural(len(files), 'file')} could not be finished: {named}{more}. The first: {lost[files[0]].splitlines()[0]}"
-    return EngineError(Fault(found, "", mend))
+    problem = f"{plural(len(files), 'file')} could not be finished: {named}{more}. The first: {lost[files[0]].splitlines()[0]}"
+    return EngineError(Fault(problem, "", mend))
 
 
 def _client(distributed: Any, scheduler: str | None) -> Any:
@@ -83,8 +83,8 @@ def _client(distributed: Any, scheduler: str | None) -> Any:
         _forget_half_made(distributed)
         raise
     except (OSError, ValueError) as error:
-        found = f"the Dask scheduler {scheduler or 'of this machine'} does not answer: {error}."
-        raise EngineError(Fault(found, "an address such as tcp://10.0.0.5:8786")) from None
+        problem = f"the Dask scheduler {scheduler or 'of this machine'} does not answer: {error}."
+        raise EngineError(Fault(problem, "an address such as tcp://10.0.0.5:8786")) from None
 
 
 def _forget_half_made(distributed: Any) -> None:

@@ -1,6 +1,6 @@
 """Ask a table with every context of a file: the one function that every engine runs for `contextdb evaluate`.
 
-A chunk at a time is read, as strictly as a single query reads its facts, and only sums are kept. The answers, where they are
+A chunk at a time is read, as strictly as a single query reads its facts, and only sums are retained. The answers, where they are
 wanted, go into Parquet files of a folder, a chunk each; the folder takes its name when the last is written, so that it is there
 whole or not at all, and a file that is asked twice, since a worker died, is there once.
 """
@@ -11,7 +11,6 @@ import hashlib
 import os
 import re
 import secrets
-import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -23,12 +22,13 @@ import polars as pl
 from contextdb.bitmask import Rows
 from contextdb.cells.facts import Unknown
 from contextdb.compiled.batch import query_encoded
+from contextdb.compiled.many import rows_of
 from contextdb.compiled.table import CompiledTable, data_of
 from contextdb.console import printable
 from contextdb.disk import why_unwritten
+from contextdb.disk.folder_lock import growing_folder
 from contextdb.errors import ContextDBError, Fault, FileError, Place
 from contextdb.telemetry.contexts import contexts_in
-from contextdb.telemetry.keys import rows_of
 
 MOST_ANSWERS = 1 << 21
 """Valid rows, summed over contexts, that are written at once."""
@@ -45,7 +45,7 @@ EMPTY: dict[str, pl.DataType] = {
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """What each context is asked."""
+    """What is evaluated for each context."""
 
     compiled: CompiledTable
     unknown: Unknown
@@ -102,14 +102,8 @@ def _answers_folder(folder: Path | None, path: Path) -> Iterator[Path | None]:
         yield None
         return
     whole, growing = folder / _name(path), folder / f"{_name(path)}.{secrets.token_hex(4)}"
-    try:
-        with answers_written(folder):
-            growing.mkdir()  # not the folders above: they are gone where the run has ended
-            yield growing
-            if not whole.exists():  # else an earlier worker finished it, and died before it could say so
-                os.rename(growing, whole)
-    finally:
-        shutil.rmtree(growing, ignore_errors=True)
+    with answers_written(folder), growing_folder(growing, whole):
+        yield growing  # where an earlier worker finished it, and died before it could say so, that one's stays
 
 
 @contextmanager
@@ -126,14 +120,14 @@ def answers_written(place: Path) -> Iterator[None]:
 
 
 def _of_system(error: Exception) -> OSError:
-    """What the system refused: polars says its number in a text alone. A text without one loses the names that nobody asked for."""
+    """What the system refused: polars says its number in a text alone. A text without one loses the names that nobody requested."""
     if isinstance(error, OSError) and error.errno is not None:
         return error
-    said = str(error).strip()
-    if found := re.search(r"\(os error (\d+)\)", said):
-        number = int(found[1])  # of Windows there; Python then knows which number it has elsewhere
+    text = str(error).strip()
+    if match := re.search(r"\(os error (\d+)\)", text):
+        number = int(match[1])  # of Windows there; Python then knows which number it has elsewhere
         return OSError(number, os.strerror(number), None, number)
-    return OSError(re.sub(r"\s*:?\s*\S*\.contextdb-\S*", "", said.splitlines()[0] if said else "no reason given").rstrip(".:"))
+    return OSError(re.sub(r"\s*:?\s*\S*\.contextdb-\S*", "", text.splitlines()[0] if text else "no reason given").rstrip(".:"))
 
 
 def _write(question: Question, facts: pl.DataFrame, counts: Rows, first: int, file: str, stem: Path) -> None:

@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from contextdb.bitmask import Flags
 from contextdb.cells.conditions import Condition
+from contextdb.cells.fact_columns import column_type
 from contextdb.cells.facts import Fact, read_fact, read_fact_text
 from contextdb.cells.sets import Cell
 from contextdb.cells.words import format_number
-from contextdb.errors import ContextError, shown
+from contextdb.errors import ContextError, safe_text
 
 PLAIN_NUMBER = r"^[ \t]*[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?[ \t]*$"
 MOST_EXAMPLES = 5
@@ -42,15 +43,16 @@ class FactColumn:
         """A few of the values outside, the first by their letters, of the rows that count."""
         if self.outside is None:
             return ()
-        found = self.given.filter(pl.Series(self.outside & counted))
-        if isinstance(found.dtype, pl.Float32 | pl.Float64 | pl.String) or found.dtype.is_integer():
-            texts = found.unique().to_list()
+        values = self.given.filter(pl.Series(self.outside & counted))
+        if isinstance(values.dtype, pl.Float32 | pl.Float64 | pl.String) or values.dtype.is_integer():
+            texts = values.unique().to_list()
         else:
-            texts = found.to_list()
-        return tuple(sorted({_shown(value) for value in texts})[:MOST_EXAMPLES])
+            texts = values.to_list()
+        return tuple(sorted({_value_text(value) for value in texts})[:MOST_EXAMPLES])
 
 
 def read_facts(given: pl.Series, condition: Condition, is_text: bool) -> FactColumn:
+    """A recorded column as facts of a condition, with what is missing and what is outside its domain."""
     kind = condition.domain.type
     if kind.is_numeric:
         return _numbers(given, condition, is_text)
@@ -99,7 +101,7 @@ def _doubles(series: pl.Series) -> Doubles:
 
 
 def _is_inside(facts: Doubles, condition: Condition) -> bool:
-    """Whether no fact is missing or outside the domain, as far as that is quickly said."""
+    """Whether no fact is missing or outside the domain, as far as a quick test shows."""
     domain = condition.domain
     if domain.type.is_whole or not len(facts):
         return False
@@ -169,25 +171,25 @@ def _coded(given: pl.Series) -> tuple[NDArray[np.int64], list[object]]:
         return codes.to_numpy(), [*distinct.to_list(), None]
     known: dict[object, int] = {}
     values: list[object] = []
-    found = []
+    seen = []
     for value in given.to_list():
         key = (type(value), str(value))
         if key not in known:
             known[key] = len(values)
             values.append(value)
-        found.append(known[key])
-    return np.array(found, np.int64), values
+        seen.append(known[key])
+    return np.array(seen, np.int64), values
 
 
 def _dtype(condition: Condition) -> pl.DataType:
     kind = condition.domain.type
     if kind.is_numeric:
         return pl.Float64()
-    dtype: pl.DataType = pl.Enum(list(condition.domain.values or ())) if kind.needs_values else kind.dtype
+    dtype: pl.DataType = pl.Enum(list(condition.domain.values or ())) if kind.needs_values else column_type(kind)
     return dtype
 
 
-def _shown(value: object) -> str:
+def _value_text(value: object) -> str:
     if isinstance(value, (float, int)) and not isinstance(value, bool):
         return format_number(value)
-    return " ".join(sorted(map(str, value))) if isinstance(value, list) else shown(str(value))
+    return " ".join(sorted(map(str, value))) if isinstance(value, list) else safe_text(str(value))

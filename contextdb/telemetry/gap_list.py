@@ -46,7 +46,7 @@ def ranked(report: CoverageReport, ready: Opened, seen: Observed, work: int, sam
 
 def _renewed(space: Space, gaps: Sequence[Gap], boxes: Mapping[str, Box | None], measure: Measure) -> list[Gap]:
     """The gaps with what none before them holds."""
-    found: list[Gap] = []
+    renewed: list[Gap] = []
     earlier: list[Sides] = []
     for gap in gaps:
         box = boxes[gap.id]
@@ -55,8 +55,8 @@ def _renewed(space: Space, gaps: Sequence[Gap], boxes: Mapping[str, Box | None],
             new_share, is_exact = measure(sides, earlier)
             gap = replace(gap, new_share=min(gap.share, new_share), is_exact=gap.is_exact and is_exact)
             earlier.append(sides)
-        found.append(gap)
-    return found
+        renewed.append(gap)
+    return renewed
 
 
 def _measure(ready: Opened, work: int, samples: int | None, seed: int) -> Measure:

@@ -47,7 +47,7 @@ def observe(
     max_gaps: int = MOST_GAPS,
     known: Sequence[Gap] = (),
 ) -> Observed:
-    """Evaluate recorded contexts against a table. Files are streamed, and only sums are kept.
+    """Evaluate recorded contexts against a table. Files are streamed, and only sums are retained.
 
     Parameters
     ----------
@@ -100,18 +100,18 @@ def observe(
         raise FileError(*(fault for file in unread for fault in file.faults))
     boxes = [box for gap in known if (box := box_of(space, gap.cells)) is not None]
     gaps = seen_gaps(space, compiled, total, max_gaps, boxes)
-    named = tuple(gap if ready.ruled is None else _told(gap, ready.ruled) for gap in gaps.gaps)
+    named = tuple(gap if ready.ruled is None else _with_rules(gap, ready.ruled) for gap in gaps.gaps)
     return _observed(compiled, total, sorted(unread, key=lambda f: f.file), named, gaps.elsewhere)
 
 
-def _told(gap: SeenGap, ruled: RuledTable) -> SeenGap:
+def _with_rules(gap: SeenGap, ruled: RuledTable) -> SeenGap:
     """A gap in which cells of columns that the table does not have are a rule."""
     if ruled.column is None:
         return gap
     near = gap.nearest
     is_rule = near is not None and near.condition in ruled.rules
-    told = replace(near, condition=ruled.column, cell="Any") if near is not None and is_rule else near
-    return replace(gap, cells=ruled.cells(gap.cells), nearest=told)
+    named = replace(near, condition=ruled.column, cell="Any") if near is not None and is_rule else near
+    return replace(gap, cells=ruled.cells(gap.cells), nearest=named)
 
 
 def _paths(files: str | Path | Sequence[str | Path]) -> list[Path]:
@@ -119,21 +119,21 @@ def _paths(files: str | Path | Sequence[str | Path]) -> list[Path]:
     patterns = [require_path(each, "one of files") for each in several]
     if not patterns:
         raise FileError(Fault("no file of contexts is given.", "a .csv, .parquet or .jsonl file, or a glob", rule="no-such-path"))
-    found = {os.path.realpath(path): path for pattern in patterns for path in context_files(str(pattern))}
-    return sorted(found.values())
+    by_path = {os.path.realpath(path): path for pattern in patterns for path in context_files(str(pattern))}
+    return sorted(by_path.values())
 
 
 def _parts(
     plan: Plan, paths: Sequence[Path], engine: Engine, scheduler: str | None, resume: str | Path | None, progress: Tell | None
 ) -> Iterator[tuple[Path, Part]]:
-    """The part of every file, those that are kept from an earlier run first."""
+    """The part of every file, those that are retained from an earlier run first."""
     saved = None if resume is None else SavedParts(Path(resume), plan)
-    kept = {path: part for path in paths if saved is not None and (part := saved.get(path)) is not None}
+    parts = {path: part for path in paths if saved is not None and (part := saved.get(path)) is not None}
     keys = {} if saved is None else {path: saved.key(path) for path in paths}
-    n_done = len(kept)
+    n_done = len(parts)
     _tell(progress, n_done, len(paths))
-    yield from kept.items()
-    left = [path for path in paths if path not in kept]
+    yield from parts.items()
+    left = [path for path in paths if path not in parts]
     if not left:
         return
 
@@ -158,11 +158,11 @@ def _tell(progress: Tell | None, n_done: float, n_files: int) -> None:
 
 
 def _tag_factors(space: Space, compiled: CompiledData) -> dict[str, tuple[TagFactor, ...]]:
-    found = {}
+    factors = {}
     for at, condition in enumerate(compiled.conditions):
         if isinstance(compiled.masks[at], TagMasks):
-            found[condition.name] = tuple(f for n in space.of_condition[at] if isinstance(f := space.factors[n], TagFactor))
-    return found
+            factors[condition.name] = tuple(f for n in space.of_condition[at] if isinstance(f := space.factors[n], TagFactor))
+    return factors
 
 
 def _observed(

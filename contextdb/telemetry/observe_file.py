@@ -16,20 +16,20 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from contextdb import bitmask
 from contextdb.bitmask import Flags
+from contextdb.compiled.batch import answered
 from contextdb.errors import ContextDBError, Fault, Place, TableError, in_quotes, no_such, plural
 from contextdb.telemetry import parts
 from contextdb.telemetry.chunks import Chunk, chunks_of
 from contextdb.telemetry.facts_read import FactColumn, read_facts
 from contextdb.telemetry.fields import Fields
-from contextdb.telemetry.keys import NUMPY_BLOCK, Counts, Hashes, KeyWords, grouped, load_kernels
+from contextdb.telemetry.keys import Counts, Hashes, KeyWords, grouped
 from contextdb.telemetry.parts import Part, Plan, most_examples, nothing, require_countable
 from contextdb.telemetry.smallest import SmallestHashes, SmallestKeys
 
 Chunks = Iterable[tuple[Sequence[str], Chunk]]
 TellRows = Callable[[float], None]
-"""Is told which share of a file is done."""
+"""Receives which share of a file is done."""
 
 
 def observe_file(plan: Plan, path: str | Path, n_threads: int = 1, tell: TellRows | None = None) -> Part:
@@ -37,20 +37,20 @@ def observe_file(plan: Plan, path: str | Path, n_threads: int = 1, tell: TellRow
     sums = _Sums(plan)
     try:
         chunks = chunks_of(Path(path), {*plan.compiled.asked, *([plan.count] if plan.count else [])}, plan.compiled.name)
-        for found in _worked_out(plan, chunks, str(path), n_threads):
-            sums.add(found)
+        for chunk in _worked_out(plan, chunks, str(path), n_threads):
+            sums.add(chunk)
             if tell is not None:
-                tell(found.share_done)
+                tell(chunk.share_done)
     except ContextDBError as error:
         return nothing(plan, error.faults)
     return sums.part()
 
 
-def _worked_out(plan: Plan, chunks: Chunks, file: str, n_threads: int) -> Iterator[_Found]:
+def _worked_out(plan: Plan, chunks: Chunks, file: str, n_threads: int) -> Iterator[_Evaluated]:
     if n_threads == 1:
         yield from (_observe_chunk(plan, names, chunk, file) for names, chunk in chunks)
         return
-    waiting: deque[Future[_Found]] = deque()
+    waiting: deque[Future[_Evaluated]] = deque()
     with ThreadPoolExecutor(n_threads) as pool:
         for names, chunk in chunks:
             waiting.append(pool.submit(_observe_chunk, plan, names, chunk, file))
@@ -61,7 +61,7 @@ def _worked_out(plan: Plan, chunks: Chunks, file: str, n_threads: int) -> Iterat
 
 
 @dataclass(frozen=True, eq=False)
-class _Found:
+class _Evaluated:
     """What a chunk holds: its distinct contexts (M of them), and what is wrong with its facts."""
 
     rows: int
@@ -80,17 +80,17 @@ class _Found:
     share_done: float
 
 
-def _observe_chunk(plan: Plan, names: Sequence[str], chunk: Chunk, file: str) -> _Found:
+def _observe_chunk(plan: Plan, names: Sequence[str], chunk: Chunk, file: str) -> _Evaluated:
     moments = moments_of(plan.count, names, chunk, file)
-    asked = plan.compiled.asked
+    conditions = plan.compiled.asked
     total = int(moments.sum())
-    read = {n: read_facts(chunk.frame[n], c, chunk.is_text) for n, c in asked.items() if n in names and chunk.n_rows}
+    read = {n: read_facts(chunk.frame[n], c, chunk.is_text) for n, c in conditions.items() if n in names and chunk.n_rows}
     fields = plan.fields
     words = fields.words(read, chunk.n_rows)
     hashes, first, sums = grouped(words, moments)
     hits, is_open = _evaluated(fields, words, first, sums)
     outside = {n: int(moments[c.outside].sum()) for n, c in read.items() if c.outside is not None}
-    return _Found(
+    return _Evaluated(
         rows=chunk.n_rows,
         moments=total,
         hits=hits,
@@ -99,10 +99,10 @@ def _observe_chunk(plan: Plan, names: Sequence[str], chunk: Chunk, file: str) ->
         first=first,
         sums=sums,
         is_open=is_open,
-        missing={n: _missing(read.get(n), moments, total) for n in asked},
+        missing={n: _missing(read.get(n), moments, total) for n in conditions},
         outside=outside,
-        examples={n: read[n].examples(moments > 0) for n, found in outside.items() if found},
-        columns=frozenset(n for n in names if n not in asked and n != plan.count),
+        examples={n: read[n].examples(moments > 0) for n, values in outside.items() if values},
+        columns=frozenset(n for n in names if n not in conditions and n != plan.count),
         share_done=chunk.share_done,
     )
 
@@ -116,19 +116,9 @@ def _missing(column: FactColumn | None, moments: Counts, total: int) -> int:
 def _evaluated(fields: Fields, words: KeyWords, rows: NDArray[np.int32], sums: Counts) -> tuple[Counts, Flags]:
     """The moments in which each row is valid, and which contexts have no row: int64 [n_rows], bool [M]."""
     compiled = fields.compiled
-    stack = compiled.stack
-    hits, is_open = np.zeros(64 * len(compiled.enabled), np.int64), np.ones(len(rows), np.bool_)
-    if kernels := load_kernels():
-        given = (fields.table[: stack.n_codes], fields.groups, fields.numbers, stack.masks, stack.wide, compiled.enabled)
-        kernels.evaluate(words, rows, sums, *given, hits, is_open)
-    else:
-        codes = fields.codes(words[:, rows])[:, : stack.n_codes]
-        for start in range(0, len(codes), NUMPY_BLOCK):
-            masks = compiled.stack.masks_of(codes[start : start + NUMPY_BLOCK], compiled.enabled)
-            is_open[start : start + NUMPY_BLOCK] = ~masks.any(axis=1)
-            contexts, own = bitmask.places(masks)
-            np.add.at(hits, own, sums[start : start + NUMPY_BLOCK][contexts])
-    return hits[: compiled.n_rows], is_open
+    counts, hits = np.empty(len(rows), np.int64), np.zeros(64 * len(compiled.enabled), np.int64)
+    answered(compiled, fields.codes(words, rows, compiled.codes.n_codes), counts=counts, hits=hits, weights=sums)
+    return hits[: compiled.n_rows], counts == 0
 
 
 class _Sums:
@@ -145,23 +135,23 @@ class _Sums:
         self.distinct = SmallestHashes(parts.MOST_HASHES)
         self.open = SmallestKeys(parts.MOST_OPEN, plan.fields.n_words)
 
-    def add(self, found: _Found) -> None:
-        require_countable(self.moments + found.moments)
-        self.rows += found.rows
-        self.moments += found.moments
-        self.uncovered += int(found.sums[found.is_open].sum())
-        self.hits += found.hits
-        self.missing.update(found.missing)
-        self.outside.update(found.outside)
-        self.examples = most_examples(self.examples, found.examples)
-        self.columns |= found.columns
-        self.distinct.add(found.hashes)
-        at = np.flatnonzero(found.is_open)
-        self.open.add(found.hashes[at], found.words, found.first[at], found.sums[at])
+    def add(self, chunk: _Evaluated) -> None:
+        require_countable(self.moments + chunk.moments)
+        self.rows += chunk.rows
+        self.moments += chunk.moments
+        self.uncovered += int(chunk.sums[chunk.is_open].sum())
+        self.hits += chunk.hits
+        self.missing.update(chunk.missing)
+        self.outside.update(chunk.outside)
+        self.examples = most_examples(self.examples, chunk.examples)
+        self.columns |= chunk.columns
+        self.distinct.add(chunk.hashes)
+        at = np.flatnonzero(chunk.is_open)
+        self.open.add(chunk.hashes[at], chunk.words, chunk.first[at], chunk.sums[at])
 
     def part(self) -> Part:
-        hashes, is_full = self.distinct.found()
-        open_hashes, words, moments, has_all = self.open.found()
+        hashes, is_full = self.distinct.settled()
+        open_hashes, words, moments, has_all = self.open.settled()
         return Part(
             rows=self.rows,
             moments=self.moments,
@@ -174,7 +164,7 @@ class _Sums:
             hashes=hashes,
             is_full=is_full,
             open_hashes=open_hashes,
-            open_keys=self.plan.fields.codes(words),
+            open_keys=self.plan.fields.keys(words),
             open_moments=moments,
             has_all_open=has_all,
             files=1,
@@ -205,7 +195,7 @@ def moments_of(count: str | None, names: Sequence[str], chunk: Chunk, file: str)
     if not is_number or not right.all():
         at = 0 if not is_number else int(np.flatnonzero(~right.to_numpy())[0])
         value = given[at]
-        said = "is missing" if value is None else f"{in_quotes(str(value))} is not a count"
+        problem = "is missing" if value is None else f"{in_quotes(str(value))} is not a count"
         place = Place(file, chunk.line(at), count, chunk.first_row + at)
-        raise TableError(Fault(f"the count {said}.", f"a whole number from 0 to {MOST_COUNT:,}", place=place))
+        raise TableError(Fault(f"the count {problem}.", f"a whole number from 0 to {MOST_COUNT:,}", place=place))
     return numbers.cast(pl.Int64).to_numpy()

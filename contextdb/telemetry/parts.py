@@ -22,12 +22,12 @@ MOST_OPEN = 1 << 13
 MOST_HASHES = 1 << 16
 MOST_MOMENTS = 1 << 62
 Keys = NDArray[np.int32]
-"""Codes of contexts as `contextdb.compiled.stack` has them, and the classes of their sets of tags: int32 [N, P]."""
+"""Codes of contexts as `contextdb.compiled.codes` has them, and the classes of their sets of tags: int32 [N, P]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """What is asked of each file."""
+    """What is worked out for each file."""
 
     compiled: CompiledData
     count: str | None
@@ -68,7 +68,7 @@ class Part:
 
 def nothing(plan: Plan, faults: Sequence[Fault] = ()) -> Part:
     """The part of no file, or of one that cannot be read."""
-    width = plan.compiled.stack.n_codes + sum(map(len, plan.tags.values()))
+    width = plan.compiled.codes.n_codes + sum(map(len, plan.tags.values()))
     keys, hits = np.zeros((0, width), np.int32), np.zeros(plan.compiled.n_rows, np.int64)
     return Part(
         rows=0,
@@ -117,7 +117,7 @@ def require_countable(moments: int) -> None:
 
 
 def most_examples(a: Mapping[str, tuple[str, ...]], b: Mapping[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
-    """The examples of both, those that are kept."""
+    """The examples of both, those that are retained."""
     return {n: tuple(sorted({*a.get(n, ()), *b.get(n, ())})[:MOST_EXAMPLES]) for n in sorted({*a, *b})}
 
 

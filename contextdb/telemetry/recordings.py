@@ -1,6 +1,6 @@
 """Recorded contexts, looked at a few rows at a time: telemetry of the game, however long, in CSV, Parquet or lines of a link.
 
-One row is a moment, one column a fact. The rows stay in their file (Parquet) or its bytes (CSV) until they are asked for. Texts of
+One row is a moment, one column a fact. The rows stay in their file (Parquet) or its bytes (CSV) until they are requested. Texts of
 a CSV are facts as on the command line; values of a Parquet file become such texts.
 """
 
@@ -75,13 +75,13 @@ def _rows_with(frame: pl.DataFrame, words: list[str]) -> NDArray[np.int64]:
     if not words:
         return np.arange(len(frame), dtype=np.int64)
     numbered = frame.rename({name: str(at) for at, name in enumerate(frame.columns)})  # polars reads some names as patterns
-    said = [_said(name, numbered[str(at)]) for at, name in enumerate(frame.columns)]
-    line = pl.concat_str(said or [pl.lit("")]).str.to_lowercase()
+    texts = [_search_text(name, numbered[str(at)]) for at, name in enumerate(frame.columns)]
+    line = pl.concat_str(texts or [pl.lit("")]).str.to_lowercase()
     holds = pl.all_horizontal([line.str.contains(word, literal=True) for word in words])
     return numbered.select(holds.arg_true()).to_series().to_numpy().astype(np.int64)
 
 
-def _said(name: str, column: pl.Series) -> pl.Expr:
+def _search_text(name: str, column: pl.Series) -> pl.Expr:
     """What a search finds of a fact: "gait=Walk "; nothing where the fact is missing."""
     value = pl.col(column.name)
     text = (

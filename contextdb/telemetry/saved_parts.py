@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from contextdb.disk import make_folder, read_bytes, write_atomic
+from contextdb.disk.boundary import inside
 from contextdb.errors import ContextDBError
 from contextdb.telemetry.parts import MOST_HASHES, MOST_OPEN, Part, Plan
 
@@ -41,14 +42,14 @@ class SavedParts:
                 about = json.loads(str(arrays["about"]))
                 if about["for"] != self._key(path):
                     return None
-                found = {name: arrays[name] for name in _ARRAYS}
+                saved = {name: arrays[name] for name in _ARRAYS}
         except (ContextDBError, OSError, ValueError, KeyError, EOFError, TypeError, IndexError):
             return None
         except Exception as error:  # a file cut short: zipfile has errors of its own
             if type(error).__module__ not in ("zipfile", "zlib"):
                 raise
             return None
-        given: dict[str, Any] = {**found, **{name: about[name] for name in _PLAIN}}
+        given: dict[str, Any] = {**saved, **{name: about[name] for name in _PLAIN}}
         given |= {name: Counter(about[name]) for name in ("missing", "outside")}
         examples = {name: tuple(texts) for name, texts in about["examples"].items()}
         return Part(**given, examples=examples, columns=frozenset(about["columns"]))
@@ -70,7 +71,7 @@ class SavedParts:
 
     def _file(self, path: Path) -> Path:
         name = hashlib.sha256(os.path.realpath(path).encode("utf-8", "surrogateescape")).hexdigest()[:24]
-        return self.folder / f"{name}.npz"
+        return inside(self.folder / f"{name}.npz", self.folder)
 
     def _key(self, path: Path) -> str:
         seen = os.stat(path)
@@ -80,11 +81,11 @@ class SavedParts:
 def plan_digest(plan: Plan) -> str:
     """A name for all that a part depends on besides its file."""
     compiled = plan.compiled
-    found = hashlib.sha256(f"{VERSION} {MOST_OPEN} {MOST_HASHES} {plan.count!r}".encode())
+    digest = hashlib.sha256(f"{VERSION} {MOST_OPEN} {MOST_HASHES} {plan.count!r}".encode())
     for condition, texts in zip(compiled.conditions, compiled.texts, strict=True):
-        found.update(repr((condition.name, condition.domain, condition.expr, texts.texts)).encode("utf-8", "surrogatepass"))
-        found.update(texts.codes.tobytes())
+        digest.update(repr((condition.name, condition.domain, condition.expr, texts.texts)).encode("utf-8", "surrogatepass"))
+        digest.update(texts.codes.tobytes())
     inputs = () if compiled.derivation is None else compiled.derivation.conditions
-    found.update(repr([(c.name, c.domain, c.expr) for c in inputs]).encode("utf-8", "surrogatepass"))
-    found.update(compiled.enabled.tobytes() + str(compiled.n_rows).encode())
-    return found.hexdigest()
+    digest.update(repr([(c.name, c.domain, c.expr) for c in inputs]).encode("utf-8", "surrogatepass"))
+    digest.update(compiled.enabled.tobytes() + str(compiled.n_rows).encode())
+    return digest.hexdigest()

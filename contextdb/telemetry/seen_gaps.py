@@ -42,8 +42,8 @@ def seen_gaps(space: Space, compiled: CompiledData, part: Part, most: int, known
     """
     points = _points(space, compiled, part)
     is_placed = (points >= 0).all(axis=1)
-    kept = int(part.open_moments.sum())
-    scale = part.uncovered / kept if kept else 0.0
+    counted = int(part.open_moments.sum())
+    scale = part.uncovered / counted if counted else 0.0
     elsewhere = int(part.open_moments[~is_placed].sum())
     moments = part.open_moments[is_placed]
     rows = BoxSet.of(space.full, space.boxes)
@@ -51,9 +51,9 @@ def seen_gaps(space: Space, compiled: CompiledData, part: Part, most: int, known
     held = [(box, _inside(box, points[is_placed])) for box in dict.fromkeys(known)]
     boxes = [(box, inside) for box, inside in held if inside.any()]
     boxes += _boxes(space, rows, points[is_placed], moments, most * TRIED, boxes)
-    found = _ranked(space, boxes, points[is_placed], moments)[: most + len(held)]
+    ranked = _ranked(space, boxes, points[is_placed], moments)[: most + len(held)]
     gaps, before = [], np.zeros(len(moments), np.bool_)
-    for box, inside in found:
+    for box, inside in ranked:
         n, n_new = int(moments[inside].sum()), int(moments[inside & ~before].sum())
         before |= inside
         sides = space.sides_of(box)
@@ -75,14 +75,14 @@ def _boxes(
     left = np.lexsort((*points.T[::-1], -moments))
     for _, inside in known:
         left = left[~inside[left]]
-    found: list[tuple[Box, Flags]] = []
-    while len(left) and len(found) < most:
+    boxes: list[tuple[Box, Flags]] = []
+    while len(left) and len(boxes) < most:
         box = widened(space, rows, tuple(points[left[0]].tolist()), order)
         inside = _inside(box, points)
         inside[left[0]] = True
-        found.append((box, inside))
+        boxes.append((box, inside))
         left = left[~inside[left]]
-    return found
+    return boxes
 
 
 def _inside(box: Box, points: Points) -> Flags:
@@ -102,21 +102,18 @@ def _ranked(
 
 def _points(space: Space, compiled: CompiledData, part: Part) -> Points:
     """Each context's class in every factor."""
-    stack, keys = compiled.stack, part.open_keys
+    codes, keys = compiled.codes, part.open_keys
     points = np.full((len(keys), len(space.factors)), -1, np.int64)
-    slot, wide, tag = 0, stack.n_plain, stack.n_codes
-    wides = set(stack.wide[:, 0].tolist())
+    tag = codes.n_codes
     for at, masks in enumerate(compiled.masks):
         numbers = space.of_condition[at]
         if isinstance(masks, TagMasks):
             points[:, list(numbers)] = keys[:, tag : tag + len(numbers)]
             tag += len(numbers)
         else:
-            own = keys[:, wide] if at in wides else keys[:, slot] - stack.starts[at]
+            own = keys[:, codes.slots[at].start] - codes.starts[at]
             classes = _classes(masks, space.factors[numbers[0]])
             points[:, numbers[0]] = np.array([*classes, -1], np.int64)[np.clip(own, 0, len(classes))]
-        wide += at in wides
-        slot += 0 if at in wides else stack.n_slots[at]
     return points
 
 

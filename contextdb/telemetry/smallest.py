@@ -1,6 +1,6 @@
-"""The contexts of the smallest hashes, as many as are kept, with their moments: gathered chunk by chunk.
+"""The contexts of the smallest hashes, as many as are retained, with their moments: gathered chunk by chunk.
 
-Once more were seen than are kept, only what is not above the largest kept can still be among the smallest; so what is kept has all
+Once more were seen, only what is not above the largest retained can still be among the smallest; so what is retained has all
 its moments, however the contexts come.
 """
 
@@ -18,7 +18,7 @@ class Smallest:
     def __init__(self, most: int) -> None:
         self.most = most
         self.is_full = False
-        """Whether there were more than are kept."""
+        """Whether there were more than are retained."""
         self._limit: np.uint64 | None = None
         self._parts: list[Hashes] = []
         self._n_waiting = 0
@@ -41,12 +41,12 @@ class Smallest:
         order = np.argsort(waiting, kind="stable")
         ordered = waiting[order]
         is_new = begins(ordered)
-        kept = ordered[is_new]
-        self.is_full = self.is_full or len(kept) > self.most
-        kept = kept[: self.most]
-        self._limit = kept[-1] if self.is_full else None
-        self._parts, self._n_waiting = [kept], len(kept)
-        return kept, order, is_new
+        retained = ordered[is_new]
+        self.is_full = self.is_full or len(retained) > self.most
+        retained = retained[: self.most]
+        self._limit = retained[-1] if self.is_full else None
+        self._parts, self._n_waiting = [retained], len(retained)
+        return retained, order, is_new
 
 
 class SmallestHashes:
@@ -60,7 +60,7 @@ class SmallestHashes:
         if self._smallest.wants_sorting:
             self._smallest.settle()
 
-    def found(self) -> tuple[Hashes, bool]:
+    def settled(self) -> tuple[Hashes, bool]:
         """The smallest, ascending, and whether there were more."""
         hashes, _, _ = self._smallest.settle()
         return hashes, self._smallest.is_full
@@ -80,9 +80,9 @@ class SmallestKeys:
         self._words.append(words[:, at if near is None else at[near]])
         self._moments.append(moments if near is None else moments[near])
         if self._smallest.wants_sorting:
-            self.found()
+            self.settled()
 
-    def found(self) -> tuple[Hashes, KeyWords, Counts, bool]:
+    def settled(self) -> tuple[Hashes, KeyWords, Counts, bool]:
         """Hashes ascending, keys and moments, and whether these are all."""
         hashes, order, is_new = self._smallest.settle()
         words, moments = np.concatenate(self._words, axis=1)[:, order], np.concatenate(self._moments)[order]

@@ -29,8 +29,11 @@ ROOT = DOCS.parent
 BUILD = ROOT / "build"
 SOURCE, SITE, CACHE = BUILD / "site-source", BUILD / "site", BUILD / "site-cache"
 NAMES = [f"names-{where}" for where in names.MODULES]
-SITE_ONLY = {"Start": ["live-pages"], "Reference": NAMES, "Project": ["changelog"]}
+SITE_ONLY = {"Start": ["live-pages"], "Reference": NAMES, "Project": ["changelog", "security"]}
 """Pages that the site has beside those of docs/, by group."""
+
+ROOT_PAGES = {"CHANGELOG.md": "changelog.md", "SECURITY.md": "security.md"}
+"""Files at the top of the repository that are pages of the site too."""
 
 MENDS = {
     'role="heading"': 'role="heading" aria-level="2"',
@@ -52,7 +55,8 @@ def main() -> int:
     for page in DOCS.glob("*.md"):
         write_page(page.name, page.read_text(encoding="utf-8"))
     write_page("live-pages.md", LIVE_PAGES)
-    write_page("changelog.md", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"))
+    for file, page in ROOT_PAGES.items():
+        write_page(page, (ROOT / file).read_text(encoding="utf-8"))
     for where, page in zip(names.MODULES, NAMES, strict=True):
         write_page(f"{page}.md", names.page(where))
     make_live_pages(SOURCE / "extra" / "live")
@@ -103,8 +107,8 @@ def _in_both_themes(found: re.Match[str]) -> str:
 
 def _outside(found: re.Match[str]) -> str:
     """A link to a file outside docs/: a page of its own, or a copy of the file."""
-    if found[1] == "CHANGELOG.md":
-        return "](changelog.md"
+    if found[1] in ROOT_PAGES:
+        return f"]({ROOT_PAGES[found[1]]}"
     target = SOURCE / "files" / found[1]
     target.parent.mkdir(parents=True, exist_ok=True)
     shutil.copy(ROOT / found[1], target)

@@ -1,7 +1,6 @@
 """What the window shows of the game: the ground, characters as capsules, paths, contacts and the ball. It changes nothing.
 
-Colours are flat and few: warm is the player, blue the rival, white the wish, yellow the clip, green what holds. All meshes are made
-of numbers; nothing is loaded from a file.
+Colours are flat and few: warm is the player, blue the rival, white the wish, yellow the clip, green what holds. No file is read.
 """
 
 import math
@@ -14,6 +13,7 @@ from panda3d import core
 from panda3d.core import LColor, LMatrix4, LVector3, NodePath
 
 from contextdb import motion
+from contextdb.motion.characters.paths import path_ahead
 from examples.playground import world
 from examples.playground.actor import Actor
 from examples.playground.game import Game
@@ -53,7 +53,7 @@ class Body:
         """The pose as it is now."""
         pose, playing = self.actor.pose, self.actor.pose.playing
         assert playing is not None
-        led = motion.path_ahead(self.actor.stock.databases[playing.database], playing, pose.root, N_DOTS * DOT_EVERY_S)
+        led = path_ahead(self.actor.stock.databases[playing.database], playing, pose.root, N_DOTS * DOT_EVERY_S)
         for parent, joint, node in self.bones:
             node.setPos(*here(pose.positions[parent]))
             node.lookAt(node.getParent(), *here(pose.positions[joint]))

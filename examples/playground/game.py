@@ -4,6 +4,7 @@ It knows neither a window nor a clock: `update` is called with the seconds that 
 """
 
 import math
+import os
 from contextlib import AbstractContextManager
 from pathlib import Path
 
@@ -96,7 +97,7 @@ class Game(AbstractContextManager["Game"]):
 
     def _refused(self, error: cdb.ContextDBError) -> None:
         """What was saved cannot be used: what was good plays on."""
-        self.trouble = str(error.faults[0])
+        self.trouble = str(error.faults[0]).replace(f"{self.watch.folder}{os.sep}", "")
 
     @property
     def state(self) -> list[str]:

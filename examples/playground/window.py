@@ -20,7 +20,7 @@ from examples.playground.drawing import CLIP, Scene
 from examples.playground.game import Game
 from examples.playground.stick import Stick
 
-LONGEST_FRAME_S, SLOW, TURN_PER_PIXEL, TURN_DPS, SIZE, MOST_ROWS = 0.05, 0.2, 0.2, 140.0, 0.048, 6
+STEP_S, LONGEST_FRAME_S, SLOW, TURN_PER_PIXEL, TURN_DPS, SIZE, MOST_ROWS = 0.05, 0.25, 0.2, 0.2, 140.0, 0.048, 6
 KEYS = {"w": "ahead", "s": "back", "a": "left", "d": "right", "q": "strafe", "mouse3": "strafe", "shift": "run", "lshift": "run"}
 KEYS |= {"arrow_up": "ahead", "arrow_down": "back", "arrow_left": "left", "arrow_right": "right"}
 SHADES = {"big": CLIP, "plays": CLIP, "dim": core.LColor(0.68, 0.72, 0.8, 1.0), "alarm": core.LColor(1.0, 0.5, 0.45, 1.0)}
@@ -36,7 +36,7 @@ F3\tthe page of the last minute
 F4\trecord, and write what was recorded
 Esc\tquit
 
-beside it: contextdb edit examples/playground/tables"""
+Any key begins. The tables, beside it: """
 SETTINGS = """\
 window-title contextdb playground
 text-pixels-per-unit 60
@@ -64,7 +64,7 @@ class Window:
     def __init__(self, game: Game, is_offscreen: bool = False, size: tuple[int, int] = (1280, 720), words: float = SIZE) -> None:
         self.game, self.base, self.is_offscreen = game, opened(is_offscreen, size), is_offscreen
         self.scene = Scene(self.base, game)
-        self.notice, self.is_slow, self.held = "", False, set[str]()
+        self.notice, self.is_slow, self.held, self.is_centred = "", False, set[str](), False
         self.gamepads: Any = lambda: self.base.devices.getDevices(core.InputDevice.DeviceClass.gamepad)
         for name, shade in SHADES.items():
             properties = core.TextProperties()
@@ -80,18 +80,26 @@ class Window:
         base = self.base
         base.disableMouse()
         for key, name in KEYS.items():
-            base.accept(key, self.held.add, [name])
-            base.accept(f"shift-{key}", self.held.add, [name])
+            base.accept(key, self._hold, [name])
+            base.accept(f"shift-{key}", self._hold, [name])
             base.accept(f"{key}-up", self.held.discard, [name])
         for key, act in (("f1", self._help), ("f2", self._slow), ("f3", self._page), ("f4", self._record), ("escape", sys.exit)):
             base.accept(key, act)
         base.taskMgr.add(self._frame, "game")
+        self._help()
         return base
+
+    def _hold(self, name: str) -> None:
+        """A key is held; the help has been read."""
+        self.held.add(name)
+        self.middle.setText("")
 
     def _frame(self, task: Any) -> Any:
         dt = min(core.ClockObject.getGlobalClock().getDt(), LONGEST_FRAME_S)
         self._look(dt)
-        self.game.update(dt * (SLOW if self.is_slow else 1.0), self._stick())
+        steps = math.ceil(dt / STEP_S) or 1  # few pictures a second do not make the play slow
+        for _ in range(steps):
+            self.game.update(dt / steps * (SLOW if self.is_slow else 1.0), self._stick())
         self.show()
         return task.cont
 
@@ -101,7 +109,7 @@ class Window:
         said = self.game.player.readout
         rows = [_in("plays", text) if plays else text for text, plays in said.rows[:MOST_ROWS]]
         rows += [f"and {len(said.rows) - MOST_ROWS} more"] * (len(said.rows) > MOST_ROWS)
-        rows = rows or [_in("alarm", "no row is valid: here"), said.gap]
+        rows = rows or [_in("alarm", "No row is valid now."), said.gap]
         heads = [_in("big", said.title), said.why, "", _in("dim", "valid rows of moves")]
         self.top.setText("\n".join([*heads, *rows, "", _in("dim", said.facts)]))
         self.state.setText("\n".join([*self.game.state, *([_in("plays", self.notice)] if self.notice else [])]))
@@ -141,14 +149,18 @@ class Window:
         scene, window = self.scene, self.base.win
         if not self.is_offscreen and window.getProperties().getForeground():
             pointer, x, y = window.getPointer(0), window.getXSize() // 2, window.getYSize() // 2
-            if window.movePointer(0, x, y):
+            is_centred = window.movePointer(0, x, y)
+            if is_centred and self.is_centred:  # where the pointer comes from is no look
                 scene.turn -= TURN_PER_PIXEL * (pointer.getX() - x)
                 scene.tilt = min(60.0, max(4.0, scene.tilt + TURN_PER_PIXEL * (pointer.getY() - y)))
+            self.is_centred = is_centred
+        else:
+            self.is_centred = False
         for pad in self.gamepads():
             scene.turn -= dt * TURN_DPS * pad.findAxis(core.InputDevice.Axis.right_x).value
 
     def _help(self) -> None:
-        self.middle.setText("" if self.middle.getText() else HELP)
+        self.middle.setText("" if self.middle.getText() else HELP + edit_command(self.game.watch.folder))
 
     def _slow(self) -> None:
         self.is_slow, self.notice = not self.is_slow, "" if self.is_slow else "slow motion"
@@ -157,14 +169,15 @@ class Window:
         """Have the debugger's page of the last minute written by another process, and show it."""
         session = Path(tempfile.mkdtemp(prefix="playground-")) / "last_minute.parquet"
         self.game.player.trace.save(session)
-        self.notice = "the page of the last minute is being written"
-        self.paging = threading.Thread(target=self._write_page, args=(session, session.with_suffix(".html")), daemon=True)
+        page = session.with_suffix(".html")
+        self.notice = f"The page of the last minute is being written: {page}"
+        self.paging = threading.Thread(target=self._write_page, args=(session, page), daemon=True)
         self.paging.start()
 
     def _write_page(self, session: Path, page: Path) -> None:
         words = ["motion", "replay", str(session), "--project", str(self.game.watch.folder), "--html", str(page)]
         done = subprocess.run([sys.executable, "-m", "contextdb", *words], capture_output=True, text=True)
-        self.notice = f"written: {page}" if done.returncode == 0 else done.stderr.strip()
+        self.notice = f"Written: {page}" if done.returncode == 0 else done.stderr.strip()
         if done.returncode == 0:
             webbrowser.open(page.as_uri())
 
@@ -174,8 +187,15 @@ class Window:
         if is_over:
             path = Path(f"playground-{round(self.game.time_s)}s.parquet")
             player.trace.save(path)
-            self.notice = f"written: {path}"
+            self.notice = f"Written: {path}"
         player.trace = player.character.record(5, most=LAST_MINUTE if is_over else LONGEST)
+
+
+def edit_command(tables: Path) -> str:
+    """What opens the editor on the tables, as this environment names it, from the folder where the game was started."""
+    name, here = Path(sys.executable).with_name("contextdb"), Path.cwd()
+    command, folder = (path.relative_to(here) if path.is_relative_to(here) else path for path in (name, tables))
+    return f"{command if command.exists() else 'contextdb'} edit {folder}"
 
 
 def _in(style: str, text: str) -> str:

@@ -121,3 +121,37 @@ def test_an_assumption_about_facts_that_no_row_restricts_leaves_the_share_exact(
     assert (report.covered, report.method, report.sampled) == (0.5, "exact", ())
     tied = cdb.coverage(table_of(columns, schema, "speed < target_speed", "target_speed < 1 or (p and extra * 2 < 1)"))
     assert (tied.method, tied.sampled) == ("estimate", ("speed < target_speed", "target_speed < 1 or (p and extra * 2 < 1)"))
+
+
+@pytest.mark.parametrize("cell", ["7..10", "9..10", "3", "..10", "7.."])
+def test_a_whole_number_without_bounds_under_a_derived_fact_is_drawn_whole(cell):
+    schema = {"m": {"type": "int"}, "d": {"type": "number", "expr": "m * 30"}}
+    report = cdb.coverage(table_of({"Asset": ["a"], "m": [cell], "d": ["3.."]}, schema), samples=2000)
+    assert report.method == "estimate"
+    assert 0.0 < report.lower < report.upper < 1.0
+
+
+@pytest.mark.parametrize("assume", ["-90 <= heading <= 90", "heading >= -90 and heading <= 90", "heading in '-90..90'"])
+def test_half_a_turn_is_one_of_its_two_names_throughout_an_assumption(assume):
+    schema = {"heading": {"type": "angle"}, "p": {"type": "bool"}}
+    columns = {"Asset": ["a", "b"], "heading": ["-90..90", "-90..90"], "p": ["True", "False"]}
+    report = cdb.coverage(table_of(columns, schema, assume))
+    assert (report.covered, report.method, report.gaps, report.gaps_complete) == (1.0, "exact", (), True)
+    (gap,) = cdb.coverage(table_of(columns, schema, f"not p or ({assume})")).gaps
+    assert gap.cells == {"heading": "(90..-90)"}
+    (gap,) = cdb.coverage(table_of(columns, schema, "heading <= 90")).gaps
+    assert gap.share == pytest.approx(1 / 3)
+
+
+def test_an_assumption_about_a_derived_fact_that_is_no_column_leaves_its_contexts_out():
+    schema = {"p": {"type": "bool"}, "q": {"type": "bool"}, "both": {"type": "bool", "expr": "p and q"}}
+    table = table_of({"Asset": ["a"], "p": ["True"], "q": ["True"]}, schema, "both")
+    report = cdb.coverage(table, samples=1000)
+    assert (report.lower <= 1.0 <= report.upper, report.gaps) == (True, ())
+
+
+def test_assumptions_that_contradict_each_other_leave_no_context_whatever_the_rows_restrict():
+    schema = {"p": {"type": "bool"}, "n": {"type": "int", "min": 0, "max": 4}}
+    table = table_of({"Asset": ["a"], "p": ["True"]}, schema, "n > 7")
+    report = cdb.coverage(table)
+    assert ([f.rule for f in report.findings], report.gaps) == (["no-context"], ())

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from strategies import examples
 
 import contextdb as cdb
-from contextdb.covering import coverage
+from contextdb.covering import coverage, crowded
 
 SEEDS = st.integers(0, 2**32)
 
@@ -23,10 +23,10 @@ def test_the_fullest_contexts_of_a_small_table_are_found(seed):
     table = random_table(rng)
     brute = Brute(table, random_boxes(rng, table))
     counts = [len(rows) for (_, measure), rows in zip(brute.contexts, brute.valid, strict=True) if measure]
-    crowded = coverage(table, impossible=brute.impossible).crowded
+    crowds = coverage(table, impossible=brute.impossible).crowded
     most = max(counts, default=0)
-    assert (crowded[0].n_rows if crowded else 0) == (most if most > 1 else 0)
-    assert [c.n_rows for c in crowded] == sorted((c.n_rows for c in crowded), reverse=True)
+    assert (crowds[0].n_rows if crowds else 0) == (most if most > 1 else 0)
+    assert [c.n_rows for c in crowds] == sorted((c.n_rows for c in crowds), reverse=True)
 
 
 @examples(2)
@@ -57,3 +57,15 @@ def test_crowds_are_found_in_a_table_too_large_to_go_through():
 def test_ends_that_touch_are_no_crowd():
     schema = {"speed": {"type": "number", "min": 0, "max": 10}}
     assert coverage(cdb.Table.from_columns({"Asset": ["A", "B"], "speed": ["..5", "5.."]}, schema)).crowded == ()
+
+
+def test_contexts_are_climbed_from_as_far_as_their_work_goes(monkeypatch: pytest.MonkeyPatch):
+    names = [f"b{i}" for i in range(30)]
+    columns = {name: ["True" if i == r else "Any" for r in range(20)] for i, name in enumerate(names)}
+    table = cdb.Table.from_columns({"Asset": ["A"] * 20, **columns}, {name: {"type": "bool"} for name in names})
+    climbs: list[tuple[int, ...]] = []
+    real = crowded._climbed
+    monkeypatch.setattr(crowded, "_climbed", lambda *given: climbs.append(given[-1]) or real(*given))
+    monkeypatch.setattr(crowded, "MOST_CLASSES", 0)
+    assert coverage(table, samples=200).crowded[0].rows == tuple(range(20))
+    assert len(climbs) == crowded.MOST_CROWDS

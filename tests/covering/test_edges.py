@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import reduce
-from operator import add
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 import contextdb as cdb
-from contextdb.covering import count_kernels, coverage, format_percent
+from contextdb.covering import count, coverage, format_percent
 from contextdb.covering.report import share_at_once
-from contextdb.covering.shares import told_apart, wilson
+from contextdb.covering.sample import MOST_WORDS, samples_of
+from contextdb.covering.shares import distinct_percents, wilson
 from contextdb.schema.settings import TableSettings
 
 SPEED = {"speed": {"type": "number", "min": 0.0, "max": 10.0}}
@@ -189,6 +185,36 @@ def test_an_estimate_holds_the_exact_share_and_depends_on_the_seed_alone():
     assert one.lower <= exact.covered <= one.upper
 
 
+@pytest.mark.parametrize("budget", ["MOST_BYTES", "WORDS_A_STEP"])
+def test_a_count_that_is_too_much_is_left_out_and_the_share_is_between_certain_bounds(budget: str, monkeypatch: pytest.MonkeyPatch):
+    names = [f"n{i}" for i in range(12)]
+    schema = {name: {"type": "number", "min": 0, "max": 100} for name in names}
+    columns = {name: [f"{(7 * i + 13 * r) % 61}..{(7 * i + 13 * r) % 61 + 39}" for r in range(40)] for i, name in enumerate(names)}
+    exact = report_of(columns, schema, samples=0)
+    monkeypatch.setattr(count, budget, 0)
+    report, sampled = report_of(columns, schema, samples=0), report_of(columns, schema, samples=50_000)
+    assert (exact.method, report.method, sampled.method) == ("exact", "bounds", "estimate")
+    assert report.work == 0
+    assert 0.39**12 <= report.lower <= exact.covered <= report.upper <= 40 * 0.39**12 + 2 * count.ROUNDING
+    assert report.certain == sampled.certain
+    assert sampled.lower <= exact.covered <= sampled.upper
+
+
+def test_boxes_that_are_compared_with_each_other_are_too_many_for_a_small_count():
+    """What it takes to find those within others is estimated too: it grows with their square."""
+    n = 4000
+    boxes = np.full((n, 9), -1, np.int32)
+    table = boxes, np.zeros((0, 2), np.int32), np.zeros(1, np.int64), np.zeros((0, 2), np.uint64), np.arange(0, 20, 2)
+    assert count._is_countable(table, 40_000_000)
+    assert not count._is_countable(table, n * (n // 64 + 1) * 9 // count.WORDS_A_STEP - 1)
+
+
+def test_samples_are_fewer_where_boxes_are_very_many():
+    few, many = (SimpleNamespace(factors=[None] * 9, boxes=range(n)) for n in (1000, 10_000_000))
+    assert [samples_of(None, 200_000, space) for space in (few, many)] == [200_000, MOST_WORDS // (9 * 156_250)]
+    assert samples_of(123, 200_000, many) == 123
+
+
 def test_more_gaps_than_asked_for_are_not_called_complete():
     schema = {"speed": {"type": "number", "min": 0, "max": 10}, "run": {"type": "bool"}}
     columns = {"speed": ["..3", "3..", "5"], "run": ["True", "False", "Any"]}
@@ -243,7 +269,7 @@ def test_a_percentage_never_rounds_to_0_or_100(share, text):
     ],
 )
 def test_two_ends_are_written_so_that_they_can_be_told_apart(one, other, texts):
-    assert told_apart(one, other) == texts
+    assert distinct_percents(one, other) == texts
 
 
 def test_an_interval_of_samples_holds_the_share_that_was_seen():
@@ -251,31 +277,6 @@ def test_an_interval_of_samples_holds_the_share_that_was_seen():
         low, high = wilson(n_hits, 100)
         assert 0.0 <= low <= n_hits / 100 <= high <= 1.0
     assert wilson(0, 0) == (0.0, 1.0)
-
-
-def test_without_numba_the_report_is_the_same():
-    script = """
-import sys, json
-if sys.argv[1] == "without":
-    sys.modules["numba"] = None
-import contextdb as cdb
-from contextdb.covering import coverage
-columns = {"Asset": ["a", "b", "c"], "speed": ["..5", "4..9", "Any"], "gait": ["Walk", "Run", "Any"], "up": ["Any", "Any", "True"]}
-schema = {"speed": {"type": "number", "min": 0, "max": 10}, "gait": {"type": "enum", "values": ["Walk", "Run", "Idle"]}}
-report = coverage(cdb.Table.from_columns(columns, schema | {"up": {"type": "bool"}}), samples=1000)
-print(json.dumps(report.to_json()))
-"""
-    out = [
-        subprocess.run([sys.executable, "-W", "error", "-c", script, how], capture_output=True, text=True, check=True).stdout
-        for how in ("with", "without")
-    ]
-    assert out[0] == out[1] != ""
-
-
-@given(st.lists(st.floats(0.0, 1.0), max_size=40))
-def test_the_sum_of_the_boxes_that_a_cut_leaves_out_is_the_same_without_numba(shares):
-    loop = count_kernels._sum
-    assert loop(np.array(shares)) == loop.py_func(np.array(shares)) == reduce(add, shares, 0.0)
 
 
 def test_a_text_whose_values_nobody_declares_leaves_every_other_text_open():

@@ -1,4 +1,4 @@
-"""The two ways of answering questions about boxes agree, and the counter's loops with the simplest count there is."""
+"""The two ways of answering questions about boxes agree, and the count with the simplest one there is."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_a_count_that_is_cut_anywhere_gives_bounds_that_hold_the_share(boxes, we
 
 @examples(1.5)
 @given(boxes=MANY_BOXES, box=BOXES)
-def test_whether_boxes_hold_another_is_the_same_by_loops_and_by_search(boxes, box):
+def test_whether_boxes_hold_another_is_the_same_by_the_core_and_by_search(boxes, box):
     by = (1 << len(boxes)) - 1
     is_held, is_certain, _ = Questions(boxes, FULL).are_held(box, by, 1_000_000)
     point = BoxSet.of(FULL, boxes).outside(by, box, Steps(100_000))
@@ -81,16 +81,6 @@ def test_the_first_holder_of_each_box_is_that_of_comparing_all_pairs(boxes):
         return next(holders, -1)
 
     assert Questions(boxes, FULL).holders(len(boxes)).tolist() == [first(i) for i in range(len(boxes))]
-
-
-def test_the_first_holders_are_told_of_and_can_be_stopped(monkeypatch: pytest.MonkeyPatch):
-    boxes = [(1, 3, 7, 15, 3, 7), (3, 3, 7, 15, 3, 7), (2, 2, 7, 15, 3, 7)]
-    monkeypatch.setattr("contextdb.covering.questions.AT_ONCE", 1)
-    told: list[float] = []
-    assert Questions(boxes, FULL).holders(3, Progress(lambda _, share: told.append(share))).tolist() == [1, -1, 1]
-    assert told == [0.0, 1 / 3, 2 / 3]
-    with pytest.raises(Cancelled):
-        Questions(boxes, FULL).holders(3, Progress(None, lambda: len(told) == 3))
 
 
 def test_boxes_are_read_until_it_is_time_to_stop():

@@ -6,7 +6,10 @@ import pytest
 
 from contextdb.errors import TableError
 from contextdb.exchange.formats import ReadOptions, read
+from contextdb.exchange.importing import decimal_commas_reported
+from contextdb.exchange.mapping import propose
 from contextdb.exchange.reading import Reading
+from contextdb.schema.settings import EMPTY, TableSettings
 
 
 def texts(reading: Reading) -> dict[str, list[str]]:
@@ -74,16 +77,21 @@ def test_decimal_commas_become_points_where_no_number_has_one(cell: str, point: 
     assert 'column "speed": decimal commas became points' in told(reading)
 
 
+def commas(reading: Reading) -> str:
+    columns = propose(reading, EMPTY, TableSettings("t"))
+    return "\n".join(decimal_commas_reported(columns, reading, EMPTY, "--decimal comma"))
+
+
 def test_a_comma_is_a_pair_where_other_numbers_have_points():
     reading = read(b"a;speed\nx;3,5\ny;3.5\n", "x.csv")
     assert texts(reading)["speed"] == ["3,5", "3.5"]
-    assert "is read as centre and tolerance" in told(reading)
+    assert 'with a comma, "3,5" in row 1, read as centre and tolerance, 3 ± 5; --decimal comma reads 3.5.' in commas(reading)
 
 
 def test_in_tab_separated_text_a_comma_is_a_pair_unless_said_otherwise():
     reading = read(b"a\tspeed\nx\t3,5\n", "x.tsv")
     assert texts(reading)["speed"] == ["3,5"]
-    assert '"3,5" is read as centre and tolerance; say so if it is a decimal comma.' in told(reading)
+    assert "read as centre and tolerance, 3 ± 5; --decimal comma reads 3.5." in commas(reading)
     assert texts(read(b"a\tspeed\nx\t3,5\n", "x.tsv", ReadOptions(is_decimal_comma=True)))["speed"] == ["3.5"]
 
 

@@ -180,6 +180,11 @@ def test_columns_of_a_job_are_known_by_their_names_when_their_cells_fit():
     assert [found[name].job for name in ("enabled", "Priority", "Weight")] == ["enabled", "priority", "condition"]
 
 
+def test_a_column_of_a_job_may_have_spaces_around_its_name_in_the_file():
+    found = mapped(reading(**{" Name ": ["a", "b"], " Priority ": ["1", "2"]}))
+    assert [(column.name, column.job) for column in found.values()] == [("Name", "asset"), ("Priority", "priority")]
+
+
 def test_the_asset_is_the_column_that_is_named_so_else_the_first():
     assert mapped(reading(id=["1"], Asset__Name=["x"]))["Asset Name"].job == "asset"
     assert mapped(reading(id=["1"], other=["x"]))["id"].job == "asset"

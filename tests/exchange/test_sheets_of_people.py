@@ -10,7 +10,7 @@ import xlsxwriter
 
 from contextdb.errors import TableError
 from contextdb.exchange.formats import ReadOptions, read
-from contextdb.exchange.importing import whole_names_told
+from contextdb.exchange.importing import whole_names_sentence
 from contextdb.exchange.mapping import Mapped, propose
 from contextdb.exchange.reading import Reading
 from contextdb.schema.settings import EMPTY, TableSettings
@@ -111,7 +111,7 @@ def test_texts_that_may_mean_something_else_stay_as_they_are(name: str, cells: l
 
 def test_lists_of_names_are_not_told_as_one_name_each():
     reading = read(b"Asset;stance\na;Low\nb;Low / Mid\nc;Mid\nd;Low\n", "x.csv")
-    assert whole_names_told(propose(reading, EMPTY, TableSettings("t")), reading, "words") == ""
+    assert whole_names_sentence(propose(reading, EMPTY, TableSettings("t")), reading, "words") == ""
 
 
 # ---- titles

@@ -170,7 +170,7 @@ def test_sets_of_values_leave_every_row_that_may_match_and_promise_none_that_may
         worlds = [{**world, name: value} for world in worlds for value in SETS[name][1]]
     answers = [set(case.answer(world, unknown)) for world in worlds]
     assert set(always) <= set.intersection(*answers)
-    assert set.union(*answers) <= set(matches)
+    assert set.union(*answers) <= set(matches.rows.tolist())
 
 
 KNOWN = contexts().map(lambda facts: {n: STANDING_IN.get(n, 1.0) if f is None else f for n, f in facts.items()})

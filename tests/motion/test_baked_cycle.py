@@ -5,12 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from contextdb import motion
 from contextdb.errors import ContextError, FileError, MotionError
+from contextdb.motion.clips.poses import LocalPoses, forward_kinematics
+from contextdb.motion.made.recipes import make_clip
+from contextdb.motion.storage.written_poses import write_arrays
+from contextdb.motion.walking.baked import baked_cycle
+from contextdb.motion.walking.cycle import Cycle
 
-CYCLE = motion.Cycle.of(motion.make_clip("walk").clip)
+CYCLE = Cycle.of(make_clip("walk").clip)
 N = 24
-BAKED = motion.baked_cycle(CYCLE, N)
+BAKED = baked_cycle(CYCLE, N)
 N_JOINTS = CYCLE.skeleton.n_joints
 
 
@@ -23,7 +27,7 @@ def moved(points, moment, joint):
 @pytest.mark.parametrize("moment", [0, 7, N - 1])
 def test_each_joint_is_where_the_cycle_has_it(moment):
     rotations, positions = CYCLE.at(moment / N)
-    shown = motion.forward_kinematics(motion.LocalPoses(CYCLE.skeleton, 1.0, positions[None], rotations[None])).positions[0]
+    shown = forward_kinematics(LocalPoses(CYCLE.skeleton, 1.0, positions[None], rotations[None])).positions[0]
     for joint in range(N_JOINTS):
         np.testing.assert_allclose(moved(BAKED["rest"][joint], moment, joint), shown[joint], atol=1e-5)
 
@@ -40,7 +44,7 @@ def test_points_of_a_mesh_are_where_their_joints_hold_them():
     weights = np.zeros((2, N_JOINTS))
     weights[0, knee] = 1.0
     weights[1, [knee, foot]] = 0.25, 0.75
-    found = motion.baked_cycle(CYCLE, N, points, weights)["positions"]
+    found = baked_cycle(CYCLE, N, points, weights)["positions"]
     for moment in (0, 11):
         np.testing.assert_allclose(found[moment, 0], moved(points[0], moment, knee), atol=1e-5)
         mixed = 0.25 * moved(points[1], moment, knee) + 0.75 * moved(points[1], moment, foot)
@@ -57,7 +61,7 @@ def test_the_moment_behind_the_last_is_the_first():
 def test_arrays_are_read_as_they_were_written_and_the_same_ones_give_the_same_bytes(tmp_path):
     files = [tmp_path / name for name in ("a.npz", "b.npz")]
     for file in files:
-        motion.write_arrays(BAKED, file)
+        write_arrays(BAKED, file)
     assert files[0].read_bytes() == files[1].read_bytes()
     with np.load(files[0]) as again:
         assert set(again.files) == set(BAKED)
@@ -69,10 +73,10 @@ def test_a_mesh_or_a_file_that_does_not_fit_is_refused(tmp_path):
     points = np.zeros((2, 3))
     for weights in (None, np.ones((2, 3)), np.full((2, N_JOINTS), 0.5)):
         with pytest.raises(MotionError, match="weights"):
-            motion.baked_cycle(CYCLE, N, points, weights)
+            baked_cycle(CYCLE, N, points, weights)
     with pytest.raises(MotionError, match="n_moments is 1"):
-        motion.baked_cycle(CYCLE, 1)
+        baked_cycle(CYCLE, 1)
     with pytest.raises(FileError, match=r"ends in \.npz"):
-        motion.write_arrays(BAKED, tmp_path / "walk.txt")
+        write_arrays(BAKED, tmp_path / "walk.txt")
     with pytest.raises(ContextError, match="not an array of numbers"):
-        motion.write_arrays({"x": [object()]}, tmp_path / "walk.npz")
+        write_arrays({"x": [object()]}, tmp_path / "walk.npz")

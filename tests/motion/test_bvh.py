@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from contextdb.errors import ClipError, FileError
-from contextdb.motion import Clip, Skeleton, load_bvh, load_clips, parse_bvh, write_bvh
+from contextdb.motion import Clip, Skeleton, load_bvh, load_clips, write_bvh
+from contextdb.motion.clips.clip import parse_bvh
 from contextdb.motion.clips.skeleton import CHANNELS
 
 SMALL = """HIERARCHY

@@ -14,11 +14,12 @@ from strategies import examples
 from test_mocap import FOLDER, listed, load
 
 from contextdb.errors import MotionError, SchemaError
-from contextdb.motion import Clip, FeatureSchema, Skeleton, features_of, make_clip, query_from, steady_path
+from contextdb.motion import Clip, FeatureSchema, Skeleton, query_from, steady_path
 from contextdb.motion.clips.foot_bones import feet_of
 from contextdb.motion.features.channels import AXES, WHATS
-from contextdb.motion.features.extraction import clip_features
+from contextdb.motion.features.extraction import clip_features, features_of
 from contextdb.motion.features.schema import Channel
+from contextdb.motion.made.recipes import make_clip
 
 BONES = ("Hips", "Head", "LeftFoot", "RightHand", "LeftUpLeg")
 WALK = make_clip("walk").clip

@@ -18,7 +18,11 @@ from hypothesis import strategies as st
 import contextdb as cdb
 from contextdb import motion
 from contextdb.motion.characters.drives import drives
+from contextdb.motion.characters.facts import FACTS, Moment
+from contextdb.motion.characters.paths import path_from
 from contextdb.motion.characters.probing import plan_of
+from contextdb.motion.clips.steering import steered_path
+from contextdb.motion.made.recipes import make_clip
 
 DT = 1.0 / 30.0
 NAMES = ("idle", "walk", "walk_turn_left_90", "walk_turn_right_90", "jog", "start_walk", "stop_walk")
@@ -45,7 +49,7 @@ CONDITIONS = {
 
 @cache
 def clips():
-    return tuple(motion.make_clip(name).clip for name in NAMES)
+    return tuple(make_clip(name).clip for name in NAMES)
 
 
 @cache
@@ -112,7 +116,7 @@ def test_an_update_is_what_its_parts_do_by_hand():
             pose = database.raw(ahead.frame)
         direction = math.degrees(math.remainder(math.atan2(*stick) - body.heading, math.tau)) if any(stick) else 0.0
         facts = {**gait(stick), "speed": math.hypot(*body.velocity), "direction": direction}
-        query = motion.with_path(schema, pose, motion.steered_path([body], stick, reach_s=1.0 + DT))
+        query = motion.with_path(schema, pose, steered_path([body], stick, reach_s=1.0 + DT))
         decision = controller.update(DT, query, table().query(facts))
         updated = one.update(DT, stick, gait(stick))
         assert updated.body == body
@@ -142,7 +146,7 @@ def test_a_search_hears_where_the_animation_really_is():
     updated = one.update(0.0, (1.2, 0.0), gait((1.2, 0.0)))
     path = updated.path
     assert path.positions[path.now] == pytest.approx(root[:2], abs=0.02)
-    end = motion.steered_path([updated.body], (1.2, 0.0), reach_s=1.0 + DT)
+    end = steered_path([updated.body], (1.2, 0.0), reach_s=1.0 + DT)
     assert math.dist(path.positions[-1], end.positions[-1]) < 0.1 * math.dist(root[:2], body.position)
 
 
@@ -184,14 +188,14 @@ def test_facts_of_the_game_win_over_the_character_s_own():
     ("stick", "heading", "expected"), [((1.0, 0.0), 0.0, 90.0), ((0.0, -1.0), 3.0, 8.1), ((0.0, 0.0), 2.0, 0.0)]
 )
 def test_the_direction_is_the_stick_s_against_the_facing(stick, heading, expected):
-    moment = motion.Moment(DT, stick, None, motion.Steered(heading=heading), None)
-    assert motion.FACTS["direction"](moment) == pytest.approx(expected, abs=0.02)
+    moment = Moment(DT, stick, None, motion.Steered(heading=heading), None)
+    assert FACTS["direction"](moment) == pytest.approx(expected, abs=0.02)
 
 
 def test_speed_and_turn_are_the_body_s():
-    moment = motion.Moment(DT, (0.0, 0.0), None, motion.Steered(velocity=(3.0, 4.0), turn_rate=math.pi), None)
-    assert motion.FACTS["speed"](moment) == 5.0
-    assert motion.FACTS["turn"](moment) == 180.0
+    moment = Moment(DT, (0.0, 0.0), None, motion.Steered(velocity=(3.0, 4.0), turn_rate=math.pi), None)
+    assert FACTS["speed"](moment) == 5.0
+    assert FACTS["turn"](moment) == 180.0
 
 
 @pytest.mark.parametrize(
@@ -354,8 +358,8 @@ def test_a_record_has_every_decision_and_its_facts():
     st.tuples(st.floats(-2, 2), st.floats(-2, 2)),
 )
 def test_a_path_from_a_root_begins_there_and_comes_to_the_body_s_path_without_a_step(root, halflife_s, stick):
-    path = motion.steered_path([motion.Steered(velocity=(0.0, 1.0))], stick, reach_s=12.0, rate=300.0)
-    found = motion.path_from(root, path, halflife_s=halflife_s)
+    path = steered_path([motion.Steered(velocity=(0.0, 1.0))], stick, reach_s=12.0, rate=300.0)
+    found = path_from(root, path, halflife_s=halflife_s)
     apart = np.column_stack((found.positions - path.positions, found.headings - path.headings))
     assert apart[0] == pytest.approx(root, abs=1e-9)
     np.testing.assert_allclose(apart[-1], 0.0, atol=1e-3)
@@ -365,14 +369,14 @@ def test_a_path_from_a_root_begins_there_and_comes_to_the_body_s_path_without_a_
 
 
 def test_a_character_that_faces_far_away_is_told_to_be_45_degrees_away():
-    path = motion.steered_path([motion.Steered()], (0.0, 1.0))
-    assert motion.path_from((0.0, 0.0, 3.0), path).headings[0] == pytest.approx(math.radians(45.0))
-    assert motion.path_from((0.0, 0.0, -3.0), path).headings[0] == pytest.approx(-math.radians(45.0))
+    path = steered_path([motion.Steered()], (0.0, 1.0))
+    assert path_from((0.0, 0.0, 3.0), path).headings[0] == pytest.approx(math.radians(45.0))
+    assert path_from((0.0, 0.0, -3.0), path).headings[0] == pytest.approx(-math.radians(45.0))
 
 
 def test_a_body_that_is_where_its_root_is_keeps_its_path():
-    path = motion.steered_path([motion.Steered()], (0.0, 1.0))
-    assert motion.path_from((0.0, 0.0, math.tau), path) is path
+    path = steered_path([motion.Steered()], (0.0, 1.0))
+    assert path_from((0.0, 0.0, math.tau), path) is path
 
 
 def test_what_lies_behind_is_where_the_animation_was():
@@ -400,7 +404,7 @@ def test_a_crowd_plays_what_each_plays_alone(more):
         members.append(one)
     members[2].tables = table().live()
     members[3].tables = {"all": table()}
-    members[4].own_facts = {**motion.FACTS, "speed": lambda moment: 1.0}
+    members[4].own_facts = {**FACTS, "speed": lambda moment: 1.0}
     members[5].ground = lambda x, z: (0.2, (0.0, 1.0, 0.0))
     crowd, alone = crowd_of(members)
     for tick in range(70):

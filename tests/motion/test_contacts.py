@@ -12,23 +12,13 @@ import numpy as np
 import pytest
 
 from contextdb.errors import MotionError
-from contextdb.motion import (
-    RECIPES,
-    Clip,
-    FeatureSchema,
-    Markup,
-    MotionDatabase,
-    PoseBank,
-    Skeleton,
-    footfalls,
-    load_bvh,
-    make_clip,
-)
+from contextdb.motion import Clip, FeatureSchema, Markup, MotionDatabase, PoseBank, Skeleton, load_bvh
 from contextdb.motion.clips.contacts import _most_nearby, stances
-from contextdb.motion.clips.feet import footfalls_of, marked
+from contextdb.motion.clips.feet import footfalls, footfalls_of, marked
 from contextdb.motion.clips.foot_bones import FootBones, feet_of
 from contextdb.motion.clips.poses import forward_kinematics, local_poses, resampled
 from contextdb.motion.features.extraction import clip_features
+from contextdb.motion.made.recipes import RECIPES, make_clip
 
 FRAME_S = 1.01 / 30.0
 STANCES = Path(os.environ.get("CONTEXTDB_STANCES", ""))

@@ -5,23 +5,25 @@ from __future__ import annotations
 import math
 import random
 from itertools import pairwise
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from lines import DT, RATE, line
 
 from contextdb.errors import MotionError, QueryError
-from contextdb.motion import Entry, FeatureSchema, MotionDatabase, Selector, Status, make_clip
+from contextdb.motion import Entry, FeatureSchema, MotionDatabase, Selector
+from contextdb.motion.answers import NamedAssets
+from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.markup.marks import TagFilter
 from contextdb.motion.search.filters import Biases
+from contextdb.motion.selection.choice import Status
 from contextdb.motion.selection.controller import Controller
 from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.controller_state import ControllerState
 from contextdb.motion.selection.decision import Action
-from contextdb.motion.selection.step import continuing_cost
 from contextdb.motion.selection.variation import Variation
+from contextdb.motion.trace.reasked_decision import continuing_cost
 
 EVERY = {"search_every_s": 0.0, "jump_threshold_s": 0.0, "history_s": 0.0, "rate": RATE}
 """Search at every update, and leave nothing out."""
@@ -34,7 +36,7 @@ def controller(*databases, recorder=None, rng=None, clock=None, **changes):
 
 
 def valid(*assets):
-    return SimpleNamespace(assets=list(assets))
+    return NamedAssets(list(assets))
 
 
 def at(decision):

@@ -14,7 +14,8 @@ from strategies import examples
 
 import contextdb as cdb
 from contextdb.errors import ContextError, MotionError, QueryError
-from contextdb.motion import Entry, ManySteered, Selector, Steered
+from contextdb.motion import Entry, Selector, Steered
+from contextdb.motion.clips.many_steered import ManySteered
 from contextdb.motion.markup.marks import TagFilter
 from contextdb.motion.selection.controller import Controller
 from contextdb.motion.selection.controller_group import ControllerGroup
@@ -209,7 +210,7 @@ def test_the_time_of_a_search_is_shared_by_those_who_searched():
         ({"tags": [None]}, "1 tag filter for 2 characters"),
         ({"force": [True]}, "1 flag to force for 2 characters"),
         ({"among": [["a"], ["z"]]}, r'character 1: the selector has no database "z"'),
-        ({"valid": [None]}, "1 mask for 2 queries"),
+        ({"valid": [None]}, "1 mask for 2 characters"),
         ({"valid": {"z": None}}, r'the selector has no database "z"'),
         ({"contexts": [{}]}, "1 context for 2 characters"),
         ({"body": [None]}, "1 body for 2 characters"),

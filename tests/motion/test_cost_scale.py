@@ -10,19 +10,12 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from contextdb.motion import (
-    Biases,
-    Entry,
-    FeatureSchema,
-    MatchGate,
-    MotionDatabase,
-    Selector,
-    best_start,
-)
+from contextdb.motion import Entry, FeatureSchema, MatchGate, MotionDatabase, Selector, best_start
 from contextdb.motion.features.extraction import ClipFeatures
 from contextdb.motion.features.normalisation import Normalisation
 from contextdb.motion.features.schema import Channel
-from contextdb.motion.selection.step import continuing_cost
+from contextdb.motion.search.filters import Biases
+from contextdb.motion.trace.reasked_decision import continuing_cost
 
 WEIGHTS = st.one_of(st.just(0.0), st.floats(1e-3, 1e3))
 
@@ -85,16 +78,6 @@ def test_a_cost_is_the_plain_weighted_mean_everywhere(schema, seed):
     assert continuing_cost(database, query, database.filter(current=frame)) == hit.cost
     assert Selector([Entry("x", database)]).search(query).hit.cost == hit.cost
     assert MatchGate(database, 1.0).cost(query) == best_start(database, query).cost == hit.cost
-
-
-@given(schemas(), st.integers(0, 2**32))
-def test_the_search_without_numba_has_the_same_costs_to_the_last_bit(schema, seed):
-    sizes, weights = schema
-    features, query = random_features(seed, sum(sizes))
-    compiled, plain = (database_of(features, sizes, weights) for _ in range(2))
-    vars(plain._searcher)["_compiled"] = None
-    assert compiled.search(query) == plain.search(query)
-    assert compiled.search_many([query, -query]) == plain.search_many([query, -query])
 
 
 @given(schemas(), st.integers(0, 2**32))

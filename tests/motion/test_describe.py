@@ -14,16 +14,17 @@ from contextdb.errors import ContextDBError
 from contextdb.motion.clips.feet import Footfalls
 from contextdb.motion.clips.poses import poses_of
 from contextdb.motion.clips.trajectory import Trajectory, root_trajectory
+from contextdb.motion.made.recipes import MadeClip, made_clips, make_clip
 from contextdb.motion.preparing.cells_of_clips import cells_of
 from contextdb.motion.preparing.clip_facts import Moments, Spread, common_words, gait_of, is_moving, style_of
-from contextdb.motion.preparing.describing import condition_sections, patterns_of, table_section
+from contextdb.motion.preparing.describing import Described, condition_sections, patterns_of, table_section
 
-MADE = motion.made_clips()
+MADE = made_clips()
 ROWS = {row.asset: row for row in motion.describe([made.clip for made in MADE])}
 STEADY = [made for made in MADE if made.recipe.change == "steady"]
 
 
-def table_of(rows: list[motion.Described]) -> cdb.Table:
+def table_of(rows: list[Described]) -> cdb.Table:
     columns = {"Asset Name": [row.asset for row in rows]}
     columns |= {name: [row.cells[name] for row in rows] for name in rows[0].cells}
     conditions = {name: said for (_, name), said in condition_sections(rows).items()}
@@ -34,7 +35,7 @@ def table_of(rows: list[motion.Described]) -> cdb.Table:
 
 
 @pytest.mark.parametrize("made", STEADY, ids=lambda made: made.name)
-def test_a_made_clip_has_the_speed_and_turn_of_its_recipe(made: motion.MadeClip):
+def test_a_made_clip_has_the_speed_and_turn_of_its_recipe(made: MadeClip):
     facts = ROWS[made.name].facts
     assert facts.speed_mps.middle == pytest.approx(made.recipe.pace.speed_mps, abs=0.02)
     assert facts.turn_dps.middle == pytest.approx(made.recipe.turn_dps, abs=1.0)
@@ -45,7 +46,7 @@ def test_a_made_clip_has_the_speed_and_turn_of_its_recipe(made: motion.MadeClip)
 
 
 @pytest.mark.parametrize("made", MADE, ids=lambda made: made.name)
-def test_gait_style_and_duration_come_back(made: motion.MadeClip):
+def test_gait_style_and_duration_come_back(made: MadeClip):
     facts = ROWS[made.name].facts
     assert facts.gait == made.recipe.gait
     assert facts.style == made.recipe.style
@@ -53,7 +54,7 @@ def test_gait_style_and_duration_come_back(made: motion.MadeClip):
 
 
 @pytest.mark.parametrize("made", MADE, ids=lambda made: made.name)
-def test_starts_begin_and_stops_end_standing(made: motion.MadeClip):
+def test_starts_begin_and_stops_end_standing(made: MadeClip):
     facts = ROWS[made.name].facts
     is_idle = made.recipe.gait == "Idle"
     assert (facts.start == "Idle") == (is_idle or made.recipe.change == "start")
@@ -72,7 +73,7 @@ def test_a_direction_against_the_facing_comes_back(degrees: float):
 
 
 def test_a_clip_that_walks_sideways_has_that_direction():
-    walk = motion.make_clip("walk").clip
+    walk = make_clip("walk").clip
     turned = turned_by(walk, 90.0)
     row = motion.describe([turned])[0]
     assert row.facts.direction_deg is not None
@@ -100,7 +101,7 @@ def test_a_path_of_one_frame_stands():
 
 
 def test_a_clip_of_one_frame_is_described():
-    walk = motion.make_clip("walk").clip
+    walk = make_clip("walk").clip
     row = motion.describe([replace(walk, values=walk.values[:1])])[0]
     assert row.cells["gait"] == "Idle"
     assert row.cells["duration_s"] == "0"
@@ -193,7 +194,7 @@ def test_a_slow_clip_moves_where_its_name_says_so_and_slow_hops_are_no_run():
 
 
 def test_a_mirrored_turn_leaves_the_other_side_to_its_mirror():
-    clips = [motion.make_clip(name).clip for name in ("walk", "walk_turn_left_90")]
+    clips = [make_clip(name).clip for name in ("walk", "walk_turn_left_90")]
     alone, both = ({row.asset: row.cells["turn"] for row in motion.describe(clips, mirrored=each)} for each in (False, True))
     assert alone["walk"].startswith("<=")
     assert both["walk"] == "-55..55"
@@ -201,7 +202,7 @@ def test_a_mirrored_turn_leaves_the_other_side_to_its_mirror():
 
 
 def test_a_normal_clip_serves_styles_without_one_of_its_gait():
-    clips = [motion.make_clip(name).clip for name in ("idle", "walk", "walk_tired")]
+    clips = [make_clip(name).clip for name in ("idle", "walk", "walk_tired")]
     styles = {row.asset: row.cells["style"] for row in motion.describe(clips)}
     assert styles == {"idle": "Any", "walk": "normal", "walk_tired": "tired"}
 
@@ -212,14 +213,14 @@ def test_a_description_does_not_depend_on_the_order_of_clips():
 
 
 def test_two_clips_of_one_name_are_refused():
-    clip = motion.make_clip("walk").clip
+    clip = make_clip("walk").clip
     with pytest.raises(ContextDBError, match='two clips are named "walk"'):
         motion.describe([clip, clip])
 
 
 def test_progress_tells_of_each_clip():
     told: list[tuple[int, int, str]] = []
-    motion.describe([motion.make_clip(name).clip for name in ("idle", "walk")], progress=lambda *args: told.append(args))
+    motion.describe([make_clip(name).clip for name in ("idle", "walk")], progress=lambda *args: told.append(args))
     assert told == [(0, 2, "idle"), (1, 2, "walk")]
 
 
@@ -242,7 +243,7 @@ def test_patterns_fit_the_clips_of_a_rig_and_no_others(own: list[str], others: s
 
 
 def test_a_clip_that_is_too_far_away_is_refused():
-    walk = motion.make_clip("walk").clip
+    walk = make_clip("walk").clip
     for call in (motion.describe, motion.prepare):
         with pytest.raises(ContextDBError, match="too far away"):
             call([replace(walk, values=walk.values * 1e300)])

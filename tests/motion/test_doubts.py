@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 
 from contextdb.errors import MotionError
-from contextdb.motion import Clip, MotionConfig, build_all, doubts_of, load_bvh, make_clip, write_bvh
-from contextdb.motion.clips.doubts import Measures, grouped, measure
+from contextdb.motion import Clip, MotionConfig, load_bvh, write_bvh
+from contextdb.motion.clips.doubts import Measures, doubts_of, grouped, measure
+from contextdb.motion.made.recipes import make_clip
+from contextdb.motion.storage.building import build_all
 
 BESIDE = Path(__file__).parents[2].parent / "shared" / "data" / "mocap"
 MOCAP = Path(os.environ.get("CONTEXTDB_MOCAP", BESIDE))
@@ -43,7 +45,7 @@ def root_columns(clip: Clip) -> list[int]:
 
 
 def test_nothing_is_doubted_of_the_made_clips():
-    from contextdb.motion import RECIPES
+    from contextdb.motion.made.recipes import RECIPES
 
     assert doubts_of([make_clip(name).clip for name in RECIPES]) == []
 

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from contextdb.errors import MotionError
-from contextdb.motion import Clip, Footfalls, Skeleton, footfalls, make_clip
-from contextdb.motion.clips.feet import phases
+from contextdb.motion import Clip, Skeleton
+from contextdb.motion.clips.feet import Footfalls, footfalls, phases
+from contextdb.motion.made.recipes import make_clip
 
 FALLS = Footfalls(4.0, {"LeftFoot": np.array([[0.0, 1.0], [2.0, 3.0]]), "RightFoot": np.zeros((0, 2))})
 

@@ -14,7 +14,6 @@ import pytest
 import contextdb as cdb
 from contextdb.motion import (
     Action,
-    Biases,
     Controller,
     ControllerSettings,
     Entry,
@@ -25,10 +24,11 @@ from contextdb.motion import (
     Steered,
     build,
     load_bvh,
-    steered_path,
     with_path,
     write_made_clips,
 )
+from contextdb.motion.clips.steering import steered_path
+from contextdb.motion.search.filters import Biases
 from contextdb.motion.storage.database_settings import CONTINUING_BIAS, LOOPING_BIAS
 
 ROOT = Path(__file__).parents[2]

@@ -10,18 +10,13 @@ from motion_oracles import place_joint, rotation_about
 from test_bvh import SMALL, clips
 
 from contextdb.errors import MotionError
-from contextdb.motion import (
-    Clip,
-    Skeleton,
-    local_poses,
-    make_clip,
-    parse_bvh,
-    poses_of,
-    resampled,
-)
+from contextdb.motion import Clip, Skeleton, poses_of, resampled
 from contextdb.motion.clips import quaternions
 from contextdb.motion.clips.bone_names import meant_bone, nearest_bones
+from contextdb.motion.clips.clip import parse_bvh
+from contextdb.motion.clips.poses import local_poses
 from contextdb.motion.clips.skeleton import sided_pairs
+from contextdb.motion.made.recipes import make_clip
 
 ANGLES = st.floats(-360.0, 360.0)
 

@@ -16,12 +16,12 @@ from contextdb.motion import (
     PoseSettings,
     PoseStream,
     Skeleton,
-    make_clip,
     poses_of,
     query_from,
     query_from_pose,
 )
 from contextdb.motion.clips import quaternions
+from contextdb.motion.made.recipes import make_clip
 
 RATE = 30.0
 CHANNELS = (

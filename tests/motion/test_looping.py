@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from contextdb.motion import FeatureSchema, Markup, MotionDatabase, clip_features, make_clip, poses_of, root_trajectory
+from contextdb.motion import FeatureSchema, Markup, MotionDatabase, poses_of, root_trajectory
 from contextdb.motion.clips.looping import three_rounds
+from contextdb.motion.features.extraction import clip_features
+from contextdb.motion.made.recipes import make_clip
 
 SCHEMA = FeatureSchema.from_dict(
     "loco",

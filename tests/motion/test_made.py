@@ -9,20 +9,10 @@ import numpy as np
 import pytest
 
 from contextdb.errors import MotionError
-from contextdb.motion import (
-    ABOUT_TURNS,
-    RECIPES,
-    Cycle,
-    descriptions,
-    load_bvh,
-    made_clips,
-    make_clip,
-    poses_of,
-    root_trajectory,
-    write_game_clips,
-    write_made_clips,
-)
+from contextdb.motion import load_bvh, poses_of, root_trajectory, write_game_clips, write_made_clips
 from contextdb.motion.clips.quaternions import rotate
+from contextdb.motion.made.recipes import ABOUT_TURNS, RECIPES, descriptions, made_clips, make_clip
+from contextdb.motion.walking.cycle import Cycle
 
 MADE = {made.name: made for made in (*made_clips(), *map(make_clip, ABOUT_TURNS))}
 STEADY = [name for name, made in MADE.items() if made.recipe.change == "steady" and made.recipe.gait != "Idle"]

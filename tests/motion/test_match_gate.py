@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from contextdb.errors import MotionError, QueryError
-from contextdb.motion import MotionDatabase, make_clip, query_from
+from contextdb.motion import MotionDatabase, query_from
+from contextdb.motion.answers import NamedAssets
+from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.nodes.match_gate import MatchGate
 from contextdb.motion.nodes.match_node import MatchNode
 from contextdb.motion.nodes.pose_match import pose_schema
@@ -85,7 +86,7 @@ def test_a_cost_at_the_threshold_is_not_under_it():
 def test_it_is_shut_when_nothing_may_play():
     gate = MatchGate(POINTS, 1e9)
     assert gate.update([0.0]).is_open
-    look = gate.update([0.0], valid=SimpleNamespace(assets=[]))
+    look = gate.update([0.0], valid=NamedAssets([]))
     assert look.closes
     assert look.cost == math.inf
 
@@ -107,7 +108,7 @@ def test_closed_by_hand_it_gives_the_entry_animation_anew():
 
 def test_what_it_saw_reads_as_a_line():
     gate = MatchGate(POINTS, 2.0, close_above=2.5)
-    none = SimpleNamespace(assets=[])
+    none = NamedAssets([])
     told = [str(gate.update([x])) for x in (2.0, 1.0, 1.5, 3.0)] + [str(gate.update([0.0], valid=none))]
     assert told == [
         "shut: near costs 4.000, not under 2",

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from itertools import pairwise
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +13,9 @@ from hypothesis import strategies as st
 from strategies import examples
 
 from contextdb.errors import MotionError, QueryError
-from contextdb.motion import Clip, MotionDatabase, make_clip, query_from
+from contextdb.motion import Clip, MotionDatabase, query_from
+from contextdb.motion.answers import NamedAssets
+from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.markup.marks import Mark, Marks, TagFilter
 from contextdb.motion.markup.markup import Markup
@@ -287,10 +288,10 @@ def test_candidates_begin_with_the_frame_entered_and_tell_why_others_are_out():
 def test_masks_tags_and_marks_hold_as_in_every_search():
     database = made("walk,Gait.Walk run,Gait.Run run,DoNotChoose,0.5")
     query, target = query_from(SCHEMA, make_clip("run").clip, 30), Target(0.0, 2.0)
-    assert node(database).enter(query, target, SimpleNamespace(assets=["walk"])).hit.asset == "walk"
+    assert node(database).enter(query, target, NamedAssets(["walk"])).hit.asset == "walk"
     assert node(database).enter(query, target, tags=TagFilter(include=("Gait.Walk",))).hit.asset == "walk"
-    assert node(database).enter(query, target, SimpleNamespace(assets=["run"])).entry_s < 0.5
-    assert node(database).enter(query, target, SimpleNamespace(assets=[])) is None
+    assert node(database).enter(query, target, NamedAssets(["run"])).entry_s < 0.5
+    assert node(database).enter(query, target, NamedAssets([])) is None
 
 
 # ---- playing

@@ -12,15 +12,17 @@ from hypothesis import strategies as st
 from test_mocap import FOLDER, listed, load
 
 from contextdb.errors import MotionError
-from contextdb.motion import Clip, FeatureSchema, LocalPoses, Skeleton, forward_kinematics, local_poses, make_clip, poses_of
+from contextdb.motion import Clip, FeatureSchema, Skeleton, poses_of
 from contextdb.motion.clips.foot_bones import feet_of
 from contextdb.motion.clips.mirror import mirrored, mirrored_path, partners_of, unevenness
 from contextdb.motion.clips.own_axes import fixed_joints, has_even_axes, own_axes
+from contextdb.motion.clips.poses import LocalPoses, forward_kinematics, local_poses
 from contextdb.motion.clips.quaternions import inverse, matrices, multiply, rotation_vectors
 from contextdb.motion.clips.skeleton import sided_pairs
 from contextdb.motion.clips.trajectory import root_trajectory
 from contextdb.motion.features.extraction import clip_features
 from contextdb.motion.features.schema import Channel
+from contextdb.motion.made.recipes import make_clip
 
 MADE = make_clip("walk").clip.skeleton
 SIDES = (("Left*", "Right*"),)

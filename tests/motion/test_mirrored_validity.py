@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from itertools import pairwise
-from types import SimpleNamespace
 
 import numpy as np
 import oracles
@@ -18,7 +17,9 @@ from strategies import contexts, examples
 from test_mirroring import mirroring_tables, plain_in_mirror
 
 import contextdb as cdb
-from contextdb.motion import Entry, FeatureSchema, MotionDatabase, Selector, make_clip, write_bvh
+from contextdb.motion import Entry, FeatureSchema, MotionDatabase, Selector, write_bvh
+from contextdb.motion.answers import NamedAssets
+from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.nodes.pose_match import best_start
 from contextdb.motion.selection.controller import Controller
@@ -114,8 +115,8 @@ def test_soft_cells_cost_a_mirrored_range_what_they_cost_with_mirrored_facts(dat
 
 
 def test_names_of_assets_and_flags_of_ranges_stand_for_what_they_say(database):
-    assert database.filter(SimpleNamespace(assets=[TURNS[0]])).ranges.tolist() == [a == TURNS[0] for a in database.assets]
-    in_mirror = SimpleNamespace(assets=[TURNS[0]], mirrored=SimpleNamespace(assets=["walk"]))
+    assert database.filter(NamedAssets([TURNS[0]])).ranges.tolist() == [a == TURNS[0] for a in database.assets]
+    in_mirror = NamedAssets([TURNS[0]], NamedAssets(["walk"]))
     wanted = [a == ("walk" if m else TURNS[0]) for a, m in zip(database.assets, database.mirrored, strict=True)]
     assert database.filter(in_mirror).ranges.tolist() == wanted
     flags = np.array([True, False] * 3)

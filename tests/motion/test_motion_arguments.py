@@ -13,6 +13,34 @@ from strategies import some
 
 from contextdb import motion
 from contextdb.errors import ContextDBError
+from contextdb.motion.characters.paths import path_ahead, path_from
+from contextdb.motion.clips.clip import parse_bvh
+from contextdb.motion.clips.doubts import doubts_of
+from contextdb.motion.clips.feet import footfalls
+from contextdb.motion.clips.many_steered import ManySteered, steered_paths
+from contextdb.motion.clips.mirror import mirrored_path, partners_of
+from contextdb.motion.clips.poses import forward_kinematics, local_poses
+from contextdb.motion.clips.steering import steered_path
+from contextdb.motion.features.extraction import clip_features, clip_permutations, features_of
+from contextdb.motion.features.path_features import with_paths
+from contextdb.motion.made.joint import make_joint_clip, write_joint_clips
+from contextdb.motion.made.recipes import descriptions, make_clip
+from contextdb.motion.measuring.wanted import ClipContexts
+from contextdb.motion.nodes.pose_match import pose_schema
+from contextdb.motion.output.track import clip_of_poses, pose_arrays
+from contextdb.motion.search.database import build_databases
+from contextdb.motion.search.filters import Biases
+from contextdb.motion.storage.building import build_all, saved_path
+from contextdb.motion.storage.pose_files import open_poses, poses_path, save_poses
+from contextdb.motion.storage.stored import inputs_of, open_database, save_database
+from contextdb.motion.storage.written_poses import write_arrays
+from contextdb.motion.walking.baked import baked_cycle
+from contextdb.motion.walking.blending import Gait
+from contextdb.motion.walking.cycle import Cycle
+from contextdb.motion.walking.stances import Stances
+from contextdb.motion.walking.transitions import Transitions
+from contextdb.motion.walking.walked import walked_clips
+from contextdb.motion.walking.walker import Walker
 
 
 class Odd:
@@ -24,12 +52,12 @@ WRONG: list[object] = [
     [[]], [None], {}, {5: 5}, {"x": 5}, {"x": [5]}, (1, 2), (1, 2, 3), ("x", "y"), {1}, np.zeros((2, 2)), np.arange(3), np.zeros(0),
     Odd(), Odd, Path("none"),
 ]  # fmt: skip
-CLIP = motion.make_clip("idle").clip
-LOCAL, POSES = motion.local_poses(CLIP), motion.poses_of(CLIP, 30.0)
+CLIP = make_clip("idle").clip
+LOCAL, POSES = local_poses(CLIP), motion.poses_of(CLIP, 30.0)
 PATH = motion.root_trajectory(POSES)
 CHANNELS = [{"type": "trajectory", "what": "position", "at": [0.2]}, {"type": "position", "bone": "Hips"}]
 SCHEMA = motion.FeatureSchema.from_dict("pose", {"rate": 30, "channels": CHANNELS})
-PARTS = [motion.clip_features(CLIP, SCHEMA)]
+PARTS = [clip_features(CLIP, SCHEMA)]
 DATABASE = motion.MotionDatabase.from_features(np.eye(4, 2), [0, 2], [2, 4], ["a", "b"])
 SELECTOR = motion.Selector([motion.Entry("only", DATABASE)])
 QUERY = [0.0, 1.0]
@@ -37,10 +65,10 @@ RECORDED = motion.Trace(2)
 motion.Controller(SELECTOR, recorder=RECORDED).update(0.1, QUERY)
 REASKED = RECORDED.reasked()
 STEERED = [motion.Steered()]
-MANY_STEERED = motion.ManySteered.of(STEERED)
+MANY_STEERED = ManySteered.of(STEERED)
 CONFIG = motion.MotionConfig()
-FALLS = motion.footfalls(CLIP)
-LIVE = motion.LivePose(motion.poses_of(CLIP).positions[0], motion.local_poses(CLIP).rotations[0])
+FALLS = footfalls(CLIP)
+LIVE = motion.LivePose(motion.poses_of(CLIP).positions[0], local_poses(CLIP).rotations[0])
 HISTORY = motion.PoseHistory(CLIP.skeleton)
 NODE = motion.MatchNode(motion.MotionDatabase.build([CLIP], SCHEMA))
 PLAY = NODE.enter(NODE.database.raw(0), motion.Target(0, 1))
@@ -50,12 +78,10 @@ DECISION = motion.Controller(motion.Selector([motion.Entry("only", BUILT)])).upd
 BY_CLIP = motion.PoseSettings(root="animation")
 POSED = [motion.PoseStream(BANK, BY_CLIP).update(DECISION, 0.1)]
 PLAYER = motion.Character(motion.Controller(motion.Selector([motion.Entry("only", BUILT)])), SCHEMA, None, motion.PoseStream(BANK))
-WALKED = motion.Cycle.of(motion.make_clip("walk").clip)
-WALKS = [motion.Gait("walk", [WALKED])]
+WALKED = Cycle.of(make_clip("walk").clip)
+WALKS = [Gait("walk", [WALKED])]
 STANCES = WALKED.stances
-JOINT = motion.JointDatabase.of(
-    motion.MotionDatabase.build(motion.make_joint_clip("greet_walk").values(), SCHEMA), ("Host", "Guest")
-)
+JOINT = motion.JointDatabase.of(motion.MotionDatabase.build(make_joint_clip("greet_walk").values(), SCHEMA), ("Host", "Guest"))
 TOGETHER = motion.JointSearcher(JOINT)
 POSED_TWO = {5: JOINT.database.raw(0), 6: JOINT.database.raw(0)}
 PLACED_TWO = {5: (0.0, 0.0, 0.0), 6: (0.0, 1.0, 3.0)}
@@ -73,47 +99,44 @@ CALLS: dict[str, Call] = {
     "prepare(kinds), one": lambda x: motion.prepare([CLIP], kinds=[x]),
     "prepare(progress)": lambda x: x is Odd or motion.prepare([CLIP], progress=x),
     "load_bvh(path)": lambda x: motion.load_bvh(x),
-    "load_bvh(metres_per_unit)": lambda x: motion.parse_bvh("", "a", metres_per_unit=x),
+    "load_bvh(metres_per_unit)": lambda x: parse_bvh("", "a", metres_per_unit=x),
     "load_clips(paths)": lambda x: motion.load_clips(x),
     "load_clips(paths), one": lambda x: motion.load_clips([x]),
-    "parse_bvh(text)": lambda x: motion.parse_bvh(x, "a"),
+    "parse_bvh(text)": lambda x: parse_bvh(x, "a"),
     "write_bvh(clip)": lambda x: motion.write_bvh(x, "/nowhere/x.bvh"),
     "write_bvh(target)": lambda x: isinstance(x, (str, Path)) or motion.write_bvh(CLIP, x),
     "write_bvh(digits)": lambda x: motion.write_bvh(CLIP, "/nowhere/x.bvh", digits=x),
     "poses_of(clip)": lambda x: motion.poses_of(x),
     "poses_of(rate)": lambda x: motion.poses_of(CLIP, x),
-    "local_poses(clip)": lambda x: motion.local_poses(x),
+    "local_poses(clip)": lambda x: local_poses(x),
     "resampled(local)": lambda x: motion.resampled(x, 30.0),
     "resampled(rate)": lambda x: motion.resampled(LOCAL, x),
-    "forward_kinematics(local)": lambda x: motion.forward_kinematics(x),
+    "forward_kinematics(local)": lambda x: forward_kinematics(x),
     "root_trajectory(poses)": lambda x: motion.root_trajectory(x),
     "root_trajectory(root)": lambda x: motion.root_trajectory(POSES, x),
     "root_trajectory(facing)": lambda x: motion.root_trajectory(POSES, facing=x),
     "root_trajectory(facing_smooth_s)": lambda x: motion.root_trajectory(POSES, facing_smooth_s=x),
-    "footfalls(clip)": lambda x: motion.footfalls(x),
-    "footfalls(feet)": lambda x: motion.footfalls(CLIP, x),
-    "footfalls(slowest_mps)": lambda x: motion.footfalls(CLIP, slowest_mps=x),
+    "footfalls(clip)": lambda x: footfalls(x),
+    "footfalls(feet)": lambda x: footfalls(CLIP, x),
+    "footfalls(slowest_mps)": lambda x: footfalls(CLIP, slowest_mps=x),
     "mirrored(moved)": lambda x: motion.mirrored(x, [("LeftFoot", "RightFoot")]),
     "mirrored(pairs)": lambda x: motion.mirrored(POSES, x),
-    "mirrored_path(path)": lambda x: motion.mirrored_path(x),
-    "partners_of(skeleton)": lambda x: motion.partners_of(x, []),
-    "partners_of(pairs)": lambda x: motion.partners_of(CLIP.skeleton, x),
-    "doubts_of(clips)": lambda x: motion.doubts_of(x),
-    "doubts_of(clips), one": lambda x: motion.doubts_of([x]),
-    "make_clip(name)": lambda x: motion.make_clip(x),
+    "mirrored_path(path)": lambda x: mirrored_path(x),
+    "partners_of(skeleton)": lambda x: partners_of(x, []),
+    "partners_of(pairs)": lambda x: partners_of(CLIP.skeleton, x),
+    "doubts_of(clips)": lambda x: doubts_of(x),
+    "doubts_of(clips), one": lambda x: doubts_of([x]),
+    "make_clip(name)": lambda x: make_clip(x),
     "write_made_clips(folder)": lambda x: isinstance(x, (str, Path)) or motion.write_made_clips(x),
-    "descriptions(clips)": lambda x: x is None or motion.descriptions(x),
-    "descriptions(clips), one": lambda x: motion.descriptions([x]),
-    "clip_features(clip)": lambda x: motion.clip_features(x, SCHEMA),
-    "clip_features(schema)": lambda x: motion.clip_features(CLIP, x),
-    "clip_permutations(clip)": lambda x: motion.clip_permutations(x, SCHEMA),
-    "clip_permutations(schema)": lambda x: motion.clip_permutations(CLIP, x),
-    "Permutations(count)": lambda x: motion.Permutations(x),
-    "Permutations(step_s)": lambda x: motion.Permutations(2, x),
-    "Permutations(from_s)": lambda x: motion.Permutations(2, 0.1, x),
+    "descriptions(clips)": lambda x: x is None or descriptions(x),
+    "descriptions(clips), one": lambda x: descriptions([x]),
+    "clip_features(clip)": lambda x: clip_features(x, SCHEMA),
+    "clip_features(schema)": lambda x: clip_features(CLIP, x),
+    "clip_permutations(clip)": lambda x: clip_permutations(x, SCHEMA),
+    "clip_permutations(schema)": lambda x: clip_permutations(CLIP, x),
     "query_from(permutation)": lambda x: motion.query_from(SCHEMA, CLIP, 0, permutation=x),
-    "features_of(clip)": lambda x: motion.features_of(x, SCHEMA),
-    "features_of(schema)": lambda x: motion.features_of(CLIP, x),
+    "features_of(clip)": lambda x: features_of(x, SCHEMA),
+    "features_of(schema)": lambda x: features_of(CLIP, x),
     "query_from(schema)": lambda x: motion.query_from(x, CLIP),
     "query_from(clip)": lambda x: motion.query_from(SCHEMA, x),
     "query_from(frame)": lambda x: motion.query_from(SCHEMA, CLIP, x),
@@ -133,39 +156,39 @@ CALLS: dict[str, Call] = {
     "steady_path(strafe_deg)": lambda x: motion.steady_path(1.0, strafe_deg=x),
     "steady_path(reach_s)": lambda x: motion.steady_path(1.0, reach_s=x),
     "steady_path(rate)": lambda x: motion.steady_path(1.0, rate=x),
-    "steered_path(past)": lambda x: motion.steered_path(x, (0.0, 1.0)),
-    "steered_path(past), one": lambda x: motion.steered_path([x], (0.0, 1.0)),
-    "steered_path(wanted)": lambda x: motion.steered_path(STEERED, x),
-    "steered_path(facing)": lambda x: motion.steered_path(STEERED, (0.0, 1.0), x),
-    "steered_path(reach_s)": lambda x: motion.steered_path(STEERED, (0.0, 1.0), reach_s=x),
-    "steered_paths(past)": lambda x: motion.steered_paths(x, [(0.0, 1.0)]),
-    "steered_paths(past), one": lambda x: motion.steered_paths([x], [(0.0, 1.0)]),
-    "steered_paths(wanted)": lambda x: motion.steered_paths([MANY_STEERED], x),
-    "steered_paths(facing)": lambda x: motion.steered_paths([MANY_STEERED], [(0.0, 1.0)], x),
-    "steered_paths(reach_s)": lambda x: motion.steered_paths([MANY_STEERED], [(0.0, 1.0)], reach_s=x),
-    "steered_paths(rate)": lambda x: motion.steered_paths([MANY_STEERED], [(0.0, 1.0)], rate=x),
-    "with_paths(schema)": lambda x: motion.with_paths(x, PARTS[0].features[:1], [PATH]),
-    "with_paths(queries)": lambda x: motion.with_paths(SCHEMA, x, [PATH]),
-    "with_paths(wanted)": lambda x: motion.with_paths(SCHEMA, PARTS[0].features[:1], x),
-    "with_paths(wanted), one": lambda x: motion.with_paths(SCHEMA, PARTS[0].features[:1], [x]),
-    "steered_path(rate)": lambda x: motion.steered_path(STEERED, (0.0, 1.0), rate=x),
+    "steered_path(past)": lambda x: steered_path(x, (0.0, 1.0)),
+    "steered_path(past), one": lambda x: steered_path([x], (0.0, 1.0)),
+    "steered_path(wanted)": lambda x: steered_path(STEERED, x),
+    "steered_path(facing)": lambda x: steered_path(STEERED, (0.0, 1.0), x),
+    "steered_path(reach_s)": lambda x: steered_path(STEERED, (0.0, 1.0), reach_s=x),
+    "steered_paths(past)": lambda x: steered_paths(x, [(0.0, 1.0)]),
+    "steered_paths(past), one": lambda x: steered_paths([x], [(0.0, 1.0)]),
+    "steered_paths(wanted)": lambda x: steered_paths([MANY_STEERED], x),
+    "steered_paths(facing)": lambda x: steered_paths([MANY_STEERED], [(0.0, 1.0)], x),
+    "steered_paths(reach_s)": lambda x: steered_paths([MANY_STEERED], [(0.0, 1.0)], reach_s=x),
+    "steered_paths(rate)": lambda x: steered_paths([MANY_STEERED], [(0.0, 1.0)], rate=x),
+    "with_paths(schema)": lambda x: with_paths(x, PARTS[0].features[:1], [PATH]),
+    "with_paths(queries)": lambda x: with_paths(SCHEMA, x, [PATH]),
+    "with_paths(wanted)": lambda x: with_paths(SCHEMA, PARTS[0].features[:1], x),
+    "with_paths(wanted), one": lambda x: with_paths(SCHEMA, PARTS[0].features[:1], [x]),
+    "steered_path(rate)": lambda x: steered_path(STEERED, (0.0, 1.0), rate=x),
     "build(config)": lambda x: motion.build(x, "none"),
     "build(folder)": lambda x: motion.build(CONFIG, x),
     "build(assets)": lambda x: motion.build(CONFIG, "none", x),
     "build(names)": lambda x: motion.build(CONFIG, "none", names=x),
-    "build_all(config)": lambda x: motion.build_all(x, "none"),
+    "build_all(config)": lambda x: build_all(x, "none"),
     "open_or_build(config)": lambda x: motion.open_or_build(x, "none"),
     "open_or_build(folder)": lambda x: motion.open_or_build(CONFIG, x),
     "open_or_build(names)": lambda x: motion.open_or_build(CONFIG, "none", names=x),
-    "build_databases(sets)": lambda x: motion.build_databases(x, SCHEMA),
-    "build_databases(sets), one": lambda x: motion.build_databases({"a": [x]}, SCHEMA),
-    "build_databases(schema)": lambda x: motion.build_databases({"a": [CLIP]}, x),
-    "save_database(database)": lambda x: motion.save_database(x, "/nowhere/x.safetensors"),
-    "save_database(path)": lambda x: isinstance(x, (str, Path)) or motion.save_database(DATABASE, x),
-    "open_database(path)": lambda x: motion.open_database(x),
-    "saved_path(folder)": lambda x: motion.saved_path(x, "loco"),
-    "saved_path(name)": lambda x: motion.saved_path(Path("none"), x),
-    "inputs_of(path)": lambda x: motion.inputs_of(x),
+    "build_databases(sets)": lambda x: build_databases(x, SCHEMA),
+    "build_databases(sets), one": lambda x: build_databases({"a": [x]}, SCHEMA),
+    "build_databases(schema)": lambda x: build_databases({"a": [CLIP]}, x),
+    "save_database(database)": lambda x: save_database(x, "/nowhere/x.safetensors"),
+    "save_database(path)": lambda x: isinstance(x, (str, Path)) or save_database(DATABASE, x),
+    "open_database(path)": lambda x: open_database(x),
+    "saved_path(folder)": lambda x: saved_path(x, "loco"),
+    "saved_path(name)": lambda x: saved_path(Path("none"), x),
+    "inputs_of(path)": lambda x: inputs_of(x),
     "MotionDatabase.build(clips)": lambda x: motion.MotionDatabase.build(x, SCHEMA),
     "MotionDatabase.build(clips), one": lambda x: motion.MotionDatabase.build([x], SCHEMA),
     "MotionDatabase.build(schema)": lambda x: motion.MotionDatabase.build([CLIP], x),
@@ -217,17 +240,10 @@ CALLS: dict[str, Call] = {
     "best_start(database)": lambda x: motion.best_start(x, QUERY),
     "best_start(query)": lambda x: motion.best_start(DATABASE, x),
     "best_start(assets)": lambda x: motion.best_start(DATABASE, QUERY, x),
-    "pose_schema(skeleton)": lambda x: motion.pose_schema(x),
-    "pose_schema(bones)": lambda x: motion.pose_schema(CLIP.skeleton, x),
-    "pose_schema(rate)": lambda x: motion.pose_schema(CLIP.skeleton, rate=x),
-    "ControllerSettings(search_every_s)": lambda x: motion.ControllerSettings(x),
-    "ControllerSettings(rate)": lambda x: motion.ControllerSettings(rate=x),
-    "ControllerSettings(cost_bar)": lambda x: motion.ControllerSettings(cost_bar=x),
-    "ControllerSettings(grace_s)": lambda x: motion.ControllerSettings(grace_s=x),
-    "ControllerSettings(until_natural)": lambda x: motion.ControllerSettings(until_natural=x),
+    "pose_schema(skeleton)": lambda x: pose_schema(x),
+    "pose_schema(bones)": lambda x: pose_schema(CLIP.skeleton, x),
+    "pose_schema(rate)": lambda x: pose_schema(CLIP.skeleton, rate=x),
     "ControllerSettings(variation)": lambda x: motion.ControllerSettings(variation=x),
-    "Variation(within)": lambda x: motion.Variation(x),
-    "Variation(memory)": lambda x: motion.Variation(0.1, x),
     "TagFilter(include)": lambda x: motion.TagFilter(x),
     "TagFilter(prefer)": lambda x: motion.TagFilter(prefer=x),
     "Trace(n_candidates)": lambda x: motion.Trace(x),
@@ -290,9 +306,9 @@ CALLS: dict[str, Call] = {
     "JointPlay.decision(tick)": lambda x: MET.decision("Host", tick=x),
     "JointPlay.decision(time_s)": lambda x: x is None or MET.decision("Host", time_s=x),
     "JointPlay.decision(database)": lambda x: isinstance(x, str) or MET.decision("Host", x),
-    "make_joint_clip(name)": lambda x: motion.make_joint_clip(x),
+    "make_joint_clip(name)": lambda x: make_joint_clip(x),
     "write_game_clips(folder)": lambda x: isinstance(x, (str, Path)) or motion.write_game_clips(x),
-    "write_joint_clips(folder)": lambda x: isinstance(x, (str, Path)) or motion.write_joint_clips(x),
+    "write_joint_clips(folder)": lambda x: isinstance(x, (str, Path)) or write_joint_clips(x),
     "MatchGate(over)": lambda x: motion.MatchGate(x, 1.0),
     "MatchGate(threshold)": lambda x: motion.MatchGate(DATABASE, x),
     "MatchGate.update(query)": lambda x: motion.MatchGate(DATABASE, 1.0).update(x),
@@ -306,7 +322,7 @@ CALLS: dict[str, Call] = {
     "Entry(database)": lambda x: motion.Selector([motion.Entry("a", x)]),
     "Entry(name)": lambda x: motion.Selector([motion.Entry(x, DATABASE)]),
     "Entry(threshold)": lambda x: motion.Selector([motion.Entry("a", DATABASE, x)]),
-    "Biases(base)": lambda x: motion.Biases(x),
+    "Biases(base)": lambda x: Biases(x),
     "Clip(name)": lambda x: motion.Clip(x, CLIP.skeleton, 0.1, CLIP.values),
     "Clip(skeleton)": lambda x: motion.Clip("a", x, 0.1, CLIP.values),
     "Clip(frame_time_s)": lambda x: motion.Clip("a", CLIP.skeleton, x, CLIP.values),
@@ -314,6 +330,7 @@ CALLS: dict[str, Call] = {
     "FeatureSchema.from_dict(mapping)": lambda x: motion.FeatureSchema.from_dict("a", x),
     "FeatureSchema.from_dict(name)": lambda x: motion.FeatureSchema.from_dict(x, {"rate": 30, "channels": CHANNELS}),
     "MotionConfig.from_dict()": lambda x: motion.MotionConfig.from_dict(x),
+    "PoseSettings.from_dict()": lambda x: motion.PoseSettings.from_dict(x),
     "MotionConfig.database()": lambda x: CONFIG.database(x),
     "MotionConfig.selector()": lambda x: CONFIG.selector(x, {}),
     "MotionConfig.controller()": lambda x: CONFIG.controller(x, {}),
@@ -324,13 +341,13 @@ CALLS: dict[str, Call] = {
     "PoseBank.build(schema)": lambda x: motion.PoseBank.build([CLIP], x),
     "PoseBank.sample(asset)": lambda x: BANK.sample(x, 0.0),
     "PoseBank.sample(time_s)": lambda x: BANK.sample("idle", x),
-    "save_poses(bank)": lambda x: motion.save_poses(x, "/nowhere/x.poses.safetensors"),
-    "save_poses(path)": lambda x: isinstance(x, (str, Path)) or motion.save_poses(BANK, x),
-    "open_poses(path)": lambda x: motion.open_poses(x),
+    "save_poses(bank)": lambda x: save_poses(x, "/nowhere/x.poses.safetensors"),
+    "save_poses(path)": lambda x: isinstance(x, (str, Path)) or save_poses(BANK, x),
+    "open_poses(path)": lambda x: open_poses(x),
     "open_or_build_poses(config)": lambda x: motion.open_or_build_poses(x, "/nowhere"),
     "open_or_build_poses(folder)": lambda x: motion.open_or_build_poses(CONFIG, x),
-    "poses_path(folder)": lambda x: motion.poses_path(x, "a"),
-    "poses_path(name)": lambda x: motion.poses_path("/nowhere", x),
+    "poses_path(folder)": lambda x: poses_path(x, "a"),
+    "poses_path(name)": lambda x: poses_path("/nowhere", x),
     "PoseStream(banks)": lambda x: motion.PoseStream(x),
     "PoseStream(settings)": lambda x: motion.PoseStream(BANK, x),
     "PoseStream.update(decision)": lambda x: motion.PoseStream(BANK, BY_CLIP).update(x, 0.1),
@@ -349,15 +366,15 @@ CALLS: dict[str, Call] = {
         x is None or callable(x) or motion.PoseStreams([motion.PoseStream(BANK, BY_CLIP)]).update([DECISION], 0.1, None, x)
     ),
     "PoseStreams.restore(states)": lambda x: motion.PoseStreams([motion.PoseStream(BANK)]).restore(x),
-    "clip_of_poses(poses)": lambda x: motion.clip_of_poses(x, BANK, 30.0),
-    "clip_of_poses(poses), one": lambda x: motion.clip_of_poses([x], BANK, 30.0),
-    "clip_of_poses(bank)": lambda x: motion.clip_of_poses(POSED, x, 30.0),
-    "clip_of_poses(rate)": lambda x: motion.clip_of_poses(POSED, BANK, x),
-    "pose_arrays(poses)": lambda x: motion.pose_arrays(x, BANK, 30.0),
-    "pose_arrays(bank)": lambda x: motion.pose_arrays(POSED, x, 30.0),
-    "pose_arrays(rate)": lambda x: motion.pose_arrays(POSED, BANK, x),
-    "write_arrays(arrays)": lambda x: motion.write_arrays(x, "/nowhere/x.npz"),
-    "write_arrays(path)": lambda x: motion.write_arrays({}, x),
+    "clip_of_poses(poses)": lambda x: clip_of_poses(x, BANK, 30.0),
+    "clip_of_poses(poses), one": lambda x: clip_of_poses([x], BANK, 30.0),
+    "clip_of_poses(bank)": lambda x: clip_of_poses(POSED, x, 30.0),
+    "clip_of_poses(rate)": lambda x: clip_of_poses(POSED, BANK, x),
+    "pose_arrays(poses)": lambda x: pose_arrays(x, BANK, 30.0),
+    "pose_arrays(bank)": lambda x: pose_arrays(POSED, x, 30.0),
+    "pose_arrays(rate)": lambda x: pose_arrays(POSED, BANK, x),
+    "write_arrays(arrays)": lambda x: write_arrays(x, "/nowhere/x.npz"),
+    "write_arrays(path)": lambda x: write_arrays({}, x),
     "write_poses(poses)": lambda x: motion.write_poses(x, BANK, "/nowhere/x.bvh", 30.0),
     "write_poses(path)": lambda x: isinstance(x, (str, Path)) or motion.write_poses(POSED, BANK, x, 30.0),
     "MotionDatabase.raw_many(frames)": lambda x: DATABASE.raw_many(x),
@@ -368,8 +385,8 @@ CALLS: dict[str, Call] = {
     "Selector.search_many(tags)": lambda x: SELECTOR.search_many([QUERY], tags=x),
     "ControllerGroup(controllers)": lambda x: motion.ControllerGroup(x),
     "ControllerGroup(controllers), one": lambda x: motion.ControllerGroup([x]),
-    "ManySteered.of(bodies)": lambda x: motion.ManySteered.of(x),
-    "ManySteered.of(bodies), one": lambda x: motion.ManySteered.of([x]),
+    "ManySteered.of(bodies)": lambda x: ManySteered.of(x),
+    "ManySteered.of(bodies), one": lambda x: ManySteered.of([x]),
     "ManySteered.moved(dt_s)": lambda x: MANY_STEERED.moved(x, [(0.0, 1.0)]),
     "ManySteered.moved(wanted)": lambda x: MANY_STEERED.moved(0.1, x),
     "MotionDatabase.raw()": lambda x: DATABASE.raw(x),
@@ -393,14 +410,12 @@ CALLS: dict[str, Call] = {
     "coverage(never_valid)": lambda x: motion.coverage({"x": BUILT}, never_valid=x),
     "coverage(pattern)": lambda x: motion.coverage({"x": BUILT}, pattern=x),
     "coverage(near_cost)": lambda x: motion.coverage({"x": BUILT}, near_cost=x),
-    "ClipContexts(assets)": lambda x: motion.coverage({"x": BUILT}, [motion.ClipContexts(x, frozenset())]),
-    "ClipContexts(mirrored)": lambda x: motion.coverage({"x": BUILT}, [motion.ClipContexts(frozenset(["idle"]), x)]),
-    "ClipContexts(share)": lambda x: motion.coverage({"x": BUILT}, [motion.ClipContexts(frozenset(["idle"]), frozenset(), x)]),
-    "ClipContexts(asked)": lambda x: motion.coverage(
-        {"x": BUILT}, [motion.ClipContexts(frozenset(["idle"]), frozenset(), asked=x)]
-    ),
-    "ClipContexts(asked), spans": lambda x: motion.ClipContexts(frozenset(), frozenset(), asked={"speed": x}),
-    "ClipContexts(asked), span": lambda x: motion.ClipContexts(frozenset(), frozenset(), asked={"speed": [x]}),
+    "ClipContexts(assets)": lambda x: motion.coverage({"x": BUILT}, [ClipContexts(x, frozenset())]),
+    "ClipContexts(mirrored)": lambda x: motion.coverage({"x": BUILT}, [ClipContexts(frozenset(["idle"]), x)]),
+    "ClipContexts(share)": lambda x: motion.coverage({"x": BUILT}, [ClipContexts(frozenset(["idle"]), frozenset(), x)]),
+    "ClipContexts(asked)": lambda x: motion.coverage({"x": BUILT}, [ClipContexts(frozenset(["idle"]), frozenset(), asked=x)]),
+    "ClipContexts(asked), spans": lambda x: ClipContexts(frozenset(), frozenset(), asked={"speed": x}),
+    "ClipContexts(asked), span": lambda x: ClipContexts(frozenset(), frozenset(), asked={"speed": [x]}),
     "measure(session_or_poses)": lambda x: motion.measure(x, BANK),
     "measure(banks)": lambda x: motion.measure(POSED, x, rate=30.0),
     "measure(poses)": lambda x: motion.measure(motion.Trace(), BANK, poses=x),
@@ -438,10 +453,10 @@ CALLS: dict[str, Call] = {
     "OneOff(play)": lambda x: motion.OneOff(PLAYER, x, "all"),
     "OneOff(database)": lambda x: isinstance(x, str) or motion.OneOff(PLAYER, PLAY, x),
     "OneOff.update(dt)": lambda x: motion.OneOff(PLAYER.copy(), PLAY, "only").update(x),
-    "path_ahead(database)": lambda x: motion.path_ahead(x, DECISION.playing, (0, 0, 0)),
-    "path_ahead(playing)": lambda x: motion.path_ahead(BUILT, x, (0, 0, 0)),
-    "path_ahead(root)": lambda x: motion.path_ahead(BUILT, DECISION.playing, x),
-    "path_ahead(seconds)": lambda x: motion.path_ahead(BUILT, DECISION.playing, (0, 0, 0), x),
+    "path_ahead(database)": lambda x: path_ahead(x, DECISION.playing, (0, 0, 0)),
+    "path_ahead(playing)": lambda x: path_ahead(BUILT, x, (0, 0, 0)),
+    "path_ahead(root)": lambda x: path_ahead(BUILT, DECISION.playing, x),
+    "path_ahead(seconds)": lambda x: path_ahead(BUILT, DECISION.playing, (0, 0, 0), x),
     "Character.body": lambda x: setattr(PLAYER.copy(), "body", x),
     "Character.restore(state)": lambda x: PLAYER.restore(x),
     "Character.update(dt)": lambda x: PLAYER.copy().update(x),
@@ -455,9 +470,9 @@ CALLS: dict[str, Call] = {
     "Readout.update(updated)": lambda x: motion.Readout().update(x, 0),  # type: ignore[arg-type]
     "Readout.update(table)": lambda x: motion.Readout().update(PLAYER.copy().update(0.1), x),
     "Readout.update(shown)": lambda x: motion.Readout().update(PLAYER.copy().update(0.1), 0, x),  # type: ignore[arg-type]
-    "path_from(root)": lambda x: motion.path_from(x, PATH),
-    "path_from(path)": lambda x: motion.path_from((0.0, 0.0, 0.0), x),
-    "path_from(halflife_s)": lambda x: motion.path_from((0.0, 0.0, 1.0), PATH, halflife_s=x),
+    "path_from(root)": lambda x: path_from(x, PATH),
+    "path_from(path)": lambda x: path_from((0.0, 0.0, 0.0), x),
+    "path_from(halflife_s)": lambda x: path_from((0.0, 0.0, 1.0), PATH, halflife_s=x),
     "Crowd(characters)": lambda x: motion.Crowd(x),
     "Crowd(characters), one": lambda x: motion.Crowd([x]),
     "Crowd.add(character)": lambda x: motion.Crowd().add(x),
@@ -469,54 +484,52 @@ CALLS: dict[str, Call] = {
     "Crowd.update(facing)": lambda x: motion.Crowd([PLAYER.copy()]).update(0.1, [(0.0, 1.0)], facing=x),
     "Marks.left_out(tags)": lambda x: DATABASE.marks.left_out(x),
     "Marks.tag_biases(tags)": lambda x: DATABASE.marks.tag_biases(x),
-    "Cycle.of(clip)": lambda x: motion.Cycle.of(x),
-    "Cycle.of(feet)": lambda x: motion.Cycle.of(motion.make_clip("walk").clip, feet=x),
-    "Cycle.of(footfalls)": lambda x: motion.Cycle.of(CLIP, footfalls=x),
-    "Cycle.of(stances)": lambda x: motion.Cycle.of(CLIP, stances=x),
-    "Cycle.of(most_m)": lambda x: motion.Cycle.of(CLIP, most_m=x),
-    "Cycle.of(most_deg)": lambda x: motion.Cycle.of(CLIP, most_deg=x),
+    "Cycle.of(clip)": lambda x: Cycle.of(x),
+    "Cycle.of(feet)": lambda x: Cycle.of(make_clip("walk").clip, feet=x),
+    "Cycle.of(footfalls)": lambda x: Cycle.of(CLIP, footfalls=x),
+    "Cycle.of(stances)": lambda x: Cycle.of(CLIP, stances=x),
+    "Cycle.of(most_m)": lambda x: Cycle.of(CLIP, most_m=x),
+    "Cycle.of(most_deg)": lambda x: Cycle.of(CLIP, most_deg=x),
     "Cycle.at(phase)": lambda x: WALKED.at(x),
     "Cycle.toes_at(phase)": lambda x: WALKED.toes_at(x),
-    "Stances(down)": lambda x: motion.Stances(x, (0.0, 0.5)),
-    "Stances(holds)": lambda x: motion.Stances((0.0, 0.5), (0.5, 0.0), x),
-    "Stances.of_curves(curves)": lambda x: motion.Stances.of_curves(x),
+    "Stances(down)": lambda x: Stances(x, (0.0, 0.5)),
+    "Stances(holds)": lambda x: Stances((0.0, 0.5), (0.5, 0.0), x),
+    "Stances.of_curves(curves)": lambda x: Stances.of_curves(x),
     "Stances.is_down(foot)": lambda x: STANCES.is_down(x, 0.0),
     "Stances.is_down(phase)": lambda x: STANCES.is_down(0, x),
     "Stances.until_change(foot)": lambda x: STANCES.until_change(x, 0.0),
     "Stances.share_of_state(phase)": lambda x: STANCES.share_of_state(0, x),
-    "Gait(name)": lambda x: motion.Gait(x, [WALKED]),
-    "Gait(steady)": lambda x: motion.Gait("walk", x),
-    "Gait(steady), one": lambda x: motion.Gait("walk", [x]),
-    "Gait(speeding_up)": lambda x: motion.Gait("walk", [WALKED], x),
+    "Gait(name)": lambda x: Gait(x, [WALKED]),
+    "Gait(steady)": lambda x: Gait("walk", x),
+    "Gait(steady), one": lambda x: Gait("walk", [x]),
+    "Gait(speeding_up)": lambda x: Gait("walk", [WALKED], x),
     "Gait.weights(speed_mps)": lambda x: WALKS[0].weights(x),
     "Gait.weights(acceleration)": lambda x: WALKS[0].weights(1.0, x),
-    "WalkSettings(halflife_s)": lambda x: motion.WalkSettings(halflife_s=x),
-    "WalkSettings(full_turn_dps)": lambda x: motion.WalkSettings(full_turn_dps=x),
     "retargeted(clip)": lambda x: motion.retargeted(x, CLIP.skeleton),
     "retargeted(rig)": lambda x: motion.retargeted(CLIP, x),
     "retargeted(metres_per_unit)": lambda x: motion.retargeted(CLIP, CLIP.skeleton, metres_per_unit=x),
     "retargeted(names)": lambda x: motion.retargeted(CLIP, CLIP.skeleton, names=x),
-    "baked_cycle(cycle)": lambda x: motion.baked_cycle(x),
-    "baked_cycle(n_moments)": lambda x: motion.baked_cycle(WALKED, x),
-    "baked_cycle(points)": lambda x: motion.baked_cycle(WALKED, 4, x, [[1.0]]),
-    "baked_cycle(weights)": lambda x: motion.baked_cycle(WALKED, 4, [[0.0, 0.0, 0.0]], x),
-    "walked_clips(gaits)": lambda x: motion.walked_clips(x, [1.3]),
-    "walked_clips(speeds_mps)": lambda x: motion.walked_clips(WALKS, x),
-    "walked_clips(turns_dps)": lambda x: motion.walked_clips(WALKS, [1.3], x),
-    "walked_clips(rate)": lambda x: motion.walked_clips(WALKS, [1.3], rate=x),
-    "walked_clips(settings)": lambda x: motion.walked_clips(WALKS, [1.3], settings=x),
-    "Walker(gaits)": lambda x: motion.Walker(x),
-    "Walker(settings)": lambda x: motion.Walker(WALKS, x),
-    "Walker(phase)": lambda x: motion.Walker(WALKS, phase=x),
-    "Walker.update(dt)": lambda x: motion.Walker(WALKS).update(x, (0.0, 0.0, 0.0)),
-    "Walker.update(body)": lambda x: motion.Walker(WALKS).update(0.1, x),
-    "Walker.update(ground)": lambda x: callable(x) or motion.Walker(WALKS).update(0.1, (0.0, 0.0, 0.0), x),
-    "Walker.update(adjust)": lambda x: callable(x) or motion.Walker(WALKS).update(0.1, (0.0, 0.0, 0.0), None, x),
-    "Walker.restore(state)": lambda x: motion.Walker(WALKS).restore(x),
-    "Transitions(clips)": lambda x: motion.Transitions(x),
-    "Transitions(patterns)": lambda x: motion.Transitions([], x),
-    "Transitions.find(from_state)": lambda x: motion.Transitions([]).find(x, "walk"),
-    "Transitions.missing(states)": lambda x: motion.Transitions([]).missing(x),
+    "baked_cycle(cycle)": lambda x: baked_cycle(x),
+    "baked_cycle(n_moments)": lambda x: baked_cycle(WALKED, x),
+    "baked_cycle(points)": lambda x: baked_cycle(WALKED, 4, x, [[1.0]]),
+    "baked_cycle(weights)": lambda x: baked_cycle(WALKED, 4, [[0.0, 0.0, 0.0]], x),
+    "walked_clips(gaits)": lambda x: walked_clips(x, [1.3]),
+    "walked_clips(speeds_mps)": lambda x: walked_clips(WALKS, x),
+    "walked_clips(turns_dps)": lambda x: walked_clips(WALKS, [1.3], x),
+    "walked_clips(rate)": lambda x: walked_clips(WALKS, [1.3], rate=x),
+    "walked_clips(settings)": lambda x: walked_clips(WALKS, [1.3], settings=x),
+    "Walker(gaits)": lambda x: Walker(x),
+    "Walker(settings)": lambda x: Walker(WALKS, x),
+    "Walker(phase)": lambda x: Walker(WALKS, phase=x),
+    "Walker.update(dt)": lambda x: Walker(WALKS).update(x, (0.0, 0.0, 0.0)),
+    "Walker.update(body)": lambda x: Walker(WALKS).update(0.1, x),
+    "Walker.update(ground)": lambda x: callable(x) or Walker(WALKS).update(0.1, (0.0, 0.0, 0.0), x),
+    "Walker.update(adjust)": lambda x: callable(x) or Walker(WALKS).update(0.1, (0.0, 0.0, 0.0), None, x),
+    "Walker.restore(state)": lambda x: Walker(WALKS).restore(x),
+    "Transitions(clips)": lambda x: Transitions(x),
+    "Transitions(patterns)": lambda x: Transitions([], x),
+    "Transitions.find(from_state)": lambda x: Transitions([]).find(x, "walk"),
+    "Transitions.missing(states)": lambda x: Transitions([]).missing(x),
 }
 
 

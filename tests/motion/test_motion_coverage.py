@@ -12,10 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from contextdb.errors import ContextError, MotionError
-from contextdb.motion import ClipContexts, FeatureSchema, Markup, MotionCoverage, MotionDatabase, coverage, load_clips, make_clip
+from contextdb.motion import FeatureSchema, Markup, MotionDatabase, coverage, load_clips
+from contextdb.motion.made.recipes import make_clip
+from contextdb.motion.measuring.coverage import MotionCoverage
 from contextdb.motion.measuring.moves import DIRECTION, LEAST_FRAMES, MAPS, TURN
 from contextdb.motion.measuring.transition_names import transitions_of
-from contextdb.motion.measuring.wanted import _between, _straightest
+from contextdb.motion.measuring.wanted import ClipContexts, _between, _straightest
 
 SCHEMA = FeatureSchema.from_dict(
     "loco",

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from functools import reduce
 from operator import add
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,18 +13,12 @@ from hypothesis import strategies as st
 from motion_oracles import best_frame
 
 from contextdb.errors import MotionError, QueryError
-from contextdb.motion import (
-    Clip,
-    FeatureSchema,
-    Hit,
-    MotionDatabase,
-    build_databases,
-    features_of,
-    made_clips,
-    make_clip,
-    query_from,
-)
+from contextdb.motion import Clip, FeatureSchema, Hit, MotionDatabase, query_from
+from contextdb.motion.answers import NamedAssets
+from contextdb.motion.features.extraction import features_of
 from contextdb.motion.features.normalisation import floor_of
+from contextdb.motion.made.recipes import made_clips, make_clip
+from contextdb.motion.search.database import build_databases
 
 SCHEMA = FeatureSchema.from_dict(
     "loco",
@@ -46,7 +39,7 @@ LOCO = MotionDatabase.build(CLIPS, SCHEMA)
 
 def matches(*names):
     """What a table's query answers, as far as a search looks."""
-    return SimpleNamespace(assets=list(names))
+    return NamedAssets(list(names))
 
 
 @st.composite

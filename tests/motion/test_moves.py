@@ -9,7 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contextdb.motion import RECIPES, make_clip, mirrored_path, poses_of, root_trajectory, steady_path
+from contextdb.motion import poses_of, root_trajectory, steady_path
+from contextdb.motion.clips.mirror import mirrored_path
+from contextdb.motion.made.recipes import RECIPES, make_clip
 from contextdb.motion.measuring.moves import DIRECTION, MAPS, TURN, Moves
 
 RATE = 30.0

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from contextdb.motion import FeatureSchema, MotionDatabase, Normalisation, features_of, make_clip, query_from
-from contextdb.motion.features.normalisation import floor_of
+from contextdb.motion import FeatureSchema, MotionDatabase, query_from
+from contextdb.motion.features.extraction import features_of
+from contextdb.motion.features.normalisation import Normalisation, floor_of
 from contextdb.motion.features.schema import Channel
+from contextdb.motion.made.recipes import make_clip
 
 CHANNELS = (
     Channel("velocity", bone="LeftFoot"),

@@ -10,6 +10,8 @@ from test_character import DT, character, parts
 
 from contextdb import motion
 from contextdb.errors import ContextError
+from contextdb.motion.characters.paths import path_ahead
+from contextdb.motion.selection.decision import Playing
 
 
 def begun():
@@ -60,14 +62,14 @@ def test_a_screen_names_the_one_off_that_is_shown_and_why():
 def test_the_path_ahead_is_where_the_clip_goes_from_its_root():
     database = parts()[1]
     start = int(database.starts[database.assets.index("walk")])
-    playing = motion.Playing("all", "walk", database.assets.index("walk"), start + 10, 1 / 3, False)
-    path = motion.path_ahead(database, playing, (3.0, 4.0, math.pi / 2.0), 0.5)
+    playing = Playing("all", "walk", database.assets.index("walk"), start + 10, 1 / 3, False)
+    path = path_ahead(database, playing, (3.0, 4.0, math.pi / 2.0), 0.5)
     assert len(path.positions) == 16
     assert path.positions[0] == pytest.approx((3.0, 4.0))
     own = database.root[start + 10 : start + 26]
     assert path.positions[-1][0] - 3.0 == pytest.approx(np.linalg.norm(own[-1, :2] - own[0, :2]), abs=0.02)
-    last = motion.Playing("all", "walk", playing.range, int(database.stops[playing.range]) - 1, 0.0, False)
-    assert len(motion.path_ahead(database, last, (0.0, 0.0, 0.0)).positions) == 1
+    last = Playing("all", "walk", playing.range, int(database.stops[playing.range]) - 1, 0.0, False)
+    assert len(path_ahead(database, last, (0.0, 0.0, 0.0)).positions) == 1
 
 
 def test_a_target_says_how_far_and_in_which_direction_it_is():

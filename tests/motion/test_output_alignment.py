@@ -11,11 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from played import RATE, bank, decisions, range_of
 
-from contextdb.motion import FeatureSchema, PoseBank, PoseSettings, PoseStream, Steered, make_clip
+from contextdb.motion import FeatureSchema, PoseBank, PoseSettings, PoseStream, Steered
 from contextdb.motion.clips import quaternions
-from contextdb.motion.output.alignment import _followed
+from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.output.pipeline import spine_of
-from contextdb.motion.output.stages import TURN, damping
 
 STEP = 1.0 / RATE
 RIG = bank().skeleton
@@ -132,21 +131,14 @@ def test_the_way_is_the_bodys_velocity_or_its_change_between_updates(given_as):
         place = (v[0] * t, v[1] * t)
         body = (*place, 0.0) if given_as == "place" else Steered(position=place, velocity=v)
         stream.update(d, STEP if d.tick else 0.0, body)
-    assert stream.state.row[TURN] == pytest.approx(math.atan2(0.5, 1.2), abs=0.02)
+    assert stream.state.warp[1] == pytest.approx(math.atan2(0.5, 1.2), abs=0.02)
 
 
 def test_a_character_that_stands_is_not_turned():
     stream = PoseStream(bank(), PoseSettings(root="code", foot_lock=False))
     for d in decisions([("idle", 0.0, 30)], STEP):
         stream.update(d, STEP if d.tick else 0.0, (d.tick * 0.05, 0.0, 0.0))
-    assert stream.state.row[TURN] == 0.0
-
-
-@given(st.floats(-1.0, 1.0), st.floats(-3.0, 3.0), st.floats(-1.0, 1.0), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
-def test_a_turn_may_take_its_time_in_parts(value, pace, goal, a, b):
-    y = damping(0.15)
-    twice = _followed(*_followed(value, pace, goal, y, a), goal, y, b)
-    np.testing.assert_allclose(twice, _followed(value, pace, goal, y, a + b), atol=1e-9)
+    assert stream.state.warp[1] == 0.0
 
 
 def test_a_spine_is_found_from_where_the_legs_part_to_where_the_arms_do():

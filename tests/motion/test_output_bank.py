@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import re
 from dataclasses import replace
 
@@ -11,13 +12,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from played import LOOPS, NAMES, RATE, SCHEMA, bank, clips, database
 
-from contextdb import console, motion
 from contextdb.errors import ContextError, MotionError
-from contextdb.motion import PoseBank, forward_kinematics, local_poses, make_clip, mirrored, poses_of, resampled
-from contextdb.motion.clips.poses import LocalPoses
+from contextdb.motion import PoseBank, mirrored, poses_of, resampled
+from contextdb.motion.clips.clip import parse_bvh
+from contextdb.motion.clips.feet import footfalls
+from contextdb.motion.clips.poses import LocalPoses, forward_kinematics, local_poses
 from contextdb.motion.clips.quaternions import about_axis, multiply, rotate
-from contextdb.motion.output import kernels
-from contextdb.motion.output.bank import loops
+from contextdb.motion.made.recipes import make_clip
 
 
 def placed(bank, number, time_s):
@@ -87,7 +88,7 @@ def test_a_loop_goes_on_at_its_beginning_and_another_clip_holds_its_ends():
 
 
 def test_a_planted_foot_is_a_contact_in_the_bank():
-    falls = motion.footfalls(next(clip for clip in clips() if clip.name == "walk"))
+    falls = footfalls(next(clip for clip in clips() if clip.name == "walk"))
     number = bank().range_of("walk")
     for foot, name in enumerate(bank().feet):
         middle = float(np.mean(falls.down[name][1]))
@@ -110,7 +111,7 @@ Frames: 3
 Frame Time: 0.033333
 """
     rows = "".join(f"0 90 {10 * i} 0 0 {5 * i} 0 10 0 0 0 0\n" for i in range(3))
-    clip = motion.parse_bvh(
+    clip = parse_bvh(
         text.replace("{", "{\n")
         .replace("}", "\n}")
         .replace(" CHANNELS", "\nCHANNELS")
@@ -128,7 +129,7 @@ Frame Time: 0.033333
 
 def test_clips_that_are_no_one_rig_are_refused_together():
     walk = clips()[1]
-    other = motion.parse_bvh(
+    other = parse_bvh(
         "HIERARCHY\nROOT Hips\n{\nOFFSET 0 0 0\nCHANNELS 3 Xposition Yposition Zposition\nEnd Site\n{\nOFFSET 0 1 0\n}\n}\n"
         "MOTION\nFrames: 1\nFrame Time: 0.1\n0 0 0\n",
         "pole",
@@ -175,10 +176,14 @@ def test_the_same_clips_give_the_same_bank():
         np.testing.assert_array_equal(getattr(again, name), getattr(bank(), name))
 
 
-def test_it_is_said_when_loops_are_compiled_for_the_first_time(monkeypatch, caplog):
-    if not kernels.IS_COMPILED:
-        pytest.skip("numba is not installed")
-    monkeypatch.setattr(console, "was_compiled", lambda loop: False)
-    caplog.set_level("INFO", logger="contextdb.loops")
-    loops.__wrapped__()
-    assert caplog.messages == [console.PREPARING]
+def test_a_bank_that_was_pickled_gives_the_same_moments():
+    again = pickle.loads(pickle.dumps(bank()))
+    for name in ("rotations", "positions", "spins", "velocities"):
+        np.testing.assert_array_equal(getattr(again.sample_of(1, 0.517), name), getattr(bank().sample_of(1, 0.517), name))
+
+
+def test_joints_are_at_their_places_against_a_body_at_the_origin():
+    sample = bank().sample_of(2, 0.4)
+    local = LocalPoses(bank().skeleton, RATE, bank().translations(sample.positions)[None], sample.rotations[None].copy())
+    turned = rotate(about_axis("y", np.array(0.3)), forward_kinematics(local).positions[0])
+    np.testing.assert_allclose(bank().joints_at(2, 0.4, 0.3), turned, atol=1e-12)

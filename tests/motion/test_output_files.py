@@ -16,17 +16,14 @@ from contextdb.motion import (
     PoseStream,
     load_bvh,
     open_or_build_poses,
-    open_poses,
-    pose_arrays,
     poses_of,
-    poses_path,
-    save_poses,
     write_bvh,
     write_poses,
 )
 from contextdb.motion.features.schema_dict import schema_to_dict
+from contextdb.motion.output.track import pose_arrays
 from contextdb.motion.storage.building import build_all
-from contextdb.motion.storage.pose_files import ARRAYS
+from contextdb.motion.storage.pose_files import ARRAYS, open_poses, poses_path, save_poses
 
 CONFIG = MotionConfig.from_dict(
     {

@@ -11,11 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from played import LOOPS, RATE, SCHEMA, bank, clips, decisions, range_of
 
+from contextdb.core import feel_ground
 from contextdb.errors import ContextError
 from contextdb.motion import PoseBank, PoseSettings, PoseStream
 from contextdb.motion.clips import quaternions
-from contextdb.motion.output.ground import FLAT, STEEPEST, below, standing, swinging
-from contextdb.motion.output.stages import damping
+from contextdb.motion.output.ground import STEEPEST, below
 
 STEP = 1.0 / RATE
 RIG = bank().skeleton
@@ -127,23 +127,19 @@ def test_no_foot_is_steeper_than_it_may_be():
 
 @given(st.lists(st.tuples(st.booleans(), st.floats(-1.0, 1.0), st.floats(0.0, 1.0)), min_size=1, max_size=6), st.floats(0.0, 0.2))
 def test_what_is_below_a_foot_comes_to_its_goal_in_any_parts_of_time(changes, dt):
-    y, whole, parts = damping(0.1), FLAT, FLAT
+    whole, parts, hips = np.zeros((1, 9)), np.zeros((1, 9)), np.zeros(2)
     for is_down, height, share in changes:
-        ground = (height, 0.1, -0.1)
-        if is_down:
-            whole = standing(whole, ground, y, dt)
-            parts = standing(standing(parts, ground, y, dt / 2), ground, y, dt / 2)
-        else:
-            whole = swinging(whole, ground, share, y, dt)
-            parts = swinging(swinging(parts, ground, share, y, dt / 2), ground, share, y, dt / 2)
-    np.testing.assert_allclose([*parts.now, *parts.speed], [*whole.now, *whole.speed], atol=1e-9)
+        felt = np.array([[height, 0.1, -0.1]]), np.array([-1.0 if is_down else share])
+        feel_ground(whole, hips, *felt, False, dt)
+        for _ in range(2):
+            feel_ground(parts, hips, *felt, False, dt / 2)
+    np.testing.assert_allclose(parts, whole, atol=1e-9)
 
 
 def test_a_foot_goes_up_early_and_down_late():
-    y = damping(0.001)
-    up, down = (swinging(FLAT, (height, 0.0, 0.0), 0.5, y, 1.0).now[0] for height in (0.2, -0.2))
-    assert up == pytest.approx(0.2)
-    assert down == pytest.approx(0.0)
+    feet = np.zeros((2, 9))
+    feel_ground(feet, np.zeros(2), np.array([[0.2, 0.0, 0.0], [-0.2, 0.0, 0.0]]), np.array([0.5, 0.5]), False, 9.0)
+    assert feet[:, 0].tolist() == pytest.approx([0.2, 0.0])
 
 
 def test_a_character_that_leaves_the_ground_function_comes_back_to_flat():

@@ -22,11 +22,11 @@ from contextdb.motion import (
     Steered,
     mirrored,
     poses_of,
-    steered_path,
     with_path,
 )
 from contextdb.motion.clips.mirror import unevenness
 from contextdb.motion.clips.skeleton import sided_pairs
+from contextdb.motion.clips.steering import steered_path
 from contextdb.motion.output.legs import leg_of
 
 __all__ = ["pytestmark"]

@@ -20,10 +20,10 @@ from contextdb.motion import (
     PoseStream,
     RootMotion,
     Target,
-    make_clip,
-    pose_schema,
     query_from,
 )
+from contextdb.motion.made.recipes import make_clip
+from contextdb.motion.nodes.pose_match import pose_schema
 
 STEP = 1.0 / RATE
 ANIMATION = PoseSettings(root="animation", foot_lock=False)

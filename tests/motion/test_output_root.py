@@ -87,7 +87,7 @@ segments = st.lists(
 )
 
 
-@given(segments, bodies, st.sampled_from(["spring", "dead", "none"]))
+@given(segments, bodies, st.sampled_from(["spring", "none"]))
 def test_mixed_is_never_farther_from_the_game_than_the_clamp(segments, speed, blend):
     def body(t):
         return (speed[0] * t, speed[1] * t, speed[2] * t)

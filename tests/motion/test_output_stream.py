@@ -13,15 +13,13 @@ from hypothesis import strategies as st
 from played import NAMES, RATE, SCHEMA, bank, clips, database, decisions, playing_at, range_of
 
 from contextdb.errors import ContextError, MotionError
-from contextdb.motion import Action, Decision, PoseBank, PoseSettings, PoseState, PoseStream, RootMotion, mirrored, poses_of
+from contextdb.motion import Action, Decision, PoseBank, PoseSettings, PoseStream, RootMotion, mirrored, poses_of
 from contextdb.motion.clips import quaternions
-from contextdb.motion.output import kernels
-from contextdb.motion.output.stages import damping
+from contextdb.motion.output.stream import PoseState
 from contextdb.motion.selection.playhead import Playhead
 
 OFF = PoseSettings(root="animation", blend="none", foot_lock=False)
 SPRING = PoseSettings(root="animation", halflife_s=0.1, foot_lock=False)
-DEAD = PoseSettings(root="animation", blend="dead", fade_s=0.4, fade_halflife_s=0.1, foot_lock=False)
 LOCKED = PoseSettings(root="animation")
 STEP = 1.0 / RATE
 
@@ -29,7 +27,6 @@ between_frames = st.integers(0, 120).map(lambda n: n / 100 + 0.0021)
 """Velocities of clips change at their frames: seconds that are 2 ms or more from any."""
 moments = st.tuples(st.sampled_from(NAMES), between_frames, st.integers(1, 12), st.booleans())
 plays = st.lists(moments, min_size=2, max_size=5)
-vectors = st.lists(st.floats(-1.7, 1.7), min_size=3, max_size=3).map(lambda v: np.array([v]))
 
 
 def streamed(segments, settings, dt=STEP):
@@ -71,9 +68,8 @@ def test_with_everything_off_the_poses_are_the_clips(name, is_mirrored):
     np.testing.assert_allclose(shown, wanted.positions, atol=1e-5)
 
 
-@pytest.mark.parametrize("settings", [SPRING, DEAD])
-def test_without_a_jump_the_rotations_are_the_clips_bit_for_bit(settings):
-    for on, off in zip(*(streamed([("start_walk", 0.1, 40)], each) for each in (settings, OFF)), strict=True):
+def test_without_a_jump_the_rotations_are_the_clips_bit_for_bit():
+    for on, off in zip(*(streamed([("start_walk", 0.1, 40)], each) for each in (SPRING, OFF)), strict=True):
         np.testing.assert_array_equal(on.rotations, off.rotations)
         np.testing.assert_array_equal(on.positions, off.positions)
 
@@ -91,7 +87,7 @@ def test_bones_keep_their_lengths_whatever_is_blended():
     parents = bank().skeleton.parents
     fixed = np.setdiff1d(np.arange(bank().n_joints), bank().moving)
     wanted = np.linalg.norm(bank().skeleton.offsets[fixed], axis=-1)
-    for settings in (SPRING, DEAD, LOCKED):
+    for settings in (SPRING, LOCKED):
         for pose in streamed(segments, settings):
             found = np.linalg.norm(pose.positions[fixed] - pose.positions[parents[fixed]], axis=-1)
             np.testing.assert_allclose(found, wanted, atol=1e-9)
@@ -100,11 +96,10 @@ def test_bones_keep_their_lengths_whatever_is_blended():
 # ---- seams
 
 
-@pytest.mark.parametrize("settings", [SPRING, DEAD])
 @given(segments=plays, then=st.tuples(st.sampled_from(NAMES), between_frames, st.booleans()))
-def test_a_jump_changes_neither_the_pose_nor_its_velocity(settings, segments, then):
+def test_a_jump_changes_neither_the_pose_nor_its_velocity(segments, then):
     short = 1e-5
-    on, jumped = branched(segments, settings, playing_at(*then), short)
+    on, jumped = branched(segments, SPRING, playing_at(*then), short)
     np.testing.assert_allclose(jumped[0].positions, on[0].positions, atol=1e-9)
     velocities = [(late.positions - early.positions) / short for early, late in (on, jumped)]
     fastest = max(1.0, np.abs(velocities[0]).max())
@@ -138,11 +133,10 @@ def test_the_shown_pose_is_off_by_no_more_than_the_jump_and_comes_to_the_clip():
 
 def test_four_jumps_a_second_stay_bounded():
     segments = [(NAMES[1 + i % 3], 0.13 * (i % 7), 7, i % 2 == 0) for i in range(40)]
-    for settings in (SPRING, DEAD):
-        poses = streamed(segments, settings)
-        heights = np.array([pose.positions[:, 1] for pose in poses])
-        assert heights.min() > -0.3
-        assert heights.max() < 2.2
+    poses = streamed(segments, SPRING)
+    heights = np.array([pose.positions[:, 1] for pose in poses])
+    assert heights.min() > -0.3
+    assert heights.max() < 2.2
 
 
 def test_where_a_database_is_gone_the_last_moment_shown_counts_as_left():
@@ -162,27 +156,6 @@ def test_a_character_that_has_played_nothing_stands_as_its_rig_does():
 
 
 # ---- closed forms
-
-
-def decayed(offsets, speeds, halflife_s, dt):
-    to_offsets, to_speeds = np.empty_like(offsets), np.empty_like(speeds)
-    kernels.decay(offsets, speeds, damping(halflife_s), dt, to_offsets, to_speeds)
-    return to_offsets, to_speeds
-
-
-@given(vectors, vectors, st.floats(0.02, 1.0), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
-def test_offsets_decay_in_closed_form_whatever_the_steps(x, v, halflife_s, a, b):
-    twice, once = decayed(*decayed(x, v, halflife_s, a), halflife_s, b), decayed(x, v, halflife_s, a + b)
-    y = damping(halflife_s)
-    expected = np.exp(-y * (a + b)) * (x + (v + x * y) * (a + b))
-    for offsets, _ in (twice, once):
-        np.testing.assert_allclose(offsets, expected, atol=1e-9)
-    np.testing.assert_allclose(twice[1], once[1], atol=1e-8)
-
-
-def test_after_one_halflife_three_fifths_of_a_resting_offset_are_left():
-    x, v = np.array([[1.0, -2.0, 0.5]]), np.zeros((1, 3))
-    np.testing.assert_allclose(decayed(x, v, 0.1, 0.1)[0], 0.5 * (1.0 + 2.0 * math.log(2.0)) * 0.5 * x)
 
 
 def runs_out(decision):
@@ -226,50 +199,10 @@ def test_a_step_of_time_may_be_taken_in_parts(segments, parts):
         np.testing.assert_allclose(many.rotations, one.rotations, atol=1e-9)
 
 
-@given(vectors, vectors, vectors, vectors, vectors, vectors)
-def test_a_seam_keeps_pose_and_spin_for_any_offset(turn, speed, left, left_spin, entered, entered_spin):
-    def sample(rotation, spin):
-        rotations = np.empty((1, 4))
-        kernels.turn_by(rotation, np.array([[1.0, 0.0, 0.0, 0.0]]), rotations)
-        return replace(bank().sample_of(0, 0.0), rotations=rotations, spins=spin, positions=turn, velocities=spin)
-
-    a, b = sample(left, left_spin), sample(entered, entered_spin)
-    before, after = (turn, speed), (np.empty((1, 3)), np.empty((1, 3)))
-    kernels.leave(*before, a.rotations, a.spins, b.rotations, b.spins, *after)
-    assert np.linalg.norm(after[0]) <= math.pi + 1e-9
-
-    def shown(offsets, moment, t):
-        under = np.empty((1, 4))
-        kernels.turn_by(t * moment.spins, moment.rotations, under)
-        over = np.empty((1, 4))
-        kernels.turn_by(offsets[0] + t * offsets[1], under, over)
-        return over
-
-    tiny = 1e-6
-    old, new = (
-        quaternions.rotation_vectors(quaternions.multiply(shown(o, m, tiny), quaternions.inverse(shown(o, m, 0.0)))) / tiny
-        for o, m in ((before, a), (after, b))
-    )
-    assert abs(float((shown(before, a, 0.0) * shown(after, b, 0.0)).sum())) == pytest.approx(1.0, abs=1e-12)
-    if np.linalg.norm(after[0]) < 3.0:  # close to π the shorter way changes sides
-        np.testing.assert_allclose(new, old, atol=1e-4)
-
-
-# ---- dead blending
-
-
-def test_what_was_left_has_faded_after_its_time_and_nothing_remains():
-    segments = [("run", 0.1, 10), ("idle", 0.5, 30)]
-    shown, plain = streamed(segments, DEAD), streamed(segments, OFF)
-    for one, other in zip(shown[10 + 13 :], plain[10 + 13 :], strict=True):
-        np.testing.assert_array_equal(one.rotations, other.rotations)
-    assert np.abs(shown[11].rotations - plain[11].rotations).max() > 0.1
-
-
 # ---- state
 
 
-@given(segments=plays, data=st.data(), blend=st.sampled_from(["spring", "dead", "none"]))
+@given(segments=plays, data=st.data(), blend=st.sampled_from(["spring", "none"]))
 def test_a_stream_restored_at_any_tick_gives_the_same_poses_again(segments, data, blend):
     settings = PoseSettings(root="mixed", blend=blend, foot_lock=blend != "none")
     stream, ticks = PoseStream(bank(), settings), list(decisions(segments, STEP))
@@ -300,15 +233,26 @@ def test_a_state_may_be_pickled_for_a_saved_game():
     np.testing.assert_array_equal(other.update(last, STEP).positions, stream.update(last, STEP).positions)
 
 
-@pytest.mark.parametrize("blend", ["spring", "dead"])
-def test_after_a_very_long_pause_nothing_is_left_of_a_jump(blend):
+def test_after_a_very_long_pause_nothing_is_left_of_a_jump():
     segments = [("run", 0.1, 5), ("idle", 0.5, 2)]
-    settings = PoseSettings(root="animation", blend=blend, foot_lock=False)
-    stream, (*before, last) = PoseStream(bank(), settings), decisions(segments, STEP)
+    stream, (*before, last) = PoseStream(bank(), SPRING), decisions(segments, STEP)
     for decision in before:
         stream.update(decision, STEP if decision.tick else 0.0)
     pose = stream.update(replace(last, root_motion=RootMotion()), 1e9)
     np.testing.assert_allclose(pose.rotations, bank().sample("idle", last.playing.time_s).rotations, atol=1e-12)
+
+
+def test_after_one_halflife_three_fifths_of_a_resting_offset_are_left():
+    start = Decision(0, 0.0, Action.START, "", True, playing_at("idle", 0.5), None)
+    jump = Decision(1, 0.0, Action.JUMP, "", True, playing_at("run", 0.3), None, play_rate=0.0)
+    still = Decision(2, 0.0, Action.CONTINUE, "", False, jump.playing, None, play_rate=0.0)
+    stream, left = PoseStream(bank(), SPRING), []
+    for decision, dt in ((replace(start, play_rate=0.0), 0.0), (jump, 0.0), (still, SPRING.halflife_s)):
+        pose = stream.update(decision, dt)
+        over = quaternions.multiply(pose.rotations, quaternions.inverse(bank().sample("run", 0.3).rotations))
+        left.append(quaternions.rotation_vectors(over))
+    np.testing.assert_allclose(left[2], 0.5 * (1.0 + 2.0 * math.log(2.0)) * 0.5 * left[1], atol=1e-9)
+    assert np.abs(left[1]).max() > 0.1
 
 
 def test_the_play_rate_is_the_clips_time_over_the_games():
@@ -332,6 +276,7 @@ def test_a_jump_is_marked_and_a_start_is_not():
         (lambda: PoseStream({"jog": bank()}).update(walking(), 0.0, (0, 0, 0)), 'no pose bank of the database "loco"'),
         (lambda: PoseStream(PoseBank.build(clips()[:1], SCHEMA)).update(walking(), 0.0, (0, 0, 0)), 'no poses of "walk"'),
         (lambda: PoseStream(bank()).update(walking(), 0.0), "needs a body"),
+        (lambda: PoseSettings(blend="dead"), 'blend = "dead".*"spring"'),
     ],
 )
 def test_what_a_stream_cannot_do_is_told(wrong, said):

@@ -24,30 +24,28 @@ from contextdb.motion import (
     LivePose,
     MotionConfig,
     MotionDatabase,
-    Permutations,
     PoseBank,
     PoseHistory,
     Selector,
     Trace,
-    build_all,
-    clip_features,
-    clip_permutations,
-    local_poses,
-    make_clip,
-    make_joint_clip,
     measure,
-    open_database,
-    parse_bvh,
     poses_of,
     query_from,
     query_from_pose,
     resampled,
-    save_database,
     write_bvh,
 )
+from contextdb.motion.clips.clip import parse_bvh
+from contextdb.motion.clips.poses import local_poses
+from contextdb.motion.features.extraction import clip_features, clip_permutations
+from contextdb.motion.features.permutations import Permutations
 from contextdb.motion.features.schema_dict import schema_to_dict
+from contextdb.motion.made.joint import make_joint_clip
+from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.measuring.coverage import coverage
 from contextdb.motion.measuring.near_clips import near_clips
+from contextdb.motion.storage.building import build_all
+from contextdb.motion.storage.stored import open_database, save_database
 from contextdb.motion.trace.views import decision_lines
 
 N_FRAMES = 60
@@ -293,15 +291,10 @@ def test_permutations_are_read_and_written():
     ("changes", "said"),
     [
         ({"permutations": 3}, "this is a number, not a table"),
-        ({"permutations": {"step_s": 0.1}}, 'permutations has no "count"'),
         ({"permutations": {"count": 2}}, 'permutations has no "step_s"'),
-        ({"permutations": {"count": 2.5, "step_s": 0.1}}, "this is not whole"),
-        ({"permutations": {"count": 0}}, "out of range"),
         ({"permutations": {"count": 2, "step_s": 0.0}}, "out of range"),
-        ({"permutations": {"count": 2, "step_s": 0.1, "from_s": -0.1}}, "out of range"),
         ({"permutations": {"count": 100, "step_s": 1.0}}, "the last looks 99 s ahead"),
         ({"channels": [{"type": "position", "bone": "Hips"}]}, "no channel looks ahead by them"),
-        ({"channels": [{"type": "position", "bone": "Hips", "permuted": 1}]}, "neither true nor false"),
         ({"channels": [{"type": "position", "bone": "Hips", "permuted": True, "at": 0.1}]}, 'both "at" and "permuted"'),
         ({"channels": [{"type": "phase", "permuted": True}]}, 'has no key "permuted"'),
     ],

@@ -20,16 +20,17 @@ from contextdb.motion import (
     MotionDatabase,
     Selector,
     Trace,
-    make_clip,
     steady_path,
     with_path,
 )
+from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.markup.markup import Markup
-from contextdb.motion.selection.play_rate import SHARE, eased
 from contextdb.motion.trace.views import decision_lines
 
 RATE = 30.0
 STEP = 1.0 / RATE
+SHARE = 0.36
+"""So much of a missing speed is made up for, in logarithms: `CDBM_RATE_SHARE` in controller.h."""
 SCHEMA = FeatureSchema.from_dict(
     "loco",
     {
@@ -119,11 +120,6 @@ def test_the_rate_changes_by_and_by_while_a_clip_plays_on():
     rates = [each.play_rate for each in driven([own_mps()] + [1.8 * own_mps()] * 60)]
     assert max(b - a for a, b in pairwise(rates)) < 0.04
     assert rates[-1] == pytest.approx(1.8**SHARE, rel=0.05)
-
-
-@given(st.floats(0.5, 2.0), st.floats(0.5, 2.0), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
-def test_a_change_of_rate_may_be_taken_in_parts(rate, to, a, b):
-    assert eased(eased(rate, to, a), to, b) == pytest.approx(eased(rate, to, a + b), abs=1e-12)
 
 
 def test_without_a_channel_of_the_path_every_clip_has_its_own_rate():

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from contextdb.errors import ContextDBError, MotionError, QueryError, SchemaError
-from contextdb.motion import Markup, MotionDatabase, Skeleton, make_clip, query_from
+from contextdb.motion import Markup, MotionDatabase, Skeleton, query_from
+from contextdb.motion.answers import NamedAssets
+from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.nodes.pose_match import best_start, hands_of, pose_schema
 
 SKELETON = make_clip("walk").clip.skeleton
@@ -63,7 +64,7 @@ def test_of_a_list_of_clips_the_one_with_the_best_pose_is_chosen():
 
 
 def test_the_assets_of_a_tables_answer_are_such_a_list():
-    valid = SimpleNamespace(assets=["walk", "an asset of another database"])
+    valid = NamedAssets(["walk", "an asset of another database"])
     assert best_start(DATABASE, pose("run", 0.4), valid).asset == "walk"
 
 

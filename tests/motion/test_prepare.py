@@ -10,23 +10,27 @@ import pytest
 
 from contextdb import motion
 from contextdb.errors import ContextDBError
+from contextdb.motion.made.recipes import made_clips
 from contextdb.motion.markup.reserved import ReservedTag
 from contextdb.motion.markup.spans import TOLERANCE_S
 from contextdb.motion.preparing.look import span_of_frames
-from contextdb.motion.preparing.proposal import KINDS
+from contextdb.motion.preparing.proposal import KINDS, Proposal
+from contextdb.motion.walking.blending import Gait
+from contextdb.motion.walking.cycle import Cycle
+from contextdb.motion.walking.walked import walked_clips
 
-MADE = motion.made_clips()
+MADE = made_clips()
 CLIPS = {made.name: made.clip for made in MADE}
 STEADY = {made.name for made in MADE if made.recipe.change == "steady"}
 FOUND = motion.prepare(list(CLIPS.values()))
 FRAME_S = 1.0 / 30.0
 
 
-def of(kind: str, found: Sequence[motion.Proposal] = FOUND) -> list[motion.Proposal]:
+def of(kind: str, found: Sequence[Proposal] = FOUND) -> list[Proposal]:
     return [each for each in found if each.kind == kind]
 
 
-def as_markup(found: Sequence[motion.Proposal]) -> motion.Markup:
+def as_markup(found: Sequence[Proposal]) -> motion.Markup:
     return motion.Markup(
         tuple(
             motion.Span(each.asset, each.tag, each.from_s or 0.0, np.inf if each.to_s is None else each.to_s, each.value)
@@ -46,10 +50,10 @@ def test_the_clips_that_loop_are_found_and_no_others():
 
 def test_loops_of_one_cycle_are_found_whose_feet_come_down_at_an_end():
     gaits = [
-        motion.Gait(name, [motion.Cycle.of(CLIPS[each]) for each in own])
+        Gait(name, [Cycle.of(CLIPS[each]) for each in own])
         for name, own in (("walk", ("walk", "walk_fast")), ("run", ("jog", "run")))
     ]
-    clips = motion.walked_clips(gaits, speeds_mps=[1.3, 1.4, 1.55, 2.5], turns_dps=[0, 45])
+    clips = walked_clips(gaits, speeds_mps=[1.3, 1.4, 1.55, 2.5], turns_dps=[0, 45])
     assert {each.asset for each in motion.prepare(clips, kinds=["loops"])} == {clip.name for clip in clips}
 
 

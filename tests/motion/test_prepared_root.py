@@ -7,22 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from contextdb.motion import (
-    ABOUT_TURNS,
-    RECIPES,
-    FeatureSchema,
-    LocalPoses,
-    PoseBank,
-    forward_kinematics,
-    make_clip,
-    poses_of,
-    root_trajectory,
-)
+from contextdb.motion import FeatureSchema, PoseBank, poses_of, root_trajectory
 from contextdb.motion.clips.mirror import mirrored
-from contextdb.motion.clips.poses import Poses
+from contextdb.motion.clips.poses import LocalPoses, Poses, forward_kinematics
 from contextdb.motion.clips.quaternions import about_axis, rotate
 from contextdb.motion.clips.trajectory import Trajectory, unbroken
-from contextdb.motion.made.recipes import RAMP_S
+from contextdb.motion.made.recipes import ABOUT_TURNS, RAMP_S, RECIPES, make_clip
 from contextdb.motion.made.steps import about_turn, timeline
 
 SMOOTH = FeatureSchema.from_dict(

@@ -2,30 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import random
 from dataclasses import replace
 
 import numpy as np
-import polars as pl
 import pytest
 
 from contextdb.errors import ContextDBError, MotionError
-from contextdb.motion import (
-    Biases,
-    Controller,
-    ControllerSettings,
-    Entry,
-    FeatureSchema,
-    LeftOut,
-    Selector,
-    TagFilter,
-    Trace,
-    make_clip,
-)
+from contextdb.motion import Controller, ControllerSettings, Entry, FeatureSchema, Selector, TagFilter, Trace
+from contextdb.motion.made.recipes import make_clip
+from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.search import candidates
 from contextdb.motion.search.database import MotionDatabase
+from contextdb.motion.search.filters import Biases
 from contextdb.motion.trace.reasked import require_known, why_not_asked
 
 SCHEMA = FeatureSchema.from_dict(
@@ -163,28 +153,6 @@ def test_an_asset_that_there_is_not_is_refused_with_the_nearest(trace):
     unsearched = next(i for i, decision in enumerate(trace) if not decision.searched)
     with pytest.raises(MotionError, match="nothing was searched"):
         trace.reasked(DATABASES).why_not(unsearched, "jog")
-
-
-def test_a_session_of_format_1_is_read_with_the_candidates_that_it_kept(trace, tmp_path):
-    whole = pl.read_parquet(trace.to_bytes())
-    fields = [each.name for each in whole.schema["filters"].inner.fields if not each.name.endswith("_runs")]
-    old_filters = pl.col("filters").list.eval(pl.struct([pl.element().struct.field(name) for name in fields]))
-    about = {name: {key: said[key] for key in ("rate", "features", "channels", "digest")} for name, said in trace.about.items()}
-    metadata = {"contextdb.trace": "1", "about": json.dumps(about)}
-    dense = next(
-        i for i, decision in enumerate(trace) if decision.searched and not any(len(f.frame_biases) for _, f in decision.filters)
-    )
-    for name, old in (("filters.parquet", whole.with_columns(old_filters)), ("none.parquet", whole.drop("filters"))):
-        old.drop("inputs").write_parquet(tmp_path / name, metadata=metadata)
-        loaded = Trace.load(tmp_path / name)
-        assert len(loaded) == len(trace)
-        assert all(decision.inputs is None for decision in loaded)
-    assert all(decision.filters == () for decision in loaded)
-    kept = Trace.load(tmp_path / "filters.parquet")
-    assert kept.use(DATABASES) == ""
-    assert kept[dense].candidates[0][1].rows[:3] == trace[dense].candidates[0][1].rows[:3]
-    with pytest.raises(MotionError, match="does not say how its updates were made"):
-        kept.what_if(DATABASES)
 
 
 def test_recording_works_no_candidate_out_until_it_is_asked_for(monkeypatch):

@@ -12,10 +12,12 @@ from lines import DT, HEADER, RATE
 from strategies import examples
 
 import contextdb as cdb
-from contextdb.motion import Biases, Controller, ControllerSettings, Entry, LeftOut, MotionDatabase, Selector, TagFilter, Trace
+from contextdb.motion import Controller, ControllerSettings, Entry, MotionDatabase, Selector, TagFilter, Trace
+from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.markup.marking import marks_of
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.search import cost
+from contextdb.motion.search.filters import Biases
 from contextdb.motion.trace.what_if import run_again
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -209,7 +211,7 @@ def _check(each, told, change):
         search = each.searches[told.database]
         at = search.database.range_of(told.frame)
         biases = search.chosen.range_biases + np.where(np.arange(len(search.chosen.range_biases)) == at, change.to, 0.0)
-        chosen = search.chosen._replace(range_biases=biases, least_of_ranges=float(biases.min()))
+        chosen = search.chosen._replace(range_biases=biases)
         other = each.with_searches({**each.searches, told.database: search.with_filter(chosen)})
     else:
         return

@@ -6,14 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from clip_files import Moving, gltf
+from test_retargeting import ARMS_UP, resting, standing
 
 from contextdb import motion
 from contextdb.errors import FileError, MotionError, SchemaError
+from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.storage.building import build_all
 from contextdb.motion.storage.checking import check_motion
 from contextdb.motion.storage.pose_files import open_or_build_poses
 
-MADE = {name: motion.make_clip(name) for name in ("walk", "idle")}
+MADE = {name: make_clip(name) for name in ("walk", "idle")}
 WALK = MADE["walk"].clip
 FEET = ("LeftFoot", "RightFoot")
 OTHER_NAMES = {"Hips": "Pelvis", "LeftUpLeg": "LeftThigh", "RightUpLeg": "RightThigh"}
@@ -110,7 +113,6 @@ def test_a_check_tells_of_other_proportions_and_names_the_setting(folder):
 @pytest.mark.parametrize(
     ("keys", "told"),
     [
-        ({"rig": "clips/idle.bvh"}, r'walk_other: there is no bone for "Hips", "LeftUpLeg"'),
         ({"rig": "clips/idle.bvh", "rig_bones": {"Hip": "Pelvis"}}, r'rig_bones: there is no bone "Hip"\..*Did you mean "Hips"'),
         ({"rig": "clips/idle.bvh", "rig_bones": {**OTHER_NAMES, "LeftUpLeg": "LeftThigg"}}, r'Did you mean "LeftThigh"'),
     ],
@@ -125,11 +127,39 @@ def test_a_rig_that_is_no_file_is_told_with_its_place(folder):
         motion.build(config_of(rig="clips/gone.bvh"), folder, cache=None)
 
 
+def test_rigs_formats_and_units_meet_in_one_database(tmp_path):
+    """Clips in centimetres, in metres, of Mixamo's names as FBX-like GLB, of another body, and one that rests with its arms up."""
+    (tmp_path / "clips").mkdir()
+    (tmp_path / "poses").mkdir()
+    motion.write_bvh(MADE["idle"].clip, tmp_path / "clips/idle.bvh")
+    metres = replace(WALK.skeleton, offsets=WALK.skeleton.offsets * 0.01)
+    values = WALK.values.copy()
+    values[:, :3] *= 0.01
+    motion.write_bvh(replace(WALK, skeleton=metres, values=values), tmp_path / "clips/walk_metres.bvh", digits=9)
+    motion.write_bvh(of_another_body(WALK), tmp_path / "clips/walk_other.bvh")
+    body = Moving.of(WALK)
+    (tmp_path / "clips/walk_mixamo.glb").write_bytes(gltf(replace(body, names=tuple(f"mixamorig:{each}" for each in body.names))))
+    motion.write_bvh(resting(WALK, ARMS_UP), tmp_path / "clips/walk_t.bvh")
+    motion.write_bvh(standing(WALK, ARMS_UP), tmp_path / "poses/t.bvh")
+    keys = {"clips": "clips/*.{bvh,glb}", "rig": "clips/idle.bvh", "metres_per_unit": "size"}
+    with pytest.raises(MotionError, match='"LeftForeArm" of the rig points another way'):
+        motion.build(config_of(**{**keys, "clips": "clips/walk_t.bvh"}), tmp_path, cache=None)
+    config = config_of(**keys, rig_pose="poses/*.bvh")
+    poses = [motion.poses_of(clip) for clip in config.load_clips("all", tmp_path) if clip.name != "idle"]
+    assert [each.skeleton.names for each in poses] == [WALK.skeleton.names] * 4
+    for each in poses:
+        joints = [each.skeleton.index(bone) for bone in (*FEET, "Head")]
+        np.testing.assert_allclose(each.positions[:, joints], poses[0].positions[:, joints], atol=0.02)
+    (tmp_path / "poses/t.bvh").unlink()
+    with pytest.raises(MotionError, match=r"no file matches rig_pose"):
+        motion.build(config, tmp_path, cache=None)
+
+
 @pytest.mark.parametrize(
     ("keys", "told"),
     [
-        ({"rig": "clips/idle.fbx"}, "this is not a BVH file"),
-        ({"rig": "../idle.bvh"}, "this leaves the folder"),
+        ({"rig": "clips/idle.c3d"}, "its ending is that of no file of clips"),
+        ({"rig": "../idle.bvh"}, "it leaves the folder"),
         ({"rig_bones": {"Hips": "Pelvis"}}, "there is no rig that it could be about"),
         ({"rig": "clips/idle.bvh", "rig_bones": {"Hips": 3}}, "these are not names of bones"),
         ({"rigg": "clips/idle.bvh"}, 'Did you mean "rig"'),

@@ -1,4 +1,4 @@
-"""The fast search, the full scan and the candidates against an oracle that looks at one frame after another."""
+"""The search and the candidates against an oracle that looks at one frame after another."""
 
 from __future__ import annotations
 
@@ -163,23 +163,10 @@ def allowed_frames(database, given):
     return sorted(rows)
 
 
-def by(engine, database):
-    """The database as it is, or as it searches where numba cannot be installed, few frames or many."""
-    if engine != "numba":
-        vars(database._searcher)["_compiled"] = None
-    if engine == "groups":
-        database._searcher._scan.small = 0
-    return database
-
-
-engines = pytest.mark.parametrize("engine", ["numba", "numpy", "groups"])
-
-
-@engines
 @examples(1.5)
 @given(st.data())
-def test_a_search_is_a_scan_of_all_frames_whatever_masks_tags_skips_and_biases_say(engine, data):
-    database = by(engine, data.draw(marked_databases()))
+def test_a_search_is_a_scan_of_all_frames_whatever_masks_tags_skips_and_biases_say(data):
+    database = data.draw(marked_databases())
     given = data.draw(questions(database))
     expected = allowed_frames(database, given)
     hit = database.search(**given)
@@ -192,11 +179,10 @@ def test_a_search_is_a_scan_of_all_frames_whatever_masks_tags_skips_and_biases_s
     assert hit.asset == database.assets[hit.range]
 
 
-@engines
 @examples(1)
 @given(st.data())
-def test_candidates_begin_with_the_choice_and_every_frame_has_its_reason(engine, data):
-    database = by(engine, data.draw(marked_databases()))
+def test_candidates_begin_with_the_choice_and_every_frame_has_its_reason(data):
+    database = data.draw(marked_databases())
     given = data.draw(questions(database))
     found = database.candidates(k=5, **given)
     hit = database.search(**given)
@@ -215,11 +201,10 @@ def test_candidates_begin_with_the_choice_and_every_frame_has_its_reason(engine,
     }
 
 
-@engines
 @examples(1)
 @given(st.data())
-def test_the_best_of_each_range_are_those_near_the_best_of_all(engine, data):
-    database = by(engine, data.draw(marked_databases()))
+def test_the_best_of_each_range_are_those_near_the_best_of_all(data):
+    database = data.draw(marked_databases())
     given = data.draw(questions(database))
     within = data.draw(st.sampled_from([0.0, 0.5, 4.0, math.inf]))
     best = {}
@@ -233,32 +218,15 @@ def test_the_best_of_each_range_are_those_near_the_best_of_all(engine, data):
     assert hits[:1] == [hit for hit in [database.search(**given)] if hit]
 
 
-@engines
 @given(st.data())
-def test_many_characters_are_answered_like_each_alone(engine, data):
-    database = by(engine, data.draw(marked_databases()))
+def test_many_characters_are_answered_like_each_alone(data):
+    database = data.draw(marked_databases())
     asked = [data.draw(questions(database)) for _ in range(data.draw(st.integers(0, 4)))]
     queries = np.array([one["query"] for one in asked]).reshape(len(asked), database.n_features)
     masks, currents = [one.get("valid") for one in asked], [one.get("current") for one in asked]
     tags = asked[0].get("tags") if asked else None
     singly = [database.search(q, m, tags, c) for q, m, c in zip(queries, masks, currents, strict=True)]
     assert database.search_many(queries, masks, currents, tags) == singly
-
-
-@pytest.mark.parametrize("features", ["walks", "noise"])
-def test_many_frames_are_searched_in_groups_to_the_same_bit_as_by_the_compiled_search(features):
-    pytest.importorskip("numba")
-    rng = np.random.default_rng(3)
-    steps = rng.normal(size=(9_000, 24))
-    rows = (steps.cumsum(axis=0) / 8 if features == "walks" else steps).astype(np.float32)
-    starts = np.arange(0, 9_000, 90)
-    plain = MotionDatabase.from_features(rows, starts, starts + rng.integers(1, 91, 100), [f"a{i}" for i in range(100)])
-    without = by("groups", replace(plain))
-    for _ in range(30):
-        query = rows[rng.integers(9_000, size=2)].mean(axis=0)
-        valid, current = rng.random(100) < 0.4, int(rng.integers(-1, 9_000))
-        given = {"valid": valid, "current": current, "skip": [Skip(current - 9, current + 30, LeftOut.JUMP)]}
-        assert without.search(query, **given) == plain.search(query, **given)
 
 
 def test_a_new_mask_rebuilds_nothing():
@@ -270,21 +238,19 @@ def test_a_new_mask_rebuilds_nothing():
     assert database._searcher is searcher
 
 
-@engines
-def test_a_weight_turned_to_zero_hides_no_frame_at_the_ends_of_float32(engine):
+def test_a_weight_turned_to_zero_hides_no_frame_at_the_ends_of_float32():
     features = np.array([[3e38, 1.0], [-3e38, 0.0]], np.float32)
     plain = MotionDatabase.from_features(features, [0], [2], ["a"])
     database = replace(plain, slices=(slice(0, 1), slice(1, 2)), channel_names=("far", "near"), weights=np.array([0.0, 1.0]))
-    assert by(engine, database).search([3e38, 0.0]) == Hit("a", 0, 1, 0.0)
+    assert database.search([3e38, 0.0]) == Hit("a", 0, 1, 0.0)
 
 
-@engines
-def test_a_frame_just_cheaper_than_another_is_found_where_float32_cannot_tell_them_apart(engine):
+def test_a_frame_just_cheaper_than_another_is_found_where_float32_cannot_tell_them_apart():
     features = np.zeros((64, 2), np.float32)
     features[:, 0] = 1000.0
     features[40, 1] = 1e-4
     database = MotionDatabase.from_features(features, [0, 32], [32, 64], ["a", "b"])
-    assert by(engine, database).search([0.0, 1e-4]).frame == 40
+    assert database.search([0.0, 1e-4]).frame == 40
 
 
 def test_penalties_of_an_asset_count_for_all_its_ranges():
@@ -319,7 +285,7 @@ def test_the_memory_of_a_search_is_a_fifth_more_than_the_features_at_most():
     stops = np.cumsum(lengths)
     features = rng.normal(size=(int(stops[-1]), 27)).astype(np.float32)
     database = MotionDatabase.from_features(features, stops - lengths, stops, [f"a{i}" for i in range(60)])
-    assert database.layout.n_bytes <= 1.2 * features.nbytes
+    assert database.layout.n_bytes + database._searcher._frames.n_bytes <= 1.2 * features.nbytes
 
 
 def test_a_database_that_has_searched_can_be_sent_to_another_process():

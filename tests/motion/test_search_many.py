@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from strategies import examples
-from test_search import by, engines, marked_databases, questions, tag_filters
+from test_search import marked_databases, questions, tag_filters
 
 import contextdb as cdb
 from contextdb.errors import QueryError
@@ -28,11 +28,10 @@ def moves(data):
     return cdb.Table.from_columns(columns, {"speed": {"type": "number"}}).compile()
 
 
-@engines
 @examples(1)
 @given(st.data())
-def test_the_answers_of_a_table_serve_as_masks_in_every_form(engine, data):
-    database, compiled = by(engine, data.draw(marked_databases())), moves(data)
+def test_the_answers_of_a_table_serve_as_masks_in_every_form(data):
+    database, compiled = data.draw(marked_databases()), moves(data)
     speeds = data.draw(st.lists(st.sampled_from([0.0, 2.0, 3.5, 5.0]), max_size=6))
     queries = np.array([data.draw(questions(database))["query"] for _ in speeds]).reshape(len(speeds), database.n_features)
     each = [compiled.query({"speed": speed}) for speed in speeds]
@@ -75,11 +74,10 @@ def test_blocks_and_cores_change_no_answer(n_cores, monkeypatch):
     assert database.search_many(queries, masks, currents) == singly
 
 
-@engines
 @examples(1)
 @given(st.data())
-def test_many_searches_with_everything_of_their_own_are_answered_like_each_alone(engine, data):
-    database = by(engine, data.draw(marked_databases()))
+def test_many_searches_with_everything_of_their_own_are_answered_like_each_alone(data):
+    database = data.draw(marked_databases())
     filters = data.draw(st.lists(st.one_of(st.none(), tag_filters()), min_size=2, max_size=2))
     asked = [data.draw(questions(database)) for _ in range(data.draw(st.integers(0, 6)))]
     asked = [one | {"tags": data.draw(st.sampled_from(filters))} if data.draw(st.booleans()) else one for one in asked]
@@ -88,40 +86,35 @@ def test_many_searches_with_everything_of_their_own_are_answered_like_each_alone
     assert database.search_each(queries, asked) == singly
 
 
-@engines
-def test_of_equal_frames_the_playing_one_wins_then_the_lowest_also_in_one_box(engine):
+def test_of_equal_frames_the_playing_one_wins_then_the_lowest_also_in_one_box():
     features = np.zeros((40, 2), np.float32)
     features[:3] = 1.0
-    database = by(engine, MotionDatabase.from_features(features, [0, 20], [20, 40], ["a", "b"]))
+    database = MotionDatabase.from_features(features, [0, 20], [20, 40], ["a", "b"])
     hits = database.search_many(np.zeros((4, 2)), [None, None, np.array([False, True]), None], [None, 30, None, 2])
     assert [hit.frame for hit in hits] == [3, 30, 20, 3]
 
 
-@engines
-def test_of_frames_that_a_bias_makes_equal_the_lowest_wins_though_a_later_one_is_nearer(engine):
-    database = by(engine, MotionDatabase.from_features([[2.0], [1.0]], [0], [2], ["a"]))
+def test_of_frames_that_a_bias_makes_equal_the_lowest_wins_though_a_later_one_is_nearer():
+    database = MotionDatabase.from_features([[2.0], [1.0]], [0], [2], ["a"])
     hits = database.search_each(np.zeros((2, 1)), [{"bias": [0.0, 3.0]}, {"bias": [0.0, 3.0], "current": 1}])
     assert [(hit.frame, hit.cost) for hit in hits] == [(0, 4.0), (1, 4.0)]
 
 
-@engines
-def test_a_weight_turned_to_zero_hides_no_frame_from_many_at_the_ends_of_float32(engine):
+def test_a_weight_turned_to_zero_hides_no_frame_from_many_at_the_ends_of_float32():
     features = np.array([[3e38, 1.0], [-3e38, 0.0]], np.float32)
     plain = MotionDatabase.from_features(features, [0], [2], ["a"])
     database = replace(plain, slices=(slice(0, 1), slice(1, 2)), channel_names=("far", "near"), weights=np.array([0.0, 1.0]))
-    assert [hit.frame for hit in by(engine, database).search_many([[3e38, 0.0], [-3e38, 1.0]])] == [1, 0]
+    assert [hit.frame for hit in database.search_many([[3e38, 0.0], [-3e38, 1.0]])] == [1, 0]
 
 
-@engines
-def test_frames_without_features_cost_nothing_and_the_lowest_that_may_play_wins(engine):
-    database = by(engine, MotionDatabase.from_features(np.zeros((40, 0)), [0, 20], [20, 40], ["a", "b"]))
+def test_frames_without_features_cost_nothing_and_the_lowest_that_may_play_wins():
+    database = MotionDatabase.from_features(np.zeros((40, 0)), [0, 20], [20, 40], ["a", "b"])
     hits = database.search_many(np.zeros((2, 0)), [None, np.array([False, True])])
     assert [(hit.frame, hit.cost) for hit in hits] == [(0, 0.0), (20, 0.0)]
 
 
-@engines
-def test_one_query_that_is_no_number_is_named_and_nobody_is_answered(engine):
-    database = by(engine, MotionDatabase.from_features(np.arange(4.0)[:, None], [0], [4], ["a"]))
+def test_one_query_that_is_no_number_is_named_and_nobody_is_answered():
+    database = MotionDatabase.from_features(np.arange(4.0)[:, None], [0], [4], ["a"])
     with pytest.raises(QueryError, match='"feature 0" is nan'):
         database.search_many([[1.0], [math.nan], [2.0]])
 

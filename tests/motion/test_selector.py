@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,9 +12,11 @@ from lines import line
 
 from contextdb import Table
 from contextdb.errors import MotionError, QueryError
-from contextdb.motion import Entry, MotionDatabase, Reason, Selector, Status
+from contextdb.motion import Entry, MotionDatabase, Selector
+from contextdb.motion.answers import NamedAssets
 from contextdb.motion.markup.left_out import LeftOut, Skip
 from contextdb.motion.markup.marks import TagFilter
+from contextdb.motion.selection.choice import Reason, Status
 
 
 def database(*places, asset="clip"):
@@ -61,13 +62,13 @@ def test_on_a_tie_the_priority_database_wins():
 
 
 def test_a_priority_database_without_a_valid_asset_leaves_the_choice_to_the_default():
-    choice = SELECTOR.search([9.0], valid=SimpleNamespace(assets=["jog"]))
+    choice = SELECTOR.search([9.0], valid=NamedAssets(["jog"]))
     assert choice.database == "jog"
     assert [search.status for search in choice.searches] == [Status.NOTHING_VALID, Status.WINNER]
 
 
 def test_nothing_valid_anywhere_is_a_false_choice():
-    choice = SELECTOR.search([9.0], valid=SimpleNamespace(assets=["swim"]))
+    choice = SELECTOR.search([9.0], valid=NamedAssets(["swim"]))
     assert not choice
     assert (choice.database, choice.hit.cost, choice.reason) == (None, math.inf, Reason.NOTHING_VALID)
     assert choice.why == "jog_tired: nothing valid; jog: nothing valid. Nothing may play."
@@ -176,7 +177,7 @@ def test_only_the_buckets_of_the_moment_are_searched():
 
 
 def test_a_table_whose_rows_are_databases_names_the_buckets_and_may_name_those_of_others():
-    choice = BUCKETS.search([1.0], among=SimpleNamespace(assets=["cycles", "swimming"]))
+    choice = BUCKETS.search([1.0], among=NamedAssets(["cycles", "swimming"]))
     assert choice.database == "cycles"
     compiled = Table.from_columns({"Database": ["starts", "stops", "cycles"], "moving": ["False", "True", "True"]}).compile()
     assert BUCKETS.search([1.0], among=compiled.query({"moving": False})).database == "starts"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from contextdb.motion.trace.asked_views import diff_lines, stats_lines, what_if_lines, why_lines
+from contextdb.motion.trace.answer_views import diff_lines, stats_lines, what_if_lines, why_lines
 from contextdb.motion.trace.json_form import as_plain
 from contextdb.motion.trace.session_diff import Parting, SessionDiff
 from contextdb.motion.trace.stats import SessionStats

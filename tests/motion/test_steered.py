@@ -8,23 +8,14 @@ import os
 import tomllib
 from functools import cache
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from contextdb.motion import (
-    Entry,
-    FeatureSchema,
-    MotionConfig,
-    MotionDatabase,
-    PoseSettings,
-    Selector,
-    load_bvh,
-    made_clips,
-    with_path,
-)
+from contextdb.motion import Entry, FeatureSchema, MotionConfig, MotionDatabase, PoseSettings, Selector, load_bvh, with_path
+from contextdb.motion.answers import NamedAssets
 from contextdb.motion.clips.steering import Steered, steered_path
+from contextdb.motion.made.recipes import made_clips
 from contextdb.motion.markup.marks import Mark
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.search.filters import Biases
@@ -112,7 +103,7 @@ def made_run(**changes):
     schema, loco, tired = made()
     settings = ControllerSettings(**changes)
     controller = Controller(Selector([Entry("loco_tired", tired, 2.75), Entry("loco", loco)]), settings)
-    fresh = SimpleNamespace(assets=[asset for asset in loco.assets if not asset.endswith("_tired")])
+    fresh = NamedAssets([asset for asset in loco.assets if not asset.endswith("_tired")])
     asked = {
         "among": lambda time_s: ["loco"] if time_s < 40.0 else None,
         "valid": lambda time_s: {"loco": fresh} if time_s < 40.0 else None,

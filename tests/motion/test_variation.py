@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import random
 from collections import Counter
 
@@ -11,7 +10,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contextdb.errors import MotionError
 from contextdb.motion import Hit
 from contextdb.motion.selection.variation import Variation, restore, state_of
 
@@ -55,17 +53,3 @@ def test_the_same_seed_and_a_restored_generator_choose_the_same_again(make):
     restore(rng, state)
     assert [variation.choose(ties(*"abcde"), (), rng) for _ in range(20)] == following
     assert state_of(None) is None
-
-
-@pytest.mark.parametrize(
-    ("within", "memory", "message"),
-    [
-        (-0.1, 1, r"variation within -0\.1 of the best cost"),
-        (math.nan, 1, "variation within nan"),
-        (0.1, -1, "variation with a memory of -1"),
-        (0.1, 1.5, r"variation with a memory of 1\.5\. Accepted: a whole number of assets"),
-    ],
-)
-def test_variation_that_cannot_be_meant_is_refused(within, memory, message):
-    with pytest.raises(MotionError, match=message):
-        Variation(within, memory)

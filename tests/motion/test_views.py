@@ -253,7 +253,7 @@ def test_databases_are_told_when_there_are_several_and_mirrored_assets_are_marke
 
 @pytest.mark.parametrize("cause", Trigger)
 def test_every_cause_of_a_search_has_a_word(cause):
-    told = replace(SESSION[6], why=f"{cause.told(WALK)}: jog at 1.00 s costs 0.2.")
+    told = replace(SESSION[6], why=f"{cause.sentence(WALK)}: jog at 1.00 s costs 0.2.")
     (_, _, row) = session_lines([told])
     assert row.split("  ")[2].strip() or row.split()[2]
 

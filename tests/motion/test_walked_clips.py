@@ -9,11 +9,15 @@ import pytest
 
 from contextdb import motion
 from contextdb.errors import ContextDBError, ContextError, MotionError
+from contextdb.motion.made.recipes import make_clip
+from contextdb.motion.walking.blending import Gait
+from contextdb.motion.walking.cycle import Cycle
+from contextdb.motion.walking.walked import walked_clips
 
-CYCLES = {name: motion.Cycle.of(motion.make_clip(name).clip) for name in ("walk", "walk_fast", "jog", "run")}
+CYCLES = {name: Cycle.of(make_clip(name).clip) for name in ("walk", "walk_fast", "jog", "run")}
 GAITS = [
-    motion.Gait("walk", [CYCLES["walk"], CYCLES["walk_fast"]]),
-    motion.Gait("run", [CYCLES["jog"], CYCLES["run"]]),
+    Gait("walk", [CYCLES["walk"], CYCLES["walk_fast"]]),
+    Gait("run", [CYCLES["jog"], CYCLES["run"]]),
 ]
 NAMES = ["walk_1.30", "walk_1.30_left_60", "walk_1.60", "walk_1.60_left_60", "run_3.00", "run_3.00_left_60"]
 SCHEMA = motion.FeatureSchema.from_dict(
@@ -32,7 +36,7 @@ SCHEMA = motion.FeatureSchema.from_dict(
 @functools.cache
 def clips() -> dict[str, motion.Clip]:
     """Clips of a walker at three speeds, straight on and to the left."""
-    return {clip.name: clip for clip in motion.walked_clips(GAITS, [1.3, 1.6, 3.0], [0.0, 60.0])}
+    return {clip.name: clip for clip in walked_clips(GAITS, [1.3, 1.6, 3.0], [0.0, 60.0])}
 
 
 def test_names_say_gait_speed_and_turn():
@@ -64,7 +68,7 @@ def test_feet_that_are_down_stand(name: str):
 
 def test_a_walker_is_a_database_of_a_selector_beside_others_and_its_poses_come_from_the_same_stream():
     loops = motion.Markup.parse("asset,tag,from,to,value\n*,Looping,,,\n")
-    made = [motion.make_clip(name).clip for name in ("run", "sprint")]
+    made = [make_clip(name).clip for name in ("run", "sprint")]
     parts = {"captured": made, "walked": list(clips().values())}
     built = motion.MotionDatabase.build([*made, *clips().values()], SCHEMA, markup=loops).normalisation
     databases = {
@@ -90,5 +94,5 @@ def test_a_walker_is_a_database_of_a_selector_beside_others_and_its_poses_come_f
 )
 def test_other_speeds_and_turns_are_refused(speeds, turns):
     with pytest.raises(ContextDBError) as caught:
-        motion.walked_clips(GAITS, speeds, turns)
+        walked_clips(GAITS, speeds, turns)
     assert isinstance(caught.value, (MotionError, ContextError))

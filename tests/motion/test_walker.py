@@ -13,9 +13,11 @@ from strategies import examples, some
 from test_walking_blends import BOTH, cycle, run, walk
 
 from contextdb.errors import ContextError
-from contextdb.motion import Footstep, Gait, MotionError, Steered, Walker, WalkSettings
+from contextdb.motion import MotionError, Steered
 from contextdb.motion.clips import quaternions
-from contextdb.motion.walking.footsteps import delta, middles, reference
+from contextdb.motion.walking.blending import Gait
+from contextdb.motion.walking.footsteps import Footstep, delta, middles, reference
+from contextdb.motion.walking.walker import Walker, WalkSettings
 
 DT = 1.0 / 60.0
 UP = (0.0, 1.0, 0.0)

@@ -12,9 +12,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contextdb.motion import Cycle, Gait, MotionError, Stances, make_clip
-from contextdb.motion.walking.blending import Mix
+from contextdb.motion import MotionError
+from contextdb.motion.made.recipes import make_clip
+from contextdb.motion.walking.blending import Gait, Mix
+from contextdb.motion.walking.cycle import Cycle
 from contextdb.motion.walking.gaits import GaitState, advanced, wanted_gait
+from contextdb.motion.walking.stances import Stances
 
 SPEEDS = st.floats(0.0, 8.0)
 AXES = st.floats(-1.5, 1.5)

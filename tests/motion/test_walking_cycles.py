@@ -10,9 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from contextdb.errors import ContextError
-from contextdb.motion import RECIPES, Clip, Cycle, LocalPoses, MotionError, Stances, forward_kinematics, make_clip
+from contextdb.motion import Clip, MotionError
+from contextdb.motion.clips.poses import LocalPoses, forward_kinematics
+from contextdb.motion.made.recipes import RECIPES, make_clip
+from contextdb.motion.walking.cycle import Cycle
 from contextdb.motion.walking.places import joined, moved, movement_of, movement_to, undone
-from contextdb.motion.walking.stances import blended_stances
+from contextdb.motion.walking.stances import Stances, blended_stances
 
 STEADY = [name for name, recipe in RECIPES.items() if recipe.change == "steady" and recipe.gait != "Idle"]
 PHASES = st.floats(0.0, 1.0, exclude_max=True)

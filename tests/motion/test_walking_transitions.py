@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from contextdb.motion import MotionError, Transitions
+from contextdb.motion import MotionError
+from contextdb.motion.walking.transitions import Transitions
 
 CLIPS = ["walk", "run", "idle_to_walk", "walk_to_idle", "walk_to_rum", "run-idle"]
 

@@ -58,7 +58,7 @@ def test_a_mark_and_a_cost_need_both():
 
 def test_tags_that_were_asked_for_are_named():
     found = told("walk", markup="jog,Calm,,,", tags=TagFilter("Calm"))
-    assert found.reasons == ("tags: its frames do not have the tags that were asked for",)
+    assert found.reasons == ("tags: its frames do not have the tags that were requested",)
     assert kinds(found) == [("tags", "tags on walk", True)]
 
 

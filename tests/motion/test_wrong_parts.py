@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from contextdb.errors import MotionError, SchemaError
-from contextdb.motion import Entry, Gait, MotionConfig, MotionDatabase, Selector, Steered, make_clip
+from contextdb.motion import Entry, MotionConfig, MotionDatabase, Selector, Steered
+from contextdb.motion.made.recipes import make_clip
+from contextdb.motion.walking.blending import Gait
 from contextdb.motion.walking.cycle import Cycle
 
 

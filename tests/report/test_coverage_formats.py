@@ -18,10 +18,11 @@ from report_strategies import MARKUP
 from contextdb.covering import coverage, pairs
 from contextdb.covering.assumed import opened
 from contextdb.covering.baseline import compared, read_baseline
+from contextdb.covering.declared import declared
 from contextdb.covering.report import Overlap
 from contextdb.report import formats, render
 from contextdb.report.coverage_results import CoverageResults, Measured, fail_under, fail_under_telemetry, max_drop, table_gone
-from contextdb.report.coverage_text import bar
+from contextdb.report.document import Bar
 from contextdb.schema.settings import TableSettings
 from contextdb.tables.table import Table
 from contextdb.telemetry.observed import FactNote, Observed, SeenGap
@@ -42,7 +43,7 @@ NAMES = st.sampled_from(MARKUP + HOSTILE).map(lambda text: f"n{text}n")
 def measured_of(table: Table, file: str | None = "tables/t.csv") -> Measured:
     report = coverage(table, samples=500, work=100_000)
     lines = tuple(range(2, table.n_rows + 2))
-    return Measured(report, file, tuple(table.assets), lines, pairs(table, samples=500))
+    return Measured(report, file, tuple(table.assets), lines, pairs(table, samples=500), space=declared(table, report.assumed))
 
 
 def sample(name: str = "jog", assets: tuple[str, ...] = ("walk", "run", "jog")) -> Measured:
@@ -51,7 +52,7 @@ def sample(name: str = "jog", assets: tuple[str, ...] = ("walk", "run", "jog")) 
     cells = {"Asset": list(assets), "speed": ["0..4", "4..9.9999999", "1..2"], name: ["Any", '"a b" c', "c"]}
     table = Table.from_columns(cells, schema, TableSettings("t", assume=("speed != 3",)), name=name)
     before = table.with_cell(1, "speed", "4..10")
-    earlier = read_baseline(json.dumps({"format": 1, "tables": [coverage(before).to_json()]}), "b")[name]
+    [earlier] = read_baseline(render("json", CoverageResults((measured_of(before),))), "b").tables.values()
     found = measured_of(table, f"tables/{name}.csv")
     change = compared(opened(table), found.report, earlier)
     gap = SeenGap("0" * 12, 1.0, 1e-7, 1e-7, {name: "c"}, None)
@@ -63,7 +64,7 @@ def sample(name: str = "jog", assets: tuple[str, ...] = ("walk", "run", "jog")) 
 
 def texts_of(found: Measured) -> dict[str, str]:
     name = found.report.table
-    results = CoverageResults((found,), {name: table_gone(name, False), "kept": table_gone("kept", True)})
+    results = CoverageResults((found,), ((name, table_gone(name, False)), ("kept", table_gone("kept", True))))
     return {name: render(name, results) for name in formats("coverage")}
 
 
@@ -171,7 +172,7 @@ def test_no_share_rounds_to_nothing_or_to_everything(share: float):
 @given(st.floats(0, 1), st.floats(0, 1))
 def test_a_bar_is_full_or_empty_only_where_the_share_is(one: float, other: float):
     lower, upper = sorted((one, other))
-    text = bar(lower, upper, 40)
+    text = Bar(lower, upper, "").text
     assert len(text) == 40
     assert (text == "█" * 40) == (lower == 1.0)
     assert ("█" in text) == (lower > 0.0)

@@ -10,7 +10,7 @@ from report_strategies import EXAMPLE, reports
 from contextdb.console import printable
 from contextdb.findings import LEVELS, Finding
 from contextdb.report import render_github
-from contextdb.report.results import CheckReport, as_path, told
+from contextdb.report.results import CheckReport, as_path, message_of
 
 KINDS = {"error": "error", "warning": "warning", "info": "notice"}
 
@@ -41,7 +41,7 @@ def test_the_runner_reads_back_what_was_found(report: CheckReport):
         expected = {"title": f"contextdb {printable(finding.rule)}"}
         if finding.file:
             expected |= {"file": as_path(finding.file)} | ({"line": str(finding.line)} if finding.line else {})
-        assert read_back(line) == (KINDS[finding.level], expected, told(finding))
+        assert read_back(line) == (KINDS[finding.level], expected, message_of(finding))
 
 
 def test_annotations_look_as_github_documents_them():

@@ -28,7 +28,7 @@ def test_every_field_of_every_finding_comes_back(report: CheckReport):
 
 def test_a_finding_has_the_fixed_fields_with_rows_from_0_and_lines_from_1():
     document = json.loads(render_json.render(EXAMPLE))
-    assert document.keys() == {"format", "findings", "tables"}
+    assert document.keys() == {"format", "findings", "tables", "contracts"}
     assert all(f.keys() >= FIXED for f in document["findings"])
     assert document["findings"][3] == {
         "rule": "identical-rows",
@@ -46,4 +46,4 @@ def test_a_finding_has_the_fixed_fields_with_rows_from_0_and_lines_from_1():
 
 
 def test_nothing_found_is_an_empty_list():
-    assert json.loads(render_json.render(CheckReport((), ()))) == {"format": 1, "findings": [], "tables": []}
+    assert json.loads(render_json.render(CheckReport((), ()))) == {"format": 1, "findings": [], "tables": [], "contracts": []}

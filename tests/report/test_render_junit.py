@@ -14,7 +14,7 @@ from contextdb import report as formats
 from contextdb.checks.rules import TABLE_RULES
 from contextdb.findings import LEVELS, Level
 from contextdb.report import render_junit
-from contextdb.report.results import CheckReport, told
+from contextdb.report.results import CheckReport, message_of
 
 SOME = reports().filter(CheckReport.groups)
 
@@ -38,7 +38,7 @@ def test_the_cases_that_fail_are_those_with_a_finding_that_fails(report: CheckRe
 def test_every_finding_is_told_in_the_case_of_its_rule(report: CheckReport):
     for suite, group in zip(read(report), report.groups(), strict=True):
         cases = {case.get("name"): "".join(case.itertext()) for case in suite}
-        assert all(told(f) in cases[f.rule] for f in group.findings)
+        assert all(message_of(f) in cases[f.rule] for f in group.findings)
 
 
 @given(SOME)

@@ -16,7 +16,7 @@ from report_strategies import EXAMPLE, many, reports
 from contextdb.checks.rules import RULES
 from contextdb.findings import LEVELS, Finding
 from contextdb.report import render_sarif
-from contextdb.report.results import CheckReport, as_path, told
+from contextdb.report.results import CheckReport, as_path, message_of
 
 SARIF_LEVELS = {"error": "error", "warning": "warning", "info": "note"}
 URI = re.compile(r"(file:///)?([\w.~/-]|%[0-9A-F]{2})*", re.ASCII)
@@ -53,7 +53,7 @@ def test_every_finding_is_a_result_of_a_rule_that_is_described(report: CheckRepo
     for result, finding in zip(run["results"], ordered, strict=True):
         assert result["ruleId"] == rules[result["ruleIndex"]]["id"] == finding.rule
         assert result["level"] == SARIF_LEVELS[finding.level]
-        assert as_read(result["message"]["text"]) == told(finding)
+        assert as_read(result["message"]["text"]) == message_of(finding)
     described = [rule for rule in rules if rule["id"] in RULES]
     assert all(rule["help"]["text"] and rule["shortDescription"]["text"] for rule in described)
 

@@ -13,7 +13,7 @@ from contextdb.console import printable, width_of
 from contextdb.findings import Finding
 from contextdb.report import render_text
 from contextdb.report.render_text import wrapped
-from contextdb.report.results import CheckReport, TableSummary, place_of, told
+from contextdb.report.results import CheckReport, TableSummary, message_of, place_of
 
 
 def squeezed(text: str) -> str:
@@ -25,7 +25,7 @@ def squeezed(text: str) -> str:
 def test_every_message_is_there_in_full_beside_its_place(report: CheckReport):
     text = squeezed(render_text.render(report, shows_all=True))
     for finding in report.findings:
-        assert squeezed(place_of(finding) + told(finding, names_asset=False)) in text
+        assert squeezed(place_of(finding) + message_of(finding, names_asset=False)) in text
 
 
 @given(reports(), st.integers(60, 160))

@@ -12,7 +12,7 @@ from report_strategies import EXAMPLE, JOG, RUN, many, reports
 
 from contextdb import ContextDBError, report
 from contextdb.findings import LEVELS, Finding
-from contextdb.report.results import CheckReport, TableSummary, place_of, told
+from contextdb.report.results import CheckReport, TableSummary, message_of, place_of
 
 
 @given(reports())
@@ -99,10 +99,10 @@ def test_each_table_and_each_finding_is_in_one_group(found: CheckReport):
 def test_a_finding_says_what_it_is_about():
     by_line = Finding("empty-cell", "error", "it is empty.", "jog", "tables/jog.csv", 3, "Jog\n1", 5, "speed")
     by_row = Finding("empty-cell", "error", "it is empty.", "run", "tables/run.parquet", 3, None, None, "speed")
-    assert (place_of(by_line), told(by_line)) == ("tables/jog.csv:5", r'"Jog\n1", column "speed": it is empty.')
-    assert told(by_line, names_asset=False) == 'column "speed": it is empty.'
-    assert (place_of(by_row), told(by_row)) == ("tables/run.parquet", 'row 4, column "speed": it is empty.')
-    assert (place_of(Finding("odd", "info", "nowhere.")), told(Finding("odd", "info", "nowhere."))) == ("", "nowhere.")
+    assert (place_of(by_line), message_of(by_line)) == ("tables/jog.csv:5", r'"Jog\n1", column "speed": it is empty.')
+    assert message_of(by_line, names_asset=False) == 'column "speed": it is empty.'
+    assert (place_of(by_row), message_of(by_row)) == ("tables/run.parquet", 'row 4, column "speed": it is empty.')
+    assert (place_of(Finding("odd", "info", "nowhere.")), message_of(Finding("odd", "info", "nowhere."))) == ("", "nowhere.")
 
 
 def test_labels_are_all_different():

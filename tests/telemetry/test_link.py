@@ -18,11 +18,10 @@ import contextdb as cdb
 from contextdb import motion
 from contextdb.cells.facts import FactSet
 from contextdb.compiled.live import LiveContext
-from contextdb.compiled.live_asking import AskingLiveContext
 from contextdb.compiled.table import data_of
+from contextdb.telemetry.link.feed import MOST_ENTRIES, Feed, Moments, Picked, Source
 from contextdb.telemetry.link.lines import given_facts
 from contextdb.telemetry.link.listeners import FileListener
-from contextdb.telemetry.link.ring import MOST_ENTRIES, Moments, Picked, Ring, Source, newest
 
 __all__ = ["meeting"]
 pytestmark = pytest.mark.skipif(not hasattr(os, "getuid"), reason="sockets in folders of a user are of Unix")
@@ -39,41 +38,36 @@ def link(meeting: Path) -> Iterator[cdb.Link]:
         yield opened
 
 
-def what_it_is(compiled: cdb.CompiledTable) -> tuple[object, ...]:
-    data = data_of(compiled)
-    return data._ask, data.heard, sorted(set(vars(data)) - {"_tap"})
-
-
-def test_while_nobody_listens_a_table_is_the_object_that_it_was(link: cdb.Link, meeting: Path):
+def test_what_is_watched_is_the_object_that_it_was_and_its_copies_are_watched_by_nobody(link: cdb.Link, meeting: Path):
     jog = table()
+    live = jog.live(FACTS)
     jog.query(FACTS)
-    data = data_of(jog)
-    data.version, data.asked, data.keep, data.mirroring, jog.pick(FACTS)
-    ask = data._ask
+    ask = data_of(jog)._ask
     link.watch(jog, "player")
-    before = what_it_is(jog)
-    assert data._ask is ask
+    link.watch(live, "npc")
     with listening(link, meeting):
-        assert data._ask is not ask
-    until(lambda: not link.is_heard)
-    assert data._ask is ask
-    assert what_it_is(jog) == before
+        assert (data_of(jog)._ask, type(live)) == (ask, LiveContext)
+        for copied in (live.copy(), copy.deepcopy(live), pickle.loads(pickle.dumps(live))):
+            assert copied._watcher is None
+            assert copied.matches().assets == live.matches().assets
+        assert data_of(pickle.loads(pickle.dumps(jog)))._watcher is None
+    link.close()
+    assert data_of(jog)._watcher is live._watcher is None
 
 
-def test_while_nobody_listens_a_live_context_is_of_the_class_that_it_was(link: cdb.Link, meeting: Path):
-    live = table().live(FACTS)
-    link.watch(live, "player")
-    assert type(live) is LiveContext
-    with listening(link, meeting):
-        assert type(live) is not LiveContext
-        fork = live.copy()
-        assert type(fork) is LiveContext
-        assert type(copy.deepcopy(live)) is LiveContext
-        assert type(pickle.loads(pickle.dumps(live))) is LiveContext
-        assert fork.matches().assets == live.matches().assets
-    until(lambda: not link.is_heard)
-    assert type(live) is LiveContext
-    assert not hasattr(live, "_ears")
+def test_a_copy_of_a_controller_is_watched_by_nobody(link: cdb.Link):
+    controller = motion.Controller(two_databases())
+    link.watch(controller)
+    assert copy.deepcopy(controller)._watcher is None
+    assert controller.copy()._watcher is None
+
+
+def test_while_nobody_listens_nothing_is_published(link: cdb.Link, meeting: Path):
+    jog = table()
+    link.watch(jog, "player")
+    jog.pick(jog.query(FACTS))
+    jog.live(FACTS).matches()
+    assert not link._feed.entries
 
 
 def test_a_listener_learns_who_asked_what_and_what_was_picked(link: cdb.Link, meeting: Path):
@@ -84,7 +78,7 @@ def test_a_listener_learns_who_asked_what_and_what_was_picked(link: cdb.Link, me
         assert hearing.header["pid"] == os.getpid()
         told = hearing.header["tables"]["jog"]
         assert told == {"version": jog.version, "rows": 3, "conditions": {"speed": "number", "gait": "enum"}}
-        with link._publisher.lock:  # so that both are told at once
+        with link._writer.lock:  # so that both are told at once
             asset = jog.pick(jog.query(FACTS))
         [line] = next_lines(hearing, "ask")
     assert (line["who"], line["table"], line["facts"]) == ("player", "jog", FACTS)
@@ -101,7 +95,7 @@ def test_every_way_to_ask_a_table_is_told_once(meeting: Path, file: Path):
         jog.query(FACTS, unknown="any")
         jog.query({"speed": 1.0}, unknown="never")  # read with care
         jog.query({"speed": FactSet("0..5"), "gait": "Idle"})
-        with link._publisher.lock:
+        with link._writer.lock:
             jog.pick(FACTS)
         with pytest.raises(cdb.ContextError):
             jog.query({"speed": 1.0})
@@ -145,7 +139,7 @@ def test_a_live_context_tells_what_it_is_asked_and_its_picks_are_its_own(meeting
     with cdb.link("game", record=file) as link:
         for number, live in enumerate(contexts):
             link.watch(live, f"npc{number}")
-        with link._publisher.lock:
+        with link._writer.lock:
             answers = [live.matches() for live in contexts]
             for answer in answers:
                 jog.pick(answer)
@@ -171,7 +165,7 @@ def test_a_live_context_with_derived_facts_and_rules_is_watched_too(meeting: Pat
     with cdb.link("game", record=file) as link:
         link.watch(live, "npc")
         assert len(live.matches()) == 1
-    assert type(live) is AskingLiveContext
+    assert type(live) is LiveContext
     assert [line["facts"] for line in recorded(file)] == [{"speed": 1.0, "goal": 3.0}]
 
 
@@ -220,11 +214,11 @@ def test_a_folder_that_is_watched_stays_watched_over_a_hot_reload(meeting: Path,
                 watch.poll()
             new = watch["jog"]
             assert new is not old
-            until(lambda: data_of(new).heard is not None)
+            until(lambda: data_of(new)._watcher is not None)
             assert next_lines(hearing, "tables")[0]["tables"]["jog"]["version"] == new.version
             new.query({"speed": 5.0})
             assert next_lines(hearing, "ask")[0]["rows"] == "2"
-    assert data_of(new).heard is None
+    assert data_of(new)._watcher is None
 
 
 def test_what_the_game_lets_go_is_watched_no_more(meeting: Path, file: Path):
@@ -234,10 +228,10 @@ def test_what_the_game_lets_go_is_watched_no_more(meeting: Path, file: Path):
         for _ in range(50):
             link.watch(jog.live(FACTS), "gone")
         gc.collect()
-        until(lambda: len(link._taps) == 1)
+        until(lambda: len(link._watched) == 1)
         del jog
         gc.collect()
-        until(lambda: len(link._taps) == 0)
+        until(lambda: len(link._watched) == 0)
 
 
 def two_databases() -> motion.Selector:
@@ -250,7 +244,7 @@ def two_databases() -> motion.Selector:
     return motion.Selector([motion.Entry("all", database)])
 
 
-def test_a_controller_tells_its_decisions_and_gets_its_own_recorder_back(meeting: Path, file: Path):
+def test_a_controller_tells_its_decisions_and_keeps_its_own_recorder(meeting: Path, file: Path):
     class Kept:
         n_candidates = 1
 
@@ -349,76 +343,64 @@ def test_a_process_that_is_forked_off_tells_nothing_and_takes_nothing_along(link
         child = os.fork()
         if child == 0:
             jog.query(FACTS)
-            os._exit(0 if data_of(jog).heard is None and link._is_closed else 1)
+            os._exit(0 if data_of(jog)._watcher is None and link._is_closed else 1)
         assert os.waitpid(child, 0)[1] == 0
         jog.query(FACTS)
         assert next_lines(hearing, "ask")
 
 
-# ---- the ring
+# ---- the queue
 
 
 SOURCE = Source("jog", "v", 3, {})
 
 
-def filled(*entries: tuple[object, object, object]) -> Ring:
-    ring = Ring(100)
-    ring.keeps_all = True
+def lines_of(*entries: tuple[str, object, object], every: bool = False) -> list[tuple[str | None, object, object]]:
+    feed, moments = Feed(), Moments()
     for who, what, answer in entries:
-        ring.put(who, 0.0, who, SOURCE, what, answer)  # type: ignore[arg-type]
-    return ring
+        feed.put(who, SOURCE, what, answer)  # type: ignore[arg-type]
+    new = moments.of(feed.take(100))
+    return [(one.who, one.facts, one.pick and one.pick.asset) for one in (new if every else moments.newest())]
 
 
-def told(ring: Ring, every: bool) -> list[tuple[str | None, object, object]]:
-    entries = ring.take()
-    kept = entries if every else newest(entries)
-    return [(one.who, one.facts, one.pick and one.pick.asset) for one in Moments().of(kept)]
-
-
-def test_of_each_character_the_newest_question_is_told_and_the_newest_that_was_picked_from():
+def test_of_each_character_the_newest_question_is_sent_and_the_newest_that_was_picked_from():
     answers = [object() for _ in range(4)]
     entries = [("a", {"n": i}, answer) for i, answer in enumerate(answers)]
-    entries.insert(2, ("a", Picked(0, "walk"), answers[1]))
-    entries.insert(1, ("a", Picked(1, "old"), answers[0]))
+    entries.insert(2, ("a", Picked(0, "walk"), answers[1]))  # type: ignore[arg-type]
+    entries.insert(1, ("a", Picked(1, "old"), answers[0]))  # type: ignore[arg-type]
     entries.append(("b", {"n": 9}, object()))
-    assert told(filled(*entries), False) == [("a", {"n": 1}, "walk"), ("a", {"n": 3}, None), ("b", {"n": 9}, None)]
-    assert told(filled(*entries), True) == [
+    assert lines_of(*entries) == [("a", {"n": 1}, "walk"), ("a", {"n": 3}, None), ("b", {"n": 9}, None)]
+    assert lines_of(*entries, every=True) == [
         ("a", {"n": 0}, "old"), ("a", {"n": 1}, "walk"), ("a", {"n": 2}, None), ("a", {"n": 3}, None), ("b", {"n": 9}, None)
     ]  # fmt: skip
 
 
-def test_a_pick_of_an_answer_that_was_told_before_is_of_who_asked():
-    answer, moments = object(), Moments()
-    ring = filled(("a", {"n": 1}, answer))
-    moments.of(ring.take())
-    ring.put("a", 0.0, "table", SOURCE, Picked(2, "run"), answer)  # type: ignore[arg-type]
-    [pick] = moments.of(ring.take())
+def test_characters_that_ask_first_and_are_picked_for_later_keep_their_picks():
+    answers = {name: object() for name in "abcdef"}
+    asked = [(name, {"n": 1}, answer) for name, answer in answers.items()]
+    picked = [("table", Picked(0, f"of {name}"), answers[name]) for name in "abc"]
+    assert [(who, asset) for who, _, asset in lines_of(*asked, *picked)] == [
+        ("a", "of a"), ("b", "of b"), ("c", "of c"), ("d", None), ("e", None), ("f", None)
+    ]  # fmt: skip
+
+
+def test_a_pick_of_a_question_that_was_sent_before_is_of_who_asked():
+    answer, feed, moments = object(), Feed(), Moments()
+    feed.put("a", SOURCE, {"n": 1}, answer)  # type: ignore[arg-type]
+    [question] = moments.of(feed.take(9))
+    question._line = b"{}"
+    moments.newest()
+    feed.put("table", SOURCE, Picked(2, "run"), answer)  # type: ignore[arg-type]
+    [pick] = moments.of(feed.take(9))
     assert (pick.who, pick.facts, pick.pick) == ("a", None, Picked(2, "run"))
 
 
-def test_entries_that_had_to_go_are_counted():
-    ring = Ring(4)
-    ring.keeps_all = True
-    for number in range(10):
-        ring.put("a", 0.0, "a", SOURCE, {"n": number}, None)
-    assert [entry[4] for entry in ring.take()] == [{"n": n} for n in range(6, 10)]
-    assert ring.lost() == 6
-    assert ring.lost() == 0
-    ring.put("a", 0.0, "a", SOURCE, {}, None)
-    assert len(ring.take()) == 1
-    assert ring.lost() == 0
-
-
-def test_what_was_told_to_nobody_is_not_lost():
-    ring = Ring(4)
-    ring.keeps_all = True
-    for _ in range(3):
-        for number in range(10):
-            ring.put("a", 0.0, "a", SOURCE, {"n": number}, None)
-        ring.forget(lambda: None)
-    ring.put("a", 0.0, "a", SOURCE, {}, None)
-    assert len(ring.take()) == 1
-    assert ring.lost() == 0
+def test_a_full_queue_drops_what_comes_next_and_counts_it():
+    feed = Feed(4)
+    for n in range(10):
+        feed.put("a", SOURCE, {"n": n})
+    assert [entry[3] for entry in feed.take(100)] == [{"n": n} for n in range(4)]
+    assert (feed.dropped(), feed.dropped()) == (6, 0)
 
 
 def test_no_entry_is_lost_or_told_twice_when_several_threads_ask(meeting: Path, file: Path):
@@ -445,8 +427,8 @@ def test_lines_that_are_lost_are_told(link: cdb.Link, meeting: Path):
     jog = table()
     link.watch(jog)
     with listening(link, meeting, every=True) as hearing:
-        until(lambda: link._ring.keeps_all)
-        with link._publisher.lock:  # the thread waits, as on a machine that is busy
+        until(lambda: link._writer._listeners and link._writer._listeners[0].wants_every)
+        with link._writer.lock:  # the thread waits, as on a machine that is busy
             generator = random.Random(0)
             for _ in range(3 * MOST_ENTRIES):
                 jog.query({**FACTS, "speed": generator.random()})
@@ -455,59 +437,20 @@ def test_lines_that_are_lost_are_told(link: cdb.Link, meeting: Path):
     assert lost >= MOST_ENTRIES
 
 
-# ---- the newest alone
-
-
-def slotted() -> Ring:
-    return Ring(4)
-
-
-def test_of_each_teller_the_newest_is_kept_with_the_newest_that_was_picked_from():
-    ring, answers = slotted(), [object() for _ in range(5)]
-    for time_s, answer in enumerate(answers):
-        ring.put("a", time_s, "a", SOURCE, {"n": time_s}, answer)  # type: ignore[arg-type]
-        if time_s in (1, 2):
-            ring.put_pick(("table", "a"), time_s, "table", SOURCE, Picked(time_s, f"p{time_s}"), answer)  # type: ignore[arg-type]
-    ring.put("b", 9.0, "b", SOURCE, {"n": 9}, None)
-    assert not ring.entries
-    assert told(ring, False) == [("a", {"n": 2}, "p2"), ("a", {"n": 4}, None), ("b", {"n": 9}, None)]
-    assert ring.lost() == 0
-    assert ring.take() == []
-
-
-def test_a_pick_of_an_older_answer_is_told_by_itself():
-    ring, old = slotted(), object()
-    ring.put("a", 1.0, "a", SOURCE, {"n": 1}, old)  # type: ignore[arg-type]
-    ring.put("a", 2.0, "a", SOURCE, {"n": 2}, object())  # type: ignore[arg-type]
-    ring.put_pick(("a",), 3.0, "a", SOURCE, Picked(0, "walk"), old)  # type: ignore[arg-type]
-    assert told(ring, False) == [("a", {"n": 2}, None), ("a", None, "walk")]
-
-
-def test_characters_that_ask_first_and_are_picked_for_later_keep_their_picks():
-    ring, answers = slotted(), {name: object() for name in "abcdef"}
-    for time_s, (name, answer) in enumerate(answers.items()):
-        ring.put(name, time_s, name, SOURCE, {}, answer)  # type: ignore[arg-type]
-    for name, answer in list(answers.items())[:3]:
-        ring.put_pick(("table", "f"), 9.0, "table", SOURCE, Picked(0, f"of {name}"), answer)  # type: ignore[arg-type]
-    assert [(who, asset) for who, _, asset in told(ring, False)] == [
-        ("a", "of a"), ("b", "of b"), ("c", "of c"), ("d", None), ("e", None), ("f", None)
-    ]  # fmt: skip
-
-
 def test_a_listener_that_wants_the_newest_gets_each_character_of_a_table(link: cdb.Link, meeting: Path):
     jog, now = table(), {"who": ""}
     link.watch(jog, lambda: now["who"])
     live = jog.live(FACTS)
     link.watch(live, "npc")
-    with listening(link, meeting) as hearing, link._publisher.lock:
+    with listening(link, meeting) as hearing, link._writer.lock:
         for now["who"] in ("a", "b", "a"):
             jog.query(FACTS)
         picked = jog.pick(live.matches())
-        link._publisher.lock.release()
+        link._writer.lock.release()
         try:
             lines = next_lines(hearing, "ask", 3)
         finally:
-            link._publisher.lock.acquire()
+            link._writer.lock.acquire()
     assert sorted((line["who"], line.get("pick", {}).get("asset")) for line in lines) == [("a", None), ("b", None), ("npc", picked)]
 
 

@@ -34,8 +34,8 @@ class Desk(App[None]):
 
     def __init__(self, condition: Condition | None, text: str, at: Region = CELL, kind: str = "", **more: Any) -> None:
         super().__init__()
-        self.said: list[CellEditor.Committed | CellEditor.Cancelled] = []
-        self._more = {"check": checker(condition, more.get("is_fact", False)), "known": (), **more}
+        self.said: list[CellEditor.Outcome] = []
+        self._more = {"check": checker(condition, more.get("is_fact", False)), "known": (), "on_done": self.said.append, **more}
         self._of = condition, kind or condition.domain.kind, text
         self.at = at
 
@@ -53,12 +53,6 @@ class Desk(App[None]):
         """Remember where everything stands: an app that has ended no longer knows."""
         popup = self.query_one(Popup)
         self.entry_at, self.popup_at = self.editor.region, popup.region if popup.display else None
-
-    def on_cell_editor_committed(self, message: CellEditor.Committed) -> None:
-        self.said.append(message)
-
-    def on_cell_editor_cancelled(self, message: CellEditor.Cancelled) -> None:
-        self.said.append(message)
 
 
 def checker(condition: Condition | None, is_fact: bool) -> Callable[[str], Fault | None]:

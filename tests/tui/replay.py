@@ -203,7 +203,7 @@ class Replay:
         if step.command == "column":
             return iter(next(c for c in self.app.main.session.sheet.table.columns if c.name == step.rest).to_list())
         if step.command == "said":
-            text, level = self.app.main._said
+            text, level = self.app.main._notice
             return iter([text if level == "information" else f"! {text}"])
         lines = [SCROLL_BAR.sub("", line) for line in screen_text(self.app).splitlines()]
         if step.command == "place":

@@ -91,4 +91,4 @@ async def press(pilot: Pilot[Any], *keys: str) -> None:
 
 def said(app: EditorApp) -> str:
     """What the line over the footer says."""
-    return app.main._said[0]
+    return app.main._notice[0]

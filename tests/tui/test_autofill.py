@@ -14,8 +14,9 @@ from running import run
 from terminal import press, said, screen_text, with_editor
 from textual.pilot import Pilot
 
-from contextdb.motion import make_clip, write_bvh
-from contextdb.tables.clip_folder import Tell
+from contextdb.authoring.clip_folder import Tell
+from contextdb.motion import write_bvh
+from contextdb.motion.made.recipes import make_clip
 from tui.app import EditorApp
 from tui.screens import autofill
 from tui.screens.autofill import AutofillDialog
@@ -223,4 +224,4 @@ def test_a_folder_without_clips_is_told(game: Path):
         await press(pilot, "enter")
         return " ".join(screen_text(app).split())
 
-    assert "no BVH file" in in_dialog(game, then)
+    assert "there is no file of" in in_dialog(game, then)

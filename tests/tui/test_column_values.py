@@ -11,7 +11,7 @@ from contextdb.columns import TextColumn
 from contextdb.errors import TableError
 from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict
 from contextdb.tables.table import Table
-from tui.model.column_values import described, selection_said, values_of
+from tui.model.column_values import described, selection_summary, values_of
 from tui.model.sheet import Sheet
 from tui.model.views import CellTest, Filter, Sort
 
@@ -155,10 +155,10 @@ def test_a_selection_of_numbers_is_summed_up_and_other_texts_are_counted():
     sheet = sheet_of()
     sheet.go(0, 3)
     sheet.go(4, 3, extend=True)
-    assert selection_said(sheet) == ": sum 16, mean 4, 1 to 10"
+    assert selection_summary(sheet) == ": sum 16, mean 4, 1 to 10"
     sheet.go(0, 2)
     sheet.go(4, 2, extend=True)
-    assert selection_said(sheet) == ": 4 different texts"
+    assert selection_summary(sheet) == ": 4 different texts"
 
 
 @pytest.fixture

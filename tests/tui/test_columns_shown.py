@@ -9,42 +9,41 @@ from hypothesis import given
 from hypothesis import strategies as st
 from terminal import press, said, screen_text, with_editor
 
-from tui.model.columns_shown import ColumnsShown, prefix_of
-from tui.model.kept_columns import kept_columns, kept_path
 from tui.model.layout import layout
 from tui.model.session import Session
+from tui.model.visible_columns import VisibleColumns, columns_path, prefix_of, read_columns
 
 NAMES = ["Asset", "Defender.Depth", "Defender.Facing", "gait", "Catcher.Depth", "Defender.Late"]
 RAW = ",".join(NAMES) + "\na,CB,True,Walk,1,x\nb,FS,Any,Run,2,y\n"
 
 
-def seen(shown: ColumnsShown) -> list[str]:
+def seen(shown: VisibleColumns) -> list[str]:
     return [name for name, is_hidden in zip(NAMES, shown.are_hidden(NAMES, "Asset"), strict=True) if not is_hidden]
 
 
 def test_a_folded_group_shows_its_first_column_only():
-    folded = ColumnsShown().folded_at("Defender.Facing")
+    folded = VisibleColumns().folded_at("Defender.Facing")
     assert seen(folded) == ["Asset", "Defender.Depth", "gait", "Catcher.Depth"]
-    assert folded.folded_at("Defender.Depth") == ColumnsShown()
-    assert ColumnsShown().folded_at("gait") == ColumnsShown()
+    assert folded.folded_at("Defender.Depth") == VisibleColumns()
+    assert VisibleColumns().folded_at("gait") == VisibleColumns()
 
 
 def test_where_the_first_of_a_group_is_hidden_the_next_one_is_seen():
-    shown = ColumnsShown(frozenset(["Defender.Depth"]), frozenset(["Defender."]))
+    shown = VisibleColumns(frozenset(["Defender.Depth"]), frozenset(["Defender."]))
     assert seen(shown) == ["Asset", "Defender.Facing", "gait", "Catcher.Depth"]
 
 
 def test_a_hidden_column_is_revealed_and_the_assets_are_never_hidden():
-    shown = ColumnsShown().turned("gait").turned("Asset")
+    shown = VisibleColumns().turned("gait").turned("Asset")
     assert "gait" not in seen(shown)
     assert "Asset" in seen(shown)
     assert seen(shown.revealed("gait")) == NAMES
 
 
 def test_columns_are_frozen_up_to_one_or_up_to_the_assets():
-    assert ColumnsShown().n_frozen(NAMES, "Asset") == 1
-    assert ColumnsShown(frozen="gait").n_frozen(NAMES, "Asset") == 4
-    assert ColumnsShown(frozen="gone").n_frozen(NAMES, "Asset") == 1
+    assert VisibleColumns().n_frozen(NAMES, "Asset") == 1
+    assert VisibleColumns(frozen="gait").n_frozen(NAMES, "Asset") == 4
+    assert VisibleColumns(frozen="gone").n_frozen(NAMES, "Asset") == 1
 
 
 @pytest.mark.parametrize(("name", "prefix"), [("Defender.Depth", "Defender."), ("gait", None), ("a.b.c", "a.")])
@@ -121,11 +120,20 @@ def test_the_list_of_columns_hides_freezes_and_goes(path):
     async def script(app, pilot):
         await press(pilot, "right", "alt+j", "space", "f", "down", "enter")
         sheet = app.main.session.sheet
-        return sheet.columns_shown, sheet.cursor
+        return sheet.visible_columns, sheet.cursor
 
     shown, cursor = with_editor(path, script, (120, 30))
-    assert shown == ColumnsShown(frozenset(["Defender.Depth"]), frozen="Defender.Facing")
+    assert shown == VisibleColumns(frozenset(["Defender.Depth"]), frozen="Defender.Facing")
     assert cursor == (0, 3)
+
+
+def test_the_capitals_that_a_hint_names_do_what_the_letters_do(path):
+    async def script(app, pilot):
+        await press(pilot, "right", "alt+j", "F", "escape", *"Q", "enter")
+        sheet = app.main.session.sheet
+        return sheet.visible_columns.frozen, sheet.table.text_column("Defender.Depth").to_list()
+
+    assert with_editor(path, script) == ("Defender.Depth", ["Q", "FS"])
 
 
 def test_the_list_of_columns_counts_the_texts_that_are_in_rows_now(path):
@@ -159,21 +167,21 @@ def test_problems_go_to_a_hidden_column_and_show_it(path):
 
 
 def test_what_is_hidden_folded_and_frozen_is_kept_for_the_next_time(path):
-    wanted = ColumnsShown(frozenset(["gait"]), frozenset(["Defender."]), "Defender.Depth")
+    wanted = VisibleColumns(frozenset(["gait"]), frozenset(["Defender."]), "Defender.Depth")
     session = Session(path)
     session.sheet.show_columns(wanted)
     session.close()
     again = Session(path)
-    kept, cursor = again.sheet.columns_shown, again.sheet.cursor
-    again.sheet.show_columns(ColumnsShown())
+    kept, cursor = again.sheet.visible_columns, again.sheet.cursor
+    again.sheet.show_columns(VisibleColumns())
     again.close()
     assert (kept, cursor) == (wanted, (0, 0))
-    assert not kept_path(path).exists()
+    assert not columns_path(path).exists()
     assert path.read_text() == RAW
 
 
 @pytest.mark.parametrize("raw", [b"no", b"[]", b'{"hidden": 3}', b"\xff"])
 def test_a_file_of_kept_columns_that_is_none_hides_nothing(path, raw):
-    kept_path(path).parent.mkdir()
-    kept_path(path).write_bytes(raw)
-    assert kept_columns(path) == ColumnsShown()
+    columns_path(path).parent.mkdir()
+    columns_path(path).write_bytes(raw)
+    assert read_columns(path) == VisibleColumns()

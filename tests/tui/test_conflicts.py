@@ -12,7 +12,7 @@ from textual.pilot import Pilot
 
 from contextdb.tables.merging.conflicts import Conflict
 from tui.model.lock import Holder
-from tui.screens.conflicts import ConflictsDialog, told
+from tui.screens.conflicts import ConflictsDialog, version_text
 from tui.screens.dialog import Dialog
 from tui.screens.leaving import HeldDialog, LeavingDialog
 
@@ -131,7 +131,12 @@ def test_a_thousand_conflicts_fit_any_screen_and_the_end_is_reached(size):
 
 
 def test_what_is_not_there_is_said_in_words():
-    assert [told(None), told(""), told(" "), told("a\nb")] == ["(deleted)", "(empty)", "(empty)", "a\\nb"]
+    assert [version_text(None), version_text(""), version_text(" "), version_text("a\nb")] == [
+        "(deleted)",
+        "(empty)",
+        "(empty)",
+        "a\\nb",
+    ]
 
 
 # ---- leaving

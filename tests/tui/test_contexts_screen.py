@@ -20,7 +20,7 @@ from contextdb.checks.cases import read_cases
 from contextdb.tables.project import load
 from contextdb.tables.table import Table
 from tui.model.context_list import ContextList
-from tui.screens.contexts import ContextsDialog, Loaded, columns_of, shown_facts
+from tui.screens.contexts import ContextsDialog, Loaded, columns_of, displayed_facts
 
 TOML = """
 [conditions.speed]
@@ -353,16 +353,16 @@ def wide(tmp_path: Path) -> ContextList:
 
 def test_facts_that_are_the_same_in_every_case_make_room_for_the_others(tmp_path: Path):
     contexts = wide(tmp_path)
-    shown_at_80 = shown_facts(contexts, 72)
+    shown_at_80 = displayed_facts(contexts, 72)
     assert "condition_29" in shown_at_80
     assert len(shown_at_80) < 10
-    assert len(shown_facts(contexts, 1000)) == 30
+    assert len(displayed_facts(contexts, 1000)) == 30
 
 
 @pytest.mark.parametrize("width", [30, 60, 80, 100, 160])
 def test_the_columns_shown_fit_the_room(tmp_path: Path, width: int):
     contexts = wide(tmp_path)
-    columns = columns_of(contexts, shown_facts(contexts, width))
+    columns = columns_of(contexts, displayed_facts(contexts, width))
     assert sum(column.width for column in columns) + 2 * (len(columns) - 1) <= max(width, 19)
 
 

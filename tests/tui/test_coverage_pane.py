@@ -14,7 +14,7 @@ from textual.pilot import Pilot
 
 import contextdb as cdb
 from contextdb.covering import Cancelled
-from tui.messages import FillGap, GoToCell, SetContext, Told
+from tui.messages import FillGap, GoToCell, Notice, SetContext
 from tui.model.coverage_lines import as_typed
 from tui.model.coverage_run import CoverageRun, Result
 from tui.model.sheet import Sheet
@@ -61,7 +61,7 @@ class PaneApp(App[None]):
     def on_go_to_cell(self, message: GoToCell) -> None:
         self.told.append(message)
 
-    def on_told(self, message: Told) -> None:
+    def on_notice(self, message: Notice) -> None:
         self.told.append(message)
 
 
@@ -338,7 +338,7 @@ def test_a_gap_over_a_condition_that_is_gone_is_not_filled():
         await pilot.press("enter")
 
     app, _ = shown(play)
-    assert [(type(m), m.level) for m in app.told] == [(Told, "warning")]
+    assert [(type(m), m.level) for m in app.told] == [(Notice, "warning")]
     assert '"speed" is not a condition any more' in app.told[0].text
 
 

@@ -65,7 +65,7 @@ def game(here: Path, meeting: Path) -> Iterator[Game]:
 @pytest.fixture
 def live(game: Game, meeting: Path, here: Path) -> Iterator[Live]:
     one = Live("game", meeting / "game.sock", None, str(here / "game"), game.recorded.databases, clock=lambda: 0.0)
-    until(lambda: game.link.is_heard and game.link._ring.keeps_filters)
+    until(lambda: game.link.is_heard and game.link._feed.wants_filters)
     yield one
     one.close()
 
@@ -77,9 +77,7 @@ def heard(live: Live, n: int) -> None:
 
 def test_what_is_heard_is_what_a_recorder_keeps_and_is_asked_again_bit_for_bit(game: Game, live: Live):
     own = Trace()
-    tap = game.controller.recorder
-    assert tap is not None
-    tap._other = own  # type: ignore[attr-defined]
+    game.controller.recorder = own
     game.play(40)
     heard(live, 40)
     assert live.recording is not None
@@ -122,10 +120,9 @@ def test_nobody_who_only_looks_makes_decisions_cost_more(game: Game, meeting: Pa
 
     with hear(meeting / "game.sock"):
         until(lambda: game.link.is_heard)
-        assert game.controller.recorder is not None
-        assert game.controller.recorder.n_candidates == 0
+        assert game.controller._n_candidates == 0
     until(lambda: not game.link.is_heard)
-    assert game.controller.recorder is None
+    assert game.controller._n_candidates == 0
 
 
 def test_the_screen_follows_is_held_and_goes_back_to_now(game: Game, live: Live):

@@ -8,23 +8,12 @@ import numpy as np
 import pytest
 from test_motion_measure_command import here, made
 
-from contextdb.motion import (
-    Channel,
-    Controller,
-    Entry,
-    FeatureSchema,
-    LeftOut,
-    MotionDatabase,
-    Permutations,
-    PoseBank,
-    Selector,
-    Trace,
-    make_clip,
-    open_or_build,
-    poses_path,
-    save_poses,
-)
+from contextdb.motion import Channel, Controller, Entry, FeatureSchema, MotionDatabase, PoseBank, Selector, Trace, open_or_build
+from contextdb.motion.features.permutations import Permutations
+from contextdb.motion.made.recipes import make_clip
+from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.storage.config import MotionConfig
+from contextdb.motion.storage.pose_files import poses_path, save_poses
 from contextdb.motion.trace.stats import gains_of
 from contextdb.tables.project import Project
 from tui.debug import ladder

@@ -16,7 +16,8 @@ from test_motion_measure_command import here, made
 from textual.pilot import Pilot
 
 from contextdb.errors import MotionError
-from contextdb.motion import Action, Decision, Playing, Together, Trace
+from contextdb.motion import Action, Decision, Trace
+from contextdb.motion.selection.decision import Playing, Together
 from contextdb.motion.trace.cost_views import cost_text
 from tui.debug.app import DebugApp
 from tui.debug.opening import opened
@@ -266,13 +267,13 @@ def test_weights_are_written_and_taken_back(recording: Recording, here: Path):
     assert '{ type = "position", bone = "LeftFoot", weight = 1.5 }' in written
     assert "threshold = 0.0 }" in written
     assert len(set(written.splitlines()) - set(before.splitlines())) == 2
-    assert "says these weights now; u takes it back." in said
+    assert "has these weights now; u undoes it." in said
     assert back == before
 
 
 def test_nothing_is_written_where_nothing_is_turned(recording: Recording, here: Path):
-    assert "Nothing is turned" in after(recording, "w")
-    assert "Nothing was written" in after(recording, "u")
+    assert "No weight is changed" in after(recording, "w")
+    assert "There is nothing written to undo" in after(recording, "u")
 
 
 # ---- panes, poses and sizes
@@ -461,8 +462,8 @@ def test_what_is_not_there_is_said(recording: Recording):
     assert "There is no jump before this moment." in jump
     assert "There is no peak of" in peak
     for text in (run, write):
-        assert "Nothing is turned" in text
-    assert "Nothing was written" in undo
+        assert "No weight is changed" in text
+    assert "nothing written to undo" in undo
 
 
 def test_a_weight_that_is_turned_back_is_turned_no_more(recording: Recording):

@@ -12,9 +12,9 @@ from terminal import press, said, screen_text, with_editor
 from textual.events import Key, Paste
 
 import tui.doing
-from tui.messages import Told
+from tui.messages import Notice
 from tui.model.find import Search
-from tui.model.long_work import told
+from tui.model.long_work import with_progress
 from tui.model.sheet import Done, Sheet
 from tui.widgets.find_bar import FindBar
 
@@ -43,7 +43,7 @@ async def ended(app, pilot) -> None:
 
 def test_esc_stops_long_work_before_a_cell_is_changed(file, is_long):
     def for_ever(sheet: Sheet) -> Done:
-        for _ in told(count(), 1000):
+        for _ in with_progress(count(), 1000):
             pass
         return sheet.clear()
 
@@ -75,7 +75,7 @@ def test_keys_wait_for_a_long_paste_which_is_one_step(file, is_long):
 
 def test_a_long_copy_says_its_share_and_then_what_was_copied(file, is_long, monkeypatch):
     shares: list[str] = []
-    monkeypatch.setattr(tui.doing, "Told", lambda *told: shares.append(told[0]) or Told(*told))
+    monkeypatch.setattr(tui.doing, "Notice", lambda *told: shares.append(told[0]) or Notice(*told))
 
     async def script(app, pilot):
         await press(pilot, "ctrl+a", "ctrl+c")

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from strategies import tables
-from terminal import drive, screen_text, with_editor
+from terminal import drive, press, screen_text, with_editor
 from terminal import said as said_by
 from textual.app import App
 from textual.pilot import Pilot
@@ -495,3 +495,30 @@ def test_the_editor_writes_an_export_and_says_so(table: Table):
 
     assert with_editor(table.path, script) == "Wrote out.tsv."
     assert (table.path.parent / "work" / "out.tsv").read_text("utf-8").splitlines()[0] == "Asset Name\tspeed"
+
+
+@pytest.mark.parametrize("where", ["read", "answer"])
+def test_a_file_at_which_we_fail_ends_neither_the_dialog_nor_the_editor(tmp_path, monkeypatch, where):
+    def fail(*_: object) -> None:
+        raise IndexError("list index out of range")
+
+    (path := tmp_path / "t.csv").write_text("Asset,speed\nwalk,2\n")
+    (tmp_path / "other.csv").write_text("Asset,speed\nnew,1\n")
+
+    async def script(app, pilot):
+        await press(pilot, "x", "enter")
+        await app.main.run_command("import")
+        await press(pilot)
+        if where == "read":
+            monkeypatch.setattr(Draft, "read", fail)
+        await press(pilot, *"other.csv", "enter")
+        await pilot.app.workers.wait_for_complete()
+        monkeypatch.setattr(Draft, "answer", fail)
+        await press(pilot, "f6")
+        shown = screen_text(app)
+        await press(pilot, "escape")
+        return shown, app.main.session.sheet.is_modified
+
+    shown, is_modified = with_editor(path, script)
+    assert "contextdb fails at this file (IndexError" in shown
+    assert is_modified

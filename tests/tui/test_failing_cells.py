@@ -49,7 +49,7 @@ def test_the_key_goes_through_every_failing_cell_and_round(is_backwards):
 
 
 def test_it_goes_on_where_the_rows_are_looked_through_in_blocks(monkeypatch):
-    monkeypatch.setattr("tui.model.shown.SEEK_ROWS", 2)
+    monkeypatch.setattr("tui.model.displayed_table.SEEK_ROWS", 2)
     sheet = sheet_of(hit="True")
     for is_backwards in (False, True):
         assert sorted(gone_to(sheet, is_backwards)) == [(1, 1), (2, 1)]

@@ -283,7 +283,7 @@ def test_a_game_in_another_process_is_followed_stops_floods_and_is_killed(path):
             """What was on its way when the game stopped still comes, so that the clock is put back until nothing does."""
             listening._heard_at -= 10
             following.tick()
-            return "nothing asked for" in screen_text(app)
+            return "no query for" in screen_text(app)
 
         await until(pilot, is_said)
         seen.append(screen_text(app))
@@ -301,7 +301,7 @@ def test_a_game_in_another_process_is_followed_stops_floods_and_is_killed(path):
         game.stdout.close()
     assert "other · npc\\x1b[31m 7" in running
     assert texts["gait"] == "Half Way" or texts["gait"] == '"Half Way"'
-    assert "nothing asked for" in stopped
+    assert "no query for" in stopped
     assert "the game is gone" in killed
 
 

@@ -47,7 +47,7 @@ def test_the_editor_sees_the_gap_live_makes_its_row_and_the_game_plays_it(tables
 
             for _ in range(30):
                 step()
-            seen = [(list(game.player.readout.valid), game.player.playing)]
+            seen = [(game.player.readout.valid.rows.tolist(), game.player.playing)]
             await press(pilot, *watch[0])
             dialog = app.screen
             await until(pilot, lambda: step() or dialog.show() or len(dialog._lines) == 2)

@@ -22,8 +22,8 @@ from tui.model.interval_picture import (
     holds_dot,
     interval_line,
     number_words,
-    shown_range,
     spans_of,
+    visible_range,
 )
 
 SPEED = Domain("number", None, 0.0, 7.0)
@@ -76,10 +76,10 @@ def test_bounds_of_the_domain_have_a_stop_and_a_range_that_is_only_shown_has_non
 
 
 def test_without_bounds_the_range_goes_a_step_past_the_ends_of_the_cell():
-    assert shown_range(parse_cell("1..3", NUMBER), NUMBER) == (0.5, 3.5)
-    assert shown_range(parse_cell("5", NUMBER), NUMBER) == (0.0, 10.0)
-    assert shown_range(parse_cell("not 5", NUMBER), NUMBER) == (-5.0, 15.0)
-    assert shown_range(parse_cell("Any", INT), INT) == (-1.0, 1.0)
+    assert visible_range(parse_cell("1..3", NUMBER), NUMBER) == (0.5, 3.5)
+    assert visible_range(parse_cell("5", NUMBER), NUMBER) == (0.0, 10.0)
+    assert visible_range(parse_cell("not 5", NUMBER), NUMBER) == (-5.0, 15.0)
+    assert visible_range(parse_cell("Any", INT), INT) == (-1.0, 1.0)
 
 
 @pytest.mark.parametrize("text", ["1e308", "-1e308..1e308", "5e-324", "inf", "-inf..inf", "0..5e-324"])
@@ -90,7 +90,7 @@ def test_the_ends_of_the_doubles_can_be_drawn(text):
 @given(st.data(), domains(("int", "number")), st.integers(1, 60))
 def test_each_character_says_what_the_cell_says_of_the_values_that_stand_there(data, domain, width):
     cell = parse_cell(data.draw(cells(domain)), domain)
-    low, high = shown_range(cell, domain)
+    low, high = visible_range(cell, domain)
     signs = "".join(run for run, _ in interval_line(cell, domain, width))
     assert len(signs) == width
     ends = [end for span in spans_of(cell) for end in span if low <= end <= high]
@@ -108,7 +108,7 @@ def test_each_character_says_what_the_cell_says_of_the_values_that_stand_there(d
 @given(st.data(), domains(("int", "number")))
 def test_a_range_shown_holds_every_bound_and_is_never_empty(data, domain):
     cell = parse_cell(data.draw(cells(domain)), domain)
-    low, high = shown_range(cell, domain)
+    low, high = visible_range(cell, domain)
     assert math.isfinite(low)
     assert math.isfinite(high)
     assert low < high

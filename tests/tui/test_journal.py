@@ -162,7 +162,7 @@ def test_a_folder_that_cannot_be_written_is_told_and_editing_goes_on(tmp_path):
     (tmp_path / ".contextdb-journal").write_text("a file in the way")
     sheet.apply(edits.delete_rows(sheet.table, [0]))
     assert sheet.table.n_rows == 2
-    assert "not kept" in sheet.recorder.problem.found
+    assert "not stored" in sheet.recorder.problem.found
 
 
 def test_a_second_editor_is_told_who_has_the_table_and_a_killed_one_holds_nothing(tmp_path):

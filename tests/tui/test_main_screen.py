@@ -62,7 +62,7 @@ def test_a_cell_that_cannot_be_read_is_finished_before_a_save(path):
         return said(app), app.main.assets.editor is not None
 
     text, is_open = with_editor(path, script)
-    assert "Finish the cell first" in text
+    assert "Correct the cell first" in text
     assert is_open
     assert path.read_text() == "Asset,hit\nwalk,True\nrun,Any\n"
 

@@ -13,6 +13,7 @@ from terminal import alone, drive, press, screen_text
 from test_debug_parts import recording_of
 from test_motion_measure_command import here, made
 from textual.pilot import Pilot
+from watched_disk import touched
 
 from tui.app import EditorApp
 from tui.debug.app import DebugApp
@@ -25,6 +26,12 @@ from tui.screens.main import MainScreen
 
 __all__ = ["here", "made"]
 """Fixtures of another file."""
+
+
+@pytest.fixture(autouse=True)
+def in_git(here: Path) -> None:
+    """The sessions are beside the project, in one work tree of git."""
+    (here / ".git").mkdir()
 
 
 async def settled(pilot: Pilot[Any]) -> None:
@@ -44,6 +51,14 @@ def test_sessions_are_found_by_what_they_say_the_newest_first(here: Path):
     assert sessions_of(here / "game2") == []
     shutil.copy("session.parquet", "newer.parquet")
     assert [path.name for path in sessions_of(here / "game")] == ["newer.parquet", "session.parquet"]
+
+
+def test_no_file_is_looked_at_around_the_work_tree_of_a_project(here: Path):
+    shutil.copy("session.parquet", "game/own.parquet")
+    (here / ".git").rename("game/.git")
+    with touched() as found:
+        sessions_of(here / "game")
+    assert found.outside(here / "game", here) == []
 
 
 def test_a_session_whose_databases_are_gone_is_opened_and_says_so(here: Path):

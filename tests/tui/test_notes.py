@@ -50,7 +50,7 @@ def test_a_file_of_notes_that_is_none_says_nothing(path, text):
 def test_a_colour_that_there_is_not_colours_nothing_and_stays_in_the_file(path):
     notes_path(path).write_text("Asset,Column,Note,Colour\nb,,,mauve\nb,speed,ask Ana,red\n")
     assert not Notes.beside(path).colours
-    Notes.kept(path).with_note("c", "speed", "x").with_colour(["c"], "red").write(path)
+    Notes.read(path).with_note("c", "speed", "x").with_colour(["c"], "red").write(path)
     told = "Asset,Column,Note,Colour\nb,,,mauve\nb,speed,ask Ana,red\nc,,,red\nc,speed,x,\n"
     assert notes_path(path).read_text() == told
 
@@ -93,7 +93,7 @@ def test_the_editor_writes_a_note_shows_it_and_takes_it_away(path):
     seen, told, (screen, marks), after, is_modified = with_editor(path, script, (100, 24))
     assert "note: hello" in seen
     assert "▪2" in seen
-    assert told == "Note kept."
+    assert told == "Note saved."
     assert "marked amber" in screen
     assert marks == Notes({("b", "speed"): "hello"}, {("b", ""): "amber"})
     assert after == Notes({}, {("b", ""): "amber"})

@@ -309,9 +309,10 @@ def test_the_weight_of_a_condition_is_typed_and_taken_away():
         await submit(pilot, "#condition-weight", "2.5")
         assert app.sheet.table.condition("side").condition.weight == 2.5
         await submit(pilot, "#condition-weight", "-1")
-        assert "below 0" in wrong(app, "weight")
+        assert "below 0" in app.query_one("#options-condition #field-weight", Field).wrong
+        assert app.query_one("#options-table #field-weight", Field).wrong == ""
         await submit(pilot, "#condition-weight", "much")
-        assert wrong(app, "weight") == '"much" is not a number.'
+        assert app.query_one("#options-condition #field-weight", Field).wrong == '"much" is not a number.'
         assert app.sheet.table.condition("side").condition.weight == 2.5
         await submit(pilot, "#condition-weight", "")
         assert app.sheet.table.condition("side").condition.weight == 1.0

@@ -167,7 +167,7 @@ def test_an_editor_that_was_open_for_other_cells_looks_like_a_new_one(second):
                 await pilot.pause()
                 desk.editor.place(Region(20, 10, 16, 1), desk.size)
                 of_cell, more = of(name)
-                desk.editor.open(*of_cell, **more)
+                desk.editor.open(*of_cell, on_done=desk.said.append, **more)
             await pilot.pause()
             return painted(desk.screen), desk.editor.text, desk.focused is desk.editor.entry
 

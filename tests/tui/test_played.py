@@ -136,7 +136,7 @@ def test_a_row_that_refers_to_a_table_is_used_where_a_row_inside_is(outer, path)
 
 def test_moments_without_any_and_moments_with_actors_alone_are_told(outer):
     cast = Moment(0.0, {}, 0, 0, actors={"Defender": [{"id": 1}]})
-    for moments, why in (([], "nothing was asked yet"), ([cast], "each was asked with actors")):
+    for moments, why in (([], "there was no query yet"), ([cast], "every query had actors")):
         run, done = PlayedRun(), Event()
         run.start_live(outer, lambda kept=moments: kept, "game", done.set)
         assert done.wait(LIMIT_S)
@@ -149,7 +149,31 @@ def test_the_answer_of_a_game_is_that_of_the_rows_inside_here(outer):
     answer = outer.compile().query(facts)
     query = QueryRow(outer)
     query.load({"speed": "6", "gait": "Run"})
-    assert GameAnswer(Moment(0.0, facts, answer.bits, len(answer)), query).differs == ""
-    other = GameAnswer(Moment(0.0, facts, 0, 0, pick=(0, None)), query)
+    assert GameAnswer(Moment(0.0, facts, answer.bits, len(answer)), query, outer, outer).differs == ""
+    other = GameAnswer(Moment(0.0, facts, 0, 0, pick=(0, None)), query, outer, outer)
     assert other.differs == "≠ the game: 0 rows valid there, here 1 more"
-    assert other.said.endswith("the game plays nothing")
+    assert other.summary.endswith("the game plays nothing")
+
+
+def test_the_rows_of_a_game_are_compared_by_their_assets_after_an_edit(path):
+    game_table = cdb.load(path)
+    answer = game_table.compile().query({"speed": 2.0, "gait": "Walk"})
+    moment = Moment(0.0, {}, answer.bits, len(answer))
+    differs = {}
+    for name, cells in {
+        "inserted": CELLS.replace("slow", "new,8..9,Run\nslow"),
+        "fills the gap": CELLS.replace("slow", "new,2,Walk\nslow"),
+        "deleted": CELLS.replace("slow,0..3,Walk\n", ""),
+        "twice": CELLS.replace("slow,0..3,Walk\n", "slow,8..9,Run\nslow,0..3,Walk\n"),
+    }.items():
+        path.write_text(cells)
+        table = cdb.load(path)
+        query = QueryRow(table)
+        query.load({"speed": "2", "gait": "Walk"})
+        differs[name] = GameAnswer(moment, query, table, game_table).differs
+    assert differs == {
+        "inserted": "",
+        "fills the gap": "≠ the game: 1 row valid there, here 1 more",
+        "deleted": "≠ the game: 1 row valid there, here 1 fewer",
+        "twice": "≠ the game: 1 row valid there, here 1 more and 1 fewer",
+    }

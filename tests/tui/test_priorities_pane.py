@@ -11,7 +11,7 @@ from textual.app import App, ComposeResult
 from textual.widgets import Input, OptionList
 
 from contextdb.tables.project import load
-from tui.messages import Edited, Told
+from tui.messages import Edited, Notice
 from tui.model.sheet import Sheet
 from tui.panes.priorities import PrioritiesPane
 
@@ -40,7 +40,7 @@ class PrioritiesApp(App[None]):
     def on_edited(self, message: Edited) -> None:
         self.told.append(message.done.name)
 
-    def on_told(self, message: Told) -> None:
+    def on_notice(self, message: Notice) -> None:
         self.told.append(message.text)
 
     def order(self) -> list[tuple[object, object]]:

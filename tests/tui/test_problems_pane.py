@@ -16,7 +16,7 @@ from textual.pilot import Pilot
 import contextdb as cdb
 from contextdb.commands.check_command import check_path
 from contextdb.covering import Cancelled
-from tui.messages import GoToCell, Told
+from tui.messages import GoToCell, Notice
 from tui.model.coverage_lines import in_rows
 from tui.model.problems import Problem, Problems, cell_findings, row_findings
 from tui.model.sheet import Sheet
@@ -54,7 +54,7 @@ class PaneApp(App[None]):
         super().__init__()
         self.sheet = Sheet(table)
         self.pane = ProblemsPane(self.sheet)
-        self.told: list[GoToCell | Told] = []
+        self.told: list[GoToCell | Notice] = []
 
     def compose(self) -> ComposeResult:
         yield self.pane
@@ -65,7 +65,7 @@ class PaneApp(App[None]):
     def on_go_to_cell(self, message: GoToCell) -> None:
         self.told.append(message)
 
-    def on_told(self, message: Told) -> None:
+    def on_notice(self, message: Notice) -> None:
         self.told.append(message)
 
 
@@ -166,13 +166,13 @@ def test_a_fact_of_the_test_row_that_cannot_be_read_is_a_problem_too(table):
 def test_a_sound_table_has_nothing_to_show():
     sound = cdb.Table.from_columns({"Asset": ["A"], "up": ["True"]}, {"up": {"type": "bool"}})
     app, screen = shown(sound, "enter", "down", "end", "4")
-    assert "found nothing wrong with this table" in screen
+    assert "finds nothing wrong with this table" in screen
     assert app.told == []
 
 
 def test_a_problem_of_the_whole_table_has_no_cell_to_go_to():
     app, _ = shown(cdb.Table.from_columns({"Asset": []}), "enter")
-    assert [type(m) for m in app.told] == [Told]
+    assert [type(m) for m in app.told] == [Notice]
 
 
 def test_texts_that_look_like_markup_are_shown_as_they_are(table):
@@ -285,7 +285,7 @@ def test_while_the_rows_are_looked_at_no_empty_list_says_that_there_is_nothing()
 
 async def _half_known(pilot: Pilot[None]) -> None:
     pane = pilot.app.pane
-    pane.post_message(pane.Checked(pane.sheet.table, pane._found, False))
+    pane.post_message(pane.Checked(pane.sheet.table, pane._findings, False))
     await pilot.pause()
 
 

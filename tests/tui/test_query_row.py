@@ -101,3 +101,19 @@ def test_the_nearest_rows_say_what_would_mend_them():
     query.set("speed", "10")
     query.set("hit", "False")
     assert [str(row) for row in query.nearest(1)] == ["c: speed is 10, the cell says 5..9"]
+
+
+@given(tables(KINDS, least_conditions=1), st.data())
+@examples(2)
+def test_what_cannot_be_read_takes_away_its_row_and_nothing_else(table, data):
+    names = [column.condition.name for column in table.conditions if not column.condition.domain.type.is_tags]
+    cells = st.tuples(st.integers(0, max(table.n_rows - 1, 0)), st.sampled_from(names or ["Asset"]))
+    wrong = data.draw(st.lists(cells, max_size=4)) if names and table.n_rows else []
+    broken = edits.set_cells(table, [(row, name, "5; ~ 3") for row, name in wrong]).apply(table)
+    query = QueryRow(broken)
+    for column in table.conditions:
+        query.set(column.condition.name, data.draw(st.just("") | sets(column.condition.domain)))
+    unread = {row for column in broken.conditions for row, _ in column.faulty_rows()}
+    sound = [row for row in range(table.n_rows) if row not in unread]
+    expected = table.with_rows_taken(sound).compile().query(query.given, unknown="any").indices.tolist()
+    assert np.flatnonzero(query.valid).tolist() == [sound[row] for row in expected]

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from strategies import examples, tables
 
 from contextdb.tables.table import Table
-from tui.model.views import Filter, Sort, View, shown_rows, sorted_rows
+from tui.model.views import Filter, Sort, View, filtered_rows, sorted_rows
 
 
 def column(texts: list[str], **declared: object) -> Table:
@@ -25,7 +25,7 @@ def in_order(table: Table, name: str = "x", is_descending: bool = False) -> list
 def test_sort_and_filter_never_lose_or_double_a_row(table, data):
     sort = Sort(data.draw(st.sampled_from([c.name for c in table.columns])), data.draw(st.booleans()))
     assert sorted(sorted_rows(table, sort).tolist()) == list(range(table.n_rows))
-    shown = shown_rows(table, Filter(text=data.draw(st.sampled_from(["", "a1", "true", "."]))))
+    shown = filtered_rows(table, Filter(text=data.draw(st.sampled_from(["", "a1", "true", "."]))))
     view = View.of(table, sort, shown)
     expected = range(table.n_rows) if shown is None else np.flatnonzero(shown).tolist()
     assert sorted(view.rows.tolist()) == list(expected)
@@ -36,7 +36,7 @@ def test_sort_and_filter_never_lose_or_double_a_row(table, data):
 @examples(2)
 def test_a_view_after_an_edit_shows_what_it_showed_and_the_new_rows(table, data):
     sort = data.draw(st.none() | st.just(Sort("Asset", True)))
-    shown = shown_rows(table, data.draw(st.sampled_from([Filter(), Filter(text="a1")])))
+    shown = filtered_rows(table, data.draw(st.sampled_from([Filter(), Filter(text="a1")])))
     view = View.of(table, sort, shown)
     edit = data.draw(edits_of(table))
     came_from = edit.came_from(table.n_rows)
@@ -85,11 +85,11 @@ def test_a_filter_shows_rows_that_pass_everything_it_says():
     valid = np.array([True, True, False])
 
     def shown(**said: object) -> list[int]:
-        return np.flatnonzero(shown_rows(table, Filter(**said), valid, ~valid)).tolist()
+        return np.flatnonzero(filtered_rows(table, Filter(**said), valid, ~valid)).tolist()
 
     assert shown(text="A1") == [1]
     assert shown(columns=(("x", "e"),)) == [0, 2]
     assert shown(cells=(("x", frozenset(["Any", "False"])),)) == [1, 2]
     assert shown(is_valid=True, columns=(("x", "TRUE"),)) == [0]
     assert shown(has_findings=True) == [2]
-    assert shown_rows(table, Filter()) is None
+    assert filtered_rows(table, Filter()) is None

@@ -316,3 +316,65 @@ def test_the_debugger_works_in_a_real_terminal(terminal):
     terminal.wait("─Bars · ", "─Why─", "─Poses · as shown, blended─", "─Weights─")
     terminal.keys("q")
     terminal.wait("exit code 0")
+
+
+# ---- a cell that is edited
+
+
+@pytest.mark.parametrize("size", [(80, 24), (120, 36), (160, 48)], ids=lambda size: f"{size[0]}x{size[1]}")
+def test_what_is_typed_goes_to_the_tab_or_the_bar_that_was_opened_over_a_cell(terminal, size):
+    terminal.start("screen-256color")
+    terminal.resize(*size)
+    terminal.wait_for_foot(size[1], "row 1 · Asset")
+    for at, opened in enumerate(("M-4", "M-3", "M-5", "M-Right", "C-NPage", "C-f", "C-l")):
+        terminal.keys("C-Home", *["Down"] * (at + 1))
+        terminal.wait(f"row {at + 2} · Asset")
+        terminal.raw(f"Q{at}")
+        terminal.wait(f"Q{at}", "Enter OK")
+        terminal.keys(opened)
+        terminal.wait_without("Enter OK")
+        terminal.raw("7w")
+        terminal.keys("Escape", "M-1", "M-g")
+        terminal.wait("· Asset", "F2 Edit", f"Q{at}", "clip_20" if size[1] > 30 else "clip_08")
+    lines = terminal.screen.splitlines()
+    terminal.keys("C-Home", *["Down"] * 8)
+    terminal.wait("row 9 · Asset")
+    terminal.raw("Q7")
+    terminal.wait("Q7", "Enter OK")
+    terminal.mouse(0, lines[0].index("Coverage"), 0)
+    terminal.wait_without("Enter OK")
+    terminal.raw("7w")
+    terminal.keys("M-1")
+    terminal.wait("row 9 · Asset", "F2 Edit")
+    terminal.keys("C-s")
+    terminal.wait("Saved t.csv.")
+    expected = RAW
+    for at in range(8):
+        expected = expected.replace(b"clip_%02d," % (at + 1), b"Q%d," % at)
+    assert (terminal.folder / "t.csv").read_bytes() == expected
+
+
+def test_a_save_takes_the_cell_that_is_edited_and_home_stays_in_the_empty_row(terminal):
+    terminal.start("screen-256color")
+    terminal.wait("row 1 · Asset", "F2 Edit")
+    terminal.keys("C-End", "Down")
+    terminal.wait("new row · hit")
+    terminal.keys("Home")
+    terminal.wait("new row · Asset")
+    terminal.raw("Perch_01")
+    terminal.keys("C-s")
+    terminal.wait("Saved t.csv.")
+    assert (terminal.folder / "t.csv").read_bytes() == RAW + b"Perch_01,,\r\n"
+    terminal.keys("C-Home", "Right")
+    terminal.raw("x7")
+    terminal.keys("C-s")
+    terminal.wait("Correct the cell first")
+    terminal.keys("Escape")
+    terminal.tmux("set-buffer", "0,5\n1,5\n")
+    terminal.tmux("paste-buffer", "-p")
+    terminal.wait("What 0,5 means", "0.5: the comma is a decimal sign")
+    terminal.keys("Enter")
+    terminal.wait("Paste 2 × 1.", "1.5")
+    terminal.keys("C-s")
+    terminal.wait("Saved t.csv.")
+    assert (terminal.folder / "t.csv").read_bytes().startswith(b"Asset,speed,hit\r\nclip_00,0.5,True\r\nclip_01,1.5,True\r\n")

@@ -132,7 +132,7 @@ SCREENS = (
     Screen("\t\t\t]", JUMPED, "Channels", leaves="q", before=(*MOTION, BARS)),
     Screen("?", "Esc close", "DebugHelp HelpPage Dialog", leaves="qq", before=(*MOTION, BARS)),
     Screen(xterm("ctrl+g"), "Go to", "AskDialog Dialog", is_typed_in=True, also=TYPED),
-    Screen(xterm("f9") + xterm("f2"), "Rename the context", "NameDialog Dialog", is_typed_in=True, leaves=ESC + ESC, also=TYPED),
+    Screen(xterm("f9") + xterm("f2"), "Rename the context", "AskDialog Dialog", is_typed_in=True, leaves=ESC + ESC, also=TYPED),
     Screen(xterm("f9") + xterm("delete"), "It cannot be undone", "SureDialog Dialog", leaves=ESC + ESC),
     Screen(
         "\r",
@@ -141,7 +141,7 @@ SCREENS = (
         leaves=ESC + ESC,
         before=((named("import"), "Enter read"), ("../cells.csv\r", "Becomes")),
     ),
-    Screen(xterm("shift+f4"), "A what differs, too", "AutofillDialog LineList Dialog"),
+    Screen(xterm("shift+f4"), "A also cells that differ", "AutofillDialog LineList Dialog"),
     Screen(
         xterm("home") + "\r",
         "it has decided nothing yet",
@@ -166,6 +166,7 @@ SCREENS = (
 def editor(made: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Editor]:
     folder = tmp_path_factory.mktemp("screens")
     shutil.copytree(made, folder, dirs_exist_ok=True)
+    (folder / ".git").mkdir()  # one work tree: sessions beside a project are those of its repository
     (folder / "game" / "acts.csv").write_text(TABLE, encoding="utf-8")
     (folder / "game" / "acts.cases.csv").write_text(CASES, encoding="utf-8")
     (folder / "game" / "held.csv").write_text(TABLE, encoding="utf-8")

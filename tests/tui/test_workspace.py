@@ -9,7 +9,7 @@ import pytest
 
 from contextdb.errors import ContextDBError, SchemaError
 from tui.model.beginning import Beginning
-from tui.model.columns_shown import ColumnsShown
+from tui.model.visible_columns import VisibleColumns
 from tui.model.workspace import Workspace
 
 RAW = "Asset,hit\nwalk,True\n"
@@ -163,7 +163,7 @@ def test_a_contextdb_toml_that_breaks_while_tables_are_open_is_told_and_loses_no
 def test_a_table_that_is_held_elsewhere_keeps_its_columns_when_it_is_taken_over(folder):
     holder, space = Workspace(folder), Workspace(folder)
     holder.session("a")
-    hidden = ColumnsShown(frozenset(["hit"]))
+    hidden = VisibleColumns(frozenset(["hit"]))
     space.session("a").sheet.show_columns(hidden)
     assert space.session("a").is_read_only
-    assert space.reopen("a", takes_over=True).sheet.columns_shown == hidden
+    assert space.reopen("a", takes_over=True).sheet.visible_columns == hidden

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from tui.debug.game import Live
-from tui.debug.recording import Recording
-from tui.debug.screen import DebugScreen, RowWanted, Start
-from tui.debug.waiting import WaitingScreen
-from tui.one_key import OneKeyAtATime
-from tui.themes import DARK, THEMES
+from ..one_key import OneKeyAtATime
+from ..themes import DARK, THEMES
+from .game import Live
+from .recording import Recording
+from .screen import DebugScreen, RowWanted, Start
+from .waiting import WaitingScreen
 
 
 class DebugApp(OneKeyAtATime):
@@ -16,9 +16,9 @@ class DebugApp(OneKeyAtATime):
     TITLE = "contextdb"
     ENABLE_COMMAND_PALETTE = False
 
-    def __init__(self, shown: Recording | Live, theme: str = "", *, measures: bool = True, start: Start | None = None) -> None:
+    def __init__(self, recording: Recording | Live, theme: str = "", *, measures: bool = True, start: Start | None = None) -> None:
         super().__init__()
-        self._shown, self._start = shown, start
+        self._recording, self._start = recording, start
         self.wanted: RowWanted | None = None
         """The row for which the screen was left."""
         self._measures = measures
@@ -32,18 +32,18 @@ class DebugApp(OneKeyAtATime):
         self.exit()
 
     def on_mount(self) -> None:
-        shown = self._shown
-        if isinstance(shown, Recording):
-            self.push_screen(DebugScreen(shown, measures=self._measures, start=self._start))
-        elif shown.recording is None:
-            self.push_screen(WaitingScreen(shown, self._begun, self.exit))
+        recording = self._recording
+        if isinstance(recording, Recording):
+            self.push_screen(DebugScreen(recording, measures=self._measures, start=self._start))
+        elif recording.recording is None:
+            self.push_screen(WaitingScreen(recording, self._begun, self.exit))
         else:
-            self.push_screen(self._live_screen(shown))
+            self.push_screen(self._live_screen(recording))
 
     def _begun(self) -> None:
         """The game has decided something."""
-        assert isinstance(self._shown, Live), "a recording is never waited for"
-        self.switch_screen(self._live_screen(self._shown))
+        assert isinstance(self._recording, Live), "a recording is never waited for"
+        self.switch_screen(self._live_screen(self._recording))
 
     def _live_screen(self, live: Live) -> DebugScreen:
         assert live.recording is not None, "was waited for"

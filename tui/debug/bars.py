@@ -8,44 +8,26 @@ from typing import ClassVar
 import numpy as np
 from rich.segment import Segment
 from rich.style import Style
-from textual import events
-from textual.binding import Binding, BindingType
+from textual.binding import BindingType
 from textual.message import Message
 from textual.strip import Strip
-from textual.widget import Widget
 
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.trace.cost_views import cost_text
-from tui.debug.landscape import LEVELS, Landscape, Row
-from tui.debug.timeline import BARS
-from tui.widgets.fitted import fitted
+
+from ..widgets.cursor_lines import PAGES, CursorLines, style_names
+from ..widgets.fitted import fitted
+from .landscape import LEVELS, Landscape, Row
+from .timeline import BARS
 
 LEAST_NAME, MOST_NAME, COST = 12, 34, 9
 TIMES = (LeftOut.JUMP, LeftOut.HISTORY, LeftOut.PHASE)
 
 
-class Bars(Widget, can_focus=True):
+class Bars(CursorLines):
     """What every frame of every asset costs."""
 
-    ALLOW_SELECT = False
-    BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("up", "move(-1)", "Up", show=False),
-        Binding("down", "move(1)", "Down", show=False),
-        Binding("pageup", "page(-1)", "Page up", show=False),
-        Binding("pagedown", "page(1)", "Page down", show=False),
-    ]
-    COMPONENT_CLASSES: ClassVar[set[str]] = {
-        "bars--head",
-        "bars--name",
-        "bars--out",
-        "bars--cursor",
-        "bars--free",
-        "bars--invalid",
-        "bars--marked",
-        "bars--recent",
-        "bars--chosen",
-        "bars--playing",
-    }
+    BINDINGS: ClassVar[list[BindingType]] = PAGES
     DEFAULT_CSS = """
     Bars {
         background: $surface;
@@ -63,6 +45,7 @@ class Bars(Widget, can_focus=True):
         &:ansi .bars--cursor { background: ansi_blue; color: ansi_bright_white; }
     }
     """
+    COMPONENT_CLASSES: ClassVar[set[str]] = style_names(DEFAULT_CSS)
 
     @dataclass
     class Moved(Message):
@@ -74,8 +57,6 @@ class Bars(Widget, can_focus=True):
         super().__init__(id="bars")
         self.landscape = Landscape({})
         self.rows: list[Row] = []
-        self.at = 0
-        self.top = 0
         self.chosen: tuple[str, int] | None = None
         """Database and frame of what the search chooses."""
         self.playing: tuple[str, int] | None = None
@@ -95,50 +76,22 @@ class Bars(Widget, can_focus=True):
         key = None if before is None else (before.database, before.asset, before.mirrored)
         places = [i for i, row in enumerate(rows) if (row.database, row.asset, row.mirrored) == key]
         self.at = places[0] if places else 0
-        self._keep_in_sight()
+        self.keep_in_sight()
         self.refresh()
-
-    def go(self, at: int) -> None:
-        """Move the cursor."""
-        if not self.rows:
-            return
-        self.at = min(max(0, at), len(self.rows) - 1)
-        self._keep_in_sight()
-        self.refresh()
-        self.post_message(self.Moved(self.row))
-
-    def action_move(self, by: int) -> None:
-        """To the next asset."""
-        self.go(self.at + by)
-
-    def action_page(self, by: int) -> None:
-        """As far as is seen."""
-        self.go(self.at + by * max(1, self._n_lines - 1))
 
     @property
-    def _n_lines(self) -> int:
-        return max(1, self.size.height - 1)
+    def n_lines(self) -> int:
+        """A line for each asset."""
+        return len(self.rows)
 
-    def _keep_in_sight(self) -> None:
-        self.top = min(max(self.top, self.at - self._n_lines + 1), self.at)
-        self.top = max(0, min(self.top, len(self.rows) - self._n_lines))
-
-    def on_resize(self) -> None:
-        """Keep the cursor in sight."""
-        self._keep_in_sight()
-
-    def on_click(self, event: events.Click) -> None:
-        """Go to the asset under the mouse."""
-        place = event.get_content_offset(self)
-        if place is not None and place.y >= 1 and self.top + place.y - 1 < len(self.rows):
-            self.go(self.top + place.y - 1)
+    def moved(self) -> None:
+        """Say which asset it is."""
+        self.post_message(self.Moved(self.row))
 
     def on_mouse_scroll_up(self) -> None:
-        """Up."""
         self.go(self.at - 3)
 
     def on_mouse_scroll_down(self) -> None:
-        """Down."""
         self.go(self.at + 3)
 
     # ---- painting
@@ -174,7 +127,7 @@ class Bars(Widget, can_focus=True):
     def to_chosen(self) -> None:
         """Move the cursor to what is chosen, without a message."""
         self.at = next((i for i, row in enumerate(self.rows) if self.is_in(row, self.chosen)), self.at)
-        self._keep_in_sight()
+        self.keep_in_sight()
         self.refresh()
 
     def is_in(self, row: Row, frame: tuple[str, int] | None) -> bool:
@@ -185,11 +138,11 @@ class Bars(Widget, can_focus=True):
         return int(database.starts[row.range]) <= frame[1] < int(database.stops[row.range])
 
     def _bars(self, row: Row, width: int) -> list[Segment]:
-        levels, may, (start, stop) = self.landscape.bars(row, width)
+        levels, is_valid, (start, stop) = self.landscape.bars(row, width)
         why = "bars--invalid" if row.left_out is LeftOut.NOT_VALID else "bars--marked"
         out = self.get_component_rich_style("bars--recent" if row.left_out in TIMES else why)
         free = self.get_component_rich_style("bars--free")
-        cells = [(BARS[level], free if ok else out) for level, ok in zip(levels.tolist(), may.tolist(), strict=True)]
+        cells = [(BARS[level], free if ok else out) for level, ok in zip(levels.tolist(), is_valid.tolist(), strict=True)]
         for frame, kind, sign in ((self.playing, "bars--playing", "○"), (self.chosen, "bars--chosen", "▶")):
             if frame is not None and frame[0] == row.database and start <= frame[1] < stop and cells:
                 edges = (np.arange(len(cells)) * (stop - start)) // len(cells)

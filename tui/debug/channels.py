@@ -7,14 +7,13 @@ from typing import ClassVar
 
 from rich.segment import Segment
 from rich.style import Style
-from textual import events
-from textual.binding import Binding, BindingType
 from textual.message import Message
 from textual.strip import Strip
-from textual.widget import Widget
 
 from contextdb.motion.trace.cost_views import cost_text
-from tui.widgets.fitted import fitted
+
+from ..widgets.cursor_lines import CursorLines, style_names
+from ..widgets.fitted import fitted
 
 NUMBER, COST, LEAST_NAME = 11, 9, 18
 
@@ -34,27 +33,12 @@ class Dial:
 
     @property
     def label(self) -> str:
-        """As it is shown."""
         return self.name if self.is_weight else f"threshold {self.name}"
 
 
-class Channels(Widget, can_focus=True):
+class Channels(CursorLines):
     """Weights and thresholds."""
 
-    ALLOW_SELECT = False
-    BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("up", "move(-1)", "Up", show=False),
-        Binding("down", "move(1)", "Down", show=False),
-    ]
-    COMPONENT_CLASSES: ClassVar[set[str]] = {
-        "channels--head",
-        "channels--plain",
-        "channels--cursor",
-        "channels--turned",
-        "channels--chosen",
-        "channels--playing",
-        "channels--asset",
-    }
     DEFAULT_CSS = """
     Channels {
         background: $surface;
@@ -69,6 +53,7 @@ class Channels(Widget, can_focus=True):
         &:ansi .channels--cursor { background: ansi_blue; color: ansi_bright_white; }
     }
     """
+    COMPONENT_CLASSES: ClassVar[set[str]] = style_names(DEFAULT_CSS)
 
     @dataclass
     class Clicked(Message):
@@ -79,8 +64,6 @@ class Channels(Widget, can_focus=True):
     def __init__(self) -> None:
         super().__init__(id="channels")
         self.dials: list[Dial] = []
-        self.at = 0
-        self.top = 0
 
     def get_content_height(self, container: object, viewport: object, width: int) -> int:
         """A line for each number, and one above them."""
@@ -92,36 +75,22 @@ class Channels(Widget, can_focus=True):
         return self.dials[self.at] if self.dials else None
 
     def show(self, dials: list[Dial]) -> None:
-        """Show these."""
         is_longer = len(dials) != len(self.dials)
         self.dials = dials
         self.at = min(self.at, max(0, len(dials) - 1))
-        self._keep_in_sight()
+        self.keep_in_sight()
         self.refresh(layout=is_longer)
 
-    def action_move(self, by: int) -> None:
-        """To the next number."""
-        self.at = min(max(0, self.at + by), max(0, len(self.dials) - 1))
-        self._keep_in_sight()
-        self.refresh()
+    @property
+    def n_lines(self) -> int:
+        """A line for each number."""
+        return len(self.dials)
 
-    def _keep_in_sight(self) -> None:
-        n_lines = max(1, self.size.height - 1)
-        self.top = min(max(self.top, self.at - n_lines + 1), self.at)
-
-    def on_resize(self) -> None:
-        """Keep the cursor in sight."""
-        self._keep_in_sight()
-
-    def on_click(self, event: events.Click) -> None:
-        """Go to a number, or turn it."""
-        place = event.get_content_offset(self)
-        if place is not None and place.y >= 1 and self.top + place.y - 1 < len(self.dials):
-            self.at = self.top + place.y - 1
-            self.refresh()
-            x = place.x - 1 - self._name_width
-            if 0 <= x < NUMBER:
-                self.post_message(self.Clicked(x > NUMBER // 2))
+    def clicked(self, x: int) -> None:
+        """Turn the number where one of its arrows was clicked."""
+        x -= 1 + self._name_width
+        if 0 <= x < NUMBER:
+            self.post_message(self.Clicked(x > NUMBER // 2))
 
     # ---- painting
 

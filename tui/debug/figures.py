@@ -13,11 +13,12 @@ import numpy as np
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.features.channels import Channel
-from contextdb.motion.output.bank import PoseBank, loops
+from contextdb.motion.output.bank import PoseBank
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.decision import Playing
 from contextdb.motion.trace.cost_views import PATH
-from tui.debug.recording import Displayed, Moment, Recording
+
+from .recording import Displayed, Moment, Recording
 
 AHEAD_S = 1.0
 """So long paths are."""
@@ -60,7 +61,9 @@ def figure_of(
     """
     decision, line = moment.decision, recording.line
     return Figure(
-        chosen=_bones_of(banks, decision.playing) if recording.displayed is None else _shown(recording.displayed, moment.index),
+        chosen=_bones_of(banks, decision.playing)
+        if recording.displayed is None
+        else _displayed_points(recording.displayed, moment.index),
         plays_on=_bones_of(banks, decision.before) if line.jumped[moment.index] else NO_BONES,
         asset=NO_BONES if asset is None else _bones(banks, *asset),
         wanted=wanted_path(moment),
@@ -74,8 +77,8 @@ def _bones_of(banks: Mapping[str, PoseBank], playing: Playing | None) -> Floats:
     return NO_BONES if playing is None else _bones(banks, playing.database, playing.asset, playing.mirrored, playing.time_s)
 
 
-def _shown(displayed: Displayed, index: int) -> Floats:
-    """The bones of the pose that was shown at an update."""
+def _displayed_points(displayed: Displayed, index: int) -> Floats:
+    """The bones of the pose that was displayed at an update."""
     x, z, heading = displayed.roots[index].tolist()
     at = displayed.positions[index].astype(np.float64)
     across, along = at[:, 0] - x, at[:, 2] - z
@@ -96,18 +99,15 @@ def _bones(banks: Mapping[str, PoseBank], database: str, asset: str, mirrored: b
     bank = banks.get(database)
     if bank is None:
         return NO_BONES
-    sample = bank.sample_of(bank.range_of(asset, mirrored), time_s)
-    positions, world = np.empty((bank.n_joints, 3)), np.empty((bank.n_joints, 4))
-    loops().place(bank.skeleton.parents, bank.translations(sample.positions), sample.rotations, 0.0, 0.0, 0.0, positions, world)
-    return _pairs(positions, bank.skeleton.parents)
+    return _pairs(bank.joints_at(bank.range_of(asset, mirrored), time_s), bank.skeleton.parents)
 
 
 def wanted_path(moment: Moment) -> Floats:
     """The path that the query asks for."""
     decision = moment.searched
-    if decision is None or decision.query is None or moment.asked is None:
+    if decision is None or decision.query is None or moment.repeated is None:
         return NO_PATH
-    for search in moment.asked.searches.values():
+    for search in moment.repeated.searches.values():
         points = _path_points(search.database, decision.query)
         if len(points):
             return points
@@ -116,15 +116,15 @@ def wanted_path(moment: Moment) -> Floats:
 
 def _path_points(database: MotionDatabase, query: Floats) -> Floats:
     """The points of the channels of positions on the path, in order of time, the body's own place first."""
-    found = [(0.0, 0.0, 0.0, 0.0)]
+    points = [(0.0, 0.0, 0.0, 0.0)]
     schema = database.schema
     if schema is None:
         return NO_PATH
     for channel in schema.channels:
         if _is_place(channel):
             values = query[schema.slices[channel.name]].reshape(-1, 2)
-            found += [(at, left, 0.0, ahead) for at, (left, ahead) in zip(channel.at, values.tolist(), strict=True)]
-    return np.array(sorted(found))[:, 1:] if len(found) > 1 else NO_PATH
+            points += [(at, left, 0.0, ahead) for at, (left, ahead) in zip(channel.at, values.tolist(), strict=True)]
+    return np.array(sorted(points))[:, 1:] if len(points) > 1 else NO_PATH
 
 
 def _is_place(channel: Channel) -> bool:

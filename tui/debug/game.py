@@ -13,28 +13,30 @@ from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.trace.last_minute import LastMinute
 from contextdb.telemetry.link.hearing import Wanted
 from contextdb.telemetry.link.lines import DATABASES, DECISION, Line
-from tui.debug.recording import Recording
-from tui.model.listening import Listening
+
+from ..model.listening import MOST_TRACKS, Listening
+from .recording import Recording
 
 MOST_WAITING = 4096
 """So many decisions wait for the screen at most."""
 MOST_PLAIN = 60
-"""A game that told so many decisions without their rows knows nothing of rows."""
+"""A game that sent so many decisions without their rows knows nothing of rows."""
 AGAIN_S = 1.0
 
 
 class Decisions(Listening):
     """The decisions of a game, in full."""
 
-    def __init__(self, game: str, path: Path, who: str | None) -> None:
+    def __init__(self, game: str, path: Path, character_id: str | None) -> None:
         self.rows: deque[tuple[str | None, str]] = deque(maxlen=MOST_WAITING)
         self.databases: dict[str | None, Mapping[str, Any]] = {}
         self.n_plain = 0
-        super().__init__(game, path, Wanted(() if who is None else (who,), trace=True))
+        super().__init__(game, path, Wanted(() if character_id is None else (character_id,), trace=True))
 
     def _take(self, line: Line, n_bytes: int) -> None:
         if line["line"] == DATABASES:
-            self.databases[line["who"]] = line["databases"]
+            if line["who"] in self.databases or len(self.databases) < MOST_TRACKS:
+                self.databases[line["who"]] = line["databases"]
         elif line["line"] != DECISION:
             super()._take(line, n_bytes)
         elif isinstance(line.get("row"), str):
@@ -50,7 +52,7 @@ class Live:
     ----------
     game, path
         The game's name, and its door.
-    who : str or None
+    character_id : str or None
         The character; None for the one that decides first.
     folder : str
         Of the project; "" without one.
@@ -62,32 +64,32 @@ class Live:
         self,
         game: str,
         path: Path,
-        who: str | None,
+        character_id: str | None,
         folder: str,
         databases: Mapping[str, MotionDatabase],
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self.game, self._path, self._wanted, self._clock = game, path, who, clock
+        self.game, self._path, self._wanted, self._clock = game, path, character_id, clock
         self.folder, self._databases = folder, databases
-        self.who: str | None = who
+        self.character_id: str | None = character_id
         self.characters: dict[str | None, None] = {}
         self.trace = LastMinute(databases)
         self.recording: Recording | None = None
         """None until the first decision."""
         self.n_refused = 0
-        self._told: object = None
+        self._reported: object = None
         self._tried_at = clock()
-        self.listening = Decisions(game, path, who)
+        self.listening = Decisions(game, path, character_id)
 
     @property
     def name(self) -> str:
         """The game and the character."""
-        return printable(self.game if self.who is None else f"{self.game} · {self.who}")
+        return printable(self.game if self.character_id is None else f"{self.game} · {self.character_id}")
 
     @property
     def notes(self) -> str:
         """What is to be known of the game: that it is silent, has ended, or is of another version."""
-        notes = [self.listening.trouble.replace("nothing asked", "nothing decided")]
+        notes = [self.listening.trouble.replace("no query", "no decision")]
         if self.listening.n_plain >= MOST_PLAIN and not self.characters:
             notes.append("the game is of a version whose decisions cannot be debugged")
         if self.n_refused:
@@ -103,18 +105,19 @@ class Live:
         self._connect_again()
         rows, n = self.listening.rows, 0
         while rows:
-            who, text = rows.popleft()
+            character_id, text = rows.popleft()
             if not self.characters and self._wanted is None:
-                self.who = who
-            self.characters[who] = None
-            if who == self.who:
+                self.character_id = character_id
+            if len(self.characters) < MOST_TRACKS:
+                self.characters[character_id] = None
+            if character_id == self.character_id:
                 is_taken = self.trace.take(text)
                 n, self.n_refused = n + is_taken, self.n_refused + (not is_taken)
-        told = self.listening.databases.get(self.who)
-        is_other = told is not None and told is not self._told
-        if told is not None and is_other:
-            self._told = told
-            self.trace.made_with(told)
+        reported = self.listening.databases.get(self.character_id)
+        is_other = reported is not None and reported is not self._reported
+        if reported is not None and is_other:
+            self._reported = reported
+            self.trace.made_with(reported)
         if not n:
             return False
         self.trace.settle()
@@ -125,7 +128,6 @@ class Live:
         return True
 
     def close(self) -> None:
-        """Hang up."""
         self.listening.close()
 
     def _connect_again(self) -> None:

@@ -7,8 +7,8 @@ from typing import ClassVar
 
 from textual.binding import Binding, BindingType
 
-from tui.debug.keys import KEYS, names_of
-from tui.screens.help_page import HelpPage, Lines
+from ..screens.help_page import HelpPage, Lines
+from .keys import KEYS, names_of
 
 QUESTIONS = (
     ("Why this clip?", "Go to a jump with [ and ]: the second line says why. The weights show what each channel adds."),

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from tui.debug.keys import TOGETHER, name_of
-from tui.widgets.key_line import Key, KeyLine
+from ..widgets.key_line import Key, KeyLine
+from .keys import TOGETHER, name_of
 
 
 class DebugKeyLine(KeyLine):

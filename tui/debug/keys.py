@@ -19,7 +19,6 @@ class Key:
     in_foot: bool = False
 
     def binding(self) -> Binding:
-        """As Textual takes it."""
         return Binding(self.keys, self.action, self.label, show=self.in_foot)
 
 

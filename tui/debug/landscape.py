@@ -41,7 +41,7 @@ class Row:
 
     @property
     def name(self) -> str:
-        """As it is shown."""
+        """As it is displayed."""
         return f"{self.asset}{' ~' if self.mirrored else ''}{'' if self.permutation_s is None else f' +{self.permutation_s:g} s'}"
 
     @property
@@ -66,13 +66,13 @@ class Landscape:
 
     def ordered(self, order: str, text: str = "", uses: Mapping[tuple[str, bool], int] | None = None) -> list[Row]:
         """The rows whose asset's name holds a text, by "best" cost, by "name", or by "use" in the session."""
-        found = [row for row in self.rows if text.casefold() in row.asset.casefold()]
+        rows = [row for row in self.rows if text.casefold() in row.asset.casefold()]
         if order == "name":
-            return sorted(found, key=lambda row: (row.asset, row.mirrored, row.database))
+            return sorted(rows, key=lambda row: (row.asset, row.mirrored, row.database))
         if order == "use":
             counts = uses or {}
-            return sorted(found, key=lambda row: (-counts.get((row.asset, row.mirrored), 0), row.asset))
-        return sorted(found, key=lambda row: (not row.may_play, row.cost))
+            return sorted(rows, key=lambda row: (-counts.get((row.asset, row.mirrored), 0), row.asset))
+        return sorted(rows, key=lambda row: (not row.may_play, row.cost))
 
     @cached_property
     def reach(self) -> tuple[float, float]:
@@ -97,8 +97,8 @@ class Landscape:
         costs, is_free = search.costs[start:stop], search.left_out[start:stop] == LeftOut.NO
         of_free = np.minimum.reduceat(np.where(is_free, costs, np.inf), edges)
         of_all = np.minimum.reduceat(costs, edges)
-        may = np.isfinite(of_free) & row.is_searched
-        return self._levels(np.where(np.isfinite(of_free), of_free, of_all)), may, (start, stop)
+        is_valid = np.isfinite(of_free) & row.is_searched
+        return self._levels(np.where(np.isfinite(of_free), of_free, of_all)), is_valid, (start, stop)
 
     def _levels(self, costs: Floats) -> Ints:
         least, most = self.reach
@@ -109,7 +109,7 @@ class Landscape:
 def _rows(name: str, search: ReaskedSearch, is_searched: bool) -> Sequence[Row]:
     database = search.database
     starts, stops = np.asarray(database.starts, np.int64), np.asarray(database.stops, np.int64)
-    found = []
+    rows = []
     for i, (start, stop) in enumerate(zip(starts.tolist(), stops.tolist(), strict=True)):
         if stop <= start:
             continue
@@ -117,5 +117,5 @@ def _rows(name: str, search: ReaskedSearch, is_searched: bool) -> Sequence[Row]:
         free = np.where(why == LeftOut.NO, costs, np.inf)
         at = int(free.argmin()) if np.isfinite(free).any() else int(costs.argmin())
         mirrored, left_out, ahead_s = bool(database.mirrored[i]), LeftOut(int(why[at])), database.permutation_s(i)
-        found.append(Row(name, i, database.assets[i], mirrored, start + at, float(costs[at]), left_out, is_searched, ahead_s))
-    return found
+        rows.append(Row(name, i, database.assets[i], mirrored, start + at, float(costs[at]), left_out, is_searched, ahead_s))
+    return rows

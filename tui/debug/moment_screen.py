@@ -19,17 +19,18 @@ from textual.widgets import Input, Static
 from contextdb.console import printable
 from contextdb.motion.output.bank import PoseBank
 from contextdb.motion.selection.decision import Action
-from tui.debug import reasons
-from tui.debug.bars import Bars
-from tui.debug.channels import Channels, Dial
-from tui.debug.figures import figure_of
-from tui.debug.game import Live
-from tui.debug.key_line import DebugKeyLine
-from tui.debug.landscape import ORDERS
-from tui.debug.recording import Moment, Recording, Turned
-from tui.debug.stage import Stage
-from tui.debug.timeline import Timeline
-from tui.debug.words import channel_costs, detail, instead, named
+
+from . import reasons
+from .bars import Bars
+from .channels import Channels, Dial
+from .figures import figure_of
+from .game import Live
+from .key_line import DebugKeyLine
+from .landscape import ORDERS
+from .recording import Moment, Recording, Turned
+from .stage import Stage
+from .timeline import Timeline
+from .words import channel_costs, detail, instead, named
 
 LARGE = (100, 34)
 """From so many columns and lines on all panes are seen."""
@@ -48,12 +49,12 @@ class MomentScreen(Screen[None]):
     CSS = """
     MomentScreen {
         background: $background;
-        #head, #told, #figures, #said, #detail { text-wrap: nowrap; text-overflow: ellipsis; }
+        #head, #reason, #figures, #message, #detail { text-wrap: nowrap; text-overflow: ellipsis; }
         #head { height: 1; background: $panel; text-style: bold; padding: 0 1; }
-        #told { height: 2; padding: 0 1; background: $surface; }
+        #reason { height: 2; padding: 0 1; background: $surface; }
         #status { height: 2; padding: 0 1; background: $surface; color: $text-muted; }
         #figures { height: 1; padding: 0 1; color: $text-muted; background: $surface; }
-        #said { height: 1; padding: 0 1; }
+        #message { height: 1; padding: 0 1; }
         #detail { height: 2; padding: 0 1; color: $text-muted; }
         #left, #right { width: 1fr; height: 1fr; }
         #right { width: 1.2fr; }
@@ -66,7 +67,7 @@ class MomentScreen(Screen[None]):
         #why { scrollbar-size-vertical: 1; padding: 0 1; background: $surface; }
         #reasons { height: auto; }
         #find { height: 1; border: none; padding: 0 1; background: $boost; display: none; }
-        #find.-shown { display: block; }
+        #find.-open { display: block; }
         #tiny { display: none; }
         &.-small #status { display: none; }
         &.-small #left, &.-small #right { width: 1fr; }
@@ -81,7 +82,7 @@ class MomentScreen(Screen[None]):
         self.live = live
         """The game that is followed; None for a recorded session."""
         self.is_now = live is not None
-        """Whether the newest moment of the game is shown, and goes on."""
+        """Whether the newest moment of the game is displayed, and goes on."""
         self.index = 0
         self.turned = Turned()
         self.order = ORDERS[0]
@@ -102,7 +103,7 @@ class MomentScreen(Screen[None]):
         yield Static(id="tiny")
         with Vertical(id="body"):
             yield Static(id="head")
-            yield Static(id="told")
+            yield Static(id="reason")
             yield Static(id="status")
             yield Timeline(self.recording)
             yield Static(id="figures")
@@ -116,12 +117,11 @@ class MomentScreen(Screen[None]):
                     yield Static(id="detail")
                     with VerticalScroll(id="why"):
                         yield Static(id="reasons")
-            yield Static(id="said")
+            yield Static(id="message")
             yield DebugKeyLine()
 
     @property
     def timeline(self) -> Timeline:
-        """Time."""
         return self.query_one(Timeline)
 
     @property
@@ -131,12 +131,10 @@ class MomentScreen(Screen[None]):
 
     @property
     def stage(self) -> Stage:
-        """The poses."""
         return self.query_one(Stage)
 
     @property
     def channels(self) -> Channels:
-        """The weights."""
         return self.query_one(Channels)
 
     # ---- the layout
@@ -148,8 +146,8 @@ class MomentScreen(Screen[None]):
         is_tiny = width < LEAST[0] or height < LEAST[1]
         self.set_class(self._is_small, "-small")
         self.set_class(is_tiny, "-tiny")
-        said = f"The screen is too small: {width} x {height}; {LEAST[0]} x {LEAST[1]} is the least."
-        self.query_one("#tiny", Static).update(said)
+        message = f"The screen is too small: {width} x {height}; {LEAST[0]} x {LEAST[1]} is the least."
+        self.query_one("#tiny", Static).update(message)
         self.timeline.n_strips = 1 if height < 20 else 2 if self._is_small else 3 if height < HIGH else 5
         self.timeline.refresh(layout=True)
         self._arrange()
@@ -182,7 +180,7 @@ class MomentScreen(Screen[None]):
             self._pane = pane
             self._arrange()
 
-    # ---- what is shown of a moment
+    # ---- display of a moment
 
     def _show(self) -> None:
         """Show the moment in all panes."""
@@ -221,10 +219,10 @@ class MomentScreen(Screen[None]):
             if notes:
                 text = Text(f"! {printable(notes)}  ", style="bold") + text
         self.query_one("#head", Static).update(text)
-        told = Text("\n".join(self._told(moment)))
-        self.query_one("#told", Static).update(told)
+        reason = Text("\n".join(self._reason_lines(moment)))
+        self.query_one("#reason", Static).update(reason)
 
-    def _told(self, moment: Moment) -> Iterator[str]:
+    def _reason_lines(self, moment: Moment) -> Iterator[str]:
         """Why, in a line, and what turned weights would make of it."""
         decision = moment.decision
         if decision.searched or decision.action in (Action.START, Action.JUMP):
@@ -233,13 +231,13 @@ class MomentScreen(Screen[None]):
             yield printable(f"Nothing was searched. The last search, at {moment.searched.time_s:.2f} s: {moment.searched.why}")
         else:
             yield "Nothing was searched up to here."
-        if self.turned and moment.turned is not None and moment.asked is not None:
+        if self.turned and moment.turned is not None and moment.repeated is not None:
             yield instead(moment)
         else:
             yield self._facts(moment)
 
     def _facts(self, moment: Moment) -> str:
-        """What the game said of the moment, behind the speeds where these have no line of their own."""
+        """The facts of the game at the moment, behind the speeds where these have no line of their own."""
         facts = ", ".join(f"{name} {reasons.fact_text(value)}" for name, value in sorted((moment.decision.context or {}).items()))
         speed = self._status[0][1] if self._is_small and self._status and self._status[0][0] == "m/s" else ""
         return printable(" · ".join(filter(None, (f"m/s {speed}" if speed else "", facts))))
@@ -247,7 +245,7 @@ class MomentScreen(Screen[None]):
     def _show_status(self) -> None:
         """Speeds and angles, on a line of their own where there is room."""
         self._status = list(self.recording.status_at(self.index).lines())
-        text = Text(" · ".join(f"{name} {told}" for name, told in self._status))
+        text = Text(" · ".join(f"{name} {state}" for name, state in self._status))
         self.query_one("#status", Static).update(text)
 
     def _show_bars(self) -> None:
@@ -258,7 +256,7 @@ class MomentScreen(Screen[None]):
         bars.chosen = None if choice is None or choice.database is None else (choice.database, choice.hit.frame)
         before = None if moment.searched is None else moment.searched.before
         bars.playing = None if before is None else (before.database, before.frame)
-        note = moment.not_asked
+        note = moment.not_repeated
         if not note and not rows:
             note = f"no asset's name holds {self.text!r}" if self.text else "nothing was searched"
         n, n_may = len(rows), sum(row.may_play for row in rows)
@@ -314,11 +312,14 @@ class MomentScreen(Screen[None]):
         if not self.query_one("#why").display or moment is None:
             return
         if row is None or moment.turned is None:
-            lines = [reasons.Line(moment.not_asked or "no asset is under the cursor")]
+            lines = [reasons.Line(moment.not_repeated or "no asset is under the cursor")]
         else:
             lines = reasons.reason_lines(self.recording, moment, row)
         if self._is_small:
-            lines += [reasons.Line("how it stands", "head"), *(reasons.Line(f"    {name}  {told}") for name, told in self._status)]
+            lines += [
+                reasons.Line("how it stands", "head"),
+                *(reasons.Line(f"    {name}  {state}") for name, state in self._status),
+            ]
         text = Content.assemble(*((f"{printable(line.text)}\n", STYLES[line.kind]) for line in lines))
         self.query_one("#reasons", Static).update(text)
 
@@ -347,7 +348,7 @@ class MomentScreen(Screen[None]):
             self._pane = "bars"
             self._arrange()
         field = self.query_one("#find", Input)
-        field.add_class("-shown")
+        field.add_class("-open")
         field.value = self.text
         field.focus()
 
@@ -359,14 +360,14 @@ class MomentScreen(Screen[None]):
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
         """Back to the bars; the cursor is at the first of them."""
-        self.query_one("#find", Input).remove_class("-shown")
+        self.query_one("#find", Input).remove_class("-open")
         self.bars.focus()
         if self.text:
             self.bars.go(0)
 
-    # ---- what is said
+    # ---- messages
 
     def say(self, text: str, is_error: bool = False) -> None:
         """Say something over the foot."""
-        line = self.query_one("#said", Static)
+        line = self.query_one("#message", Static)
         line.update(Text(printable(text), style="bold" if is_error else ""))

@@ -15,7 +15,8 @@ from contextdb.motion.trace.filter_rows import is_recorded
 from contextdb.motion.trace.session import Trace
 from contextdb.motion.trace.timeline import timeline_of
 from contextdb.tables.project import Project
-from tui.debug.recording import Figures, Recording
+
+from .recording import Figures, Recording
 
 
 def measures_of(path: Path) -> tuple[float, Figures]:
@@ -39,7 +40,7 @@ def opened(path: Path, folder: Path) -> Recording:
         databases = _databases(folder, trace.about)
         missing = trace.use(databases)
     except ContextDBError as error:
-        databases, missing = {}, error.faults[0].message
+        databases, missing = {}, str(error.faults[0])
     return Recording(str(path), trace, str(folder), databases, missing)
 
 
@@ -54,13 +55,13 @@ def databases_of(folder: Path, names: Iterable[str] | None = None) -> dict[str, 
 
 def _databases(folder: Path, about: Mapping[str, Mapping[str, Any]]) -> dict[str, MotionDatabase]:
     """Those that a session was recorded with; saved ones are opened without a look at the clips."""
-    found = {}
-    for name, told in about.items():
+    databases = {}
+    for name, declared in about.items():
         try:
             database = open_database(saved_path(folder, name))
         except ContextDBError:
             break
-        if not is_recorded(told, database):
+        if not is_recorded(declared, database):
             break
-        found[name] = database
-    return found if len(found) == len(about) else databases_of(folder, about)
+        databases[name] = database
+    return databases if len(databases) == len(about) else databases_of(folder, about)

@@ -10,8 +10,9 @@ from contextdb.errors import ContextDBError
 from contextdb.motion.trace.cost_views import cost_text
 from contextdb.motion.trace.other_filters import UNKNOWN
 from contextdb.motion.trace.why_not import why_not
-from tui.debug.landscape import Row
-from tui.debug.recording import Moment, Recording
+
+from .landscape import Row
+from .recording import Moment, Recording
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,18 +30,18 @@ def reason_lines(recording: Recording, moment: Moment, row: Row) -> list[Line]:
 
 def _why(moment: Moment, row: Row) -> Iterator[Line]:
     assert moment.turned is not None, "a row is of a search"
-    told = why_not(moment.turned, row.asset)
-    place = "" if told.time_s is None else f" at {told.time_s:.2f} s"
-    if told.winner == told.asset:
-        yield Line(f"{told.asset} is chosen: cost {cost_text(told.cost)}", "good")
+    exclusion = why_not(moment.turned, row.asset)
+    place = "" if exclusion.time_s is None else f" at {exclusion.time_s:.2f} s"
+    if exclusion.winner == exclusion.asset:
+        yield Line(f"{exclusion.asset} is chosen: cost {cost_text(exclusion.cost)}", "good")
         if moment.searched is not None:
             yield Line(moment.searched.why, "dim")
         return
-    yield Line(f"why not {told.asset}{place}: rank {told.rank:,}", "head")
-    for reason in told.reasons:
+    yield Line(f"why not {exclusion.asset}{place}: rank {exclusion.rank:,}", "head")
+    for reason in exclusion.reasons:
         yield Line(f"  {reason}", "bad")
-    yield Line("it would win with" if any(each.wins for each in told.changes) else "no single change is enough", "head")
-    for each in sorted(told.changes, key=lambda change: not change.wins):
+    yield Line("it would win with" if any(each.wins for each in exclusion.changes) else "no single change is enough", "head")
+    for each in sorted(exclusion.changes, key=lambda change: not change.wins):
         to = each.to if isinstance(each.to, str) else f"{each.to:.4g}"
         sign, kind = ("✓", "good") if each.wins else ("– not enough:", "dim")
         yield Line(f"  {sign} {each.kind} {each.what} → {to}", kind)

@@ -1,4 +1,4 @@
-"""A recorded session as the debugger reads it: its timeline, the search behind each moment asked again, its poses and measures."""
+"""A recorded session as the debugger reads it: its timeline, the search behind each moment repeated, its poses and measures."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from contextdb.errors import ContextDBError, plural
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
-from contextdb.motion.measuring import measure, shown
+from contextdb.motion.measuring import displayed, measure
+from contextdb.motion.measuring.displayed import strips_of
 from contextdb.motion.measuring.raw_clips import Clips
-from contextdb.motion.measuring.shown import strips_of
 from contextdb.motion.output.bank import PoseBank
 from contextdb.motion.output.settings import PoseSettings
 from contextdb.motion.search.database import MotionDatabase
@@ -30,7 +30,8 @@ from contextdb.motion.trace.status import Status, status_of
 from contextdb.motion.trace.stock import Stock
 from contextdb.motion.trace.timeline import Timeline, timeline_of
 from contextdb.tables.project import SCHEMA_FILE, Project
-from tui.debug.landscape import Landscape
+
+from .landscape import Landscape
 
 MEASURES = {"accel": "acceleration m/s²", "skate": "skate cm/s", "error": "path error m"}
 """What is measured of the poses, with its unit."""
@@ -46,11 +47,11 @@ class Turned:
     def __bool__(self) -> bool:
         return bool(self.weights or self.thresholds)
 
-    def of(self, asked: ReaskedDecision) -> ReaskedDecision:
+    def of(self, decision: ReaskedDecision) -> ReaskedDecision:
         """A decision with them."""
         for name, threshold in self.thresholds.items():
-            asked = asked.with_threshold(name, threshold)
-        return asked.with_weights(self.weights) if self.weights else asked
+            decision = decision.with_threshold(name, threshold)
+        return decision.with_weights(self.weights) if self.weights else decision
 
 
 @dataclass(frozen=True)
@@ -86,11 +87,10 @@ class Figures:
 
     @property
     def text(self) -> str:
-        """In a line."""
-        told = f"{plural(self.jumps, 'jump')}, {self.jumps_per_s:.2f} a second, {self.forced:,} forced"
+        text = f"{plural(self.jumps, 'jump')}, {self.jumps_per_s:.2f} a second, {self.forced:,} forced"
         if self.gain_median is not None and self.gain_small_share is not None:
-            told += f" · gain median {self.gain_median:.0%}, {self.gain_small_share:.0%} under {SMALL_GAIN:.0%}"
-        return told if self.stay_s is None else f"{told} · {self.stay_s:.2f} s in a clip"
+            text += f" · gain median {self.gain_median:.0%}, {self.gain_small_share:.0%} under {SMALL_GAIN:.0%}"
+        return text if self.stay_s is None else f"{text} · {self.stay_s:.2f} s in a clip"
 
 
 class Watched(Sequence[Decision]):
@@ -125,7 +125,7 @@ class Recording:
     databases : mapping of name to MotionDatabase
         Those of the project.
     missing : str
-        Why some searches cannot be asked again, in a sentence; "" when all can.
+        Why some searches cannot be repeated, in a sentence; "" when all can.
     """
 
     def __init__(self, file: str, trace: Trace, folder: str, databases: Mapping[str, MotionDatabase], missing: str) -> None:
@@ -139,6 +139,7 @@ class Recording:
         """And what is measured of them."""
         self.run_again: Mapping[str, float | None] | None = None
         """Its measures run again with nothing turned, once they are known."""
+        """What its poses are made with in place of what the project says, in sentences."""
         self.refresh(missing)
 
     def refresh(self, missing: str) -> None:
@@ -176,15 +177,15 @@ class Recording:
         last, known = self.trace[index - 1] if index else None, {} if self.missing else self.databases
         return status_of(self.trace[index], last, known, None if self.displayed is None else self.displayed.warps[index])
 
-    def asked(self, index: int) -> tuple[ReaskedDecision | None, str]:
-        """The search of an update asked again, or why it cannot be."""
+    def repeated(self, index: int) -> tuple[ReaskedDecision | None, str]:
+        """The search of an update repeated, or why it cannot be."""
         decision = self.trace[index]
         why = why_not_asked(decision, self.trace.about, self.databases) if self.databases else self.missing
         return (None, self.missing or why) if why else (self.reasked.of(decision), "")
 
     @cached_property
     def reasked(self) -> Reasked:
-        """The session asked again, of its tables too."""
+        """The session repeated, of its tables too."""
         return Reasked(self.trace, self.trace.about, self.stock, {})
 
     @cached_property
@@ -212,11 +213,11 @@ class Recording:
     def decisions(self, on_step: Callable[[], None]) -> list[Decision]:
         """All decisions in full; read once, which takes some seconds for a long session."""
         if self._decisions is None:
-            found = []
+            decisions = []
             for each in self.trace:
-                found.append(each)
+                decisions.append(each)
                 on_step()
-            self._decisions = found
+            self._decisions = decisions
         return self._decisions
 
     @property
@@ -231,11 +232,11 @@ class Recording:
 
     def weights(self) -> dict[str, float]:
         """The weights of all channels, as they were recorded."""
-        found: dict[str, float] = {}
+        weights: dict[str, float] = {}
         for database in self.databases.values():
             for name, weight in zip(database.channel_names, database.weights.tolist(), strict=True):
-                found.setdefault(name, weight)
-        return found
+                weights.setdefault(name, weight)
+        return weights
 
     def thresholds(self) -> dict[str, float]:
         """The thresholds of the databases that have one, as they were at the first search."""
@@ -265,22 +266,22 @@ class Recording:
         return saved_poses(self.folder, self.databases) if self.folder else {}
 
     def strips(self, banks: Mapping[str, PoseBank], on_step: Callable[[], None]) -> Mapping[str, Floats]:
-        """What is measured of the session's poses at each update, by the names of `MEASURES`; the poses themselves are kept."""
+        """What is measured of the session's poses at each update, by the names of `MEASURES`; the poses themselves are stored."""
         decisions = self.decisions(on_step)
         settings = PoseSettings() if self.config is None else self.config.output_of(self.controller)
         warped = list(measure.warped_poses(Watched(decisions, on_step), banks, settings))
-        poses = shown.of_poses([pose for pose, _ in warped], 1.0)
+        poses = displayed.of_poses([pose for pose, _ in warped], 1.0)
         assert poses.positions is not None, "was just made"
         assert poses.roots is not None, "was just made"
         parents = next(iter(banks.values())).skeleton.parents
         self.displayed = Displayed(poses.positions.astype(np.float32), poses.roots, parents, [warp for _, warp in warped])
-        self.measured = strips_of(shown.with_poses(shown.of_decisions(decisions), poses).with_contacts(Clips.of(banks)))
+        self.measured = strips_of(displayed.with_poses(displayed.of_decisions(decisions), poses).with_contacts(Clips.of(banks)))
         return self.measured
 
 
 @dataclass(frozen=True, eq=False)
 class Displayed:
-    """The poses of a session as they are shown: blended, with feet locked and all else that its settings ask for.
+    """The poses of a session as they are displayed: blended, with feet locked and all else that its settings ask for.
 
     Attributes
     ----------
@@ -305,9 +306,9 @@ class Moment:
     decision: Decision
     search_index: int | None
     searched: Decision | None
-    asked: ReaskedDecision | None
+    repeated: ReaskedDecision | None
     turned: ReaskedDecision | None
-    not_asked: str
+    not_repeated: str
 
     @classmethod
     def of(cls, recording: Recording, index: int, turned: Turned) -> Moment:
@@ -316,15 +317,15 @@ class Moment:
         if at is None:
             return cls(index, decision, None, None, None, None, "nothing was searched up to here.")
         searched = decision if at == index else recording.trace[at]
-        asked, why = recording.asked(at)
-        return cls(index, decision, at, searched, asked, None if asked is None else turned.of(asked), why)
+        repeated, why = recording.repeated(at)
+        return cls(index, decision, at, searched, repeated, None if repeated is None else turned.of(repeated), why)
 
     def with_turned(self, turned: Turned) -> Moment:
         """The same with other weights; nothing but the weighing is done again."""
-        again = None if self.asked is None else turned.of(self.asked)
-        return Moment(self.index, self.decision, self.search_index, self.searched, self.asked, again, self.not_asked)
+        again = None if self.repeated is None else turned.of(self.repeated)
+        return Moment(self.index, self.decision, self.search_index, self.searched, self.repeated, again, self.not_repeated)
 
     @cached_property
     def landscape(self) -> Landscape:
-        """The costs of all frames; empty where the search cannot be asked again."""
+        """The costs of all frames; empty where the search cannot be repeated."""
         return Landscape({}) if self.turned is None else Landscape(self.turned.searches, self.turned.searched)

@@ -23,18 +23,19 @@ from contextdb.edits.schema_file import SchemaChange
 from contextdb.errors import ContextDBError, MotionError
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.output.bank import PoseBank
-from tui.debug import ladder, reasons
-from tui.debug.channels import Channels
-from tui.debug.game import Live
-from tui.debug.help import DebugHelp
-from tui.debug.keys import KEYS
-from tui.debug.landscape import Row
-from tui.debug.moment_screen import TITLES, MomentScreen
-from tui.debug.recording import MEASURES, Recording, Turned
-from tui.debug.stage import NEARER, TURN
-from tui.debug.timeline import Timeline
-from tui.debug.whole import Cancelled, Outcome, outcome_of
-from tui.debug.writing import write_turned
+
+from . import ladder, reasons
+from .channels import Channels
+from .game import Live
+from .help import DebugHelp
+from .keys import KEYS
+from .landscape import Row
+from .moment_screen import TITLES, MomentScreen
+from .recording import MEASURES, Recording, Turned
+from .stage import NEARER, TURN
+from .timeline import Timeline
+from .whole import Cancelled, Outcome, outcome_of
+from .writing import write_turned
 
 FRAME_S = 1.0 / 30.0
 LIVE_S = 0.2
@@ -147,23 +148,22 @@ class DebugScreen(MomentScreen):
     def action_jump(self, by: int) -> None:
         """To the next jump, or the one before."""
         jumps = self.recording.jumps
-        found = jumps[jumps > self.index] if by > 0 else jumps[jumps < self.index][::-1]
-        if len(found):
-            self.go(int(found[0]))
+        frames = jumps[jumps > self.index] if by > 0 else jumps[jumps < self.index][::-1]
+        if len(frames):
+            self.go(int(frames[0]))
         else:
             self.say(f"There is no jump {'behind' if by > 0 else 'before'} this moment.")
 
     def action_peak(self, by: int) -> None:
         """To the next peak of the chosen measure."""
-        found = self.timeline.peak_from(self.index, by > 0)
-        if found is None:
+        peak = self.timeline.peak_from(self.index, by > 0)
+        if peak is None:
             self.say(f"There is no peak of {self.timeline.measure} {'behind' if by > 0 else 'before'} this moment.")
         else:
-            self.go(found)
+            self.go(peak)
             self.say(f"{self.timeline.measure}: {self._measured(self.timeline.measure)}")
 
     def action_measure(self) -> None:
-        """Choose the next measure."""
         name = self.timeline.next_measure()
         self.say(f"n goes to the next peak of {MEASURES.get(name, name)}; here it is {self._measured(name)}.")
 
@@ -223,12 +223,12 @@ class DebugScreen(MomentScreen):
     def action_sheet(self) -> None:
         """Open the row of the asset in the sheet, or say how."""
         row = self.bars.row
-        found = None if row is None else reasons.table_row(self.recording, row)
-        if row is None or found is None:
+        table_row = None if row is None else reasons.table_row(self.recording, row)
+        if row is None or table_row is None:
             self.say("No table has a row of this asset.")
             return
         where = Start(int(self.recording.line.ticks[self.index]), self.turned)
-        self.post_message(RowWanted(*found, self._failing(row), where))
+        self.post_message(RowWanted(*table_row, self._failing(row), where))
 
     def _failing(self, row: Row) -> str | None:
         """The first column whose cell does not accept its fact."""
@@ -245,7 +245,7 @@ class DebugScreen(MomentScreen):
         """Turn the weight, or threshold, under the cursor."""
         dial = self.channels.dial
         if dial is None:
-            self.say("There is no weight to turn: " + (self.recording.missing or "the session has no database."))
+            self.say("There is no weight to change: " + (self.recording.missing or "the session has no database."))
             return
         now = ladder.turned(dial.now, by > 0)
         weights, thresholds = dict(self.turned.weights), dict(self.turned.thresholds)
@@ -254,16 +254,16 @@ class DebugScreen(MomentScreen):
         if now == dial.recorded:
             del numbers[dial.name]
         if dial.is_weight and not any({**self._recorded, **weights}.values()):
-            self.say("The weight of every channel would be 0: at least one is to be above it.")
+            self.say("The weight of every channel would be 0: at least one must be above 0.")
             return
         self._turn(Turned(weights, thresholds))
-        keys = "r runs the whole session with it, w writes it, 0 takes it back." if self.turned else "All is as it was recorded."
+        keys = "r runs the whole session with it, w writes it, 0 takes it back." if self.turned else "All weights are as recorded."
         self.say(f"{dial.label} {dial.now:g} → {now:g} · {keys}")
 
     def action_reset(self) -> None:
         """As it was recorded."""
         self._turn(Turned())
-        self.say("All is as it was recorded.")
+        self.say("All weights are as recorded.")
 
     def _turn(self, turned: Turned) -> None:
         self.turned = turned
@@ -274,7 +274,7 @@ class DebugScreen(MomentScreen):
     def action_write(self) -> None:
         """Write what is turned into contextdb.toml."""
         if not self.turned:
-            self.say("Nothing is turned: + and - turn the weight under the cursor of the weights.")
+            self.say("No weight is changed: + and - change the weight under the cursor.")
             return
         config = self.recording.config
         if config is None:
@@ -287,12 +287,12 @@ class DebugScreen(MomentScreen):
             return
         self._written += done
         path = self.recording.schema_file
-        self.say(f"{path} says these weights now; u takes it back." if done else f"{path} says so already.")
+        self.say(f"{path} has these weights now; u undoes it." if done else f"{path} has these weights already.")
 
     def action_undo(self) -> None:
         """Take back what was written last."""
         if not self._written:
-            self.say("Nothing was written that could be taken back.")
+            self.say("There is nothing written to undo.")
             return
         while self._written:
             last = self._written[-1]
@@ -310,7 +310,7 @@ class DebugScreen(MomentScreen):
     def action_run(self) -> None:
         """Run the whole session again with what is turned."""
         if not self.turned:
-            self.say("Nothing is turned: + and - turn the weight under the cursor of the weights.")
+            self.say("No weight is changed: + and - change the weight under the cursor.")
         elif self.live is not None:
             self.say("A running game cannot be run again: record a session of it with motion.Trace.")
         elif self.recording.missing or not self.recording.databases:
@@ -357,7 +357,6 @@ class DebugScreen(MomentScreen):
     def _take_strips(self, strips: Mapping[str, Floats]) -> None:
         self.timeline.add_strips(strips)
         self._show()
-        self.say("")
 
     def _progress(self, what: str) -> Callable[[float], None]:
         """Shows a bar; raises Cancelled once the work is no longer wanted."""
@@ -382,10 +381,10 @@ class DebugScreen(MomentScreen):
         is_at_work = any(worker.is_running for worker in self.workers if worker.node is self)
         if self._playing is not None:
             self._stop_playing()
-        elif field.has_class("-shown") or self.text:
+        elif field.has_class("-open") or self.text:
             if field.has_focus:
                 self.bars.focus()
-            field.remove_class("-shown")
+            field.remove_class("-open")
             field.value = ""
         elif is_at_work:
             self.workers.cancel_node(self)
@@ -404,11 +403,9 @@ class DebugScreen(MomentScreen):
         self.stage.look(self.stage.camera.zoomed(NEARER if by > 0 else 1.0 / NEARER))
 
     def action_help(self) -> None:
-        """The help."""
         self.app.push_screen(DebugHelp())
 
     def action_quit(self) -> None:
-        """Leave."""
         self.workers.cancel_node(self)
         if self._is_inside:
             self.dismiss()

@@ -14,10 +14,11 @@ from textual.strip import Strip
 from textual.widget import Widget
 
 from contextdb.motion.clips.quaternions import Floats
-from tui.debug.camera import Camera
-from tui.debug.canvas import HIGH, WIDE, Canvas
-from tui.debug.figures import Figure, grid
-from tui.widgets.fitted import fitted
+
+from ..widgets.fitted import fitted
+from .camera import Camera
+from .canvas import HIGH, WIDE, Canvas
+from .figures import Figure, grid
 
 GROUND, CANDIDATES, GOT, ASSET, PLAYS_ON, WANTED, CHOSEN = range(1, 8)
 NAMES = ("blank", "ground", "candidates", "got", "asset", "plays-on", "wanted", "chosen")
@@ -67,7 +68,6 @@ class Stage(Widget, can_focus=True):
         self._drag: tuple[int, int] | None = None
 
     def show(self, figure: Figure | None, note: str = "") -> None:
-        """Show a figure."""
         self.figure, self.note = figure, note
         self._changed()
 
@@ -131,13 +131,13 @@ class Stage(Widget, can_focus=True):
 
     def _legend(self, width: int) -> Strip:
         segments = [Segment(" ", self.rich_style)]
-        shown = self._shown()
+        lines = self._visible_lines()
         for layer, text in LEGEND:
-            if layer in shown and sum(len(s.text) for s in segments) + len(text) + 4 <= width:
+            if layer in lines and sum(len(s.text) for s in segments) + len(text) + 4 <= width:
                 segments.append(Segment(f"━ {text}  ", self.get_component_rich_style(f"stage--{NAMES[layer]}")))
         return Strip(segments).adjust_cell_length(width, self.rich_style)
 
-    def _shown(self) -> set[int]:
+    def _visible_lines(self) -> set[int]:
         """The layers in which something is drawn."""
         it = self.figure
         if it is None:
@@ -160,14 +160,11 @@ class Stage(Widget, can_focus=True):
             self.look(self.camera.turned(DRAG * (event.x - x), DRAG * (event.y - y)))
 
     def on_mouse_up(self) -> None:
-        """Let go."""
         self._drag = None
         self.release_mouse()
 
     def on_mouse_scroll_up(self) -> None:
-        """Nearer."""
         self.look(self.camera.zoomed(NEARER))
 
     def on_mouse_scroll_down(self) -> None:
-        """Farther away."""
         self.look(self.camera.zoomed(1.0 / NEARER))

@@ -21,8 +21,9 @@ from textual.widget import Widget
 from contextdb.console import printable
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
-from tui.debug.recording import Recording
-from tui.widgets.fitted import fitted
+
+from ..widgets.fitted import fitted
+from .recording import Recording
 
 LABEL = 9
 N_COLOURS = 8
@@ -98,7 +99,6 @@ class Timeline(Widget):
     # ---- what is seen
 
     def go(self, index: int) -> None:
-        """Show another moment."""
         self.index = index
         self.refresh()
 
@@ -136,21 +136,21 @@ class Timeline(Widget):
         rises = values > np.append(-np.inf, values[:-1])
         holds = values >= np.append(values[1:], -np.inf)
         peaks = np.flatnonzero(rises & holds & (values >= bar))
-        found = peaks[peaks > index] if forwards else peaks[peaks < index][::-1]
-        return int(found[0]) if len(found) else None
+        ahead = peaks[peaks > index] if forwards else peaks[peaks < index][::-1]
+        return int(ahead[0]) if len(ahead) else None
 
     @property
-    def shown_strips(self) -> list[str]:
+    def visible_strips(self) -> list[str]:
         """The strips that are seen: the chosen one first where not all fit."""
         names = [name for name in TITLES if name in self.strips]
         if len(names) <= self.n_strips:
             return names
-        kept = [self.measure, *(name for name in names if name != self.measure)][: self.n_strips]
-        return [name for name in names if name in kept]
+        strips = [self.measure, *(name for name in names if name != self.measure)][: self.n_strips]
+        return [name for name in names if name in strips]
 
     def get_content_height(self, container: object, viewport: object, width: int) -> int:
         """Session, ruler, what plays, what happened, and the strips."""
-        return 4 + len(self.shown_strips)
+        return 4 + len(self.visible_strips)
 
     # ---- columns
 
@@ -180,7 +180,7 @@ class Timeline(Widget):
         """One line of the screen."""
         first, stop = self._window()
         edges = self._edges(0, len(self.recording)) if y == 0 else self._edges(first, stop)
-        names = self.shown_strips
+        names = self.visible_strips
         if y == 0:
             label, cells = self._session(edges)
         elif y == 1:
@@ -197,7 +197,7 @@ class Timeline(Widget):
         text, style = cells[at]
         cursor = self.get_component_rich_style("timeline--cursor")
         cells[at] = ("▼" if y == 1 else text, cursor if y in (0, 2, 3) else style + cursor)
-        joined = [Segment(label[0], label[1]), *_joined(cells)]
+        joined = [Segment(label[0], label[1]), *_merged_segments(cells)]
         return Strip(joined).adjust_cell_length(self.size.width, self.rich_style)
 
     def _label(self, text: str, is_here: bool = False) -> tuple[str, Style]:
@@ -255,7 +255,7 @@ class Timeline(Widget):
         counts = [np.concatenate(([0], np.cumsum(flags))) for flags, _, _ in kinds]
         for start, stop in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
             end = max(stop, start + 1) if stop > start else start
-            kind = next((i for i, told in enumerate(counts) if told[min(end, len(line))] > told[start]), None)
+            kind = next((i for i, levels in enumerate(counts) if levels[min(end, len(line))] > levels[start]), None)
             cells.append((" ", self.rich_style) if kind is None else (kinds[kind][1], styles[kinds[kind][2]]))
         return self._label("events"), cells
 
@@ -284,16 +284,13 @@ class Timeline(Widget):
             self._scrub(event.x, 1)
 
     def on_mouse_up(self) -> None:
-        """Let go."""
         self._is_dragging = False
         self.release_mouse()
 
     def on_mouse_scroll_up(self) -> None:
-        """A shorter window."""
         self.zoom(True)
 
     def on_mouse_scroll_down(self) -> None:
-        """A longer window."""
         self.zoom(False)
 
     def _scrub(self, x: int, y: int) -> None:
@@ -308,15 +305,15 @@ def _levels(values: Floats, least: float, most: float) -> list[int]:
     return [0 if share <= 0.0 else max(1, round(8.0 * share)) for share in shares.tolist()]
 
 
-def _joined(cells: list[tuple[str, Style]]) -> list[Segment]:
+def _merged_segments(cells: list[tuple[str, Style]]) -> list[Segment]:
     """Cells as segments, those of one style together."""
-    found: list[Segment] = []
+    segments: list[Segment] = []
     start = 0
     for i in range(1, len(cells) + 1):
         if i == len(cells) or cells[i][1] is not cells[start][1]:
-            found.append(Segment("".join(text for text, _ in cells[start:i]), cells[start][1]))
+            segments.append(Segment("".join(text for text, _ in cells[start:i]), cells[start][1]))
             start = i
-    return found
+    return segments
 
 
 def _tail(name: str, width: int) -> str:

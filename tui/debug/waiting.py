@@ -11,8 +11,8 @@ from textual.screen import Screen
 from textual.timer import Timer
 from textual.widgets import Static
 
-from tui.debug.game import Live
-from tui.debug.key_line import DebugKeyLine
+from .game import Live
+from .key_line import DebugKeyLine
 
 LOOK_S = 0.1
 
@@ -51,6 +51,5 @@ class WaitingScreen(Screen[None]):
         self.query_one("#waiting", Static).update(f"{self.live.name}: {notes}\n\n{watched}")
 
     def action_leave(self) -> None:
-        """Leave."""
         self.live.close()
         self._leave()

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from contextdb.motion.trace.reasked import Changes, Reasked
 from contextdb.motion.trace.stats import measures_of
 from contextdb.motion.trace.what_if import run_again
-from tui.debug.recording import Recording, Turned
+
+from .recording import Recording, Turned
 
 Measured = Mapping[str, float | None]
 Progress = Callable[[float], None]
-"""Is told the share that is done; raises Cancelled to end it."""
+"""Takes the share that is done; raises Cancelled to end it."""
 LABELS = (
     ("jumps_per_s", "jumps a second", "{:.2f}"),
     ("forced_jumps", "forced jumps", "{:.0f}"),
@@ -44,13 +45,12 @@ class Outcome:
 
     @property
     def text(self) -> str:
-        """In a sentence."""
-        told = f"{self.other_assets:,} of {self.searches:,} searches choose another asset"
+        text = f"{self.other_assets:,} of {self.searches:,} searches choose another asset"
         for name, label, form in LABELS:
             was, now = self.before.get(name), self.after.get(name)
             if was is not None and now is not None:
-                told += f" · {label} {form.format(was)} → {form.format(now)}"
-        return told
+                text += f" · {label} {form.format(was)} → {form.format(now)}"
+        return text
 
 
 def outcome_of(recording: Recording, turned: Turned, progress: Progress) -> Outcome:
@@ -59,19 +59,19 @@ def outcome_of(recording: Recording, turned: Turned, progress: Progress) -> Outc
     steps = _Steps(progress, 4 * n)
     recording.decisions(steps.step)
     steps.at(n)
-    counts = asked_again(recording, turned, steps.step)
+    counts = repeated_searches(recording, turned, steps.step)
     return Outcome(*counts, *run_both(recording, turned, steps.step))
 
 
-def asked_again(recording: Recording, turned: Turned, on_step: Callable[[], None]) -> tuple[int, int, int]:
+def repeated_searches(recording: Recording, turned: Turned, on_step: Callable[[], None]) -> tuple[int, int, int]:
     """How many searches there are, and how many choose another frame, and another asset."""
     n_searches = n_frames = n_assets = 0
-    for asked in _reasked(recording, turned):
+    for decision in _reasked(recording, turned):
         on_step()
-        if asked.choice is not None:
+        if decision.choice is not None:
             n_searches += 1
-            n_frames += asked.is_changed
-            n_assets += asked.is_other_asset
+            n_frames += decision.is_changed
+            n_assets += decision.is_other_asset
     return n_searches, n_frames, n_assets
 
 

@@ -7,8 +7,9 @@ from collections.abc import Iterator
 from contextdb.console import printable
 from contextdb.motion.selection.decision import Playing
 from contextdb.motion.trace.cost_views import cost_text
-from tui.debug.landscape import Row
-from tui.debug.recording import Moment
+
+from .landscape import Row
+from .recording import Moment
 
 
 def named(playing: Playing) -> str:
@@ -39,8 +40,8 @@ def detail(moment: Moment, row: Row) -> Iterator[str]:
     tags = [
         tag for tag, has in zip(database.marks.tags, database.marks.kind_tags[database.marks.kinds[row.frame]], strict=True) if has
     ]
-    said = f" · {', '.join(tags)}" if tags else ""
-    yield printable(f"{row.name} at {at_s:.2f} s: cost {cost_text(row.cost)}{out}{said} · {row.database}")
+    tag_text = f" · {', '.join(tags)}" if tags else ""
+    yield printable(f"{row.name} at {at_s:.2f} s: cost {cost_text(row.cost)}{out}{tag_text} · {row.database}")
     own = database.cost_weights * search.sums[:, row.frame]
     parts = sorted(zip(database.channel_names, own.tolist(), strict=True), key=lambda part: -part[1])
     yield printable(" + ".join(f"{name} {cost_text(value)}" for name, value in parts) + _biases(search.biases[row.frame]))

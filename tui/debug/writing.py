@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+from contextdb.authoring.weights import weights_change
 from contextdb.edits.schema_file import SchemaChange
-from contextdb.edits.weights import weights_change
-from tui.debug.recording import Recording, Turned
+
+from .recording import Recording, Turned
 
 
 def write_turned(recording: Recording, turned: Turned) -> Iterator[SchemaChange | None]:

@@ -6,7 +6,8 @@ import re
 from functools import lru_cache
 
 from contextdb.columns import TextColumn
-from tui.model.layout import MOST_TEXTS
+
+from .layout import MOST_TEXTS
 
 MOST_ALIGNED = 200
 """By so many distinct texts of a column it is decided how far its numbers are indented."""
@@ -20,8 +21,8 @@ _WHOLE = re.compile(r"[^0-9.]{0,3}[0-9]+|[^0-9.]{0,3}(?=\.[0-9])")
 
 def before_point(text: str) -> int | None:
     """How many characters stand before the point of the first number; None where the text begins with no number."""
-    found = _WHOLE.match(text)
-    return found.end() if found is not None and found.end() <= MOST_BEFORE else None
+    match = _WHOLE.match(text)
+    return match.end() if match is not None and match.end() <= MOST_BEFORE else None
 
 
 def indent_of(column: TextColumn) -> int:

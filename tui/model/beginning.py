@@ -15,8 +15,9 @@ from contextdb.exchange.formats import ReadOptions, read
 from contextdb.schema.settings import TableSettings
 from contextdb.tables.project import read_folder_schema
 from contextdb.tables.table import Table
-from tui.model.importing import suffixes_read
-from tui.model.new_table import ASSET, name_fault
+
+from .importing import suffixes_read
+from .new_table import ASSET, name_fault
 
 WORKBOOKS = (".xlsx", ".xlsm", ".xls")
 MOST_FILES = 5
@@ -25,13 +26,13 @@ MOST_FILES = 5
 
 @dataclass(frozen=True)
 class Beginning:
-    """A folder in which a table may be made, and what was asked for."""
+    """A folder in which a table may be made, and what was requested."""
 
     folder: Path
     name: str = ""
-    """The name that was asked for; empty: a name is asked."""
+    """The name that was requested; empty: the dialog requests one."""
     source: Path | None = None
-    """The file that was asked for, which a new table can be read from."""
+    """The file that was requested, which a new table can be read from."""
     near: str = ""
     """The nearest name that there is, as it would be typed."""
 
@@ -39,8 +40,8 @@ class Beginning:
     def files(self) -> list[Path]:
         """Files of the folder that a table can be read from, the newest first."""
         kinds = tuple(suffix for suffix in suffixes_read() if suffix not in TABLE_SUFFIXES)
-        found = [file for file in self.folder.iterdir() if file.is_file() and file.name.lower().endswith(kinds)]
-        return sorted((f for f in found if not f.name.endswith(".actors.json")), key=lambda f: -f.stat().st_mtime)[:MOST_FILES]
+        paths = [file for file in self.folder.iterdir() if file.is_file() and file.name.lower().endswith(kinds)]
+        return sorted((f for f in paths if not f.name.endswith(".actors.json")), key=lambda f: -f.stat().st_mtime)[:MOST_FILES]
 
     def proposed_name(self, source: Path | None, taken: list[str]) -> str:
         """A name for a table that is read from a file: that of the file, or that with a number behind it."""
@@ -62,7 +63,7 @@ def beginning(path: Path, error: ContextDBError | None = None) -> Beginning | No
 def beginning_from(path: Path) -> Beginning | None:
     """How to begin with a file that is no table of ours; None: the import cannot read it either."""
     try:
-        if path.suffix.lower() not in WORKBOOKS:  # of these the sheet, and the row of its names, are asked
+        if path.suffix.lower() not in WORKBOOKS:  # of these the sheet, and the row of its names, are requested
             read(read_bytes(path), str(path), ReadOptions())
     except ContextDBError:
         return None

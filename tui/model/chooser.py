@@ -12,7 +12,8 @@ from functools import cached_property
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.words import says_any
-from tui.model.completion import (
+
+from .completion import (
     Tick,
     Vocabulary,
     Word,
@@ -133,11 +134,11 @@ class Chooser:
 
     def same(self, text: str, row: Row) -> bool:
         """Whether a text is what picking a row writes; for a bool its first letters are enough."""
-        said = text.strip()
+        stripped = text.strip()
         if not self.is_truth:
-            return said == (row or "").strip()
+            return stripped == (row or "").strip()
         written = self.any_text if row is None else row
-        return written.casefold().startswith(said.casefold()) if said else row is None
+        return written.casefold().startswith(stripped.casefold()) if stripped else row is None
 
     def toggle(self, text: str, row: Row, sign: str = "") -> str:
         """The text with a row ticked or unticked, or given a sign."""

@@ -1,6 +1,6 @@
 """Which cells of a table say what their clips say: the mark that Autofill leaves.
 
-Nothing of it is kept in a file: a cell is of its clip as long as its text is the one that the clip gives, and `contextdb motion
+Nothing of it is stored in a file: a cell is of its clip as long as its text is the one that the clip gives, and `contextdb motion
 describe --into` asks the clips in the same way.
 """
 
@@ -33,7 +33,7 @@ class ClipCells:
             return OF_CLIP
         return OTHERWISE if (name, column, text) in self.refused else ""
 
-    def said(self, asset: str, column: str, text: str) -> str:
+    def mark_text(self, asset: str, column: str, text: str) -> str:
         """The same in words."""
         mark = self.mark(asset, column, text)
         if mark == OTHERWISE:

@@ -6,12 +6,16 @@ A cell with a tab, a line end or a double quote at its start is in double quotes
 
 from __future__ import annotations
 
+import csv
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
+from contextdb.cells.conditions import Condition
+from contextdb.exchange.decimal_commas import DECIMAL_COMMA, PAIR, as_pair
 from contextdb.tables.table import Table
-from tui.model.selection import Block
+
+from .selection import Block
 
 Texts = list[list[str]]
 """Rows of cells, all equally wide."""
@@ -33,10 +37,10 @@ def parse_tsv(text: str) -> Texts:
     rows = [[]]
     at = 0
     while at < len(text):
-        found = _FIELD.match(text, at)
-        assert found is not None, "the second way matches any text"
-        at, end = found.end(), found[3]
-        rows[-1].append(found[2] if found[1] is None else found[1].replace('""', '"'))
+        field = _FIELD.match(text, at)
+        assert field is not None, "the second way matches any text"
+        at, end = field.end(), field[3]
+        rows[-1].append(field[2] if field[1] is None else field[1].replace('""', '"'))
         if end == "\t" and at == len(text):
             rows[-1].append("")
         elif end not in ("\t", ""):
@@ -96,6 +100,57 @@ def place_paste(texts: Texts, selected: Block, n_columns: int) -> Placed:
     right = min(selected.left + wide, n_columns)
     cut = selected.left + wide - right
     return Placed(Block(selected.top, selected.left, selected.top + tall, right), texts, cut)
+
+
+@dataclass(frozen=True, slots=True)
+class PasteDoubt:
+    """A text that could be meant in two ways: what is asked, and for each answer the text to paste."""
+
+    question: str
+    ways: tuple[tuple[str, str], ...]
+
+
+def paste_doubt(text: str, conditions: Sequence[Condition | None]) -> PasteDoubt | None:
+    """What to ask before a text is pasted into columns of these conditions, None for other columns: whether commas part cells, or
+    are decimal signs; None where it is clear."""
+    if "," not in text:
+        return None
+    return _comma_lines(text, len(conditions)) or _decimal_commas(text, conditions)
+
+
+def _comma_lines(text: str, n_columns: int) -> PasteDoubt | None:
+    """A text without tabs whose lines have equally many commas, with nothing blank behind them: it may be CSV."""
+    if "\t" in text:
+        return None
+    try:
+        rows = list(csv.reader(_LINE_END.split(text.rstrip("\r\n")), strict=True))
+    except csv.Error:
+        return None
+    width = len(rows[0]) if rows else 0
+    is_even = all(len(row) == width for row in rows) and not any(cell[:1] == " " for row in rows for cell in row)
+    are_numbers = all(PAIR.fullmatch(line) for line in _LINE_END.split(text) if line)
+    if not is_even or are_numbers or not 2 <= width <= n_columns or len(rows) * width < 3:
+        return None
+    split, whole = f"Split at the commas, into {width} columns", "As it is, into one column"
+    return PasteDoubt("Commas in the text that is pasted", ((split, format_tsv(rows)), (whole, text)))
+
+
+def _decimal_commas(text: str, conditions: Sequence[Condition | None]) -> PasteDoubt | None:
+    """Numbers with a comma in columns of numbers, where a cell reads centre and tolerance."""
+    rows = parse_tsv(text)
+    numeric = [
+        at for at, one in enumerate(conditions) if one is not None and one.domain.type.is_numeric and rows and at < len(rows[0])
+    ]
+    pointed, first = [list(row) for row in rows], None
+    for row in pointed:
+        for at in numeric:
+            if "," in row[at] and PAIR.fullmatch(row[at]):
+                pair, row[at] = row[at].strip(), DECIMAL_COMMA.sub(".", row[at]).strip()
+                first = first or (pair, row[at])
+    if first is None:
+        return None
+    as_number, as_it_is = f"{first[1]}: the comma is a decimal sign", f"{as_pair(first[0])}: centre and tolerance"
+    return PasteDoubt(f"What {first[0]} means", ((as_number, format_tsv(pointed)), (as_it_is, text)))
 
 
 def asks_how_to_read(text: str, table: Table) -> bool:

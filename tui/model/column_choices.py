@@ -4,33 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import get_args
 
 from contextdb.cells.conditions import Condition
 from contextdb.edits import edits
-from contextdb.edits.edits import Job, NewColumn
-from contextdb.errors import ContextDBError, in_quotes, plural, shown
-from contextdb.schema.jobs import PlainJob
-from contextdb.schema.shapes import wrong_name
+from contextdb.edits.edits import NewColumn
+from contextdb.errors import ContextDBError, in_quotes, plural, safe_text
+from contextdb.files.settings import settings_of
+from contextdb.files.toml_shapes import wrong_name
+from contextdb.schema.table_settings import PLAIN_JOBS, TableSettings
 from contextdb.tables.changes import Edit
 from contextdb.tables.table import Table
-from tui.model.condition_form import ConditionForm, plain
 
-JOB_WORDS: dict[Job, str] = {
-    "condition": "excludes rows that refuse the fact",
-    "output": "data for the game",
-    "when": "an expression that must hold in each row",
-    "enabled": "a row that says False never matches",
-    "priority": "higher rows are picked first",
-    "weight": "how often a row is picked among equals",
-    "once": "a row that says True is picked once",
-    "cooldown_s": "seconds until a row is picked again",
-    "cooldown_turns": "picks until a row is picked again",
-}
+from .condition_form import ConditionForm, plain
+
+
+def _words(job: str) -> str:
+    about = settings_of(TableSettings)[job].about
+    return f"{about[0].lower()}{about[1:-1]}"
+
+
+JOB_WORDS = {"condition": "excludes rows that refuse the fact", "output": "data for the game"}
+JOB_WORDS |= {job: _words(job) for job in edits.JOBS if job not in JOB_WORDS}
 """What a column can be, in a few words."""
 JOB_NAMES = {"when": "rule"}
 """What a job is called, where it is not called as in contextdb.toml."""
-assert tuple(JOB_WORDS) == get_args(Job)
 
 
 @dataclass(frozen=True)
@@ -69,7 +66,7 @@ class Blueprint:
         """How many columns it would add."""
         if not self.missing:
             return f"all {len(self.conditions)} are here" if self.conditions else "no conditions"
-        return f"{plural(len(self.missing), 'column')} of {len(self.conditions)}: {', '.join(map(shown, self.missing))}"
+        return f"{plural(len(self.missing), 'column')} of {len(self.conditions)}: {', '.join(map(safe_text, self.missing))}"
 
 
 def choices(table: Table, text: str = "") -> list[Choice]:
@@ -81,8 +78,8 @@ def choices(table: Table, text: str = "") -> list[Choice]:
         if b.missing
     ]
     words = text.casefold().split()
-    found = [c for c in declared + made if all(word in f"{c.name} {c.about}".casefold() for word in words)]
-    return sorted(found, key=lambda c: not c.name.casefold().startswith(text.strip().casefold()))
+    matching = [c for c in declared + made if all(word in f"{c.name} {c.about}".casefold() for word in words)]
+    return sorted(matching, key=lambda c: not c.name.casefold().startswith(text.strip().casefold()))
 
 
 def missing_conditions(table: Table) -> list[Condition]:
@@ -96,7 +93,7 @@ def about(condition: Condition) -> str:
     domain = condition.domain
     values = f" {' '.join(domain.values[:4])}{' …' if len(domain.values) > 4 else ''}" if domain.values else ""
     unit = f", {condition.unit}" if condition.unit else ""
-    return shown(f"{domain.kind}{values}{unit}" + (f": {condition.description}" if condition.description else ""), 200)
+    return safe_text(f"{domain.kind}{values}{unit}" + (f": {condition.description}" if condition.description else ""), 200)
 
 
 def blueprints(table: Table) -> list[Blueprint]:
@@ -112,8 +109,8 @@ def places(table: Table, column: int) -> dict[str, int]:
     """Where new columns can go, in words: behind the cursor's column, or the last one."""
     names = [c.name for c in table.columns]
     at = min(column, len(names) - 1)
-    found = {"at the end": len(names)}
-    return {f"behind {shown(names[at])}": at + 1} | found if 0 <= at < len(names) - 1 else found
+    rows = {"at the end": len(names)}
+    return {f"behind {safe_text(names[at])}": at + 1} | rows if 0 <= at < len(names) - 1 else rows
 
 
 @dataclass(frozen=True)
@@ -121,15 +118,15 @@ class NewColumnForm:
     """A new column as it is typed: its name, what it is, and, for a condition, its form."""
 
     name: str
-    job: Job = "condition"
+    job: str = "condition"
     condition: ConditionForm = field(default_factory=ConditionForm)
 
     def read(self, table: Table) -> tuple[NewColumn, dict[str, str]]:
         """The column, and for each invalid field why."""
         name = self.name.strip()
-        said, wrong = self.condition.declared() if self.job == "condition" else ({}, {})
+        declared, wrong = self.condition.declared() if self.job == "condition" else ({}, {})
         is_known = self.job == "condition" and name in table.schema.conditions
-        column = NewColumn(name, self.job, None if is_known or self.job != "condition" else said)
+        column = NewColumn(name, self.job, None if is_known or self.job != "condition" else declared)
         faults = {"name": _wrong_name(table, name), "job": _wrong_job(table, self.job, name), **({} if is_known else wrong)}
         return column, {key: why for key, why in faults.items() if why} or _refused(table, column)
 
@@ -144,8 +141,8 @@ def _wrong_name(table: Table, name: str) -> str:
     return f"This cannot be a name: {wrong}." if (wrong := wrong_name(name)) else ""
 
 
-def _wrong_job(table: Table, job: Job, name: str) -> str:
-    if job in ("when", *get_args(PlainJob)) and (column := getattr(table.settings, job)):
+def _wrong_job(table: Table, job: str, name: str) -> str:
+    if job in ("when", *PLAIN_JOBS) and (column := getattr(table.settings, job)):
         return f"The table has one already: {in_quotes(column)}."
     is_declared = job != "condition" and name in table.schema.conditions
     return f"{in_quotes(name)} is declared as a condition." if is_declared else ""
@@ -161,7 +158,7 @@ def _refused(table: Table, column: NewColumn) -> dict[str, str]:
 
 
 def blueprint_fault(table: Table, name: str, conditions: Sequence[str]) -> str:
-    """Why conditions cannot be kept as a blueprint of this name."""
+    """Why conditions cannot be stored as a blueprint of this name."""
     if not name.strip():
         return "A blueprint needs a name."
     if name.strip() in table.schema.blueprints:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, get_args
+from typing import Any
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.kinds import KINDS
@@ -16,32 +16,31 @@ from contextdb.cells.output_types import OUTPUT_TYPES
 from contextdb.cells.outputs import Output
 from contextdb.cells.words import format_number, quoted
 from contextdb.edits.renaming import uses_of
-from contextdb.errors import CellError, ContextDBError, Fault, in_quotes, plural, shown
+from contextdb.errors import CellError, ContextDBError, Fault, in_quotes, plural, safe_text
 from contextdb.expressions.names import names_in as expression_names
-from contextdb.schema.jobs import JOBS, PlainJob
 from contextdb.schema.outputs import declared_outputs, outputs_faults
 from contextdb.schema.sections import condition_to_dict, differences, has_place, settings_to_dict
 from contextdb.schema.settings import TableSettings, with_outputs
+from contextdb.schema.table_settings import JOBS, PLAIN_JOBS
 from contextdb.tables.changes import Change, Columns, Edit, Sections
 from contextdb.tables.table import Table
-from tui.model.condition_form import ConditionForm, names_in, plain
-from tui.model.roomy_sheet import RoomySheet
-from tui.model.shown import Header
+
+from .condition_form import TYPED, ConditionForm, names_in, plain
+from .displayed_table import Header
+from .options import CONDITION_OPTIONS
+from .roomy_sheet import RoomySheet
 
 NAME, IS, TYPE = "Column", "Is", "Type"
 CONDITION, OUTPUT, ASSET, RULE, DECLARED = "condition", "output", "asset", "rule", "declared"
-WORDS = (CONDITION, OUTPUT, ASSET, RULE, *get_args(PlainJob), DECLARED)
+WORDS = (CONDITION, OUTPUT, ASSET, RULE, *PLAIN_JOBS, DECLARED)
 """What a row can be; "declared": contextdb.toml tells of the condition, and the table has no column of it."""
 HINTS = {
     NAME: "name", IS: "job", TYPE: "type", "Unit": "m/s", "Least": "bound", "Most": "bound", "Values": "names",
     "Default": "output", "Weight": "number", "Mirror": "pairs", "Expression": "computed as", "Description": "text",
 }  # fmt: skip
 """The columns of the sheet, and what is below their names."""
-_FORM = {
-    "minimum": "Least", "maximum": "Most", "unit": "Unit", "values": "Values", "description": "Description", "mirror": "Mirror",
-    "weight": "Weight",
-}  # fmt: skip
-_KEYS = {"min": "Least", "max": "Most", "size": "Values", "default": "Default", "expr": "Expression"}
+_FORM = {key: CONDITION_OPTIONS[key].label for key in TYPED}
+_KEYS = _FORM | {"size": "Values", "default": "Default", "expr": "Expression"}
 _OF_CONDITIONS = ("Weight", "Mirror", "Expression")
 _TOLD = tuple(HINTS)[2:]
 _JOB_OF = {RULE: "when"}
@@ -75,7 +74,6 @@ class ColumnRow:
 
     @property
     def job(self) -> str:
-        """What it is."""
         return self.texts[IS] or CONDITION
 
     @property
@@ -84,8 +82,8 @@ class ColumnRow:
         return self.job in (CONDITION, DECLARED)
 
     @property
-    def is_told_anew(self) -> bool:
-        """Whether something else is said of it than before, or of another name."""
+    def is_changed(self) -> bool:
+        """Whether it is declared differently than before, or of another name."""
         was = self.first.get(IS, "") in (CONDITION, DECLARED)
         same = all(self.texts[key] == self.first.get(key, "") for key in _TOLD)
         return not (same and self.name == (self.before or "") and was == self.is_condition)
@@ -135,12 +133,12 @@ class ColumnSheet(RoomySheet):
     @property
     def _rows(self) -> list[ColumnRow]:
         """The rows in their order, empty ones too."""
-        table, found = self.table, []
+        table, rows = self.table, []
         for row in range(table.n_rows):
             origin, texts = int(table.origin[row]), {c.name: c[row] for c in table.columns}
             first = self.first[origin] if 0 <= origin < len(self.first) else {}
-            found.append(ColumnRow(self.view.place(row) or 0, texts, first.get(NAME), first))
-        return found
+            rows.append(ColumnRow(self.view.place(row) or 0, texts, first.get(NAME), first))
+        return rows
 
     def edit(self) -> Edit:
         """The edit of the table that the sheet was made of.
@@ -161,12 +159,12 @@ def _texts_of(table: Table) -> Iterator[dict[str, str]]:
     conditions = {c.condition.name: c.condition for c in table.conditions}
     jobs = {column: job for job, column in settings.jobs if job != "outputs"} | {settings.when: RULE, table.asset_column: ASSET}
     for column in table.columns:
-        said = {NAME: column.name, IS: jobs.get(column.name, OUTPUT)}
+        texts = {NAME: column.name, IS: jobs.get(column.name, OUTPUT)}
         if (condition := conditions.get(column.name)) is not None:
-            said |= {IS: CONDITION} | _condition_texts(condition)
+            texts |= {IS: CONDITION} | _condition_texts(condition)
         elif (output := settings.output(column.name)) is not None:
-            said |= _output_texts(output)
-        yield said
+            texts |= _output_texts(output)
+        yield texts
     here = {c.name for c in table.columns}
     for condition in table.schema.conditions.values():
         if condition.name not in here:
@@ -182,8 +180,8 @@ def _output_texts(output: Output) -> dict[str, str]:
     low, high = (format_number(x) if abs(x) != float("inf") else "" for x in (output.minimum, output.maximum))
     values = str(output.size) if output.type.has_size else " ".join(map(quoted, output.values))
     default = "" if output.default is None else output.written(output.default)
-    told = {TYPE: output.kind, "Unit": output.unit, "Least": low, "Most": high, "Values": values, "Default": default}
-    return told | {"Description": output.description}
+    texts = {TYPE: output.kind, "Unit": output.unit, "Least": low, "Most": high, "Values": values, "Default": default}
+    return texts | {"Description": output.description}
 
 
 # ---- one row
@@ -197,11 +195,11 @@ def _require_row(row: ColumnRow) -> dict[str, Any]:
         if row.texts[key].strip() and row.job not in ("", *JOBS):
             raise row.wrong(key, f"Only a condition has {'an' if key[0] == 'E' else 'a'} {key.lower()}.")
     if row.is_condition:
-        return _condition_said(row)
-    return _output_said(row) if row.job == OUTPUT else {}
+        return _condition_keys(row)
+    return _output_keys(row) if row.job == OUTPUT else {}
 
 
-def _condition_said(row: ColumnRow) -> dict[str, Any]:
+def _condition_keys(row: ColumnRow) -> dict[str, Any]:
     kind, typed = row.texts[TYPE], [key for key in _TOLD if row.texts[key].strip()]
     if not typed and not row.first.get(TYPE):
         return {}
@@ -211,43 +209,42 @@ def _condition_said(row: ColumnRow) -> dict[str, Any]:
         raise row.wrong(TYPE, f'"{kind}" is not a type of a condition. Accepted: {", ".join(KINDS)}.')
     if row.texts["Default"].strip():
         raise row.wrong("Default", "Only an output has a default.")
-    for key, column in (("min", "Least"), ("max", "Most"), ("values", "Values"), ("mirror", "Mirror")):
+    for key, column in _FORM.items():
         if row.texts[column].strip() and not has_place(key, kind):
             raise row.wrong(column, f"A condition of type {kind} has none. Empty the cell.")
-    said, wrong = ConditionForm(kind, **{key: row.texts[column] for key, column in _FORM.items()}).declared()
+    keys, wrong = ConditionForm(kind, **{key: row.texts[column] for key, column in _FORM.items()}).declared()
     for key, why in wrong.items():
-        column = TYPE if key == "type" else {"min": "Least", "max": "Most"}.get(key) or _FORM[key]
-        raise row.wrong(column, why)
-    return said | ({"expr": row.texts["Expression"].strip()} if row.texts["Expression"].strip() else {})
+        raise row.wrong(_FORM.get(key, TYPE), why)
+    return keys | ({"expr": row.texts["Expression"].strip()} if row.texts["Expression"].strip() else {})
 
 
-def _output_said(row: ColumnRow) -> dict[str, Any]:
+def _output_keys(row: ColumnRow) -> dict[str, Any]:
     texts = {key: row.texts[key].strip() for key in _TOLD}
     if not any(texts.values()):
         return {}
     kind = texts[TYPE] or "text"
     if kind not in OUTPUT_TYPES:
         raise row.wrong(TYPE, f'"{kind}" is not a type of an output. Accepted: {", ".join(OUTPUT_TYPES)}.')
-    said: dict[str, Any] = {"type": kind}
+    keys: dict[str, Any] = {"type": kind}
     for key, column in (("min", "Least"), ("max", "Most")):
         if texts[column]:
-            said[key] = _number(row, column, texts[column])
+            keys[key] = _number(row, column, texts[column])
     if texts["Values"] and OUTPUT_TYPES[kind].has_size:
-        said["size"] = _number(row, "Values", texts["Values"])
+        keys["size"] = _number(row, "Values", texts["Values"])
     elif texts["Values"]:
-        said["values"] = list(dict.fromkeys(names_in(texts["Values"])))
-    said |= {key: texts[column] for key, column in (("unit", "Unit"), ("description", "Description")) if texts[column]}
-    for path, fault in outputs_faults({"outputs": {row.name: said}}):
+        keys["values"] = list(dict.fromkeys(names_in(texts["Values"])))
+    keys |= {key: texts[column] for key, column in (("unit", "Unit"), ("description", "Description")) if texts[column]}
+    for path, fault in outputs_faults({"outputs": {row.name: keys}}):
         key = path[2] if len(path) > 2 else "values" if "values" in fault.found or "size" in fault.found else "type"
-        raise row.wrong({**_KEYS, "values": "Values", "type": TYPE}.get(key, TYPE), plain(fault))
+        raise row.wrong(_KEYS.get(key, TYPE), plain(fault))
     if texts["Default"]:
-        [output] = declared_outputs({row.name: said})
+        [output] = declared_outputs({row.name: keys})
         try:
             value = output.read(texts["Default"])
         except CellError as error:
             raise row.wrong("Default", plain(error.faults[0])) from None
-        said["default"] = list(value) if isinstance(value, tuple) else value
-    return said
+        keys["default"] = list(value) if isinstance(value, tuple) else value
+    return keys
 
 
 def _number(row: ColumnRow, column: str, text: str) -> float | int:
@@ -262,7 +259,7 @@ def _number(row: ColumnRow, column: str, text: str) -> float | int:
 
 
 def _edit(table: Table, rows: Sequence[ColumnRow]) -> Edit:
-    said = [_require_row(row) for row in rows]
+    declared = [_require_row(row) for row in rows]
     _require_whole(table, rows)
     here = {c.name for c in table.columns}
     layout = tuple((row.name, row.before if row.before in here else None) for row in rows if row.job != DECLARED)
@@ -271,8 +268,8 @@ def _edit(table: Table, rows: Sequence[ColumnRow]) -> Edit:
         changes.append(Columns(layout))
     try:
         moved = Edit("", tuple(changes)).apply(table.with_rows_taken([]))
-        settings = _settings(moved.settings, rows, said)
-        parts = _conditions(table, rows, said)
+        settings = _settings(moved.settings, rows, declared)
+        parts = _conditions(table, rows, declared)
         sections = Sections(settings, {"conditions": parts} if parts else {})
         changes += [] if sections.is_empty else [sections]
         edit = Edit(_name(rows, table), tuple(changes))
@@ -301,20 +298,20 @@ def _require_whole(table: Table, rows: Sequence[ColumnRow]) -> None:
     if ASSET not in jobs:
         raise rows[0].wrong(IS, "One column names the assets: write asset here.") if rows else Wrong(0, NAME, "There is no column.")
     gone = {c.name for c in table.schema.conditions.values()} - {row.before for row in rows} - {c.name for c in table.columns}
-    kept = {row.name for row in rows}
-    for name in sorted(gone - kept):
+    names = {row.name for row in rows}
+    for name in sorted(gone - names):
         if uses := uses_of(table, name).text:
             raise Wrong(0, NAME, f"{name} is used by {uses}, so it stays declared. Ctrl+Z brings its row back.")
 
 
-def _settings(before: TableSettings, rows: Sequence[ColumnRow], said: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def _settings(before: TableSettings, rows: Sequence[ColumnRow], declared: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """The keys of the table's section that change."""
     columns = {_JOB_OF.get(row.job, row.job): row.name for row in rows}
     first = next(row for row in rows if row.job != DECLARED)
     jobs: dict[str, Any] = {job: columns.get(job) for job in JOBS}
     if before.asset is None and first.job == ASSET:
         jobs["asset"] = None
-    outputs = {row.name: dict(part) for row, part in zip(rows, said, strict=True) if row.job == OUTPUT}
+    outputs = {row.name: dict(part) for row, part in zip(rows, declared, strict=True) if row.job == OUTPUT}
     names = [name for name in before.outputs if name in outputs] + [name for name in outputs if name not in before.outputs]
     after = settings_to_dict(replace(with_outputs(before, names), **jobs))
     after.pop("outputs", None)
@@ -325,20 +322,20 @@ def _settings(before: TableSettings, rows: Sequence[ColumnRow], said: Sequence[M
 
 
 def _conditions(
-    table: Table, rows: Sequence[ColumnRow], said: Sequence[Mapping[str, Any]]
+    table: Table, rows: Sequence[ColumnRow], texts_of_rows: Sequence[Mapping[str, Any]]
 ) -> dict[str, Mapping[str, object] | None]:
     """What changes of the conditions that contextdb.toml tells of."""
     declared, parts = table.schema.conditions, Parts()
-    for row, part in zip(rows, said, strict=True):
+    for row, part in zip(rows, texts_of_rows, strict=True):
         was = declared.get(row.before or "")
         if was is not None and (not row.is_condition or row.name != row.before):
             parts[was.name] = None
-        if not row.is_condition or not part or (row.name in declared and not row.is_told_anew):
+        if not row.is_condition or not part or (row.name in declared and not row.is_changed):
             continue
-        if row.is_told_anew or row.job == DECLARED:
-            kept = {} if was is None else {k: v for k, v in condition_to_dict(was).items() if k == "hysteresis"}
-            parts[row.name] = {**{k: v for k, v in kept.items() if has_place(k, part["type"])}, **part}
-    for row, part in zip(rows, said, strict=True):  # an expression names what is declared
+        if row.is_changed or row.job == DECLARED:
+            unchanged = {} if was is None else {k: v for k, v in condition_to_dict(was).items() if k == "hysteresis"}
+            parts[row.name] = {**{k: v for k, v in unchanged.items() if has_place(k, part["type"])}, **part}
+    for row, part in zip(rows, texts_of_rows, strict=True):  # an expression names what is declared
         if row.is_condition and part and row.name in _named(rows) and row.name not in declared:
             parts[row.name] = part
     known = {row.before for row in rows} | {row.name for row in rows} | {c.name for c in table.columns}
@@ -347,7 +344,6 @@ def _conditions(
 
 
 def _named(rows: Sequence[ColumnRow]) -> set[str]:
-    """What the expressions name."""
     return {name for row in rows if row.texts["Expression"].strip() for name in expression_names(row.texts["Expression"])}
 
 
@@ -358,14 +354,14 @@ def _name(rows: Sequence[ColumnRow], table: Table) -> str:
         "add": [row.name for row in rows if row.before is None and row.job != DECLARED],
         "take away": sorted({c.name for c in table.columns} - {row.before for row in rows}),
     }
-    said = [f"{verb} {_named_or_counted(names)}" for verb, names in done.items() if names]
+    parts = [f"{verb} {_named_or_counted(names)}" for verb, names in done.items() if names]
     declared = [row.name for row in rows if row.before is None and row.job == DECLARED]
-    said += [f"declare {shown(declared[0]) if len(declared) == 1 else plural(len(declared), 'condition')}"] if declared else []
-    return f"{said[0][:1].upper()}{said[0][1:]}{''.join(f', {one}' for one in said[1:])}" if said else "Move columns"
+    parts += [f"declare {safe_text(declared[0]) if len(declared) == 1 else plural(len(declared), 'condition')}"] if declared else []
+    return f"{parts[0][:1].upper()}{parts[0][1:]}{''.join(f', {one}' for one in parts[1:])}" if parts else "Move columns"
 
 
 def _named_or_counted(names: Sequence[str]) -> str:
-    return f"the column {shown(names[0])}" if len(names) == 1 else plural(len(names), "column")
+    return f"the column {safe_text(names[0])}" if len(names) == 1 else plural(len(names), "column")
 
 
 def _placed(fault: Fault, rows: Sequence[ColumnRow]) -> Wrong:

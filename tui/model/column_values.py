@@ -11,12 +11,13 @@ import numpy as np
 
 from contextdb.edits import edits
 from contextdb.edits.renaming_values import with_value
-from contextdb.errors import Fault, TableError, in_quotes, plural, shown
+from contextdb.errors import Fault, TableError, in_quotes, plural, safe_text
 from contextdb.tables.changes import Cells, Edit
 from contextdb.tables.table import Table
-from tui.model.long_work import told
-from tui.model.meaning import mend_of
-from tui.model.shown import ShownTable
+
+from .displayed_table import DisplayedTable
+from .long_work import with_progress
+from .meaning import mend_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,20 +32,20 @@ class ColumnValue:
     """Why the text cannot be read."""
 
 
-def values_of(sheet: ShownTable, column: int) -> list[ColumnValue]:
+def values_of(sheet: DisplayedTable, column: int) -> list[ColumnValue]:
     """The texts of a column, the most frequent first; those that cannot be read come before all others."""
     texts = sheet.table.columns[column]
     counts = np.bincount(texts.codes, minlength=len(texts.texts))
     valid = None if sheet.query.is_empty else np.bincount(texts.codes[sheet.query.valid], minlength=len(texts.texts))
-    found = [
+    column_values = [
         ColumnValue(text, int(counts[code]), None if valid is None else int(valid[code]), _fault(sheet, column, code))
         for code, text in enumerate(texts.texts)
         if counts[code]
     ]
-    return sorted(found, key=lambda value: (value.fault is None, -value.n_rows))
+    return sorted(column_values, key=lambda value: (value.fault is None, -value.n_rows))
 
 
-def described(sheet: ShownTable, column: int, values: list[ColumnValue]) -> str:
+def described(sheet: DisplayedTable, column: int, values: list[ColumnValue]) -> str:
     """A column in a line: its type, its unit, how many texts it holds and how many rows say nothing, and its description."""
     header, condition = sheet.header(column), sheet.condition(column)
     kind = f"{header.kind} in {header.unit}" if header.unit else header.kind
@@ -53,13 +54,13 @@ def described(sheet: ShownTable, column: int, values: list[ColumnValue]) -> str:
         cells = dict(zip(condition.texts.texts, condition.cells, strict=True))
         empty = sum(value.n_rows for value in values if value.fault is None and cells[value.text].is_any)
     wrong = sum(value.n_rows for value in values if value.fault is not None)
-    said = [kind, f"{plural(len(values), 'text')} in {plural(sheet.table.n_rows, 'row')}"]
-    said += [f"{empty:,} Any"] * bool(empty) + [f"{plural(wrong, 'cell')} cannot be read"] * bool(wrong)
+    parts = [kind, f"{plural(len(values), 'text')} in {plural(sheet.table.n_rows, 'row')}"]
+    parts += [f"{empty:,} Any"] * bool(empty) + [f"{plural(wrong, 'cell')} cannot be read"] * bool(wrong)
     about = condition.condition.description if condition is not None else ""
-    return " · ".join(said) + (f"\n{about}" if about else "")
+    return " · ".join(parts) + (f"\n{about}" if about else "")
 
 
-def mends_of(sheet: ShownTable, column: int, texts: Iterable[str] | None = None) -> dict[str, str]:
+def mends_of(sheet: DisplayedTable, column: int, texts: Iterable[str] | None = None) -> dict[str, str]:
     """For the texts of a column that cannot be read, or for some of them, the nearest that can; those without one are left out."""
     condition, table = sheet.condition(column), sheet.table
     name = table.columns[column].name
@@ -67,7 +68,7 @@ def mends_of(sheet: ShownTable, column: int, texts: Iterable[str] | None = None)
     wanted = None if texts is None else set(texts)
     mends: dict[str, str] = {}
     texts_of = table.columns[column].texts
-    for code, text in told(enumerate(texts_of), len(texts_of)):
+    for code, text in with_progress(enumerate(texts_of), len(texts_of)):
         known = _fault(sheet, column, code) if wanted is None or text in wanted else None
         if known is not None:
             check = partial(edits.check_cell, table, name)
@@ -85,7 +86,7 @@ def replaced(table: Table, column: str, by: Mapping[str, str], name: str) -> Edi
     return Edit(f"{name} in {plural(len(cells), 'cell')}", (Cells({column: cells}),) if cells else ())
 
 
-def renamed_value(sheet: ShownTable, column: int, old: str, new: str, keeps_old: bool = False) -> Edit:
+def renamed_value(sheet: DisplayedTable, column: int, old: str, new: str, keeps_old: bool = False) -> Edit:
     """The edit that renames a value in every cell of a column. A declared value is renamed where it is declared, too; `keeps_old`
     leaves it there for others, and declares the new one beside it.
 
@@ -96,13 +97,13 @@ def renamed_value(sheet: ShownTable, column: int, old: str, new: str, keeps_old:
     """
     table, condition, name = sheet.table, sheet.condition(column), sheet.table.columns[column].name
     values = condition.condition.domain.values if condition is not None else None
-    what = f"Rename {shown(old)} to {shown(new)}"
+    what = f"Rename {safe_text(old)} to {safe_text(new)}"
     if condition is None or values is None or old not in values:
         if fault := edits.check_cell(table, name, new):
             raise TableError(fault)
         return replaced(table, name, {old: new}, what)
     if new in values:
-        raise TableError(Fault(f"{in_quotes(new)} is a value of {shown(name)} already.", "a name that there is not yet"))
+        raise TableError(Fault(f"{in_quotes(new)} is a value of {safe_text(name)} already.", "a name that there is not yet"))
     now = [*values, new] if keeps_old else [new if value == old else value for value in values]
     declared = edits.set_condition(table, name, values=now)
     after = declared.apply(table)
@@ -118,7 +119,7 @@ MOST_SUMMED = 100_000
 """So many cells of a selection are summed up."""
 
 
-def selection_said(sheet: ShownTable) -> str:
+def selection_summary(sheet: DisplayedTable) -> str:
     """The selection in figures: of numbers their sum, mean and ends, of other texts how many different ones there are."""
     block = sheet.block
     if not 1 < block.n_cells <= MOST_SUMMED or not len(sheet.view):
@@ -141,6 +142,6 @@ def _number_in(text: str) -> float | None:
     return number if math.isfinite(number) else None
 
 
-def _fault(sheet: ShownTable, column: int, code: int) -> Fault | None:
+def _fault(sheet: DisplayedTable, column: int, code: int) -> Fault | None:
     condition, texts = sheet.condition(column), sheet.table.columns[column]
     return condition.faults.get(code) if condition is not None else sheet.text_fault(column, texts.texts[code])

@@ -92,10 +92,10 @@ def _words(body: str, at: int, has_signs: bool) -> Iterable[Word]:
         if body[at].isspace():
             at += 1
             continue
-        found = _WORD.match(body, at)
-        assert found is not None
-        stop = max(found.end(), at + 1)
-        sign, inside, bare = found["sign"], found["inside"], found["bare"] or ""
+        match = _WORD.match(body, at)
+        assert match is not None
+        stop = max(match.end(), at + 1)
+        sign, inside, bare = match["sign"], match["inside"], match["bare"] or ""
         if inside is not None:
             yield Word(at, stop, sign, inside.replace('""', '"'))
         else:
@@ -106,58 +106,58 @@ def _words(body: str, at: int, has_signs: bool) -> Iterable[Word]:
 # ---- changes
 
 
-def toggled(found: Words, value: str, has_signs: bool) -> str:
+def toggled(words: Words, value: str, has_signs: bool) -> str:
     """The text with one value ticked or unticked: the others, `not` and the penalty stay as they are.
 
     A tag goes round from not named to + to - and back. When the last value is unticked the text is Any; the first tick on Any
     names that value alone.
     """
-    word = found.named(value)
+    word = words.named(value)
     if not has_signs:
-        return _rewritten(found, value, None if word else quoted(value))
+        return _rewritten(words, value, None if word else quoted(value))
     sign = {"": "+", "+": "-", "-": ""}[word.sign] if word else "+"
-    return _rewritten(found, value, sign + quoted(value) if sign else None)
+    return _rewritten(words, value, sign + quoted(value) if sign else None)
 
 
-def signed(found: Words, value: str, sign: str) -> str:
+def signed(words: Words, value: str, sign: str) -> str:
     """The text with a tag given this sign."""
-    return _rewritten(found, value, sign + quoted(value))
+    return _rewritten(words, value, sign + quoted(value))
 
 
-def _rewritten(found: Words, value: str, written: str | None) -> str:
-    sources = [_source(found, w) if w.name != value else written for w in found.words]
-    kept = [source for source in dict.fromkeys(sources) if source]
-    if written and found.named(value) is None:
-        kept.append(written)
-    negations = ["not"] * found.n_negations if kept and found.words else []
-    return " ".join((*negations, *(kept or ["Any"]), *([found.tail] if found.tail else [])))
+def _rewritten(words: Words, value: str, written: str | None) -> str:
+    sources = [_source(words, w) if w.name != value else written for w in words.words]
+    remaining = [source for source in dict.fromkeys(sources) if source]
+    if written and words.named(value) is None:
+        remaining.append(written)
+    negations = ["not"] * words.n_negations if remaining and words.words else []
+    return " ".join((*negations, *(remaining or ["Any"]), *([words.tail] if words.tail else [])))
 
 
-def _source(found: Words, word: Word) -> str:
+def _source(words: Words, word: Word) -> str:
     """A word as it is written, in quotes if it now needs them: a plain fact that has spaces is alone."""
-    source = found.text[word.start : word.stop]
+    source = words.text[word.start : word.stop]
     return source if '"' in source or not any(c.isspace() for c in source) else quoted(word.name)
 
 
-def alone(found: Words, value: str, sign: str = "") -> str:
+def alone(words: Words, value: str, sign: str = "") -> str:
     """The text with this value alone; the penalty stays."""
-    return " ".join((sign + quoted(value), *([found.tail] if found.tail else [])))
+    return " ".join((sign + quoted(value), *([words.tail] if words.tail else [])))
 
 
-def completed(found: Words, word: Word, value: str, default_sign: str = "") -> tuple[str, int]:
+def completed(words: Words, word: Word, value: str, default_sign: str = "") -> tuple[str, int]:
     """The text with a word replaced by a value, and where the caret is then: behind it."""
     written = (word.sign or default_sign) + quoted(value)
-    return found.text[: word.start] + written + found.text[word.stop :], word.start + len(written)
+    return words.text[: word.start] + written + words.text[word.stop :], word.start + len(written)
 
 
-def tick_of(found: Words, value: str) -> Tick:
+def tick_of(words: Words, value: str) -> Tick:
     """What the text says of a value."""
-    word = found.named(value)
+    word = words.named(value)
     if word is not None and word.sign:
         return "+" if word.sign == "+" else "-"
-    if found.is_signed:
+    if words.is_signed:
         return "off"
-    is_accepted = bool(found.words) and (word is not None) is not found.is_negated
+    is_accepted = bool(words.words) and (word is not None) is not words.is_negated
     return "on" if is_accepted else "off"
 
 

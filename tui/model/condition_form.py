@@ -14,6 +14,10 @@ from contextdb.errors import Fault, SchemaError
 from contextdb.schema.sections import has_place
 from contextdb.schema.settings import conditions_from_dict
 
+from .options import CONDITION_OPTIONS
+
+TYPED = tuple(key for key in CONDITION_OPTIONS if key != "type")
+"""The keys of a condition that are typed; the type is picked."""
 _NAME = re.compile(r'"((?:[^"]|"")*)"|([^\s,;"]+)')
 
 
@@ -22,8 +26,8 @@ class ConditionForm:
     """The fields of a condition, as texts; an empty one says nothing."""
 
     kind: str = next(iter(KINDS))
-    minimum: str = ""
-    maximum: str = ""
+    min: str = ""
+    max: str = ""
     unit: str = ""
     values: str = ""
     """Names, with spaces or commas between them; one with a space in it is in quotes."""
@@ -51,23 +55,23 @@ class ConditionForm:
 
     def declared(self) -> tuple[dict[str, object], dict[str, str]]:
         """What `[conditions.NAME]` would say, and for each field that cannot be read why; fields without a place are left out."""
-        said: dict[str, object] = {"type": self.kind, "unit": self.unit.strip(), "description": self.description.strip()}
+        keys: dict[str, object] = {"type": self.kind, "unit": self.unit.strip(), "description": self.description.strip()}
         wrong: dict[str, str] = {}
-        for key, text in (("min", self.minimum), ("max", self.maximum)):
+        for key, text in (("min", self.min), ("max", self.max)):
             if has_place(key, self.kind) and text.strip():
                 number = text.strip() if KINDS[self.kind].is_spelt else _number(text)
-                said[key] = number
+                keys[key] = number
                 if number is None:
                     wrong[key] = f'"{text.strip()}" is not a number.'
         if has_place("values", self.kind) and self.values.strip():
-            said["values"] = list(dict.fromkeys(names_in(self.values)))
-        said["mirror"] = _mirror(self.mirror)
+            keys["values"] = list(dict.fromkeys(names_in(self.values)))
+        keys["mirror"] = _mirror(self.mirror)
         if self.weight.strip():
-            said["weight"] = _number(self.weight)
-            if said["weight"] is None:
+            keys["weight"] = _number(self.weight)
+            if keys["weight"] is None:
                 wrong["weight"] = f'"{self.weight.strip()}" is not a number.'
-        said = {key: value for key, value in said.items() if value not in ("", None)}
-        return said, wrong or _faults(said)
+        keys = {key: value for key, value in keys.items() if value not in ("", None)}
+        return keys, wrong or _faults(keys)
 
 
 def names_in(text: str) -> Iterable[str]:
@@ -91,7 +95,7 @@ def _mirror(text: str) -> str | dict[str, str]:
     """What a person typed: pairs of names with "=" between them, or a word, as it is."""
     parts = [re.split(r"\s*=\s*", part.strip()) for part in text.split(",")]
     names = [[name for side in part for name in names_in(side)] for part in parts]
-    is_pairs = all(len(part) == len(found) == 2 for part, found in zip(parts, names, strict=True))
+    is_pairs = all(len(part) == len(names_in_part) == 2 for part, names_in_part in zip(parts, names, strict=True))
     pairs = {pair[0]: pair[1] for pair in names} if is_pairs else {}
     return pairs if pairs and len(pairs) == len(names) else text.strip()
 
@@ -104,17 +108,17 @@ def _number(text: str) -> float | int | None:
     return int(value) if value.is_integer() and abs(value) < 2.0**53 else value
 
 
-def _faults(said: dict[str, object]) -> dict[str, str]:
+def _faults(keys: dict[str, object]) -> dict[str, str]:
     """What is wrong with each field of what is declared."""
     try:
-        conditions_from_dict({"x": said})
+        conditions_from_dict({"x": keys})
     except SchemaError as error:
         return {_field_of(fault): plain(fault) for fault in reversed(error.faults)}
     return {}
 
 
 def _field_of(fault: Fault) -> str:
-    key = re.match(r"\[conditions\.x\] (min|max|values|unit|description|mirror|weight)\b", fault.found)
+    key = re.match(rf"\[conditions\.x\] ({'|'.join(TYPED)})\b", fault.found)
     return key[1] if key else "values" if "values" in fault.found + fault.accepted else "type"
 
 

@@ -39,13 +39,14 @@ from contextdb.tables.compiling import compile_table
 from contextdb.tables.other_files import cases_path
 from contextdb.tables.table import Table
 from contextdb.telemetry.recordings import Recording, fact_text, open_recording
-from tui.model.wanted import wanted_by
+
+from .wanted import wanted_by
 
 BLOCK = 256
 """Rows of a recording that are read in one go."""
 
 KEPT_BLOCKS = 64
-"""Blocks that are kept available: a page of rows that a search found may lie in as many."""
+"""Blocks that stay in memory: a page of rows of a search's matches may lie in as many."""
 
 
 class Rows(Protocol):
@@ -84,8 +85,8 @@ class SavedRows:
 
     def facts(self, i: int, conditions: Mapping[str, Condition]) -> dict[str, str]:
         """The facts of a case."""
-        said = self.cases[i].facts
-        return {name: said[name] for name in conditions if name in said}
+        facts = self.cases[i].facts
+        return {name: facts[name] for name in conditions if name in facts}
 
     def search(self, text: str) -> Iterator[NDArray[np.int64]]:
         """The cases in which every word stands."""
@@ -114,8 +115,8 @@ class RecordedRows:
         if not self.recording.facts:
             return {}
         values = zip(self.recording.facts, self._block(i // BLOCK).row(i % BLOCK), strict=True)
-        said = {name: fact_text(value, conditions[name]) for name, value in values if name in conditions}
-        return {name: said[name] for name in conditions if said.get(name, "").strip()}
+        texts = {name: fact_text(value, conditions[name]) for name, value in values if name in conditions}
+        return {name: texts[name] for name in conditions if texts.get(name, "").strip()}
 
     def search(self, text: str) -> Iterator[NDArray[np.int64]]:
         """The rows in which every word stands."""
@@ -174,7 +175,7 @@ class ContextList:
         """Stand on this table from now on; what is expected is judged again."""
         self.table = table
         self.conditions = wanted_by(table).given
-        """The conditions whose facts are kept: those that a person may give, computed ones not among them."""
+        """The conditions whose facts are stored: those that a person may give, computed ones not among them."""
         self._verdicts: dict[int, Verdict] = {}
         self._compiled: tuple[CompiledData, int] | None = None
         """The table compiled, and its rows whose cells can all be read."""
@@ -308,8 +309,8 @@ class ContextList:
         own = self.rows if isinstance(self.rows, SavedRows) else SavedRows(cases_file(self.table))
         old = next((case for case in own.cases if case.name == name), Case(name, {}))
         foreign = {fact: text for fact, text in old.facts.items() if fact not in self.conditions}
-        said = {fact: text for fact, text in facts.items() if fact in self.conditions and text.strip()}
-        keep_case(own.path, replace(old, facts=foreign | said, expected=expected, note=note or old.note))
+        given = {fact: text for fact, text in facts.items() if fact in self.conditions and text.strip()}
+        keep_case(own.path, replace(old, facts=foreign | given, expected=expected, note=note or old.note))
         if own is self.rows:
             self._reload()
             self.at = next((i for i, case in enumerate(self.cases) if case.name == name), None)
@@ -361,5 +362,5 @@ def summary(facts: Mapping[str, str]) -> str:
 
 
 def _line(case: Case) -> str:
-    said = {EXPECTED: case.expected, NOTE: case.note, **case.facts}
-    return " ".join([case.name, *(f"{name}={text}" for name, text in said.items())]).casefold()
+    texts = {EXPECTED: case.expected, NOTE: case.note, **case.facts}
+    return " ".join([case.name, *(f"{name}={text}" for name, text in texts.items())]).casefold()

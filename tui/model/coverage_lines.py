@@ -8,12 +8,14 @@ from collections.abc import Mapping, Sequence
 from contextdb.cells.words import NUMBER_TEXT
 from contextdb.checks.rules import RULES
 from contextdb.covering import CoverageReport, Gap, Nearest, PairTable, Slice, format_percent
-from contextdb.covering.report import Crowd, share_at_once
-from contextdb.covering.shares import told_apart
+from contextdb.covering.report import Crowd
+from contextdb.covering.shares import distinct_percents
 from contextdb.errors import plural
 from contextdb.findings import Finding
+from contextdb.report.coverage_words import histogram_lines
 from contextdb.tables.table import Table
-from tui.model.coverage_run import CoverageRun, Result
+
+from .coverage_run import CoverageRun, Result
 
 MOST_ROWS_NAMED = 12
 SHORT_NAME = 18
@@ -51,15 +53,15 @@ def state_text(run: CoverageRun, table: Table) -> str:
 
 
 def unknown_text(run: CoverageRun) -> str:
-    """What is said instead of an empty list while nothing is known of the table as it is; empty once it is measured."""
-    said = {
+    """The text instead of an empty list while nothing is known of the table as it is; empty once it is measured."""
+    parts = {
         "none": "Not counted yet: R counts.",
         "running": "Counting …",
         "stale": "The table has changed since it was counted.",
         "failed": "Not known.",
         "done": "",
     }
-    return said[run.state]
+    return parts[run.state]
 
 
 def summary_text(report: CoverageReport) -> str:
@@ -154,7 +156,7 @@ def covered_text(slice_: Slice) -> str:
         return "no row accepts this"
     if slice_.is_exact:
         return f"{format_percent(slice_.covered)} have a valid row"
-    ends = " to ".join(told_apart(slice_.lower, slice_.upper))
+    ends = " to ".join(distinct_percents(slice_.lower, slice_.upper))
     return f"{ends} have a valid row ({plural(slice_.n_samples, 'sample')})"
 
 
@@ -180,9 +182,9 @@ def in_rows(finding: Finding, table: Table) -> str:
     """The message of a finding with the rows that it names by their numbers in the grid, and not by lines of the file."""
     numbers = {table.place(row).line: row + 1 for row in finding.by if row < table.n_rows}
 
-    def numbered(found: re.Match[str]) -> str:
-        row = numbers.get(int(found[1]))
-        return found[0] if row is None else f"row {row:,}"
+    def numbered(match: re.Match[str]) -> str:
+        row = numbers.get(int(match[1]))
+        return match[0] if row is None else f"row {row:,}"
 
     return re.sub(r"\bline (\d+)\b(?! of )", numbered, finding.message)
 
@@ -216,10 +218,7 @@ def about_text(result: Result) -> str:
     lines += [f"Known to samples only, so that the share is an estimate: {text}" for text in report.sampled]
     lines.append("")
     lines.append(f"Rows valid at once: {report.overlap.mean:.3g} on average ({report.overlap.method}).")
-    histogram = report.overlap.histogram
-    lines += [
-        f"  {n:>3}   {share_at_once(report, n):>9}  {'█' * round(40 * s)}".rstrip() for n, s in enumerate(histogram) if s > 0.0
-    ]
+    lines += histogram_lines(report)
     lines.append("")
     if pairs is None:
         lines.append(result.left_out)

@@ -19,7 +19,7 @@ from typing import Literal
 from contextdb.covering import Cancelled, CoverageReport, PairTable, coverage, pairs
 from contextdb.covering.pairs import left_out
 from contextdb.covering.progress import Stops, Tell
-from contextdb.errors import ContextDBError, plural, shown
+from contextdb.errors import ContextDBError, plural, safe_text
 from contextdb.tables.nesting.flat import FlatTable
 from contextdb.tables.table import Table
 
@@ -84,14 +84,14 @@ class _Task:
 
 
 class CoverageRun:
-    """The coverage of the table that is shown, as far as it is known."""
+    """The coverage of the table that is displayed, as far as it is known."""
 
     def __init__(self, measure: Measure = measured) -> None:
         self._measure = measure
         self._lock = Lock()
         self._task: _Task | None = None
         self._table: Table | None = None
-        """The table that is shown."""
+        """The table that is displayed."""
         self._known: tuple[Table, Result] | None = None
         self._failed: tuple[Table, str] | None = None
         self._listeners: list[Callable[[], None]] = []
@@ -100,7 +100,6 @@ class CoverageRun:
 
     @property
     def state(self) -> State:
-        """How things stand."""
         with self._lock:
             if self._task is not None:
                 return "running"
@@ -139,7 +138,6 @@ class CoverageRun:
         self._listeners.append(listener)
 
     def unlisten(self, listener: Callable[[], None]) -> None:
-        """Call this no more."""
         self._listeners = [other for other in self._listeners if other != listener]
 
     # ---- what can be done
@@ -163,7 +161,7 @@ class CoverageRun:
             self._tell_listeners()
 
     def follow(self, table: Table) -> None:
-        """Say which table is shown now: a run for another one is stopped, and a result of another one is stale."""
+        """Say which table is displayed now: a run for another one is stopped, and a result of another one is stale."""
         with self._lock:
             is_same = _is_same(table, self._table)
             self._table = table
@@ -192,7 +190,7 @@ class CoverageRun:
         except Cancelled:
             pass
         except ContextDBError as error:
-            problem = _said(error)
+            problem = _problem_text(error)
         except MemoryError:
             problem = "There is not enough memory for this table."
         with self._lock:
@@ -206,7 +204,7 @@ class CoverageRun:
         self._tell_listeners()
 
     def _advance(self, task: _Task, part: str, share: float) -> None:
-        """Note the progress; listeners are told of whole percents."""
+        """Note the progress; listeners are called at whole percents."""
         is_new = part != task.part or int(100 * share) != int(100 * task.share)
         task.part, task.share = part, share
         if is_new and self._task is task:
@@ -229,7 +227,7 @@ def _is_same(one: Table, other: Table | None) -> bool:
     return one is other or (one.columns is other.columns and one.conditions is other.conditions and one.settings == other.settings)
 
 
-def _said(error: ContextDBError) -> str:
-    first = shown(str(error.faults[0]), 400) if error.faults else "The table cannot be measured."
+def _problem_text(error: ContextDBError) -> str:
+    first = safe_text(str(error.faults[0]), 400) if error.faults else "The table cannot be measured."
     n_more = len(error.faults) - 1
     return f"{first} ({plural(n_more, 'fault')} more.)" if n_more > 0 else first

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from tui.model.asked import Offered
-from tui.model.query_row import QueryRow
+from .query_row import QueryRow
+from .table_answer import Offered
 
 
 @dataclass(frozen=True, slots=True)
 class _State:
-    """What is asked: the facts that are not empty, and who is offered."""
+    """What is queried: the facts that are not empty, and who is offered."""
 
     texts: Mapping[str, str]
     actors: Offered

@@ -16,10 +16,11 @@ import polars as pl
 
 from contextdb.bitmask import Flags, Rows
 from contextdb.columns import TextColumn
-from contextdb.errors import ContextDBError, Fault, in_quotes, plural, shown
+from contextdb.errors import ContextDBError, Fault, in_quotes, plural, safe_text
 from contextdb.tables.changes import Cells, Edit
 from contextdb.tables.table import Table
-from tui.model.long_work import told
+
+from .long_work import with_progress
 
 
 class PatternError(ContextDBError):
@@ -51,7 +52,7 @@ class Search:
             pl.Series([""]).str.contains(self.pattern)
         except pl.exceptions.PolarsError as error:
             why = str(error).strip().splitlines()[-1].removeprefix("error: ")
-            return Fault(f"cannot read the pattern {in_quotes(self.text)}: {shown(why, 120)}.", "a regular expression")
+            return Fault(f"cannot read the pattern {in_quotes(self.text)}: {safe_text(why, 120)}.", "a regular expression")
         return None
 
 
@@ -60,7 +61,7 @@ def _literal(character: str) -> str:
 
 
 def find(table: Table, search: Search, rows: Rows, columns: Sequence[str]) -> Flags:
-    """Which cells are found: bool [rows, columns].
+    """Which cells match: bool [rows, columns].
 
     Raises
     ------
@@ -69,11 +70,11 @@ def find(table: Table, search: Search, rows: Rows, columns: Sequence[str]) -> Fl
     """
     if not search.text:
         return np.zeros((len(rows), len(columns)), np.bool_)
-    return np.stack([_found(table.text_column(c), search)[rows] for c in columns], axis=1)
+    return np.stack([_matching_cells(table.text_column(c), search)[rows] for c in columns], axis=1)
 
 
 def next_hit(hits: Flags, at: tuple[int, int], is_backwards: bool = False) -> tuple[int, int] | None:
-    """The cell found after (before) a cell, row by row and going round at the end; None when nothing was found."""
+    """The matching cell after (before) a cell, row by row and going round at the end; None when nothing matches."""
     places = np.flatnonzero(hits)
     if not len(places):
         return None
@@ -84,7 +85,7 @@ def next_hit(hits: Flags, at: tuple[int, int], is_backwards: bool = False) -> tu
 
 
 def replace_all(table: Table, search: Search, replacement: str, rows: Rows, columns: Sequence[str]) -> Edit:
-    """One edit that replaces what is found in some rows and columns; without changes when nothing is found.
+    """One edit that replaces the matches in some rows and columns; without changes when nothing matches.
 
     Raises
     ------
@@ -92,23 +93,23 @@ def replace_all(table: Table, search: Search, replacement: str, rows: Rows, colu
         The pattern cannot be read.
     """
     changed: dict[str, dict[int, str]] = {}
-    for name in told(columns, len(columns), every=1) if search.text else ():
+    for name in with_progress(columns, len(columns), every=1) if search.text else ():
         column = table.text_column(name)
         now = _replaced(column, search, replacement)
         differs = np.array([a != b for a, b in zip(column.texts, now, strict=True)], np.bool_)
         hits = rows[differs[column.codes[rows]]] if len(differs) else rows[:0]
         if len(hits):
             changed[name] = {row: now[column.codes[row]] for row in hits.tolist()}
-    name = f"Replace {shown(search.text)} in {plural(sum(map(len, changed.values())), 'cell')}"
+    name = f"Replace {safe_text(search.text)} in {plural(sum(map(len, changed.values())), 'cell')}"
     return Edit(name, (Cells(changed),) if changed else ())
 
 
-def _found(column: TextColumn, search: Search) -> Flags:
+def _matching_cells(column: TextColumn, search: Search) -> Flags:
     if not column.texts:
         return np.zeros(column.n_rows, np.bool_)
     _require_pattern(search)
-    found = pl.Series(column.texts, dtype=pl.String).str.contains(search.pattern)
-    return np.asarray(found.to_numpy(), np.bool_)[column.codes]
+    contains = pl.Series(column.texts, dtype=pl.String).str.contains(search.pattern)
+    return np.asarray(contains.to_numpy(), np.bool_)[column.codes]
 
 
 def _replaced(column: TextColumn, search: Search, replacement: str) -> list[str]:
@@ -117,8 +118,8 @@ def _replaced(column: TextColumn, search: Search, replacement: str) -> list[str]
         words = re.sub(r"\$\$|\$(\d+)", lambda m: f"${{{m[1]}}}" if m[1] else m[0], replacement)
     else:
         words = replacement.replace("$", "$$")
-    found: list[str] = pl.Series(column.texts, dtype=pl.String).str.replace_all(search.pattern, words).to_list()
-    return found
+    texts: list[str] = pl.Series(column.texts, dtype=pl.String).str.replace_all(search.pattern, words).to_list()
+    return texts
 
 
 def _require_pattern(search: Search) -> None:

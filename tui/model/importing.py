@@ -15,15 +15,17 @@ import numpy as np
 from contextdb.cells.kinds import KINDS
 from contextdb.columns import TextColumn
 from contextdb.edits.edits import edit_between
-from contextdb.errors import ContextDBError, Fault, TableError, nearest, plural, shown
+from contextdb.errors import ContextDBError, Fault, TableError, nearest, plural, safe_text
 from contextdb.exchange.formats import FORMATS, ReadOptions, read
-from contextdb.exchange.importing import NAMES, has_whole_names, whole_names_told
-from contextdb.exchange.mapping import PLAIN_JOBS, Mapped, as_condition, as_job, as_type, propose
+from contextdb.exchange.importing import NAMES, decimal_commas_reported, has_whole_names, whole_names_sentence
+from contextdb.exchange.mapping import COLUMN_JOBS, Mapped, as_condition, as_job, as_type, propose
 from contextdb.exchange.proposals import names_of
 from contextdb.exchange.reading import Reading, listed
 from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict
 from contextdb.tables.changes import CameFrom, Edit
 from contextdb.tables.table import Table
+
+from .asset_rows import rows_of_assets
 
 Mode = Literal["merge", "append", "replace"]
 MODES: dict[Mode, str] = {
@@ -32,7 +34,7 @@ MODES: dict[Mode, str] = {
     "replace": "in place of those of the table",
 }
 N_SHOWN = 3
-"""Cells of a column that are shown before it is imported."""
+"""Cells of a column that are displayed before it is imported."""
 
 
 @dataclass(frozen=True)
@@ -55,18 +57,19 @@ class Choice:
 class Draft:
     """A file that was read, and what is decided of it so far."""
 
-    def __init__(self, table: Table, reading: Reading, name: str, tells_names: bool = True) -> None:
-        """`name` is what the file is called in the step's name; `tells_names` says in the notes which texts became one name."""
+    def __init__(self, table: Table, reading: Reading, name: str, tells_names: bool = True, tells_commas: bool = True) -> None:
+        """`name` is what the file is called in the step's name; `tells_names` says in the notes which texts became one name,
+        `tells_commas` which numbers have a comma."""
         self.table = table
         self.reading = reading
         self.name = name
-        self.tells_names = tells_names
+        self.tells_names, self.tells_commas = tells_names, tells_commas
         self.mode: Mode = "merge"
         self.columns: list[Mapped] = list(propose(reading, self._schema, self._settings))
 
     @classmethod
     def read(cls, table: Table, raw: bytes, name: str, options: ReadOptions, names: str | None = None) -> Draft:
-        """Read a file for a table; `names` is how its texts are read, "whole" or "words", where that is said.
+        """Read a file for a table; `names` is how its texts are read, "whole" or "words", where that is given.
 
         Raises
         ------
@@ -74,7 +77,8 @@ class Draft:
             It cannot be read, with every fault.
         """
         whole = has_whole_names(names, Path(name))
-        return cls(table, read(raw, name, replace(options, has_whole_names=whole)), Path(name).name, tells_names=not names)
+        reading = read(raw, name, replace(options, has_whole_names=whole))
+        return cls(table, reading, Path(name).name, not names, options.is_decimal_comma is None)
 
     @property
     def _schema(self) -> Schema:
@@ -147,22 +151,26 @@ class Draft:
         )
         near = nearest(column.name, self._schema.conditions)
         every = [as_condition(mapped, column, name, self._schema) for name in self._schema.conditions]
-        for found in sorted(every, key=lambda c: (c.name != near, c.n_unreadable > 0, c.name not in self._names, c.name)):
-            name = found.name
+        for condition in sorted(every, key=lambda c: (c.name != near, c.n_unreadable > 0, c.name not in self._names, c.name)):
+            name = condition.name
             where = "in the table" if name in self._names else "declared"
-            wrong = f"; {found.n_unreadable:,} unreadable" if found.n_unreadable else ""
-            yield Choice(name, f"{self._schema.conditions[name].domain.kind}, {where}{wrong}", found)
+            wrong = f"; {condition.n_unreadable:,} unreadable" if condition.n_unreadable else ""
+            yield Choice(name, f"{self._schema.conditions[name].domain.kind}, {where}{wrong}", condition)
         yield from self._other_columns(plain)
         if column.name not in self._names and column.name not in self._schema.conditions:
             for kind in (kind for kind in KINDS if not KINDS[kind].needs_values or names_of(mapped.names or column)):
-                found = as_type(plain, column, kind)
-                wrong = f"{plural(found.n_unreadable, 'cell')} cannot be read" if found.n_unreadable else "every cell can be read"
-                yield Choice(f"new condition, {kind}", wrong, found)
+                condition = as_type(plain, column, kind)
+                wrong = (
+                    f"{plural(condition.n_unreadable, 'cell')} cannot be read"
+                    if condition.n_unreadable
+                    else "every cell can be read"
+                )
+                yield Choice(f"new condition, {kind}", wrong, condition)
             yield Choice("new column of data", "for the game; no condition", as_job(plain, "output"))
 
     def _other_columns(self, plain: Mapped) -> Iterator[Choice]:
         settings = self.table.settings
-        for job in PLAIN_JOBS:
+        for job in COLUMN_JOBS:
             name = getattr(settings, job)
             if name is not None:
                 yield Choice(f"{name} ({job})", "in the table", as_job(replace(plain, name=name), job))
@@ -191,22 +199,22 @@ class Draft:
         texts = {self._name(column): (column.cells or self.reading.columns[at], target) for at, column in taken}
         names = [*self._names, *(name for name in texts if name not in self._names)]
         columns = [self._column(name, came_from, texts.get(name)) for name in names]
-        schema, settings = self._said([column for _, column in taken])
+        schema, settings = self._declared([column for _, column in taken])
         after = Table.build(self.table.name, columns, schema, settings, self.table.path)
-        return edit_between(self.table, after, came_from, f"Import {shown(self.name)}")
+        return edit_between(self.table, after, came_from, f"Import {safe_text(self.name)}")
 
     def summary(self) -> str:
         """What becomes of the rows, or why the file cannot be imported, in one line; cheap, whatever the size of the file."""
         try:
             taken = self._taken()
-            self._said([column for _, column in taken])
+            self._declared([column for _, column in taken])
         except ContextDBError as error:
             return error.faults[0].message
         came_from, target = self._rows()
         n_new, n_kept = int((came_from < 0).sum()), int((came_from >= 0).sum())
         counts = {"added": n_new, "here already": len(target) - n_new, "taken away": self.table.n_rows - n_kept}
-        said = ", ".join(f"{n:,} {what}" for what, n in counts.items() if n)
-        return f"{plural(len(target), 'row')} in the file{f': {said}' if said else ''}."
+        parts = ", ".join(f"{n:,} {what}" for what, n in counts.items() if n)
+        return f"{plural(len(target), 'row')} in the file{f': {parts}' if parts else ''}."
 
     def _taken(self) -> list[tuple[int, Mapped]]:
         """The columns that are imported, with their places in the file."""
@@ -220,9 +228,12 @@ class Draft:
         """What a person should know: how the file was read, and columns of the table that it does not have."""
         have = {self._name(column) for column in self.columns if column.job != "left out"}
         missing = [name for name in self._names if name not in have]
-        kept = [f"Not in the file: {listed(missing, 3)}. New rows are empty there, others stay."] if missing else []
-        told = whole_names_told(self.columns, self.reading, f'Names, "{NAMES["words"]}",') if self.tells_names else ""
-        return (*map(str, self.reading.remarks), *([told] if told else []), *kept)
+        missing_note = [f"Not in the file: {listed(missing, 3)}. New rows are empty there, others stay."] if missing else []
+        names_note = whole_names_sentence(self.columns, self.reading, f'Names, "{NAMES["words"]}",') if self.tells_names else ""
+        commas = (
+            decimal_commas_reported(self.columns, self.reading, self._schema, 'Decimal sign, "comma",') if self.tells_commas else []
+        )
+        return (*map(str, self.reading.remarks), *commas, *([names_note] if names_note else []), *missing_note)
 
     def answer(self) -> Import:
         """What the dialog gives back."""
@@ -236,24 +247,20 @@ class Draft:
         n_before, n_file = self.table.n_rows, self.reading.n_rows
         if self.mode == "append":
             return np.append(np.arange(n_before), np.full(n_file, -1)), np.arange(n_before, n_before + n_file)
-        found = self._found()
+        origins = self._matched_rows()
         if self.mode == "replace":
-            return found, np.arange(n_file)
-        is_new = found < 0
-        target = found.copy()
+            return origins, np.arange(n_file)
+        is_new = origins < 0
+        target = origins.copy()
         target[is_new] = np.arange(n_before, n_before + int(is_new.sum()))
         return np.append(np.arange(n_before), np.full(int(is_new.sum()), -1)), target
 
-    def _found(self) -> CameFrom:
+    def _matched_rows(self) -> CameFrom:
         """For each row of the file the row of the table with its asset, -1 without one; equal assets pair up in their order."""
         at = next((at for at, column in enumerate(self.columns) if column.job == "asset"), None)
         if at is None:
             return np.full(self.reading.n_rows, -1)
-        rows: dict[str, list[int]] = {}
-        for row, asset in enumerate(self.table.assets):
-            rows.setdefault(asset, []).append(row)
-        places = {asset: iter(found) for asset, found in rows.items()}
-        return np.array([next(places.get(asset, iter(())), -1) for asset in self.reading.columns[at].to_list()], np.int64)
+        return rows_of_assets(self.reading.columns[at].to_list(), self.table.assets)
 
     def _column(self, name: str, came_from: CameFrom, given: tuple[TextColumn, CameFrom] | None) -> TextColumn:
         """A column after the import: the texts that were, empty for new rows, and those of the file over them."""
@@ -268,7 +275,7 @@ class Draft:
             codes[target] = new[column.codes] if len(new) else codes[target]
         return TextColumn(name, tuple(code_of), codes)
 
-    def _said(self, taken: Sequence[Mapped]) -> tuple[Schema, TableSettings]:
+    def _declared(self, taken: Sequence[Mapped]) -> tuple[Schema, TableSettings]:
         """What contextdb.toml says after the import."""
         added = [column for column in taken if not self._is_here(column)]
         declared = {c.name: c.declared for c in added if c.is_new and c.declared is not None}
@@ -276,9 +283,9 @@ class Draft:
         if declared:
             schema = replace(schema, conditions={**schema.conditions, **conditions_from_dict(declared)})
         settings = self.table.settings
-        said: dict[str, Any] = {column.job: column.name for column in added if column.job in PLAIN_JOBS}
+        jobs: dict[str, Any] = {column.job: column.name for column in added if column.job in COLUMN_JOBS}
         outputs = (*settings.outputs, *(column.name for column in added if column.job == "output"))
-        return schema, replace(settings, outputs=outputs, **said)
+        return schema, replace(settings, outputs=outputs, **jobs)
 
 
 def suffixes_read() -> list[str]:
@@ -296,5 +303,5 @@ def why_not(error: ContextDBError) -> str:
     first = error.faults[0]
     more = f" (and {plural(len(error.faults) - 1, 'more fault')})" if len(error.faults) > 1 else ""
     line = f"Line {first.place.line}: " if first.place.line else ""
-    said = replace(first, mend="") if "--" in first.mend else first  # options of the command line are no help here
-    return f"{line}{said.message}{more}"
+    fault = replace(first, mend="") if "--" in first.mend else first  # options of the command line are no help here
+    return f"{line}{fault.message}{more}"

@@ -3,7 +3,7 @@
     0 ├──●━━━━━━━○────┤ 7        ● this end is in, ○ it is not
 
 Pictures are runs of (text, is_accepted): whether the cell holds any of the values that are there. Every character of a line is a
-stretch of the range shown: ━ where all of it is held, ─ where none is, ● or ○ where a span ends.
+stretch of the visible range: ━ where all of it is held, ─ where none is, ● or ○ where a span ends.
 """
 
 from __future__ import annotations
@@ -58,15 +58,15 @@ def pieces(cell: Cell, domain: Domain) -> tuple[Piece, ...]:
     if not domain.type.is_circular or cell.accepts is None:
         return tuple(_piece(span, domain) for span in spans)
     is_through = len(spans) > 1 and spans[0][0] == CIRCLE[0] and spans[-1][1] == CIRCLE[1]
-    found = [_piece(span, domain) for span in spans]
+    all_pieces = [_piece(span, domain) for span in spans]
     if not is_through:
-        return tuple(found)
-    first, *middle, last = found
+        return tuple(all_pieces)
+    first, *middle, last = all_pieces
     return (*middle, Piece(last.low, _half_turn(first.high), last.is_low_in, first.is_high_in))
 
 
 def _half_turn(degrees: float) -> float:
-    """Half a turn is shown as 180, not as the -180 that is stored."""
+    """Half a turn is displayed as 180, not as the -180 that is stored."""
     return 180.0 if degrees == -180.0 else degrees
 
 
@@ -88,7 +88,7 @@ def _piece(span: Span, domain: Domain) -> Piece:
 # ---- the line
 
 
-def shown_range(cell: Cell, domain: Domain) -> Range:
+def visible_range(cell: Cell, domain: Domain) -> Range:
     """From where to where a line shows: between the bounds of the domain; without one, round the ends of the cell."""
     low, high = domain.minimum, domain.maximum
     if math.isfinite(low) and math.isfinite(high) and low < high:
@@ -116,16 +116,16 @@ def _nice(size: float) -> float:
     return max((n * power for n in (1.0, 2.0, 5.0) if n * power <= size), default=power)
 
 
-def column_of(value: float, shown: Range, width: int) -> int:
+def column_of(value: float, visible: Range, width: int) -> int:
     """The character of a line of `width` that a value of the range is in."""
-    low, high = shown
+    low, high = visible
     share = (max(low, min(value, high)) - low) / (high - low)
     return min(int(share * width), width - 1)
 
 
-def interval_line(cell: Cell, domain: Domain, width: int, shown: Range | None = None) -> list[Run]:
-    """A line of `width` characters from end to end of the range shown."""
-    low, high = shown or shown_range(cell, domain)
+def interval_line(cell: Cell, domain: Domain, width: int, visible: Range | None = None) -> list[Run]:
+    """A line of `width` characters from end to end of the visible range."""
+    low, high = visible or visible_range(cell, domain)
     signs = [FREE] * width
     for first, last in spans_of(cell):
         if last < low or first > high:
@@ -152,12 +152,12 @@ def runs(signs: Iterable[Run]) -> list[Run]:
 
 
 def framed_line(cell: Cell, domain: Domain, width: int) -> list[Run]:
-    """The line with the ends of its range next to it; a bound of the domain has a stop, an end that is only shown has none."""
-    low, high = shown = shown_range(cell, domain)
+    """The line with the ends of its range next to it; a bound of the domain has a stop, an end that is only displayed has none."""
+    low, high = visible = visible_range(cell, domain)
     left = _end(low, domain) + (" ├" if low == domain.minimum else "  ")
     right = ("┤ " if high == domain.maximum else "  ") + _end(high, domain)
     room = max(width - len(left) - len(right), 8)
-    return runs([(left, False), *interval_line(cell, domain, room, shown), (right, False)])
+    return runs([(left, False), *interval_line(cell, domain, room, visible), (right, False)])
 
 
 def _end(value: float, domain: Domain) -> str:
@@ -206,20 +206,20 @@ def holds_dot(spans: Spans, distance: float, degrees: float) -> bool:
 
 def number_words(cell: Cell, domain: Domain, unit: str = "") -> str:
     """A set of numbers in words: "10.01 to 29.99 degrees, ends included"."""
-    found = pieces(cell, domain)
+    parts = pieces(cell, domain)
     if cell.is_any or spans_of(cell) in (EVERYTHING, (CIRCLE,)):
         return f"every {domain.type.value.removeprefix('a ').removeprefix('an ')}"
-    if not found:
+    if not parts:
         return "no number: the row never matches"
     unit = f" {unit or DEGREES}" if domain.type.is_circular or unit else ""
-    if len(found) == 1:
-        return _alone(found[0], unit, domain) + _outside(cell, domain)
-    return " or ".join(_among(piece, domain) for piece in found) + unit + _outside(cell, domain)
+    if len(parts) == 1:
+        return _alone(parts[0], unit, domain) + _outside(cell, domain)
+    return " or ".join(_among(piece, domain) for piece in parts) + unit + _outside(cell, domain)
 
 
 def _alone(piece: Piece, unit: str, domain: Domain) -> str:
     if piece.is_point and not piece.is_low_in:
-        return f"every angle but {_told(piece.low, domain)}{unit}"
+        return f"every angle but {_bound_text(piece.low, domain)}{unit}"
     if piece.is_point or math.isinf(piece.low) or math.isinf(piece.high):
         return ("exactly " if piece.is_point else "") + _among(piece, domain) + unit
     low, high = _ends(piece, domain)
@@ -245,10 +245,10 @@ def _among(piece: Piece, domain: Domain) -> str:
 
 def _ends(piece: Piece, domain: Domain) -> tuple[str, str]:
     """The two ends as texts; an angle that runs through half a turn ends behind it."""
-    return _told(piece.low, domain), _told(piece.high, domain)
+    return _bound_text(piece.low, domain), _bound_text(piece.high, domain)
 
 
-def _told(value: float, domain: Domain) -> str:
+def _bound_text(value: float, domain: Domain) -> str:
     """A number as a person would say it: the last bit of a sum left out."""
     return f"{value:.15g}" if domain.type.is_decimal else domain.type.spelling.write(value)
 
@@ -258,5 +258,9 @@ def _outside(cell: Cell, domain: Domain) -> str:
     low, high = domain.minimum, domain.maximum
     if any(first <= high and last >= low for first, last in spans_of(cell)):
         return ""
-    within = f"within {_told(low, domain)} to {_told(high, domain)}" if low > -math.inf else f"up to {_told(high, domain)}"
-    return f"; nothing {within}" if high < math.inf else f"; nothing from {_told(low, domain)} up"
+    within = (
+        f"within {_bound_text(low, domain)} to {_bound_text(high, domain)}"
+        if low > -math.inf
+        else f"up to {_bound_text(high, domain)}"
+    )
+    return f"; nothing {within}" if high < math.inf else f"; nothing from {_bound_text(low, domain)} up"

@@ -53,9 +53,9 @@ class Layout:
     @cached_property
     def hides(self) -> frozenset[int]:
         """The columns that are seen, behind which others are hidden."""
-        shown = [at for at, width in enumerate(self.widths) if width]
-        following = [*shown[1:], len(self.widths)]
-        return frozenset(at for at, after in zip(shown, following, strict=True) if after > at + 1)
+        visible = [at for at, width in enumerate(self.widths) if width]
+        following = [*visible[1:], len(self.widths)]
+        return frozenset(at for at, after in zip(visible, following, strict=True) if after > at + 1)
 
     @property
     def frozen(self) -> int:
@@ -178,7 +178,7 @@ def cut_middle(text: str, width: int, n_shared: int = 0) -> str:
 
 @lru_cache(maxsize=1 << 16)
 def cut(text: str, width: int) -> str:
-    """The text in exactly so many cells; a longer one ends in "…". Line ends and tabs are shown by signs, other controls by "�"."""
+    """The text in exactly so many cells; a longer one ends in "…". Line ends and tabs become signs, other controls "�"."""
     if not text.isprintable():
         text = "".join(c if c.isprintable() or c == JOINER else "�" for c in text.translate(_SHOWN))
     if cell_len(text) <= width:

@@ -1,7 +1,7 @@
 """A running game that is listened to: a thread of its own reads its lines, and keeps the last minute of each character.
 
-The thread works a quarter of the time at most: of a game that tells more, lines are lost, and it is said how many. Nothing here
-waits for the game but the thread, which ends when the game does, or when nobody listens any more.
+The thread works a quarter of the time at most: of a game that tells more, lines are lost, and counted. Nothing here waits
+for the game but the thread, which ends when the game does, or when nobody listens any more.
 """
 
 from __future__ import annotations
@@ -15,15 +15,16 @@ from typing import Literal
 from contextdb.errors import ContextDBError
 from contextdb.telemetry.link.hearing import Hearing, Wanted, hear
 from contextdb.telemetry.link.lines import ASK, END, HEADER, LOST, PICK, TABLES, Line
-from tui.model.moments import Key, LiveTrack, Moment, pick_of
+
+from .moments import Key, LiveTrack, Moment, pick_of
 
 State = Literal["opening", "on", "ended", "gone", "refused"]
 MOST_TRACKS = 500
-"""So many characters are kept apart; those that come later are left out."""
+"""At most this many characters have a track; those that come later are left out."""
 PAUSE, LONGEST_S = 3.0, 0.25
 """The thread rests so many times as long as it worked, and not longer than that."""
 SILENT_S = 2.0
-"""A game that has sent nothing for so long is said to ask nothing."""
+"""A game that has sent nothing for so long counts as one that asks nothing."""
 
 
 class Listening:
@@ -63,12 +64,11 @@ class Listening:
         if self.state == "opening":
             return "connecting"
         if self.state == "on":
-            return f"nothing asked for {self.silent_s:.0f} s" if self.silent_s >= SILENT_S else ""
-        said = {"ended": "the game has ended", "gone": "the game is gone", "refused": "the game does not answer"}[self.state]
-        return self.problem or said
+            return f"no query for {self.silent_s:.0f} s" if self.silent_s >= SILENT_S else ""
+        reason = {"ended": "the game has ended", "gone": "the game is gone", "refused": "the game does not answer"}[self.state]
+        return self.problem or reason
 
     def close(self) -> None:
-        """Hang up."""
         self._closed.set()
         if self._hearing is not None:
             self._hearing.close()
@@ -123,4 +123,4 @@ class Listening:
                 self.tracks[key] = track
 
     def _take_tables(self, line: Line) -> None:
-        self.tables = {**self.tables, **line["tables"]}
+        self.tables = line["tables"]

@@ -11,25 +11,16 @@ import json
 import os
 import platform
 import secrets
-from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from contextdb.disk import make_folder, write_atomic
-from contextdb.errors import ContextDBError
+from contextdb.disk.own_files import NOT_OURS, make_own_folder, open_own, read_own, rewrite_own
+from contextdb.errors import Fault, FileError
 
 FOLDER = ".contextdb-journal"
 MOST_BYTES = 1000
-
-
-def own_folder(folder: Path) -> None:
-    """Make the folder of journals and locks, which git passes over."""
-    make_folder(folder)
-    ignore = folder / ".gitignore"
-    if not ignore.exists():
-        write_atomic(ignore, b"*\n")
 
 
 @dataclass(frozen=True)
@@ -47,8 +38,8 @@ class Holder:
         return not self.host
 
     def __str__(self) -> str:
-        who = f"process {self.pid}" if self.pid else "another process"
-        return f"{who} on {self.host}" if self.host else who
+        process = f"process {self.pid}" if self.pid else "another process"
+        return f"{process} on {self.host}" if self.host else process
 
 
 class Lock:
@@ -59,16 +50,21 @@ class Lock:
         self.id = secrets.token_hex(8)
         self._host = platform.node() if host is None else host
         self._descriptor = -1
+        self.problem: Fault | None = None
+        """Why there is no lock: what has its name is not ours."""
 
     def acquire(self, takes_over: bool = False) -> Holder | None:
         """Take the lock; gives who has it when somebody else does. Where the disk cannot lock, nobody is reported.
 
         `takes_over`: take it from an editor on another machine, which a person says has ended.
         """
+        self.problem = None
         try:
-            own_folder(self.path.parent)
-            descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
-        except (OSError, ContextDBError):
+            make_own_folder(self.path.parent)
+            descriptor = self._opened()
+        except OSError as error:
+            refused = error.faults[0] if isinstance(error, FileError) else None
+            self.problem = refused if refused is not None and refused.rule == NOT_OURS else None
             return None
         try:
             _lock(descriptor)
@@ -84,9 +80,16 @@ class Lock:
             os.close(descriptor)
             return last
         with suppress(OSError):  # a full disk: the lock holds, and does not say whose it is
-            self._write(descriptor, {"pid": os.getpid(), "id": self.id, "host": self._host})
+            rewrite_own(descriptor, json.dumps({"pid": os.getpid(), "id": self.id, "host": self._host}).encode())
         self._descriptor = descriptor
         return None
+
+    def _opened(self) -> int:
+        """The lock of another user is looked at, and not written into."""
+        try:
+            return open_own(self.path, os.O_RDWR, makes=True)
+        except FileError:
+            return open_own(self.path, os.O_RDONLY, is_anybodys=True)
 
     @property
     def is_held(self) -> bool:
@@ -98,7 +101,7 @@ class Lock:
         if not self.is_held:
             return None
         with suppress(OSError):
-            holder = self._holder(self.path.read_bytes()[:MOST_BYTES])
+            holder = self._holder(read_own(self.path)[:MOST_BYTES])
             return holder if holder is not None and holder.id not in ("", self.id) else None
         return None
 
@@ -107,7 +110,7 @@ class Lock:
         if self.is_held:
             with suppress(OSError):
                 if self.taken_by() is None:
-                    os.truncate(self._descriptor, 0)
+                    rewrite_own(self._descriptor, b"")
             with suppress(OSError):  # a network drive may refuse at last; let go of it is
                 os.close(self._descriptor)
             self._descriptor = -1
@@ -119,19 +122,14 @@ class Lock:
     def __exit__(self, *_: object) -> None:
         self.release()
 
-    def _write(self, descriptor: int, said: Mapping[str, object]) -> None:
-        os.truncate(descriptor, 0)
-        os.lseek(descriptor, 0, os.SEEK_SET)
-        os.write(descriptor, json.dumps(said).encode())
-
     def _holder(self, raw: bytes) -> Holder | None:
         """Who the file names; None when it names nobody: the last holder let go."""
         if not raw.strip():
             return None
         try:
-            said: Any = json.loads(raw)
-            host = str(said.get("host", ""))
-            return Holder(int(said["pid"]), str(said["id"]), "" if host == self._host else host)
+            document: Any = json.loads(raw)
+            host = str(document.get("host", ""))
+            return Holder(int(document["pid"]), str(document["id"]), "" if host == self._host else host)
         except (ValueError, KeyError, TypeError, AttributeError):  # it is just writing who it is
             return Holder(0, "")
 

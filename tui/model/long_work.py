@@ -1,7 +1,7 @@
 """Long work on a table that says which share of it is done, and can be stopped. Nothing is changed before all of it is worked out.
 
-A verb of a sheet names what it goes through with `told`, and changes the sheet `in_turn`. Where nobody works beside the screen both
-do nothing; see `tui.doing`.
+A verb of a sheet takes its steps `with_progress`, and changes the sheet `in_turn`. Where nobody works off the screen's thread
+both do nothing; see `tui.doing`.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class StoppedError(Exception):
 
 @dataclass(frozen=True)
 class Work:
-    """What somebody who works beside the screen is told."""
+    """What long work off the screen's thread reports to."""
 
     tell: Callable[[float], None]
     """Takes the share that is done; raises `StoppedError` once the work is no longer wanted."""
@@ -35,23 +35,23 @@ class Work:
 PRESENT: ContextVar[Work | None] = ContextVar("PRESENT", default=None)
 
 
-def told(steps: Iterable[T], n_steps: int, every: int = EVERY) -> Iterable[T]:
+def with_progress(steps: Iterable[T], n_steps: int, every: int = EVERY) -> Iterable[T]:
     """The steps, of which there are about so many; `every` is 1 for those that take long."""
     work = PRESENT.get()
-    return steps if work is None else _told(work, steps, n_steps, every)
+    return steps if work is None else _reporting(work, steps, n_steps, every)
 
 
-def _told(work: Work, steps: Iterable[T], n_steps: int, every: int) -> Iterator[T]:
-    said = 0.0
+def _reporting(work: Work, steps: Iterable[T], n_steps: int, every: int) -> Iterator[T]:
+    last_s = 0.0
     for at, step in enumerate(steps):
-        if at % every == 0 and (now := time.monotonic()) - said >= OFTEN_S:
-            said = now
+        if at % every == 0 and (now := time.monotonic()) - last_s >= OFTEN_S:
+            last_s = now
             work.tell(min(at / max(n_steps, 1), 1.0))
         yield step
 
 
 def in_turn(change: Callable[[], T]) -> T:
-    """Change the sheet."""
+    """Make a change on the editor's thread, from the work that runs beside it."""
     work = PRESENT.get()
     if work is None:
         return change()

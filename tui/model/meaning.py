@@ -12,8 +12,10 @@ from contextdb.cells.grammar import parse_cell, reads
 from contextdb.cells.mends import candidates
 from contextdb.cells.sets import Cell, TagSet, ValueSet
 from contextdb.cells.words import format_number
-from contextdb.errors import CellError, ContextError, Fault, Place, plural, shown
-from tui.model.interval_picture import number_words
+from contextdb.errors import CellError, ContextError, Fault, Place, plural, safe_text
+from contextdb.exchange.decimal_commas import PAIR, as_pair
+
+from .interval_picture import number_words
 
 _MOST_TAGS = 4
 _MOST_MENDED = 1000
@@ -38,7 +40,7 @@ def meaning(text: str, condition: Condition, is_fact: bool = False) -> Meaning:
 
 def _cell_meaning(text: str, condition: Condition) -> Meaning:
     cell = parse_cell(text, condition.domain, wants_mend=False)
-    words = set_words(cell, condition.domain, condition.unit)
+    words = _words_of(text, cell, condition)
     if cell.penalty is not None:
         words += f"; others cost {format_number(cell.penalty)} more"
     return Meaning(words, cell=cell)
@@ -54,11 +56,17 @@ def _fact_meaning(text: str, condition: Condition) -> Meaning:
     if fact is None:
         return Meaning("not given")
     if isinstance(fact, Cell):
-        return Meaning(f"may be {set_words(fact, domain, condition.unit)}", cell=fact)
-    told = describe(fact, domain)
+        return Meaning(f"may be {_words_of(text, fact, condition)}", cell=fact)
+    description = describe(fact, domain)
     if domain.type.is_numeric:
-        return Meaning(f"exactly {told} {condition.unit}".rstrip(), cell=parse_cell(told, domain))
-    return Meaning(f"has {told}" if isinstance(fact, frozenset) else f"is {told}")
+        return Meaning(f"exactly {description} {condition.unit}".rstrip(), cell=parse_cell(description, domain))
+    return Meaning(f"has {description}" if isinstance(fact, frozenset) else f"is {description}")
+
+
+def _words_of(text: str, cell: Cell, condition: Condition) -> str:
+    """A set of values in words; of "0,5", which could be meant as 0.5, first that it is centre and tolerance."""
+    words = set_words(cell, condition.domain, condition.unit)
+    return f"{as_pair(text)}: {words}" if condition.domain.type.is_numeric and PAIR.fullmatch(text) else words
 
 
 def set_words(cell: Cell, domain: Domain, unit: str = "") -> str:
@@ -87,12 +95,12 @@ def _value_words(accepts: ValueSet, domain: Domain) -> str:
 
 def _tag_words(accepts: TagSet) -> str:
     has = [f"{verb} {_listed(tags)}" for verb, tags in (("has", accepts.needs), ("has not", accepts.bans)) if tags]
-    said = ", ".join(has) or "any set of tags"
-    return f"anything but: {said}" if accepts.is_complement else said
+    words = ", ".join(has) or "any set of tags"
+    return f"anything but: {words}" if accepts.is_complement else words
 
 
 def _listed(tags: frozenset[str]) -> str:
-    names = [shown(tag) for tag in sorted(tags)]
+    names = [safe_text(tag) for tag in sorted(tags)]
     return (
         " and ".join(names)
         if len(names) <= _MOST_TAGS

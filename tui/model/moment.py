@@ -10,9 +10,10 @@ from contextdb.cells.grammar import parse_cell
 from contextdb.cells.sets import Cell
 from contextdb.cells.words import format_number
 from contextdb.covering.inside import facts_inside
-from contextdb.errors import ContextError, Fault, shown
+from contextdb.errors import ContextError, Fault, safe_text
 from contextdb.telemetry.recordings import fact_text
-from tui.model.wanted import Wanted
+
+from .wanted import Wanted
 
 MOST_TRIED = 4000
 """So many combinations of facts are tried for what is computed from them."""
@@ -26,7 +27,7 @@ def moment_inside(cells: Mapping[str, str], wanted: Wanted) -> dict[str, str]:
     Raises
     ------
     ContextError
-        No facts were found from which what is computed comes out so.
+        There are no facts from which what is computed comes out so.
     CellError
         A cell cannot be read.
     """
@@ -41,7 +42,7 @@ def moment_inside(cells: Mapping[str, str], wanted: Wanted) -> dict[str, str]:
         facts = wanted.read({**given, **texts})[0]
         if all(facts[name] is not None and cell.holds(facts[name]) for name, cell in derived.items()):
             return {**given, **texts}
-    named = ", ".join(map(shown, derived))
+    named = ", ".join(map(safe_text, derived))
     raise ContextError(Fault(f"no facts were found from which {named} is computed as this says.", "facts typed into the test row"))
 
 

@@ -1,6 +1,6 @@
-"""Moments of a game as the test row takes them: what a character asked a table, and what the game made of it.
+"""Moments of a game as the test row takes them: what a character queried of a table, and what the game made of it.
 
-A track is what one character asked one table, in order; moments count on, also where the first of them are forgotten. A live
+A track is what one character queried of one table, in order; moments count on, also where the first of them are forgotten. A live
 track keeps the last minute; that of a recording leaves its moments in the file. An edge: recordings are read here.
 """
 
@@ -21,9 +21,9 @@ from contextdb.telemetry.link.lines import Line, given_facts, read_line
 from contextdb.telemetry.recordings import fact_text
 
 KEPT_S = 60.0
-"""So much of what a running game asked is kept."""
+"""So much of what a running game queried is stored."""
 MOST_KEPT, MOST_BYTES = 4096, 1 << 24
-"""At most so many moments of a character are kept, and so many bytes of their lines."""
+"""At most so many moments of a character are stored, and so many bytes of their lines."""
 
 Actors = Mapping[str, Sequence[Mapping[str, object]]]
 Key = tuple[str | None, str]
@@ -53,13 +53,13 @@ class Moment:
 
     def texts(self, conditions: Mapping[str, Condition]) -> dict[str, str]:
         """The facts as the test row takes them, those of some conditions; a fact that is none is left out."""
-        found = {}
+        texts = {}
         for name, condition in conditions.items():
             try:
-                found[name] = text_of(self.facts.get(name), condition)
+                texts[name] = text_of(self.facts.get(name), condition)
             except ValueError:
                 continue
-        return {name: text for name, text in found.items() if text}
+        return {name: text for name, text in texts.items() if text}
 
 
 def text_of(sent: object, condition: Condition) -> str:
@@ -74,7 +74,7 @@ def pick_of(line: Line) -> tuple[object, str | None] | None:
 
 
 def _actors(sent: object) -> Actors | None:
-    """The actors that a question was asked with; None without, and for what is none."""
+    """The actors that a question was queried with; None without, and for what is none."""
     if not isinstance(sent, dict):
         return None
     try:
@@ -84,11 +84,11 @@ def _actors(sent: object) -> Actors | None:
 
 
 class Track(Protocol):
-    """What one character asked one table: the moments `first` up to `stop`."""
+    """What one character queried of one table: the moments `first` up to `stop`."""
 
     @property
     def first(self) -> int:
-        """The number of the first moment that is kept."""
+        """The number of the first moment that is stored."""
         ...
 
     @property
@@ -97,16 +97,16 @@ class Track(Protocol):
         ...
 
     def moment(self, at: int) -> Moment | None:
-        """A moment; None for one that is not kept."""
+        """A moment; None for one that is not stored."""
         ...
 
     def time(self, at: int) -> float:
-        """When a moment was; that of the nearest one that is kept."""
+        """When a moment was; that of the nearest one that is stored."""
         ...
 
     @property
-    def kept(self) -> list[Moment]:
-        """All moments that are kept."""
+    def moments(self) -> list[Moment]:
+        """All moments that are stored."""
         ...
 
 
@@ -115,16 +115,16 @@ class LiveTrack:
 
     def __init__(self) -> None:
         self._lock = Lock()
-        self._kept: deque[tuple[Moment, int]] = deque()
+        self._moments: deque[tuple[Moment, int]] = deque()
         """Moments, each with the bytes of its line."""
         self._n_bytes = 0
         self._stop = 0
 
     @property
     def first(self) -> int:
-        """The number of the first moment that is kept."""
+        """The number of the first moment that is stored."""
         with self._lock:
-            return self._stop - len(self._kept)
+            return self._stop - len(self._moments)
 
     @property
     def stop(self) -> int:
@@ -132,42 +132,42 @@ class LiveTrack:
         return self._stop
 
     def moment(self, at: int) -> Moment | None:
-        """A moment; None for one that is not kept."""
+        """A moment; None for one that is not stored."""
         with self._lock:
-            place = at - (self._stop - len(self._kept))
-            return self._kept[place][0] if 0 <= place < len(self._kept) else None
+            place = at - (self._stop - len(self._moments))
+            return self._moments[place][0] if 0 <= place < len(self._moments) else None
 
     def time(self, at: int) -> float:
-        """When a moment was; that of the nearest one that is kept."""
+        """When a moment was; that of the nearest one that is stored."""
         with self._lock:
-            if not self._kept:
+            if not self._moments:
                 return 0.0
-            place = at - (self._stop - len(self._kept))
-            return self._kept[max(0, min(place, len(self._kept) - 1))][0].t
+            place = at - (self._stop - len(self._moments))
+            return self._moments[max(0, min(place, len(self._moments) - 1))][0].t
 
     @property
-    def kept(self) -> list[Moment]:
-        """All moments that are kept."""
+    def moments(self) -> list[Moment]:
+        """All moments that are stored."""
         with self._lock:
-            return [moment for moment, _ in self._kept]
+            return [moment for moment, _ in self._moments]
 
     def add(self, moment: Moment, n_bytes: int) -> None:
         """Add a moment, and forget those that are older than a minute."""
         with self._lock:
-            self._kept.append((moment, n_bytes))
+            self._moments.append((moment, n_bytes))
             self._n_bytes += n_bytes
             self._stop += 1
-            while len(self._kept) > 1 and (
-                self._kept[0][0].t < moment.t - KEPT_S or len(self._kept) > MOST_KEPT or self._n_bytes > MOST_BYTES
+            while len(self._moments) > 1 and (
+                self._moments[0][0].t < moment.t - KEPT_S or len(self._moments) > MOST_KEPT or self._n_bytes > MOST_BYTES
             ):
-                self._n_bytes -= self._kept.popleft()[1]
+                self._n_bytes -= self._moments.popleft()[1]
 
     def picked(self, pick: tuple[object, str | None] | None) -> None:
         """What the game picked from the last answer."""
         with self._lock:
-            if self._kept:
-                moment, n_bytes = self._kept[-1]
-                self._kept[-1] = replace(moment, pick=pick), n_bytes
+            if self._moments:
+                moment, n_bytes = self._moments[-1]
+                self._moments[-1] = replace(moment, pick=pick), n_bytes
 
 
 class RecordedTrack:
@@ -203,13 +203,13 @@ class RecordedTrack:
             with self.path.open("rb") as file:
                 file.seek(start)
                 line = read_line(file.read(n_bytes))
-            found = Moment.of(line)
+            moment = Moment.of(line)
         except (OSError, ValueError, KeyError):
             return None
-        return replace(found, pick=self._picks[at]) if at in self._picks else found
+        return replace(moment, pick=self._picks[at]) if at in self._picks else moment
 
     @property
-    def kept(self) -> list[Moment]:
+    def moments(self) -> list[Moment]:
         """All moments, as long as the file is there."""
         return [moment for at in range(self.stop) if (moment := self.moment(at)) is not None]
 
@@ -248,8 +248,8 @@ def open_session(path: Path) -> Session:
                 except ValueError as error:
                     if not raw.endswith(b"\n") and number > 1:
                         break
-                    found = f"the line cannot be read: {error}"
-                    raise TableError(Fault(found, "lines that `contextdb live --record` wrote", place=place)) from None
+                    problem = f"the line cannot be read: {error}"
+                    raise TableError(Fault(problem, "lines that `contextdb live --record` wrote", place=place)) from None
                 if number == 1:
                     require_header(line, place)
                 if line["line"] in (lines.HEADER, lines.TABLES):

@@ -9,6 +9,7 @@ import numpy as np
 
 from contextdb.columns import TextColumn
 from contextdb.disk import TABLE_SUFFIXES
+from contextdb.disk.boundary import inside
 from contextdb.errors import in_quotes
 from contextdb.files.file_names import alike, why_no_table
 from contextdb.files.texts import write_texts
@@ -39,7 +40,7 @@ def make_table(folder: Path, name: str, conditions: Sequence[str]) -> Path:
     FileError
         The disk refuses.
     """
-    path = folder / f"{name.strip()}.csv"
+    path = inside(folder / f"{name.strip()}.csv", folder)
     columns = [TextColumn.of(column, ()) for column in (ASSET, *conditions)]
     write_texts(path, columns, None, np.arange(0))
     return path

@@ -5,7 +5,7 @@
     jog,,,amber
 
 A line is of one cell, or of one row where it names no column; lines are sorted, so that two people's notes merge. A row is meant by
-its asset, so the same is said of all rows of one asset.
+its asset, so the same notes stand at all rows of one asset.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Notes:
     texts: Mapping[Spot, str] = field(default_factory=dict)
     """Asset and column to note."""
     words: Mapping[Spot, str] = field(default_factory=dict)
-    """Asset and column to what is said of its colour: also of one that there is not, and of a cell, which has none here."""
+    """Asset and column to the text of its colour: also of one that there is not, and of a cell, which has none here."""
 
     @cached_property
     def colours(self) -> Mapping[str, str]:
@@ -42,12 +42,12 @@ class Notes:
     def beside(cls, table: Path) -> Notes:
         """Those of a table's file; none where there is no file of them, or none that can be read."""
         try:
-            return cls.kept(table, or_more=True)
+            return cls.read(table, or_more=True)
         except ContextDBError:
             return cls()
 
     @classmethod
-    def kept(cls, table: Path, *, or_more: bool = False) -> Notes:
+    def read(cls, table: Path, *, or_more: bool = False) -> Notes:
         """Those of a table's file, all that it holds.
 
         Raises ContextDBError where there is a file that cannot be read, or that holds more, unless `or_more`: to write the notes

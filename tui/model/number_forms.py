@@ -15,7 +15,8 @@ from contextdb.cells.domains import Domain
 from contextdb.cells.grammar import format_cell, parse_cell, reads
 from contextdb.cells.sets import Cell, NumberSet
 from contextdb.cells.words import format_number
-from tui.model.interval_picture import Piece, pieces
+
+from .interval_picture import Piece, pieces
 
 _CENTRE_MARK = re.compile(r",|±|\+-")
 
@@ -38,11 +39,11 @@ def nudged(text: str, caret: int, domain: Domain, steps: int) -> tuple[str, int]
     """
     if not reads(text, domain):
         return None
-    found = [m for m in _numbers(domain.type.spelling.number).finditer(text) if "inf" not in m[1]]
-    if not found:
+    matches = [m for m in _numbers(domain.type.spelling.number).finditer(text) if "inf" not in m[1]]
+    if not matches:
         return None
-    number = next((m for m in found if m.start(1) <= caret <= m.end(1)), None)
-    number = number or next((m for m in reversed(found) if m.end(1) < caret), found[0])
+    number = next((m for m in matches if m.start(1) <= caret <= m.end(1)), None)
+    number = number or next((m for m in reversed(matches) if m.end(1) < caret), matches[0])
     moved = _moved(number[1], domain, steps)
     changed = text[: number.start(1)] + moved + text[number.end(1) :]
     if not reads(changed, domain) or parse_cell(changed, domain).is_empty > parse_cell(text, domain).is_empty:
@@ -64,7 +65,7 @@ def _moved(text: str, domain: Domain, steps: int) -> str:
     low, high = (Decimal(-180), Decimal(180)) if domain.type.is_circular else (_bound(domain.minimum), _bound(domain.maximum))
     if low <= old <= high and not low <= new <= high:
         new = new + (360 if new < low else -360) if domain.type.is_circular else max(low, min(new, high))
-    if "." in text and not text.endswith("0"):  # no zeros are kept that nobody wrote: 1 follows 0.9, and 3.50 follows 3.40
+    if "." in text and not text.endswith("0"):  # no zeros stay that nobody wrote: 1 follows 0.9, and 3.50 follows 3.40
         new = new.normalize()
     return f"{new:f}" if -30 < new.adjusted() < 30 else str(new)
 

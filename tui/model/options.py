@@ -1,47 +1,22 @@
-"""The settings of a table as fields: what each is for, what it may be, and the edit that sets it."""
+"""The settings of a table and of a condition that the tab Options has, and what may be picked for them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from contextdb.files.settings import Settings, settings_of
+from contextdb.schema.shapes import CONDITION
+from contextdb.schema.table_settings import TableSettings
 from contextdb.tables.table import Table
 
-POLICY_WORDS = {
-    "collect": "several may be valid: that is variety",
-    "first": "the first valid row of the file plays",
-    "unique": "at most one may be valid; two are a fault",
-    "priority": "the highest priority plays",
-    "specific": "the row with most cells that are not Any plays",
-    "cheapest": "the row whose soft cells cost least plays",
-}
-"""What each policy means, in a few words."""
+
+def _options(settings: Settings, *first: str) -> Settings:
+    """The settings that have a name in the editor; those that are used most come first."""
+    return {key: settings[key] for key in dict.fromkeys((*first, *settings)) if settings[key].label}
 
 
-@dataclass(frozen=True)
-class Option:
-    """A setting: its key in contextdb.toml, its name for people, and what it does."""
-
-    key: str
-    label: str
-    meaning: str
-
-
-OPTIONS = (
-    Option("policy", "Policy", "What the game does when several rows are valid at once."),
-    Option("asset", "Asset column", "Names the asset of each row."),
-    Option("outputs", "Outputs", "Columns that are data for the game. They are not conditions: they exclude no row."),
-    Option("enabled", "Enabled column", "A row that says False here never matches."),
-    Option("priority", "Priority column", "A whole number in each row. Of the valid rows those with the highest are picked from."),
-    Option("weight", "Weight column", "How often a row is picked among equals: 2 is twice as often as 1."),
-    Option("fallback", "Fallback", "The asset that plays when no row is valid. Empty: none does."),
-    Option(
-        "assume", "Assumptions", "What is always so, such as: not (IsRunning and IsIdle). Coverage leaves out all other contexts."
-    ),
-    Option("once", "Once column", "A row that says True here is picked once by each character, then no more."),
-    Option("cooldown_s", "Cooldown seconds", "A column: for so many seconds after it was picked a row is not picked again."),
-    Option("cooldown_turns", "Cooldown picks", "A column: for so many picks after it was picked a row is not picked again."),
-)
+OPTIONS = _options(settings_of(TableSettings), "policy", "asset", "outputs", "enabled", "priority", "weight", "fallback", "assume")
+CONDITION_OPTIONS = _options(CONDITION, "type", "min", "max", "unit", "values", "mirror", "weight")
 
 
 def columns_for(table: Table, key: str) -> list[str]:

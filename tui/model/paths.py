@@ -10,7 +10,7 @@ MOST_NAMES = 500
 
 
 def completions(text: str, folder: Path, suffixes: Sequence[str]) -> list[str]:
-    """The folders (with a slash at the end) and files that a path may go on to be, folders first; hidden ones when asked for.
+    """The folders (with a slash at the end) and files that a path may go on to be, folders first; hidden ones when requested.
 
     Parameters
     ----------
@@ -22,8 +22,8 @@ def completions(text: str, folder: Path, suffixes: Sequence[str]) -> list[str]:
     tail = text.replace(os.sep, "/").rpartition("/")[2]
     start = text[: len(text) - len(tail)]
     try:
-        found = sorted(os.scandir(folder / os.path.expanduser(start or ".")), key=lambda entry: entry.name.casefold())
-        entries = [(entry.name, entry.is_dir()) for entry in found]
+        listed = sorted(os.scandir(folder / os.path.expanduser(start or ".")), key=lambda entry: entry.name.casefold())
+        entries = [(entry.name, entry.is_dir()) for entry in listed]
     except (OSError, ValueError):
         return []
     near = [(name, is_dir) for name, is_dir in entries if name.casefold().startswith(tail.casefold()) and _is_meant(name, tail)]

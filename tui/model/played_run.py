@@ -14,6 +14,7 @@ from threading import Thread
 import numpy as np
 
 from contextdb.cells.grammar import parse_cell
+from contextdb.disk import write_atomic
 from contextdb.errors import ContextDBError, Fault, TableError, plural
 from contextdb.tables.nesting.flat import FlatTable
 from contextdb.tables.table import Table
@@ -21,9 +22,10 @@ from contextdb.telemetry import Observed, observe
 from contextdb.telemetry.contexts import context_files
 from contextdb.telemetry.link.lines import ASK, FORMAT, HEADER, dumped
 from contextdb.telemetry.observed import SeenGap
-from tui.model.context_list import ContextList
-from tui.model.moments import Moment
-from tui.model.wanted import wanted_by
+
+from .context_list import ContextList
+from .moments import Moment
+from .wanted import wanted_by
 
 MOST_LOOKED = 200_000
 """So many recorded moments are looked through for one in a gap."""
@@ -32,11 +34,11 @@ LIVE = "live.jsonl"
 
 @dataclass(frozen=True)
 class Played:
-    """What was found."""
+    """The result."""
 
     table: Table
     name: str
-    """What was read, as it is said."""
+    """What was read, as a text."""
     files: Sequence[Path]
     observed: Observed
     gaps: Sequence[SeenGap]
@@ -67,11 +69,11 @@ class PlayedRun:
         self._start(table, lambda: (pattern, name), name, tell)
 
     def start_live(self, table: Table, moments: Callable[[], Sequence[Moment]], name: str, tell: Callable[[], None]) -> None:
-        """Read the moments that are kept of a game, or a recording."""
+        """Read the moments that are stored of a game, or a recording."""
         if self._folder is None:
             self._folder = tempfile.TemporaryDirectory(prefix="contextdb-")
         path = Path(self._folder.name) / LIVE
-        self._start(table, lambda: (str(path), _kept(path, table, moments(), name)), name, tell)
+        self._start(table, lambda: (str(path), _written_moments(path, table, moments(), name)), name, tell)
 
     def _start(self, table: Table, source: Callable[[], tuple[str, str]], name: str, tell: Callable[[], None]) -> None:
         self._turn += 1
@@ -80,7 +82,6 @@ class PlayedRun:
         self._thread.start()
 
     def close(self) -> None:
-        """Forget everything."""
         self._turn += 1
         if self._folder is not None:
             self._folder.cleanup()
@@ -90,20 +91,20 @@ class PlayedRun:
         try:
             pattern, name = source()
             files = context_files(pattern)
-            found, problem = _of_file(table, name, files, observe(table.flat(), files)), ""
+            played, problem = _of_file(table, name, files, observe(table.flat(), files)), ""
         except ContextDBError as error:
-            found, problem = None, str(error.faults[0])
+            played, problem = None, str(error.faults[0])
         if turn == self._turn:
-            self.result, self.problem, self.reading = found or self.result, problem, ""
+            self.result, self.problem, self.reading = played or self.result, problem, ""
             tell()
 
 
-def _kept(path: Path, table: Table, moments: Sequence[Moment], name: str) -> str:
+def _written_moments(path: Path, table: Table, moments: Sequence[Moment], name: str) -> str:
     """Write moments as a recording; gives how they are called. One with actors is left out: it is counted by facts alone."""
     plain = [moment for moment in moments if not moment.actors]
     if not plain:
-        why = "each was asked with actors" if moments else "nothing was asked yet"
-        raise TableError(Fault(f"{name} has no moment to count: {why}.", "moments that were asked without actors"))
+        why = "every query had actors" if moments else "there was no query yet"
+        raise TableError(Fault(f"{name} has no moment to count: {why}.", "queries without actors"))
     conditions = sorted({fact for moment in plain for fact in moment.facts})
     tables = {table.name: {"version": None, "conditions": dict.fromkeys(conditions, "")}}
     lines: list[dict[str, object]] = [{"line": HEADER, "format": FORMAT, "game": name, "pid": 0, "tables": tables}]
@@ -111,7 +112,7 @@ def _kept(path: Path, table: Table, moments: Sequence[Moment], name: str) -> str
         {"line": ASK, "t": m.t, "who": None, "table": table.name, "facts": m.facts, "rows": f"{m.rows:x}", "valid": m.n_valid}
         for m in plain
     ]
-    path.write_bytes(b"".join(map(dumped, lines)))
+    write_atomic(path, b"".join(map(dumped, lines)), syncs=False)
     n_left = len(moments) - len(plain)
     return f"{name} ({plural(n_left, 'moment')} with actors left out)" if n_left else name
 
@@ -128,7 +129,7 @@ def _of_file(table: Table, name: str, files: Sequence[Path], observed: Observed)
 
 
 def moment_in(played: Played, gap: SeenGap) -> tuple[dict[str, str], str] | None:
-    """The first recorded moment that lies in a gap, as the test row takes it, and where it is; None where none was found."""
+    """The first recorded moment that lies in a gap, as the test row takes it, and where it is; None where there is none."""
     wanted = wanted_by(played.table)
     cells = {
         name: parse_cell(text, wanted.conditions[name].domain) for name, text in gap.cells.items() if name in wanted.conditions

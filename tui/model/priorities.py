@@ -1,7 +1,7 @@
 """Selectors as a designer sees them: databases in order, and which of them decides for the test context.
 
 A database holds the assets whose clips its pattern finds; where no clip is there yet, the rows of its table that the pattern fits.
-An asset is valid when a row of it is. No pose is known here, so nothing is said of costs but what the thresholds make of them.
+An asset is valid when a row of it is. No pose is known here, so nothing is known of costs but what the thresholds make of them.
 
 This reads the disk: the names of clips, and tables other than the open one, each once until `reload`.
 """
@@ -13,14 +13,17 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from contextdb.disk import fits, matching
+from contextdb.disk import fits
 from contextdb.errors import ContextDBError, Fault, SchemaError, in_quotes
+from contextdb.motion.clips.source import ENDINGS
+from contextdb.motion.storage.clip_files import named_takes
 from contextdb.motion.storage.config import MotionConfig
 from contextdb.motion.storage.database_settings import DatabaseSettings
 from contextdb.tables.project import load, table_files
 from contextdb.tables.table import Table
-from tui.model.query_row import QueryRow
-from tui.model.sheet import Sheet
+
+from .query_row import QueryRow
+from .sheet import Sheet
 
 Order = tuple[tuple[str, float | None], ...]
 """Databases in order, each with the threshold under which it wins outright; the last has none."""
@@ -50,7 +53,7 @@ class DatabaseNow:
     assets: tuple[str, ...] = ()
     valid: tuple[str, ...] = ()
     note: str = ""
-    """What one should know of the count: that there are no clips yet, or why nothing can be said."""
+    """What one should know of the count: that there are no clips yet, or why nothing is known."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +102,6 @@ class Priorities:
 
     @property
     def folder(self) -> Path | None:
-        """The folder of contextdb.toml."""
         schema = self.sheet.table.schema
         return Path(schema.file).parent if schema.file else None
 
@@ -112,7 +114,7 @@ class Priorities:
         return [clip for clip in dict.fromkeys(clip for one in own for clip in self._clips_of(one)) if clip not in named]
 
     def faults(self) -> tuple[Fault, ...]:
-        """Why the selectors cannot be shown."""
+        """Why the selectors cannot be displayed."""
         try:
             _ = self.config
         except SchemaError as error:
@@ -152,25 +154,25 @@ class Priorities:
             held = tuple(clip for clip in clips if clip in assets)
             return held, tuple(clip for clip in held if clip in valid), ""
         pattern = PurePosixPath(settings.clips).name
-        rows = tuple(asset for asset in assets if fits(f"{asset}.bvh", pattern))
+        rows = tuple(asset for asset in assets if any(fits(f"{asset}{ending}", pattern) for ending in ENDINGS))
         return rows, tuple(asset for asset in rows if asset in valid), "no clips yet: counted from the rows of the table"
 
     def _clips_of(self, settings: DatabaseSettings) -> tuple[str, ...]:
         key = settings.clips, settings.roles
         if key not in self._clips:
-            found: list[Path] = []
-            with suppress(ValueError, OSError):  # a pattern that pathlib does not know, or a folder that may not be read
-                found = matching(self.folder, settings.clips) if self.folder else []
-            self._clips[key] = tuple(dict.fromkeys(settings.asset_of(path.stem) for path in found))
+            names: list[str] = []
+            with suppress(ContextDBError, OSError):  # a pattern that pathlib does not know, or a folder that may not be read
+                names = [name for name, _, _ in named_takes(settings, self.folder)] if self.folder else []
+            self._clips[key] = tuple(dict.fromkeys(map(settings.asset_of, names)))
         return self._clips[key]
 
     def _valid_in(self, name: str) -> Answer | str:
         """What a table answers to the test row, or why it cannot be reported."""
         if name not in self._answers:
-            self._answers[name] = self._asked(name)
+            self._answers[name] = self._answer_of(name)
         return self._answers[name]
 
-    def _asked(self, name: str) -> Answer | str:
+    def _answer_of(self, name: str) -> Answer | str:
         if name == self.sheet.table.settings.name:
             return _answer(self.sheet.query)
         table = self._table(name)
@@ -186,18 +188,18 @@ class Priorities:
         return self._tables[name]
 
     def _loaded(self, name: str) -> Table | str:
-        found = dict(table_files(self.folder, self.sheet.table.schema)) if self.folder else {}
-        if name not in found:
+        files = dict(table_files(self.folder, self.sheet.table.schema)) if self.folder else {}
+        if name not in files:
             return f"there is no table {in_quotes(name)}"
         try:
-            return load(found[name], strict=False)
+            return load(files[name], strict=False)
         except ContextDBError as error:
             return f"the table {in_quotes(name)} cannot be read: {error.faults[0].found}"
 
 
 def _answer(query: QueryRow) -> Answer:
-    found = list(query.answers())
-    return dict.fromkeys(asset for asset, _ in found), {asset for asset, is_valid in found if is_valid}
+    answers = list(query.answers())
+    return dict.fromkeys(asset for asset, _ in answers), {asset for asset, is_valid in answers if is_valid}
 
 
 # ---- the rule in words
@@ -220,11 +222,11 @@ def _steps(able: Sequence[DatabaseNow]) -> list[str]:
     first, last = able[0], able[-1]
     if len(able) == 2:
         return [f"{first.name} wins outright when its best cost is under {_cost(first)}, otherwise the cheaper of both plays."]
-    said = [f"{first.name} wins outright when its best cost is under {_cost(first)}."]
+    steps = [f"{first.name} wins outright when its best cost is under {_cost(first)}."]
     for n, one in enumerate(able[1:-1], 2):
         cheapest = "the cheaper of both plays" if n == 2 else f"the cheapest of the first {n} plays"
-        said.append(f"If not, {one.name} is searched too: when its best cost is under {_cost(one)}, {cheapest}.")
-    return [*said, f"If not, {last.name} is searched too, and the cheapest of all {len(able)} plays."]
+        steps.append(f"If not, {one.name} is searched too: when its best cost is under {_cost(one)}, {cheapest}.")
+    return [*steps, f"If not, {last.name} is searched too, and the cheapest of all {len(able)} plays."]
 
 
 def _cost(one: DatabaseNow) -> str:

@@ -1,4 +1,4 @@
-"""What is wrong with the table that is shown: what `contextdb check` finds, and the facts of the test row that cannot be read.
+"""What is wrong with the table that is displayed: what `contextdb check` finds, and the facts of the test row that cannot be read.
 
 The findings of cells are there at once. Those of whole rows and of saved contexts take longer: `row_findings` is for a thread.
 """
@@ -18,8 +18,9 @@ from contextdb.errors import ContextDBError, Fault, plural
 from contextdb.findings import LEVELS, Finding, Level
 from contextdb.tables.other_files import cases_path
 from contextdb.tables.table import Table
-from tui.model.coverage_lines import in_rows, rows_text
-from tui.model.coverage_run import is_quick
+
+from .coverage_lines import in_rows, rows_text
+from .coverage_run import is_quick
 
 AT_ONCE = 200_000
 """Cells of a table that is checked in a fraction of a second."""
@@ -72,10 +73,10 @@ class Problems:
 
     @classmethod
     def of(cls, findings: Sequence[Finding], facts: Mapping[str, Fault]) -> Problems:
-        """What was found, and the facts of the test row that cannot be read."""
-        found = [Problem("error", fault.rule, fault.message, column=name, is_of_test_row=True) for name, fault in facts.items()]
-        found += [_problem(finding) for finding in findings]
-        return cls(tuple(sorted(found, key=lambda p: LEVELS.index(p.level))))
+        """The findings, and the facts of the test row that cannot be read."""
+        problems = [Problem("error", fault.rule, fault.message, column=name, is_of_test_row=True) for name, fault in facts.items()]
+        problems += [_problem(finding) for finding in findings]
+        return cls(tuple(sorted(problems, key=lambda p: LEVELS.index(p.level))))
 
     def of_level(self, level: Level | None) -> tuple[Problem, ...]:
         """The problems of one level; None: all of them."""
@@ -101,8 +102,8 @@ class Problems:
     @property
     def summary(self) -> str:
         """How many there are, in a sentence."""
-        said = [f"{n:,} for information" if level == "info" else plural(n, level) for level, n in self.counts.items() if n]
-        return f"{', '.join(said)}." if said else "The check found nothing wrong with this table."
+        counts = [f"{n:,} for information" if level == "info" else plural(n, level) for level, n in self.counts.items() if n]
+        return f"{', '.join(counts)}." if counts else "The check finds nothing wrong with this table."
 
 
 def cell_findings(table: Table) -> list[Finding]:
@@ -125,7 +126,7 @@ def row_findings(table: Table, should_stop: Stops | None = None) -> list[Finding
 
 
 def findings_at_once(table: Table) -> list[Finding]:
-    """What can be found between two keys: all of it for a small table, what is wrong with cells for a larger one."""
+    """What can be checked between two keys: all of it for a small table, what is wrong with cells for a larger one."""
     return [*cell_findings(table), *(row_findings(table) if is_quick(table) else ())]
 
 

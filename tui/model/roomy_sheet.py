@@ -5,7 +5,8 @@ from __future__ import annotations
 from contextdb.cells.conditions import Condition
 from contextdb.errors import Fault
 from contextdb.tables.table import Table
-from tui.model.sheet import Done, Sheet
+
+from .sheet import Done, Sheet
 
 
 class RoomySheet(Sheet):

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from contextdb.disk import real_path
 from contextdb.errors import SchemaError
 from contextdb.schema.sections import EDITED_SECTIONS, settings_to_dict, settings_with
 from contextdb.schema.settings import Schema, TableSettings
@@ -25,10 +26,10 @@ def under_schema(saved: Table, present: Table, path: Path, folder: Path, schema:
     settings = schema.settings_for(_below(path, folder))
 
     def renewed(table: Table) -> Table:
-        conditions, blueprints, selectors = (_joined(saved.schema, table.schema, schema, part) for part in EDITED_SECTIONS)
+        conditions, blueprints, selectors = (_merged_section(saved.schema, table.schema, schema, part) for part in EDITED_SECTIONS)
         wanted = replace(schema, conditions=conditions, blueprints=blueprints, selectors=selectors)
-        said = _joined_settings(saved.settings, table.settings, settings)
-        changed = Sections.between(table, replace(table, schema=wanted, settings=said)).apply(table)
+        merged = _merged_settings(saved.settings, table.settings, settings)
+        changed = Sections.between(table, replace(table, schema=wanted, settings=merged)).apply(table)
         return replace(changed, schema=replace(changed.schema, **_rest(schema)))
 
     renewed(present)
@@ -44,10 +45,10 @@ def under_schema(saved: Table, present: Table, path: Path, folder: Path, schema:
 
 def with_settings(edit: Edit, before: Table, after: Table) -> Edit:
     """An edit that leads from `before` to the texts of `after`, with all that `after` says of contextdb.toml besides."""
-    said = Sections.between(edit.apply(before), after)
-    if said.is_empty:
+    sections = Sections.between(edit.apply(before), after)
+    if sections.is_empty:
         return edit
-    whole = replace(edit, changes=(*edit.changes, said))
+    whole = replace(edit, changes=(*edit.changes, sections))
     try:
         whole.apply(before)
     except SchemaError:  # what others made of the table does not go with it
@@ -55,21 +56,21 @@ def with_settings(edit: Edit, before: Table, after: Table) -> Edit:
     return whole
 
 
-def _joined(saved: Schema, table: Schema, disk: Schema, section: str) -> dict[str, Any]:
+def _merged_section(saved: Schema, table: Schema, disk: Schema, section: str) -> dict[str, Any]:
     """One section, name by name: as the table has it where that was edited here, else as the disk."""
     was, mine, yours = (getattr(schema, section) for schema in (saved, table, disk))
     return _three_way(was, mine, yours)
 
 
-def _joined_settings(saved: TableSettings, table: TableSettings, disk: TableSettings) -> TableSettings:
+def _merged_settings(saved: TableSettings, table: TableSettings, disk: TableSettings) -> TableSettings:
     joined = _three_way(settings_to_dict(saved), settings_to_dict(table), settings_to_dict(disk))
     return settings_with(TableSettings(disk.name), joined)
 
 
 def _three_way(was: Mapping[str, Any], mine: Mapping[str, Any], yours: Mapping[str, Any]) -> dict[str, Any]:
     names = [*yours, *(name for name in mine if name not in yours)]
-    found = {name: yours.get(name) if mine.get(name) == was.get(name) else mine.get(name) for name in names}
-    return {name: value for name, value in found.items() if value is not None}
+    values = {name: yours.get(name) if mine.get(name) == was.get(name) else mine.get(name) for name in names}
+    return {name: value for name, value in values.items() if value is not None}
 
 
 def _rest(schema: Schema) -> dict[str, Any]:
@@ -79,5 +80,5 @@ def _rest(schema: Schema) -> dict[str, Any]:
 
 
 def _below(path: Path, folder: Path) -> str:
-    whole, root = path.parent.resolve() / path.name, folder.resolve()
+    whole, root = real_path(path.parent) / path.name, real_path(folder)
     return whole.relative_to(root).as_posix() if whole.is_relative_to(root) else path.name

@@ -1,6 +1,6 @@
 """What is selected: a rectangle of cells from an anchor to a cursor, whole rows or whole columns.
 
-All places are (row, column) of the *view*: row 0 is the first row shown, whatever row of the file it is. A selection is never
+All places are (row, column) of the *view*: row 0 is the first row displayed, whatever row of the file it is. A selection is never
 changed; each key gives a new one. With `extend` the anchor stays, as with Shift held.
 """
 

@@ -19,10 +19,10 @@ def continued(begun: Sequence[str], n_more: int) -> list[str]:
         is_alone = before is None or not _NUMBER.fullmatch(before)
         step = Decimal(1) if is_alone or before is None else Decimal(last) - Decimal(before)
         return [format(Decimal(last) + step * at, "f") for at in range(1, n_more + 1)]
-    found = _last_number(last)
-    if found is None:
+    number = _last_number(last)
+    if number is None:
         return [last] * n_more
-    head, digits, tail = found
+    head, digits, tail = number
     other = _last_number(before) if before is not None else None
     step_by = int(digits) - int(other[1]) if other is not None and (other[0], other[2]) == (head, tail) else 1
     counts = (int(digits) + step_by * at for at in range(1, n_more + 1))

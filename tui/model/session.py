@@ -7,14 +7,16 @@ into the sheet as one step, and `reload_schema` reads contextdb.toml again. Unsa
 from __future__ import annotations
 
 import os
+import stat
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from contextdb.disk import Was, needing, path_in_quotes, read_bytes, write_atomic
+from contextdb.disk import Was, needing, path_in_quotes, read_bytes, real_path, write_atomic
 from contextdb.disk.folder_lock import sweep
+from contextdb.disk.own_files import NOT_OURS
 from contextdb.disk.together import NewFile, write_together
 from contextdb.edits.diffing import diff
 from contextdb.edits.history import History
@@ -25,22 +27,22 @@ from contextdb.tables.merging.merging import Merge, merge
 from contextdb.tables.project import SCHEMA_FILE, load_table, schema_for
 from contextdb.tables.saving import require_related
 from contextdb.tables.table import Table
-from tui.model.journal import Journal, finish_save, journal_path, recover, set_aside
-from tui.model.kept_columns import keep_columns, kept_columns
-from tui.model.lock import Holder, Lock
-from tui.model.notes import Notes
-from tui.model.read_only import why_read_only
-from tui.model.schemas import under_schema, with_settings
-from tui.model.sheet import Done, Sheet
-from tui.model.teams import Teams
-from tui.model.watched import Seen, State, Watched, digest_of
+
+from .journal import Journal, finish_save, journal_path, recover, set_aside
+from .lock import Holder, Lock
+from .notes import Notes
+from .schemas import under_schema, with_settings
+from .sheet import Done, Sheet
+from .teams import Teams
+from .visible_columns import read_columns, write_columns
+from .watched import Seen, State, Watched, digest_of
 
 MERGE_NAME = "Merge changes on disk"
 
 
 @dataclass(frozen=True, slots=True)
 class OnDisk:
-    """What others did since the last time it was asked. False when nothing."""
+    """What others did since the last look. False when nothing."""
 
     table: State = "same"
     """The table's file."""
@@ -77,27 +79,27 @@ class Session:
         self.path: Path = table.path
         self.lock = Lock(self.path)
         self.holder: Holder | None = self.lock.acquire(takes_over)
-        """The other editor that has the table open. Until it has closed it nothing is saved here, and no journal is kept."""
+        """The other editor that has the table open. Until it has closed it nothing is saved here, and no journal is stored."""
         self._clear_leftovers()
         if self.holder is None and finish_save(table):
             table = load_table(self.path, strict=False)
-        found = recover(table) if self.holder is None else None
-        self.n_recovered = found.n_edits if found else 0
+        recovery = recover(table) if self.holder is None else None
+        self.n_recovered = recovery.n_edits if recovery else 0
         """How many unsaved edits were brought back."""
-        self.problem: Fault | None = found.problem if found else None
-        """Why unsaved edits could not be brought back, or not all of them."""
-        self.saved_table = found.base if found and found.base else table
+        self.problem: Fault | None = (recovery.problem if recovery else None) or self.lock.problem
+        """Why unsaved edits could not be brought back, or not all of them, or why the table is not locked."""
+        self.saved_table = recovery.base if recovery and recovery.base else table
         """The table as it is in the file: what edits are compared with when they are saved."""
         self.teams: Teams | None = None
-        """The actors for the roles of the test row, once they were asked for."""
-        self._history = found.history if found and found.n_edits else History(self.saved_table)
+        """The actors for the roles of the test row, once they were requested."""
+        self._history = recovery.history if recovery and recovery.n_edits else History(self.saved_table)
         self._watch_files()
         self.journal = Journal(self.path, self._digest, self._history if self.n_recovered else None)
         if self.holder is None:
             self._begin_journal()
         self.sheet = Sheet(self._history.table, self.journal if self.holder is None else None, self._history)
-        self._kept_columns = kept_columns(self.path)
-        self.sheet.show_columns(self._kept_columns)
+        self._stored_columns = read_columns(self.path)
+        self.sheet.show_columns(self._stored_columns)
         self.sheet.marks = Notes.beside(self.path)
 
     # ---- what others do
@@ -122,7 +124,7 @@ class Session:
     def why_read_only(self) -> str:
         """Why nothing can be saved to the file, for a person; empty when it can."""
         holder = self.holder or self.lock.taken_by()
-        return f"{holder} has it open for editing" if holder is not None else why_read_only(self.path)
+        return f"{holder} has it open for editing" if holder is not None else _why_not_writable(self.path)
 
     @property
     def is_read_only(self) -> bool:
@@ -143,10 +145,10 @@ class Session:
             self.reload_schema()
         on_disk = load_table(self.path, strict=False)
         require_related(self.saved_table, on_disk, "to open it again, or to save over it")
-        found = merge(self.saved_table, self.sheet.table, on_disk)
-        if not found.conflicts:
-            self.take(found)
-        return found
+        merged = merge(self.saved_table, self.sheet.table, on_disk)
+        if not merged.conflicts:
+            self.take(merged)
+        return merged
 
     def take(self, merged: Merge[Table]) -> Done:
         """Make a merge of `merge_from_disk` the sheet's, as one step. What is not decided stays as in the sheet."""
@@ -240,10 +242,10 @@ class Session:
         return replace(table, path=target, source=source, origin=np.arange(table.n_rows)) if is_written else None
 
     def close(self, keep_journal: bool = False) -> None:
-        """Let go of the table. Unsaved edits are gone then, unless the journal is kept for the next time."""
+        """Let go of the table. Unsaved edits are gone then, unless the journal is stored for the next time."""
         if self.holder is None and self.lock.taken_by() is None:
-            if self.sheet.columns_shown != self._kept_columns:
-                keep_columns(self.path, self.sheet.columns_shown)
+            if self.sheet.visible_columns != self._stored_columns:
+                write_columns(self.path, self.sheet.visible_columns)
             if not keep_journal:
                 self.journal.discard()
         self.lock.release()
@@ -260,9 +262,9 @@ class Session:
         return digest_of(self._raw)
 
     def _begin_journal(self) -> None:
-        if self.problem is not None:
-            kept = set_aside(self.path)
-            self.problem = replace(self.problem, mend=f"to look at what was kept, in {path_in_quotes(kept)}")
+        if self.problem is not None and self.problem.rule != NOT_OURS:
+            aside = set_aside(self.path)
+            self.problem = replace(self.problem, mend=f"to look at the stored edits, in {path_in_quotes(aside)}")
             self._keep_unsaved()
         elif not self.n_recovered:
             self.journal.keep_base()
@@ -282,7 +284,7 @@ class Session:
 
     def _clear_leftovers(self) -> None:
         if self.lock.is_held:
-            for folder in (Path(os.path.realpath(self.path)).parent, self.lock.path.parent):
+            for folder in (real_path(self.path).parent, self.lock.path.parent):
                 sweep(folder)
 
     def _is_free(self) -> bool:
@@ -299,15 +301,15 @@ class Session:
             self._take_over()
         holder = self.holder or self.lock.taken_by()
         if holder is not None:
-            found = f"{holder} has this table open, so it is not saved here."
-            raise FileError(Fault(found, "another file", "to save it under another name", Place(str(self.path)), "table-held"))
+            problem = f"{holder} has this table open, so it is not saved here."
+            raise FileError(Fault(problem, "another file", "to save it under another name", Place(str(self.path)), "table-held"))
 
     def _take_over(self) -> None:
         """Have the table that another editor has closed, and keep a journal of the edits made meanwhile."""
         if journal_path(self.path).exists():
-            found = "the other editor has ended and left edits that are not saved."
+            problem = "the other editor has ended and left edits that are not saved."
             mend = "to save under another name; then open this table again"
-            raise FileError(Fault(found, "another file", mend, Place(str(self.path)), "table-held"))
+            raise FileError(Fault(problem, "another file", mend, Place(str(self.path)), "table-held"))
         self.holder = self.lock.acquire()
         if self.holder is None:
             self._keep_unsaved()
@@ -318,14 +320,16 @@ class Session:
             return
         place = Place(str(self.path))
         try:
-            found = self.merge_from_disk()
+            merged = self.merge_from_disk()
         except ContextDBError as error:
-            said = f"the file has been changed since it was read, and cannot be read any more: {error.faults[0].found}"
+            problem = f"the file has been changed since it was read, and cannot be read any more: {error.faults[0].found}"
             mend = "to save under another name, or over it"
-            raise FileError(Fault(said, "a table", mend, place, "merge-conflict")) from None
-        if found.conflicts:
-            said = f"the file has been changed since it was read, in {plural(len(found.conflicts), 'place')} differently than here."
-            raise FileError(Fault(said, mend="to decide which hold", place=place, rule="merge-conflict"))
+            raise FileError(Fault(problem, "a table", mend, place, "merge-conflict")) from None
+        if merged.conflicts:
+            problem = (
+                f"the file has been changed since it was read, in {plural(len(merged.conflicts), 'place')} differently than here."
+            )
+            raise FileError(Fault(problem, mend="to decide which hold", place=place, rule="merge-conflict"))
 
     def _moved_to(self, target: Path) -> None:
         if target == self.path:
@@ -353,3 +357,18 @@ def _watched(path: Path) -> Watched:
         return Watched(path, digest_of(read_bytes(path)))
     except FileError:
         return Watched(path, None)
+
+
+def _why_not_writable(path: Path) -> str:
+    """Why a save would be refused, for a person; empty when nothing speaks against it. Whether it works only a save shows."""
+    target = real_path(path)
+    folder = target.parent
+    try:
+        mode = target.stat().st_mode
+    except OSError:
+        mode = None
+    if mode is not None and not (mode & (stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH) and os.access(target, os.W_OK)):
+        return "the file is marked read-only"
+    if folder.is_dir() and not os.access(folder, os.W_OK | os.X_OK):  # a save puts a new file into the folder
+        return "its folder may not be written in"
+    return ""

@@ -8,27 +8,34 @@ from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 
+from contextdb.disk import real_path
+from contextdb.disk.boundary import is_below, why_outside, work_tree
+
 MOST_FILES = 1000
 """So many files are looked at."""
 
 
 def sessions_of(folder: Path) -> list[Path]:
-    """The recorded sessions of a project, the newest first: those in its folder, two folders deep, and beside it."""
-    found = []
+    """The recorded sessions of a project, the newest first: those in its folder, two folders deep, and
+    beside it in the same work tree of git."""
+    paths = []
     for path in islice(_near(folder), MOST_FILES):
         try:
             if _is_of(path, folder):
-                found.append((path.stat().st_mtime, path))
+                paths.append((path.stat().st_mtime, path))
         except OSError:  # gone since
             continue
-    return [path for _, path in sorted(found, key=lambda each: (-each[0], each[1].name))]
+    return [path for _, path in sorted(paths, key=lambda each: (-each[0], each[1].name))]
 
 
 def _near(folder: Path) -> Iterator[Path]:
-    own = [(folder, pattern) for pattern in ("*.parquet", "*/*.parquet", "*/*/*.parquet")]
-    for base, pattern in (*own, (folder.resolve().parent, "*.parquet")):
+    places = [(folder, pattern) for pattern in ("*.parquet", "*/*.parquet", "*/*/*.parquet")]
+    beside = real_path(folder).parent
+    if is_below(beside, work_tree(folder)):
+        places.append((beside, "*.parquet"))
+    for base, pattern in places:
         try:
-            yield from base.glob(pattern)
+            yield from (path for path in base.glob(pattern) if why_outside(path, base) is None)
         except OSError:
             continue
 
@@ -43,13 +50,13 @@ def _is_of(path: Path, folder: Path) -> bool:
     )
 
     try:
-        told = pl.read_parquet_metadata(path)
-        about = json.loads(told[ABOUT_KEY]) if FORMAT_KEY in told else None
+        metadata = pl.read_parquet_metadata(path)
+        about = json.loads(metadata[ABOUT_KEY]) if FORMAT_KEY in metadata else None
     except (KeyError, ValueError, pl.exceptions.PolarsError):
         return False
     if not isinstance(about, dict):
         return False
     projects = {str(each["project"]) for each in about.values() if isinstance(each, dict) and "project" in each}
     if not projects:
-        return folder.resolve() in path.resolve().parents
+        return real_path(folder) in real_path(path).parents
     return any(os.path.realpath(path.parent / project) == os.path.realpath(folder) for project in projects)

@@ -1,6 +1,6 @@
-"""The sheet: a table as it is shown, and the verbs that keys call.
+"""The sheet: a table as it is displayed, and the verbs that keys call.
 
-Every edit is one step of the history and, where there is a recorder, told to it before the verb returns. Cells that are pasted or
+Every edit is one step of the history and, where there is a recorder, given to it before the verb returns. Cells that are pasted or
 replaced are taken as they are, and how many of them cannot be read is noted; a text that is typed must be readable.
 """
 
@@ -16,18 +16,19 @@ from contextdb.bitmask import Rows
 from contextdb.edits import edits
 from contextdb.edits.history import History, Step
 from contextdb.edits.renaming import uses_of
-from contextdb.errors import Fault, TableError, in_quotes, plural, shown
+from contextdb.errors import Fault, TableError, in_quotes, plural, safe_text
 from contextdb.tables.changes import Cells, Change, Edit
 from contextdb.tables.table import Table
-from tui.model.clipboard import format_tsv, parse_tsv, place_paste
-from tui.model.column_values import mends_of, renamed_value, replaced
-from tui.model.condition_form import undeclared
-from tui.model.find import Search, find, next_hit, replace_all
-from tui.model.long_work import in_turn, told
-from tui.model.selection import Block
-from tui.model.series import continued, tells_step
-from tui.model.shown import ShownTable
-from tui.model.views import Sort, sorted_rows
+
+from .clipboard import format_tsv, parse_tsv, place_paste
+from .column_values import mends_of, renamed_value, replaced
+from .condition_form import undeclared
+from .displayed_table import DisplayedTable
+from .find import Search, find, next_hit, replace_all
+from .long_work import in_turn, with_progress
+from .selection import Block
+from .series import continued, tells_step
+from .views import Sort, sorted_rows
 
 
 class Recorder(Protocol):
@@ -50,7 +51,7 @@ class Done:
     """What did not go as one would think."""
 
 
-class Sheet(ShownTable):
+class Sheet(DisplayedTable):
     """A table being edited."""
 
     def __init__(self, table: Table, recorder: Recorder | None = None, history: History | None = None) -> None:
@@ -81,11 +82,11 @@ class Sheet(ShownTable):
 
     def fill(self, text: str) -> Done:
         """Put a text into every selected cell."""
-        return self._set(((r, c, text) for r, c in self._cells(self.block)), f"Fill {self._size(self.block)}")
+        return self._set_each(text, "Fill")
 
     def clear(self) -> Done:
         """Empty every selected cell; an empty condition is Any."""
-        return self._set(((r, c, "") for r, c in self._cells(self.block)), f"Clear {self._size(self.block)}")
+        return self._set_each("", "Clear")
 
     def fill_down(self) -> Done:
         """Copy the first selected row into the others; one row alone is filled from the one above it."""
@@ -94,16 +95,17 @@ class Sheet(ShownTable):
         if source < 0:
             return Done(notes=("There is no row above to fill from.",))
         cells = ((r, c, self.text(source, c)) for r, c in self._cells(block) if r != source)
-        return self._set(cells, f"Fill down {self._size(block)}")
+        return self._set_in(block, cells, f"Fill down {self._size(block)}")
 
     def fill_right(self) -> Done:
         """Copy the first selected column into the others; one column alone is filled from the one before it."""
-        block = self.block
-        source = block.left if block.shape[1] > 1 else block.left - 1
-        if source < 0:
+        block, columns = self.block, self.columns_of(self.block)
+        before = self.columns_of(Block(0, 0, 0, block.left))
+        sources = columns[:1] if len(columns) > 1 else before[-1:]
+        if not sources:
             return Done(notes=("There is no column to the left to fill from.",))
-        cells = ((r, c, self.text(r, source)) for r, c in self._cells(block) if c != source)
-        return self._set(cells, f"Fill right {self._size(block)}")
+        cells = ((r, c, self.text(r, sources[0])) for r, c in self._cells(block) if c != sources[0])
+        return self._set_in(block, cells, f"Fill right {self._size(block)}")
 
     def fill_series(self) -> Done:
         """Go on with what the selected columns begin with: one text counts on by 1, two say the step. One cell alone goes on from
@@ -111,14 +113,14 @@ class Sheet(ShownTable):
         block = self.block
         top = block.top - 1 if block.shape[0] == 1 and block.top else block.top
         cells: list[tuple[int, int, str]] = []
-        for column in range(block.left, block.right):
+        for column in self.columns_of(block):
             texts = [self.text(row, column) for row in range(top, block.bottom)]
             n_begun = 2 if len(texts) > 2 and tells_step(texts[0], texts[1]) else 1
             more = continued(texts[:n_begun], len(texts) - n_begun)
             cells += [(top + n_begun + at, column, text) for at, text in enumerate(more)]
         if not cells:
             return Done(notes=("Select the first cell and those below it that the series fills.",))
-        return self._set(cells, f"Fill a series of {len(cells)}")
+        return self._set_in(block, cells, f"Fill a series of {len(cells)}")
 
     def declare_value(self, text: str, is_new_row: bool = False) -> Done:
         """Put a text into the cell of the cursor, or into a new row, and declare the values in it that the condition lacks."""
@@ -135,43 +137,47 @@ class Sheet(ShownTable):
             cell = edits.insert_rows(after, after.n_rows, [{name: text}])
         else:
             cell = edits.set_cells(after, [(int(self.view.rows[row]), name, text)])
-        edit = Edit(f"Add {', '.join(map(shown, new))} to the values of {shown(name)}", (*declared.changes, *cell.changes))
+        edit = Edit(f"Add {', '.join(map(safe_text, new))} to the values of {safe_text(name)}", (*declared.changes, *cell.changes))
         done = self._do(edit)
         if is_new_row:
             self._select_file_rows(self.table.n_rows - 1, 1)
         return done
 
     def copy(self) -> str:
-        """The selected cells as tab-separated text."""
+        """The selected cells as tab-separated text, without hidden columns."""
         block = self.block
-        rows, columns = self.view.rows[block.top : block.bottom], self.table.columns[block.left : block.right]
+        rows, columns = self.view.rows[block.top : block.bottom], [self.table.columns[at] for at in self.columns_of(block)]
         texts = [[c.texts[code] for code in c.codes[rows].tolist()] for c in columns]
-        return format_tsv(told(zip(*texts, strict=True), len(rows)))
+        return format_tsv(with_progress(zip(*texts, strict=True), len(rows)))
 
     def cut(self) -> tuple[str, Done]:
         """The selected cells as text; they are empty then."""
-        text, block = self.copy(), self.block
-        return text, self._set(((r, c, "") for r, c in self._cells(block)), f"Cut {self._size(block)}")
+        text = self.copy()
+        return text, self._set_each("", "Cut")
 
     def paste(self, text: str) -> Done:
-        """Put tab-separated text over the selection; see `tui.model.clipboard.place_paste`. Rows past the last are added."""
-        texts = parse_tsv(text)
+        """Put tab-separated text over the selection; see `tui.model.clipboard.place_paste`. Rows past the last are added; hidden
+        columns are passed over."""
+        texts, block = parse_tsv(text), self.block
         if not texts:
             return Done(notes=("The clipboard is empty.",))
-        placed = place_paste(texts, self.block, self.shape[1])
+        columns = self.columns_of(Block(0, block.left, 0, self.shape[1]))
+        selected = Block(block.top, 0, block.bottom, len(self.columns_of(block)))
+        placed = place_paste(texts, selected, len(columns))
         n_new = max(placed.block.bottom - len(self.view), 0)
         table, n_before = self.table, self.table.n_rows
         rows = [*self.view.rows.tolist(), *range(n_before, n_before + n_new)]
-        names = [c.name for c in table.columns]
-        cells = told(placed.cells(), placed.block.n_cells)
+        names = [table.columns[at].name for at in columns]
+        cells = with_progress(placed.cells(), placed.block.n_cells)
         edit = edits.set_cells(table, ((rows[r], names[c], t) for r, c, t in cells), placed.name, n_new)
+        left, right = columns[placed.block.left], columns[placed.block.right - 1]
+        hidden = self.hidden_in(Block(placed.block.top, left, placed.block.bottom, right + 1))
         done = self._do(edit)
-        block = placed.block
-        self._select(self.selection.at(block.top, block.left, self.shape))
-        self._select(self.selection.at(block.bottom - 1, block.right - 1, self.shape, extend=True))
+        self._select(self.selection.at(placed.block.top, left, self.shape))
+        self._select(self.selection.at(placed.block.bottom - 1, right, self.shape, extend=True))
         cut = f"{plural(placed.n_columns_cut, 'column')} left out: the sheet ends here. Add columns and paste again."
         notes = (f"{plural(n_new, 'row')} added.",) if n_new else ()
-        return replace(done, notes=notes, warnings=((cut,) if placed.n_columns_cut else ()) + done.warnings)
+        return replace(done, notes=notes + _unchanged(hidden), warnings=((cut,) if placed.n_columns_cut else ()) + done.warnings)
 
     def type_below(self, text: str) -> Fault | None:
         """Put a text into a new row behind the last one, in the column of the cursor; what is wrong with it as in `type_text`."""
@@ -182,23 +188,11 @@ class Sheet(ShownTable):
 
     def paste_below(self, text: str) -> Done:
         """Put tab-separated text into new rows behind the last one, from the column of the cursor on."""
-        texts, names = parse_tsv(text), [c.name for c in self.table.columns[self.selection.column :]]
-        if not texts:
-            return Done(notes=("The clipboard is empty.",))
-        done = self.append_rows([dict(zip(names, row, strict=False)) for row in texts])
-        n_cut = max(max(map(len, texts)) - len(names), 0)
-        cut = f"{plural(n_cut, 'column')} left out: the sheet ends here. Add columns and paste again."
-        return replace(done, warnings=((cut,) if n_cut else ()) + done.warnings)
+        return self._paste_rows(text, self.append_rows)
 
     def insert_copied(self, text: str) -> Done:
         """Put tab-separated text into new rows above the selection, from the column of the cursor on."""
-        texts, names = parse_tsv(text), [c.name for c in self.table.columns[self.selection.column :]]
-        if not texts:
-            return Done(notes=("The clipboard is empty.",))
-        done = self.insert_rows(texts=[dict(zip(names, row, strict=False)) for row in texts])
-        n_cut = max(max(map(len, texts)) - len(names), 0)
-        cut = f"{plural(n_cut, 'column')} left out: the sheet ends here."
-        return replace(done, warnings=((cut,) if n_cut else ()) + done.warnings)
+        return self._paste_rows(text, lambda rows: self.insert_rows(texts=rows))
 
     def fill_to(self, row: int, column: int) -> Done:
         """Fill from the selection down to a row, or right to a column, as the handle at its corner does: a series where the cells
@@ -208,7 +202,7 @@ class Sheet(ShownTable):
             self._select(self.selection.at(block.top, block.left, self.shape))
             self._select(self.selection.at(row, block.right - 1, self.shape, extend=True))
             cells: list[tuple[int, int, str]] = []
-            for at in range(block.left, block.right):
+            for at in self.columns_of(block):
                 texts = [self.text(r, at) for r in range(block.top, block.bottom)]
                 is_step = len(texts) > 1 and tells_step(texts[-2], texts[-1])
                 begun = texts[-2:] if is_step else texts[-1:]
@@ -216,14 +210,14 @@ class Sheet(ShownTable):
                 is_series = is_step or (len(texts) == 1 and self.condition(at) is None)
                 more = continued(begun, n_more) if is_series else [texts[i % len(texts)] for i in range(n_more)]
                 cells += [(block.bottom + i, at, text) for i, text in enumerate(more)]
-            return self._set(cells, f"Fill {len(cells)} down")
+            return self._set_in(self.block, cells, f"Fill {len(cells)} down")
         if column >= block.right:
             self._select(self.selection.at(block.top, block.left, self.shape))
             self._select(self.selection.at(block.bottom - 1, column, self.shape, extend=True))
-            width = block.right - block.left
-            places = [(r, c) for r in range(block.top, block.bottom) for c in range(block.right, column + 1)]
-            filled = [(r, c, self.text(r, block.left + (c - block.left) % width)) for r, c in places]
-            return self._set(filled, f"Fill {len(places)} right")
+            sources, columns = self.columns_of(block), self.columns_of(Block(0, block.right, 0, column + 1))
+            pairs = [(c, sources[at % len(sources)]) for at, c in enumerate(columns)]
+            filled = [(r, c, self.text(r, source)) for r in range(block.top, block.bottom) for c, source in pairs]
+            return self._set_in(self.block, filled, f"Fill {len(filled)} right")
         return Done()
 
     def move_rows_to(self, row: int) -> Done:
@@ -240,7 +234,8 @@ class Sheet(ShownTable):
         block = self.block
         if block.left <= column < block.right:
             return Done()
-        return self._do(edits.move_columns(self.table, self.selected_columns, column + (column >= block.right)))
+        names = [c.name for c in self.table.columns[block.left : block.right]]  # hidden ones go with those next to them
+        return self._do(edits.move_columns(self.table, names, column + (column >= block.right)))
 
     # ---- edits of rows
 
@@ -261,7 +256,6 @@ class Sheet(ShownTable):
         return done
 
     def delete_rows(self) -> Done:
-        """Delete the selected rows."""
         row = self.block.top
         done = self._do(edits.delete_rows(self.table, self.selected_rows))
         self._select(self.selection.at(row, self.selection.column, self.shape))
@@ -275,7 +269,7 @@ class Sheet(ShownTable):
         return done
 
     def move_rows(self, down: int) -> Done:
-        """Move the selected rows past the next shown row: down 1 or up -1. Not in a sorted view, whose order is not the file's."""
+        """Move the selected rows past the next visible row: down 1 or up -1. Not in a sorted view: its order is not the file's."""
         self._require_unsorted()
         block, rows = self.block, self.selected_rows
         beside = block.top - 1 if down < 0 else block.bottom
@@ -293,13 +287,13 @@ class Sheet(ShownTable):
     def sort_file(self, sort: Sort) -> Done:
         """Put the rows of the file itself in order."""
         way = ", descending" if sort.is_descending else ""
-        name = f"Sort the file by {shown(sort.column)}{way}"
+        name = f"Sort the file by {safe_text(sort.column)}{way}"
         return self._do(edits.reorder_rows(self.table, sorted_rows(self.table, sort), name))
 
     # ---- edits of columns
 
     def delete_columns(self) -> Done:
-        """Delete the selected columns."""
+        """Delete the selected columns, without hidden ones."""
         return self._do(edits.delete_columns(self.table, self.selected_columns))
 
     def move_column(self, right: int) -> Done:
@@ -321,15 +315,15 @@ class Sheet(ShownTable):
     # ---- find and replace
 
     def find(self, search: Search, is_backwards: bool = False) -> int:
-        """Go to the next cell that is found; gives how many there are."""
+        """Go to the next matching cell; gives how many there are."""
         hits = find(self.table, search, self.view.rows, [c.name for c in self.table.columns])
         if (place := next_hit(hits, self.cursor, is_backwards)) is not None:
-            self.columns_shown = self.columns_shown.revealed(self.table.columns[place[1]].name)
+            self.visible_columns = self.visible_columns.revealed(self.table.columns[place[1]].name)
             self.go(*place)
         return int(hits.sum())
 
     def count(self, search: Search) -> int:
-        """How many shown cells are found.
+        """How many displayed cells match.
 
         Raises
         ------
@@ -339,17 +333,18 @@ class Sheet(ShownTable):
         return int(find(self.table, search, self.view.rows, [c.name for c in self.table.columns]).sum())
 
     def replace_here(self, search: Search, replacement: str) -> Done:
-        """Replace in the cursor's cell, and go to the next one found."""
+        """Replace in the cursor's cell, and go to the next match."""
         rows = self.view.rows[self.selection.row : self.selection.row + 1]
         done = self._replace(search, replacement, rows, [self.table.columns[self.selection.column].name])
         self.find(search)
         return done
 
     def replace_all(self, search: Search, replacement: str, in_selection: bool = False) -> Done:
-        """Replace in every shown cell, or every selected one, as one step."""
+        """Replace in every visible cell, or every selected one, as one step."""
         block = self.block if in_selection else Block(0, 0, *self.shape)
-        names = [c.name for c in self.table.columns[block.left : block.right]]
-        return self._replace(search, replacement, self.view.rows[block.top : block.bottom], names)
+        names, hidden = [self.table.columns[at].name for at in self.columns_of(block)], self.hidden_in(block)
+        done = self._replace(search, replacement, self.view.rows[block.top : block.bottom], names)
+        return replace(done, notes=done.notes + _unchanged(hidden))
 
     def _replace(self, search: Search, replacement: str, rows: Rows, columns: Sequence[str]) -> Done:
         edit = replace_all(self.table, search, replacement, rows, columns)
@@ -372,7 +367,7 @@ class Sheet(ShownTable):
         name = self.table.columns[self.selection.column].name
         if fault := self.check(new):
             raise TableError(fault)
-        return self._do(replaced(self.table, name, dict.fromkeys(old, new), f"Replace by {shown(new)}"))
+        return self._do(replaced(self.table, name, dict.fromkeys(old, new), f"Replace by {safe_text(new)}"))
 
     def rename_value(self, old: str, new: str, keeps_old: bool = False) -> Done:
         """Rename a value of the cursor's column in all its cells, and where it is declared, as one step of this table; where others
@@ -429,16 +424,36 @@ class Sheet(ShownTable):
         self._follow(before, step)
         return Done(edit.name, warnings=self._unreadable(edit.changes))
 
+    def _paste_rows(self, text: str, add: Callable[[list[dict[str, str]]], Done]) -> Done:
+        texts, columns = parse_tsv(text), self.columns_of(Block(0, self.selection.column, 0, self.shape[1]))
+        if not texts:
+            return Done(notes=("The clipboard is empty.",))
+        names = [self.table.columns[at].name for at in columns]
+        done = add([dict(zip(names, row, strict=False)) for row in texts])
+        n_cut = max(max(map(len, texts)) - len(names), 0)
+        cut = f"{plural(n_cut, 'column')} left out: the sheet ends here. Add columns and paste again."
+        return replace(done, warnings=((cut,) if n_cut else ()) + done.warnings)
+
+    def _set_each(self, text: str, verb: str) -> Done:
+        return self._set_in(self.block, ((r, c, text) for r, c in self._cells(self.block)), f"{verb} {self._size(self.block)}")
+
+    def _set_in(self, block: Block, cells: Iterable[tuple[int, int, str]], name: str) -> Done:
+        """Set cells of a block, and say what is hidden in it and stays."""
+        hidden = self.hidden_in(block)
+        done = self._set(cells, name)
+        return replace(done, notes=done.notes + _unchanged(hidden))
+
     def _set(self, cells: Iterable[tuple[int, int, str]], name: str = "") -> Done:
         rows, names = self.view.rows, [c.name for c in self.table.columns]
-        cells = told(cells, len(cells) if isinstance(cells, list) else self.block.n_cells)
+        cells = with_progress(cells, len(cells) if isinstance(cells, list) else self.block.n_cells)
         return self._do(edits.set_cells(self.table, ((int(rows[r]), names[c], text) for r, c, text in cells), name))
 
     def _cells(self, block: Block) -> Iterable[tuple[int, int]]:
-        return ((r, c) for r in range(block.top, block.bottom) for c in range(block.left, block.right))
+        columns = self.columns_of(block)
+        return ((r, c) for r in range(block.top, block.bottom) for c in columns)
 
     def _size(self, block: Block) -> str:
-        return f"{block.shape[0]} × {block.shape[1]}"
+        return f"{block.shape[0]} × {len(self.columns_of(block))}"
 
     def _unreadable(self, changes: Iterable[Change]) -> tuple[str, ...]:
         """How many of the cells just set cannot be read."""
@@ -456,3 +471,7 @@ class Sheet(ShownTable):
         column = self.selection.column
         self._select(self.selection.at(top or 0, column, self.shape))
         self._select(self.selection.at(bottom or 0, column, self.shape, extend=True))
+
+
+def _unchanged(hidden: str) -> tuple[str, ...]:
+    return (f"Unchanged: {hidden}.",) if hidden else ()

@@ -1,7 +1,7 @@
 """Actors for the test row: for each role of a table a team, as a small sheet of one row an actor and one column a fact.
 
-A fact is written as in the test row: a value or a set of values; an empty one is not asked about. Actors of one name in two teams
-are one actor, who plays one role at most. Teams are kept in `NAME.actors.json` next to the table, {role: [actor]}: what
+A fact is written as in the test row: a value or a set of values; an empty one is no part of it. Actors of one name in two teams
+are one actor, who plays one role at most. Teams are stored in `NAME.actors.json` next to the table, {role: [actor]}: what
 `CompiledTable.query` takes as its actors. An edge: this reads and writes that file.
 """
 
@@ -18,22 +18,23 @@ from contextdb.errors import ContextError, Fault, FileError, Place, in_quotes
 from contextdb.schema.settings import TableSettings
 from contextdb.tables.table import Table
 from contextdb.telemetry.recordings import fact_text
-from tui.model.asked import fact_fault
-from tui.model.roomy_sheet import RoomySheet
-from tui.model.shown import Header
-from tui.model.wanted import wanted_by
+
+from .displayed_table import Header
+from .roomy_sheet import RoomySheet
+from .table_answer import fact_fault
+from .wanted import wanted_by
 
 NAME = "Actor"
 
 
 def roles_of(table: Table) -> dict[str, list[Condition]]:
     """The roles of a table, each with the conditions that its actors give facts of: those named `Role.fact`, and not computed."""
-    found: dict[str, list[Condition]] = {}
+    roles: dict[str, list[Condition]] = {}
     for condition in wanted_by(table).given.values():
         role, dot, fact = condition.name.partition(".")
         if role and dot and fact:
-            found.setdefault(role, []).append(condition)
-    return found
+            roles.setdefault(role, []).append(condition)
+    return roles
 
 
 class TeamSheet(RoomySheet):
@@ -57,8 +58,12 @@ class TeamSheet(RoomySheet):
 
     def header(self, column: int) -> Header:
         """What stands over a column."""
-        found = self.of_column(column)
-        return Header(NAME, "name") if found is None else Header(super().header(column).name, found.domain.kind, found.unit)
+        condition = self.of_column(column)
+        return (
+            Header(NAME, "name")
+            if condition is None
+            else Header(super().header(column).name, condition.domain.kind, condition.unit)
+        )
 
     def fault_of(self, column: int, text: str) -> Fault | None:
         """Why a text of a column cannot be read."""
@@ -74,20 +79,20 @@ class TeamSheet(RoomySheet):
     def faults(self) -> list[str]:
         """What is wrong with facts and names, each with its actor."""
         seen: set[str] = set()
-        found = []
+        faults = []
         for at, row in enumerate(self.texts):
-            who = row.get(NAME) or f"actor {at + 1}"
+            actor = row.get(NAME) or f"actor {at + 1}"
             for column, one in enumerate(self.table.columns):
                 if fault := self.fault_of(column, row.get(one.name, "")):
-                    found.append(f"{who}, {one.name}: {fault.message}")
+                    faults.append(f"{actor}, {one.name}: {fault.message}")
             if NAME in row and row[NAME] in seen:
-                found.append(f"{who} appears twice among the actors for {self.role}.")
+                faults.append(f"{actor} appears twice among the actors for {self.role}.")
             seen.add(row.get(NAME, ""))
-        return found
+        return faults
 
     def actors(self) -> list[dict[str, object]]:
         """The actors as they are offered: with a name, an id where they were given a name, and the facts that can be read."""
-        found: list[dict[str, object]] = []
+        actors: list[dict[str, object]] = []
         taken: set[str] = set()
         for at, row in enumerate(self.texts):
             name = row.get(NAME, "")
@@ -98,17 +103,17 @@ class TeamSheet(RoomySheet):
             for fact, condition in self.facts.items():
                 if (value := _read(row.get(fact, ""), condition)) is not None:
                     actor[condition.name] = value
-            found.append(actor)
-        return found
+            actors.append(actor)
+        return actors
 
 
 class Teams:
     """The teams of a table's roles."""
 
-    def __init__(self, table: Table, kept: Mapping[str, Sequence[Mapping[str, str]]] | None = None) -> None:
-        """`kept` are the actors of each role, as texts."""
-        kept = kept or {}
-        self.sheets = {role: TeamSheet(role, found, kept.get(role, ())) for role, found in roles_of(table).items()}
+    def __init__(self, table: Table, texts: Mapping[str, Sequence[Mapping[str, str]]] | None = None) -> None:
+        """`texts` are the actors of each role, as texts."""
+        texts = texts or {}
+        self.sheets = {role: TeamSheet(role, conditions, texts.get(role, ())) for role, conditions in roles_of(table).items()}
 
     @classmethod
     def beside(cls, table: Table) -> Teams:
@@ -124,7 +129,7 @@ class Teams:
 
     def of(self, table: Table) -> Teams:
         """The same actors for a table whose columns may have changed."""
-        same = {role: [c.name for c in found] for role, found in roles_of(table).items()}
+        same = {role: [c.name for c in conditions] for role, conditions in roles_of(table).items()}
         if same == {role: [c.name for c in sheet.facts.values()] for role, sheet in self.sheets.items()}:
             return self
         return Teams(table, {role: sheet.texts for role, sheet in self.sheets.items()})
@@ -159,14 +164,14 @@ def _read(text: str, condition: Condition) -> Fact:
 
 def _as_json(row: Mapping[str, str], sheet: TeamSheet) -> dict[str, object]:
     """An actor as a program would write him: plain values where his facts are plain, else their text."""
-    said: dict[str, object] = {"name": row[NAME], "id": row[NAME]} if NAME in row else {}
+    document: dict[str, object] = {"name": row[NAME], "id": row[NAME]} if NAME in row else {}
     for fact, condition in sheet.facts.items():
         if fact in row:
             value = _read(row[fact], condition)
             kind = condition.domain.type
             is_plain = isinstance(value, (bool, int, float, str)) and not (kind.is_tags or kind.is_spelt)
-            said[fact] = value if is_plain else row[fact]
-    return said
+            document[fact] = value if is_plain else row[fact]
+    return document
 
 
 def _texts_in(path: Path, roles: Mapping[str, Sequence[Condition]]) -> dict[str, list[dict[str, str]]]:
@@ -176,21 +181,21 @@ def _texts_in(path: Path, roles: Mapping[str, Sequence[Condition]]) -> dict[str,
             raise ValueError("it is not a mapping of roles to lists of actors")
         return {role: [_texts_of(actor, role, roles[role]) for actor in team] for role, team in teams.items() if role in roles}
     except ValueError as error:
-        found = f"its actors cannot be read: {in_quotes(str(error))}."
-        raise FileError(Fault(found, '{"Defender": [{"name": …}]}', place=Place(str(path)))) from None
+        problem = f"its actors cannot be read: {in_quotes(str(error))}."
+        raise FileError(Fault(problem, '{"Defender": [{"name": …}]}', place=Place(str(path)))) from None
 
 
 def _texts_of(actor: object, role: str, conditions: Sequence[Condition]) -> dict[str, str]:
     if not isinstance(actor, dict):
         raise ValueError("an actor is not a mapping of facts")
     name = actor.get("name", actor.get("id"))
-    said = {NAME: str(name)} if name is not None else {}
+    texts = {NAME: str(name)} if name is not None else {}
     for condition in conditions:
         fact = condition.name.removeprefix(f"{role}.")
         value = actor.get(fact, actor.get(condition.name))
         if value is not None:
-            said[fact] = value if isinstance(value, str) else _text_of(value, condition)
-    return said
+            texts[fact] = value if isinstance(value, str) else _text_of(value, condition)
+    return texts
 
 
 def _text_of(value: object, condition: Condition) -> str:

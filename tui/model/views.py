@@ -1,6 +1,6 @@
-"""Which rows are shown and in what order: sort and filter as views, that never touch the file.
+"""Which rows are displayed and in what order: sort and filter as views, that never touch the file.
 
-A view is the numbers of the file's rows, in the order shown. Columns are sorted in the natural order of their type: numbers by
+A view is the numbers of the file's rows, in the order displayed. Columns are sorted in the natural order of their type: numbers by
 where they begin, then by where they end; enums as declared; texts without regard to case, numbers in them by value. Any comes
 last, then what cannot be read, both ways round. The sort is stable.
 """
@@ -31,7 +31,7 @@ _DIGITS = 20
 
 @dataclass(frozen=True, slots=True)
 class Sort:
-    """By which column the rows shown stand."""
+    """By which column the rows displayed stand."""
 
     column: str
     is_descending: bool = False
@@ -55,7 +55,7 @@ COMPARED: tuple[Compared, ...] = ("<=", ">=", "!=", "<", ">", "=")
 
 @dataclass(frozen=True, slots=True)
 class CellTest:
-    """What a cell must say to be shown: it accepts a number below or above one, or it is a text, or it is not."""
+    """What a cell must say to be displayed: it accepts a number below or above one, or it is a text, or it is not."""
 
     column: str
     how: Compared
@@ -64,21 +64,21 @@ class CellTest:
     @classmethod
     def read(cls, column: str, text: str) -> CellTest | None:
         """A test as a person types it: "<3", ">= 2", "=Walk", "!= Walk", "not Walk"; None for a text to be looked for."""
-        said = text.strip()
-        if said.casefold().startswith("not "):
-            return cls(column, "!=", said[4:].strip())
-        how = next((sign for sign in COMPARED if said.startswith(sign)), None)
-        return None if how is None or not said[len(how) :].strip() else cls(column, how, said[len(how) :].strip())
+        stripped = text.strip()
+        if stripped.casefold().startswith("not "):
+            return cls(column, "!=", stripped[4:].strip())
+        how = next((sign for sign in COMPARED if stripped.startswith(sign)), None)
+        return None if how is None or not stripped[len(how) :].strip() else cls(column, how, stripped[len(how) :].strip())
 
     @property
-    def said(self) -> str:
+    def label(self) -> str:
         """The test as its chip says it."""
         return f"{self.column} {'not' if self.how == '!=' else self.how} {self.text}"
 
 
 @dataclass(frozen=True)
 class Filter:
-    """Which rows are shown: all that is said must hold."""
+    """Which rows are displayed: all its parts must hold."""
 
     text: str = ""
     """Stands in some cell of the row, without regard to case."""
@@ -95,33 +95,33 @@ class Filter:
 
     @property
     def is_off(self) -> bool:
-        """Whether every row is shown."""
+        """Whether every row is displayed."""
         return not (self.text or self.columns or self.cells or self.tests or self.is_valid or self.has_findings)
 
     def of_columns(self, names: Container[str]) -> Filter:
         """The filter without what it asks of columns that are gone."""
         tests = tuple(test for test in self.tests if test.column in names)
-        return replace(self, columns=_kept(self.columns, names), cells=_kept(self.cells, names), tests=tests)
+        return replace(self, columns=_without_others(self.columns, names), cells=_without_others(self.cells, names), tests=tests)
 
     @property
     def parts(self) -> list[tuple[str, Filter]]:
         """What it asks for, part by part in words, each with the filter that is left without that part."""
-        found = [(f'"{self.text}"', replace(self, text=""))] if self.text else []
+        parts = [(f'"{self.text}"', replace(self, text=""))] if self.text else []
         for at, (name, text) in enumerate(self.columns):
-            found.append((f'{name} has "{text}"', replace(self, columns=_without(self.columns, at))))
+            parts.append((f'{name} has "{text}"', replace(self, columns=_without(self.columns, at))))
         for at, (name, texts) in enumerate(self.cells):
-            said = " or ".join(sorted(text or "(empty)" for text in texts)[:3]) + (" or …" if len(texts) > 3 else "")
-            found.append((f"{name}: {said}", replace(self, cells=_without(self.cells, at))))
+            values = " or ".join(sorted(text or "(empty)" for text in texts)[:3]) + (" or …" if len(texts) > 3 else "")
+            parts.append((f"{name}: {values}", replace(self, cells=_without(self.cells, at))))
         for at, test in enumerate(self.tests):
-            found.append((test.said, replace(self, tests=_without(self.tests, at))))
-        found += [("valid", replace(self, is_valid=False))] if self.is_valid else []
-        return found + ([("with problems", replace(self, has_findings=False))] if self.has_findings else [])
+            parts.append((test.label, replace(self, tests=_without(self.tests, at))))
+        parts += [("valid", replace(self, is_valid=False))] if self.is_valid else []
+        return parts + ([("with problems", replace(self, has_findings=False))] if self.has_findings else [])
 
 
 Part = TypeVar("Part")
 
 
-def _kept(parts: tuple[tuple[str, Part], ...], names: Container[str]) -> tuple[tuple[str, Part], ...]:
+def _without_others(parts: tuple[tuple[str, Part], ...], names: Container[str]) -> tuple[tuple[str, Part], ...]:
     return tuple(part for part in parts if part[0] in names)
 
 
@@ -131,29 +131,29 @@ def _without(parts: tuple[Part, ...], at: int) -> tuple[Part, ...]:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """The rows shown: view row i is row `rows[i]` of the table, which has `n_rows`."""
+    """The rows displayed: view row i is row `rows[i]` of the table, which has `n_rows`."""
 
     rows: Rows
     n_rows: int
     is_sorted: bool = False
 
     @classmethod
-    def of(cls, table: Table, sort: Sort | None = None, shown: Flags | None = None) -> View:
+    def of(cls, table: Table, sort: Sort | None = None, flags: Flags | None = None) -> View:
         """A view of a table: sorted, and with the rows whose flag is set; all without flags."""
         order = np.arange(table.n_rows) if sort is None else sorted_rows(table, sort)
-        return cls(order if shown is None else order[shown[order]], table.n_rows, sort is not None)
+        return cls(order if flags is None else order[flags[order]], table.n_rows, sort is not None)
 
     def __len__(self) -> int:
         return len(self.rows)
 
     def place(self, row: int) -> int | None:
-        """Where a row of the table is shown; None when it is not."""
+        """Where a row of the table is displayed; None when it is not."""
         at = int(self._places[row]) if 0 <= row < self.n_rows else -1
         return at if at >= 0 else None
 
     def after(self, came_from: CameFrom) -> View:
-        """The view of a table whose rows changed. What was shown stays shown, in the order of the file or, in a sorted view, where
-        it was; new rows are behind the shown row that is before them in the file."""
+        """The view of a table whose rows changed. Visible rows stay visible, in the order of the file or, in a sorted view, where
+        it was; new rows are behind the visible row that is before them in the file."""
         places = np.append(self._places, -1)[came_from]
         is_shown = (places >= 0) | (came_from < 0)
         if self.is_sorted:
@@ -174,25 +174,25 @@ def _filled_forward(places: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.append(-1, places)[at]
 
 
-def shown_rows(table: Table, wanted: Filter, valid: Flags | None = None, findings: Flags | None = None) -> Flags | None:
+def filtered_rows(table: Table, wanted: Filter, valid: Flags | None = None, findings: Flags | None = None) -> Flags | None:
     """Whether each row passes a filter: bool [n_rows]; None when all do. `valid` and `findings` are flags of rows."""
     if wanted.is_off:
         return None
-    shown = np.ones(table.n_rows, np.bool_)
+    flags = np.ones(table.n_rows, np.bool_)
     if wanted.text:
-        shown &= np.logical_or.reduce([_contains(c, wanted.text) for c in table.columns])
+        flags &= np.logical_or.reduce([_contains(c, wanted.text) for c in table.columns])
     for name, text in wanted.columns:
-        shown &= _contains(table.text_column(name), text)
+        flags &= _contains(table.text_column(name), text)
     for name, texts in wanted.cells:
         column = table.text_column(name)
-        shown &= _of_codes(column, np.array([t in texts for t in column.texts], np.bool_))
+        flags &= _of_codes(column, np.array([t in texts for t in column.texts], np.bool_))
     for test in wanted.tests:
-        shown &= _passes(table, test)
+        flags &= _passes(table, test)
     if wanted.is_valid and valid is not None:
-        shown &= valid
+        flags &= valid
     if wanted.has_findings and findings is not None:
-        shown &= findings
-    return shown
+        flags &= findings
+    return flags
 
 
 def _contains(column: TextColumn, text: str) -> Flags:
@@ -235,8 +235,8 @@ def _number_in(text: str) -> float | None:
     return None if math.isnan(number) else number
 
 
-def _of_codes(column: TextColumn, said: Flags) -> Flags:
-    return said[column.codes] if len(said) else np.zeros(column.n_rows, np.bool_)
+def _of_codes(column: TextColumn, flags: Flags) -> Flags:
+    return flags[column.codes] if len(flags) else np.zeros(column.n_rows, np.bool_)
 
 
 # ---- the natural order
@@ -316,6 +316,6 @@ def text_keys(texts: tuple[str, ...]) -> NDArray[np.int64]:
     """A number for each text, in their natural order: "walk_2" before "walk_10", whatever the case."""
     if not texts:
         return np.empty(0, np.int64)
-    found = pl.Series(texts, dtype=pl.String).str.strip_chars().str.to_lowercase()
-    padded = found.str.replace_all(r"([0-9]+)", "0" * _DIGITS + "$1").str.replace_all(rf"[0-9]*([0-9]{{{_DIGITS}}})", "$1")
+    keys = pl.Series(texts, dtype=pl.String).str.strip_chars().str.to_lowercase()
+    padded = keys.str.replace_all(r"([0-9]+)", "0" * _DIGITS + "$1").str.replace_all(rf"[0-9]*([0-9]{{{_DIGITS}}})", "$1")
     return padded.rank("dense").cast(pl.Int64).to_numpy()

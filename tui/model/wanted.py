@@ -12,11 +12,11 @@ from functools import cached_property
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import Fact, read_fact, read_fact_text
-from contextdb.errors import ContextDBError, ContextError, Fault, shown, some
+from contextdb.errors import ContextDBError, ContextError, Fault, safe_text, some
 from contextdb.expressions import Derivation
 from contextdb.schema.settings import derivation_of
 from contextdb.tables.data import known_conditions
-from contextdb.tables.nesting.links import is_nested
+from contextdb.tables.readable import readable
 from contextdb.tables.table import EitherTable
 
 
@@ -62,8 +62,8 @@ class Wanted:
             except ContextError as error:
                 facts[name], faults[name] = None, error.faults[0]
         own = {name: fact for name, fact in facts.items() if fact is not None and name.partition(".")[0] not in cast}
-        found = self.derivation.compute(own) if self.derivation is not None else {}
-        for name, value in found.items():
+        computed = self.derivation.compute(own) if self.derivation is not None else {}
+        for name, value in computed.items():
             try:
                 facts[name] = read_fact(value, self.conditions[name])
             except ContextError as error:
@@ -75,20 +75,13 @@ class Wanted:
         if self.derivation is None or name not in self.computed:
             return ""
         inputs = some(c.name for c in self.derivation.only([name]).inputs) or "no other fact"
-        how = f"{shown(name)} is computed: {shown(self.conditions[name].expr or '')}."
+        how = f"{safe_text(name)} is computed: {safe_text(self.conditions[name].expr or '')}."
         return f"{how} Type the facts that it is computed from: {inputs}."
 
 
-def flat_of(table: EitherTable) -> EitherTable | None:
-    """The table with the rows of the tables inside it; the table itself where there are none; None where it cannot be made."""
-    if not is_nested(table):
-        return table
-    try:
-        return table.flat()
-    except ContextDBError:
-        return None
-
-
 def wanted_by(table: EitherTable) -> Wanted:
-    """What a table asks for, and the tables inside it, where they can be read."""
-    return Wanted.of(flat_of(table) or table)
+    """What a table asks for, and the tables inside it, where they can be read together."""
+    try:
+        return Wanted.of(readable(table).flat())
+    except ContextDBError:
+        return Wanted.of(table)

@@ -63,10 +63,10 @@ class Watched:
 
     def _seen(self) -> Seen:
         try:
-            found = os.stat(self.path)
+            stat = os.stat(self.path)
         except (OSError, ValueError):
             return None
-        return found.st_mtime_ns, found.st_ctime_ns, found.st_size, found.st_ino
+        return stat.st_mtime_ns, stat.st_ctime_ns, stat.st_size, stat.st_ino
 
     def _digest_now(self) -> str | None:
         try:

@@ -1,7 +1,7 @@
 """Why rows are not valid in the test row's context: cell by cell, with the cell that would mend each.
 
-What is said of a row is what `contextdb query --explain` says, with two reasons more that an editor meets: cells that cannot be
-read, and rows that are disabled. Of a valid row it is said whether it is picked, in the words of `contextdb.compiled.pick`. For a
+The reasons for a row are those of `contextdb query --explain`, and two more that an editor meets: cells that cannot be
+read, and rows that are disabled. Of a valid row they tell whether it is picked, in the words of `contextdb.compiled.pick`. For a
 role with actors the fact is the actor who plays it, or the one whose fact is in the way.
 """
 
@@ -11,13 +11,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
+from contextdb.cells.words import says_any
 from contextdb.compiled.explain import describe_fact, mended
 from contextdb.edits.edits import check_cell
 from contextdb.errors import some
-from contextdb.expressions.rules import has_no_rule
 from contextdb.tables.condition_column import ConditionColumn
 from contextdb.tables.table import Table
-from tui.model.query_row import QueryRow
+
+from .query_row import QueryRow
 
 NEEDED = "(needed)"
 """The text for the cell of a role that is not filled."""
@@ -34,7 +35,7 @@ class CellWhy:
     column: str
     cell: str
     fact: str
-    """Empty where the fact is not asked for."""
+    """Empty where the fact is not requested."""
     state: State
     mend: str | None = None
     """The cell with which the row would pass; None where there is nothing to mend, or no telling."""
@@ -88,8 +89,8 @@ def why_row(query: QueryRow, table: Table, row: int) -> RowWhy:
 
 def nearest_rows(query: QueryRow, table: Table, most: int = 20) -> list[RowWhy]:
     """The rows nearest to valid, each with the cells that keep it from being so."""
-    found = [why_row(query, table, row.row) for row in query.nearest(most)]
-    return [RowWhy(why.row, why.asset, tuple(cell for cell in why.cells if cell.is_wrong)) for why in found]
+    rows = [why_row(query, table, row.row) for row in query.nearest(most)]
+    return [RowWhy(why.row, why.asset, tuple(cell for cell in why.cells if cell.is_wrong)) for why in rows]
 
 
 def _cell(query: QueryRow, column: ConditionColumn, row: int, fails: bool) -> CellWhy:
@@ -98,16 +99,16 @@ def _cell(query: QueryRow, column: ConditionColumn, row: int, fails: bool) -> Ce
         return _cast_cell(query, column, row)
     fact = query.facts.get(condition.name)
     unit = f" {condition.unit}" if condition.unit and fact is not None else ""
-    said = "" if fact is None else describe_fact(fact, condition) + unit
+    fact_text = "" if fact is None else describe_fact(fact, condition) + unit
     if code in column.faults:
-        return CellWhy(row, condition.name, text, said, "unreadable")
+        return CellWhy(row, condition.name, text, fact_text, "unreadable")
     if fact is None:
         lacking = query.lacking([condition.name]) if query.is_computed(condition.name) else ()
         return CellWhy(row, condition.name, text, f"needs {some(lacking)}" if lacking else "", "not given")
     if not fails:
         state: State = "holds" if query.accepts_every(condition.name, row) else "open"
-        return CellWhy(row, condition.name, text, said, state)
-    return CellWhy(row, condition.name, text, said, "fails", mended(text, fact, condition.domain))
+        return CellWhy(row, condition.name, text, fact_text, state)
+    return CellWhy(row, condition.name, text, fact_text, "fails", mended(text, fact, condition.domain))
 
 
 def _cast_cell(query: QueryRow, column: ConditionColumn, row: int) -> CellWhy:
@@ -132,15 +133,14 @@ def _roles(query: QueryRow, row: int) -> Iterator[CellWhy]:
 
 
 def _rule(query: QueryRow, table: Table, row: int) -> Iterator[CellWhy]:
-    """The row's own rule."""
     name = table.settings.when
-    if name is not None and table.when is not None and not has_no_rule(text := table.text(row, name)):
+    if name is not None and table.when is not None and not says_any(text := table.text(row, name)):
         is_unread = check_cell(table, name, text) is not None
         lacking, failure = query.open_facts(row), next((f for f in query.failures(row) if f.condition == name), None)
         state: State = "fails" if query.excluded_by_rule([row])[0] else "holds" if lacking is None else "open"
         state = "unreadable" if is_unread else "not given" if query.is_empty else state
-        said = some(lacking) if lacking else failure.fact if failure is not None else ""
-        yield CellWhy(row, name, text, said, state, is_of_rule=True)
+        lacking_text = some(lacking) if lacking else failure.fact if failure is not None else ""
+        yield CellWhy(row, name, text, lacking_text, state, is_of_rule=True)
 
 
 def _behind(query: QueryRow, table: Table, row: int) -> Iterator[CellWhy]:

@@ -9,8 +9,9 @@ import numpy as np
 
 from contextdb.cells.sets import Cell
 from contextdb.tables.condition_column import ConditionColumn
-from tui.model.alignment import indented
-from tui.model.shown import ShownTable
+
+from .alignment import indented
+from .displayed_table import DisplayedTable
 
 Kind = Literal["text", "any", "failing", "fault"]
 """How a cell is meant: it accepts everything; it does not accept its fact; it cannot be read."""
@@ -56,7 +57,7 @@ class WindowRow:
 class Window:
     """Rows `top` up to `top + n_rows` of a sheet's view."""
 
-    def __init__(self, sheet: ShownTable, top: int, n_rows: int, before: Window | None = None) -> None:
+    def __init__(self, sheet: DisplayedTable, top: int, n_rows: int, before: Window | None = None) -> None:
         self.top = top
         self._rows = rows = sheet.view.rows[top : top + n_rows]
         self._conditions: dict[int, tuple[ConditionColumn, list[tuple[str, Kind]]]] = {}
@@ -72,8 +73,8 @@ class Window:
         if is_asked:
             query = sheet.query
             counts = self._failing.sum(axis=1).tolist() if self._failing is not None else [0] * self.n_rows
-            said = zip(self.rows, query.marks(rows), counts, strict=True)
-            self.rows = [WindowRow(r.number, r.is_enabled, *marks, count) for r, marks, count in said]
+            row_marks = zip(self.rows, query.marks(rows), counts, strict=True)
+            self.rows = [WindowRow(r.number, r.is_enabled, *marks, count) for r, marks, count in row_marks]
             self.rows = [replace(r, standing=query.brief(r.number - 1)) if r.is_valid else r for r in self.rows]
         if sheet.played is not None:
             self.rows = [replace(r, is_played=True) if r.number - 1 == sheet.played else r for r in self.rows]
@@ -95,7 +96,7 @@ class Window:
         return [] if self._failing is None else np.flatnonzero(self._failing[row - self.top]).tolist()
 
     def again(self) -> Window:
-        """The same rows read for the facts that are asked now; the texts of cells are those that were read."""
+        """The same rows read for the facts that are queried now; the texts of cells are those that were read."""
         window = Window(self._sheet, self.top, self.n_rows)
         window._texts = self._texts
         return window
@@ -137,12 +138,12 @@ class Window:
     def _read(self, column: int) -> list[tuple[str, Kind]]:
         if column not in self._texts:
             self._texts[column] = self._read_texts(column)
-        found, condition = self._texts[column], self._sheet.condition(column)
+        cells, condition = self._texts[column], self._sheet.condition(column)
         is_rule = self._sheet.table.columns[column].name == self._sheet.table.settings.when
         if self._failing is None or (condition is None and not is_rule):
-            return found
+            return cells
         fails = self._failing[:, column].tolist()
-        return [(text, "failing") if f and kind != "fault" else (text, kind) for (text, kind), f in zip(found, fails, strict=True)]
+        return [(text, "failing") if f and kind != "fault" else (text, kind) for (text, kind), f in zip(cells, fails, strict=True)]
 
     def _read_texts(self, column: int) -> list[tuple[str, Kind]]:
         condition = self._sheet.condition(column)
@@ -158,12 +159,12 @@ class Window:
         codes = texts.codes[self._rows].tolist()
         kinds = {code: self._kind(column, condition, code) for code in set(codes)}
         indent = self._sheet.indent(column)
-        said = {code: indented(texts.texts[code], indent) for code in kinds} if indent else texts.texts
-        found = [(said[code], kinds[code]) for code in codes]
+        texts_of_codes = {code: indented(texts.texts[code], indent) for code in kinds} if indent else texts.texts
+        cells = [(texts_of_codes[code], kinds[code]) for code in codes]
         if condition is None and self._sheet.missing_output(column) is not None:
             is_missing = [self._sheet.is_missing(int(row), column) for row in self._rows]
-            found = [(text, "fault" if wrong else kind) for (text, kind), wrong in zip(found, is_missing, strict=True)]
-        return found
+            cells = [(text, "fault" if wrong else kind) for (text, kind), wrong in zip(cells, is_missing, strict=True)]
+        return cells
 
     def _kind(self, column: int, condition: ConditionColumn | None, code: int) -> Kind:
         if condition is None:

@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+from contextdb.disk import real_path
+from contextdb.disk.boundary import inside
 from contextdb.edits.renaming import Renaming
 from contextdb.errors import ContextDBError, Fault, FileError, TableError, some
 from contextdb.tables.nesting.links import Neighbours
 from contextdb.tables.places import table_path
 from contextdb.tables.project import read_folder_schema, schema_for, table_files
 from contextdb.tables.table import Table
-from tui.model.beginning import Beginning, beginning, beginning_from
-from tui.model.session import Session
+
+from .beginning import Beginning, beginning, beginning_from
+from .session import Session
 
 
 class OpenTables(Mapping[str, Table]):
@@ -38,7 +41,7 @@ FOLDERS = (Path("tables"), Path())
 
 
 class Workspace:
-    """A folder of tables. A table is read when it is first asked for, and then stays open with its edits."""
+    """A folder of tables. A table is read when it is first requested, and then stays open with its edits."""
 
     def __init__(self, path: str | Path | None = None) -> None:
         """Look at a folder, or at the folder of a table; without a path in tables/ or here.
@@ -57,7 +60,7 @@ class Workspace:
         """So many of them hold now; the others were taken back."""
         self.beginning: Beginning | None = None
         """How to begin, where the path is that of no table."""
-        where = _found(path)
+        where = _resolved(path)
         if isinstance(where, Beginning):
             self.beginning, self.folder, self.first = where, where.folder, ""
             self.files = _tables(self.folder)
@@ -99,8 +102,8 @@ class Workspace:
         if before is not None:
             before.close()
         self.sessions[name] = session = Session(self.files[name], takes_over)
-        if before is not None:  # of one that is read-only nothing was kept
-            session.sheet.show_columns(before.sheet.columns_shown)
+        if before is not None:  # of one that is read-only nothing was stored
+            session.sheet.show_columns(before.sheet.visible_columns)
         return session
 
     def save_as(self, name: str, other: str, suffix: str = ".csv") -> None:
@@ -111,14 +114,14 @@ class Workspace:
         FileError, TableError, SchemaError
             As of `Session.save`; nothing has changed then.
         """
-        path = self.folder / f"{other}{suffix}"
+        path = inside(self.folder / f"{other}{suffix}", self.folder)
         session = self.session(name)
         session.save(path)
         session.close()
         del self.sessions[name]
         self.files[other] = path
 
-    def rename(self, name: str, found: Renaming, names: Mapping[str, str]) -> tuple[str, ...]:
+    def rename(self, name: str, renaming: Renaming, names: Mapping[str, str]) -> tuple[str, ...]:
         """Write a rename into the files of the project; gives which were written. `names`: the other names of facts of test rows.
 
         The tables whose files are written are opened again: what was edited before cannot be taken back any more, but for the
@@ -129,8 +132,8 @@ class Workspace:
         TableError, FileError
             A table that is to be written has unsaved edits, or is read-only; else as `Renaming.write`. Nothing has changed then.
         """
-        files = self._write_renaming(name, found, names)
-        self._renames = [*self._renames[: self._n_renamed], (found, dict(names))]
+        files = self._write_renaming(name, renaming, names)
+        self._renames = [*self._renames[: self._n_renamed], (renaming, dict(names))]
         self._n_renamed += 1
         return files
 
@@ -139,27 +142,27 @@ class Workspace:
         at = self._n_renamed if is_redo else self._n_renamed - 1
         if not 0 <= at < len(self._renames):
             return None
-        found, names = self._renames[at]
+        renaming, names = self._renames[at]
         if is_redo:
-            self._write_renaming(name, found, names)
+            self._write_renaming(name, renaming, names)
         else:
-            self._write_renaming(name, found.reversed, {new: old for old, new in names.items()})
+            self._write_renaming(name, renaming.reversed, {new: old for old, new in names.items()})
         self._n_renamed += 1 if is_redo else -1
-        return found
+        return renaming
 
-    def _write_renaming(self, name: str, found: Renaming, names: Mapping[str, str]) -> tuple[str, ...]:
-        paths = {file.path.resolve() for file in found.files}
-        open_here = [one for one, session in self.sessions.items() if session.path.resolve() in paths or one == name]
+    def _write_renaming(self, name: str, renaming: Renaming, names: Mapping[str, str]) -> tuple[str, ...]:
+        paths = {real_path(file.path) for file in renaming.files}
+        open_here = [one for one, session in self.sessions.items() if real_path(session.path) in paths or one == name]
         if waiting := [one for one in open_here if one in self.unsaved]:
-            said = f"{some(waiting)} {'has' if len(waiting) == 1 else 'have'} unsaved edits, and the rename is written at once."
-            raise TableError(Fault(said, "tables that are saved", "to save first: Ctrl+S"))
+            problem = f"{some(waiting)} {'has' if len(waiting) == 1 else 'have'} unsaved edits, and the rename is written at once."
+            raise TableError(Fault(problem, "tables that are saved", "to save first: Ctrl+S"))
         if held := [one for one in open_here if self.sessions[one].is_read_only]:
             raise FileError(Fault(f"{some(held)} can be read only.", "tables that can be written"))
-        found.write()
+        renaming.write()
         for one in open_here:
             query = self.sessions[one].sheet.query
             self.reopen(one).sheet.query.load({names.get(fact, fact): text for fact, text in query.texts.items()})
-        return tuple(file.path.name for file in found.files)
+        return tuple(file.path.name for file in renaming.files)
 
     @property
     def unsaved(self) -> list[str]:
@@ -191,7 +194,7 @@ def _of_disk(tables: Mapping[str, Table]) -> Mapping[str, Table]:
     return inner.base if isinstance(inner, OpenTables) else tables
 
 
-def _found(path: str | Path | None) -> Path | Beginning:
+def _resolved(path: str | Path | None) -> Path | Beginning:
     if path is None:
         return next((folder for folder in FOLDERS if folder.is_dir() and _tables(folder)), Path())
     if Path(path).is_dir():
@@ -207,7 +210,7 @@ def _found(path: str | Path | None) -> Path | Beginning:
 
 
 def _tables(folder: Path) -> dict[str, Path]:
-    found: dict[str, Path] = {}
+    paths: dict[str, Path] = {}
     for name, file in table_files(folder, read_folder_schema(folder)):
-        found.setdefault(name, file)
-    return found
+        paths.setdefault(name, file)
+    return paths

@@ -17,22 +17,23 @@ from textual.geometry import Size
 from contextdb.cells.words import MARK
 from contextdb.columns import TextColumn
 from contextdb.errors import ContextDBError, Fault, plural
-from tui.clipboard import Clipboard
-from tui.messages import Edited, RenameWanted, Told
-from tui.model.asked import Offered, fact_fault
-from tui.model.column_values import selection_said
-from tui.model.find import PatternError, Search
-from tui.model.notes import COLOURS, Notes
-from tui.model.selection import Block
-from tui.model.sheet import Done, Sheet
-from tui.panes.sheet_view import SheetView
-from tui.panes.why import WhyPane
-from tui.screens.ask import AskDialog, ChooseDialog
-from tui.widgets.bar import Bar, CellLine, Item
-from tui.widgets.cell_editor import CellEditor
-from tui.widgets.find_bar import FilterBar, FindBar
-from tui.widgets.grid import Grid
-from tui.widgets.live_line import LiveLine, Said
+
+from ..clipboard import Clipboard
+from ..messages import Edited, Notice, RenameWanted
+from ..model.column_values import selection_summary
+from ..model.find import PatternError, Search
+from ..model.notes import COLOURS, Notes
+from ..model.selection import Block
+from ..model.sheet import Done, Sheet
+from ..model.table_answer import Offered, fact_fault
+from ..screens.ask import AskDialog, ChooseDialog
+from ..widgets.bar import Bar, CellLine, Item
+from ..widgets.cell_editor import CellEditor
+from ..widgets.find_bar import FilterBar, FindBar
+from ..widgets.grid import Grid
+from ..widgets.live_line import LiveLine, LiveState
+from .sheet_view import SheetView
+from .why import WhyPane
 
 MOST_KNOWN = 10_000
 """So many of a column's texts are offered to complete from."""
@@ -40,9 +41,8 @@ MOST_KNOWN = 10_000
 
 @dataclass(frozen=True, slots=True)
 class _Place:
-    """The cell, or the fact, that an editor was opened for."""
+    """The cell, or the fact, that an editor was opened for: the cursor stays there until the editor is closed."""
 
-    row: int = 0
     column: int = 0
     is_fact: bool = False
     is_new: bool = False
@@ -97,7 +97,7 @@ class AssetsPane(SheetView):
         chips = self.query_one("#chips", Bar)
         parts = self.sheet.filter.parts
         chips.display = bool(parts)
-        chips.show([Item(f"unfilter({at})", f"{said} ✕") for at, (said, _) in enumerate(parts)])
+        chips.show([Item(f"unfilter({at})", f"{label} ✕") for at, (label, _) in enumerate(parts)])
         self.grid.changed()
         self._show_cell()
 
@@ -119,7 +119,7 @@ class AssetsPane(SheetView):
         parts = []
         if not sheet.query.is_empty:
             where = f" for {self.grid.test_name}" if self.grid.test_name else ""
-            parts.append(f"{sheet.query.said}{where}")
+            parts.append(f"{sheet.query.summary}{where}")
         if len(sheet.view) < sheet.table.n_rows:
             parts.append(f"{len(sheet.view):,} of {plural(sheet.table.n_rows, 'row')} shown")
         if any(sheet.hidden):
@@ -128,7 +128,7 @@ class AssetsPane(SheetView):
             keys = (f"{key.column} {'▼' if key.is_descending else '▲'}" for key in sheet.sort.keys)
             parts.append(f"sorted by {', '.join(keys)}")
         if block.n_cells > 1:
-            parts.append(f"{block.shape[0]:,} × {block.shape[1]:,} selected{selection_said(sheet)}")
+            parts.append(f"{block.shape[0]:,} × {block.shape[1]:,} selected{selection_summary(sheet)}")
         return " · ".join(parts)
 
     @on(Bar.Pressed)
@@ -158,8 +158,8 @@ class AssetsPane(SheetView):
         elif len(sheet.view):
             place = f"row {sheet.row_number(row)} · {name}"
             file_row = int(sheet.view.rows[row])
-            said = " · ".join(filter(None, (sheet.marked(file_row, column), sheet.said_of(file_row)))) or about
-            self.query_one(CellLine).show(place, sheet.text(row, column), _short(sheet.fault(row, column)), said)
+            message = " · ".join(filter(None, (sheet.marked(file_row, column), sheet.row_summary(file_row)))) or about
+            self.query_one(CellLine).show(place, sheet.text(row, column), _short(sheet.fault(row, column)), message)
         else:
             self.query_one(CellLine).show(name, "", "", about)
 
@@ -170,9 +170,8 @@ class AssetsPane(SheetView):
         event.stop()
         if self.editor is not None:
             return
-        row, column = self.sheet.cursor
         column = self.grid.field
-        self._edited = _Place(row, column, self.grid.is_in_test_row, self.grid.is_in_new_row)
+        self._edited = _Place(column, self.grid.is_in_test_row, self.grid.is_in_new_row)
         columns = self.sheet.table.columns
         over = self.query_one("#over")
         editor = next(iter(over.query(CellEditor)), None) or CellEditor()
@@ -182,6 +181,7 @@ class AssetsPane(SheetView):
             self.sheet.header(column).kind,
             event.text,
             check=self._check_fact if self._edited.is_fact else lambda text: self.sheet.check_at(column, text),
+            on_done=self._edit_done,
             known=self._known(columns[column]) if column < len(columns) else [],
             is_fact=self._edited.is_fact,
             is_typing=event.is_typing,
@@ -201,63 +201,54 @@ class AssetsPane(SheetView):
         known += [f"{MARK}{name}" for name in table.around or () if name != table.name and f"{MARK}{name}" not in known]
         if not table.schema.motion.get("databases"):
             return known
-        from tui.model.priorities import Priorities
+        from ..model.priorities import Priorities
 
         return [*Priorities(self.sheet).clips_without_row(), *known]
 
     def _check_fact(self, text: str) -> Fault | None:
         return fact_fault(text, self.sheet.fact_of(self._edited.column))
 
-    @on(CellEditor.Committed)
-    def _commit(self, event: CellEditor.Committed) -> None:
-        """Take the text for the cell that was edited, wherever a click has put the cursor meanwhile."""
-        event.stop()
-        place, clicked = self._edited, self.sheet.selection
-        is_elsewhere = (self.sheet.cursor[0], self.grid.field) != (place.row, place.column)
-        is_elsewhere = is_elsewhere or (self.grid.is_in_test_row, self.grid.is_in_new_row) != (place.is_fact, place.is_new)
+    def _edit_done(self, outcome: CellEditor.Outcome) -> None:
+        if isinstance(outcome, CellEditor.Committed):
+            self._commit(outcome)
+            return
+        self._close_editor()
+        if isinstance(outcome, CellEditor.Declared):
+            self._try(lambda: self.sheet.declare_value(outcome.text, self._edited.is_new))
+
+    def _commit(self, outcome: CellEditor.Committed) -> None:
+        """Take the text for the cell that was edited, and go on."""
+        place = self._edited
         if place.is_fact:
-            self.sheet.set_fact(self.sheet.header(place.column).name, event.text)
-            self.grid.again = partial(self.grid.fill, event.text)
+            self.sheet.set_fact(self.sheet.header(place.column).name, outcome.text)
+            self.grid.again = partial(self.grid.fill, outcome.text)
             self._close_editor()
             self.grid.post_message(Grid.FactChanged())
-            if not is_elsewhere and event.right:
-                self.grid.action_move(0, event.right, False)
+            if outcome.right:
+                self.grid.action_move(0, outcome.right, False)
             return
-        if is_elsewhere:
-            self.sheet.go(place.row, place.column)
-        if not self._enter(event.text, event.is_fill):
+        if not self._enter(outcome.text, outcome.is_fill):
             return
         if place.is_new:
-            self.grid.goes_to_new_row = not is_elsewhere and event.down > 0
-        if is_elsewhere:
-            self.sheet.select(lambda _, shape: clicked.within(shape))
-        elif not event.is_fill and not (place.is_new and not event.text.strip()):
-            start, before = self._run_start(event), self.sheet.cursor[0]
-            self.sheet.select(lambda s, shape: s.next_cell(event.down, event.right, shape))
+            self.grid.goes_to_new_row = outcome.down > 0
+        if not outcome.is_fill and not (place.is_new and not outcome.text.strip()):
+            start, before = self._run_start(outcome), self.sheet.cursor[0]
+            self.sheet.move_on(outcome.down, outcome.right)
             if start is not None:
                 is_last = before == self.sheet.cursor[0] == len(self.sheet.view) - 1
                 self.sheet.go(self.sheet.cursor[0], start)
                 self.grid.goes_to_new_row = is_last or self.grid.goes_to_new_row
         self.grid.show_cursor()
 
-    def _run_start(self, event: CellEditor.Committed) -> int | None:
+    def _run_start(self, outcome: CellEditor.Committed) -> int | None:
         """The column that Enter goes back to after a run of Tabs in one row; None where there was no such run."""
         if self.sheet.block.n_cells > 1:
             return None
-        if event.is_tab:
+        if outcome.is_tab:
             self.grid.run.tab(*self.sheet.cursor)
             return None
         start = self.grid.run.enter(*self.sheet.cursor)
-        return start if event.down == 1 else None
-
-    @on(CellEditor.Declared)
-    def _declare(self, event: CellEditor.Declared) -> None:
-        """Take a text with values that are declared with it."""
-        event.stop()
-        place = self._edited
-        self.sheet.go(place.row, place.column)
-        self._close_editor()
-        self._try(lambda: self.sheet.declare_value(event.text, place.is_new))
+        return start if outcome.down == 1 else None
 
     def _enter(self, text: str, is_fill: bool) -> bool:
         """Put a text into the cell, or into all that are selected; one that is refused stays in the editor."""
@@ -275,13 +266,8 @@ class AssetsPane(SheetView):
             done = Done(self.sheet.history.undo_name or "")
         self._close_editor()
         self.grid.again = partial(self.grid.fill, text)
-        self.post_message(Edited(done))
+        self.screen.post_message(Edited(done))
         return True
-
-    @on(CellEditor.Cancelled)
-    def _cancel(self, event: CellEditor.Cancelled) -> None:
-        event.stop()
-        self._close_editor()
 
     def _close_editor(self) -> None:
         if self.editor is not None:
@@ -326,30 +312,30 @@ class AssetsPane(SheetView):
         sheet.played = played
         sheet.follow(facts, actors)
         self.grid.test_name = name
-        if sheet.filter.is_valid:
+        if sheet.filter.is_valid and self.editor is None:  # the rows stay under a cell that is edited
             sheet.refresh()
         if is_other:
             self.grid.refit()
             self.grid.changed()
         else:
-            self.grid.asked_again()
+            self.grid.requested_again()
         self.why_pane.follow_soon(sheet)
         self._show_place()
 
-    def show_live(self, said: Said | None, items: Sequence[Item] = ()) -> None:
+    def show_live(self, state: LiveState | None, items: Sequence[Item] = ()) -> None:
         """Say how it stands with the game; None: none is followed."""
         line, tools = self.query_one(LiveLine), self.query_one("#live", Bar)
-        if line.display != (said is not None):
-            line.display = tools.display = said is not None
-        if said is not None:
-            line.show(said)
+        if line.display != (state is not None):
+            line.display = tools.display = state is not None
+        if state is not None:
+            line.show(state)
             tools.show(items)
         elif self.sheet.played is not None:
             self.sheet.played = None
             self.grid.changed()
 
     def refresh_valid(self) -> None:
-        """Filter again where only valid rows are shown, and make room for what is beside cells."""
+        """Filter again where only valid rows are displayed, and make room for what is beside cells."""
         if self.sheet.filter.is_valid:
             self.sheet.refresh()
         self.grid.refit()
@@ -361,24 +347,36 @@ class AssetsPane(SheetView):
         event.stop()
         problem = self.clipboard.copy(event.text)
         if problem:
-            self.post_message(Told(problem, "warning"))
+            self.post_message(Notice(problem, "warning"))
         elif event.is_told:
-            rows, columns = self.sheet.block.shape
-            self.post_message(Told(f"Copied {rows:,} × {columns:,}."))
+            sheet = self.sheet
+            n_columns, hidden = len(sheet.columns_of(sheet.block)), sheet.hidden_in(sheet.block)
+            self.post_message(Notice(f"Copied {sheet.block.shape[0]:,} × {n_columns:,}{f', without {hidden}' if hidden else ''}."))
 
     @on(Grid.PasteWanted)
     def _paste(self, event: Grid.PasteWanted) -> None:
         event.stop()
         self.grid.paste(self.clipboard.paste())
 
+    @on(Grid.PasteDoubted)
+    def _ask_of_paste(self, event: Grid.PasteDoubted) -> None:
+        """Ask what is meant by commas, and paste that; nothing where it is not answered."""
+        event.stop()
+        doubt = event.doubt
+
+        def chosen(at: int | None) -> None:
+            if at is not None:
+                event.paste(doubt.ways[at][1], True)
+
+        self.app.push_screen(ChooseDialog(doubt.question, [label for label, _ in doubt.ways]), chosen)
+
     async def action_insert_copied(self) -> None:
         """Put what was copied into new rows above the cursor's."""
-        self._try(lambda: self.sheet.insert_copied(self.clipboard.paste()))
+        self.grid.insert_copied(self.clipboard.paste())
 
     # ---- find
 
     async def action_find(self) -> None:
-        """Open the bar."""
         self.query_one(FilterBar).remove_class("-open")
         await self.query_one(FindBar).open()
 
@@ -424,7 +422,6 @@ class AssetsPane(SheetView):
     # ---- filter, notes, colours
 
     async def action_filter(self) -> None:
-        """Open the bar."""
         self.query_one(FindBar).remove_class("-open")
         await self.query_one(FilterBar).open()
 
@@ -439,7 +436,7 @@ class AssetsPane(SheetView):
 
         def noted(text: str | None) -> None:
             if text is not None and text.strip() != before:
-                self._mark(lambda marks: marks.with_note(asset, name, text), "Note kept." if text.strip() else "Note taken away.")
+                self._mark(lambda marks: marks.with_note(asset, name, text), "Note saved." if text.strip() else "Note removed.")
 
         question = f"A note on {name} of {asset}, for people; empty takes it away"
         self.app.push_screen(AskDialog("Note", question, before, lambda _: ""), noted)
@@ -453,27 +450,27 @@ class AssetsPane(SheetView):
         def chosen(at: int | None) -> None:
             if at is not None:
                 colour = "" if words[at] == "none" else words[at]
-                said = f"{plural(len(assets), 'row')} {f'marked {colour}' if colour else 'without a colour'}."
-                self._mark(lambda marks: marks.with_colour(assets, colour), said)
+                message = f"{plural(len(assets), 'row')} {f'marked {colour}' if colour else 'without a colour'}."
+                self._mark(lambda marks: marks.with_colour(assets, colour), message)
 
         if assets:
             now = sheet.marks.colours.get(assets[0], "none")
             self.app.push_screen(ChooseDialog("Colour of the rows", words, words.index(now)), chosen)
 
-    def _mark(self, change: Callable[[Notes], Notes], said: str) -> None:
+    def _mark(self, change: Callable[[Notes], Notes], message: str) -> None:
         """Change the notes as they are on the disk now, so that nobody else's are lost."""
         sheet = self.sheet
         if sheet.path is None:
             return
         try:
-            marks = change(Notes.kept(sheet.path))
+            marks = change(Notes.read(sheet.path))
             marks.write(sheet.path)
         except ContextDBError as error:
-            self.post_message(Told(str(error), "error"))
+            self.post_message(Notice(str(error), "error"))
             return
         sheet.marks = marks
         self.show()
-        self.post_message(Told(said))
+        self.post_message(Notice(message))
 
     def action_go_to(self) -> None:
         """Ask for a row, by its number or its asset, or for a column."""
@@ -533,7 +530,6 @@ class AssetsPane(SheetView):
         self.grid.autofit()
 
     def refresh_view(self) -> None:
-        """Sort and filter again."""
         self.sheet.refresh()
         self.show()
 

@@ -19,21 +19,22 @@ from textual.widgets import ContentSwitcher, Static
 from contextdb.covering import CoverageReport, format_percent
 from contextdb.errors import ContextDBError, in_quotes
 from contextdb.telemetry.observed import SeenGap
-from tui.messages import FillGap, GoToCell, SetContext, Told
-from tui.model import coverage_lines as lines
-from tui.model.coverage_run import CoverageRun, Result, is_quick
-from tui.model.moment import moment_inside
-from tui.model.moments import Moment
-from tui.model.played_run import Played, PlayedRun, moment_in
-from tui.model.rows_near import is_near_at_once, rows_near
-from tui.model.sheet import Sheet
-from tui.panes.pair_map import PairMap
-from tui.panes.pane import Pane
-from tui.panes.rows_below import IN_TABLE, MOST, RowsBelow
-from tui.screens.ask import AskDialog
-from tui.widgets.choice_line import ChoiceLine
-from tui.widgets.fitted import bar
-from tui.widgets.line_list import LineList, ListCell, ListColumn
+
+from ..messages import FillGap, GoToCell, Notice, SetContext
+from ..model import coverage_lines as lines
+from ..model.coverage_run import CoverageRun, Result, is_quick
+from ..model.moment import moment_inside
+from ..model.moments import Moment
+from ..model.played_run import Played, PlayedRun, moment_in
+from ..model.rows_near import is_near_at_once, rows_near
+from ..model.sheet import Sheet
+from ..screens.ask import AskDialog
+from ..widgets.choice_line import ChoiceLine
+from ..widgets.fitted import bar
+from ..widgets.line_list import LineList, ListCell, ListColumn
+from .pair_map import PairMap
+from .pane import Pane
+from .rows_below import IN_TABLE, MOST, RowsBelow
 
 SECTIONS = ("gaps", "pairs", "crowded", "rows", "about", "played", "unused")
 NAMES = ("Gaps", "Pairs", "Crowded", "Rows", "About", "Played", "Unused")
@@ -43,7 +44,7 @@ NEAREST = "The nearest rows: a change of the marked cells would close it"
 EMPTY = {
     "gaps": "No gap is known.",
     "crowded": "Nowhere are two rows valid at once, as far as is known.",
-    "rows": "No row was found to be redundant.",
+    "rows": "No row is redundant.",
 }
 EMPTY_OF_PLAY = {"played": "Every recorded moment has a valid row.", "unused": "Every row was valid in some recorded moment."}
 """What a list without lines says once the table is measured."""
@@ -110,12 +111,11 @@ class CoveragePane(Pane):
         self.played = PlayedRun()
         self._shown_play: Played | None = None
         self.section = 0
-        self._shown: Result | None = None
+        self._displayed: Result | None = None
         self._details = dict.fromkeys(SECTIONS, "")
         self._detail = ""
 
     def compose(self) -> ComposeResult:
-        """The parts."""
         yield Static(id="coverage-state", markup=False)
         yield Static(id="coverage-bar", markup=False)
         yield ChoiceLine(self._labels(), id="coverage-sections")
@@ -150,7 +150,6 @@ class CoveragePane(Pane):
         yield RowsBelow(id="coverage-rows")
 
     def on_mount(self) -> None:
-        """Begin to listen."""
         self.run.listen(self._tell)
         self.show()
 
@@ -163,7 +162,7 @@ class CoveragePane(Pane):
     def _tell(self) -> None:
         self.post_message(self.Changed())
 
-    # ---- what is shown
+    # ---- display
 
     def show(self) -> None:
         """Bring everything up to date; a small table is measured at once."""
@@ -184,8 +183,8 @@ class CoveragePane(Pane):
         self.query_one("#coverage-state", Static).update(of_play or lines.state_text(run, self.sheet.table))
         self._show_play()
         self._show_bar()
-        if run.result is not self._shown:
-            self._shown = run.result
+        if run.result is not self._displayed:
+            self._displayed = run.result
             if run.result is not None:
                 self._fill(run.result)
         unknown = lines.unknown_text(run)
@@ -296,8 +295,8 @@ class CoveragePane(Pane):
         self._details[event.list.id] = text
         self._show_section()
 
-    @on(PairMap.Said)
-    def _said(self, event: PairMap.Said) -> None:
+    @on(PairMap.Described)
+    def _described(self, event: PairMap.Described) -> None:
         event.stop()
         if SECTIONS[self.section] == "pairs":
             self._show_rows()
@@ -326,8 +325,8 @@ class CoveragePane(Pane):
             finding = result.report.findings[self._at(section)]
             rows = [row for row in (finding.row, *finding.by) if row is not None]
             below.show_compared(table, [row for row in dict.fromkeys(rows) if row < table.n_rows], {}, finding.column)
-        elif (found := self._cells_here()) is not None:
-            self._show_near(below, found[1])
+        elif (cells := self._cells_here()) is not None:
+            self._show_near(below, cells[1])
 
     def _show_near(self, below: RowsBelow, cells: Mapping[str, str]) -> None:
         table = self.sheet.table
@@ -368,23 +367,22 @@ class CoveragePane(Pane):
 
     def action_read_live(self) -> None:
         """Take the moments of the game that the test row follows."""
-        found = self.live()
-        if found is None:
-            self.post_message(Told("No game and no recording is followed. Alt+U shows the games that run.", "warning"))
+        recorded = self.live()
+        if recorded is None:
+            self.post_message(Notice("No game and no recording is followed. Alt+U shows the games that run.", "warning"))
             return
-        self.played.start_live(self.sheet.table, found[1], found[0], self._tell)
+        self.played.start_live(self.sheet.table, recorded[1], recorded[0], self._tell)
         self.action_section(SECTIONS.index("played"))
         self._show_state()
 
     @work(thread=True, exclusive=True)
     def _try_moment(self, play: Played, at: int) -> None:
         """Put the first recorded moment of a gap into the test row; looking for it may take a while."""
-        found = moment_in(play, play.gaps[at])
-        message = SetContext(*found) if found is not None else Told("No recorded moment of this gap was found.", "warning")
+        moment = moment_in(play, play.gaps[at])
+        message = SetContext(*moment) if moment is not None else Notice("No recorded moment lies in this gap.", "warning")
         self.post_message(message)
 
     def action_section(self, at: int) -> None:
-        """Show another section."""
         had_focus = self.has_focus_within
         self.section = at
         self._show_state()
@@ -394,7 +392,6 @@ class CoveragePane(Pane):
             self.take_focus()
 
     def action_turn(self, step: int) -> None:
-        """Show the section beside."""
         self.action_section((self.section + step) % len(SECTIONS))
 
     @on(ChoiceLine.Picked)
@@ -408,7 +405,7 @@ class CoveragePane(Pane):
         self.run.start(self.sheet.table)
 
     def action_back(self) -> None:
-        """Stop what runs; else leave the pair that is shown."""
+        """Stop what runs; else leave the pair that is displayed."""
         if self.run.state == "running":
             self.run.cancel()
             self._show_state()
@@ -442,11 +439,11 @@ class CoveragePane(Pane):
         gone = cells.keys() - conditions.keys()
         if gone and self.sheet.query.is_nested:
             self.post_message(
-                Told(f"{in_quotes(min(gone))} is a condition of a table inside: a row for the gap belongs there.", "warning")
+                Notice(f"{in_quotes(min(gone))} is a condition of a table inside: a row for the gap belongs there.", "warning")
             )
         elif gone:
             self.post_message(
-                Told(f"{in_quotes(min(gone))} is not a condition any more. R measures the coverage again.", "warning")
+                Notice(f"{in_quotes(min(gone))} is not a condition any more. R measures the coverage again.", "warning")
             )
         else:
             is_number = {name: conditions[name].domain.type.is_numeric for name in cells}
@@ -454,7 +451,7 @@ class CoveragePane(Pane):
 
     def _go_to(self, row: int, column: str | None = None) -> None:
         if self.run.state == "stale" and row >= self.sheet.table.n_rows:
-            self.post_message(Told("That row is gone. R measures the coverage again.", "warning"))
+            self.post_message(Notice("That row is gone. R measures the coverage again.", "warning"))
         else:
             self.post_message(GoToCell(row, column))
 
@@ -468,15 +465,15 @@ class CoveragePane(Pane):
         if SECTIONS[self.section] == "played" and play is not None and play.gaps:
             self._try_moment(play, self.query_one("#played", LineList).index)
             return
-        found = self._cells_here()
-        if found is None:
-            self.post_message(Told("There is nothing here to try.", "warning"))
+        gap_cells = self._cells_here()
+        if gap_cells is None:
+            self.post_message(Notice("There is nothing here to try.", "warning"))
             return
-        name, cells = found
+        name, cells = gap_cells
         try:
             facts = moment_inside(cells, self.sheet.query.wanted)
         except ContextDBError as error:
-            self.post_message(Told(str(error.faults[0]), "error"))
+            self.post_message(Notice(str(error.faults[0]), "error"))
             return
         self.post_message(SetContext(facts, name))
 

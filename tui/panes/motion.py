@@ -21,13 +21,14 @@ from textual.worker import get_current_worker
 from contextdb.console import printable
 from contextdb.errors import ContextDBError, plural
 from contextdb.telemetry.link.doors import doors
-from tui.debug.game import Live
-from tui.debug.opening import databases_of, measures_of, opened
-from tui.debug.recording import Figures, Recording
-from tui.messages import Told
-from tui.model.sessions import sessions_of
-from tui.panes.pane import Pane
-from tui.widgets.line_list import LineList, ListCell, ListColumn
+
+from ..debug.game import Live
+from ..debug.opening import databases_of, measures_of, opened
+from ..debug.recording import Figures, Recording
+from ..messages import Notice
+from ..model.sessions import sessions_of
+from ..widgets.line_list import LineList, ListCell, ListColumn
+from .pane import Pane
 
 LOOK_EVERY_S = 1.0
 NONE = 'No session is recorded here: "contextdb motion run" records one, and so does motion.Trace in your game.'
@@ -37,7 +38,7 @@ NONE = 'No session is recorded here: "contextdb motion run" records one, and so 
 class DebugWanted(Message):
     """Show the debugger of a session, or of a game."""
 
-    shown: Recording | Live
+    recording: Recording | Live
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,6 @@ class MotionPane(Pane):
         self._known: dict[tuple[Path, int], tuple[float, Figures] | str] = {}
 
     def compose(self) -> ComposeResult:
-        """The parts."""
         yield Static(id="motion-summary", markup=False)
         columns = [ListColumn("Session", 18, 3, is_name=True), ListColumn("When", 12), ListColumn("Lasts", 9, 0, True)]
         columns += [ListColumn("Jumps/s", 8, 0, True), ListColumn("Forced", 7, 0, True)]
@@ -99,7 +99,6 @@ class MotionPane(Pane):
         self.query_one(SessionList).focus()
 
     def action_look(self) -> None:
-        """Look again."""
         self.look()
 
     # ---- what there is
@@ -161,19 +160,19 @@ class MotionPane(Pane):
     def _chosen(self, event: LineList.Chosen) -> None:
         event.stop()
         if 0 <= event.index < len(self.entries):
-            self.post_message(Told(f"Opening {printable(self.entries[event.index].path.name)} …"))
+            self.post_message(Notice(f"Opening {printable(self.entries[event.index].path.name)} …"))
             self.open(self.entries[event.index])
 
     @work(thread=True, exclusive=True, group="open")
     def open(self, entry: Entry) -> None:
         """Open a session, or listen to a game; its databases may have to be built."""
         try:
-            shown = self._live(entry.path) if entry.is_game else opened(entry.path, self.folder)
+            recording = self._live(entry.path) if entry.is_game else opened(entry.path, self.folder)
         except ContextDBError as error:
-            self.post_message(Told(str(error), "error"))
+            self.post_message(Notice(str(error), "error"))
             return
-        self.post_message(Told(""))
-        self.post_message(DebugWanted(shown))
+        self.post_message(Notice(""))
+        self.post_message(DebugWanted(recording))
 
     def _live(self, path: Path) -> Live:
         return Live(path.stem, path, None, str(self.folder), databases_of(self.folder))

@@ -7,7 +7,7 @@ the reason.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, ClassVar, get_args
+from typing import Any, ClassVar
 
 from rich.markup import escape
 from textual import on
@@ -24,34 +24,23 @@ from textual.widgets.selection_list import Selection
 from contextdb.cells.kinds import KINDS
 from contextdb.edits import edits
 from contextdb.errors import ContextDBError
-from contextdb.schema.jobs import PlainJob
+from contextdb.schema.policies import POLICIES
 from contextdb.schema.sections import has_place
-from contextdb.schema.shapes import POLICIES
+from contextdb.schema.table_settings import JOBS
 from contextdb.tables.changes import Edit
 from contextdb.tables.condition_column import ConditionColumn
-from tui.messages import Edited
-from tui.model.condition_form import ConditionForm, plain
-from tui.model.options import OPTIONS, POLICY_WORDS, columns_for, with_expression
-from tui.model.sheet import Sheet
-from tui.panes.pane import Pane
-from tui.widgets.field import Field
-from tui.widgets.pick import Pick
-from tui.widgets.ticks import TickList
+
+from ..messages import Edited
+from ..model.condition_form import TYPED, ConditionForm, plain
+from ..model.options import CONDITION_OPTIONS, OPTIONS, columns_for, with_expression
+from ..model.sheet import Sheet
+from ..widgets.field import Field
+from ..widgets.pick import Pick
+from ..widgets.ticks import TickList
+from .pane import Pane
 
 WIDE = 120
 """From so many columns on the condition is next to the table's settings."""
-
-_BY_COLUMN = ("asset", *get_args(PlainJob))
-_FORM = {
-    "min": "minimum",
-    "max": "maximum",
-    "unit": "unit",
-    "values": "values",
-    "mirror": "mirror",
-    "weight": "weight",
-    "description": "description",
-}
-"""The keys of a condition that are typed, and the fields of the form that hold them."""
 
 
 class OptionsPane(Pane):
@@ -80,64 +69,42 @@ class OptionsPane(Pane):
         super().__init__(id=id)
         self.sheet = sheet
         self._condition = ""
-        """The condition that is shown."""
-        self._shown = -1
-        """The version of the sheet that is shown."""
+        """The condition that is displayed."""
+        self._displayed_version = -1
+        """The version of the sheet that is displayed."""
 
     def compose(self) -> ComposeResult:
         """The table's settings, and the condition's."""
         with Vertical(id="options-table", classes="options--part"):
             yield Static(id="options-title", classes="options--title")
-            for option in OPTIONS:
-                yield Field(option.label, self._control(option.key), option.meaning, option.key)
+            for key, option in OPTIONS.items():
+                yield Field(option.label, self._control(key), option.meaning, key)
         with Vertical(id="options-condition", classes="options--part"):
             yield Static(id="condition-title", classes="options--title")
+            for key, option in CONDITION_OPTIONS.items():
+                yield Field(option.label, self._condition_control(key), option.meaning, key)
+
+    def _condition_control(self, key: str) -> Widget:
+        if key == "type":
             kinds = [(f"{name:<8}{kind.words}", name) for name, kind in KINDS.items()]
-            yield Field("Type", Pick(kinds, compact=True, allow_blank=False, id="condition-type"), "What a fact of it is.", "type")
-            yield Field(
-                "Least",
-                Input(compact=True, placeholder="no bound", id="condition-min"),
-                "The least number. Empty: no bound.",
-                "min",
-            )
-            yield Field(
-                "Most",
-                Input(compact=True, placeholder="no bound", id="condition-max"),
-                "The greatest number. Empty: no bound.",
-                "max",
-            )
-            yield Field(
-                "Unit", Input(compact=True, placeholder="none", id="condition-unit"), "Such as m/s: shown in the header.", "unit"
-            )
-            meaning = "The names there are, with spaces between them; one with a space in it in quotes."
-            yield Field("Values", Input(compact=True, placeholder="none", id="condition-values"), meaning, "values")
-            meaning = "For clips played mirrored: negate, none, or names that change places, such as Left = Right."
-            yield Field("Mirror", Input(compact=True, placeholder="none", id="condition-mirror"), meaning, "mirror")
-            meaning = 'What a cell counts where the policy is "specific": 2 as much as two other cells, 0 nothing.'
-            yield Field("Weight", Input(compact=True, placeholder="1", id="condition-weight"), meaning, "weight")
-            yield Field(
-                "Description",
-                Input(compact=True, placeholder="none", id="condition-description"),
-                "One sentence for whoever fills cells.",
-                "description",
-            )
+            return Pick(kinds, compact=True, allow_blank=False, id="condition-type")
+        return Input(compact=True, placeholder=CONDITION_OPTIONS[key].without, id=f"condition-{key}")
 
     def _control(self, key: str) -> Widget:
         if key == "policy":
-            words = [(f"{policy:<10}{POLICY_WORDS[policy]}", policy) for policy in POLICIES]
-            return Pick(words, compact=True, allow_blank=False, id="option-policy")
+            choices = [(f"{word:<10}{kind.words}", word) for word, kind in POLICIES.items()]
+            return Pick(choices, compact=True, allow_blank=False, id=f"option-{key}")
         if key == "outputs":
             return TickList(compact=True, id="option-outputs")
-        if key == "fallback":
-            return Input(compact=True, placeholder="none", id="option-fallback")
         if key == "assume":
             return Vertical(Input(compact=True), id="options-assume")
-        return Pick[str]([], compact=True, prompt="none", id=f"option-{key}")
+        if key in JOBS:
+            return Pick[str]([], compact=True, prompt="none", id=f"option-{key}")
+        return Input(compact=True, placeholder="none", id=f"option-{key}")
 
     # ---- show
 
     def on_mount(self) -> None:
-        """Show the table."""
         self.show()
 
     def on_show(self) -> None:
@@ -150,9 +117,9 @@ class OptionsPane(Pane):
 
     def show(self) -> None:
         """The sheet has changed: show it as it is now. What was typed and not taken is gone then."""
-        if self._shown == self.sheet.version:
+        if self._displayed_version == self.sheet.version:
             return
-        self._shown = self.sheet.version
+        self._displayed_version = self.sheet.version
         with self.prevent(Select.Changed, TickList.SelectedChanged):
             self._show_table()
             self._show_condition()
@@ -164,11 +131,16 @@ class OptionsPane(Pane):
             ("Table ", "bold"), (settings.name, "bold"), (f"  {table.path.name}" if table.path else "", "$text-muted")
         )
         self.query_one("#options-title", Static).update(title)
-        self.query_one("#option-policy", Select).value = settings.policy
         first = table.columns[0].name if table.columns else ""
         self.query_one("#option-asset", Select).prompt = escape(f"the first column: {first}")
-        for key in _BY_COLUMN:
-            _show_column(self.query_one(f"#option-{key}", Select), columns_for(table, key), getattr(settings, key))
+        for key, option in OPTIONS.items():
+            value = getattr(settings, key)
+            if key in JOBS:
+                _show_column(self.query_one(f"#option-{key}", Select), columns_for(table, key), value)
+            elif option.shape.words:
+                self.query_one(f"#option-{key}", Select).value = value
+            elif key not in ("outputs", "assume"):
+                self.query_one(f"#option-{key}", Input).value = value or ""
         outputs = self.query_one("#option-outputs", TickList)
         highlighted = outputs.highlighted
         outputs.clear_options()
@@ -177,15 +149,14 @@ class OptionsPane(Pane):
         outputs.display = outputs.option_count > 0
         self._field("outputs").say(meaning=self._outputs_meaning(outputs.option_count))
         fallback = self.query_one("#option-fallback", Input)
-        fallback.value = settings.fallback or ""
         fallback.suggester = SuggestFromList(table.text_column(table.asset_column).texts, case_sensitive=False)
         is_row = settings.fallback is None or settings.fallback in table.text_column(table.asset_column).texts
-        meaning = next(option.meaning for option in OPTIONS if option.key == "fallback")
+        meaning = OPTIONS["fallback"].meaning
         self._field("fallback").say(meaning=meaning if is_row else f"{meaning} No row of this table has it.")
         self._show_assumptions([*settings.assume, ""])
 
     def _outputs_meaning(self, n_columns: int) -> str:
-        meaning = next(option.meaning for option in OPTIONS if option.key == "outputs")
+        meaning = OPTIONS["outputs"].meaning
         return meaning if n_columns else f"{meaning} All columns here are declared as conditions, or have another job."
 
     def _show_assumptions(self, texts: list[str]) -> None:
@@ -215,21 +186,21 @@ class OptionsPane(Pane):
         form = ConditionForm.of(column.condition)
         self.query_one("#condition-type", Select).value = form.kind
         self.query_one("#condition-mirror", Input).placeholder = "negate" if KINDS[form.kind].is_circular else "none"
-        for key, name in _FORM.items():
-            self.query_one(f"#condition-{key}", Input).value = getattr(form, name)
-            self._field(key).display = has_place(key, form.kind)
-            self._field(key).say()
-        self._field("type").say()
+        for key in TYPED:
+            self.query_one(f"#condition-{key}", Input).value = getattr(form, key)
+            self._field(key, "condition").display = has_place(key, form.kind)
+            self._field(key, "condition").say()
+        self._field("type", "condition").say()
 
     def _column(self) -> ConditionColumn | None:
-        """The condition under the cursor, else the one shown last, else the first."""
+        """The condition under the cursor, else the one displayed last, else the first."""
         conditions = {c.condition.name: c for c in self.sheet.table.conditions}
         at = min(self.sheet.selection.column, self.sheet.shape[1] - 1)
         under = self.sheet.condition(at) if at >= 0 else None
         return under or conditions.get(self._condition) or next(iter(conditions.values()), None)
 
-    def _field(self, key: str) -> Field:
-        return self.query_one(f"#field-{key}", Field)
+    def _field(self, key: str, part: str = "table") -> Field:
+        return self.query_one(f"#options-{part} #field-{key}", Field)
 
     def take_focus(self) -> None:
         """Give the keys to the first field."""
@@ -303,21 +274,21 @@ class OptionsPane(Pane):
         before, form = ConditionForm.of(column.condition), self._form()
         if key == "type":
             form = form.of_kind(form.kind)
-        for other in _FORM:
-            self._field(other).display = has_place(other, form.kind)
-        said, wrong = form.declared()
-        for field in ("type", *_FORM):
-            self._field(field).say(wrong.get(field, ""))
+        for other in TYPED:
+            self._field(other, "condition").display = has_place(other, form.kind)
+        declared, wrong = form.declared()
+        for field in ("type", *TYPED):
+            self._field(field, "condition").say(wrong.get(field, ""))
         if wrong or form == before:
             return
-        plainly = {name: said.get(name) for name in ("type", *_FORM)}
+        plainly = {name: declared.get(name) for name in ("type", *TYPED)}
         try:
             self._apply(edits.set_condition(self.sheet.table, self._condition, **plainly))
         except ContextDBError as error:
-            self._field(key).say(plain(error.faults[0]))
+            self._field(key, "condition").say(plain(error.faults[0]))
 
     def _form(self) -> ConditionForm:
-        texts = {name: self.query_one(f"#condition-{key}", Input).value for key, name in _FORM.items()}
+        texts = {key: self.query_one(f"#condition-{key}", Input).value for key in TYPED}
         return ConditionForm(str(self.query_one("#condition-type", Select).value), **texts)
 
     def _apply(self, edit: Edit) -> None:
@@ -328,7 +299,7 @@ class OptionsPane(Pane):
 
     def action_put_back(self) -> None:
         """Forget what was typed and not taken."""
-        self._shown = -1
+        self._displayed_version = -1
         self.show()
 
 

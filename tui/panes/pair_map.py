@@ -11,8 +11,9 @@ from textual.binding import Binding, BindingType
 from textual.message import Message
 
 from contextdb.covering import PairTable, Slice
-from tui.model import coverage_lines as lines
-from tui.widgets.heat_map import HeatMap, Square
+
+from ..model import coverage_lines as lines
+from ..widgets.heat_map import HeatMap, Square
 
 WIDEST = 14
 CORNER = "least covered, %"
@@ -27,7 +28,7 @@ class PairMap(HeatMap):
     ]
 
     @dataclass
-    class Said(Message):
+    class Described(Message):
         """What the square under the cursor means, in words."""
 
         text: str
@@ -36,7 +37,7 @@ class PairMap(HeatMap):
         super().__init__(id=id)
         self.pairs: PairTable | None = None
         self.pair: tuple[int, int] | None = None
-        """The pair that is shown, that with more parts first; None: all of them."""
+        """The pair that is displayed, that with more parts first; None: all of them."""
         self._left_out = ""
         self._opened_at = (0, 1)
         self._worst: dict[tuple[int, int], Slice | None] = {}
@@ -66,8 +67,8 @@ class PairMap(HeatMap):
 
     def cells_here(self) -> dict[str, str] | None:
         """The slice under the cursor as cells; in the overview the least covered one of the pair."""
-        found = self._slice(*self.place) if self.pair else self._worst_of(*self.place)
-        return None if found is None else found.cells
+        slice_here = self._slice(*self.place) if self.pair else self._worst_of(*self.place)
+        return None if slice_here is None else slice_here.cells
 
     def action_choose(self) -> None:
         """Open the pair of the square."""
@@ -82,12 +83,12 @@ class PairMap(HeatMap):
         """Choose a square, and say what it means."""
         super().go(row, column)
         if self.pairs is None or not self.rows:
-            self.post_message(self.Said(self._left_out))
+            self.post_message(self.Described(self._left_out))
         elif self.pair is None:
-            self.post_message(self.Said(lines.pair_text(self.pairs, *self.place)))
+            self.post_message(self.Described(lines.pair_text(self.pairs, *self.place)))
         else:
-            found = self._slice(*self.place)
-            self.post_message(self.Said("" if found is None else lines.slice_text(found)))
+            slice_here = self._slice(*self.place)
+            self.post_message(self.Described("" if slice_here is None else lines.slice_text(slice_here)))
 
     def _show(self, place: tuple[int, int]) -> None:
         self.refresh_bindings()
@@ -134,5 +135,5 @@ class PairMap(HeatMap):
         return self.pairs.slice(one, other, row, row if one == other else column)
 
 
-def _square(found: Slice | None) -> Square:
-    return Square(None) if found is None else Square(found.covered, found.lower, found.upper)
+def _square(part: Slice | None) -> Square:
+    return Square(None) if part is None else Square(part.covered, part.lower, part.upper)

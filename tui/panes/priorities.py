@@ -16,10 +16,11 @@ from textual.widget import Widget
 from textual.widgets import Button, Input, OptionList, Select, Static
 from textual.widgets.option_list import Option
 
-from contextdb.edits import edits
-from contextdb.errors import ContextDBError, Fault, plural, shown
-from tui.messages import Edited, Told
-from tui.model.priorities import (
+from contextdb.authoring.selectors import set_selector
+from contextdb.errors import ContextDBError, Fault, plural, safe_text
+
+from ..messages import Edited, Notice
+from ..model.priorities import (
     EXAMPLE,
     DatabaseNow,
     Order,
@@ -30,10 +31,10 @@ from tui.model.priorities import (
     with_threshold,
     without_database,
 )
-from tui.model.sheet import Sheet
-from tui.panes.pane import Pane
-from tui.panes.rows_below import RowsBelow
-from tui.widgets.pick import Pick
+from ..model.sheet import Sheet
+from ..widgets.pick import Pick
+from .pane import Pane
+from .rows_below import RowsBelow
 
 NO_DATABASES = (
     "A database is a set of clips to search. A selector puts databases in order: the best frame of one wins outright when its cost "
@@ -97,7 +98,7 @@ class PrioritiesPane(Pane):
         with Vertical(id="priorities-foot"):
             with Vertical(id="priorities-entry"):
                 with Horizontal():
-                    yield Static(id="priorities-asked")
+                    yield Static(id="priorities-query")
                     yield Input(id="priorities-threshold", compact=True)
                     yield Pick[str]([], id="priorities-database", compact=True, prompt="pick a database")
                 yield Static(id="priorities-wrong")
@@ -108,7 +109,6 @@ class PrioritiesPane(Pane):
     # ---- show
 
     def on_mount(self) -> None:
-        """Show the selectors."""
         self.show()
 
     def on_show(self) -> None:
@@ -128,14 +128,14 @@ class PrioritiesPane(Pane):
         empty = self.query_one("#priorities-empty", Static)
         empty.display = is_empty
         empty.update(_faults(faults) if faults else _nothing_yet(list(self.sheet.table.schema.databases)))
-        self.query_one("#priorities-context", Static).update(self._asked_for())
+        self.query_one("#priorities-context", Static).update(self._query_line())
 
-    def _asked_for(self) -> Content:
+    def _query_line(self) -> Content:
         query = self.sheet.query
-        said = [f"{name} {text}" for name, text in query.texts.items() if text.strip()]
-        if not said:
+        facts = [f"{name} {text}" for name, text in query.texts.items() if text.strip()]
+        if not facts:
             return Content("The test row is empty, so every row counts as valid. Fill it in the tab Assets.")
-        return Content.assemble(("For the test row  ", ""), (", ".join(said), "bold"))
+        return Content.assemble(("For the test row  ", ""), (", ".join(facts), "bold"))
 
     def _show_list(self) -> None:
         listed = self.query_one("#priorities-list", OptionList)
@@ -167,9 +167,9 @@ class PrioritiesPane(Pane):
         self._show_detail()
 
     def _show_detail(self) -> None:
-        found = self._chosen()
-        self.query_one("#priorities-detail", Static).update(_detail(found[0].databases[found[1]]) if found else "")
-        self._show_rows(found[0].databases[found[1] :] if found else ())
+        chosen = self._chosen()
+        self.query_one("#priorities-detail", Static).update(_detail(chosen[0].databases[chosen[1]]) if chosen else "")
+        self._show_rows(chosen[0].databases[chosen[1] :] if chosen else ())
 
     def _show_rows(self, databases: Sequence[DatabaseNow]) -> None:
         """The rows of databases of this table, each database's valid ones first; of the others the cells that fail are marked."""
@@ -177,20 +177,20 @@ class PrioritiesPane(Pane):
         own = [one for one in databases if self.priorities.config.databases[one.name].table == table.settings.name]
         if own[:1] != list(databases[:1]):
             own = []
-        found: dict[int, str] = {}
+        database_of: dict[int, str] = {}
         for one in own:
             members = set(one.assets)
-            rows = [row for row, asset in enumerate(table.assets) if asset in members and row not in found]
-            found |= dict.fromkeys(sorted(rows, key=lambda row: not query.bits >> row & 1), one.name)
-        if not found:
+            rows = [row for row, asset in enumerate(table.assets) if asset in members and row not in database_of]
+            database_of |= dict.fromkeys(sorted(rows, key=lambda row: not query.bits >> row & 1), one.name)
+        if not database_of:
             below.show_none()
             return
-        rows, names = list(found), [column.condition.name for column in table.conditions]
+        rows, names = list(database_of), [column.condition.name for column in table.conditions]
         fails = np.nonzero(query.failing(rows))
         tones = {(rows[row], names[column]): "warning" for row, column in zip(*fails, strict=True)}
-        tones |= {(row, table.asset_column): "info" for row in rows if found[row] == own[0].name}
-        then = "".join(f", then of {shown(one.name)}" for one in own[1:])
-        below.show_rows(table, f"Rows of {shown(own[0].name)}{then}: the valid ones first", rows, tones)
+        tones |= {(row, table.asset_column): "info" for row in rows if database_of[row] == own[0].name}
+        then = "".join(f", then of {safe_text(one.name)}" for one in own[1:])
+        below.show_rows(table, f"Rows of {safe_text(own[0].name)}{then}: the valid ones first", rows, tones)
 
     def _chosen(self) -> tuple[SelectorNow, int] | None:
         """The selector and the place in it of the highlighted database."""
@@ -207,14 +207,14 @@ class PrioritiesPane(Pane):
 
     def action_threshold(self) -> None:
         """Ask for the threshold of the highlighted database."""
-        found = self._chosen()
-        if found is None:
+        chosen = self._chosen()
+        if chosen is None:
             return
-        selector, at = found
+        selector, at = chosen
         database = selector.databases[at]
         if database.threshold is None:
             self.post_message(
-                Told(f"{database.name} is the last: it has no threshold, as nothing follows that it could spare a search.")
+                Notice(f"{database.name} is the last: it has no threshold, as nothing follows that it could spare a search.")
             )
             return
         field = self.query_one("#priorities-threshold", Input)
@@ -230,47 +230,47 @@ class PrioritiesPane(Pane):
     @on(Input.Submitted)
     def _typed(self, event: Input.Submitted) -> None:
         event.stop()
-        found, value = self._chosen(), _cost(event.value)
-        if found is None:
+        chosen, value = self._chosen(), _cost(event.value)
+        if chosen is None:
             return
         if value is None:
             self._wrong("A cost is a number, such as 0.1.")
             return
-        selector, at = found
+        selector, at = chosen
         name = selector.databases[at].name
-        self._set(selector, with_threshold(selector.order, at, value), f"Set the threshold of {shown(name)}")
+        self._set(selector, with_threshold(selector.order, at, value), f"Set the threshold of {safe_text(name)}")
 
     def action_move(self, down: int) -> None:
         """Move the highlighted database up or down."""
-        found = self._chosen()
-        if found is None:
+        chosen = self._chosen()
+        if chosen is None:
             return
-        selector, at = found
+        selector, at = chosen
         name = selector.databases[at].name
-        if self._set(selector, moved(selector.order, at, down), f"Move {shown(name)} {'down' if down > 0 else 'up'}"):
+        if self._set(selector, moved(selector.order, at, down), f"Move {safe_text(name)} {'down' if down > 0 else 'up'}"):
             self._highlight(selector.name, name)
 
     def action_remove(self) -> None:
         """Take the highlighted database out of its selector."""
-        found = self._chosen()
-        if found is None:
+        chosen = self._chosen()
+        if chosen is None:
             return
-        selector, at = found
+        selector, at = chosen
         if len(selector.databases) == 1:
-            self.post_message(Told("A selector has at least one database.", "warning"))
+            self.post_message(Notice("A selector has at least one database.", "warning"))
             return
         name = selector.databases[at].name
-        self._set(selector, without_database(selector.order, at), f"Remove {shown(name)} from {shown(selector.name)}")
+        self._set(selector, without_database(selector.order, at), f"Remove {safe_text(name)} from {safe_text(selector.name)}")
 
     def action_add(self) -> None:
         """Ask for a database to put before the highlighted one."""
-        found = self._chosen()
-        if found is None:
+        chosen = self._chosen()
+        if chosen is None:
             return
-        unused = self.priorities.unused(found[0])
+        unused = self.priorities.unused(chosen[0])
         if not unused:
             self.post_message(
-                Told("Every database of the same features is in the selector already. Declare another in contextdb.toml.")
+                Notice("Every database of the same features is in the selector already. Declare another in contextdb.toml.")
             )
             return
         select = self.query_one("#priorities-database", Select)
@@ -282,11 +282,11 @@ class PrioritiesPane(Pane):
     @on(Select.Changed)
     def _picked(self, event: Select.Changed) -> None:
         event.stop()
-        found = self._chosen()
-        if found is None or event.select.is_blank():
+        chosen = self._chosen()
+        if chosen is None or event.select.is_blank():
             return
-        (selector, at), name = found, str(event.select.value)
-        if self._set(selector, with_database(selector.order, at, name), f"Add {shown(name)} to {shown(selector.name)}"):
+        (selector, at), name = chosen, str(event.select.value)
+        if self._set(selector, with_database(selector.order, at, name), f"Add {safe_text(name)} to {safe_text(selector.name)}"):
             self._highlight(selector.name, name)
             self.action_threshold()
 
@@ -307,8 +307,8 @@ class PrioritiesPane(Pane):
         self.query_one("#priorities-entry").remove_class("-open")
         self.query_one("#priorities-list").focus()
 
-    def _open(self, asked: str, control: Widget) -> None:
-        self.query_one("#priorities-asked", Static).update(Content(asked))
+    def _open(self, question: str, control: Widget) -> None:
+        self.query_one("#priorities-query", Static).update(Content(question))
         self._wrong("")
         for name in ("#priorities-threshold", "#priorities-database"):
             self.query_one(name).display = self.query_one(name) is control
@@ -320,7 +320,7 @@ class PrioritiesPane(Pane):
 
     def _set(self, selector: SelectorNow, order: Order, what: str) -> bool:
         try:
-            done = self.sheet.apply(edits.set_selector(self.sheet.table, selector.name, order, what))
+            done = self.sheet.apply(set_selector(self.sheet.table, selector.name, order, what))
         except ContextDBError as error:
             self._wrong(error.faults[0].message)
             return False
@@ -350,7 +350,7 @@ def _cost(text: str) -> float | None:
 
 
 def _width(selectors: list[SelectorNow]) -> int:
-    return min(max(len(shown(one.name)) for selector in selectors for one in selector.databases), 36)
+    return min(max(len(safe_text(one.name)) for selector in selectors for one in selector.databases), 36)
 
 
 def _line(n: int, database: DatabaseNow, width: int) -> Content:
@@ -358,15 +358,15 @@ def _line(n: int, database: DatabaseNow, width: int) -> Content:
     threshold = "searched last" if database.threshold is None else f"wins under {database.threshold:g}"
     count = f"{len(database.valid)} of {plural(len(database.assets), 'asset')} valid" if database.assets else "no assets"
     mark = "●" if database.valid else "○"
-    return Content(f"  {n + 1}  {shown(database.name, width):<{width}}  {threshold:<18}  {mark} {count}")
+    return Content(f"  {n + 1}  {safe_text(database.name, width):<{width}}  {threshold:<18}  {mark} {count}")
 
 
 def _detail(database: DatabaseNow) -> Content:
     """The valid assets of a database."""
     note = f"  ({database.note})" if database.note else ""
-    names = ", ".join(map(shown, database.valid[:60])) + (" …" if len(database.valid) > 60 else "")
-    said = names or ("no asset is valid now" if database.assets else "no assets")
-    return Content.assemble((f"{shown(database.name)}: ", "bold"), said, note)
+    names = ", ".join(map(safe_text, database.valid[:60])) + (" …" if len(database.valid) > 60 else "")
+    assets = names or ("no asset is valid now" if database.assets else "no assets")
+    return Content.assemble((f"{safe_text(database.name)}: ", "bold"), assets, note)
 
 
 def _nothing_yet(databases: list[str]) -> Content:

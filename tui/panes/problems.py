@@ -22,15 +22,16 @@ from contextdb.covering import Cancelled
 from contextdb.errors import Fault
 from contextdb.findings import LEVELS, Finding, Level
 from contextdb.tables.table import Table
-from tui.doing import SLOW, do
-from tui.messages import GoToCell, Told
-from tui.model.coverage_run import is_quick
-from tui.model.problems import WORDS, Problem, Problems, cell_findings, is_checked_at_once, row_findings
-from tui.model.sheet import Sheet
-from tui.panes.pane import Pane
-from tui.panes.rows_below import IN_TABLE, RowsBelow
-from tui.widgets.choice_line import ChoiceLine
-from tui.widgets.line_list import LineList, ListCell, ListColumn
+
+from ..doing import SLOW, do
+from ..messages import GoToCell, Notice
+from ..model.coverage_run import is_quick
+from ..model.problems import WORDS, Problem, Problems, cell_findings, is_checked_at_once, row_findings
+from ..model.sheet import Sheet
+from ..widgets.choice_line import ChoiceLine
+from ..widgets.line_list import LineList, ListCell, ListColumn
+from .pane import Pane
+from .rows_below import IN_TABLE, RowsBelow
 
 FILTERS: tuple[Level | None, ...] = (None, *LEVELS)
 NAMES = ("All", "Errors", "Warnings", "Information")
@@ -71,7 +72,7 @@ class ProblemsPane(Pane):
         """So much is known of a table; sent from another thread."""
 
         table: Table
-        found: list[Finding]
+        findings: list[Finding]
         is_all: bool
 
     def __init__(self, sheet: Sheet, *, id: str | None = None) -> None:  # noqa: A002
@@ -83,13 +84,12 @@ class ProblemsPane(Pane):
         """One line for all problems of a kind in a column."""
         self._of: tuple[Table, dict[str, Fault]] | None = None
         """The table and the faults of the test row that the problems are of."""
-        self._found: list[Finding] = []
+        self._findings: list[Finding] = []
         """What is known of that table."""
         self.is_all = False
         """Whether its rows were looked at too."""
 
     def compose(self) -> ComposeResult:
-        """The parts."""
         yield Static(id="problems-summary", markup=False)
         yield ChoiceLine(NAMES, id="problems-levels")
         columns = [
@@ -104,7 +104,6 @@ class ProblemsPane(Pane):
         yield RowsBelow(id="problems-rows")
 
     def on_mount(self) -> None:
-        """Check what there is."""
         self.show()
 
     def show(self) -> None:
@@ -117,42 +116,42 @@ class ProblemsPane(Pane):
         if is_same:  # only the test row is another one
             self._fill()
             return
-        self._found, self.is_all = [], False
+        self._findings, self.is_all = [], False
         if is_checked_at_once(table):
-            self._found = cell_findings(table)
+            self._findings = cell_findings(table)
         if is_quick(table):
-            self._found, self.is_all = [*self._found, *row_findings(table)], True
+            self._findings, self.is_all = [*self._findings, *row_findings(table)], True
         self._fill()
         if not self.is_all:
-            self.run_worker(lambda: self._check(table, list(self._found)), thread=True, exclusive=True, group="check")
+            self.run_worker(lambda: self._check(table, list(self._findings)), thread=True, exclusive=True, group="check")
 
-    def _check(self, table: Table, found: list[Finding]) -> None:
+    def _check(self, table: Table, findings: list[Finding]) -> None:
         if not is_checked_at_once(table):
-            found = cell_findings(table)
-            self.post_message(self.Checked(table, found, False))
+            findings = cell_findings(table)
+            self.post_message(self.Checked(table, findings, False))
         worker = get_current_worker()
         try:
             rows = row_findings(table, lambda: worker.is_cancelled)
         except Cancelled:  # the table was changed, or the editor is left
             return
-        self.post_message(self.Checked(table, [*found, *rows], True))
+        self.post_message(self.Checked(table, [*findings, *rows], True))
 
     @on(Checked)
     def _checked(self, event: Checked) -> None:
         event.stop()
         if self._of is not None and event.table is self._of[0]:
-            self._found, self.is_all = event.found, event.is_all
+            self._findings, self.is_all = event.findings, event.is_all
             self._fill()
 
     def _fill(self) -> None:
         assert self._of is not None
-        self.problems = Problems.of(self._found, self._of[1])
+        self.problems = Problems.of(self._findings, self._of[1])
         self._show_all()
 
     def _show_all(self) -> None:
-        said = [self.problems.summary] if self.is_all or self.problems.items else []
-        said += [] if self.is_all else ["Looking at the rows …" if self._found else "Checking …"]
-        self.query_one("#problems-summary", Static).update(" ".join(said))
+        parts = [self.problems.summary] if self.is_all or self.problems.items else []
+        parts += [] if self.is_all else ["Looking at the rows …" if self._findings else "Checking …"]
+        self.query_one("#problems-summary", Static).update(" ".join(parts))
         self._show_lines(keep=True)
 
     def _show_lines(self, keep: bool = False) -> None:
@@ -160,9 +159,9 @@ class ProblemsPane(Pane):
         numbers = [len(self.problems.items), *counts.values()]
         labels = [f"{at + 1} {name} {_count(numbers[at], self.is_all)}" for at, name in enumerate(NAMES)]
         self.query_one(ChoiceLine).show(labels, FILTERS.index(self.level))
-        shown = self.query_one(LineList)
-        shown.say_empty("Nothing." if self.is_all else "Still checking …")
-        shown.show(len(lines), lambda at: _line(lines[at]), shown.index if keep else 0)
+        list_widget = self.query_one(LineList)
+        list_widget.say_empty("Nothing." if self.is_all else "Still checking …")
+        list_widget.show(len(lines), lambda at: _line(lines[at]), list_widget.index if keep else 0)
 
     @property
     def lines(self) -> Sequence[Problem]:
@@ -176,12 +175,10 @@ class ProblemsPane(Pane):
     # ---- what can be done
 
     def action_filter(self, at: int) -> None:
-        """Show one level only."""
         self.level = FILTERS[at]
         self._show_lines()
 
     def action_turn(self, step: int) -> None:
-        """Show the level beside."""
         self.action_filter((FILTERS.index(self.level) + step) % len(FILTERS))
 
     def action_group(self) -> None:
@@ -195,13 +192,12 @@ class ProblemsPane(Pane):
         problem = lines[at] if 0 <= at < len(lines) else None
         names = [column.name for column in self.sheet.table.columns]
         if problem is None or problem.row is None or problem.column not in names or problem.is_of_test_row:
-            self.post_message(Told("Only cells that cannot be read are mended here.", "warning"))
+            self.post_message(Notice("Only cells that cannot be read are mended here.", "warning"))
             return
         self.sheet.go(self.sheet.cursor[0], names.index(problem.column))
         do(self, self.sheet, self.sheet.mend_all, SLOW * self.sheet.n_unread)
 
     def action_check(self) -> None:
-        """Check again."""
         self._of = None
         self.show()
 
@@ -242,11 +238,11 @@ class ProblemsPane(Pane):
         if problem.row is not None and problem.row < self.sheet.table.n_rows:
             self.post_message(GoToCell(problem.row, problem.column))
         elif problem.is_of_test_row:
-            self.post_message(Told(f'Correct the fact "{problem.column}" in the test row, at the bottom of the grid.'))
+            self.post_message(Notice(f'Correct the fact "{problem.column}" in the test row, at the bottom of the grid.'))
         elif problem.is_of_cases:
-            self.post_message(Told("That is about a saved context: F9 lists them."))
+            self.post_message(Notice("That is about a saved context: F9 lists them."))
         else:
-            self.post_message(Told("That is about the whole table, not about a cell."))
+            self.post_message(Notice("That is about the whole table, not about a cell."))
 
 
 def _count(n: int, is_all: bool) -> str:

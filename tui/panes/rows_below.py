@@ -11,9 +11,10 @@ from textual import on
 from textual.binding import Binding, BindingType
 
 from contextdb.tables.table import Table
-from tui.messages import GoToCell
-from tui.model.coverage_lines import short_name
-from tui.widgets.line_list import LineList, ListCell, ListColumn
+
+from ..messages import GoToCell
+from ..model.coverage_lines import short_name
+from ..widgets.line_list import LineList, ListCell, ListColumn
 
 MOST = 100
 """So many rows are looked at for the widths of their columns, and are listed where they are ranked."""
@@ -35,7 +36,7 @@ class RowsBelow(LineList):
 
     def __init__(self, *, id: str | None = None) -> None:  # noqa: A002
         super().__init__([], id=id)
-        self._shown: tuple[Table, str, Sequence[int], Mapping[tuple[int, str], str], int, str | None] | None = None
+        self._displayed: tuple[Table, str, Sequence[int], Mapping[tuple[int, str], str], int, str | None] | None = None
 
     def show_rows(
         self,
@@ -49,7 +50,7 @@ class RowsBelow(LineList):
         """Show rows of a table, the one at a place chosen. Cells have a tone by row and column; `column` is seen in any case."""
         self.border_title = title
         self.set_class(bool(rows), "-filled")
-        self._shown = table, title, rows, tones or {}, at, column
+        self._displayed = table, title, rows, tones or {}, at, column
         self._lay_out()
 
     def show_compared(self, table: Table, rows: Sequence[int], tones: Mapping[tuple[int, str], str], column: str | None) -> None:
@@ -63,7 +64,7 @@ class RowsBelow(LineList):
 
     def show_none(self) -> None:
         """There are no rows to show."""
-        self._shown = None
+        self._displayed = None
         self.remove_class("-filled")
 
     def on_resize(self) -> None:
@@ -71,9 +72,9 @@ class RowsBelow(LineList):
         self._lay_out()
 
     def _lay_out(self) -> None:
-        if self._shown is None or not self.size.width:
+        if self._displayed is None or not self.size.width:
             return
-        table, _, rows, tones, at, column = self._shown
+        table, _, rows, tones, at, column = self._displayed
         sample = rows[max(0, at - MOST // 2) : max(0, at - MOST // 2) + MOST]
         names, widths = _columns(table, sample, self.size.width - len("▸ ") - 7, column)
         titles = [name if cell_len(name) <= width else short_name(name) for name, width in zip(names, widths, strict=True)]
@@ -93,8 +94,8 @@ class RowsBelow(LineList):
     @on(LineList.Chosen)
     def _go_to(self, event: LineList.Chosen) -> None:
         event.stop()
-        if self._shown is not None:
-            self.post_message(GoToCell(self._shown[2][event.index], self._shown[5]))
+        if self._displayed is not None:
+            self.post_message(GoToCell(self._displayed[2][event.index], self._displayed[5]))
 
 
 def _columns(table: Table, rows: Sequence[int], room: int, column: str | None) -> tuple[list[str], list[int]]:

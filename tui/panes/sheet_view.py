@@ -7,16 +7,16 @@ from dataclasses import replace
 
 from textual import on
 
-from tui.doing import SLOW, do
-from tui.messages import Told, ValueRenameWanted
-from tui.model.columns_shown import prefix_of
-from tui.model.problems import findings_at_once
-from tui.model.sheet import Done, Sheet
-from tui.model.views import CellTest, Filter, Sort
-from tui.panes.pane import Pane
-from tui.screens.ask import AskDialog
-from tui.widgets.find_bar import FilterBar, SheetBar
-from tui.widgets.grid import Grid
+from ..doing import SLOW, do
+from ..messages import Notice, ValueRenameWanted
+from ..model.problems import findings_at_once
+from ..model.sheet import Done, Sheet
+from ..model.views import CellTest, Filter, Sort
+from ..model.visible_columns import prefix_of
+from ..screens.ask import AskDialog
+from ..widgets.find_bar import FilterBar, SheetBar
+from ..widgets.grid import Grid
+from .pane import Pane
 
 
 class SheetView(Pane):
@@ -30,7 +30,6 @@ class SheetView(Pane):
 
     @property
     def grid(self) -> Grid:
-        """The grid."""
         return self.query_one(Grid)
 
     def _try(self, verb: Callable[[], Done], n_cells: int = 0, then: Callable[[], None] = lambda: None) -> None:
@@ -47,7 +46,7 @@ class SheetView(Pane):
 
     def action_values(self) -> None:
         """What the cursor's column holds, and what to do with it."""
-        from tui.screens.column_values import ValuesAnswer, ValuesDialog
+        from ..screens.column_values import ValuesAnswer, ValuesDialog
 
         column = self.sheet.selection.column
 
@@ -93,13 +92,11 @@ class SheetView(Pane):
         self.app.push_screen(AskDialog("Rename the value" if is_rename else "Replace everywhere", what, old, lambda _: ""), named)
 
     def action_hide_columns(self) -> None:
-        """Hide the selected columns."""
         self.sheet.hide_columns()
         self._show_columns("Alt+J shows all columns, and brings hidden ones back.")
 
     def action_show_columns(self) -> None:
-        """Show every column again."""
-        self.sheet.show_columns(replace(self.sheet.columns_shown, hidden=frozenset(), folded=frozenset()))
+        self.sheet.show_columns(replace(self.sheet.visible_columns, hidden=frozenset(), folded=frozenset()))
         self._show_columns("Every column is shown.")
 
     def action_fold(self) -> None:
@@ -107,27 +104,29 @@ class SheetView(Pane):
         name = self.sheet.table.columns[self.sheet.selection.column].name
         prefix = prefix_of(name)
         if prefix is None:
-            self.post_message(Told(f"{name} has no prefix: columns such as Defender.DepthChart are grouped by theirs.", "warning"))
+            self.post_message(
+                Notice(f"{name} has no prefix: columns such as Defender.DepthChart are grouped by theirs.", "warning")
+            )
             return
-        self.sheet.show_columns(self.sheet.columns_shown.folded_at(name))
-        is_folded = prefix in self.sheet.columns_shown.folded
+        self.sheet.show_columns(self.sheet.visible_columns.folded_at(name))
+        is_folded = prefix in self.sheet.visible_columns.folded
         self._show_columns(f"The columns of {prefix} are {'folded' if is_folded else 'open again'}.")
 
     def action_freeze(self) -> None:
         """Let the columns up to the cursor's never scroll; only the assets where that is so already."""
-        name, now = self.sheet.table.columns[self.sheet.selection.column].name, self.sheet.columns_shown
+        name, now = self.sheet.table.columns[self.sheet.selection.column].name, self.sheet.visible_columns
         frozen = None if now.frozen == name else name
         self.sheet.show_columns(replace(now, frozen=frozen))
         self._show_columns(f"The columns up to {frozen} do not scroll." if frozen else "Only the assets do not scroll.")
 
     def action_columns(self) -> None:
         """All columns in a list: go to one, hide, fold, freeze."""
-        from tui.screens.columns import ColumnsAnswer, ColumnsDialog
+        from ..screens.columns import ColumnsAnswer, ColumnsDialog
 
         def decided(answer: ColumnsAnswer | None) -> None:
             if answer is None:
                 return
-            self.sheet.show_columns(answer.shown)
+            self.sheet.show_columns(answer.columns)
             if answer.column is not None:
                 self.go_to_column(answer.column)
             self._show_columns("")
@@ -137,23 +136,23 @@ class SheetView(Pane):
         self.app.push_screen(ColumnsDialog(self.sheet), decided)
 
     def go_to_column(self, name: str) -> None:
-        """Put the cursor on a column, which is shown if it was hidden."""
+        """Put the cursor on a column, which is displayed if it was hidden."""
         names = [c.name for c in self.sheet.table.columns]
-        self.sheet.show_columns(self.sheet.columns_shown.revealed(name))
+        self.sheet.show_columns(self.sheet.visible_columns.revealed(name))
         self.grid.is_in_test_row = False
         self.grid.changed()
         self.grid.moving(lambda: self.sheet.go(self.sheet.cursor[0], names.index(name)))
 
-    def _show_columns(self, said: str) -> None:
+    def _show_columns(self, message: str) -> None:
         self.show()
         self.grid.post_message(Grid.Moved())
-        self.post_message(Told(said))
+        self.post_message(Notice(message))
 
     def action_unfilter(self, at: int = -1) -> None:
-        """Take one part off the filter; the last one unless another is said."""
+        """Take one part off the filter; the last one unless another is named."""
         parts = self.sheet.filter.parts
         if not parts:
-            self.post_message(Told("Every row is shown."))
+            self.post_message(Notice("Every row is shown."))
         elif -len(parts) <= at < len(parts):
             self.query_one(FilterBar).clear_text()
             self._show_filtered(parts[at][1])
@@ -170,7 +169,6 @@ class SheetView(Pane):
         self.grid.post_message(Grid.Moved())
 
     def action_show_all(self) -> None:
-        """Remove the filter."""
         self.query_one(FilterBar).clear()
         self._show_filtered(Filter())
 
@@ -203,7 +201,7 @@ class SheetView(Pane):
         self.grid.focus()
 
     def action_sort_file(self) -> None:
-        """Put the file's rows in the order that is shown."""
+        """Put the file's rows in the order that is displayed."""
         sort = self.sheet.sort
         if sort is None:
             name = self.sheet.table.columns[self.sheet.selection.column].name

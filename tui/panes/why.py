@@ -11,9 +11,9 @@ from textual.strip import Strip
 from textual.style import Style
 from textual.visual import Visual
 
-from tui.model.shown import ShownTable
-from tui.model.why import CellWhy, RowWhy, why_row
-from tui.screens.nearest import STATES, row_state
+from ..model.displayed_table import DisplayedTable
+from ..model.why import CellWhy, RowWhy, why_row
+from ..screens.nearest import STATES, row_state
 
 WIDE = 140
 """The pane stands beside the table on screens of so many columns; on others F12 opens a dialog."""
@@ -35,25 +35,24 @@ class WhyPane(ScrollView, can_focus=False):
 
     def __init__(self) -> None:
         super().__init__()
-        self._waiting: ShownTable | None = None
-        """What is shown when its time comes."""
-        self._said: list[Content] = []
+        self._waiting: DisplayedTable | None = None
+        """What is displayed when its time comes."""
+        self._lines_of_why: list[Content] = []
         self._strips: list[Strip] = []
         self._wrapped: dict[tuple[str, tuple[Span, ...]], list[Strip]] = {}
-        """What is said in the lines that it takes, so wide and in such colours."""
+        """The text of the lines that it takes, so wide and in such colours."""
         self._wrapped_for: tuple[int, Style] | None = None
 
     @property
     def is_open(self) -> bool:
-        """Whether it is seen."""
         return self.has_class("-open")
 
-    def turn(self, sheet: ShownTable) -> None:
+    def turn(self, sheet: DisplayedTable) -> None:
         """Open it, or close it."""
         self.toggle_class("-open")
         self.follow(sheet)
 
-    def follow_soon(self, sheet: ShownTable) -> None:
+    def follow_soon(self, sheet: DisplayedTable) -> None:
         """Show the row of the cursor, a few times a second."""
         if self.is_open and self._waiting is None:
             self.set_timer(OFTEN_S, self._follow_now)
@@ -64,17 +63,17 @@ class WhyPane(ScrollView, can_focus=False):
         if waiting is not None:
             self.follow(waiting)
 
-    def follow(self, sheet: ShownTable) -> None:
+    def follow(self, sheet: DisplayedTable) -> None:
         """Show the row of the cursor."""
         if not self.is_open:
             return
         if sheet.query.is_empty or not len(sheet.view):
-            self._said = [Content(NO_FACTS if sheet.query.is_empty else "No row is shown.")]
+            self._lines_of_why = [Content(NO_FACTS if sheet.query.is_empty else "No row is shown.")]
         else:
             row = int(sheet.view.rows[sheet.cursor[0]])
             why, outputs = why_row(sheet.query, sheet.table, row), sheet.table.settings.outputs
             gives = [f"{name} = {sheet.table.text(row, name) or '–'}" for name in outputs] if why.is_picked else []
-            self._said = _said(why, gives)
+            self._lines_of_why = _why_lines(why, gives)
         self._show()
 
     def on_resize(self) -> None:
@@ -103,23 +102,23 @@ class WhyPane(ScrollView, can_focus=False):
         if self._wrapped_for != (width, style):
             self._wrapped_for, self._wrapped, self._strips = (width, style), {}, []
         before, self._wrapped = self._wrapped, {}
-        for one in self._said:
+        for one in self._lines_of_why:
             of = one.plain, tuple(one.spans)
             self._wrapped[of] = before.get(of) or self._wrapped.get(of) or Visual.to_strips(self, one, width, None, style)
-        return [strip for one in self._said for strip in self._wrapped[one.plain, tuple(one.spans)]]
+        return [strip for one in self._lines_of_why for strip in self._wrapped[one.plain, tuple(one.spans)]]
 
     def render_line(self, y: int) -> Strip:
         y += self.scroll_offset.y
         return self._strips[y] if y < len(self._strips) else Strip.blank(self.size.width, self.visual_style.rich_style)
 
 
-def _said(why: RowWhy, gives: Sequence[str]) -> list[Content]:
+def _why_lines(why: RowWhy, gives: Sequence[str]) -> list[Content]:
     """A row in full: what it gives where it may be picked, the cells that matter, those that hold in few words."""
     lines = [Content.styled(row_state(why), "bold"), Content("")]
     lines += [Content(f"gives {', '.join(gives)}"), Content("")] if gives else []
     for cell in why.cells:
         if cell.is_wrong or cell.state == "open":
-            lines += _told(cell)
+            lines += _cell_lines(cell)
     holds = [cell.column for cell in why.cells if cell.state == "holds"]
     missing = [cell.column for cell in why.cells if cell.state == "not given"]
     lines += [Content.styled(f"✓ {', '.join(holds)}", "$text-muted"), Content("")] if holds else []
@@ -128,7 +127,7 @@ def _said(why: RowWhy, gives: Sequence[str]) -> list[Content]:
     return lines
 
 
-def _told(cell: CellWhy) -> list[Content]:
+def _cell_lines(cell: CellWhy) -> list[Content]:
     sign, tone = STATES[cell.state]
     lines = [Content.styled(f"{sign.split()[0]} {cell.column}", f"$text-{tone}" if tone else "")]
     lines.append(Content(f"  is {cell.fact or '–'}; the cell says {cell.cell or 'Any'}"))

@@ -11,10 +11,11 @@ from textual.widgets import Static
 
 from contextdb.errors import ContextDBError, plural
 from contextdb.tables.table import Table
-from tui.clipboard import Clipboard
-from tui.model.teams import NAME, Teams, TeamSheet, teams_path
-from tui.screens.sheet_dialog import SheetDialog, SmallGrid
-from tui.widgets.choice_line import ChoiceLine
+
+from ..clipboard import Clipboard
+from ..model.teams import NAME, Teams, TeamSheet, teams_path
+from ..widgets.choice_line import ChoiceLine
+from .sheet_dialog import SheetDialog, SmallGrid
 
 ABOUT = "One actor a row, one fact a column. A row of the table is valid when its roles can be filled by different actors."
 
@@ -47,11 +48,10 @@ class ActorsDialog(SheetDialog[Teams]):
         yield Static(ABOUT, classes="sheet--about")
         yield ChoiceLine((), id="actors-roles")
         yield SmallGrid(self.sheet)
-        yield Static(classes="sheet--said")
+        yield Static(classes="sheet--message")
         yield Static(classes="sheet--keys")
 
     def on_mount(self) -> None:
-        """Show the first role."""
         keys = [("save", "Ctrl+S Save")] * (teams_path(self.table) is not None)
         keys += [("turn(1)", "Alt+→ Next role")] * (len(self.teams.sheets) > 1)
         keys += [("clear", "Alt+X No actors"), ("done", "Esc Done")]
@@ -59,19 +59,18 @@ class ActorsDialog(SheetDialog[Teams]):
         self.grid.focus()
         self.show_sheet()
 
-    def show_sheet(self, said: str = "") -> None:
+    def show_sheet(self, message: str = "") -> None:
         """Show the actors, and what is wrong with them."""
         sheets = self.teams.sheets
         labels = [f"{role} {len(sheet.texts)}" for role, sheet in sheets.items()]
         self.query_one(ChoiceLine).show(labels, list(sheets).index(self.role))
         faults = self.teams.faults
         more = f" ({plural(len(faults) - 1, 'fault')} more)" if len(faults) > 1 else ""
-        super().show_sheet(f"! {faults[0]}{more}" if faults else said)
+        super().show_sheet(f"! {faults[0]}{more}" if faults else message)
 
     # ---- roles
 
     def action_turn(self, by: int) -> None:
-        """The role beside."""
         roles = list(self.teams.sheets)
         self._turn_to(roles[(roles.index(self.role) + by) % len(roles)])
 
@@ -108,7 +107,6 @@ class ActorsDialog(SheetDialog[Teams]):
 
     @on(SmallGrid.Left)
     def action_done(self) -> None:
-        """Give the teams back."""
         self.dismiss(self.teams)
 
     def action_cancel(self) -> None:

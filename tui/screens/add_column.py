@@ -6,7 +6,7 @@ or goes on to what a new column is; F6 inserts from every field.
 
 from __future__ import annotations
 
-from typing import ClassVar, cast, get_args
+from typing import ClassVar
 
 from textual import on
 from textual.app import ComposeResult
@@ -17,16 +17,17 @@ from textual.widgets import Button, Input, OptionList, Select, Static
 from textual.widgets.option_list import Option
 
 from contextdb.cells.kinds import KINDS
-from contextdb.edits.edits import Job
-from contextdb.errors import shown
+from contextdb.edits.edits import JOBS
+from contextdb.errors import safe_text
 from contextdb.schema.sections import has_place
 from contextdb.tables.table import Table
-from tui.model.column_choices import JOB_NAMES, JOB_WORDS, Choice, Insertion, NewColumnForm, choices, places
-from tui.model.condition_form import ConditionForm
-from tui.model.layout import cut_middle
-from tui.screens.dialog import Dialog
-from tui.widgets.field import Field
-from tui.widgets.pick import Pick
+
+from ..model.column_choices import JOB_NAMES, JOB_WORDS, Choice, Insertion, NewColumnForm, choices, places
+from ..model.condition_form import ConditionForm
+from ..model.layout import cut_middle
+from ..widgets.field import Field
+from ..widgets.pick import Pick
+from .dialog import Dialog
 
 _TYPED = {"min": "Least", "max": "Most", "unit": "Unit", "values": "Values", "description": "Description"}
 
@@ -64,7 +65,7 @@ class AddColumn(Dialog[Insertion]):
         super().__init__()
         self.table = table
         self.places = places(table, column)
-        self.found: list[Choice | None] = []
+        self.matching: list[Choice | None] = []
         """What the lines of the list are; None: a new column of the typed name."""
 
     def compose_body(self) -> ComposeResult:
@@ -92,7 +93,6 @@ class AddColumn(Dialog[Insertion]):
             yield Button("Cancel", compact=True, id="column-cancel")
 
     def on_mount(self) -> None:
-        """Show all there is."""
         self._filter()
         self.query_one("#column-name").focus()
 
@@ -101,18 +101,18 @@ class AddColumn(Dialog[Insertion]):
     @on(Input.Changed, "#column-name")
     def _filter(self) -> None:
         text = self.query_one("#column-name", Input).value
-        found = choices(self.table, text)
-        is_new = bool(text.strip()) and all(c.is_blueprint or c.name != text.strip() for c in found)
-        self.found = [*found, *([None] if is_new or not found else [])]
+        matching = choices(self.table, text)
+        is_new = bool(text.strip()) and all(c.is_blueprint or c.name != text.strip() for c in matching)
+        self.matching = [*matching, *([None] if is_new or not matching else [])]
         listed = self.query_one("#column-list", OptionList)
         listed.clear_options()
-        listed.add_options([Option(_line(choice, text.strip(), self._width)) for choice in self.found])
+        listed.add_options([Option(_line(choice, text.strip(), self._width)) for choice in self.matching])
         listed.highlighted = 0
         self._show_form()
 
     @property
     def _width(self) -> int:
-        return min(max((len(shown(c.name)) for c in self.found if c), default=8), 30)
+        return min(max((len(safe_text(c.name)) for c in self.matching if c), default=8), 30)
 
     @on(OptionList.OptionHighlighted)
     def _show_form(self) -> None:
@@ -127,7 +127,7 @@ class AddColumn(Dialog[Insertion]):
 
     def _choice(self) -> Choice | None:
         at = self.query_one("#column-list", OptionList).highlighted
-        return self.found[at] if at is not None and at < len(self.found) else None
+        return self.matching[at] if at is not None and at < len(self.matching) else None
 
     def action_highlight(self, down: int) -> None:
         """Go through the list from the field of the name; elsewhere from field to field."""
@@ -154,8 +154,8 @@ class AddColumn(Dialog[Insertion]):
         name, low, high, unit, values, description = (self.query_one(f"#column-{key}", Input).value for key in ("name", *_TYPED))
         condition = ConditionForm(self._picked("type"), low, high, unit, values, description)
         job = self._picked("job")
-        assert job in get_args(Job)
-        return NewColumnForm(name, cast(Job, job), condition)
+        assert job in JOBS
+        return NewColumnForm(name, job, condition)
 
     # ---- the answer
 
@@ -183,7 +183,7 @@ class AddColumn(Dialog[Insertion]):
             self.action_cancel()
 
     def action_insert(self) -> None:
-        """Give back what to insert, unless something is wrong with it: that is shown then."""
+        """Give back what to insert, unless something is wrong with it: that is displayed then."""
         at = int(str(self.query_one("#column-where", Select).value))
         choice = self._choice()
         if choice is not None:
@@ -204,6 +204,6 @@ class AddColumn(Dialog[Insertion]):
 def _line(choice: Choice | None, text: str, width: int) -> Content:
     """A line of the list."""
     if choice is None:
-        return Content(f'+ New column "{shown(text)}"' if text else "+ New column: type its name")
-    name = cut_middle(shown(choice.name), width)
+        return Content(f'+ New column "{safe_text(text)}"' if text else "+ New column: type its name")
+    name = cut_middle(safe_text(choice.name), width)
     return Content.assemble((name, "bold"), f"  {'blueprint, ' if choice.is_blueprint else ''}{choice.about}")

@@ -1,4 +1,4 @@
-"""Small dialogs: ask for a line of text, or let one choose from a list."""
+"""Small dialogs: ask for a line of text, let one choose from a list, or ask a question with an answer on each key."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from textual.binding import Binding, BindingType
 from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
-from tui.screens.dialog import Dialog
+from ..widgets.cursor_lines import UP_DOWN
+from .dialog import Answer, Dialog, buttons
 
 
 class AskDialog(Dialog[str]):
@@ -55,8 +56,7 @@ class ChooseDialog(Dialog[int]):
     ChooseDialog OptionList { height: auto; max-height: 60vh; border: none; background: $surface; margin-top: 1; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("up", "move(-1)", "Up", show=False),
-        Binding("down", "move(1)", "Down", show=False),
+        *UP_DOWN,
         Binding("pageup", "move(-10)", "Page up", show=False),
         Binding("pagedown", "move(10)", "Page down", show=False),
     ]
@@ -82,10 +82,10 @@ class ChooseDialog(Dialog[int]):
     def _show(self, word: str, chosen: int | None = None) -> None:
         options = self.query_one(OptionList)
         options.clear_options()
-        found = [i for i, line in enumerate(self._lines) if word.casefold() in line.casefold()]
-        options.add_options([Option(Text(self._lines[i]), id=str(i)) for i in found])
-        if found:
-            options.highlighted = found.index(chosen) if chosen in found else 0
+        matching = [i for i, line in enumerate(self._lines) if word.casefold() in line.casefold()]
+        options.add_options([Option(Text(self._lines[i]), id=str(i)) for i in matching])
+        if matching:
+            options.highlighted = matching.index(chosen) if chosen in matching else 0
 
     def action_move(self, by: int) -> None:
         """Up and down, while one types."""
@@ -109,3 +109,49 @@ class ChooseDialog(Dialog[int]):
 
     def _take(self, option: Option) -> None:
         self.dismiss(int(option.id or 0))
+
+
+class StepsDialog(ChooseDialog):
+    """The undo history: every step by its name, where one is, and what is on the disk. Gives how many steps shall lie behind."""
+
+    keys_text = "↑↓ choose · Enter go there · Esc cancel"
+
+    def __init__(self, names: Sequence[str], position: int) -> None:
+        texts = ["the table as it was opened", *names]
+        lines = [f"{_sign(i, position)} {i:>4}  {text}" for i, text in enumerate(texts)]
+        super().__init__("Undo history", lines, position, about="▶ where the table is · ↷ undone")
+
+
+def _sign(step: int, position: int) -> str:
+    if step == position:
+        return "▶"
+    return " " if step < position else "↷"
+
+
+class Question(Dialog[Answer]):
+    """A text, and its answers to click; children bind the keys of `answer(...)`."""
+
+    def __init__(self, title: str, text: str, answers: Sequence[tuple[str, str]]) -> None:
+        """`answers` are actions of the screen with their labels."""
+        super().__init__()
+        self.title_text, self._text, self._answers = title, text, answers
+
+    def compose_body(self) -> ComposeResult:
+        yield Static(Text(f"{self._text}\n"))
+        yield Static(buttons(self._answers))
+
+    def action_answer(self, answer: Answer) -> None:
+        self.dismiss(answer)
+
+
+class SureDialog(Question[bool]):
+    """A question before something is lost."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("y,enter", "answer(True)", "Yes"),
+        Binding("n", "answer(False)", "No"),
+    ]
+    keys_text = "Enter yes · Esc no"
+
+    def __init__(self, title: str, question: str) -> None:
+        super().__init__(title, question, [("answer(True)", "Yes"), ("answer(False)", "No")])

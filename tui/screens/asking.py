@@ -9,14 +9,15 @@ from textual.app import App
 from contextdb.edits.edits import set_cells
 from contextdb.tables.changes import Edit
 from contextdb.tables.table import Table
-from tui.clipboard import Clipboard
-from tui.messages import GoToCell, SetContext
-from tui.model.context_list import ContextList
-from tui.model.session import Session
-from tui.model.teams import Teams, roles_of
-from tui.screens.actors import ActorsDialog
-from tui.screens.contexts import ContextsDialog, Loaded
-from tui.screens.nearest import CellAnswer, NearestDialog
+
+from ..clipboard import Clipboard
+from ..messages import GoToCell, SetContext
+from ..model.context_list import ContextList
+from ..model.session import Session
+from ..model.teams import Teams, roles_of
+from .actors import ActorsDialog
+from .contexts import ContextsDialog, Loaded
+from .nearest import CellAnswer, NearestDialog
 
 
 class Valid(Protocol):

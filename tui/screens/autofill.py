@@ -19,14 +19,15 @@ from textual.content import Content
 from textual.widgets import Static
 from textual.worker import Worker, get_current_worker
 
-from contextdb.edits.described_table import ClipRows, Difference, Filling, filling, rows_for
+from contextdb.authoring.clip_folder import Tell
+from contextdb.authoring.described_table import ClipRows, Difference, Filling, filling, rows_for
 from contextdb.errors import ContextDBError, plural, some
-from contextdb.tables.clip_folder import Tell
 from contextdb.tables.table import Table
-from tui.model.clip_cells import ClipCells
-from tui.model.sheet import Done, Sheet
-from tui.screens.dialog import Dialog
-from tui.widgets.line_list import LineList, ListCell, ListColumn
+
+from ..model.clip_cells import ClipCells
+from ..model.sheet import Done, Sheet
+from ..widgets.line_list import LineList, ListCell, ListColumn
+from .dialog import Dialog
 
 
 class Stopped(Exception):
@@ -92,7 +93,7 @@ class AutofillDialog(Dialog[Autofill]):
     }
     """
     title_text = "Autofill from clips"
-    keys_text = "↑↓ · Enter only empty cells · A what differs, too · Esc cancel"
+    keys_text = "↑↓ · Enter fill empty cells · A also cells that differ · Esc cancel"
 
     def __init__(self, table: Table, folder: Path) -> None:
         """`folder` is that of contextdb.toml."""
@@ -115,7 +116,6 @@ class AutofillDialog(Dialog[Autofill]):
         yield Static(id="autofill-detail", markup=False)
 
     def on_mount(self) -> None:
-        """Begin to read."""
         self.query_one(LineList).focus()
         self._worker = self._describe()
 
@@ -130,13 +130,13 @@ class AutofillDialog(Dialog[Autofill]):
     def _describe(self) -> None:
         worker = get_current_worker()
         try:
-            found: ClipRows | ContextDBError = rows_for(self.folder, self.table.path, lambda label: self._telling(label, worker))
+            result: ClipRows | ContextDBError = rows_for(self.folder, self.table.path, lambda label: self._telling(label, worker))
         except Stopped:
             return
         except ContextDBError as error:
-            found = error
+            result = error
         if not worker.is_cancelled:
-            self.app.call_from_thread(self._take, found)
+            self.app.call_from_thread(self._take, result)
 
     @contextmanager
     def _telling(self, label: str, worker: Worker[None]) -> Iterator[Tell]:
@@ -150,18 +150,18 @@ class AutofillDialog(Dialog[Autofill]):
     def _about(self, text: str) -> None:
         self.query_one("#autofill-about", Static).update(text)
 
-    def _take(self, found: ClipRows | ContextDBError) -> None:
-        if isinstance(found, ContextDBError):
-            self.query_one("#autofill-about", Static).update(Content.styled(f"✗ {found}", "$text-error"))
+    def _take(self, result: ClipRows | ContextDBError) -> None:
+        if isinstance(result, ContextDBError):
+            self.query_one("#autofill-about", Static).update(Content.styled(f"✗ {result}", "$text-error"))
             self.query_one(LineList).display = False
             self.query_one("#dialog").border_subtitle = "Esc close"
             self.add_class("-refused")
             return
-        self.clips = found
-        fills = filling(self.table, found.rows)
+        self.clips = result
+        fills = filling(self.table, result.rows)
         self.lines = list(_lines(fills))
         self._about(_summary(fills))
-        self.query_one("#autofill-detail", Static).update("\n".join(_notes(found, fills)))
+        self.query_one("#autofill-detail", Static).update("\n".join(_notes(result, fills)))
         self.query_one(LineList).show(len(self.lines), lambda at: _cells(self.lines[at]), 0)
 
     # ---- the answer
@@ -198,8 +198,8 @@ def _summary(fills: Filling) -> str:
     empty, differs = (Counter(each.column for each in cells) for cells in (fills.empty, fills.differences))
     parts = []
     for column in dict.fromkeys([*empty, *differs, *fills.new_columns]):
-        said = [f"{empty[column]} empty"] * bool(empty[column]) + [f"{differs[column]} differ"] * bool(differs[column])
-        parts.append(f"{column}{' (new)' if column in fills.new_columns else ''}: {', '.join(said) or 'no cell'}")
+        counts = [f"{empty[column]} empty"] * bool(empty[column]) + [f"{differs[column]} differ"] * bool(differs[column])
+        parts.append(f"{column}{' (new)' if column in fills.new_columns else ''}: {', '.join(counts) or 'no cell'}")
     rows = [plural(len(fills.added), "new row")] if fills.added else []
     return " · ".join([*parts, *rows])
 
@@ -209,5 +209,5 @@ def _notes(clips: ClipRows, fills: Filling) -> Iterator[str]:
     if fills.without_clip:
         yield f"No clip for {plural(len(fills.without_clip), 'row')}: {some(fills.without_clip)}"
     yield from fills.notes
-    yield from clips.found.notes
-    yield from (f"left out: {message}" for message in clips.found.left_out)
+    yield from clips.source.notes
+    yield from (f"left out: {message}" for message in clips.source.left_out)

@@ -7,13 +7,14 @@ from functools import partial
 from pathlib import Path
 
 from contextdb.errors import ContextDBError
-from tui.clipboard import Clipboard
-from tui.editor import Editor
-from tui.model.beginning import Beginning, empty_table
-from tui.model.importing import Import
-from tui.model.new_table import make_table, name_fault
-from tui.model.workspace import Workspace
-from tui.screens.ask import AskDialog, ChooseDialog
+
+from ..clipboard import Clipboard
+from ..editor import Editor
+from ..model.beginning import Beginning, empty_table
+from ..model.importing import Import
+from ..model.new_table import make_table, name_fault
+from ..model.workspace import Workspace
+from .ask import AskDialog, ChooseDialog
 
 Way = tuple[str, Callable[[], None]]
 """A line to choose, and what it does."""
@@ -26,7 +27,7 @@ class Begin:
         self.app, self.workspace, self.beginning = app, workspace, beginning
 
     def ask(self) -> None:
-        """Ask; a file that was asked for is read at once."""
+        """Ask; a file that was requested is read at once."""
         if self.beginning.source is not None:
             self._name_for(self.beginning.source, partial(self._read, self.beginning.source))
         else:
@@ -61,7 +62,7 @@ class Begin:
     # ---- the name
 
     def _name_for(self, source: Path | None, then: Callable[[str], None]) -> None:
-        """Go on with the name that was asked for, else with one that is asked."""
+        """Go on with the name that was requested, else with one from a dialog."""
         taken = list(self.workspace.files)
         if self.beginning.name and not name_fault(self.workspace.folder, self.beginning.name, taken):
             then(self.beginning.name)
@@ -93,7 +94,7 @@ class Begin:
         self._import(name, path=path)
 
     def _import(self, name: str, text: str | None = None, path: Path | None = None) -> None:
-        from tui.screens.import_table import ImportDialog
+        from .import_table import ImportDialog
 
         try:
             table = empty_table(self.workspace.folder, name)

@@ -19,12 +19,13 @@ from textual.widgets.option_list import Option
 
 from contextdb.edits import edits
 from contextdb.edits.edits import NewColumn
-from contextdb.errors import shown
+from contextdb.errors import safe_text
 from contextdb.tables.changes import Edit
 from contextdb.tables.table import Table
-from tui.model.column_choices import Blueprint, Insertion, blueprint_fault, blueprints, conditions_of
-from tui.screens.dialog import Dialog
-from tui.widgets.field import Field
+
+from ..model.column_choices import Blueprint, Insertion, blueprint_fault, blueprints, conditions_of
+from ..widgets.field import Field
+from .dialog import Dialog
 
 
 @dataclass(frozen=True)
@@ -84,7 +85,7 @@ class Blueprints(Dialog[BlueprintAnswer]):
         """The blueprints, what the highlighted one holds, and the name of a new one."""
         yield OptionList(*(Option(_line(one, self._width)) for one in self.blueprints), id="blueprint-list", compact=True)
         yield Static(id="blueprint-detail")
-        what = ", ".join(map(shown, self.selected))
+        what = ", ".join(map(safe_text, self.selected))
         meaning = f"Keeps {what}" if what else "Select columns in the sheet first: the conditions among them are saved."
         yield Field(
             "Keep selection", Input(compact=True, placeholder="name of a new blueprint", id="blueprint-name"), meaning, "keep"
@@ -96,7 +97,6 @@ class Blueprints(Dialog[BlueprintAnswer]):
             yield Button("Cancel", compact=True, id="blueprint-cancel")
 
     def on_mount(self) -> None:
-        """Show the first one."""
         listed = self.query_one("#blueprint-list", OptionList)
         listed.display = bool(self.blueprints)
         if self.blueprints:
@@ -108,7 +108,7 @@ class Blueprints(Dialog[BlueprintAnswer]):
 
     @property
     def _width(self) -> int:
-        return min(max((len(shown(one.name)) for one in self.blueprints), default=1), 30)
+        return min(max((len(safe_text(one.name)) for one in self.blueprints), default=1), 30)
 
     def _chosen(self) -> Blueprint | None:
         at = self.query_one("#blueprint-list", OptionList).highlighted
@@ -150,11 +150,11 @@ class Blueprints(Dialog[BlueprintAnswer]):
 
 
 def _line(one: Blueprint, width: int) -> Content:
-    return Content.assemble((f"{shown(one.name, width):<{width}}", "bold"), f"  {one.about}")
+    return Content.assemble((f"{safe_text(one.name, width):<{width}}", "bold"), f"  {one.about}")
 
 
 def _detail(one: Blueprint) -> Content:
     """Each condition, with a tick where the table has it already."""
     return Content(
-        "\n".join(f"[{' ' if name in one.missing else 'x'}] {shown(name)}" for name in one.conditions) or "no conditions"
+        "\n".join(f"[{' ' if name in one.missing else 'x'}] {safe_text(name)}" for name in one.conditions) or "no conditions"
     )

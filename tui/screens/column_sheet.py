@@ -11,9 +11,10 @@ from textual.widgets import Static
 
 from contextdb.tables.changes import Edit
 from contextdb.tables.table import Table
-from tui.clipboard import Clipboard
-from tui.model.column_sheet import NAME, ColumnSheet, Wrong
-from tui.screens.sheet_dialog import SheetDialog, SmallGrid
+
+from ..clipboard import Clipboard
+from ..model.column_sheet import NAME, ColumnSheet, Wrong
+from .sheet_dialog import SheetDialog, SmallGrid
 
 ABOUT = "One column a row. A new row is a new column; one that is declared, with an Expression, is a derived fact."
 
@@ -36,18 +37,16 @@ class ColumnSheetDialog(SheetDialog[Edit]):
 
     @property
     def sheet(self) -> ColumnSheet:
-        """The columns."""
         return self.columns
 
     def compose_body(self) -> ComposeResult:
         """What this is, the columns, what is wrong, what can be done."""
         yield Static(ABOUT, classes="sheet--about")
         yield SmallGrid(self.sheet)
-        yield Static(classes="sheet--said")
+        yield Static(classes="sheet--message")
         yield Static(classes="sheet--keys")
 
     def on_mount(self) -> None:
-        """Show the columns."""
         self.show_keys([("done", "Ctrl+S Apply"), ("discard", "Alt+X Discard")])
         self.grid.focus()
         self.show_sheet()

@@ -12,10 +12,10 @@ from textual.binding import Binding, BindingType
 from textual.content import Content
 from textual.widgets import Static
 
-from tui.model.column_values import ColumnValue, described, mends_of, values_of
-from tui.model.shown import ShownTable
-from tui.screens.dialog import Dialog
-from tui.widgets.line_list import LineList, ListCell, ListColumn
+from ..model.column_values import ColumnValue, described, mends_of, values_of
+from ..model.displayed_table import DisplayedTable
+from ..widgets.line_list import LineList, ListCell, ListColumn
+from .dialog import Dialog
 
 Act = Literal["only", "without", "mend", "replace", "rename"]
 BAR = 12
@@ -50,7 +50,7 @@ class ValuesDialog(Dialog[ValuesAnswer]):
     """
     keys_text = "Enter only · N not · Space tick · M mend · R replace · E rename · Esc"
 
-    def __init__(self, sheet: ShownTable, column: int) -> None:
+    def __init__(self, sheet: DisplayedTable, column: int) -> None:
         super().__init__()
         self.title_text = f"Values of {sheet.table.columns[column].name}"
         self.values = values_of(sheet, column)
@@ -95,11 +95,11 @@ class ValuesDialog(Dialog[ValuesAnswer]):
     @on(LineList.Moved)
     def _moved(self) -> None:
         value = self._here
-        said = ""
+        message = ""
         if value is not None and value.fault is not None:
             mend = mends_of(self._sheet, self._column, [value.text]).get(value.text)
-            said = f'{value.fault.message} M writes "{mend}".' if mend else value.fault.message
-        self.query_one("#values-detail", Static).update(Content(said))
+            message = f'{value.fault.message} M writes "{mend}".' if mend else value.fault.message
+        self.query_one("#values-detail", Static).update(Content(message))
 
     def action_tick(self) -> None:
         """Tick a value, or tick it off."""

@@ -12,10 +12,10 @@ from textual import on
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
-from tui.model.columns_shown import ColumnsShown
-from tui.model.shown import ShownTable
-from tui.screens.dialog import Dialog
-from tui.widgets.line_list import LineList, ListCell, ListColumn
+from ..model.displayed_table import DisplayedTable
+from ..model.visible_columns import VisibleColumns
+from ..widgets.line_list import LineList, ListCell, ListColumn
+from .dialog import Dialog
 
 WIDEST = 40
 """A column's name takes so many cells at most."""
@@ -25,10 +25,10 @@ WIDEST = 40
 class ColumnsAnswer:
     """Which columns are to be seen, and the one to go to."""
 
-    shown: ColumnsShown
+    columns: VisibleColumns
     column: str | None = None
     wants_sheet: bool = False
-    """All of them are to be shown as a sheet, to change what they are."""
+    """All of them are to be displayed as a sheet, to change what they are."""
 
 
 class ColumnsDialog(Dialog[ColumnsAnswer]):
@@ -49,17 +49,16 @@ class ColumnsDialog(Dialog[ColumnsAnswer]):
     title_text = "Columns"
     keys_text = "Enter go · Space hide · G fold · F freeze · E edit all · Esc close"
 
-    def __init__(self, sheet: ShownTable) -> None:
+    def __init__(self, sheet: DisplayedTable) -> None:
         super().__init__()
         self.sheet = sheet
-        self.shown = sheet.columns_shown
+        self.columns = sheet.visible_columns
         self.names = [column.name for column in sheet.table.columns]
 
     def compose_body(self) -> ComposeResult:
-        """The columns."""
-        told = [ListColumn("Type", 16), ListColumn("Texts", 5, 0, True), ListColumn("Unread", 6, 0, True), ListColumn("", 10, 1)]
+        columns = [ListColumn("Type", 16), ListColumn("Texts", 5, 0, True), ListColumn("Unread", 6, 0, True), ListColumn("", 10, 1)]
         width = min(max(map(cell_len, self.names)), WIDEST)
-        yield LineList([ListColumn("", 1), ListColumn("Column", width), *told])
+        yield LineList([ListColumn("", 1), ListColumn("Column", width), *columns])
 
     def on_mount(self) -> None:
         """Stand on the column of the cursor."""
@@ -69,8 +68,8 @@ class ColumnsDialog(Dialog[ColumnsAnswer]):
 
     def _line(self, at: int) -> Sequence[ListCell]:
         header, condition, texts = self.sheet.header(at), self.sheet.condition(at), self.sheet.table.columns[at]
-        is_hidden = self.shown.are_hidden(self.names, self.sheet.table.asset_column)[at]
-        is_frozen = at < self.shown.n_frozen(self.names, self.sheet.table.asset_column)
+        is_hidden = self.columns.are_hidden(self.names, self.sheet.table.asset_column)[at]
+        is_frozen = at < self.columns.n_frozen(self.names, self.sheet.table.asset_column)
         counts = np.bincount(texts.codes, minlength=len(texts.texts))  # texts that were mended stay among them, in no row
         n_wrong = sum(int(counts[code]) for code in condition.faults) if condition is not None else 0
         tone = "muted" if is_hidden else ""
@@ -84,33 +83,33 @@ class ColumnsDialog(Dialog[ColumnsAnswer]):
     def _here(self) -> str:
         return self.names[self.query_one(LineList).index]
 
-    def _show(self, shown: ColumnsShown) -> None:
-        self.shown = shown
+    def _show(self, columns: VisibleColumns) -> None:
+        self.columns = columns
         self.query_one(LineList).refresh()
 
     def action_hide(self) -> None:
         """Hide a column, or show it again."""
         names, asset = self.names, self.sheet.table.asset_column
-        is_hidden = self.shown.are_hidden(names, asset)[names.index(self._here)]
-        self._show(self.shown.revealed(self._here) if is_hidden else self.shown.turned(self._here))
+        is_hidden = self.columns.are_hidden(names, asset)[names.index(self._here)]
+        self._show(self.columns.revealed(self._here) if is_hidden else self.columns.turned(self._here))
         self.query_one(LineList).action_move(1)
 
     def action_fold(self) -> None:
         """Fold a group, or open it."""
-        self._show(self.shown.folded_at(self._here))
+        self._show(self.columns.folded_at(self._here))
 
     def action_freeze(self) -> None:
         """Freeze up to a column; only the assets where that is so."""
-        self._show(replace(self.shown, frozen=None if self.shown.frozen == self._here else self._here))
+        self._show(replace(self.columns, frozen=None if self.columns.frozen == self._here else self._here))
 
     def action_sheet(self) -> None:
         """Change what the columns are."""
-        self.dismiss(ColumnsAnswer(self.shown, self._here, wants_sheet=True))
+        self.dismiss(ColumnsAnswer(self.columns, self._here, wants_sheet=True))
 
     @on(LineList.Chosen)
     def _chosen(self) -> None:
-        self.dismiss(ColumnsAnswer(self.shown, self._here))
+        self.dismiss(ColumnsAnswer(self.columns, self._here))
 
     def action_cancel(self) -> None:
         """Take what was hidden, and stay."""
-        self.dismiss(ColumnsAnswer(self.shown))
+        self.dismiss(ColumnsAnswer(self.columns))

@@ -12,10 +12,11 @@ from textual.content import Content
 from textual.message import Message
 from textual.widgets import Static
 
-from contextdb.errors import plural, shown
+from contextdb.errors import plural, safe_text
 from contextdb.tables.merging.conflicts import Conflict, Side
-from tui.screens.dialog import Dialog, buttons
-from tui.widgets.line_list import LineList, ListCell, ListColumn
+
+from ..widgets.line_list import LineList, ListCell, ListColumn
+from .dialog import Dialog, buttons
 
 CHOSEN, OPEN = "●", "○"
 WHERE_WIDTH = 10
@@ -85,7 +86,7 @@ class ConflictsDialog(Dialog[Mapping[int, Side]]):
 
     def compose_body(self) -> ComposeResult:
         """How many there are, the list, the texts of the chosen one in full, and what can be clicked."""
-        where = f" in {shown(self._file)}" if self._file else ""
+        where = f" in {safe_text(self._file)}" if self._file else ""
         yield Static(Content(f"{plural(len(self.conflicts), 'place')}{where} changed {self._both}. Everything else is merged."))
         columns = [ListColumn("Asset", WHERE_WIDTH, 2, is_name=True), ListColumn("Column", WHERE_WIDTH, 1, is_name=True)]
         texts = [ListColumn(title, TEXT_WIDTH, 2) for title in ("Before", *self.names)]
@@ -135,7 +136,6 @@ class ConflictsDialog(Dialog[Mapping[int, Side]]):
         self._show()
 
     def action_take_all(self, side: Side) -> None:
-        """Decide all of them."""
         self.sides = dict.fromkeys(range(len(self.conflicts)), side)
         self._show()
 
@@ -177,9 +177,9 @@ class ConflictsDialog(Dialog[Mapping[int, Side]]):
         one, side = self.conflicts[at], self.sides.get(at)
         what = one.column or "(row)"
         asset = {"column": "(column)", "name": "(name)"}.get(one.kind, one.asset)
-        texts = [("ours", told(one.ours)), ("theirs", told(one.theirs))]
+        texts = [("ours", version_text(one.ours)), ("theirs", version_text(one.theirs))]
         cells = [(f"{CHOSEN if side == name else OPEN} {text}", _tone(side, name)) for name, text in texts]
-        return [shown(asset), shown(what), (told(one.base, "(new)"), "muted"), *cells]
+        return [safe_text(asset), safe_text(what), (version_text(one.base, "(new)"), "muted"), *cells]
 
     def _show(self, is_asked: bool = False) -> None:
         self._lines.refresh()
@@ -194,16 +194,20 @@ class ConflictsDialog(Dialog[Mapping[int, Side]]):
             return
         one = self.conflicts[max(self._lines.index, 0)]
         width = max(len("Before"), *map(len, self.names))
-        texts_of = zip(("Before", *self.names), (told(one.base, "(new)"), told(one.ours), told(one.theirs)), strict=True)
+        texts_of = zip(
+            ("Before", *self.names),
+            (version_text(one.base, "(new)"), version_text(one.ours), version_text(one.theirs)),
+            strict=True,
+        )
         lines = [(f"{name:<{width}}", text) for name, text in texts_of]
-        place = Content.styled(shown(one.place, 200), "bold")
+        place = Content.styled(safe_text(one.place, 200), "bold")
         texts = [Content(f"{name}  {text}") for name, text in lines]
         self.query_one("#conflict-texts", Static).update(Content("\n").join([place, *texts]))
 
 
-def told(text: str | None, gone: str = "(deleted)") -> str:
+def version_text(text: str | None, gone: str = "(deleted)") -> str:
     """A text on one line; one that is missing, or empty, in words."""
-    return gone if text is None else shown(text, 400) if text.strip() else "(empty)"
+    return gone if text is None else safe_text(text, 400) if text.strip() else "(empty)"
 
 
 def _tone(side: Side | None, name: str) -> str:

@@ -18,13 +18,15 @@ from textual.message import Message
 from textual.widgets import Static
 from textual.worker import Worker, get_current_worker
 
-from contextdb.checks.cases import Verdict, told
+from contextdb.checks.cases import Verdict, mismatch
 from contextdb.errors import ContextDBError, in_quotes, plural
 from contextdb.tables.table import Table
-from tui.model.context_list import ContextList, cases_file, summary
-from tui.screens.context_forms import KeepDialog, Kept, NameDialog, OpenDialog, SureDialog
-from tui.screens.dialog import Dialog, buttons
-from tui.widgets.line_list import LineList, ListCell, ListColumn
+
+from ..model.context_list import ContextList, cases_file, summary
+from ..widgets.line_list import LineList, ListCell, ListColumn
+from .ask import AskDialog, SureDialog
+from .context_forms import KeepDialog, OpenDialog, SavedCase
+from .dialog import Dialog, buttons
 
 MARKS: Mapping[bool | None, ListCell] = {True: "✓ holds", False: ("✗ fails", "error"), None: ("– open", "muted")}
 WIDTHS = (32, 24, 18, 14, 12)
@@ -110,18 +112,18 @@ class ContextsDialog(Dialog[Loaded]):
         self, table: Table, facts: Mapping[str, str], contexts: ContextList | None = None, has_actors: bool = False
     ) -> None:
         """`facts` are those of the test row; `contexts` the list that is being stepped through, if there is one. `has_actors`: the
-        test row is asked with actors, which a saved context does not keep."""
+        test row is queried with actors, which a saved context does not keep."""
         super().__init__()
         self.table, self.facts, self.has_actors = table, facts, has_actors
         self.message = ""
-        """What went wrong, or what was done; shown until the cursor moves on."""
+        """What went wrong, or what was done; displayed until the cursor moves on."""
         self._told_at = -1
         self.contexts = contexts or self._beside()
         self.contexts.show(table)
-        self.found: NDArray[np.int64] | None = None
+        self.matching: NDArray[np.int64] | None = None
         """The contexts that the filter leaves; None: all."""
         self.is_busy = ""
-        self.shown: dict[str, int] = {}
+        self.displayed_facts: dict[str, int] = {}
         """The facts that have a column, and how wide it is."""
 
     def _beside(self) -> ContextList:
@@ -139,13 +141,11 @@ class ContextsDialog(Dialog[Loaded]):
         yield Static(id="contexts-keys")
 
     def on_mount(self) -> None:
-        """Show the list."""
         self.lines.focus()
         self._show_all(self.contexts.at or 0)
 
     @property
     def lines(self) -> ContextLines:
-        """The list."""
         return self.query_one(ContextLines)
 
     @property
@@ -153,21 +153,21 @@ class ContextsDialog(Dialog[Loaded]):
         """Which context the cursor is on."""
         if not self.lines.n_lines:
             return None
-        return self.lines.index if self.found is None else int(self.found[self.lines.index])
+        return self.lines.index if self.matching is None else int(self.matching[self.lines.index])
 
-    # ---- what is shown
+    # ---- display
 
     def _show_all(self, index: int = 0) -> None:
         """Another file, or another state of it: columns, lines, and no filter."""
-        self.lines.text, self.found = "", None
+        self.lines.text, self.matching = "", None
         self._lay_out()
         self._show_lines(index)
 
     def _lay_out(self) -> None:
         """Columns for the room that there is."""
         frame = self.query_one("#dialog-body").size.width or self.size.width * 96 // 100 - 4
-        self.shown = shown_facts(self.contexts, frame - 2)
-        self.lines.columns = columns_of(self.contexts, self.shown)
+        self.displayed_facts = displayed_facts(self.contexts, frame - 2)
+        self.lines.columns = columns_of(self.contexts, self.displayed_facts)
         self.lines.refresh()
 
     def on_resize(self) -> None:
@@ -175,15 +175,15 @@ class ContextsDialog(Dialog[Loaded]):
         self.call_after_refresh(self._lay_out)
 
     def _show_lines(self, index: int = 0) -> None:
-        n_lines = len(self.contexts) if self.found is None else len(self.found)
+        n_lines = len(self.contexts) if self.matching is None else len(self.matching)
         filtered = "No context has this text." if self.lines.text else "No context is saved yet: F6 saves the test row."
         self.lines.empty = filtered
         self.lines.show(n_lines, self._cells, index)
         self._say()
 
     def _cells(self, line: int) -> Sequence[ListCell]:
-        i = line if self.found is None else int(self.found[line])
-        return cells_of(self.contexts, i, self.shown)
+        i = line if self.matching is None else int(self.matching[line])
+        return cells_of(self.contexts, i, self.displayed_facts)
 
     def _say(self) -> None:
         self.query_one("#contexts-state", Static).update(Content(self._state()))
@@ -238,7 +238,7 @@ class ContextsDialog(Dialog[Loaded]):
         """Go to the next context that no row is valid for; it is looked for a piece at a time."""
         start, n_lines = self.lines.index + 1, self.lines.n_lines
         stop = min(start + LOOKED_THROUGH, n_lines)
-        lines = (line if self.found is None else int(self.found[line]) for line in range(start, stop))
+        lines = (line if self.matching is None else int(self.matching[line]) for line in range(start, stop))
         at = next((start + n for n, i in enumerate(lines) if self.contexts.n_valid(i) == 0), None)
         self.lines.go(stop - 1 if at is None else at)
         self._told_at = self.lines.index
@@ -259,28 +259,28 @@ class ContextsDialog(Dialog[Loaded]):
         self.message = ""
         self.workers.cancel_group(self, "search")
         if not event.text.strip():
-            self.found, self.is_busy = None, ""
+            self.matching, self.is_busy = None, ""
             self._show_lines()
         elif self.contexts.cases:
-            self.found = next(self.contexts.rows.search(event.text))
+            self.matching = next(self.contexts.rows.search(event.text))
             self._show_lines()
-        else:  # what was shown before stays until something is found
+        else:  # what was displayed before stays until something matches
             self.is_busy = ""
             self._search(self.contexts, event.text)
 
     @work(thread=True, group="search", exclusive=True, exit_on_error=False)
     def _search(self, contexts: ContextList, text: str) -> None:
-        """Look through a recording; what is found is shown as it is found."""
-        worker, found = get_current_worker(), np.empty(0, np.int64)
+        """Look through a recording; matches are displayed as they come."""
+        worker, matching = get_current_worker(), np.empty(0, np.int64)
         try:
             for part in contexts.rows.search(text):
                 if worker.is_cancelled:
                     return
-                is_first_page = len(part) and not len(found)
-                found = np.concatenate([found, part])
-                if is_first_page:  # what is found first is shown at once, the rest when all is known
-                    self._from_thread(worker, self._found, found, f"searching for {in_quotes(text)} …")
-            self._from_thread(worker, self._found, found, "")
+                is_first_page = len(part) and not len(matching)
+                matching = np.concatenate([matching, part])
+                if is_first_page:  # the first matches are displayed at once, the rest when all is known
+                    self._from_thread(worker, self._show_matching, matching, f"searching for {in_quotes(text)} …")
+            self._from_thread(worker, self._show_matching, matching, "")
         except ContextDBError as error:
             self._from_thread(worker, self._tell, error)
 
@@ -288,13 +288,12 @@ class ContextsDialog(Dialog[Loaded]):
         if not worker.is_cancelled and self.is_running:
             self.app.call_from_thread(call, *arguments)
 
-    def _found(self, found: NDArray[np.int64], busy: str) -> None:
+    def _show_matching(self, matching: NDArray[np.int64], busy: str) -> None:
         at = self.lines.index if self.is_busy else 0
-        self.found, self.is_busy = found, busy
+        self.matching, self.is_busy = matching, busy
         self._show_lines(at)
 
     def action_open_file(self) -> None:
-        """Ask for another file."""
         self.app.push_screen(OpenDialog(cases_file(self.table).parent), self._open)
 
     def _open(self, path: Path | None) -> None:
@@ -318,7 +317,6 @@ class ContextsDialog(Dialog[Loaded]):
         self._show_all()
 
     def action_keep(self) -> None:
-        """Save the test row."""
         self.app.push_screen(KeepDialog(self.contexts, self.facts, has_actors=self.has_actors), self._keep)
 
     def action_update(self) -> None:
@@ -328,14 +326,14 @@ class ContextsDialog(Dialog[Loaded]):
             return
         case = self.contexts.cases[i]
         self.app.push_screen(
-            KeepDialog(self.contexts, self.facts, Kept(case.name, case.expected, case.note), self.has_actors), self._keep
+            KeepDialog(self.contexts, self.facts, SavedCase(case.name, case.expected, case.note), self.has_actors), self._keep
         )
 
-    def _keep(self, kept: Kept | None) -> None:
-        if kept is None:
+    def _keep(self, case: SavedCase | None) -> None:
+        if case is None:
             return
         self._change(
-            lambda: self.contexts.keep(kept.name, self.facts, kept.expected, kept.note), f"{in_quotes(kept.name)} is saved."
+            lambda: self.contexts.keep(case.name, self.facts, case.expected, case.note), f"{in_quotes(case.name)} is saved."
         )
 
     def action_rename(self) -> None:
@@ -345,11 +343,17 @@ class ContextsDialog(Dialog[Loaded]):
             return
         name = self.contexts.cases[i].name
 
-        def rename(to: str | None) -> None:
-            if to is not None and to != name:
+        taken = {case.name for case in self.contexts.cases} - {name}
+
+        def check(to: str) -> str:
+            return "Enter a name." if not to.strip() else "There is a context of this name already." if to.strip() in taken else ""
+
+        def rename(text: str | None) -> None:
+            if text is not None and (to := text.strip()) != name:
                 self._change(lambda: self.contexts.rename(i, to), f"{in_quotes(name)} is {in_quotes(to)} now.", i)
 
-        self.app.push_screen(NameDialog(name, {case.name for case in self.contexts.cases}), rename)
+        question = f"Another name for {in_quotes(name)}; messages name the context by it"
+        self.app.push_screen(AskDialog("Rename the context", question, name, check), rename)
 
     def action_delete(self) -> None:
         """Take the chosen case out of the file, when one is sure."""
@@ -385,7 +389,7 @@ class ContextsDialog(Dialog[Loaded]):
 # ---- a context in words
 
 
-def shown_facts(contexts: ContextList, width: int) -> dict[str, int]:
+def displayed_facts(contexts: ContextList, width: int) -> dict[str, int]:
     """The facts that get a column in so many terminal cells, each with its width.
 
     Where there is no room for all, those that are the same in every case are left out first.
@@ -396,17 +400,17 @@ def shown_facts(contexts: ContextList, width: int) -> dict[str, int]:
         widths = {name: min(max(cell_len(name), LEAST), most) for name in names}
         if sum(widths.values()) + GAP * len(names) <= room:
             return widths
-    told = {name for name in names if len({case.facts.get(name, "") for case in contexts.cases}) != 1}
+    differing = {name for name in names if len({case.facts.get(name, "") for case in contexts.cases}) != 1}
     fitting: dict[str, int] = {}
-    for name in sorted(names, key=lambda name: name not in told):
+    for name in sorted(names, key=lambda name: name not in differing):
         if sum(fitting.values()) + GAP * (len(fitting) + 1) + widths[name] <= room:
             fitting[name] = widths[name]
     return {name: fitting[name] for name in names if name in fitting}
 
 
-def columns_of(contexts: ContextList, shown: Mapping[str, int]) -> tuple[ListColumn, ...]:
-    """The columns of the list: the name, for cases whether it holds, and the facts shown."""
-    return (*_head(contexts), *(ListColumn(name, width) for name, width in shown.items()))
+def columns_of(contexts: ContextList, facts: Mapping[str, int]) -> tuple[ListColumn, ...]:
+    """The columns of the list: the name, for cases whether it holds, and the facts displayed."""
+    return (*_head(contexts), *(ListColumn(name, width) for name, width in facts.items()))
 
 
 def _head(contexts: ContextList) -> tuple[ListColumn, ...]:
@@ -415,7 +419,7 @@ def _head(contexts: ContextList) -> tuple[ListColumn, ...]:
     return (name, ListColumn("Expected", 9) if contexts.cases else ListColumn("Valid", 6, 0, True))
 
 
-def cells_of(contexts: ContextList, i: int, shown: Mapping[str, int]) -> list[ListCell]:
+def cells_of(contexts: ContextList, i: int, displayed: Mapping[str, int]) -> list[ListCell]:
     """The cells of a context, as `columns_of` has them."""
     verdict = contexts.verdict(i)
     head: list[ListCell] = [contexts.rows.name(i)]
@@ -427,8 +431,8 @@ def cells_of(contexts: ContextList, i: int, shown: Mapping[str, int]) -> list[Li
     try:
         facts = contexts.facts(i)
     except ContextDBError:
-        return [*head, *(("?", "error") for _ in shown)]
-    return [*head, *(facts.get(name) or ("·", "muted") for name in shown)]
+        return [*head, *(("?", "error") for _ in displayed)]
+    return [*head, *(facts.get(name) or ("·", "muted") for name in displayed)]
 
 
 def detail_of(contexts: ContextList, i: int) -> str:
@@ -458,4 +462,4 @@ def outcome(verdict: Verdict, assets: Sequence[str]) -> str:
         return f"✗ It cannot be evaluated: {verdict.faults[0]}"
     if verdict.holds is None:
         return f"– Nothing is expected; {plural(verdict.n_valid, 'row')} valid."
-    return f"✓ It holds; {plural(verdict.n_valid, 'row')} valid." if verdict.holds else f"✗ {told(verdict, assets)}."
+    return f"✓ It holds; {plural(verdict.n_valid, 'row')} valid." if verdict.holds else f"✗ {mismatch(verdict, assets)}."

@@ -16,7 +16,7 @@ from textual.filter import LineFilter
 from textual.screen import ModalScreen, Screen
 from textual.widgets import Static
 
-from tui.contrast import without
+from ..contrast import without
 
 Answer = TypeVar("Answer")
 

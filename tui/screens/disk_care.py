@@ -16,8 +16,9 @@ from contextdb.errors import ContextDBError, FileError
 from contextdb.tables.merging.conflicts import Side
 from contextdb.tables.merging.merging import Merge
 from contextdb.tables.table import Table
-from tui.model.session import Session
-from tui.screens.conflicts import ConflictsDialog
+
+from ..model.session import Session
+from .conflicts import ConflictsDialog
 
 LOOK_EVERY_S = 1.0
 
@@ -36,38 +37,38 @@ class DiskCare:
     def __init__(self, screen: Screen[Any], session: Session, say: Say, changed: Callable[[], None]) -> None:
         """`changed` shows the sheet again; it is called after every merge and reload."""
         self._screen, self._session, self._say, self._changed = screen, session, say, changed
-        self._told = ""
-        """What was said last of the disk, so that a timer does not say it again."""
-        self._left: object = None
-        """The stamp of a version of the file that is not merged, as the person said or because it cannot be: until a save."""
+        self._notice = ""
+        """The last message about the disk, so that a timer does not say it again."""
+        self._left_stamp: object = None
+        """The stamp of a version of the file that is not merged, as the person chose or because it cannot be: until a save."""
 
     def look(self) -> None:
         """Take in what others did since the last look. Not while a dialog is open."""
         if self._screen.app.screen is not self._screen:
             return
-        found = self._session.poll()
-        if not found:
-            self._told = ""
+        change = self._session.poll()
+        if not change:
+            self._notice = ""
             return
-        if found.schema != "same":
+        if change.schema != "same":
             self._reload()
-        if found.taken_by is not None:
-            self._say_once(f"{found.taken_by} has taken over this table: you can only save it under another name.", "warning")
-        elif found.is_free:
+        if change.taken_by is not None:
+            self._say_once(f"{change.taken_by} has taken over this table: you can only save it under another name.", "warning")
+        elif change.is_free:
             self._say_once("The other editor has closed this table: it can be saved here again.")
-        elif found.has_left:
+        elif change.has_left:
             what = "The other editor has ended and left edits that are not saved."
             self._say_once(f"{what} Save yours under another name; then open this table again.", "warning")
-        elif found.held_by is not None:
-            what = f"{found.held_by} has opened this table: it can be read here, and saved under another name."
+        elif change.held_by is not None:
+            what = f"{change.held_by} has opened this table: it can be read here, and saved under another name."
             self._say_once(what, "warning")
-        if found.table == "gone":
+        if change.table == "gone":
             self._say_once(f"{self._session.path.name} is no longer on disk. Saving creates it again.", "warning")
-        elif found.table == "changed" and self._session.disk_stamp != self._left:
+        elif change.table == "changed" and self._session.disk_stamp != self._left_stamp:
             self._merge_unasked()
 
     def save(self, path: Path | None = None, overwrite: bool = False, then: Callable[[], None] = lambda: None) -> None:
-        """Save; conflicts with what others wrote are asked about first. `then` is called when the table is saved.
+        """Save; conflicts with what others wrote are resolved first. `then` is called when the table is saved.
 
         Raises
         ------
@@ -106,13 +107,13 @@ class DiskCare:
         try:
             self.merge()
         except ContextDBError as error:
-            self._left = self._session.disk_stamp
+            self._left_stamp = self._session.disk_stamp
             self._say_once(str(error), "error")
 
     def _ask(self, merged: Merge[Table], then: Callable[[], None]) -> None:
         def decided(sides: Mapping[int, Side] | None) -> None:
             if sides is None:
-                self._left = self._session.disk_stamp
+                self._left_stamp = self._session.disk_stamp
                 self._say("Nothing is merged. The next save asks again.", "warning")
                 return
             resolved = merged.resolved(sides)
@@ -127,8 +128,11 @@ class DiskCare:
     def _merged(self, merged: Merge[Table], then: Callable[[], None]) -> None:
         self._changed()
         changed = diff(merged.ours, self._session.sheet.table)
-        told = f"{changed.summary}. Ctrl+Z undoes it." if changed else "nothing changes here."
-        self._say(f"Merged from disk: {told}")
+        message = f"{changed.summary}. Ctrl+Z undoes it." if changed else "nothing changes here."
+        lost = [f" {cell}" for cell in merged.lost[:1]] + (
+            [f" {len(merged.lost) - 1:,} more cells went so."] if merged.lost[1:] else []
+        )
+        self._say(f"Merged from disk: {message}{''.join(lost)}", "warning" if lost else "information")
         then()
 
     def _reload(self) -> None:
@@ -141,6 +145,6 @@ class DiskCare:
         self._say("contextdb.toml changed on disk and was read again.")
 
     def _say_once(self, text: str, level: Level = "information") -> None:
-        if text != self._told:
-            self._told = text
+        if text != self._notice:
+            self._notice = text
             self._say(text, level)

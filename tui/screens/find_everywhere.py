@@ -17,11 +17,13 @@ from textual.widgets import Input, Static
 from contextdb.errors import ContextDBError, plural
 from contextdb.tables.project import load_table
 from contextdb.tables.table import Table
-from tui.model.find import Search, find
-from tui.model.layout import cut_middle
-from tui.model.workspace import Workspace
-from tui.screens.dialog import Dialog
-from tui.widgets.line_list import LineList, ListCell, ListColumn
+
+from ..model.find import Search, find
+from ..model.layout import cut_middle
+from ..model.workspace import Workspace
+from ..widgets.cursor_lines import UP_DOWN
+from ..widgets.line_list import LineList, ListCell, ListColumn
+from .dialog import Dialog
 
 MOST = 1000
 """So many places are listed."""
@@ -41,8 +43,7 @@ class FindEverywhere(Dialog[FoundCell]):
     """Find in all tables."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("down", "move(1)", "Down", show=False),
-        Binding("up", "move(-1)", "Up", show=False),
+        *UP_DOWN,
         Binding("pagedown", "move(10)", "Page down", show=False),
         Binding("pageup", "move(-10)", "Page up", show=False),
     ]
@@ -51,7 +52,7 @@ class FindEverywhere(Dialog[FoundCell]):
         & > #dialog { width: 110; height: 92%; }
         & > #dialog > #dialog-body { height: 1fr; }
         & LineList { height: 1fr; margin: 1 0; }
-        & #found-said { height: 1; color: $text-muted; }
+        & #found-message { height: 1; color: $text-muted; }
     }
     """
     title_text = "Find in all tables"
@@ -62,7 +63,7 @@ class FindEverywhere(Dialog[FoundCell]):
         super().__init__()
         self.workspace = workspace
         self.names = [first, *(name for name in workspace.files if name != first)]
-        self.found: list[FoundCell] = []
+        self.matches: list[FoundCell] = []
         self._read: dict[str, Table | None] = {}
 
     def compose_body(self) -> ComposeResult:
@@ -74,11 +75,10 @@ class FindEverywhere(Dialog[FoundCell]):
             ListColumn("Column", 12, 1, is_name=True),
             ListColumn("Text", 20, 3),
         ]
-        yield LineList(columns, empty="Nothing is found.")
-        yield Static(id="found-said")
+        yield LineList(columns, empty="No match.")
+        yield Static(id="found-message")
 
     def on_mount(self) -> None:
-        """Take the text."""
         self.query_one(Input).focus()
         self._show("")
 
@@ -88,16 +88,16 @@ class FindEverywhere(Dialog[FoundCell]):
         self._show(event.value)
 
     def _show(self, text: str) -> None:
-        self.found = list(islice(self._places(Search(text)), MOST)) if text.strip() else []
-        self.query_one(LineList).show(len(self.found), self._line, 0)
-        n_tables = len({one.table for one in self.found})
-        more = "at least " if len(self.found) == MOST else ""
+        self.matches = list(islice(self._places(Search(text)), MOST)) if text.strip() else []
+        self.query_one(LineList).show(len(self.matches), self._line, 0)
+        n_tables = len({one.table for one in self.matches})
+        more = "at least " if len(self.matches) == MOST else ""
         unread = [name for name, table in self._read.items() if table is None]
-        said = f"{more}{plural(len(self.found), 'cell')} in {plural(n_tables, 'table')}" if self.found else ""
-        self.query_one("#found-said", Static).update(f"{said}{f' · not read: {unread[0]}' if unread else ''}")
+        count = f"{more}{plural(len(self.matches), 'cell')} in {plural(n_tables, 'table')}" if self.matches else ""
+        self.query_one("#found-message", Static).update(f"{count}{f' · not read: {unread[0]}' if unread else ''}")
 
     def _line(self, at: int) -> Sequence[ListCell]:
-        one = self.found[at]
+        one = self.matches[at]
         return one.table, f"{one.row + 1:,}", (one.column, "muted"), partial(cut_middle, one.text)
 
     def _places(self, search: Search) -> Iterator[FoundCell]:
@@ -127,10 +127,10 @@ class FindEverywhere(Dialog[FoundCell]):
     @on(Input.Submitted)
     def _submitted(self, event: Input.Submitted) -> None:
         event.stop()
-        if self.found:
-            self.dismiss(self.found[self.query_one(LineList).index])
+        if self.matches:
+            self.dismiss(self.matches[self.query_one(LineList).index])
 
     @on(LineList.Chosen)
     def _chosen(self, event: LineList.Chosen) -> None:
         event.stop()
-        self.dismiss(self.found[event.index])
+        self.dismiss(self.matches[event.index])

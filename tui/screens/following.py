@@ -1,4 +1,4 @@
-"""The test row of a screen that follows a game, or plays a recording: one moment after the other, paused, a step back, kept."""
+"""The test row of a screen that follows a game, or plays a recording: one moment after the other, paused, a step back, saved."""
 
 from __future__ import annotations
 
@@ -14,18 +14,19 @@ from textual.timer import Timer
 from contextdb.console import printable
 from contextdb.errors import ContextDBError, plural
 from contextdb.tables.table import Table
-from tui.model.asked import Offered
-from tui.model.context_list import ContextList
-from tui.model.game_answer import GameAnswer, played_row
-from tui.model.listening import Listening
-from tui.model.moments import Key, Moment, RecordedTrack, Session, Track
-from tui.model.session import Session as TableSession
-from tui.screens.context_forms import KeepDialog, Kept
-from tui.widgets.bar import Item
-from tui.widgets.live_line import Said
+
+from ..model.context_list import ContextList
+from ..model.game_answer import GameAnswer, played_row
+from ..model.listening import Listening
+from ..model.moments import Key, Moment, RecordedTrack, Session, Track
+from ..model.session import Session as TableSession
+from ..model.table_answer import Offered
+from ..widgets.bar import Item
+from ..widgets.live_line import LiveState
+from .context_forms import KeepDialog, SavedCase
 
 RATE = 10
-"""So many moments a second are shown at most, the newest: nobody reads a table faster. All of them can be stepped through."""
+"""So many moments a second are displayed at most, the newest: nobody reads a table faster. All of them can be stepped through."""
 ITEMS = (
     ("live-pause", "Pause Alt+6"), ("previous-context", "◂ F7"), ("next-context", "F8 ▸"), ("live-back", "−1 s"),
     ("live-ahead", "+1 s"), ("live-keep", "Keep Alt+7"), ("live", "Who Alt+U"), ("live-stop", "Stop"),
@@ -38,7 +39,7 @@ class Shows(Protocol):
     def follow(self, facts: dict[str, str], actors: Offered, played: int | None, name: str) -> None:
         """Show a moment."""
 
-    def show_live(self, said: Said | None, items: Sequence[Item] = ()) -> None:
+    def show_live(self, state: LiveState | None, items: Sequence[Item] = ()) -> None:
         """Say how it stands with the game."""
 
 
@@ -78,7 +79,7 @@ class Followed:
 
     @property
     def track(self) -> Track | None:
-        """What the character asked; None where it has asked nothing yet."""
+        """What the character queried; None where it has queried nothing yet."""
         if self.listening is not None:
             return self.listening.tracks.get(self.key)
         return self.recording.tracks.get(self.key) if self.recording is not None else None
@@ -104,15 +105,15 @@ class Following:
         self.followed: Followed | None = None
         self.is_paused = False
         self.at = -1
-        """The moment that is shown."""
+        """The moment that is displayed."""
         self.moment: Moment | None = None
         self._clock = clock
         self._began = (0.0, 0.0)
         """When a recording began to play, and at which of its seconds."""
         self._timer: Timer | None = None
-        self._shown: tuple[Table, Moment] | None = None
+        self._displayed: tuple[Table, Moment] | None = None
         self._texts: dict[str, str] | None = None
-        """The facts that were shown; others were typed since."""
+        """The facts that were displayed; others were typed since."""
         self.is_typed = False
         self._own_version = OwnVersion()
 
@@ -136,22 +137,21 @@ class Following:
             self.screen.assets.show_live(None)
 
     def close(self) -> None:
-        """Hang up."""
         if self.followed is not None and self.followed.listening is not None:
             self.followed.listening.close()
-        self.followed, self.moment, self._shown, self._texts = None, None, None, None
+        self.followed, self.moment, self._displayed, self._texts = None, None, None, None
         if self._timer is not None:
             self._timer.pause()
 
     @property
-    def kept(self) -> tuple[str, Callable[[], list[Moment]]] | None:
+    def followed_moments(self) -> tuple[str, Callable[[], list[Moment]]] | None:
         """What is followed, in words, and what reads its moments: the last minute of a game, a whole recording; None where nothing
         is followed."""
         track = self.followed.track if self.followed is not None else None
         if self.followed is None or track is None:
             return None
         what = "the recording" if isinstance(track, RecordedTrack) else "the last minute of"
-        return f"{what} {self.followed.name}", lambda: track.kept
+        return f"{what} {self.followed.name}", lambda: track.moments
 
     # ---- moments
 
@@ -163,7 +163,7 @@ class Following:
         if self._texts is not None and self.session.sheet.query.texts != self._texts:
             self.is_typed = self.is_paused = True
         if self.is_typed:
-            self.screen.assets.show_live(Said("❚❚", followed.name, "", "held: facts were typed"), self._items())
+            self.screen.assets.show_live(LiveState("❚❚", followed.name, "", "held: facts were typed"), self._items())
             return
         track = followed.track
         if track is not None and not self.is_paused:
@@ -175,10 +175,10 @@ class Following:
             self.moment = moment
         if self.moment is not None:
             self._show(self.moment)
-        self.screen.assets.show_live(self._said(), self._items())
+        self.screen.assets.show_live(self._live_state(), self._items())
 
     def pause(self, is_paused: bool | None = None) -> None:
-        """Hold the moment that is shown, or go on."""
+        """Hold the moment that is displayed, or go on."""
         if self._require():
             self.is_paused = not self.is_paused if is_paused is None else is_paused
             self._forget_typed()
@@ -210,7 +210,7 @@ class Following:
         sheet = self.session.sheet
         contexts, facts, actors = ContextList.beside(sheet.table), dict(sheet.query.texts), bool(sheet.query.actors)
 
-        def kept(answer: Kept | None) -> None:
+        def save(answer: SavedCase | None) -> None:
             if answer is not None:
                 try:
                     contexts.keep(answer.name, facts, answer.expected, answer.note)
@@ -219,7 +219,7 @@ class Following:
                 else:
                     self.screen.say(f"{answer.name} is saved. F9 shows the saved contexts.")
 
-        self.screen.app.push_screen(KeepDialog(contexts, facts, has_actors=actors), kept)
+        self.screen.app.push_screen(KeepDialog(contexts, facts, has_actors=actors), save)
 
     def _hold(self, at: int) -> None:
         self.at, self.is_paused = at, True
@@ -227,7 +227,7 @@ class Following:
         self.tick()
 
     def _forget_typed(self) -> None:
-        self.is_typed, self._shown, self._texts = False, None, None
+        self.is_typed, self._displayed, self._texts = False, None, None
 
     def _require(self) -> bool:
         if self.followed is None:
@@ -239,7 +239,7 @@ class Following:
             return None
         track = self.followed.track
         if track is None or not track.stop:
-            self.screen.say("The game has asked nothing yet.")
+            self.screen.say("The game has made no query yet.")
             return None
         return track
 
@@ -261,9 +261,9 @@ class Following:
 
     def _show(self, moment: Moment) -> None:
         sheet, followed = self.session.sheet, self.followed
-        if followed is None or (self._shown is not None and self._shown[0] is sheet.table and self._shown[1] is moment):
+        if followed is None or (self._displayed is not None and self._displayed[0] is sheet.table and self._displayed[1] is moment):
             return
-        is_first, self._shown = self._shown is None or self._shown[1] is not moment, (sheet.table, moment)
+        is_first, self._displayed = self._displayed is None or self._displayed[1] is not moment, (sheet.table, moment)
         played = played_row(sheet.table, moment.pick)
         texts = moment.texts(sheet.query.wanted.given)
         if is_first or played != sheet.played:
@@ -271,9 +271,9 @@ class Following:
             self.screen.assets.follow(texts, moment.actors or {}, played, followed.name)
             self.screen.show_summary()
 
-    # ---- what is said
+    # ---- messages
 
-    def _said(self) -> Said:
+    def _live_state(self) -> LiveState:
         followed = self.followed
         assert followed is not None
         trouble = followed.listening.trouble if followed.listening is not None else ""
@@ -281,27 +281,33 @@ class Following:
         sign = "❚❚" if self.is_paused else "■" if is_over else "▷" if followed.recording is not None else "●"
         track = followed.track
         if self.moment is None or track is None:
-            return Said(sign, followed.name, "", trouble or "nothing asked yet")
-        answer = GameAnswer(self.moment, self.session.sheet.query)
+            return LiveState(sign, followed.name, "", trouble or "no query yet")
+        answer = GameAnswer(self.moment, self.session.sheet.query, self.session.sheet.table, self._game_table)
         back = track.time(track.stop - 1) - self.moment.t
         when = f"{self.moment.t:.1f} s"
         if followed.recording is not None:
             when = f"{when} of {track.time(track.stop - 1):.1f}"
         elif self.is_paused and back > 0:
             when = f"{back:.1f} s ago"
-        notes = [trouble, answer.differs, self._version()]
+        notes = [trouble, answer.differs, "" if self._is_own_version in (True, None) else "the game has another version"]
         if followed.listening is not None and followed.listening.n_lost:
             notes.append(f"{plural(followed.listening.n_lost, 'line')} lost")
-        return Said(sign, followed.name, f"{when} · {answer.said}", " · ".join(filter(None, notes)))
+        return LiveState(sign, followed.name, f"{when} · {answer.summary}", " · ".join(filter(None, notes)))
 
     def _items(self) -> list[Item]:
         return [Item(name, "Go on Alt+6" if name == "live-pause" and self.is_paused else label) for name, label in ITEMS]
 
-    def _version(self) -> str:
-        """That the game runs another version of the table; nothing where it is the same, or not known."""
+    @property
+    def _is_own_version(self) -> bool | None:
+        """Whether the game has the table as it is on the screen; None where that is not known."""
         theirs = self.followed.version if self.followed is not None else None
         own = self._own_version.of(self.session.sheet.table) if isinstance(theirs, str) else None
-        return "the game has another version" if own is not None and own != theirs else ""
+        return None if own is None else own == theirs
+
+    @property
+    def _game_table(self) -> Table:
+        """The table that the game has: the one on the screen where that is so, else most likely the one on the disk."""
+        return self.session.sheet.table if self._is_own_version else self.session.saved_table
 
 
 class OwnVersion:

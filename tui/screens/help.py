@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from tui.commands import COMMANDS, Command, key_names
-from tui.screens.help_page import HelpPage, Lines
+from ..commands import COMMANDS, Command, key_names
+from .help_page import HelpPage, Lines
 
 CELLS = (
     ("Any, or nothing", "every value"),

@@ -12,7 +12,7 @@ from textual.binding import Binding, BindingType
 from textual.containers import VerticalScroll
 from textual.widgets import Static
 
-from tui.screens.dialog import Dialog
+from .dialog import Dialog
 
 Lines = Sequence[tuple[str, str]]
 

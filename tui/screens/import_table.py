@@ -6,6 +6,7 @@ Nothing is changed here: the dialog gives back an `Import`, whose edit the sheet
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar
 
@@ -18,21 +19,25 @@ from textual.widgets import Input, Select, Static
 from textual.worker import get_current_worker
 
 from contextdb.disk import read_bytes
-from contextdb.errors import ContextDBError
+from contextdb.errors import ContextDBError, Fault, safe_text
 from contextdb.exchange.formats import FORMATS, ReadOptions, format_of, sheet_names
 from contextdb.exchange.importing import NAMES
 from contextdb.exchange.reading import SheetWanted
 from contextdb.tables.table import Table
-from tui.model.importing import MODES, Choice, Draft, Import, Mode, suffixes_read, why_not
-from tui.model.paths import common_start, completions, resolved
-from tui.screens.dialog import Dialog, buttons
-from tui.widgets.field import Field
-from tui.widgets.line_list import LineList, ListCell, ListColumn
-from tui.widgets.pick import Pick
+
+from ..model.importing import MODES, Choice, Draft, Import, Mode, suffixes_read, why_not
+from ..model.paths import resolved
+from ..widgets.cursor_lines import UP_DOWN
+from ..widgets.field import Field
+from ..widgets.line_list import LineList, ListCell, ListColumn
+from ..widgets.pick import Pick
+from .dialog import Dialog, buttons
+from .path_dialog import PathDialog
 
 BY_ITSELF = "by its content"
 THE_ONLY = "the filled sheet"
 THE_USUAL = "each text is one name, but in our own files"
+DECIMALS = [("by the cells", ""), ("comma: 0,5 is 0.5", "comma"), ("point: 0,5 is 0 ± 5", "point")]
 COLUMNS = (ListColumn("Column", 18, 2, is_name=True), ListColumn("First cells", 12, 3), ListColumn("Becomes", 20, 3))
 
 
@@ -51,7 +56,6 @@ class ChoiceDialog(Dialog[Choice]):
         self.becomes = becomes
 
     def compose_body(self) -> ComposeResult:
-        """The choices."""
         yield LineList([ListColumn("Becomes", 24, 1), ListColumn("", 20, 1)], id="choice-lines")
 
     def on_mount(self) -> None:
@@ -66,15 +70,14 @@ class ChoiceDialog(Dialog[Choice]):
         self.dismiss(self.choices[event.index])
 
 
-class ImportDialog(Dialog[Import]):
+class ImportDialog(PathDialog[Import]):
     """Import a file into the open table."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("tab", "complete", "Complete", show=False, priority=True),
         Binding("f6,ctrl+j", "import", "Import"),
         Binding("f2", "path", "Another file", show=False),
-        Binding("down", "move(1)", "Down", show=False),
-        Binding("up", "move(-1)", "Up", show=False),
+        *UP_DOWN,
     ]
     DEFAULT_CSS = """
     ImportDialog {
@@ -85,8 +88,8 @@ class ImportDialog(Dialog[Import]):
         &.-read #import-columns { display: block; }
         &.-read #import-names { display: none; }
         &.-read #field-mode, &.-read #field-texts { display: block; }
-        & #field-how Horizontal { height: auto; }
-        & #field-how Select { width: 1fr; }
+        & #field-how Horizontal, & #field-texts Horizontal { height: auto; }
+        & #field-how Select, & #field-texts Select { width: 1fr; }
         & #import-why { height: auto; max-height: 2; color: $text-muted; display: none; }
         &.-read #import-why { display: block; }
         & #import-summary { height: auto; margin: 1 0 0 0; text-style: bold; }
@@ -101,14 +104,10 @@ class ImportDialog(Dialog[Import]):
 
     def __init__(self, table: Table, folder: Path, text: str | None = None, path: Path | None = None) -> None:
         """`folder` is where paths start; `text` is imported instead of a file: what is on the clipboard. `path` is read at once."""
-        super().__init__(classes="-wide -no-sheets")
+        super().__init__(folder, suffixes_read(), classes="-wide -no-sheets")
         self.title_text = f"Import into {table.name}"
         self.table = table
-        self.folder = folder
         self.text = text
-        self.names: list[str] = []
-        self.is_chosen = False
-        """Whether the list of names was moved in since the last letter: Enter then takes its line."""
         self.draft: Draft | None = None
         self.reason = ""
         """Why there is no draft."""
@@ -117,7 +116,7 @@ class ImportDialog(Dialog[Import]):
     def compose_body(self) -> ComposeResult:
         """The file and how it is read; then its columns."""
         if self.text is None:
-            yield Field("File", Input(id="import-path", compact=True), key="path")
+            yield Field("File", self.path_entry("import"), key="path")
         formats = [(BY_ITSELF, ""), *((one.about.split(";")[0], one.name) for one in FORMATS.values() if one.is_read)]
         kind = Pick(formats, value="" if self.text is None else "tsv", allow_blank=False, compact=True, id="import-format")
         sheet = Pick([(THE_ONLY, "")], value="", allow_blank=False, compact=True, id="import-sheet")
@@ -125,12 +124,10 @@ class ImportDialog(Dialog[Import]):
         modes = [(about, mode) for mode, about in MODES.items()]
         yield Field("Rows", Pick(modes, value="merge", allow_blank=False, compact=True, id="import-mode"), key="mode")
         texts = [(THE_USUAL, ""), *((about, name) for name, about in NAMES.items())]
-        yield Field("Names", Pick(texts, value="", allow_blank=False, compact=True, id="import-texts"), key="texts")
-        yield LineList(
-            [ListColumn(f"In {self.folder.name or self.folder}", 20, 1)],
-            empty="No such file.",
-            id="import-names",
-        )
+        names = Pick(texts, value="", allow_blank=False, compact=True, id="import-texts")
+        decimal = Pick(DECIMALS, value="", allow_blank=False, compact=True, id="import-decimal")
+        yield Field("Names, decimals", Horizontal(names, decimal), key="texts")
+        yield self.path_names("import", "No such file.")
         yield LineList(COLUMNS, empty="No column.", id="import-columns")
         yield Static("", id="import-why")
         yield Static("", id="import-summary")
@@ -140,125 +137,102 @@ class ImportDialog(Dialog[Import]):
 
     def on_mount(self) -> None:
         """Show what files there are, or read the clipboard."""
-        self.query_one("#import-names", LineList).can_focus = False
         if self.text is not None:
             self._read()
             return
-        self.query_one("#import-path", Input).focus()
+        self.entry.focus()
         path = self.path
-        self._show_names("")
+        self.show_names("")
         if path is not None:
-            self._take(str(path.absolute()))
+            self.take(str(path.absolute()))
 
     # ---- which file
 
-    @on(Input.Changed, "#import-path")
-    def _typed(self, event: Input.Changed) -> None:
-        self._show_names(event.value)
-
-    def _show_names(self, text: str) -> None:
-        self.is_chosen, self.draft, self.path, self.reason = False, None, None, ""
+    def show_names(self, text: str) -> None:
+        """List what a path may go on to be; what was read goes."""
+        self.draft, self.path, self.reason = None, None, ""
         self.set_class(False, "-read")
-        self._show_keys("Enter read · Tab complete · ↑↓ choose · Esc cancel")
-        self.names = completions(text, self.folder, suffixes_read())
-        self.query_one("#import-names", LineList).show(len(self.names), lambda at: (self.names[at],))
+        self._show_keys(self.keys_text)
+        super().show_names(text)
         self._say()
 
     def action_move(self, down: int) -> None:
-        """Move in the list of names."""
+        """Move in the list of names, while there is one."""
         if not self.has_class("-read"):
-            self.is_chosen = True
-            self.query_one("#import-names", LineList).action_move(down)
+            super().action_move(down)
 
     def action_complete(self) -> None:
-        """Write as much of the path as is certain; elsewhere go to the next field."""
-        entry = self.query("#import-path").first(Input) if self.text is None else None
-        if entry is None or not entry.has_focus or self.has_class("-read"):
+        """As in every such dialog, while a path is wanted."""
+        if self.text is None and not self.has_class("-read"):
+            super().action_complete()
+        else:
             self.focus_next()
-        elif self.names:
-            names = self.query_one("#import-names", LineList)
-            self._write(self.names[names.index] if self.is_chosen else common_start(self.names, entry.value))
 
-    def _write(self, text: str) -> None:
-        entry = self.query_one("#import-path", Input)
-        entry.value = text
-        entry.cursor_position = len(text)
-
-    @on(LineList.Chosen, "#import-names")
-    def _clicked(self, event: LineList.Chosen) -> None:
-        self._take(self.names[event.index])
-
-    @on(Input.Submitted, "#import-path")
-    def _submitted(self, event: Input.Submitted) -> None:
-        is_list = self.names and (self.is_chosen or not event.value.strip())
-        self._take(self.names[self.query_one("#import-names", LineList).index] if is_list else event.value)
-
-    def _take(self, text: str) -> None:
+    def take(self, text: str) -> None:
         """Go into a folder, or read a file."""
-        path = resolved(text, self.folder)
-        try:
-            is_folder = path.is_dir()
-        except (OSError, ValueError):
-            is_folder = False
-        if is_folder:
-            self._write(text if text.endswith("/") else f"{text}/")
+        if self.is_folder(text):
             return
         with self.prevent(Input.Changed):
-            self._write(text)
-        self.path = path
+            self.write(text)
+        self.path = resolved(text, self.folder)
         self._read()
 
     def action_path(self) -> None:
         """Go back to the path."""
         if self.text is None:
-            self.query_one("#import-path", Input).focus()
+            self.entry.focus()
 
     # ---- reading
 
     @on(Select.Changed, "#import-format")
     @on(Select.Changed, "#import-sheet")
     @on(Select.Changed, "#import-texts")
+    @on(Select.Changed, "#import-decimal")
     def _read_otherwise(self) -> None:
         if self.path is not None or (self.text is not None and self.draft is not None):
             self._read()
 
     def _read(self) -> None:
         self._say("Reading …")
-        said = (str(self.query_one(f"#import-{name}", Select).value) or None for name in ("format", "sheet", "texts"))
-        kind, sheet, names = said
-        self._read_file(self.path, ReadOptions(kind, sheet), names)
+        choices = (str(self.query_one(f"#import-{name}", Select).value) or None for name in ("format", "sheet", "texts", "decimal"))
+        kind, sheet, names, sign = choices
+        is_comma = None if sign is None else sign == "comma"
+        self._read_file(self.path, ReadOptions(kind, sheet, is_decimal_comma=is_comma), names)
 
     @work(thread=True, exclusive=True)
     def _read_file(self, path: Path | None, options: ReadOptions, names: str | None) -> None:
         """Read in the background, so that a large file does not hold the keys."""
         sheets: list[str] = []
-        found: Draft | ContextDBError
+        result: Draft | ContextDBError
         try:
             name = str(path) if path is not None else "the clipboard"
             raw = (self.text or "").encode("utf-8", "replace") if path is None else read_bytes(path)
             sheets = sheet_names(raw, name) if format_of(name, options.format, raw).name == "xlsx" else []
-            options = options if options.sheet in sheets else ReadOptions(options.format)
-            found = Draft.read(self.table, raw, name, options, names)
+            options = options if options.sheet in sheets else replace(options, sheet=None)
+            result = Draft.read(self.table, raw, name, options, names)
+            result.summary()
         except ContextDBError as error:
-            found = error
+            result = error
+        except Exception as error:  # a file that we fail at must not take the edits of the open table with it
+            result = _unexpected(error)
         if not get_current_worker().is_cancelled:
-            self.app.call_from_thread(self._show, found, sheets)
+            self.app.call_from_thread(self._show, result, sheets)
 
-    def _show(self, found: Draft | ContextDBError, sheets: Sequence[str]) -> None:
+    def _show(self, result: Draft | ContextDBError, sheets: Sequence[str]) -> None:
         self._show_sheets(sheets)
-        is_read = isinstance(found, Draft)
+        is_read = isinstance(result, Draft)
         self.set_class(is_read, "-read")
-        if isinstance(found, ContextDBError):
-            self.draft, self.reason = None, why_not(found)
-            if isinstance(found, SheetWanted):
+        if isinstance(result, ContextDBError):
+            self.draft, self.reason = None, why_not(result)
+            if isinstance(result, SheetWanted):
                 self._say(self.reason)
                 self.query_one("#import-sheet", Select).action_show_overlay()
             else:
                 self._say(wrong=self.reason)
             return
         if self.draft is not None:
-            found.mode = self.draft.mode
-        self.draft = found
+            result.mode = self.draft.mode
+        self.draft = result
         self._show_columns()
         self._show_keys("F6 import · Enter change a column · F2 another file · Esc cancel")
         self.set_focus(self.query_one("#import-columns", LineList))  # before it is painted: a key then goes there
@@ -321,20 +295,29 @@ class ImportDialog(Dialog[Import]):
         except ContextDBError as error:
             self._say(wrong=why_not(error))
             return
+        except Exception as error:  # as when it is read
+            self._say(wrong=why_not(_unexpected(error)))
+            return
         if answer.edit.changes:
             self.dismiss(answer)
         else:
             self._say("Nothing would change: the table says all of this already.")
 
-    # ---- what is said
+    # ---- messages
 
-    def _say(self, told: str = "", wrong: str = "", notes: Sequence[str] = ()) -> None:
-        summary = Content.styled(f"✗ {wrong}", "$text-error") if wrong else Content(told)
+    def _say(self, message: str = "", wrong: str = "", notes: Sequence[str] = ()) -> None:
+        summary = Content.styled(f"✗ {wrong}", "$text-error") if wrong else Content(message)
         self.query_one("#import-summary", Static).update(summary)
         self.query_one("#import-notes Static", Static).update(Content("\n".join(f"· {note}" for note in notes)))
 
     def _show_keys(self, text: str) -> None:
         self.query_one("#dialog").border_subtitle = text
+
+
+def _unexpected(error: Exception) -> ContextDBError:
+    return ContextDBError(
+        Fault(f"contextdb fails at this file ({type(error).__name__}: {safe_text(str(error), 80)}).", "another file")
+    )
 
 
 def mode_of(text: str) -> Mode:

@@ -17,12 +17,13 @@ from contextdb.console import printable
 from contextdb.errors import ContextDBError, plural
 from contextdb.telemetry.link.doors import doors
 from contextdb.telemetry.link.hearing import Wanted
-from tui.model.listening import Listening
-from tui.model.moments import Key, Session, Track, open_session
-from tui.screens.ask import AskDialog
-from tui.screens.dialog import Dialog
-from tui.screens.following import Followed
-from tui.widgets.line_list import LineList, ListCell, ListColumn
+
+from ..model.listening import Listening
+from ..model.moments import Key, Session, Track, open_session
+from ..widgets.line_list import LineList, ListCell, ListColumn
+from .ask import AskDialog
+from .dialog import Dialog
+from .following import Followed
 
 LOOK_EVERY_S, SHOW_EVERY_S = 1.0, 0.25
 NO_GAME = 'No game is running: a game calls contextdb.link("game"). F4 opens a recording.'
@@ -67,7 +68,6 @@ class LiveDialog(Dialog[Followed]):
         self.show()
 
     def on_unmount(self) -> None:
-        """Hang up."""
         self._is_closed = True
         for one in self._games.values():
             one.close()
@@ -80,32 +80,32 @@ class LiveDialog(Dialog[Followed]):
 
     def _find(self) -> None:
         try:
-            found = dict(doors())
+            games = dict(doors())
         except (OSError, ContextDBError):
-            found = {}
-        for name, path in found.items():
+            games = {}
+        for name, path in games.items():
             known = self._games.get(name)
             if (known is None or known.is_over) and not self._is_closed:
                 self._games[name] = Listening(name, path, Wanted(tables=(self.table,)))
-        for name in [name for name in self._games if name not in found]:
+        for name in [name for name in self._games if name not in games]:
             self._games.pop(name).close()
         if self._is_closed:
             self.on_unmount()
 
-    # ---- what is shown
+    # ---- display
 
     def show(self) -> None:
         """Show who is there now."""
         lines = self.query_one(LineList)
         chosen = self._lines[lines.index][0] if 0 <= lines.index < len(self._lines) else None
-        before, self._lines = self._lines, list(self._found())
+        before, self._lines = self._lines, list(self._characters())
         self.query_one("#live-state", Static).update(Content(self._state()))
         if [line[:2] for line in before] != [line[:2] for line in self._lines] or lines.n_lines != len(self._lines):
             at = next((at for at, line in enumerate(self._lines) if line[0] == chosen), 0)
             lines.show(len(self._lines), self._cells, at)
         lines.refresh()
 
-    def _found(self) -> Iterator[tuple[Key, Listening | None]]:
+    def _characters(self) -> Iterator[tuple[Key, Listening | None]]:
         if self._recording is not None:
             yield from ((key, None) for key in self._recording.tracks if key[1] == self.table)
         for _, game in sorted(self._games.copy().items()):
@@ -120,8 +120,8 @@ class LiveDialog(Dialog[Followed]):
         moment = track.moment(track.stop - 1) if track is not None else None
         asset = moment.pick[1] if moment is not None and moment.pick is not None else None
         name = game.game if game is not None else self._recording.path.name if self._recording is not None else ""
-        who: ListCell = printable(key[0]) if key[0] is not None else ("not named", "muted")
-        return [printable(name), who, f"{track.stop:,}" if track is not None else "", printable(asset or "–")]
+        character: ListCell = printable(key[0]) if key[0] is not None else ("not named", "muted")
+        return [printable(name), character, f"{track.stop:,}" if track is not None else "", printable(asset or "–")]
 
     def _state(self) -> str:
         if self._problem:
@@ -133,7 +133,7 @@ class LiveDialog(Dialog[Followed]):
         parts = [f"{plural(len(self._lines), 'character')} of {self.table}"]
         for game in silent:
             why = f"does not have {self.table}" if game.state == "on" and self.table not in game.tables else game.trouble
-            parts.append(f"{printable(game.game)}: {why or 'has asked nothing yet'}")
+            parts.append(f"{printable(game.game)}: {why or 'has made no query yet'}")
         left_out = sum(game.n_left_out for game in games)
         return " · ".join([*parts, *(["some characters are left out: there are too many"] if left_out else [])])
 
@@ -152,8 +152,6 @@ class LiveDialog(Dialog[Followed]):
         self.dismiss(Followed(key, Listening(game.game, game.path, wanted)))
 
     def action_open_file(self) -> None:
-        """Ask for a recording."""
-
         def named(text: str | None) -> None:
             if text is not None and text.strip():
                 self._open(self.folder / Path(text.strip()).expanduser())

@@ -14,17 +14,18 @@ from contextdb.edits.schema_file import schema_path
 from contextdb.errors import in_quotes, plural
 from contextdb.tables.changes import Edit
 from contextdb.tables.table import Table
-from tui.commands import ASSETS, BY_ID, SCREEN, bindings, key_names
-from tui.messages import Edited, FillGap, GoToCell, RenameWanted, ValueRenameWanted
-from tui.model.importing import Import
-from tui.model.new_table import make_table, name_fault
-from tui.panes.why import WIDE
-from tui.screens.ask import AskDialog, ChooseDialog
-from tui.screens.disk_care import LOOK_EVERY_S
-from tui.screens.export_table import Export
-from tui.screens.following import Followed
-from tui.screens.table_screen import TableScreen
-from tui.widgets.grid import Grid
+
+from ..commands import ASSETS, BY_ID, SCREEN, bindings, key_names
+from ..messages import Edited, FillGap, GoToCell, RenameWanted, ValueRenameWanted
+from ..model.importing import Import
+from ..model.new_table import make_table, name_fault
+from ..panes.why import WIDE
+from ..widgets.grid import Grid
+from .ask import AskDialog, ChooseDialog
+from .disk_care import LOOK_EVERY_S
+from .export_table import Export
+from .following import Followed
+from .table_screen import TableScreen
 
 
 class Answer(Protocol):
@@ -52,8 +53,13 @@ class MainScreen(TableScreen):
 
     def on_mount(self) -> None:
         self.assets.take_focus()
-        self.set_interval(LOOK_EVERY_S, self.care.look)
+        self.set_interval(LOOK_EVERY_S, self._look)
         self._opened()
+
+    def _look(self) -> None:
+        """Take in what others wrote; not while a cell is edited, which could become another one."""
+        if self.assets.editor is None:
+            self.care.look()
 
     # ---- tables and files
 
@@ -116,10 +122,6 @@ class MainScreen(TableScreen):
 
     def action_save(self) -> None:
         """Write the table to its file, and what changes to contextdb.toml."""
-        editor = self.assets.editor
-        if editor is not None and editor.fault is not None:
-            self.say("Finish the cell first: Enter accepts it, Esc leaves it as it was.", "warning")
-            return
         self.try_to(lambda: self.care.save(then=self._saved))
 
     def _saved(self) -> None:
@@ -147,7 +149,7 @@ class MainScreen(TableScreen):
         self._import()
 
     def _import(self, text: str | None = None) -> None:
-        from tui.screens.import_table import ImportDialog
+        from .import_table import ImportDialog
 
         def chosen(answer: Import | None) -> None:
             if answer is not None:
@@ -161,7 +163,7 @@ class MainScreen(TableScreen):
         self.apply(answer.edit, answer.notes if is_short else (f"{len(answer.notes)} remarks.",))
         self.assets.grid.forget_widths()
         if not is_short:
-            from tui.screens.remarks import RemarksDialog
+            from .remarks import RemarksDialog
 
             self.app.push_screen(RemarksDialog(answer.edit.name, answer.notes))
 
@@ -187,7 +189,7 @@ class MainScreen(TableScreen):
 
     def action_export(self) -> None:
         """Write the table for another program."""
-        from tui.screens.export_table import ExportDialog
+        from .export_table import ExportDialog
 
         def chosen(answer: Export | None) -> None:
             if answer is not None:
@@ -203,14 +205,14 @@ class MainScreen(TableScreen):
 
     def action_add_column(self) -> None:
         """Add a declared condition, those of a blueprint, or a new column."""
-        from tui.screens.add_column import AddColumn
+        from .add_column import AddColumn
 
         sheet = self.session.sheet
         self.app.push_screen(AddColumn(sheet.table, sheet.selection.column), self._answered)
 
     def action_autofill(self) -> None:
         """Show what the clips give to the table, and fill it."""
-        from tui.screens.autofill import Autofill, AutofillDialog  # loads what reads clips
+        from .autofill import Autofill, AutofillDialog  # loads what reads clips
 
         table = self.session.sheet.table
 
@@ -222,7 +224,7 @@ class MainScreen(TableScreen):
 
     def action_column_sheet(self) -> None:
         """Change what contextdb.toml says of all columns, in a sheet; as one step."""
-        from tui.screens.column_sheet import ColumnSheetDialog
+        from .column_sheet import ColumnSheetDialog
 
         sheet = self.session.sheet
 
@@ -254,7 +256,7 @@ class MainScreen(TableScreen):
 
     def action_blueprints(self) -> None:
         """Insert the conditions of a blueprint, or keep the selected ones as one."""
-        from tui.screens.blueprints import Blueprints
+        from .blueprints import Blueprints
 
         sheet = self.session.sheet
         self.app.push_screen(Blueprints(sheet.table, sheet.selected_columns, sheet.selection.column), self._answered)
@@ -272,7 +274,7 @@ class MainScreen(TableScreen):
 
     def action_find_everywhere(self) -> None:
         """Find a text in all tables of the folder, and go to one of its places."""
-        from tui.screens.find_everywhere import FindEverywhere, FoundCell
+        from .find_everywhere import FindEverywhere, FoundCell
 
         def chosen(answer: FoundCell | None) -> None:
             if answer is not None:
@@ -296,7 +298,7 @@ class MainScreen(TableScreen):
 
     def action_live(self) -> None:
         """Let the test row follow a game, or a recording."""
-        from tui.screens.live import LiveDialog
+        from .live import LiveDialog
 
         def chosen(answer: Followed | None) -> None:
             if answer is not None:

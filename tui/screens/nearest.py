@@ -15,12 +15,13 @@ from textual.widgets import Static
 from contextdb.errors import plural
 from contextdb.tables.nesting.names import inner_name
 from contextdb.tables.table import Table
-from tui.model.query_row import QueryRow
-from tui.model.why import NEEDED, CellWhy, RowWhy, State, nearest_rows, why_row
-from tui.model.window import MAY_BE, PICKED, VALID
-from tui.screens.dialog import Dialog, buttons
-from tui.widgets.choice_line import ChoiceLine
-from tui.widgets.line_list import LineList, ListCell, ListColumn
+
+from ..model.query_row import QueryRow
+from ..model.why import NEEDED, CellWhy, RowWhy, State, nearest_rows, why_row
+from ..model.window import MAY_BE, PICKED, VALID
+from ..widgets.choice_line import ChoiceLine
+from ..widgets.line_list import LineList, ListCell, ListColumn
+from .dialog import Dialog, buttons
 
 MOST_ROWS = 20
 NARROW = 110
@@ -97,7 +98,6 @@ class NearestDialog(Dialog[CellAnswer]):
 
     @property
     def lines(self) -> LineList:
-        """The list of cells."""
         return self.query_one(LineList)
 
     @property
@@ -109,10 +109,10 @@ class NearestDialog(Dialog[CellAnswer]):
         pages = ["This row"] * (self.why is not None) + [f"Nearest rows {len(self.nearest)}"]
         self.query_one(ChoiceLine).show(pages, len(pages) - 1 if self.is_nearest else 0)
         self.query_one("#nearest-state", Static).update(Content(self._state()))
-        shown = self.nearest if self.is_nearest else [self.why] if self.why else []
-        self.cells = [cell for why in shown for cell in why.cells]
-        self.names = {why.row: why.asset for why in shown}
-        self.firsts = {id(why.cells[0]) for why in shown if why.cells}
+        rows = self.nearest if self.is_nearest else [self.why] if self.why else []
+        self.cells = [cell for why in rows for cell in why.cells]
+        self.names = {why.row: why.asset for why in rows}
+        self.firsts = {id(why.cells[0]) for why in rows if why.cells}
         self._lay_out()
         self.lines.empty = "Every row is valid." if self.n_valid == self.n_rows else "No row is there."
         self.lines.show(len(self.cells), lambda at: self._line(self.cells[at]))
@@ -120,16 +120,16 @@ class NearestDialog(Dialog[CellAnswer]):
     def _lay_out(self) -> None:
         """Columns for the page and the room that there is."""
         self.is_narrow = self.size.width < NARROW
-        told = [ListColumn(name, 10, 1) for name in ("Fact", "Cell", "Change to")]
+        columns = [ListColumn(name, 10, 1) for name in ("Fact", "Cell", "Change to")]
         if not self.is_nearest:
-            self.lines.columns = (ListColumn("", 11), ListColumn("Condition", 14, 2, is_name=True), *told)
+            self.lines.columns = (ListColumn("", 11), ListColumn("Condition", 14, 2, is_name=True), *columns)
         else:
-            told = [ListColumn("Change to", 14)] if self.is_narrow else told
+            columns = [ListColumn("Change to", 14)] if self.is_narrow else columns
             self.lines.columns = (
                 ListColumn("Row", 5, 0, True),
                 ListColumn("Asset", 16, 2, is_name=True),
                 ListColumn("Condition", 12, 1, is_name=True),
-                *told,
+                *columns,
             )
         self.lines.refresh()
 
@@ -139,11 +139,11 @@ class NearestDialog(Dialog[CellAnswer]):
 
     def _line(self, cell: CellWhy) -> Sequence[ListCell]:
         tone = "muted" if cell.state in ("holds", "not given") else ""
-        told: list[ListCell] = [(cell.fact or "–", tone), (cell.cell or "Any", tone), (cell.mend or "", "info")]
+        cells: list[ListCell] = [(cell.fact or "–", tone), (cell.cell or "Any", tone), (cell.mend or "", "info")]
         if not self.is_nearest:
-            return [STATES[cell.state], (cell.column, tone), *told]
+            return [STATES[cell.state], (cell.column, tone), *cells]
         head: list[ListCell] = [str(cell.row + 1), (self.names[cell.row], "strong")] if id(cell) in self.firsts else ["", ""]
-        return [*head, cell.column, *(told[-1:] if self.is_narrow else told)]
+        return [*head, cell.column, *(cells[-1:] if self.is_narrow else cells)]
 
     def _state(self) -> str:
         unread = "".join(f"\n! The fact {name} cannot be read and is left out." for name in list(self.faults)[:2])
@@ -165,7 +165,6 @@ class NearestDialog(Dialog[CellAnswer]):
 
     @on(LineList.Chosen)
     def action_go(self) -> None:
-        """Give back the cell."""
         if (cell := self.chosen) is not None:
             self.dismiss(CellAnswer(cell.row, cell.column))
 
@@ -176,7 +175,6 @@ class NearestDialog(Dialog[CellAnswer]):
             self.dismiss(CellAnswer(cell.row, cell.column, cell.mend))
 
     def action_turn(self) -> None:
-        """The other page."""
         if self.why is not None:
             self.is_nearest = not self.is_nearest
             self._show()

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from textual.command import CommandPalette, ProviderSource
 from textual.filter import LineFilter
 
-from tui.contrast import without
+from ..contrast import without
 
 
 class Palette(CommandPalette):
@@ -18,7 +18,6 @@ class Palette(CommandPalette):
         self._frame_title = title
 
     def on_mount(self) -> None:
-        """Write into the frame."""
         box = self.query_one("#--container")
         box.border_title, box.border_subtitle = self._frame_title, "↑↓ choose · Enter OK · Esc cancel"
 

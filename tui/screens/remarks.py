@@ -9,7 +9,7 @@ from textual.containers import VerticalScroll
 from textual.content import Content
 from textual.widgets import Static
 
-from tui.screens.dialog import Dialog
+from .dialog import Dialog
 
 
 class RemarksDialog(Dialog[None]):
@@ -30,11 +30,9 @@ class RemarksDialog(Dialog[None]):
         self.remarks = tuple(remarks)
 
     def compose_body(self) -> ComposeResult:
-        """The remarks."""
         with VerticalScroll(id="remarks"):
             for remark in self.remarks:
                 yield Static(Content(f"· {remark}"))
 
     def on_mount(self) -> None:
-        """The keys scroll."""
         self.query_one("#remarks").focus()

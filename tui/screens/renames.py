@@ -1,4 +1,4 @@
-"""Renames of columns, values, roles and assets: what else speaks of them is shown, and all of it goes along, or only this table."""
+"""Renames of columns, values, roles and assets: what else names them is displayed, and all of it goes along, or only this table."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ from contextdb.edits.renaming_assets import asset_renaming, asset_uses
 from contextdb.edits.renaming_roles import facts_of, role_renaming, role_uses
 from contextdb.edits.renaming_values import ValueUses, value_renaming, value_uses
 from contextdb.errors import some
-from contextdb.schema.shapes import wrong_name
-from tui.editor import Editor
-from tui.messages import Edited, RenameWanted, ValueRenameWanted
-from tui.model.column_values import replaced
-from tui.model.session import Session
-from tui.model.workspace import Workspace
-from tui.screens.ask import AskDialog, ChooseDialog
+from contextdb.files.toml_shapes import wrong_name
+
+from ..editor import Editor
+from ..messages import Edited, RenameWanted, ValueRenameWanted
+from ..model.column_values import replaced
+from ..model.session import Session
+from ..model.workspace import Workspace
+from .ask import AskDialog, ChooseDialog
 
 WRITTEN = "Everywhere and only here are written to the files at once, as one step that Ctrl+Z takes back."
 
@@ -33,7 +34,7 @@ class Renamed(Protocol):
         """Say something in a line below."""
 
     def try_to(self, verb: Callable[[], None]) -> None:
-        """Do something; what cannot be done is said."""
+        """Do something; what cannot be done is reported."""
 
     def edited(self, event: Edited) -> None:
         """The sheet was edited."""
@@ -96,10 +97,10 @@ class Renames:
 
     def _role(self, old: str, new: str) -> None:
         table = self.screen.session.sheet.table
-        said, tables = role_uses(table, old)
+        uses, tables = role_uses(table, old)
         names = {name: f"{new}.{name.removeprefix(f'{old}.')}" for name in facts_of(table, old)}
         here = f"Only here: this table, its rules, actors and saved contexts; others keep {old}"
-        about = f"{old} is used by {said}.{_named(tables)}"
+        about = f"{old} is used by {uses}.{_named(tables)}"
         self._ask(old, new, about, here, lambda only_here: role_renaming(table, old, new, only_here), names)
 
     def asset(self) -> None:
@@ -135,11 +136,11 @@ class Renames:
         verb = "redo" if is_redo else "undo"
 
         def write() -> None:
-            found = workspace.undo_rename(name, is_redo)
-            if found is None:
+            renaming = workspace.undo_rename(name, is_redo)
+            if renaming is None:
                 self.screen.say(f"There is nothing to {verb}.")
             else:
-                self._written(f"{verb.capitalize()}: Rename {found.old} to {found.new}.")
+                self._written(f"{verb.capitalize()}: Rename {renaming.old} to {renaming.new}.")
 
         self.screen.try_to(write)
 
@@ -176,11 +177,11 @@ class Renames:
 
         self.screen.app.push_screen(ChooseDialog(f"Rename {old} to {new}", lines, about=f"{about}\n{WRITTEN}"), chosen)
 
-    def _written(self, said: str) -> None:
+    def _written(self, message: str) -> None:
         row, column = self.screen.session.sheet.cursor
         self.screen.workspace.session(self.screen.table_name).sheet.go(row, column)
         self.screen.app.open_table(self.screen.table_name)
-        self.screen.app.say_renamed(said)
+        self.screen.app.say_renamed(message)
 
 
 def _named(tables: Sequence[str]) -> str:

@@ -6,18 +6,18 @@ from collections.abc import Sequence
 from functools import partial
 from typing import ClassVar
 
-from textual import on
+from textual import events, on
 from textual.content import Content
 from textual.geometry import Size
 from textual.message import Message
 from textual.widgets import Static
 
-from tui.clipboard import Clipboard
-from tui.messages import Edited, Told
-from tui.model.roomy_sheet import RoomySheet
-from tui.screens.dialog import Answer, Dialog, buttons
-from tui.widgets.cell_editor import CellEditor
-from tui.widgets.grid import Grid
+from ..clipboard import Clipboard
+from ..messages import Edited, Notice
+from ..model.roomy_sheet import RoomySheet
+from ..widgets.cell_editor import CellEditor, is_free_for
+from ..widgets.grid import Grid
+from .dialog import Answer, Dialog, buttons
 
 
 class SmallGrid(Grid):
@@ -25,6 +25,7 @@ class SmallGrid(Grid):
 
     has_test_row: ClassVar[bool] = False
     has_new_row: ClassVar[bool] = False
+    asks_of_pastes: ClassVar[bool] = False
 
     class Left(Message):
         """Esc was pressed."""
@@ -43,7 +44,7 @@ class SheetDialog(Dialog[Answer]):
         & > #dialog > #dialog-body { height: 1fr; }
         & .sheet--about { height: auto; max-height: 3; padding: 0 1; color: $text-muted; }
         & SmallGrid { height: 1fr; margin: 1 0; }
-        & .sheet--said { height: auto; max-height: 4; padding: 0 1; }
+        & .sheet--message { height: auto; max-height: 4; padding: 0 1; }
         & .sheet--keys { height: auto; max-height: 2; padding: 0 1; color: $text-muted; }
         &.-tall > #dialog, &.-tall > #dialog > #dialog-body { height: auto; }
         &.-tall SmallGrid { height: auto; min-height: 14; max-height: 60vh; }
@@ -59,7 +60,6 @@ class SheetDialog(Dialog[Answer]):
 
     @property
     def grid(self) -> SmallGrid:
-        """The grid of it."""
         return self.query_one(SmallGrid)
 
     @property
@@ -71,11 +71,11 @@ class SheetDialog(Dialog[Answer]):
         """Whether a column holds facts, not cells."""
         return False
 
-    def show_sheet(self, said: str = "") -> None:
+    def show_sheet(self, message: str = "") -> None:
         """Show the sheet as it is now, and say something."""
         self.sheet.with_room()
         self.grid.changed()
-        self.query_one(".sheet--said", Static).update(Content(said))
+        self.query_one(".sheet--message", Static).update(Content(message))
 
     def show_keys(self, keys: Sequence[tuple[str, str]]) -> None:
         """Say what can be done: actions with their labels, which a click runs too."""
@@ -96,6 +96,7 @@ class SheetDialog(Dialog[Answer]):
             sheet.header(column).kind,
             event.text,
             check=lambda text: sheet.fault_of(column, text),
+            on_done=self._edit_done,
             known=sheet.known(column),
             is_fact=self.is_fact(column),
             is_typing=event.is_typing,
@@ -104,6 +105,10 @@ class SheetDialog(Dialog[Answer]):
         if editor.parent is None:
             self.query_one("#dialog-body").mount(editor)
 
+    def _forward_event(self, event: events.Event) -> None:
+        if is_free_for(self, event):
+            super()._forward_event(event)
+
     def on_resize(self) -> None:
         self.call_after_refresh(self._place_editor)
 
@@ -111,33 +116,32 @@ class SheetDialog(Dialog[Answer]):
         if self.editor is not None:
             self.editor.place(self.grid.cell_region(), Size(self.size.width, self.size.height))
 
-    @on(CellEditor.Committed)
-    def _commit(self, event: CellEditor.Committed) -> None:
-        event.stop()
-        if event.is_fill:
-            self.sheet.fill(event.text)
-        elif fault := self.sheet.type_text(event.text):
+    def _edit_done(self, outcome: CellEditor.Outcome) -> None:
+        if isinstance(outcome, CellEditor.Committed):
+            self._commit(outcome)
+        elif isinstance(outcome, CellEditor.Cancelled):
+            self._close_editor()
+
+    def _commit(self, outcome: CellEditor.Committed) -> None:
+        if outcome.is_fill:
+            self.sheet.fill(outcome.text)
+        elif fault := self.sheet.type_text(outcome.text):
             if self.editor is not None:
                 self.editor.refuse(fault)
             return
-        self.grid.again = partial(self.grid.fill, event.text)
+        self.grid.again = partial(self.grid.fill, outcome.text)
         self._close_editor()
         self.sheet.with_room()
         start = None
-        if event.is_tab:
+        if outcome.is_tab:
             self.grid.run.tab(*self.sheet.cursor)
-        elif event.down == 1 and self.sheet.block.n_cells == 1:
+        elif outcome.down == 1 and self.sheet.block.n_cells == 1:
             start = self.grid.run.enter(*self.sheet.cursor)
-        if not event.is_fill:
-            self.sheet.select(lambda s, shape: s.next_cell(event.down, event.right, shape))
+        if not outcome.is_fill:
+            self.sheet.move_on(outcome.down, outcome.right)
         if start is not None:
             self.sheet.go(self.sheet.cursor[0], start)
         self.show_sheet()
-
-    @on(CellEditor.Cancelled)
-    def _cancelled(self, event: CellEditor.Cancelled) -> None:
-        event.stop()
-        self._close_editor()
 
     def _close_editor(self) -> None:
         if self.editor is not None:
@@ -166,7 +170,7 @@ class SheetDialog(Dialog[Answer]):
         self.grid.forget_widths()
         self.show_sheet(" ".join([f"{done.name}." if done.name else "", *done.notes, *done.warnings]).strip())
 
-    @on(Told)
-    def _told(self, event: Told) -> None:
+    @on(Notice)
+    def _show_notice(self, event: Notice) -> None:
         event.stop()
         self.show_sheet(event.text)

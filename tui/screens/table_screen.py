@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from rich.text import Text
-from textual import on
+from textual import events, on
 from textual.app import ComposeResult
 from textual.reactive import Reactive
 from textual.screen import Screen
@@ -15,27 +15,29 @@ from textual.widgets import ContentSwitcher, Static
 
 from contextdb.errors import ContextDBError, plural
 from contextdb.tables.changes import Edit
-from tui.clipboard import Clipboard
-from tui.commands import BY_ID
-from tui.editor import Editor
-from tui.messages import Edited, GoToCell, SetContext, Told
-from tui.model.coverage_run import CoverageRun
-from tui.model.session import Session
-from tui.model.sessions import sessions_of
-from tui.model.workspace import Workspace
-from tui.panes.assets import AssetsPane
-from tui.panes.options import OptionsPane
-from tui.panes.pane import Pane
-from tui.panes.problems import ProblemsPane
-from tui.screens.asking import TestRow
-from tui.screens.dialog import take_height
-from tui.screens.disk_care import DiskCare
-from tui.screens.following import Following
-from tui.screens.renames import Renames
-from tui.screens.steps import StepsDialog
-from tui.widgets.bar import Bar, Item, StatusLine
-from tui.widgets.grid import Grid
-from tui.widgets.key_line import KeyLine
+
+from ..clipboard import Clipboard
+from ..commands import BY_ID
+from ..editor import Editor
+from ..messages import Edited, GoToCell, Notice, SetContext
+from ..model.coverage_run import CoverageRun
+from ..model.session import Session
+from ..model.sessions import sessions_of
+from ..model.workspace import Workspace
+from ..panes.assets import AssetsPane
+from ..panes.options import OptionsPane
+from ..panes.pane import Pane
+from ..panes.problems import ProblemsPane
+from ..widgets.bar import Bar, Item, StatusLine
+from ..widgets.cell_editor import is_free_for
+from ..widgets.grid import Grid
+from ..widgets.key_line import KeyLine
+from .ask import StepsDialog
+from .asking import TestRow
+from .dialog import take_height
+from .disk_care import DiskCare
+from .following import Following
+from .renames import Renames
 
 TABS = ("assets", "options", "priorities", "coverage", "problems")
 MOTION = "motion"
@@ -52,10 +54,10 @@ class TableScreen(Screen[None]):
     TableScreen {
         layout: vertical;
         & > ContentSwitcher { height: 1fr; & > * { height: 1fr; } }
-        & > #said { height: auto; max-height: 4; padding: 0 1; background: $surface; display: none; }
-        & > #said.-information { display: block; }
-        & > #said.-warning { display: block; color: $text-warning; }
-        & > #said.-error { display: block; color: $text-error; text-style: bold; }
+        & > #message { height: auto; max-height: 4; padding: 0 1; background: $surface; display: none; }
+        & > #message.-information { display: block; }
+        & > #message.-warning { display: block; color: $text-warning; }
+        & > #message.-error { display: block; color: $text-error; text-style: bold; }
     }
     """
 
@@ -77,12 +79,12 @@ class TableScreen(Screen[None]):
         self.came_from = ""
         """The table from a row of which this one was gone into."""
         self.renamed = ""
-        """What is said of a rename, after which the table was opened again."""
-        self._said = ("", "information")
+        """The message about a rename, after which the table was opened again."""
+        self._notice = ("", "information")
         self._warned_at: tuple[int, int] | None = None
         """Where the cursor was when a warning of a verb was first seen: the next cell takes it away."""
         self._is_of_verb = False
-        """What is said, not quietly, is of something that was done."""
+        """The messages, unless quiet, are of something that was done."""
         self._has_sessions = False
         self._look_for_sessions()
         self.care = DiskCare(self, self.session, self.say, self.show)
@@ -113,9 +115,13 @@ class TableScreen(Screen[None]):
         yield Bar([Item(name, BY_ID[name].label) for name in TOOLS], id="tools")
         with ContentSwitcher(initial="assets", id="panes"):
             yield AssetsPane(self.session.sheet, self.clipboard)
-        yield Static(id="said")
+        yield Static(id="message")
         yield StatusLine()
         yield KeyLine()
+
+    def _forward_event(self, event: events.Event) -> None:
+        if is_free_for(self, event):
+            super()._forward_event(event)
 
     def on_resize(self) -> None:
         self._show_bars()
@@ -124,10 +130,10 @@ class TableScreen(Screen[None]):
         self.coverage.cancel()
         self.following.close()
 
-    # ---- what is shown
+    # ---- display
 
     def show(self) -> None:
-        """Show the table, and everything said of it, as it is now."""
+        """Show the table, and its messages, as it is now."""
         table = self.session.sheet.table
         self.coverage.follow(table)
         self.test_row.follow(table)
@@ -150,26 +156,26 @@ class TableScreen(Screen[None]):
         self.show_summary()
 
     def show_summary(self) -> None:
-        """Say how much of the table is valid, shown and selected."""
+        """Say how much of the table is valid, displayed and selected."""
         self.query_one(StatusLine).show(right=self.assets.summary())
 
     def say(self, text: str, level: str = "information") -> None:
-        """Say something in the line over the footer; nothing takes away what was said."""
+        """Say something in the line over the footer; nothing takes a message away."""
         is_quiet = level == "information"
         self._is_of_verb = False
         status = self.query_one(StatusLine)
         is_short = is_quiet and status.has_room(text)
         status.show(text if is_short else "")
-        if (text, level) == self._said:
+        if (text, level) == self._notice:
             return
-        self._said, said = (text, level), self.query_one("#said", Static)
+        self._notice, line = (text, level), self.query_one("#message", Static)
         if not is_short:
-            said.update(Text(text if is_quiet else f"! {text}"))
-        if not is_short or said.display:
-            said.set_classes("" if is_short else f"-{level}")
+            line.update(Text(text if is_quiet else f"! {text}"))
+        if not is_short or line.display:
+            line.set_classes("" if is_short else f"-{level}")
 
-    @on(Told)
-    def _told(self, event: Told) -> None:
+    @on(Notice)
+    def _show_notice(self, event: Notice) -> None:
         self.say(event.text, event.level)
         self._is_of_verb, self._warned_at = event.level != "information", None
 
@@ -231,19 +237,21 @@ class TableScreen(Screen[None]):
         if name == "options":
             return OptionsPane(sheet, id=name)
         if name == "priorities":
-            from tui.panes.priorities import PrioritiesPane  # with all of motion
+            from ..panes.priorities import PrioritiesPane  # with all of motion
 
             return PrioritiesPane(sheet, id=name)
         if name == MOTION:
-            from tui.panes.motion import MotionPane  # loads the motion search
+            from ..panes.motion import MotionPane  # loads the motion search
 
             return MotionPane(self.workspace.folder, id=name)
         return self._coverage_pane(name) if name == "coverage" else ProblemsPane(sheet, id=name)
 
     def _coverage_pane(self, name: str) -> Pane:
-        from tui.panes.coverage import CoveragePane
+        from ..panes.coverage import CoveragePane
 
-        return CoveragePane(self.session.sheet, self.coverage, lambda: self.following.kept, self.workspace.folder, id=name)
+        return CoveragePane(
+            self.session.sheet, self.coverage, lambda: self.following.followed_moments, self.workspace.folder, id=name
+        )
 
     async def action_next_tab(self, by: int) -> None:
         """Go to the tab beside."""
@@ -251,7 +259,7 @@ class TableScreen(Screen[None]):
         await self.action_tab(tabs[(tabs.index(self.tab) + by) % len(tabs)])
 
     def action_help(self) -> None:
-        from tui.screens.help import HelpDialog
+        from .help import HelpDialog
 
         self.app.push_screen(HelpDialog(self.app.settings.keys))
 
@@ -266,7 +274,7 @@ class TableScreen(Screen[None]):
         self.app.push_screen(StepsDialog(history.names, history.position), chosen)
 
     def apply(self, edit: Edit, notes: Sequence[str] = ()) -> None:
-        """Make an edit, show it and say what was done; what cannot be done is said."""
+        """Make an edit, show it and say what was done; what cannot be done is reported."""
 
         def made() -> None:
             done = self.session.sheet.apply(edit)
@@ -290,7 +298,7 @@ class TableScreen(Screen[None]):
         self._show_bars()
 
     def try_to(self, verb: Callable[[], None]) -> None:
-        """Do something; what cannot be done is said."""
+        """Do something; what cannot be done is reported."""
         try:
             verb()
         except ContextDBError as error:

@@ -14,7 +14,7 @@ from textual.message import Message
 from textual.strip import Strip
 from textual.widget import Widget
 
-from tui.model.layout import cut
+from ..model.layout import cut
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Item:
     """One thing to click."""
 
     command: str
-    """The id of a command, told in `Pressed`; empty: only a text."""
+    """The id of a command, given in `Pressed`; empty: only a text."""
     label: str
     is_on: bool = False
     """It is the one that is chosen."""
@@ -59,7 +59,6 @@ class Bar(Widget):
         self._hovered: str | None = None
 
     def show(self, items: Sequence[Item], text: str = "") -> None:
-        """Show other items."""
         if (tuple(items), text) != (self._items, self._text):
             self._items, self._text = tuple(items), text
             self.refresh()

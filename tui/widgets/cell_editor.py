@@ -8,15 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 from rich.cells import cell_len
 from textual import events, on
 from textual.app import ComposeResult
 from textual.binding import BindingType
+from textual.dom import DOMNode
+from textual.errors import NoWidget
 from textual.geometry import Region, Size
 from textual.markup import escape
-from textual.message import Message
+from textual.screen import Screen
 from textual.widget import Widget
 from textual.widgets import Input
 
@@ -24,20 +26,33 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.grammar import format_cell, parse_cell, reads
 from contextdb.errors import Fault, plural
 from contextdb.schema.sections import has_place
-from tui.model.chooser import Chooser, Offer, Row
-from tui.model.condition_form import undeclared
-from tui.model.layout import cut
-from tui.model.meaning import Meaning, meaning, mend_of
-from tui.model.number_forms import nudged, other_form
-from tui.widgets.editing.choice_list import ChoiceList
-from tui.widgets.editing.entry import Entry
-from tui.widgets.editing.keys import KEYS
-from tui.widgets.editing.popup import MOST_ROWS, Mend, Popup, Told
+
+from ..messages import Notice
+from ..model.chooser import Chooser, Offer, Row
+from ..model.condition_form import undeclared
+from ..model.layout import cut
+from ..model.meaning import Meaning, meaning, mend_of
+from ..model.number_forms import nudged, other_form
+from .editing.choice_list import ChoiceList
+from .editing.entry import Entry
+from .editing.keys import KEYS
+from .editing.popup import MOST_ROWS, Mend, Popup, Verdict
+from .key_line import KeyLine
+
+OF_MOUSE = (
+    events.MouseDown,
+    events.MouseUp,
+    events.Click,
+    events.MouseScrollDown,
+    events.MouseScrollUp,
+    events.MouseScrollLeft,
+    events.MouseScrollRight,
+)
 
 
 class CellEditor(Widget):
-    """Mounted once on the screen over the grid: `place` says where, `open` for which cell. It posts one of its messages and is
-    then closed: another one for each cell would cost more than all that a typed cell paints."""
+    """Mounted once on the screen over the grid: `place` says where, `open` for which cell and who takes the outcome. It is closed
+    then: another one for each cell would cost more than all that a typed cell paints."""
 
     BINDINGS: ClassVar[list[BindingType]] = KEYS
 
@@ -51,8 +66,8 @@ class CellEditor(Widget):
     }
     """
 
-    @dataclass
-    class Committed(Message):
+    @dataclass(frozen=True)
+    class Committed:
         """A good text was given."""
 
         text: str
@@ -64,15 +79,17 @@ class CellEditor(Widget):
         is_tab: bool = False
         """It was taken by Tab."""
 
-    @dataclass
-    class Declared(Message):
+    @dataclass(frozen=True)
+    class Declared:
         """Take the text, and declare the values in it that there are not yet."""
 
         text: str
 
-    @dataclass
-    class Cancelled(Message):
+    @dataclass(frozen=True)
+    class Cancelled:
         """The cell stays as it was."""
+
+    Outcome = Committed | Declared | Cancelled
 
     def __init__(self) -> None:
         super().__init__()
@@ -90,12 +107,14 @@ class CellEditor(Widget):
         text: str,
         *,
         check: Callable[[str], Fault | None],
+        on_done: Callable[[Outcome], None],
         known: Sequence[str],
         is_fact: bool = False,
         is_typing: bool = False,
         open_list: bool = False,
     ) -> None:
-        """Edit a cell, and take the keys; nothing is left of the cell before."""
+        """Edit a cell, and take the keys; nothing is left of the cell before. `on_done` is called once with the outcome, before
+        anything else happens."""
         self.condition = condition
         self.kind = kind
         self.is_fact = is_fact
@@ -103,7 +122,7 @@ class CellEditor(Widget):
         """Enter mode: arrows take the text. Else they move in it."""
         self.is_list_open = False
         """The keys go to the list."""
-        self._check = check
+        self._check, self._on_done = check, on_done
         self._began_with = None if is_typing else text
         self._chooser = Chooser(condition, kind, known, is_fact)
         self._choices.begin("(not given)" if is_fact else "Any")
@@ -138,8 +157,8 @@ class CellEditor(Widget):
             self._update()
 
     def focus(self, scroll_visible: bool = True) -> Self:
-        """Give the keys to the entry line."""
-        self.entry.focus(scroll_visible)
+        """Give the keys to the entry line, at once."""
+        self.screen.set_focus(self.entry, scroll_visible)
         return self
 
     # ---- what is seen
@@ -189,7 +208,7 @@ class CellEditor(Widget):
         ticks = None if self._chooser.has_ticks and not has_boxes else self._chooser.ticks(text)
         self._choices.show(self._offer.rows, ticks, has_boxes, highlight)
         domain = self.condition.domain if self.condition is not None and self.is_numeric else None
-        self._popup.tell(self._told(), domain, self._meaning.cell)
+        self._popup.tell(self._verdict(), domain, self._meaning.cell)
         self._popup.border_subtitle = escape(self._hint())
         self._popup.border_title = plural(self._offer.n_values, "value") if self._offer.n_values > MOST_ROWS else ""
         self.entry.set_class(self._refused is not None, "-refused")
@@ -198,12 +217,12 @@ class CellEditor(Widget):
         self.place(self._cell, self._screen)
         self.refresh_bindings()
 
-    def _told(self) -> Told:
+    def _verdict(self) -> Verdict:
         if self._refused is not None:
-            return Told("", self._refused, True, self._mend)
+            return Verdict("", self._refused, True, self._mend)
         if self._meaning.fault is not None and self._offer.word is not None and self._offer.rows:
-            return Told(f"{plural(self._offer.n_values, 'value')} possible")
-        return Told(self._meaning.words, self._meaning.fault)
+            return Verdict(f"{plural(self._offer.n_values, 'value')} possible")
+        return Verdict(self._meaning.words, self._meaning.fault)
 
     def _hint(self) -> str:
         if self._refused is not None:
@@ -262,7 +281,7 @@ class CellEditor(Widget):
         self._close()
         if not is_new:
             return False
-        self.entry.write(*self._chooser.typed(self.text, typed))
+        self._write(*self._chooser.typed(self.text, typed))
         return True
 
     def _write(self, text: str, caret: int | None = None) -> None:
@@ -307,7 +326,7 @@ class CellEditor(Widget):
             self.refuse(fault)
             return
         self._is_done = True
-        self.post_message(self.Committed(text, down, right, is_fill, self._is_tab))
+        self._on_done(self.Committed(text, down, right, is_fill, self._is_tab))
 
     def action_tab(self) -> None:
         """Take the text and go right; Enter then goes back to where the run of such cells began."""
@@ -325,7 +344,7 @@ class CellEditor(Widget):
         """Take the text with its new values."""
         if not self._is_done:
             self._is_done = True
-            self.post_message(self.Declared(self.text.strip()))
+            self._on_done(self.Declared(self.text.strip()))
 
     def _is_declarable(self) -> bool:
         """Whether a text that was refused says values that the condition could have, too."""
@@ -366,18 +385,26 @@ class CellEditor(Widget):
         """Leave the cell as it was."""
         if not self._is_done:
             self._is_done = True
-            self.post_message(self.Cancelled())
+            if self._refused is not None:
+                self.post_message(Notice(""))  # what it lacked
+            self._on_done(self.Cancelled())
 
-    def on_descendant_blur(self, event: events.DescendantBlur) -> None:
-        """A click elsewhere takes a good text; a bad one stays, unless it is the one that was there."""
-        if self._is_done or not self.app.app_focus or not self.is_attached or self.screen.focused is self.entry:
-            return
+    def leave(self) -> bool:
+        """Take a good text, since something else is to be shown; False where it cannot be taken: then it stays, with the reason."""
         if self.text == self._began_with:
             self.action_cancel()
+        else:
+            self.action_commit(0, 0)
+        if self.is_open:
+            self.post_message(Notice("Correct the cell first, or press Esc to leave it as it was.", "warning"))
+        return not self.is_open
+
+    def on_descendant_blur(self, event: events.DescendantBlur) -> None:
+        """Another part takes the keys: the cell is left, or keeps them."""
+        if self._is_done or not self.app.is_running or not self.app.app_focus or self.screen.focused is self.entry:
             return
-        self.action_commit(0, 0)
-        if not self._is_done:
-            self.entry.focus()
+        if not self.leave():
+            self.screen.set_focus(self.entry)
 
     # ---- moving
 
@@ -506,3 +533,29 @@ class CellEditor(Widget):
             self.refuse(self._check(self.text) or self._meaning.fault)
         if self._mend:
             self._write(self._mend)
+
+
+# ---- what is done beside a cell that is edited takes that cell first: `tui.editor` asks for each action, a screen for the mouse
+
+
+def open_beside(node: DOMNode) -> CellEditor | None:
+    """The editor that is open over a cell on the screen of a part; None for its own parts."""
+    focused = node.screen.focused
+    editor = focused.parent if focused is not None else None
+    is_beside = isinstance(editor, CellEditor) and editor.is_open and editor not in node.ancestors_with_self
+    return editor if isinstance(editor, CellEditor) and is_beside else None
+
+
+def is_free_for(screen: Screen[Any], event: events.Event) -> bool:
+    """Whether the mouse may do something on a screen. A press beside a cell that is edited takes the cell; where it cannot be taken
+    the press does nothing. Nor does a wheel beside an open cell: the cell stays in sight."""
+    if not isinstance(event, OF_MOUSE) or screen.app.mouse_captured is not None:
+        return True
+    try:
+        under = screen.get_widget_at(event.x, event.y)[0]
+    except NoWidget:  # beside all there is: nothing is done there
+        return True
+    editor = open_beside(under)
+    if editor is None or isinstance(under, KeyLine):  # its keys are actions
+        return True
+    return isinstance(event, events.MouseDown) and editor.leave()

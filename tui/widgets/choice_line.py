@@ -38,7 +38,6 @@ class ChoiceLine(Widget):
         self.taken = 0
 
     def show(self, labels: Sequence[str], taken: int) -> None:
-        """Show these choices."""
         self.labels, self.taken = tuple(labels), taken
         self.refresh()
 
@@ -49,7 +48,6 @@ class ChoiceLine(Widget):
         return next((gap for gap in range(GAP, 1, -1) if width + gap * (len(self.labels) - 1) <= self.content_size.width), 1)
 
     def render(self) -> Content:
-        """The line."""
         parts: list[Content] = []
         for at, label in enumerate(self.labels):
             parts.append(Content.styled(label, "$foreground bold underline" if at == self.taken else ""))
@@ -57,7 +55,6 @@ class ChoiceLine(Widget):
         return Content("").join(parts)
 
     def on_click(self, event: events.Click) -> None:
-        """Pick what was clicked."""
         offset = event.get_content_offset(self)
         at_x = 0 if offset is None else offset.x
         start = 0

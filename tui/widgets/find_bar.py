@@ -12,8 +12,8 @@ from textual.containers import Horizontal
 from textual.message import Message
 from textual.widgets import Button, Checkbox, Input, Static
 
-from tui.model.find import Search
-from tui.widgets.tick import Tick
+from ..model.find import Search
+from .ticks import Tick
 
 CSS = """
 {name} {{
@@ -50,7 +50,6 @@ class SheetBar(Horizontal):
         entry.action_select_all()
 
     def action_close(self) -> None:
-        """Hide it."""
         self.remove_class("-open")
         self.post_message(self.Closed())
 
@@ -68,7 +67,7 @@ class FindBar(SheetBar):
 
     @dataclass
     class Sought(Message):
-        """Go to the next cell found; or only count them, as the text is typed."""
+        """Go to the next matching cell; or only count them, as the text is typed."""
 
         search: Search
         is_backwards: bool = False
@@ -76,7 +75,7 @@ class FindBar(SheetBar):
 
     @dataclass
     class Replaced(Message):
-        """Replace what is found: in the cursor's cell, in every cell shown, or in those selected."""
+        """Replace the matches: in the cursor's cell, in every visible cell, or in those selected."""
 
         search: Search
         replacement: str
@@ -100,12 +99,11 @@ class FindBar(SheetBar):
 
     @property
     def search(self) -> Search:
-        """What is looked for."""
         text = self.query_one("#find-text", Input).value
         return Search(text, self._is("whole"), self._is("case"), self._is("pattern"))
 
     def say(self, text: str) -> None:
-        """Say how many cells are found."""
+        """Say how many cells match."""
         for count in self.query("#find-count").results(Static):
             count.update(text)
 
@@ -118,7 +116,6 @@ class FindBar(SheetBar):
         self._replace(False)
 
     def action_replace_all(self) -> None:
-        """Replace everywhere."""
         self._replace(True)
 
     def _replace(self, is_all: bool) -> None:
@@ -150,7 +147,7 @@ class FindBar(SheetBar):
 
 
 class FilterBar(SheetBar):
-    """Which rows are shown."""
+    """Which rows are displayed."""
 
     DEFAULT_CSS = CSS.format(name="FilterBar")
 
@@ -174,7 +171,6 @@ class FilterBar(SheetBar):
             yield Button("Clear", compact=True, id="filter-clear")
 
     def clear(self) -> None:
-        """Show every row."""
         for entry in self.query(Input):
             entry.value = ""
         for box in self.query(Checkbox):
@@ -182,7 +178,7 @@ class FilterBar(SheetBar):
         self.post_message(self.Wanted("", False, False, False))
 
     def clear_text(self) -> None:
-        """Take the text away, without a word: what it asked for stays, or has been taken off."""
+        """Take the text away, without a word: what it requested stays, or has been taken off."""
         with self.prevent(Input.Changed):
             for entry in self.query(Input):
                 entry.value = ""

@@ -5,7 +5,8 @@ from __future__ import annotations
 from rich.cells import cell_len, set_cell_size
 
 from contextdb.console import printable
-from tui.model.layout import JOINER
+
+from ..model.layout import JOINER
 
 
 def fitted(text: str, width: int, to_right: bool = False) -> str:

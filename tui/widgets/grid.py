@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import ClassVar
+from typing import ClassVar, Self
 
 from textual import events
 from textual.binding import Binding, BindingType
@@ -17,16 +17,17 @@ from textual.geometry import Region
 from textual.message import Message
 
 from contextdb.errors import TableError
-from tui.commands import BY_ID, GRID, JUMPS, bindings
-from tui.doing import CELL, SLOW, do
-from tui.messages import Edited, Told
-from tui.model.clipboard import asks_how_to_read
-from tui.model.selection import Selection
-from tui.model.sheet import Done, Sheet
-from tui.model.tab_run import TabRun
-from tui.model.views import Sort
-from tui.widgets.grid_view import GridView
-from tui.widgets.pointer import Pointer
+
+from ..commands import BY_ID, GRID, JUMPS, bindings
+from ..doing import CELL, SLOW, do
+from ..messages import Edited, Notice
+from ..model.clipboard import PasteDoubt, Texts, asks_how_to_read, parse_tsv, paste_doubt
+from ..model.selection import Block, Selection
+from ..model.sheet import Done, Sheet
+from ..model.tab_run import TabRun
+from ..model.views import Sort
+from .grid_view import GridView
+from .pointer import Pointer
 
 
 class Grid(GridView, can_focus=True):
@@ -37,6 +38,9 @@ class Grid(GridView, can_focus=True):
         Binding("tab", "tab(1)", show=False),
         Binding("shift+tab", "tab(-1)", show=False),
     ]
+
+    asks_of_pastes: ClassVar[bool] = True
+    """Whether who shows it asks about what is pasted, where that could mean something else."""
 
     @dataclass
     class EditWanted(Message):
@@ -90,6 +94,14 @@ class Grid(GridView, can_focus=True):
         text: str
 
     @dataclass
+    class PasteDoubted(Message):
+        """Ask what is meant by a text before it is pasted."""
+
+        doubt: PasteDoubt
+        paste: Callable[[str, bool], None]
+        """Pastes a text; True: nothing is asked any more."""
+
+    @dataclass
     class PasteWanted(Message):
         """Paste what the clipboard holds."""
 
@@ -100,11 +112,18 @@ class Grid(GridView, can_focus=True):
         self.run = TabRun()
         self.again: Callable[[], None] | None = None
         """Makes the last edit again, with what is selected then."""
+        self._copied: Texts = []
+        """The cells that were copied here last."""
         self._pointer = Pointer(self)
 
     def post_message(self, message: Message) -> bool:
         """Post a message as the grid's own, also when the pane has it do so: Textual ends a message at the parent that made it."""
         return super().post_message(message.set_sender(self) if isinstance(message, TOLD) else message)
+
+    def focus(self, scroll_visible: bool = True) -> Self:
+        """Take the keys at once: later, as Textual does, they could be taken from a cell that is opened meanwhile."""
+        self.screen.set_focus(self, scroll_visible)
+        return self
 
     # ---- moving
 
@@ -143,7 +162,7 @@ class Grid(GridView, can_focus=True):
     def action_tab(self, by: int) -> None:
         """Tab, and Shift+Tab: through the selected cells where there are several, else on by one."""
         if self.sheet.block.n_cells > 1 and not self.is_in_test_row:
-            self.moving(lambda: self.sheet.select(lambda s, shape: s.next_cell(0, by, shape)))
+            self.moving(lambda: self.sheet.move_on(0, by))
             return
         self.run.tab(*self.sheet.cursor, by)
         self.action_move(0, by, False)
@@ -169,16 +188,18 @@ class Grid(GridView, can_focus=True):
 
     def action_edge(self, down: int, right: int, extend: bool) -> None:
         """Ctrl and an arrow."""
-        if not self.is_in_test_row and len(self.sheet.view):
+        if not self.is_in_test_row and len(self.sheet.view) and not (self.is_in_new_row and right):
             self.moving(lambda: self.sheet.move_to_edge(down, right, extend))
         elif right:
             self.action_jump("home" if right < 0 else "end", False)
 
     def action_jump(self, jump: str, extend: bool) -> None:
-        """Home, End, with Ctrl too."""
+        """Home, End, with Ctrl too. Home and End stay in the empty row."""
         if self.is_in_test_row:
             self.go_to_field(self.sheet.shape[1] + len(self.sheet.extra) - 1 if jump in ("end", "last") else 0)
-        self.moving(lambda: self.sheet.select(lambda s, shape: JUMPS[jump](s, shape, extend)))
+        stays = self.is_in_new_row and jump in ("home", "end")
+        is_extended = extend and not stays
+        self.moving(lambda: self.sheet.select(lambda s, shape: JUMPS[jump](s, shape, is_extended)), in_new_row=stays)
         if jump in ("home", "first"):  # the frozen columns are seen wherever one is: the others come back too
             self.scroll_to(0, self.look.top, animate=False, force=True, immediate=True)
 
@@ -201,7 +222,7 @@ class Grid(GridView, can_focus=True):
         place = self.sheet.next_failing(is_backwards)
         if place is None:
             what = "No cell that is shown cannot be read" if self.sheet.query.is_empty else "No cell that is shown fails"
-            self.post_message(Told(f"{what}."))
+            self.post_message(Notice(f"{what}."))
         else:
             self.moving(lambda: self.sheet.go(*place))
 
@@ -259,7 +280,7 @@ class Grid(GridView, can_focus=True):
         assert verb is not None
         self.again = partial(self.action_verb, name)
         if self.is_in_test_row and BY_ID[name].group in ("Edit", "Rows"):
-            self.post_message(Told("The cursor is in the test row. F6 goes back to the table.", "warning"))
+            self.post_message(Notice("The cursor is in the test row. F6 goes back to the table.", "warning"))
         elif self.is_in_new_row and BY_ID[name].group in ("Edit", "Rows"):
             self._say_new_row()
         else:
@@ -267,7 +288,9 @@ class Grid(GridView, can_focus=True):
             self._do(lambda: verb(self.sheet), self.sheet.n_unread * SLOW if name == "mend-all" else n_cells)
 
     def _say_new_row(self) -> None:
-        self.post_message(Told("The cursor is below the last row. Type or paste there to make a new row; Up goes back.", "warning"))
+        self.post_message(
+            Notice("The cursor is below the last row. Type or paste there to make a new row; Up goes back.", "warning")
+        )
 
     def _do(self, verb: Callable[[], Done], n_cells: int = 0, then: Callable[[], None] = lambda: None) -> None:
         do(self, self.sheet, verb, n_cells, then)
@@ -275,7 +298,7 @@ class Grid(GridView, can_focus=True):
     def action_repeat(self) -> None:
         """Make the last edit again, with what is selected now."""
         if self.again is None:
-            self.post_message(Told("There is no edit to repeat yet.", "warning"))
+            self.post_message(Notice("There is no edit to repeat yet.", "warning"))
         else:
             self.again()
 
@@ -287,7 +310,7 @@ class Grid(GridView, can_focus=True):
         sheet, is_below = self.sheet, self.is_in_new_row
 
         def fill() -> Done:
-            columns = [sheet.cursor[1]] if is_below else range(sheet.block.left, sheet.block.right)
+            columns = [sheet.cursor[1]] if is_below else sheet.columns_of(sheet.block)
             fault = next(filter(None, (sheet.check_at(column, text) for column in columns)), None)
             fault = fault or (sheet.type_below(text) if is_below else None)
             if fault is not None:
@@ -316,8 +339,8 @@ class Grid(GridView, can_focus=True):
         name = self.sheet.undo_fact(is_redo)
         if name is not None:
             self.post_message(self.FactChanged())
-        said = f"{verb.capitalize()}: {name}." if name else f"There is no fact to {verb}. F6 goes back to the table, and its steps."
-        self.post_message(Told(said))
+        text = f"{verb.capitalize()}: {name}." if name else f"There is no fact to {verb}. F6 goes back to the table, and its steps."
+        self.post_message(Notice(text))
 
     def action_edit(self) -> None:
         self._want_edit(self.cell_text())
@@ -342,11 +365,11 @@ class Grid(GridView, can_focus=True):
     def _want_edit(self, text: str, is_typing: bool = False, opens_list: bool = False) -> None:
         if self.is_in_test_row and not self._is_condition():
             more = " Facts without a column are at the right: End goes there." if self.sheet.extra else ""
-            self.post_message(Told(f"Only conditions have a fact to test with.{more}", "warning"))
+            self.post_message(Notice(f"Only conditions have a fact to test with.{more}", "warning"))
         elif self.is_in_test_row and (why := self._why_computed()):
-            self.post_message(Told(why, "warning"))
+            self.post_message(Notice(why, "warning"))
         elif not self.is_in_test_row and not len(self.sheet.view) and not self.has_new_row:
-            self.post_message(Told("There is no row here. Ctrl+N makes one.", "warning"))
+            self.post_message(Notice("There is no row here. Ctrl+N makes one.", "warning"))
         else:
             self.show_cursor()
             self.post_message(self.EditWanted(text, is_typing, opens_list))
@@ -369,7 +392,7 @@ class Grid(GridView, can_focus=True):
         """Write the fact under the cursor; one that is computed says why it cannot be written."""
         fact = self.sheet.fact_of(self.field)
         if why := self._why_computed():
-            self.post_message(Told(why, "warning"))
+            self.post_message(Notice(why, "warning"))
         elif fact is not None:
             self.sheet.set_fact(fact.name, text)
             self.post_message(self.FactChanged())
@@ -393,6 +416,7 @@ class Grid(GridView, can_focus=True):
 
         def hand_over() -> None:
             for text in copied:  # none where it was stopped
+                self._copied = parse_tsv(text)
                 self.post_message(self.CopyWanted(text))
 
         self._do(copy, sheet.block.n_cells, hand_over)
@@ -409,6 +433,7 @@ class Grid(GridView, can_focus=True):
 
         def cut() -> Done:
             text, done = self.sheet.cut()
+            self._copied = parse_tsv(text)
             self.post_message(self.CopyWanted(text, is_told=False))
             return done
 
@@ -417,18 +442,41 @@ class Grid(GridView, can_focus=True):
     def action_paste(self) -> None:
         self.post_message(self.PasteWanted())
 
-    def paste(self, text: str) -> None:
-        """Put a text of the clipboard over the selection, or into the fact of the test row."""
-        self.again = partial(self.paste, text)
-        if self.is_in_test_row:
-            self.set_fact(text.splitlines()[0].split("\t")[0] if text.strip() else "")
-        elif asks_how_to_read(text, self.sheet.table):
+    def paste(self, text: str, is_clear: bool = False) -> None:
+        """Put a text of the clipboard over the selection, or into the fact of the test row. `is_clear`: nothing is asked."""
+        self.again = partial(self.paste, text, is_clear)
+        if is_fact := self.is_in_test_row:
+            text = text.splitlines()[0].split("\t")[0] if text.strip() else ""
+        if not is_fact and asks_how_to_read(text, self.sheet.table):
             self.post_message(self.ImportWanted(text))
+        elif not is_clear and self._asks(text, self.paste):
+            pass
+        elif is_fact:
+            self.set_fact(text.strip("\n"))
         else:
             is_below, sheet = self.is_in_new_row, self.sheet
             self.goes_to_new_row = False
             verb = sheet.paste_below if is_below else sheet.paste
             self._do(lambda: verb(text), max(len(text) // CELL, sheet.block.n_cells), self.forget_widths)
+
+    def insert_copied(self, text: str, is_clear: bool = False) -> None:
+        """Put a text of the clipboard into new rows above the cursor's. `is_clear` as in `paste`."""
+        self.again = partial(self.insert_copied, text, is_clear)
+        if is_clear or not self._asks(text, self.insert_copied):
+            self.is_in_test_row = self.goes_to_new_row = False
+            self._do(lambda: self.sheet.insert_copied(text), len(text) // CELL, self.forget_widths)
+
+    def _asks(self, text: str, paste: Callable[[str, bool], None]) -> bool:
+        """Whether a text could mean something else, so that it is asked what to paste; never of one that was copied here."""
+        if not self.asks_of_pastes or parse_tsv(text) == self._copied:
+            return False
+        sheet, is_fact = self.sheet, self.is_in_test_row and paste == self.paste
+        left = sheet.cursor[1] if paste == self.insert_copied else sheet.block.left
+        columns = [self.field] if is_fact else sheet.columns_of(Block(0, left, 0, sheet.shape[1]))
+        doubt = paste_doubt(text, [sheet.fact_of(column) for column in columns])
+        if doubt is not None:
+            self.post_message(self.PasteDoubted(doubt, paste))
+        return doubt is not None
 
     def on_paste(self, event: events.Paste) -> None:
         event.stop()
@@ -488,5 +536,5 @@ class Grid(GridView, can_focus=True):
             self._pointer.click_twice(event)
 
 
-TOLD = (Edited, Told, Grid.Moved, Grid.FactChanged)
+TOLD = (Edited, Notice, Grid.Moved, Grid.FactChanged)
 """What the grid tells the screen."""

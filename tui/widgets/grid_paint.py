@@ -15,10 +15,11 @@ from rich.style import Style
 from textual.strip import Strip
 
 from contextdb.errors import plural
-from tui.model.layout import Layout, cut, cut_middle, name_lines
-from tui.model.selection import Block
-from tui.model.shown import Header, ShownTable
-from tui.model.window import MARKS, PICKED, PLAYS, Window
+
+from ..model.displayed_table import DisplayedTable, Header
+from ..model.layout import Layout, cut, cut_middle, name_lines
+from ..model.selection import Block
+from ..model.window import MARKS, PICKED, PLAYS, Window
 
 LOWEST = 8
 """In a window of fewer lines only the names of the columns stand over the rows."""
@@ -115,7 +116,7 @@ class Look:
 class Painter:
     """Paints a sheet. `changed` must be called when anything but the cursor has changed."""
 
-    def __init__(self, sheet: ShownTable, style: StyleOf) -> None:
+    def __init__(self, sheet: DisplayedTable, style: StyleOf) -> None:
         self.sheet = sheet
         self.style = style
         self._window: Window | None = None
@@ -140,7 +141,7 @@ class Painter:
         self._headers.clear()
         self._read = self.sheet.table, self.sheet.view
 
-    def asked_again(self) -> list[int] | None:
+    def requested_again(self) -> list[int] | None:
         """Read the answers again after other facts, and remember which cells have just begun to fail; gives the rows of the view
         that look otherwise, None where nothing was read yet."""
         before = self._window
@@ -361,8 +362,8 @@ class Painter:
             is_cursor = look.is_in_new_row and column == self.sheet.cursor[1]
             ground = "row" if not is_cursor else "cursor" if look.has_focus else "cursor-away"
             text = hint if column == asset and (look.is_in_new_row or not n_rows) else ""
-            said = "on-cursor" if is_cursor and look.has_focus else "muted"
-            yield Segment(" " + cut(text, look.layout.widths[column] - 1), self.style(ground, said))
+            tone = "on-cursor" if is_cursor and look.has_focus else "muted"
+            yield Segment(" " + cut(text, look.layout.widths[column] - 1), self.style(ground, tone))
 
         gutter = "+".rjust(look.layout.gutter - 3) + "   "
         return self._joined([Segment(gutter, self.style("gutter", "muted"))], cell, look, "row")
@@ -386,7 +387,7 @@ class Painter:
             ground = ("cursor" if look.has_focus else "cursor-away") if is_cursor else "test"
             is_lit = is_cursor and look.has_focus
             if column == asset:
-                yield Segment(" " + cut(self._said(width - 1), width - 1), self.style(ground, "on-cursor" if is_lit else "name"))
+                yield Segment(" " + cut(self._adding(width - 1), width - 1), self.style(ground, "on-cursor" if is_lit else "name"))
                 return
             name = condition.name if condition is not None else ""
             is_cast, is_computed = query.role_of(name) is not None, query.is_computed(name)
@@ -399,7 +400,7 @@ class Painter:
         gutter = "?".rjust(look.layout.gutter - 3) + "   "
         return self._joined([Segment(gutter, self.style("test", "name"))], cell, look, "test")
 
-    def _said(self, width: int) -> str:
+    def _adding(self, width: int) -> str:
         query = self.sheet.query
         if query.is_empty:
             return "test row"

@@ -19,13 +19,14 @@ from textual.scroll_view import ScrollView
 from textual.scrollbar import ScrollBar, ScrollBarRender
 from textual.strip import Strip
 
-from contextdb.schema.shapes import CHANCE
-from tui.contrast import readable
-from tui.drawn import SameWidths
-from tui.model.alignment import MOST_ALIGNED, indented
-from tui.model.layout import COMPACT, MOST_TEXTS, NARROWEST, WIDEST, Layout, fitted_width, layout, name_lines, name_width
-from tui.model.sheet import Sheet
-from tui.widgets.grid_paint import Look, Painter
+from contextdb.schema.policies import lets_choose
+
+from ..contrast import readable
+from ..drawn import SameWidths
+from ..model.alignment import MOST_ALIGNED, indented
+from ..model.layout import COMPACT, MOST_TEXTS, NARROWEST, WIDEST, Layout, fitted_width, layout, name_lines, name_width
+from ..model.sheet import Sheet
+from .grid_paint import Look, Painter
 
 GROUNDS = (
     "row", "row-valid", "row-picked", "frozen", "header", "header-kind", "header-leaves", "header-chosen", "gutter", "test",
@@ -171,9 +172,9 @@ class GridView(ScrollView, inherit_bindings=False):
     def _place(look: Look) -> tuple[object, ...]:
         return look.layout.width, look.height, look.left, look.top
 
-    def asked_again(self) -> None:
+    def requested_again(self) -> None:
         """Show the answers to other facts. Only lines that look otherwise are painted; cells that have just begun to fail flash."""
-        rows = self._painter.asked_again()
+        rows = self._painter.requested_again()
         if rows is None or self.grid_layout.width != self.window.width or not self.is_mounted:
             self.changed()
             return
@@ -253,7 +254,7 @@ class GridView(ScrollView, inherit_bindings=False):
         """Where the columns stand; whether names are wrapped, since not all were seen else; how many lines the longest takes."""
         names = [*(c.name for c in self.sheet.table.columns), *fields]
         hidden, asset = self.sheet.hidden, self.sheet.table.asset_column
-        n_frozen = self.sheet.columns_shown.n_frozen([c.name for c in self.sheet.table.columns], asset)
+        n_frozen = self.sheet.visible_columns.n_frozen([c.name for c in self.sheet.table.columns], asset)
 
         def made(is_wrapped: bool) -> Layout:
             widths = [0 if at < len(hidden) and hidden[at] else self._width(at, name, is_wrapped) for at, name in enumerate(names)]
@@ -357,7 +358,7 @@ class GridView(ScrollView, inherit_bindings=False):
         role = query.role_of(column.name)
         is_opener = query.is_nested and at == self.sheet.asset_at
         if role is None and not is_opener:
-            is_weighed = at == self.sheet.asset_at and not query.is_empty and self.sheet.table.settings.policy in CHANCE
+            is_weighed = at == self.sheet.asset_at and not query.is_empty and lets_choose([self.sheet.table.settings.policy])
             longest = max((cell_len(text) for text in column.texts[:MOST_TEXTS]), default=0) if is_weighed else 0
             return longest + len(">99 %") + 2 if is_weighed else 0
         longest = max((cell_len(text) for text in column.texts[:MOST_TEXTS]), default=0)
@@ -365,7 +366,7 @@ class GridView(ScrollView, inherit_bindings=False):
             return longest + len(" 000 of 000 rows") + 1
         return longest + max(cell_len(str(actor.get("name", ""))) for actor in query.actors[role]) + 3
 
-    def _kept_in_sight(self, row: int, column: int) -> tuple[int, int]:
+    def _scrolled_into_view(self, row: int, column: int) -> tuple[int, int]:
         """The cursor, where the far corner of the selection is not seen, so that a paste of many rows does not carry one away."""
         look, here = self.look, self.sheet.cursor
         columns = {*range(look.layout.n_frozen), *look.layout.visible(look.left)}
@@ -381,8 +382,8 @@ class GridView(ScrollView, inherit_bindings=False):
             plain = Style(bgcolor=under.bgcolor, bold=under.bold, underline=under.underline)
             is_terminals = under.bgcolor is not None and under.bgcolor.number is not None
             colour = under.color if is_terminals else over.color  # no other is sure to be read on the terminal's own
-            said = Style(color=colour, bold=over.bold or None, underline=over.underline or None, strike=over.strike or None)
-            whole = plain + said
+            added = Style(color=colour, bold=over.bold or None, underline=over.underline or None, strike=over.strike or None)
+            whole = plain + added
             self._styles[ground, meant] = self._filtered(whole if meant == "line" else readable(whole), is_read=meant != "line")
         return self._styles[ground, meant]
 
@@ -462,7 +463,7 @@ class GridView(ScrollView, inherit_bindings=False):
         row = self._cursor_row if self.is_in_new_row else row
         is_wide = self.sheet.selection.far != self.sheet.cursor
         if is_after_edit and is_wide and not (self.is_in_test_row or self.is_in_new_row):
-            row, column = self._kept_in_sight(row, column)
+            row, column = self._scrolled_into_view(row, column)
         top = min(max(look.top, row - max(look.n_body, 1) + 1), row) if not self.is_in_test_row else look.top
         left = look.layout.scroll_to(column, look.left) if look.layout.widths else 0
         if (top, left) != (look.top, look.left):

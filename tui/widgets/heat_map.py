@@ -21,7 +21,8 @@ from textual.message import Message
 from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
-from tui.widgets.fitted import fitted
+from .cursor_lines import PAGES, style_names
+from .fitted import fitted
 
 ROOMY = 9
 """Where there is room a square takes so many cells for each line it is high."""
@@ -85,20 +86,11 @@ class HeatMap(ScrollView, can_focus=True):
         Binding("down", "move(1, 0)", "Down", show=False),
         Binding("left", "move(0, -1)", "Left", show=False),
         Binding("right", "move(0, 1)", "Right", show=False),
-        Binding("pageup", "page(-1)", "Page up", show=False),
-        Binding("pagedown", "page(1)", "Page down", show=False),
+        *PAGES,
         Binding("home", "end_of_row(-1)", "First", show=False),
         Binding("end", "end_of_row(1)", "Last", show=False),
         Binding("enter", "choose", "Open", show=False),
     ]
-    COMPONENT_CLASSES: ClassVar[set[str]] = {
-        "heat-map--label",
-        "heat-map--here",
-        "heat-map--none",
-        "heat-map--empty",
-        *(f"heat-map--step-{at}" for at in range(5)),
-        "heat-map--full",
-    }
     DEFAULT_CSS = """
     HeatMap {
         background: $surface;
@@ -122,6 +114,7 @@ class HeatMap(ScrollView, can_focus=True):
         }
     }
     """
+    COMPONENT_CLASSES: ClassVar[set[str]] = style_names(DEFAULT_CSS)
 
     @dataclass
     class Moved(Message):
@@ -201,7 +194,6 @@ class HeatMap(ScrollView, can_focus=True):
         return max(1, min(TALLEST, room // max(1, len(self.rows))))
 
     def go(self, row: int, column: int) -> None:
-        """Choose a square."""
         before = self.place
         self.place = max(0, min(row, len(self.rows) - 1)), max(0, min(column, len(self.columns) - 1))
         self._keep_in_sight()
@@ -226,7 +218,6 @@ class HeatMap(ScrollView, can_focus=True):
     # ---- keys and mouse
 
     def action_move(self, down: int, right: int) -> None:
-        """Go to a neighbour."""
         self.go(self.place[0] + down, self.place[1] + right)
 
     def action_page(self, down: int) -> None:
@@ -238,7 +229,6 @@ class HeatMap(ScrollView, can_focus=True):
         self.go(self.place[0], 0 if right < 0 else len(self.columns) - 1)
 
     def action_choose(self) -> None:
-        """Open the chosen square."""
         if self.rows and self.columns:
             self.post_message(self.Chosen(self, *self.place))
 

@@ -13,7 +13,7 @@ from textual.screen import Screen
 from textual.strip import Strip
 from textual.widget import Widget
 
-from tui.commands import key_name
+from ..commands import key_name
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +32,7 @@ class Key:
 
 
 class KeyLine(Widget):
-    """The keys that are bound now and meant to be shown, those of the focus first. What does not fit is left out whole."""
+    """The keys that are bound now and meant to be displayed, those of the focus first. What does not fit is left out whole."""
 
     ALLOW_SELECT = False
     COMPONENT_CLASSES: ClassVar[set[str]] = {"key-line--key", "key-line--label"}

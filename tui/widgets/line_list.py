@@ -20,8 +20,9 @@ from textual.message import Message
 from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
-from tui.model.layout import cut_middle
-from tui.widgets.fitted import fitted
+from ..model.layout import cut_middle
+from .cursor_lines import PAGES, UP_DOWN, style_names
+from .fitted import fitted
 
 ListCell = str | tuple[str, str] | Callable[[int], str]
 """A text, or a text and its tone ("error", "warning", "info", "muted" or "strong"), or the text that suits a width."""
@@ -43,23 +44,12 @@ class LineList(ScrollView, can_focus=True):
     """A list to look through and choose from."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("up", "move(-1)", "Up", show=False),
-        Binding("down", "move(1)", "Down", show=False),
-        Binding("pageup", "page(-1)", "Page up", show=False),
-        Binding("pagedown", "page(1)", "Page down", show=False),
+        *UP_DOWN,
+        *PAGES,
         Binding("home", "go(0)", "First", show=False),
         Binding("end", "last", "Last", show=False),
         Binding("enter", "choose", "Choose", show=False),
     ]
-    COMPONENT_CLASSES: ClassVar[set[str]] = {
-        "line-list--header",
-        "line-list--cursor",
-        "line-list--error",
-        "line-list--warning",
-        "line-list--info",
-        "line-list--muted",
-        "line-list--strong",
-    }
     DEFAULT_CSS = """
     LineList {
         background: $surface;
@@ -75,6 +65,7 @@ class LineList(ScrollView, can_focus=True):
         &:ansi .line-list--cursor { background: ansi_blue; color: ansi_bright_white; }
     }
     """
+    COMPONENT_CLASSES: ClassVar[set[str]] = style_names(DEFAULT_CSS)
 
     @dataclass
     class Moved(Message):
@@ -142,7 +133,6 @@ class LineList(ScrollView, can_focus=True):
     # ---- keys and mouse
 
     def action_move(self, down: int) -> None:
-        """Move the cursor."""
         self.go(self.index + down)
 
     def action_page(self, down: int) -> None:
@@ -188,8 +178,8 @@ class LineList(ScrollView, can_focus=True):
             titles = [_titled(c.title, w, c.to_right) for c, w in zip(self.columns, self._widths(width), strict=True)]
             return _strip([Segment("  ", base), *_spaced(titles, style, base)], width, base)
         index = y - 1 + self.scroll_offset.y
-        if not self.n_lines and y <= len(said := self._empty_lines(width)):
-            return _strip([Segment(fitted(f"  {said[y - 1]}", width), base + self._tone("muted"))], width, base)
+        if not self.n_lines and y <= len(empty_lines := self._empty_lines(width)):
+            return _strip([Segment(fitted(f"  {empty_lines[y - 1]}", width), base + self._tone("muted"))], width, base)
         if index >= self.n_lines:
             return Strip.blank(width, base)
         return self._line_strip(index, width, base)

@@ -11,15 +11,15 @@ from rich.style import Style
 from textual.strip import Strip
 from textual.widget import Widget
 
-from tui.model.layout import cut
+from ..model.layout import cut
 
 
 @dataclass(frozen=True)
-class Said:
+class LiveState:
     """What the line says."""
 
     sign: str = ""
-    who: str = ""
+    source: str = ""
     answer: str = ""
     note: str = ""
     """What one should know: the answers differ, the game is gone."""
@@ -29,11 +29,11 @@ class LiveLine(Widget):
     """One line; what does not fit is cut, the note last."""
 
     ALLOW_SELECT = False
-    COMPONENT_CLASSES: ClassVar[set[str]] = {"live-line--who", "live-line--answer", "live-line--note"}
+    COMPONENT_CLASSES: ClassVar[set[str]] = {"live-line--source", "live-line--answer", "live-line--note"}
     DEFAULT_CSS = """
     LiveLine {
         height: 1; background: $boost; display: none;
-        .live-line--who { color: $text-primary; text-style: bold; }
+        .live-line--source { color: $text-primary; text-style: bold; }
         .live-line--answer { color: $foreground 75%; }
         .live-line--note { color: $text-warning; text-style: bold; }
     }
@@ -41,22 +41,21 @@ class LiveLine(Widget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.said = Said()
+        self.state = LiveState()
 
-    def show(self, said: Said) -> None:
-        """Say something else."""
-        if said != self.said:
-            self.said = said
+    def show(self, state: LiveState) -> None:
+        if state != self.state:
+            self.state = state
             self.refresh()
 
     def render_line(self, y: int) -> Strip:
-        width, said = self.size.width, self.said
-        who, note = f" {said.sign} {said.who} ", f" {said.note} " if said.note else ""
-        n_who = min(cell_len(who), width)
-        n_note = min(cell_len(note), width - n_who)
+        width, state = self.size.width, self.state
+        source, note = f" {state.sign} {state.source} ", f" {state.note} " if state.note else ""
+        n_source = min(cell_len(source), width)
+        n_note = min(cell_len(note), width - n_source)
         segments = [
-            Segment(cut(who, n_who), self.get_component_rich_style("live-line--who")),
-            Segment(cut(f" {said.answer}", width - n_who - n_note), self._answer),
+            Segment(cut(source, n_source), self.get_component_rich_style("live-line--source")),
+            Segment(cut(f" {state.answer}", width - n_source - n_note), self._answer),
             Segment(cut(note, n_note), self.get_component_rich_style("live-line--note")),
         ]
         return Strip(segments).adjust_cell_length(width, self._answer)

@@ -28,7 +28,6 @@ class Picked(SelectCurrent):
         return 1
 
     def update(self, label: RenderableType | NoSelection) -> None:
-        """Show another label."""
         self.label = label
         self.has_value = not isinstance(label, NoSelection)
         self.refresh()
@@ -66,8 +65,8 @@ class Pick(Select[Value]):
             return
         self._value = value
         for line in self.query(Picked):
-            shown = None if value == self.NULL else next(prompt for prompt, each in self._options if each == value)
-            line.update(self.NULL if shown is None else shown)
+            label = None if value == self.NULL else next(prompt for prompt, each in self._options if each == value)
+            line.update(self.NULL if label is None else label)
             self.post_message(self.Changed(self, value))
 
     def _watch_prompt(self, prompt: str) -> None:

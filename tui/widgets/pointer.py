@@ -9,10 +9,10 @@ from textual import events
 from textual.app import App
 from textual.timer import Timer
 
-from tui.model.layout import NARROWEST
-from tui.model.selection import Selection
-from tui.model.sheet import Sheet
-from tui.widgets.grid_paint import Look
+from ..model.layout import NARROWEST
+from ..model.selection import Selection
+from ..model.sheet import Sheet
+from .grid_paint import Look
 
 Dragged = Literal["cells", "rows", "columns", "width", "move rows", "move columns", "fill"]
 TAKEN = ("move rows", "move columns", "fill")
@@ -47,7 +47,7 @@ class Pointed(Protocol):
         """Set the width of a column; None fits it."""
 
     def sort_by(self, column: int) -> None:
-        """Sort what is shown by a column."""
+        """Sort what is displayed by a column."""
 
     def put_down(self, what: str, row: int, column: int) -> None:
         """Rows or columns, or the handle to fill from, were dragged to a place."""

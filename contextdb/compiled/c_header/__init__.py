@@ -1,8 +1,8 @@
 """Compiled tables for games written in C or C++: one header that opens artefacts and answers `query` with the same masks.
 
-`reader/` holds the part that is the same for every project, C99 as it is written into the header, in the order of `PARTS`; `face`
-adds a struct of facts, enums and a few functions for each table. `linking` makes the file by which a game publishes what it asks,
-for `contextdb live`. Nothing here touches the disk but to read `reader/`.
+The part that is the same for every project is `contextdb.core`, C99 as it is written into the header; `face` adds a struct of
+facts, enums and a few functions for each table. `linking` makes the file by which a game publishes what it asks, for
+`contextdb live`, of `link.h`. Nothing here touches the disk but to read these files.
 """
 
 from __future__ import annotations

@@ -10,8 +10,6 @@ import math
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache
-from importlib.resources import files
 from textwrap import wrap
 
 from contextdb.cells.conditions import Condition
@@ -22,14 +20,11 @@ from contextdb.compiled.c_header.spelling import comment, literal
 from contextdb.compiled.c_header.watching import WATCH
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.table import CompiledTable, data_of
+from contextdb.core import header_text
 
-READER = 3
-"""Raised when what is in `reader/` changes: headers with different readers do not go into one file."""
+READER = 5
+"""Raised when the core changes: headers with different readers do not go into one file."""
 
-PARTS = (
-    *("types.h", "arithmetic.h", "json.h", "opening.h", "columns.h", "facts.h", "programs.h", "arrays.h", "linking.h", "levels.h"),
-    *("outputs.h", "open.h", "query.h", "rows.h", "pick.h", "files.h"),
-)
 _HEAD = """/* Written by `contextdb compile --c-header`: do not edit. */
 
 #ifdef CDB_READER
@@ -93,19 +88,13 @@ def c_header_of(tables: Mapping[str, CompiledTable], guard: str = "CDB_TABLES_H"
                 written.add(condition)
                 parts.append("\n" + "".join(f"{line}\n" for line in _choices(condition, names.choices[condition])))
         parts.append("\n" + "".join(f"{line}\n" for line in _table(table, names.tables[name], names.choices)))
-    head = _HEAD.format(version=READER, reader=_reader(), guard=names.guard)
+    head = _HEAD.format(version=READER, reader=header_text(), guard=names.guard)
     return "".join([head, *parts, _FOOT.format(guard=names.guard)])
 
 
 def reader_names() -> frozenset[str]:
     """The names that the reader has, which no project can have."""
-    return frozenset(re.findall(r"\b(?:cdb|CDB)\w*", _reader()))
-
-
-@cache
-def _reader() -> str:
-    folder = files("contextdb.compiled.c_header").joinpath("reader")
-    return "".join(folder.joinpath(part).read_text(encoding="ascii") for part in PARTS)
+    return frozenset(re.findall(r"\b(?:cdb|CDB)\w*", header_text()))
 
 
 # ---- what is written
@@ -118,9 +107,9 @@ def _choices(condition: Condition, choices: Choices) -> Iterator[str]:
     yield f"typedef enum {choices.type} {{"
     lines = [] if is_tags else [f"    {choices.missing} = CDB_MISSING"]
     lines += [f"    {name} = {number}" for number, name in enumerate(choices.enumerators, first)]
-    told = ([] if is_tags else ["not known"]) + list(choices.values)
+    labels = ([] if is_tags else ["not known"]) + list(choices.values)
     width = max(map(len, lines)) + 2
-    for number, (line, value) in enumerate(zip(lines, told, strict=True), 1):
+    for number, (line, value) in enumerate(zip(lines, labels, strict=True), 1):
         yield f"{line + (',' if number < len(lines) else ''):<{width}}{comment(value)}"
     yield f"}} {choices.type};"
     yield ""
@@ -170,7 +159,7 @@ def _facts_struct(table: CompiledData, face: TableFace, choices: Mapping[Conditi
         kind = _type(condition, choices.get(condition))
         lines.append((f"    {kind}{'' if kind.endswith('*') else ' '}{name};", condition))
     width = max((len(line) for line, _ in lines), default=0) + 2
-    yield from (f"{line:<{min(width, 60)}}{_told(condition)}" for line, condition in lines)
+    yield from (f"{line:<{min(width, 60)}}{_comment_of(condition)}" for line, condition in lines)
     if not lines:
         yield "    char nothing; /* the table needs no facts */"
     yield f"}} {face.base}_facts;"
@@ -188,7 +177,7 @@ def _type(condition: Condition, choices: Choices | None) -> str:
     return choices.type if choices else plain_of(condition.domain.type).type
 
 
-def _told(condition: Condition) -> str:
+def _comment_of(condition: Condition) -> str:
     """Type, name, bounds, unit and description of a condition."""
     domain = condition.domain
     low, high = domain.minimum, domain.maximum
@@ -261,8 +250,8 @@ def _functions(table: CompiledData, face: TableFace, choices: Mapping[Condition,
     yield f"}} {base};"
     yield ""
     yield from _facts_in_order(table, face, choices)
-    for name, arguments, told, body in _FUNCTIONS:
-        yield f"/* {told} */"
+    for name, arguments, comment_text, body in _FUNCTIONS:
+        yield f"/* {comment_text} */"
         head = f"static inline {'void' if name == 'close' else 'cdb_status'} {base}_{name}({arguments.format(base=base)})"
         yield from (line.rstrip() for line in wrap(head, 126, subsequent_indent="    ", break_long_words=False))
         yield "{"
@@ -375,8 +364,8 @@ def output_functions(table: CompiledData, face: TableFace) -> Iterator[str]:
     for number, (output, names) in enumerate(zip(table.outputs.declared, face.outputs, strict=True)):
         kind = output.type.c_type.format(name=names.name)
         size = f"{output.size} numbers" if output.type.has_size else output.kind
-        told = "; ".join(part for part in (f"{size} {output.name} {output.unit or ''}".strip(), output.description) if part)
-        yield comment(f"{told}; of a row, or of none: -1")
+        about = "; ".join(part for part in (f"{size} {output.name} {output.unit or ''}".strip(), output.description) if part)
+        yield comment(f"{about}; of a row, or of none: -1")
         yield f"static inline {kind}{names.name}(const {face.base} *opened, int64_t row)"
         yield "{"
         cast = f"({names.name}_value)" if names.enumerators else ""

@@ -1,4 +1,4 @@
-"""The file beside the header by which a game in C publishes what it asks: `reader/link.h`, and a function for each table that knows
+"""The file beside the header by which a game in C publishes what it asks: `link.h`, and a function for each table that knows
 the names of its facts. It goes with the header that `face` makes of the same tables.
 """
 
@@ -48,7 +48,7 @@ def c_link_of(tables: Mapping[str, CompiledTable], header: str, guard: str = "CD
     names = Names.of(inside, f"CDB_{PurePosixPath(header).stem}_H", reader_names())  # as in the header
     faces = [(table, names.tables[name]) for name, table in inside.items()]
     [guard] = distinct([Wanted(guard.removeprefix("CDB_"), "CDB_", is_upper=True)])
-    reader = files("contextdb.compiled.c_header").joinpath("reader", "link.h").read_text(encoding="ascii")
+    reader = files("contextdb.compiled.c_header").joinpath("link.h").read_text(encoding="ascii")
     head = _HEAD.format(header=comment(header)[3:-3], guard=guard, include=literal(header), reader=reader)
     parts = [_joined(_tables(faces)), *(_joined(_tell(table, face, names.choices)) for table, face in faces)]
     return "".join([head, *parts, _FOOT.format(guard=guard)])
@@ -66,8 +66,8 @@ def _tables(faces: Sequence[tuple[CompiledData, TableFace]]) -> Iterator[str]:
     yield '    cdbl_say(link, "{");'
     for number, (table, face) in enumerate(faces):
         comma = "," if number else ""
-        told = f'{comma}{json.dumps(face.table)}:{{"version":null,"rows":{table.n_rows},"conditions":{{'
-        yield f"    cdbl_say(link, {literal(told)});"
+        opening = f'{comma}{json.dumps(face.table)}:{{"version":null,"rows":{table.n_rows},"conditions":{{'
+        yield f"    cdbl_say(link, {literal(opening)});"
         for at, (condition, _) in enumerate(given_conditions(table, face)):
             named = f"{',' if at else ''}{json.dumps(condition.name)}:{json.dumps(condition.domain.kind)}"
             yield f"    cdbl_say(link, {literal(named)});"
@@ -98,14 +98,14 @@ def _tell(table: CompiledData, face: TableFace, choices: Mapping[Condition, Choi
 
 
 def _fact(condition: Condition, name: str, declared: Choices | None) -> str:
-    kind, field, said = condition.domain.type, f"facts->{name}", literal(condition.name)
+    kind, field, quoted = condition.domain.type, f"facts->{name}", literal(condition.name)
     if kind.is_tags and declared:
-        return f"cdbl_set(link, {said}, {field}.words, {declared.type}_values, {len(declared.values) + 1});"
+        return f"cdbl_set(link, {quoted}, {field}.words, {declared.type}_values, {len(declared.values) + 1});"
     if kind.is_tags:
-        return f"cdbl_texts(link, {said}, &{field});"
+        return f"cdbl_texts(link, {quoted}, &{field});"
     if declared:
-        return f"cdbl_choice(link, {said}, (int64_t){field}, {declared.type}_values, {len(declared.values)});"
+        return f"cdbl_choice(link, {quoted}, (int64_t){field}, {declared.type}_values, {len(declared.values)});"
     if kind.is_numeric and not kind.is_decimal:
-        return f"cdbl_date(link, {said}, {field});"
+        return f"cdbl_date(link, {quoted}, {field});"
     how = {"whole": "truth" if kind.is_truth else "whole", "number": "number", "text": "text"}[plain_of(kind).member]
-    return f"cdbl_{how}(link, {said}, {field});"
+    return f"cdbl_{how}(link, {quoted}, {field});"

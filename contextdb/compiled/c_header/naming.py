@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from contextdb.cells.conditions import Condition
 from contextdb.cells.outputs import Output
 from contextdb.compiled.c_header.spelling import Wanted, distinct, upper
+from contextdb.compiled.core_table import values_of
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.programs import named_conditions
 
@@ -83,21 +84,21 @@ class Names:
             ],
             taken,
         )
-        said = [(type_, text) for type_, c in zip(choice_types, declared, strict=True) for text in _said(c)]
-        asked = [(base, text) for base, table in zip(table_types, tables.values(), strict=True) for text in _asked(table)]
+        of_choices = [(type_, text) for type_, c in zip(choice_types, declared, strict=True) for text in _choice_texts(c)]
+        of_facts = [(base, text) for base, table in zip(table_types, tables.values(), strict=True) for text in _facts(table)]
         outputs = [output for table in tables.values() for output in table.outputs.declared]
         given = [(name, text) for name, output in zip(readers, outputs, strict=True) for text in _given(output)]
-        owned = [*said, *asked, *given]
+        owned = [*of_choices, *of_facts, *given]
         wanted = [Wanted(text.removeprefix(_OWN), _head(of), is_upper=True, of=f"{of} {text}") for of, text in owned]
-        found = iter(distinct([*wanted, Wanted(guard.removeprefix("CDB_"), "CDB_", is_upper=True)], taken))
-        choices = {c: _choices_of(c, type_, found) for c, type_ in zip(declared, choice_types, strict=True)}
-        faces = [_face_of(name, base, table, found) for (name, table), base in zip(tables.items(), table_types, strict=True)]
-        of_outputs = iter([_output_names(name, output, found) for name, output in zip(readers, outputs, strict=True)])
+        unique = iter(distinct([*wanted, Wanted(guard.removeprefix("CDB_"), "CDB_", is_upper=True)], taken))
+        choices = {c: _choices_of(c, type_, unique) for c, type_ in zip(declared, choice_types, strict=True)}
+        faces = [_face_of(name, base, table, unique) for (name, table), base in zip(tables.items(), table_types, strict=True)]
+        of_outputs = iter([_output_names(name, output, unique) for name, output in zip(readers, outputs, strict=True)])
         faces = [
             replace(face, outputs=tuple(next(of_outputs) for _ in table.outputs.declared))
             for face, table in zip(faces, tables.values(), strict=True)
         ]
-        return cls(choices, {face.table: face for face in faces}, next(found))
+        return cls(choices, {face.table: face for face in faces}, next(unique))
 
 
 _OWN = "\0"
@@ -109,34 +110,34 @@ def _head(base: str) -> str:
     return f"CDB_{upper(base.removeprefix('cdb_'))}_"
 
 
-def _said(condition: Condition) -> list[str]:
+def _choice_texts(condition: Condition) -> list[str]:
     return [*([] if condition.domain.type.is_tags else [f"{_OWN}missing"]), *values_of(condition)]
 
 
-def _asked(table: CompiledData) -> list[str]:
+def _facts(table: CompiledData) -> list[str]:
     return [*(c.name for c in conditions_of(table)), f"{_OWN}conditions"]
 
 
-def _choices_of(condition: Condition, type_: str, found: Iterator[str]) -> Choices:
-    missing = "" if condition.domain.type.is_tags else next(found)
+def _choices_of(condition: Condition, type_: str, names: Iterator[str]) -> Choices:
+    missing = "" if condition.domain.type.is_tags else next(names)
     values = values_of(condition)
-    return Choices(type_, values, tuple(next(found) for _ in values), missing)
+    return Choices(type_, values, tuple(next(names) for _ in values), missing)
 
 
-def _face_of(name: str, base: str, table: CompiledData, found: Iterator[str]) -> TableFace:
+def _face_of(name: str, base: str, table: CompiledData, names: Iterator[str]) -> TableFace:
     conditions = conditions_of(table)
     given = [c.name for c in conditions if c.expr is None]
     fields = dict(zip(given, distinct([Wanted(text) for text in given]), strict=True))
-    enumerators = tuple(next(found) for _ in conditions)
-    return TableFace(name, base, tuple(fields.get(c.name, "") for c in conditions), enumerators, next(found), ())
+    enumerators = tuple(next(names) for _ in conditions)
+    return TableFace(name, base, tuple(fields.get(c.name, "") for c in conditions), enumerators, next(names), ())
 
 
 def _given(output: Output) -> list[str]:
     return [f"{_OWN}none", *output.values] if output.values else []
 
 
-def _output_names(name: str, output: Output, found: Iterator[str]) -> OutputNames:
-    none, *enumerators = [next(found) for _ in _given(output)] or [""]
+def _output_names(name: str, output: Output, names: Iterator[str]) -> OutputNames:
+    none, *enumerators = [next(names) for _ in _given(output)] or [""]
     return OutputNames(name, none, tuple(enumerators))
 
 
@@ -146,17 +147,4 @@ def _endings(condition: Condition) -> tuple[str, ...]:
 
 def conditions_of(table: CompiledData) -> tuple[Condition, ...]:
     """The conditions of a table's schema: those of its columns, then the others that its rules and derived facts need."""
-    return (*table.conditions, *(c for c in named_conditions(table) if c.name not in table.places))
-
-
-def values_of(condition: Condition) -> tuple[str, ...]:
-    """The declared values of a condition; of tags also those above them, which a fact may hold too."""
-    values = condition.domain.values or ()
-    if not condition.domain.type.is_tags:
-        return values
-    return tuple(dict.fromkeys(tag for value in values for tag in _with_those_above(value)))
-
-
-def _with_those_above(tag: str) -> Iterator[str]:
-    parts = tag.split(".")
-    return (".".join(parts[: n + 1]) for n in range(len(parts)))
+    return (*table.conditions, *(c for c in named_conditions(table.derivation, table.when) if c.name not in table.places))

@@ -9,7 +9,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from unicodedata import normalize
 
-from contextdb.errors import ContextDBError, Fault, shown
+from contextdb.errors import ContextDBError, Fault, safe_text
 
 MOST_LETTERS = 80
 MOST_BYTES = 4000
@@ -84,10 +84,10 @@ def literal(text: str) -> str:
     """A text as C has it, in UTF-8. Raises ContextDBError where it is too long, or holds a NUL character."""
     octets = text.encode("utf-8", "surrogatepass")
     if 0 in octets:
-        raise ContextDBError(Fault(f'the name "{shown(text)}" holds a NUL character.', "names that C can hold"))
+        raise ContextDBError(Fault(f'the name "{safe_text(text)}" holds a NUL character.', "names that C can hold"))
     if len(octets) > MOST_BYTES:
         raise ContextDBError(
-            Fault(f'the name "{shown(text)}" has {len(octets):,} bytes.', f"names of at most {MOST_BYTES:,} bytes")
+            Fault(f'the name "{safe_text(text)}" has {len(octets):,} bytes.', f"names of at most {MOST_BYTES:,} bytes")
         )
     return '"' + "".join(chr(b) if _is_plain(b) else f"\\{b:03o}" for b in octets) + '"'
 
@@ -98,5 +98,5 @@ def _is_plain(octet: int) -> bool:
 
 def comment(*parts: str, most: int = 200) -> str:
     """What the parts say as one comment; nothing in them ends it, or begins another."""
-    said = shown(" ".join(part for part in parts if part), most).encode("ascii", "backslashreplace").decode("ascii")
-    return f"/* {re.sub(r'[?](?=[?])', '? ', said.replace('*/', '* /').replace('/*', '/ *'))} */"
+    text = safe_text(" ".join(part for part in parts if part), most).encode("ascii", "backslashreplace").decode("ascii")
+    return f"/* {re.sub(r'[?](?=[?])', '? ', text.replace('*/', '* /').replace('/*', '/ *'))} */"

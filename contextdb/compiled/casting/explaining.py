@@ -17,8 +17,9 @@ from contextdb.compiled.casting.facts import Ask, Offer
 from contextdb.compiled.casting.rules import CastRules
 from contextdb.compiled.casting.stage import CastMatches, Stage, set_stage
 from contextdb.compiled.data import CompiledData
-from contextdb.compiled.explain import Explanation, Failure, RowExplanation, cell_failures, rules_that_fail, told_fact
-from contextdb.expressions.rules import WhenRules, told_facts
+from contextdb.compiled.explain import Explanation, Failure, RowExplanation, cell_failures, rule_failure, told_fact
+from contextdb.compiled.failing_rules import rules_that_fail
+from contextdb.expressions.rules import WhenRules, facts_text
 
 
 class CastExplanation(Explanation):
@@ -36,6 +37,9 @@ class CastExplanation(Explanation):
         self._stage = stage
         self._plain = plain
 
+    def roles(self, row: int) -> dict[str, str]:
+        return {role: offer.label for role, offer in self.matches.cast(row).items()}
+
     def row(self, row: int) -> RowExplanation:
         row = require_row(row, len(self))
         found = super().row(row)
@@ -48,7 +52,7 @@ class CastExplanation(Explanation):
         cast = self._cast_rules.rows & ~stage.offered.bits if self._cast_rules is not None else 0
         return when.rows & ~left & ~cast
 
-    def _decided(self, always: int) -> int:
+    def decided(self, always: int) -> int:
         """The same with the rules of castings."""
         rules = self._stage.rules
         strict = None if rules is None else replace(rules, unknown="never", _known={})
@@ -66,24 +70,24 @@ class CastExplanation(Explanation):
     def _rule_failures(self, row: int) -> Iterator[Failure]:
         rules = self._cast_rules
         if rules is None or not rules.rows >> row & 1:
-            for is_open, part in rules_that_fail(self._compiled, row, self._stage.rule_facts, self._lenient):
-                yield part.failure(f"{'open' if is_open else 'false'} with {told_facts(part.rule, self._stage.rule_facts)}")
+            for is_open, part in rules_that_fail(self.compiled, row, self._stage.rule_facts, self._lenient):
+                yield rule_failure(part, f"{'open' if is_open else 'false'} with {facts_text(part.rule, self._stage.rule_facts)}")
             return
         facts = rules.facts(row, _most_filled(self._stage.parts(row)[0]))
-        for _, part in rules_that_fail(self._compiled, row, facts, self._lenient):
-            yield part.failure(f"false for every casting, such as {told_facts(part.rule, facts)}")
+        for _, part in rules_that_fail(self.compiled, row, facts, self._lenient):
+            yield rule_failure(part, f"false for every casting, such as {facts_text(part.rule, facts)}")
 
     @cached_property
     def _n_failures(self) -> NDArray[np.int64]:
         """How many cells of each row fail: int64 [n_rows]; a disabled row counts one more."""
-        counts = np.asarray(self._fails.sum(axis=0, dtype=np.int64)) + self._breaks_rule + ~self._enabled
+        counts = np.asarray(self._fails.sum(axis=0, dtype=np.int64)) + self.breaks_rule + ~self._enabled
         for row in bitmask.rows(bitmask.from_int(((1 << len(counts)) - 1) & ~self._stage.offered.bits, len(counts))).tolist():
             counts[row] += len(list(self._role_failures(row)))
         return bitmask.read_only(counts)
 
     @cached_property
     def _fails(self) -> NDArray[np.bool_]:
-        compiled = self._compiled
+        compiled = self.compiled
         fails = np.zeros((len(compiled.conditions), compiled.n_rows), np.bool_)
         for at, (bits, _) in self._plain.items():
             fails[at] = ~bitmask.unpack(bitmask.from_int(bits, compiled.n_rows), compiled.n_rows)
@@ -95,7 +99,7 @@ class CastExplanation(Explanation):
             fails = self._fails[at, rows]
             if fails.any():
                 far[fails] += self._column_distances(at, fact, rows[fails]) if isinstance(fact, float) else 1.0
-        return far + self._breaks_rule[rows]
+        return far + self.breaks_rule[rows]
 
     def _role_failures(self, row: int) -> Iterator[Failure]:
         needed, _ = self._stage.parts(row)
@@ -114,9 +118,9 @@ class CastExplanation(Explanation):
     def _misfits(self, offer: Offer, row: int) -> Iterator[Failure]:
         """The cells of a row that do not accept an actor."""
         for at, fact in offer.facts.items():
-            bits, _ = self._compiled.condition_bits(at, fact, self._stage.unknown)
+            bits, _ = self.compiled.condition_bits(at, fact, self._stage.unknown)
             if not bits >> row & 1:
-                yield from cell_failures(self._compiled, at, row, fact, f"{told_fact(self._compiled, at, fact)} of {offer.name}")
+                yield from cell_failures(self.compiled, at, row, fact, f"{told_fact(self.compiled, at, fact)} of {offer.name}")
 
 
 def _most_filled(parts: list[Part]) -> dict[str, Offer]:

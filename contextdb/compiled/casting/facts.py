@@ -9,10 +9,10 @@ from numbers import Real
 from typing import Any
 
 from contextdb.cells.facts import Context, Fact, Unknown, missing_error, misspelt, read_fact
-from contextdb.cells.mirroring import kept_facts, mirrored_facts
+from contextdb.cells.mirroring import frozen_facts, mirrored_facts
 from contextdb.compiled.casting.roles import roles_of_table
 from contextdb.compiled.data import CompiledData
-from contextdb.errors import ContextError, Fault, Place, in_quotes, mend_for, shown
+from contextdb.errors import ContextError, Fault, Place, in_quotes, mend_for, safe_text
 
 Actor = Mapping[str, Any]
 Actors = Mapping[str, Sequence[Actor]]
@@ -64,7 +64,7 @@ class Offer:
 def name_of(actor: Actor, place: int) -> str:
     """What people call an actor: its name or id, else its place in the list."""
     told = next((actor[k] for k in ("name", "id") if actor.get(k) is not None), None)
-    return f"actor {place}" if told is None else shown(str(told))
+    return f"actor {place}" if told is None else safe_text(str(told))
 
 
 def read_offers(
@@ -105,9 +105,9 @@ def mirrored_offers(
 def _listed(offered: object, role: str) -> Sequence[Actor]:
     if isinstance(offered, Sequence) and not isinstance(offered, (str, bytes)):
         return offered
-    found = f"the actors for {in_quotes(role)} are {_kind(offered)}."
+    problem = f"the actors for {in_quotes(role)} are {_kind(offered)}."
     raise ContextError(
-        Fault(found, "a list of mappings of facts", "[…]" if isinstance(offered, Mapping) else "", rule="wrong-fact")
+        Fault(problem, "a list of mappings of facts", "[…]" if isinstance(offered, Mapping) else "", rule="wrong-fact")
     )
 
 
@@ -131,9 +131,9 @@ class _Reader:
         """Raise ContextError when actors are preferred by a fact that none of them tells."""
         for name, is_told in self.preferred.items():
             if not is_told:
-                found = f"no actor has {in_quotes(name)}, by which actors are preferred."
+                problem = f"no actor has {in_quotes(name)}, by which actors are preferred."
                 mend = mend_for(name, sorted(self.names))
-                raise ContextError(Fault(found, "a number fact of the actors", mend, rule="unknown-fact"))
+                raise ContextError(Fault(problem, "a number fact of the actors", mend, rule="unknown-fact"))
 
     def read(self, role: str, places: Sequence[int], place: int, actor: Actor) -> Offer:
         where = f"{role}[{place}]"
@@ -146,7 +146,7 @@ class _Reader:
             cost = self._cost(role, actor, facts)
         except ContextError as error:
             raise ContextError(*(_in_actor(f, where) for f in error.faults)) from None
-        return Offer(actor, key, place, facts, kept_facts(told), *self._bits(facts), cost)
+        return Offer(actor, key, place, facts, frozen_facts(told), *self._bits(facts), cost)
 
     def mirrored(self, role: str, places: Sequence[int], offer: Offer) -> Offer:
         """An actor that was read, with facts as a mirror shows them."""
@@ -178,8 +178,8 @@ class _Reader:
         for name, value in actor.items():
             if not _is_same(told.setdefault(name, value), value):
                 told_twice = f"{where} says {_text(value)}, another {_text(told[name])}"
-                found = f"two actors have the id {in_quotes(str(own))}, and {in_quotes(str(name))} differs: {told_twice}."
-                raise ContextError(Fault(found, "one id for one actor, with the same facts in every role", rule="wrong-fact"))
+                problem = f"two actors have the id {in_quotes(str(own))}, and {in_quotes(str(name))} differs: {told_twice}."
+                raise ContextError(Fault(problem, "one id for one actor, with the same facts in every role", rule="wrong-fact"))
         return "id", own
 
     def _facts(self, role: str, places: Sequence[int], given: Mapping[str, object]) -> dict[int, Fact]:
@@ -188,9 +188,10 @@ class _Reader:
         derivation = self.compiled.derivation
         derived: Mapping[str, object] = {}
         joint: Mapping[str, object] = given
+        lacking: list[str] = []
         if derivation is not None and any(c.name in derivation.names for c in conditions):
-            joint = {**self.context, **given}
-            derived = derivation.only(c.name for c in conditions).compute(joint)
+            joint, own = {**self.context, **given}, derivation.only(c.name for c in conditions)
+            derived, lacking = own.compute(joint), own.missing(joint)
             derivation.refuse(n for n in given if n in derivation.names and given[n] is not None)
         facts: dict[int, Fact] = {}
         faults: list[Fault] = []
@@ -203,8 +204,9 @@ class _Reader:
         if faults:
             raise ContextError(*faults)
         told = roles_of_table(self.compiled).told_to_rules(role, self.compiled)
-        lacking = [c.name for c in told if read_fact(given.get(c.name), c) is None]
-        if missing := [*(self.compiled.conditions[at].name for at, fact in facts.items() if fact is None), *lacking]:
+        lacking += [c.name for c in told if read_fact(given.get(c.name), c) is None]
+        absent = [self.compiled.conditions[at].name for at, fact in facts.items() if fact is None]
+        if missing := list(dict.fromkeys([*absent, *lacking])):
             self._refuse_missing(role, missing, given, joint)
         return facts
 
@@ -252,8 +254,8 @@ def _own_facts(role: str, actor: Actor) -> dict[str, object]:
             raise ContextError(Fault(f"a fact's name is {_kind(name)}.", "text", rule="wrong-fact"))
         full = name if name.startswith(f"{role}.") else f"{role}.{name}"
         if full in given and not _is_same(given[full], value):
-            found = f"{in_quotes(full)} is given twice, {_text(given[full])} and {_text(value)}."
-            raise ContextError(Fault(found, "each fact once, with the role before it or without", rule="wrong-fact"))
+            problem = f"{in_quotes(full)} is given twice, {_text(given[full])} and {_text(value)}."
+            raise ContextError(Fault(problem, "each fact once, with the role before it or without", rule="wrong-fact"))
         given[full] = value
     return given
 
@@ -262,8 +264,8 @@ def _as_cost(value: object, name: str, sign: float) -> Cost:
     if value is None or (isinstance(value, Real) and not isinstance(value, bool) and math.isnan(value)):
         return 1, 0.0
     if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
-        found = f"{in_quotes(name)} is {_text(value)}, which cannot be preferred by."
-        raise ContextError(Fault(found, "a finite number", rule="wrong-fact"))
+        problem = f"{in_quotes(name)} is {_text(value)}, which cannot be preferred by."
+        raise ContextError(Fault(problem, "a finite number", rule="wrong-fact"))
     return 0, sign * float(value)
 
 
@@ -279,7 +281,7 @@ def _is_same(one: object, other: object) -> bool:
 
 
 def _text(value: object) -> str:
-    return in_quotes(shown(str(value)))
+    return in_quotes(safe_text(str(value)))
 
 
 def _in_actor(fault: Fault, where: str) -> Fault:

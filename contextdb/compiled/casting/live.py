@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from contextdb.cells.facts import Context
 from contextdb.compiled.casting.facts import Actor, Ask
 from contextdb.compiled.casting.stage import CastMatches, Offered, set_stage
+from contextdb.compiled.core_table import UNUSUAL
 from contextdb.compiled.data import CompiledData
-from contextdb.compiled.lookup import UNUSUAL
 
 _PLAIN = (float, int, str, bool, type(None), frozenset)
 """Types whose values do not change: an actor with others is read for every question."""

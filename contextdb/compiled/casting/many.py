@@ -26,8 +26,8 @@ def query_many_with_actors(compiled: CompiledData, contexts: Contexts, ask: Ask)
         raise ContextError(Fault(f"actors are of type {type(actors).__name__}.", accepted))
     n_contexts = common_length(columns) if columns else 1 if each is None else len(each)
     if each is not None and len(each) != n_contexts:
-        found = f"there are actors for {plural(len(each), 'context')}, and facts for {n_contexts:,}."
-        raise ContextError(Fault(found, "a mapping of roles for all contexts, or one for each"))
+        problem = f"there are actors for {plural(len(each), 'context')}, and facts for {n_contexts:,}."
+        raise ContextError(Fault(problem, "a mapping of roles for all contexts, or one for each"))
 
     def answer(context: int, facts: Mapping[str, object]) -> Any:
         return query_with_actors(compiled, facts, Ask(actors if each is None else each[context], ask.prefer, ask.unknown))

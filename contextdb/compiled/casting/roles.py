@@ -71,9 +71,9 @@ def _needed_by_rules(compiled: CompiledData) -> dict[str, frozenset[str]]:
 
 
 def _slot_rows(column: TextColumn) -> dict[str, int]:
-    found: dict[str, int] = {}
+    numbers: dict[str, int] = {}
     for code, text in enumerate(column.texts):
         rows = bitmask.to_int(bitmask.pack(column.codes == code))
         for word in slot_words(text):
-            found[word] = found.get(word, 0) | rows
-    return found
+            numbers[word] = numbers.get(word, 0) | rows
+    return numbers

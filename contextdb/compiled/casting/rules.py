@@ -73,21 +73,21 @@ class CastRules:
         """
         for number in [n for n in self.when.numbers(rows & self.rows) if n in self.roles]:
             own = rows & self.when.rules[number].rows
-            found = 0
+            bits = 0
             for needed, some_rows in _by_needs(own, self.roles[number], required):
                 others = [role for role in offers if role not in needed]
                 has_more = reduce(or_, (required[role] for role in others), 0)
                 for chosen in product(*(offers[role] for role in needed)):
-                    fitting = reduce(and_, map(fits, chosen), some_rows) & ~found
+                    fitting = reduce(and_, map(fits, chosen), some_rows) & ~bits
                     if not fitting or len({o.key for o in chosen}) < len(chosen):
                         continue
                     if self._truths(number, dict(zip(needed, chosen, strict=True)))[at]:
-                        found |= fitting & ~has_more
+                        bits |= fitting & ~has_more
                         taken = frozenset(o.key for o in chosen)
                         for row in _rows(fitting & has_more):
                             rest = [(n, [o for o in offers[n] if fits(o) >> row & 1]) for n in others if required[n] >> row & 1]
-                            found |= (next(assignments(rest, taken), None) is not None) << row
-            rows &= ~own | found
+                            bits |= (next(assignments(rest, taken), None) is not None) << row
+            rows &= ~own | bits
         return rows
 
     def _truths(self, number: int, cast: Cast) -> Truths:

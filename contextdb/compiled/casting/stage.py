@@ -12,7 +12,7 @@ Source: Hall, "On representatives of subsets", J. London Math. Soc. 10, 1935.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from operator import or_
@@ -23,9 +23,10 @@ from numpy.typing import NDArray
 from contextdb.cells.arguments import require_whole
 from contextdb.cells.facts import Context, Fact, Unknown, check_mode, require_context
 from contextdb.cells.hysteresis import widened_fact
-from contextdb.cells.mirroring import in_mirror, kept_facts, mirrored_facts
+from contextdb.cells.mirroring import frozen_facts, in_mirror, mirrored_facts
 from contextdb.compiled.casting.assigning import Chosen, Holds, Part, best, every
 from contextdb.compiled.casting.facts import Actor, Actors, Ask, Offer, mirrored_offers, read_offers
+from contextdb.compiled.casting.plain import PlainRoles, offers_of
 from contextdb.compiled.casting.roles import roles_of_table
 from contextdb.compiled.casting.rules import CastRules
 from contextdb.compiled.casting.together import CastRows, casts_of
@@ -57,13 +58,15 @@ class CastMatches(SetMatches):
 
     __slots__ = ("_cast_by",)
 
-    def __init__(self, bits: int, always: int, stages: CastBy, table: Answering) -> None:
+    def __init__(self, bits: int, always: int, cast_by: CastBy | Callable[[], CastBy], table: Answering) -> None:
         super().__init__(bits, table, always)
-        self._cast_by = stages
+        self._cast_by = cast_by
 
     @property
     def _stages(self) -> CastBy:
-        """Who plays what, for some rows; the first that has a row counts."""
+        """Who plays what, for some rows; the first that has a row counts. Worked out when it is first asked for."""
+        if not isinstance(self._cast_by, tuple):
+            self._cast_by = self._cast_by()
         return self._cast_by
 
     def casting(self, row: int) -> Casting:
@@ -83,16 +86,16 @@ class CastMatches(SetMatches):
         offered for one of the roles."""
         found: dict[tuple[object, ...], CastRows] = {}
         left = self.bits
-        for rows, stage in self._cast_by:
+        for rows, stage in self._stages:
             for key, each in stage.casts(left & rows, roles):
                 found[key] = found[key].joined(each, self.n_rows) if key in found else each
             left &= ~rows
         return list(found.values())
 
     def _stage(self, row: int) -> Stage:
-        if require_whole(row, "row") not in self:
+        if not (0 <= require_whole(row, "row") < self.n_rows and self.bits >> row & 1):
             raise ContextError(Fault(f"row {row} is not valid, so nobody is cast for it.", "one of the valid rows, m.indices"))
-        for rows, stage in self._cast_by:
+        for rows, stage in self._stages:
             if rows >> row & 1:
                 return stage
         raise ContextError(Fault(f"row {row} is of an answer without actors, so nobody is cast.", "query(facts, actors={...})"))
@@ -157,14 +160,14 @@ class Stage:
             some_bits &= some_rows
             all_bits &= all_rows
         some_bits, all_bits = self.left_by_rules(some_bits, all_bits)
-        found = self.answer(some_bits, all_bits, ((some_bits, self),), self.compiled.answering)
+        answer = self.answer(some_bits, all_bits, ((some_bits, self),), self.compiled.answering)
         if self.compiled.mirroring:
-            with_mirrored(found, self.mirrored)
+            with_mirrored(answer, self.mirrored)
         if self.compiled.widening:
-            with_widened(found, self.widened)
+            with_widened(answer, self.widened)
         if self.compiled.is_soft:
-            with_penalties(found, lambda: self.penalties(found))
-        return found
+            with_penalties(answer, lambda: self.penalties(answer))
+        return answer
 
     def answer(self, bits: int, always: int, stages: Stages, table: Answering) -> CastMatches:
         """An answer of some rows, with the castings of several."""
@@ -175,11 +178,11 @@ class Stage:
         conditions, unknown = self.compiled.conditions, self.unknown
         facts = {at: widened_fact(fact, conditions[at]) for at, fact in self.plain_facts.items()}
         plain = {at: self.compiled.condition_bits(at, fact, unknown) for at, fact in facts.items()}
-        found = replace(self, plain_facts=facts).matches(plain)
-        del found._widened  # nothing is widened twice
+        answer = replace(self, plain_facts=facts).matches(plain)
+        del answer._widened  # nothing is widened twice
         if self.compiled.mirroring:
-            with_mirrored(found, lambda: self.mirrored().widened)
-        return found
+            with_mirrored(answer, lambda: self.mirrored().widened)
+        return answer
 
     def mirrored(self) -> CastMatches:
         """The answer with the facts of the context and of the actors as a mirror shows them. The actors stay who they are, and as
@@ -214,7 +217,7 @@ class Stage:
         costs = np.zeros((compiled.n_depths, compiled.n_rows))
         for at, fact in self.plain_facts.items():
             costs += compiled.column_penalties(at, fact, self.unknown)
-        for row in matches:
+        for row in matches.rows.tolist():
             for _, offer in self.cast(row):
                 costs[:, row] += sum(compiled.column_penalties(at, f, self.unknown)[:, row] for at, f in offer.facts.items())
         return costs
@@ -300,8 +303,26 @@ def _as_casting(chosen: Chosen) -> Casting:
 def query_with_actors(compiled: CompiledData, context: Context, ask: Ask) -> CastMatches:
     """The rows valid for a context and actors; see `CompiledTable.query`. Raises ContextError as `query`, and for actors that
     cannot be read, with the role and the actor."""
-    stage, plain = set_stage(compiled, context, ask)
-    return stage.matches(plain)
+    own = compiled.once(PlainRoles.of)
+    read = None if own is None else own.read(context, ask)
+    if read is None:
+        stage, plain = set_stage(compiled, context, ask)
+        return stage.matches(plain)
+    rows, accepted = read
+    roles = compiled.once(_all_roles)
+    fits = [{key: own[0] for key, own in accepted[name].items()} for name in roles.names]
+    bits = rows & ~_lacking(fits, [roles.required[name] for name in roles.names], 0, {}, rows, 0)
+
+    def cast_by() -> CastBy:
+        offered = Offered(roles, {name: offers_of(own) for name, own in accepted.items()}, compiled.n_rows)
+        return ((bits, Stage(compiled, offered, {}, ask.unknown, {}, context)),)
+
+    return CastMatches(bits, bits, cast_by, compiled.answering)
+
+
+def _all_roles(compiled: CompiledData) -> Roles:
+    """The roles of a table where all of them are cast."""
+    return roles_of(compiled, {}, dict.fromkeys(roles_of_table(compiled).conditions, ()))
 
 
 def set_stage(
@@ -323,7 +344,7 @@ def set_stage(
     if offered is None:
         offers = read_offers(compiled, roles.conditions, context, ask)
         offered = Offered(roles, offers, compiled.n_rows)
-    return Stage(compiled, offered, facts, unknown, read, kept_facts(context) if compiled.mirroring else context, rules), plain
+    return Stage(compiled, offered, facts, unknown, read, frozen_facts(context) if compiled.mirroring else context, rules), plain
 
 
 def _ruled_names(compiled: CompiledData, roles: Roles) -> list[str]:
@@ -346,8 +367,8 @@ def roles_of(compiled: CompiledData, context: Context, actors: Actors) -> Roles:
     if not isinstance(actors, Mapping):
         raise ContextError(Fault(f"actors are a mapping of roles, not {type(actors).__name__}.", '{"Defender": [{...}, {...}]}'))
     if compiled.slots is None:
-        found = "this compiled file does not say which slots are mandatory."
-        raise ContextError(Fault(found, "the table itself, compiled by Table.compile()"))
+        problem = "this compiled file does not say which slots are mandatory."
+        raise ContextError(Fault(problem, "the table itself, compiled by Table.compile()"))
     require_context(context)
     members, slots = roles_of_table(compiled).conditions, roles_of_table(compiled).slot_rows
     _require_roles(actors, list(dict.fromkeys([*members, *(w for words in slots.values() for w in words)])))
@@ -371,8 +392,8 @@ def _given(compiled: CompiledData, role: str, context: Context) -> list[str]:
 def _refuse_both(compiled: CompiledData, actors: Actors, context: Context) -> None:
     for role in actors:
         for name in _given(compiled, role, context):
-            found = f"{in_quotes(name)} is given as a fact, and actors are offered for {in_quotes(role)}."
-            raise ContextError(Fault(found, "the facts of a role from its actors, or without actors for it", rule="wrong-fact"))
+            problem = f"{in_quotes(name)} is given as a fact, and actors are offered for {in_quotes(role)}."
+            raise ContextError(Fault(problem, "the facts of a role from its actors, or without actors for it", rule="wrong-fact"))
 
 
 def _require_roles(actors: Actors, known: Sequence[str]) -> None:

@@ -66,13 +66,13 @@ class Diff:
     """Beside each of these rows, whether only the writing changed."""
 
     def __bool__(self) -> bool:
-        is_as_before = all(np.array_equal(found, np.arange(n)) for found, n in self._sizes)
+        is_as_before = all(np.array_equal(rows, np.arange(n)) for rows, n in self._sizes)
         return not is_as_before or bool(self.changed) or bool(self.columns_renamed)
 
     @property
     def _sizes(self) -> tuple[tuple[CameFrom, int], tuple[CameFrom, int]]:
-        found = self.alignment
-        return (found.rows, self.before.n_rows), (found.columns, len(self.before.columns))
+        alignment = self.alignment
+        return (alignment.rows, self.before.n_rows), (alignment.columns, len(self.before.columns))
 
     @cached_property
     def rows_added(self) -> list[int]:
@@ -141,11 +141,11 @@ class Diff:
     @property
     def summary(self) -> str:
         """How much changed, in one line."""
-        said = [f"{plural(n, 'row')} {verb}" for verb, n in self._row_counts.items() if n]
-        said += [f"{plural(n, 'column')} {verb}" for verb, n in self._column_counts.items() if n]
-        said += [f"{plural(self.n_changed, 'cell')} changed"] if self.n_changed else []
-        said += [f"{plural(self.n_rewritten, 'cell')} written differently"] if self.n_rewritten else []
-        return ", ".join(said) or "no difference"
+        phrases = [f"{plural(n, 'row')} {verb}" for verb, n in self._row_counts.items() if n]
+        phrases += [f"{plural(n, 'column')} {verb}" for verb, n in self._column_counts.items() if n]
+        phrases += [f"{plural(self.n_changed, 'cell')} changed"] if self.n_changed else []
+        phrases += [f"{plural(self.n_rewritten, 'cell')} written differently"] if self.n_rewritten else []
+        return ", ".join(phrases) or "no difference"
 
     @property
     def _row_counts(self) -> dict[str, int]:
@@ -158,9 +158,9 @@ class Diff:
         return {"added": added, "removed": removed, "renamed": len(self.columns_renamed), "moved": len(self.columns_moved)}
 
     def edit(self, name: str = "Changes") -> Edit:
-        """The edit that makes the texts of `before` those of `after`, and what is said of its columns too."""
-        after, found = self.after, self.alignment
-        return edit_under(self.before, after.columns, found.rows, found.columns, after.settings, after.schema, name)
+        """The edit that makes the texts of `before` those of `after`, and the settings of its columns too."""
+        after, alignment = self.after, self.alignment
+        return edit_under(self.before, after.columns, alignment.rows, alignment.columns, after.settings, after.schema, name)
 
     def to_json(self) -> dict[str, object]:
         """The differences as plain data. Rows count from 0; "line" is that of the file, where there is one."""
@@ -199,10 +199,10 @@ def diff(before: EitherTable, after: EitherTable) -> Diff:
     a text means itself.
     """
     alignment = align(before, after)
-    kept = np.flatnonzero(alignment.rows >= 0)
+    retained = np.flatnonzero(alignment.rows >= 0)
     changed, rewritten = {}, {}
     for a, b in enumerate(alignment.columns.tolist()):
-        rows = _changed_rows(before, after, b, a, alignment.rows[kept], kept) if b >= 0 else kept[:0]
+        rows = _changed_rows(before, after, b, a, alignment.rows[retained], retained) if b >= 0 else retained[:0]
         if len(rows):
             changed[a] = rows
             rewritten[a] = _is_writing_only(before, after, b, a, alignment.rows[rows], rows)

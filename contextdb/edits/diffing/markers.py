@@ -52,7 +52,7 @@ def versions_of(raw: bytes) -> Versions | None:
 
     Where git wrote no version of before, base has nothing in its place.
     """
-    kept: list[list[bytes]] = [[], [], []]
+    versions: list[list[bytes]] = [[], [], []]
     sides: tuple[int, ...] = (0, 1, 2)
     n_blocks = 0
     steps = {OURS: (sides, (1,)), BASE: ((1,), (0,)), MIDDLE: ((0,), (2,)), THEIRS: ((2,), sides)}
@@ -67,20 +67,20 @@ def versions_of(raw: bytes) -> Versions | None:
             return None
         else:
             for side in sides:
-                kept[side].append(line)
+                versions[side].append(line)
     if not n_blocks or len(sides) != 3:
         return None
-    base, ours, theirs = (b"".join(lines) for lines in kept)
+    base, ours, theirs = (b"".join(lines) for lines in versions)
     return (base or ours.splitlines(keepends=True)[0] if ours else base), ours, theirs
 
 
 def names_of(raw: bytes) -> tuple[str, str]:
     """What the first marks of a file call ours and theirs, such as HEAD and the name of a branch; empty where they say nothing."""
-    found = {OURS: "", THEIRS: ""}
+    names = {OURS: "", THEIRS: ""}
     for line in raw.splitlines():
-        if line[:7] in found and not found[line[:7]]:
-            found[line[:7]] = line[7:].decode("utf-8", "replace").strip()
-    return found[OURS], found[THEIRS]
+        if line[:7] in names and not names[line[:7]]:
+            names[line[:7]] = line[7:].decode("utf-8", "replace").strip()
+    return names[OURS], names[THEIRS]
 
 
 # ---- parts
@@ -131,25 +131,25 @@ def _woven(mine: _Lines, yours: _Lines, was: dict[Known, bytes], end: bytes) -> 
 
 def _base_lines(merge: Merge[Table], mine: _Lines, yours: _Lines) -> dict[Known, bytes]:
     """What stood in base of each row in question, in the merged columns."""
-    asked: dict[int, list[Conflict]] = {}
+    conflicts: dict[int, list[Conflict]] = {}
     for one in merge.conflicts:
         base = one.key[1]
         if isinstance(base, int) and base >= 0:
-            asked.setdefault(base, []).append(one)
-    found: dict[Known, bytes] = {}
+            conflicts.setdefault(base, []).append(one)
+    lines_by_key: dict[Known, bytes] = {}
     for lines in (yours, mine):
-        rows = {row[0]: at for at, row in enumerate(lines.rows) if row[0] in asked}
-        cells = [cell for base, at in rows.items() for cell in _base_cells(merge, base, at, asked[base])]
+        rows = {row[0]: at for at, row in enumerate(lines.rows) if row[0] in conflicts}
+        cells = [cell for base, at in rows.items() for cell in _base_cells(merge, base, at, conflicts[base])]
         again = _Lines(merge, lines.table.with_cells(cells)) if cells else lines
         end = again.source.line_end.encode()
-        found |= {lines.rows[at]: again.line(at) + end for at in rows.values()}
-    return found
+        lines_by_key |= {lines.rows[at]: again.line(at) + end for at in rows.values()}
+    return lines_by_key
 
 
-def _base_cells(merge: Merge[Table], base: int, row: int, asked: Sequence[Conflict]) -> Iterator[tuple[int, str, str]]:
+def _base_cells(merge: Merge[Table], base: int, row: int, conflicts: Sequence[Conflict]) -> Iterator[tuple[int, str, str]]:
     """The cells of base that a row in question had: all where the row itself is, else those in question."""
-    is_whole = any(one.kind == "row" for one in asked)
-    wanted = {one.column for one in asked}
+    is_whole = any(one.kind == "row" for one in conflicts)
+    wanted = {one.column for one in conflicts}
     for column, field in zip(merge.columns, merge.fields.base.tolist(), strict=True):
         if is_whole or column.name in wanted:
             yield row, column.name, merge.base.columns[field][base] if field >= 0 else ""

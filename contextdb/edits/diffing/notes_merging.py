@@ -13,7 +13,7 @@ from contextdb.errors import Fault, FileError, Place, in_quotes
 
 FIELDS = ("Asset", "Column", "Note", "Colour")
 Spot = tuple[str, str]
-"""An asset, and a column; none for what is said of the row."""
+"""An asset, and a column; none for the note of the row."""
 Lines = Mapping[Spot, Sequence[str]]
 """Of each spot its note and its colour."""
 
@@ -23,13 +23,13 @@ def merge_notes(raws: Sequence[bytes], files: Sequence[str], takes: str | None =
     Raises FileError for a file that is none of notes, or a spot that both sides changed."""
     base, ours, theirs = (_read(raw, file) for raw, file in zip(raws, files, strict=True))
     merged = {spot: [_merged(spot, i, base, ours, theirs, files[1], takes) for i in (0, 1)] for spot in {**base, **ours, **theirs}}
-    return written({spot: said for spot, said in merged.items() if any(said)})
+    return written({spot: note for spot, note in merged.items() if any(note)})
 
 
 def written(lines: Lines) -> bytes:
     """The file, sorted, so that two versions differ in few places."""
     out = io.StringIO()
-    csv.writer(out, lineterminator="\n").writerows([FIELDS, *([*spot, *said] for spot, said in sorted(lines.items()))])
+    csv.writer(out, lineterminator="\n").writerows([FIELDS, *([*spot, *note] for spot, note in sorted(lines.items()))])
     return out.getvalue().encode()
 
 
@@ -39,8 +39,8 @@ def _merged(spot: Spot, at: int, base: Lines, ours: Lines, theirs: Lines, file: 
         return yours
     if yours == was or takes == "ours":
         return mine
-    found = f"the {FIELDS[2 + at].lower()} of {in_quotes(' '.join(spot).strip())} changed on both sides."
-    raise FileError(Fault(found, place=Place(file)))
+    problem = f"the {FIELDS[2 + at].lower()} of {in_quotes(' '.join(spot).strip())} changed on both sides."
+    raise FileError(Fault(problem, place=Place(file)))
 
 
 def _read(raw: bytes, file: str) -> Lines:

@@ -5,7 +5,7 @@ What both sides changed otherwise is between git's marks. Nothing here touches t
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from contextdb.edits.diffing.markers import block
@@ -28,15 +28,19 @@ class TomlMerge:
 def merge_toml(base: str, ours: str, theirs: str, files: tuple[str, str, str] = ("base", "ours", "theirs")) -> TomlMerge:
     """Merge three texts of a contextdb.toml; `files` are their names in messages. Raises SchemaError for a text that is no TOML."""
     was, mine, yours = (dict(_leaves(read_toml(text, file), ())) for text, file in zip((base, ours, theirs), files, strict=True))
-    text, conflicts = ours, []
     changed = [path for path in {**yours, **was} if _differs(path, was, yours) and _differs(path, mine, yours)]
-    for path in changed:
-        if _differs(path, mine, was):
-            conflicts.append(path)
-        elif path in yours:
-            text = set_key(text, path, yours[path], _sections_before(path, theirs))
-        else:
-            text = drop_empty_section(drop_key(text, path), path[:-1])
+    conflicts = [path for path in changed if _differs(path, mine, was)]
+    gone = [path for path in changed if path not in yours and not _differs(path, mine, was)]
+    new = {path: yours[path] for path in changed if path in yours}
+    if _has_clash({path: mine[path] for path in mine.keys() - set(gone)} | new):
+        return TomlMerge(ours, tuple(changed), _whole(base, ours, theirs))
+    text, parts = ours, _parts(new)
+    for path in (path for path in gone if path in parts):  # a value that is a section now
+        text = drop_key(text, path)
+    for path in (path for path in new if path not in conflicts):
+        text = set_key(text, path, new[path], _sections_before(path, theirs))
+    for path in (path for path in gone if path not in parts):
+        text = drop_empty_section(drop_key(text, path), path[:-1])
     if not conflicts:
         return TomlMerge(text, (), text)
     return TomlMerge(text, tuple(conflicts), _with_markers(text, conflicts, was, yours) or _whole(base, ours, theirs))
@@ -49,6 +53,16 @@ def _leaves(part: Mapping[str, object], path: Path) -> Iterator[tuple[Path, obje
             yield from _leaves(value, (*path, key))
         else:
             yield (*path, key), value
+
+
+def _has_clash(values: Mapping[Path, object]) -> bool:
+    """Whether a name has a value and is a section too."""
+    return any(values[path] != {} for path in _parts(values) & values.keys())
+
+
+def _parts(paths: Iterable[Path]) -> set[Path]:
+    """The sections above some keys."""
+    return {path[:depth] for path in paths for depth in range(1, len(path))}
 
 
 def _differs(path: Path, one: Mapping[Path, object], other: Mapping[Path, object]) -> bool:
@@ -69,7 +83,7 @@ def _with_markers(text: str, conflicts: list[Path], was: Mapping[Path, object], 
     blocks: list[tuple[int, int, str]] = []
     for path in conflicts:
         ours = _statement(text, path)
-        others = [_version(text, path, said) for said in (was, yours)]
+        others = [_version(text, path, values) for values in (was, yours)]
         if ours is None or None in others:
             return None
         versions = [(version or "").encode() for version in (text[slice(*ours)], *others)]
@@ -79,19 +93,19 @@ def _with_markers(text: str, conflicts: list[Path], was: Mapping[Path, object], 
     return text
 
 
-def _version(text: str, path: Path, said: Mapping[Path, object]) -> str | None:
+def _version(text: str, path: Path, values: Mapping[Path, object]) -> str | None:
     """The lines of a key as another version says it."""
-    if path not in said:
+    if path not in values:
         return ""
-    other = set_key(text, path, said[path])
-    found = _statement(other, path)
-    return None if found is None else other[slice(*found)]
+    other = set_key(text, path, values[path])
+    span = _statement(other, path)
+    return None if span is None else other[slice(*span)]
 
 
 def _statement(text: str, path: Path) -> tuple[int, int] | None:
     """Where the lines of a key start and stop."""
-    found = next((one for one in statements(text) if one.path == path and one.value is not None), None)
-    return None if found is None else (found.start, found.stop)
+    match = next((one for one in statements(text) if one.path == path and one.value is not None), None)
+    return None if match is None else (match.start, match.stop)
 
 
 def _whole(base: str, ours: str, theirs: str) -> str:

@@ -13,8 +13,8 @@ derived ones and ones that are no column of its table: their facts then belong t
 that of `contextdb.expressions`, whose third truth, missing, is treated as a missing fact: an error, ignored, or never.
 """
 
-from contextdb.expressions.rules.column import WhenColumn, check_rule, has_no_rule
+from contextdb.expressions.rules.column import WhenColumn, check_rule
 from contextdb.expressions.rules.many import ManyRules
-from contextdb.expressions.rules.rules import Rule, WhenRules, told_facts
+from contextdb.expressions.rules.rules import Rule, WhenRules, facts_text
 
-__all__ = ["ManyRules", "Rule", "WhenColumn", "WhenRules", "check_rule", "has_no_rule", "told_facts"]
+__all__ = ["ManyRules", "Rule", "WhenColumn", "WhenRules", "check_rule", "facts_text"]

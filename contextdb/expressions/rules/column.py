@@ -20,7 +20,7 @@ from contextdb.expressions.names import unknown_in
 MOST_MENDS = 20
 """Rules of one column that get a mend when they cannot be read; looking for one is slow."""
 MOST_KNOWN = 1 << 13
-"""Texts that are kept read, so that an edit of one cell reads one."""
+"""Texts that are cached as read, so that an edit of one cell reads one."""
 
 _TRUTH = Condition("", BOOL)
 
@@ -43,10 +43,10 @@ class WhenColumn:
         faults: dict[int, Fault] = {}
         for i, text in enumerate(texts.texts):
             few = len(faults) < MOST_MENDS
-            found = None if has_no_rule(text) else _read(text.strip(), known) if few else _read_fast(text.strip(), known)
-            rules.append(None if isinstance(found, Fault) else found)
-            if isinstance(found, Fault):
-                faults[i] = found
+            rule = None if says_any(text) else _read(text.strip(), known) if few else _read_fast(text.strip(), known)
+            rules.append(None if isinstance(rule, Fault) else rule)
+            if isinstance(rule, Fault):
+                faults[i] = rule
         return cls(texts, tuple(rules), faults)
 
     @property
@@ -81,11 +81,6 @@ class WhenColumn:
         held = np.unique(self.texts.codes).tolist()
         rules = (self.rules[code] for code in held)
         return tuple(dict.fromkeys(name for rule in rules if rule is not None for name in rule.names))
-
-
-def has_no_rule(text: str) -> bool:
-    """Whether a cell says that its row has no rule."""
-    return says_any(text)
 
 
 def check_rule(text: str, conditions: Mapping[str, Condition]) -> Fault | None:
@@ -126,5 +121,5 @@ def _read_fast(text: str, known: _Known) -> Expression | Fault:
     if unknown is None:
         return _read(text, known)
     name, at = unknown
-    found = f"{in_quotes(text)}, character {at + 1}: there is no condition {in_quotes(name)}."
-    return Fault(found, some(c.name for c in known.conditions), rule="unreadable-cell")
+    problem = f"{in_quotes(text)}, character {at + 1}: there is no condition {in_quotes(name)}."
+    return Fault(problem, some(c.name for c in known.conditions), rule="unreadable-cell")

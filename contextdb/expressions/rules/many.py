@@ -1,4 +1,4 @@
-"""The rules of a compiled table, asked with the facts of many contexts: N contexts, W words a mask."""
+"""The rules of a compiled table, queried with the facts of many contexts: N contexts, W words a mask."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from contextdb.bitmask import Flags, Rows, Words
 from contextdb.cells.facts import Unknown
 from contextdb.errors import ContextError, Fault, Place, plural
 from contextdb.expressions import Expression
-from contextdb.expressions.columns import NO, UNKNOWN, Column, is_missing_in, read_column, taken
+from contextdb.expressions.columns import NO, UNKNOWN, Column, missing_rows, read_column, taken
 from contextdb.expressions.frame import run_frame
 from contextdb.expressions.rules.rules import WhenRules, no_value
 
@@ -40,10 +40,7 @@ class ManyRules:
 
     def missing(self, name: str) -> Rows:
         """The contexts in which a fact is missing: int64 [n ≤ N]."""
-        column = self.facts[name]
-        if isinstance(column, np.ndarray):
-            return np.flatnonzero(column == UNKNOWN if column.dtype == np.int8 else np.isnan(column))
-        return np.flatnonzero(column.codes < 0)
+        return missing_rows(self.facts[name])
 
     def exclude(self, masks: Words, start: int = 0) -> None:
         """Take the rows whose rule does not hold out of the masks uint64 [n, W] of contexts `start` and on, in place. Raises
@@ -63,8 +60,8 @@ class ManyRules:
         """The same where few rows are left: mask `at[i]` holds row `rows[i]`."""
         numbers = self.rules.of_row[rows]
         order = np.argsort(numbers, kind="stable")
-        found, first = np.unique(numbers[order], return_index=True)
-        for number, own in zip(found.tolist(), np.split(order, first[1:]), strict=False):  # of nothing split gives one part
+        distinct, first = np.unique(numbers[order], return_index=True)
+        for number, own in zip(distinct.tolist(), np.split(order, first[1:]), strict=False):  # of nothing split gives one part
             contexts, which = np.unique(at[own], return_inverse=True)
             gone = own[self._is_broken(number, start + contexts)[which]]
             words, bits = np.divmod(rows[gone], 64)
@@ -94,16 +91,16 @@ class ManyRules:
 
     @cached_property
     def _sides(self) -> list[Side]:
-        found = []
+        sides = []
         for rule in self.rules.rules:
             mask = bitmask.from_int(rule.rows, len(self.rules.of_row))
             words = np.flatnonzero(mask)
-            found.append((words, mask[words]))
-        return found
+            sides.append((words, mask[words]))
+        return sides
 
 
 def _value_at(column: Column, context: int) -> Any:
-    if is_missing_in(column, context):
+    if len(missing_rows(taken(column, np.array([context])))):
         return None
     if isinstance(column, np.ndarray):
         return bool(column[context]) if column.dtype == np.int8 else float(column[context])

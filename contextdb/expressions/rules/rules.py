@@ -1,4 +1,4 @@
-"""The rules of a compiled table, asked with the facts of one context.
+"""The rules of a compiled table, queried with the facts of one context.
 
 Masks are Python integers, row r as bit r. Each distinct rule stands once, with the rows that have it, and is computed at most once
 for a question: when the cells leave one of its rows. A rule's truth is True, False, or open (None) where facts that it needs are
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.cells.conditions import Condition
-from contextdb.cells.facts import Fact, Unknown, describe, read_fact
+from contextdb.cells.facts import Fact, Unknown, describe
 from contextdb.cells.grammar import format_cell
 from contextdb.cells.sets import Cell
 from contextdb.columns import TextColumn
@@ -32,12 +32,6 @@ FEW = 4
 """With so many times more rules than rows left, the rules are found by the rows."""
 MOST_TOLD = 6
 """So many facts of a rule are named in a message."""
-
-"""The types of which every value but NaN is in canonical form already."""
-
-
-class Unusual(Exception):
-    """A fact is missing or a set, or a rule is open: to be answered with care."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,49 +145,20 @@ class WhenRules:
             left ^= 1 << row
             yield int(self.of_row[row])
 
-    def usual_values(self, facts: Mapping[str, object]) -> dict[str, Value]:
-        """The facts as plans take them; raises Unusual where one is missing or a set, and ContextError where one is wrong."""
-        values: dict[str, Value] = {}
-        for name, condition, usual in self._reading:
-            given = facts.get(name)
-            if type(given) is not usual:
-                given = read_fact(given, condition)
-                if given is None or isinstance(given, Cell):
-                    raise Unusual
-            if given != given:
-                raise Unusual
-            values[name] = given + 0.0 if type(given) is float else given  # type: ignore[assignment]
-        return values
-
-    def left(self, bits: int, values: Mapping[str, Value]) -> int:
-        """Of some rows those that have no rule, or one that is True; raises Unusual where a rule is open."""
-        for number in self.numbers(bits):
-            rule = self.rules[number]
-            truth = rule.run(values)
-            if truth is None:
-                raise Unusual
-            if not truth:
-                bits &= ~rule.rows
-        return bits
-
     def left_with_care(self, some: int, every: int, facts: Mapping[str, Fact], unknown: Unknown) -> tuple[int, int]:
-        """The same with facts in canonical form, None where missing, for rows that may and that always match by their cells. Raises
-        ContextError where a rule of one of the rows is open, and `unknown` is "error"."""
+        """Of rows that may and that always match by their cells those without a rule, or with one that is True. Facts are in
+        canonical form, None where missing. Raises ContextError where a rule of a row is open, and `unknown` is "error"."""
         values = values_of(facts, self.conditions)
         for number in self.numbers(some):
             rule = self.rules[number]
-            may, always = rule.truths(values, facts)
-            if may is None and unknown == "error":
+            possible, always = rule.truths(values, facts)
+            if possible is None and unknown == "error":
                 raise no_value(rule.expression, values, self.name)
-            if not (unknown == "any" if may is None else may):
+            if not (unknown == "any" if possible is None else possible):
                 some &= ~rule.rows
             if not (unknown == "any" if always is None else always):
                 every &= ~rule.rows
         return some, every & some
-
-    @cached_property
-    def _reading(self) -> tuple[tuple[str, Condition, type | None], ...]:
-        return tuple((c.name, c, c.domain.type.python) for c in self.conditions)
 
 
 def values_of(facts: Mapping[str, Fact], conditions: tuple[Condition, ...]) -> dict[str, Value]:
@@ -209,19 +174,19 @@ def _value(fact: Fact, condition: Condition) -> Value:
 
 def no_value(rule: Expression, values: Mapping[str, Value], column: str) -> ContextError:
     """The error for a rule that is open though its facts are known: a division by 0, an overflow."""
-    found = f"the rule {in_quotes(rule.text)} has no finite value with {told_facts(rule, values)}."
+    problem = f"the rule {in_quotes(rule.text)} has no finite value with {facts_text(rule, values)}."
     accepted = 'facts that it can be computed with, or unknown="any" or "never"'
-    return ContextError(Fault(found, accepted, place=Place(column=column), rule="missing-fact"))
+    return ContextError(Fault(problem, accepted, place=Place(column=column), rule="missing-fact"))
 
 
-def told_facts(rule: Expression, facts: Mapping[str, Fact | Value]) -> str:
+def facts_text(rule: Expression, facts: Mapping[str, Fact | Value]) -> str:
     """The facts of a rule in words: speed = 3, gait = Walk."""
-    told = [f"{c.name} = {_told(facts.get(c.name), c)}" for c in rule.conditions]
-    more = [f"{len(told) - MOST_TOLD} more"] if len(told) > MOST_TOLD else []
-    return ", ".join([*told[:MOST_TOLD], *more]) or "no facts"
+    phrases = [f"{c.name} = {_fact_text(facts.get(c.name), c)}" for c in rule.conditions]
+    more = [f"{len(phrases) - MOST_TOLD} more"] if len(phrases) > MOST_TOLD else []
+    return ", ".join([*phrases[:MOST_TOLD], *more]) or "no facts"
 
 
-def _told(fact: Fact | Value, condition: Condition) -> str:
+def _fact_text(fact: Fact | Value, condition: Condition) -> str:
     if isinstance(fact, Cell):
         return format_cell(fact, condition.domain)
     return describe(None if fact != fact else fact, condition.domain)

@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike
 
 from contextdb.cells.arguments import require_callable, require_kind, require_mapping, require_point, require_real, require_text
 from contextdb.errors import ContextError, Fault, in_quotes, some
-from contextdb.motion.arguments import HasAssets
+from contextdb.motion.answers import Answer
 from contextdb.motion.characters import tables as asking
 from contextdb.motion.characters.facts import FACTS, FactOf, Ground, Moment
 from contextdb.motion.characters.paths import ahead_s, apart_of, back_s, path_from_place, place_beside
@@ -39,15 +39,15 @@ from contextdb.motion.features.extraction import Features, with_path
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.nodes.warping import Target
 from contextdb.motion.output.bank import PoseBank
+from contextdb.motion.output.ground import Ground as HeightOf
 from contextdb.motion.output.samples import Place3
-from contextdb.motion.output.stages import Ground as HeightOf
 from contextdb.motion.output.stream import Pose, PoseStream
 from contextdb.motion.search.database import MotionDatabase
-from contextdb.motion.selection.asked import OfValid
 from contextdb.motion.selection.controller import Clock, Controller
-from contextdb.motion.selection.controller_state import ControllerState
+from contextdb.motion.selection.controller import Place as ControllerPlace
 from contextdb.motion.selection.decision import Decision, Playing, plays
 from contextdb.motion.selection.root_motion import NO_MOTION, RootMotion
+from contextdb.motion.selection.search_options import OfValid
 from contextdb.motion.selection.variation import Rng
 from contextdb.motion.trace.session import MOST, Trace
 
@@ -199,11 +199,11 @@ class Character:
     @property
     def asked_facts(self) -> Mapping[str, FactOf]:
         """The character's own facts that its tables ask for, as functions of the moment."""
-        tables, functions, found = self._own
+        tables, functions, fact_functions = self._own
         if tables is not self._tables or functions is not self.own_facts:
-            found = asking.own_facts_of(self._tables, self.own_facts)
-            self._own = self._tables, self.own_facts, found
-        return found
+            fact_functions = asking.own_facts_of(self._tables, self.own_facts)
+            self._own = self._tables, self.own_facts, fact_functions
+        return fact_functions
 
     @property
     def body(self) -> Steered:
@@ -270,7 +270,7 @@ class Character:
         facts : mapping of str to fact, optional
             What the game knows, for the tables; the character's own facts are added.
         facing : float, optional
-            The heading that is asked for, radians. Default: where the body goes.
+            The heading that is requested, radians. Default: where the body goes.
         body : Steered, optional
             Where a game that moves bodies itself has this one now. Default: the body follows the stick.
         path : Trajectory, optional
@@ -292,7 +292,7 @@ class Character:
         query = with_path(self.schema, self._features(step.dt_s, step.body), wished)
         if "valid" not in options:
             options["valid"] = self._valid(step.facts)
-        before = self.controller.state
+        before = self.controller.place
         decision = self.controller.update(step.dt_s, query, context=step.facts or None, body=step.body, **options)
         return self._answer(step, wished, decision, before)
 
@@ -305,7 +305,7 @@ class Character:
         require_kind(body, (Steered, type(None)), "body", "a Steered")
         if facing is not None:
             require_real(facing, "facing")
-        moved = self._body.moved(dt, stick, facing) if body is None else body
+        moved = self._body.moved_unchecked(dt, stick, facing) if body is None else body
         return self._step_of(dt, stick, given, facing, moved)
 
     def _step_of(self, dt: float, stick: Ground, given: Facts, facing: float | None, moved: Steered) -> Step:
@@ -343,33 +343,31 @@ class Character:
         """The features of the pose that a query begins with: of the frame that plays next, or of rest where nothing plays."""
         if self.pose is not None:
             return np.asarray(self.pose(self, dt_s))
-        upcoming, databases = self.controller.upcoming(dt_s), self.controller.selector.databases
-        if upcoming is not None:
-            return databases[upcoming.database].raw(upcoming.frame)
-        return resting_pose(databases, self.schema, body)
+        features = self.controller.upcoming_features(dt_s)
+        return resting_pose(self.controller.selector.databases, self.schema, body) if features is None else features
 
     def _valid(self, facts: Facts) -> OfValid | None:
         """What the tables allow with some facts."""
-        answers: dict[int, HasAssets] = {
+        answers: dict[int, Answer] = {
             id(table): asking.answer(table, facts, self.unknown) for table in asking.each_of(self._tables)
         }
         return asking.valid_of(self._tables, answers)
 
-    def _answer(self, step: Step, wished: Trajectory, decision: Decision, before: ControllerState) -> Updated:
+    def _answer(self, step: Step, wished: Trajectory, decision: Decision, before: ControllerPlace) -> Updated:
         """The pose after a decision; `before` is where the controller stood."""
         if self.stream is None:
-            return self._shown(step, (wished,), decision, (), 0, None)
+            return self._updated(step, (wished,), decision, (), 0, None)
         try:
             pose = self.stream.update(decision, step.dt_s, step.body, self.ground)
         except Exception:
-            self.controller.restore(before)
+            self.controller.put_back(before)
             raise
-        return self._shown(step, (wished,), decision, (pose,), 0, pose.root)
+        return self._updated(step, (wished,), decision, (pose,), 0, pose.root)
 
-    def _shown(
+    def _updated(
         self, step: Step, paths: Paths, decision: Decision, poses: Sequence[Pose | None], at: int, root: Place3 | None
     ) -> Updated:
-        """What an update gave, once the pose of a number among some is shown, with its root."""
+        """What an update gave, once the pose of a number among some is displayed, with its root."""
         body, apart = step.body, NO_MOTION
         if root is not None and self.stream is not None:
             if self.stream.settings.root == "animation":

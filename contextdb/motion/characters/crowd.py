@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from contextdb.cells.arguments import require_kind, require_many_of, require_mapping, require_real
-from contextdb.cells.sequences import Kept
+from contextdb.cells.sequences import ListSequence
 from contextdb.errors import ContextError, Fault, MotionError, in_quotes, plural
-from contextdb.motion.arguments import HasAssets
+from contextdb.motion.answers import Answer
 from contextdb.motion.characters import tables as asking
 from contextdb.motion.characters.character import Character
 from contextdb.motion.characters.paths import MOST_TURN_RAD, ahead_s, back_s, shares_left
@@ -25,20 +25,20 @@ from contextdb.motion.clips.many_paths import ManyTrajectories
 from contextdb.motion.clips.many_steered import ManySteered, steered_paths
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.features.extraction import with_path
-from contextdb.motion.features.many_queries import with_paths
+from contextdb.motion.features.path_features import with_paths
 from contextdb.motion.output.pose import Pose
 from contextdb.motion.output.samples import Place3
 from contextdb.motion.output.stream import PoseStream
 from contextdb.motion.output.streams import PoseStreams
 from contextdb.motion.records import collector_at_rest
-from contextdb.motion.selection.asked import OfValid
 from contextdb.motion.selection.controller_group import ControllerGroup
 from contextdb.motion.selection.decision import Decision
+from contextdb.motion.selection.search_options import OfValid
 
 FactsOfMany = Mapping[str, Any] | Sequence[Facts]
 
 
-class Crowd(Kept[Character]):
+class Crowd(ListSequence[Character]):
     """Characters in order, updated together: a sequence, with whose numbers sticks and facts go.
 
     Parameters
@@ -66,10 +66,10 @@ class Crowd(Kept[Character]):
 
     def remove(self, character: Character) -> None:
         """Let one go; those after it move up by one."""
-        kept = [own for own in self if own is not character]
-        if len(kept) == len(self):
+        remaining = [own for own in self if own is not character]
+        if len(remaining) == len(self):
             raise MotionError(Fault("the crowd does not have this character.", "one that was added"))
-        self._items = kept
+        self._items = remaining
 
     def __copy__(self) -> Crowd:
         return Crowd(character.copy() for character in self)
@@ -101,11 +101,11 @@ class Crowd(Kept[Character]):
         dt : float
             Seconds since the last update, for all.
         sticks : float array, shape (Q, 2)
-            The velocities over the ground that are asked for, x and z in m/s.
+            The velocities over the ground that are requested, x and z in m/s.
         facts : mapping of str to fact or list of Q facts, or sequence of Q mappings, optional
             What the game knows: what is no list, tuple or array is the same for all.
         facing : float array, shape (Q,), optional
-            The headings that are asked for, radians. Default: where the bodies go.
+            The headings that are requested, radians. Default: where the bodies go.
 
         Raises
         ------
@@ -126,50 +126,51 @@ class Crowd(Kept[Character]):
         group = ControllerGroup(character.controller for character in self)
         queries, paths = self._queries(dt, group, steps, bodies, wanted, headings)
         valid = self._valid(steps)
-        before = group.states
+        before = [controller.place for controller in group]
         decisions = group.update(dt, queries, valid, contexts=[step.facts or None for step in steps], body=bodies)
         try:
-            poses, roots = self._shown(dt, decisions, np.column_stack((bodies.positions, bodies.headings)))
+            poses, roots = self._poses_and_roots(dt, decisions, np.column_stack((bodies.positions, bodies.headings)))
         except Exception:
-            group.restore(before)
+            for controller, place in zip(group, before, strict=True):
+                controller.put_back(place)
             raise
         together = enumerate(zip(self, steps, decisions, roots, strict=True))
-        return [each._shown(step, paths, decision, poses, i, root) for i, (each, step, decision, root) in together]
+        return [each._updated(step, paths, decision, poses, i, root) for i, (each, step, decision, root) in together]
 
-    def _shown(
+    def _poses_and_roots(
         self, dt: float, decisions: list[Decision], places: Floats
     ) -> tuple[Sequence[Pose | None], list[Place3] | list[Place3 | None]]:
         """The poses of all and their roots, None without a stream; those of equal streams are worked out together."""
-        found = []
+        groups = []
         for numbers in self._equal_streams():
             streams = PoseStreams(stream for i in numbers if (stream := self[i].stream) is not None)
             grounds = [self[i].ground for i in numbers]
             below = grounds if any(grounds) else None
-            found.append((numbers, streams, *streams.updated([decisions[i] for i in numbers], dt, places[numbers], below)))
-        for _, streams, _, rows in found:
+            groups.append((numbers, streams, *streams.updated([decisions[i] for i in numbers], dt, places[numbers], below)))
+        for _, streams, _, rows in groups:
             streams.go_on(rows)
-        if found and len(found[0][0]) == len(self):
-            return found[0][2], [(x, z, heading) for x, z, heading in found[0][2].roots.tolist()]
-        shown: list[Pose | None] = [None] * len(self)
-        for numbers, _, poses, _ in found:
+        if groups and len(groups[0][0]) == len(self):
+            return groups[0][2], [(x, z, heading) for x, z, heading in groups[0][2].roots.tolist()]
+        displayed: list[Pose | None] = [None] * len(self)
+        for numbers, _, poses, _ in groups:
             for i, pose in zip(numbers, poses, strict=True):
-                shown[i] = pose
-        return shown, [None if pose is None else pose.root for pose in shown]
+                displayed[i] = pose
+        return displayed, [None if pose is None else pose.root for pose in displayed]
 
     def _equal_streams(self) -> list[list[int]]:
         """The numbers of the characters with a stream, those together that have the same banks and settings."""
-        found: list[tuple[PoseStream, list[int]]] = []
+        groups: list[tuple[PoseStream, list[int]]] = []
         for i, character in enumerate(self):
             stream = character.stream
             if stream is None:
                 continue
-            for other, numbers in found:
+            for other, numbers in groups:
                 if stream.is_like(other):
                     numbers.append(i)
                     break
             else:
-                found.append((stream, [i]))
-        return [numbers for _, numbers in found]
+                groups.append((stream, [i]))
+        return [numbers for _, numbers in groups]
 
     def _queries(
         self, dt: float, group: ControllerGroup, steps: list[Step], bodies: ManySteered, sticks: Floats, facing: Floats | None
@@ -201,18 +202,18 @@ class Crowd(Kept[Character]):
                 users.setdefault((id(table), character.unknown), []).append(i)
         if not users:
             return None
-        answers: list[dict[int, HasAssets]] = [{} for _ in self]
+        answers: list[dict[int, Answer]] = [{} for _ in self]
         for (key, unknown), numbers in users.items():
-            for i, found in zip(numbers, _answers(table_of[key], [steps[i].facts for i in numbers], unknown), strict=True):
-                answers[i][key] = found
+            for i, answer in zip(numbers, _answers(table_of[key], [steps[i].facts for i in numbers], unknown), strict=True):
+                answers[i][key] = answer
         first = self[0].tables
         if isinstance(first, dict) and all(character.tables == first for character in self):
             return {database: [each[id(table)] for each in answers] for database, table in first.items()}
-        valid: list[OfValid | None] = [asking.valid_of(each.tables, found) for each, found in zip(self, answers, strict=True)]
+        valid: list[OfValid | None] = [asking.valid_of(each.tables, answer) for each, answer in zip(self, answers, strict=True)]
         return valid
 
 
-def _answers(table: Table, facts: Sequence[Facts], unknown: Any) -> Iterable[HasAssets]:
+def _answers(table: Table, facts: Sequence[Facts], unknown: Any) -> Iterable[Answer]:
     """A table's answer to each of some contexts."""
     if asking.answers_many(table):
         columns = {name: [each.get(name) for each in facts] for name in table.asked}
@@ -232,8 +233,8 @@ def _facts_of_each(facts: object, n: int) -> list[Facts]:
         values = given.tolist() if isinstance(given, np.ndarray) else given
         columns[name] = list(values) if isinstance(values, (list, tuple)) else [values] * n
         if len(columns[name]) != n:
-            found = f"{in_quotes(str(name))} has {plural(len(columns[name]), 'fact')} for {plural(n, 'character')}."
-            raise ContextError(Fault(found, "one for all, or a list of one for each"))
+            problem = f"{in_quotes(str(name))} has {plural(len(columns[name]), 'fact')} for {plural(n, 'character')}."
+            raise ContextError(Fault(problem, "one for all, or a list of one for each"))
     return [{name: values[i] for name, values in columns.items()} for i in range(n)]
 
 

@@ -16,7 +16,7 @@ from contextdb.motion.characters.updates import Updated
 
 RADIUS_M = 2.0
 EVERY_S = 3.0
-"""A new direction or speed is asked for so often."""
+"""A new direction or speed is requested so often."""
 SLOW = 0.6
 """The slower one of two speeds, as a share of the other."""
 

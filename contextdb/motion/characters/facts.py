@@ -29,9 +29,9 @@ class Moment:
     dt_s : float
         Seconds since the last update.
     stick : (x, z)
-        The velocity over the ground that is asked for, m/s.
+        The velocity over the ground that is requested, m/s.
     facing : float or None
-        The heading that is asked for, radians.
+        The heading that is requested, radians.
     body : Steered
         The body now: already moved by this update.
     playing : Playing or None
@@ -86,8 +86,8 @@ def is_asked(name: str, function: FactOf, condition: Condition) -> bool:
 
 def fact_of_played(name: str, condition: Condition) -> FactOf | None:
     """The function of a fact of what plays, where a condition of that name asks for one."""
-    found = of_played(name, condition)
-    if found is None:
+    played = of_played(name, condition)
+    if played is None:
         return None
-    told, before = found
-    return lambda moment: before if moment.played is None else told(moment.played)
+    value_of, before = played
+    return lambda moment: before if moment.played is None else value_of(moment.played)

@@ -11,7 +11,7 @@ from contextdb.motion.characters.project import HasTables
 from contextdb.motion.characters.tables import Tables, Unknown
 from contextdb.motion.clips.steering import Steered
 from contextdb.motion.output.bank import PoseBank
-from contextdb.motion.output.stages import Ground as HeightOf
+from contextdb.motion.output.ground import Ground as HeightOf
 from contextdb.motion.output.stream import PoseStream
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.storage.building import open_or_build

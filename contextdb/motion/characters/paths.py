@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -96,10 +97,13 @@ def path_from_place(place: Place3, path: Trajectory, halflife_s: float = RETURN_
     return Trajectory(path.rate, path.positions + left[:, None] * apart, path.headings + left * turned, path.now)
 
 
+@lru_cache(64)
 def shares_left(n_frames: int, now: int, rate: float, halflife_s: float = RETURN_HALFLIFE_S) -> Floats:
     """What is left of a difference at each frame of a path: all of it up to the present, then (1 + y t) e^{-y t}."""
     y_t = 2.0 * math.log(2.0) / halflife_s * np.maximum(np.arange(n_frames) - now, 0) / rate
-    return np.asarray((1.0 + y_t) * np.exp(-y_t))
+    shares = np.asarray((1.0 + y_t) * np.exp(-y_t))
+    shares.flags.writeable = False
+    return shares
 
 
 def place_of(place: object, what: str) -> Place3:

@@ -112,9 +112,9 @@ def of_played(name: str, condition: Condition) -> tuple[OfPlayed, object] | None
         return None
     if foot is not None:
         return lambda played: played.until_down_s(foot), MOST_S
-    found: dict[str, OfPlayed] = {
+    functions: dict[str, OfPlayed] = {
         "Playing.Speed": lambda played: played.motion()[0],
         "Playing.Turn": lambda played: played.motion()[1],
         "Playing.Phase": lambda played: played.phase(),
     }
-    return found[name], 0.0
+    return functions[name], 0.0

@@ -79,15 +79,15 @@ class ClipSpeeds:
     @classmethod
     def of(cls, character: Character) -> ClipSpeeds:
         """Of all databases of a character."""
-        found: dict[str, Speeds] = {}
+        speeds: dict[str, Speeds] = {}
         step = max(1, round(EVEN_S * character.schema.rate))
         for database in character.controller.selector.databases.values():
             for asset, start, stop in zip(database.assets, database.starts.tolist(), database.stops.tolist(), strict=True):
                 if database.root is not None and stop - start > 1:
                     own = database.root[start:stop, :2].astype(np.float64)
                     n = min(step, len(own) - 1)
-                    found[asset] = np.hypot(*(own[n:] - own[:-n]).T) * character.schema.rate / n
-        return cls(found)
+                    speeds[asset] = np.hypot(*(own[n:] - own[:-n]).T) * character.schema.rate / n
+        return cls(speeds)
 
     def share(self, assets: Iterable[str], speed: float) -> float:
         """How much of that one of some assets goes at a speed of which most does."""
@@ -105,9 +105,9 @@ def plan_of(character: Character, speeds_mps: Sequence[float] = ()) -> Plan:
     """Choose contexts, and speeds where none are given."""
     tables = asking.each_of(character.tables)
     own = character.asked_facts
-    asked = {name: each for table in tables for name, each in table.asked.items() if name not in own}
-    chosen, left_open = _single_values(tables, asked)
-    values = {name: each.domain.everything for name, each in asked.items() if each.domain.everything}
+    conditions = {name: each for table in tables for name, each in table.asked.items() if name not in own}
+    chosen, left_open = _single_values(tables, conditions)
+    values = {name: each.domain.everything for name, each in conditions.items() if each.domain.everything}
     matter = {name: each for name, each in values.items() if each is not None and _matters(tables, name, each)}
     chosen |= {name: each[0] for name, each in values.items() if each and name not in matter}
     speeds = _grid(tables) if "speed" in own else None
@@ -149,9 +149,9 @@ def _scenes(
         following = []
         for values in product(*(matter[names[i]] for i in follows)):
             every = {**facts, **dict(zip((names[i] for i in follows), values, strict=True))}
-            found = sorted(allowed[tuple(every[name] for name in names)])
-            if found:
-                following.append(({names[i]: every[names[i]] for i in follows}, tuple(found)))
+            combinations = sorted(allowed[tuple(every[name] for name in names)])
+            if combinations:
+                following.append(({names[i]: every[names[i]] for i in follows}, tuple(combinations)))
         if following:
             yield Scene({**chosen, **facts}, tuple(following) if follows else (), tuple(_speeds(following)))
 
@@ -167,11 +167,11 @@ def _follows(allowed: Mapping[tuple[object, ...], frozenset[float]], i: int) -> 
 def _speeds(following: Sequence[tuple[Facts, Sequence[float]]]) -> Iterator[float]:
     """The middle of the speeds that each allows and at which a character moves; two of them where nothing follows the speed."""
     shares = (0.5,) if len(following) > 1 else (0.25, 0.75)
-    found = set()
+    rounded = set()
     for _, speeds in following:
         if moving := [speed for speed in speeds if speed >= STANDING_MPS]:
-            found |= {round(moving[int(share * (len(moving) - 1))], 1) for share in shares}
-    yield from sorted(found)
+            rounded |= {round(moving[int(share * (len(moving) - 1))], 1) for share in shares}
+    yield from sorted(rounded)
 
 
 def _nearest(following: Sequence[tuple[Facts, Sequence[float]]], speed: float) -> Facts:
@@ -192,11 +192,11 @@ def _contexts(values: Mapping[str, Sequence[object]]) -> list[dict[str, object]]
     return [{name: each[i % len(each)] for name, each in values.items()} for i in range(most)]
 
 
-def _single_values(tables: Sequence[Table], asked: Mapping[str, Condition]) -> tuple[dict[str, object], list[str]]:
+def _single_values(tables: Sequence[Table], conditions: Mapping[str, Condition]) -> tuple[dict[str, object], list[str]]:
     """For each condition whose values cannot be listed one under which most is valid; and the names of those left open."""
     chosen: dict[str, object] = {}
     left_open = []
-    for name, condition in asked.items():
+    for name, condition in conditions.items():
         if condition.domain.everything:
             continue
         if condition.domain.type.fixed or not condition.domain.type.is_decimal:
@@ -218,11 +218,11 @@ def _matters(tables: Sequence[Table], name: str, values: Sequence[object]) -> bo
 
 def _assets(tables: Sequence[Table], facts: Facts) -> tuple[str, ...]:
     """The valid assets of all tables; the facts that are not given are open."""
-    found: list[str] = []
+    assets: list[str] = []
     for table in tables:
         if asking.can_answer(table):
-            found += table.query({name: fact for name, fact in facts.items() if name in table.asked}, unknown="any").assets
-    return tuple(found)
+            assets += table.query({name: fact for name, fact in facts.items() if name in table.asked}, unknown="any").assets
+    return tuple(assets)
 
 
 def _grid(tables: Sequence[Table]) -> Speeds:

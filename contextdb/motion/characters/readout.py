@@ -48,7 +48,7 @@ class Readout:
         self.why, self._chosen = "", ""
         self._updated: Updated | None = None
         self._table: Any = None
-        self._shown: Playing | None = None
+        self._displayed: Playing | None = None
         self._gap: tuple[object, object, str] = (None, None, "")
 
     def update(self, updated: Updated, table: Explains, shown: Decision | Playing | None = None) -> None:
@@ -62,7 +62,7 @@ class Readout:
         require_kind(shown, (Decision, Playing, type(None)), "shown", "a Decision, a Playing, or None")
         decision = updated.decision
         seen = decision if shown is None else shown
-        self._updated, self._table, self._shown = updated, table, seen.playing if isinstance(seen, Decision) else seen
+        self._updated, self._table, self._displayed = updated, table, seen.playing if isinstance(seen, Decision) else seen
         if not self._chosen or decision.action in (Action.START, Action.JUMP):
             self._chosen = decision.why
         self.why = f"No longer valid, but held by {decision.held}." if decision.held else self._chosen
@@ -72,24 +72,24 @@ class Readout:
 
     @property
     def title(self) -> str:
-        """The asset that is shown, and the time in it."""
-        return "nothing" if self._shown is None else f"{self._shown.asset}   {self._shown.time_s:.2f} s"
+        """The asset that is displayed, and the time in it."""
+        return "nothing" if self._displayed is None else f"{self._displayed.asset}   {self._displayed.time_s:.2f} s"
 
     @property
     def facts(self) -> str:
         """What the table was asked, in its order."""
         if self._updated is None:
             return ""
-        asked = {name: self._updated.facts.get(name) for name in self._table.asked}
-        return "  ".join(f"{name} {fact:.1f}" if isinstance(fact, float) else f"{name} {fact}" for name, fact in asked.items())
+        facts = {name: self._updated.facts.get(name) for name in self._table.asked}
+        return "  ".join(f"{name} {fact:.1f}" if isinstance(fact, float) else f"{name} {fact}" for name, fact in facts.items())
 
     @property
     def rows(self) -> list[tuple[str, bool]]:
         """The valid rows, numbered from 1, and whether each is of the asset that plays."""
         if self._updated is None:
             return []
-        assets, name = self._table.assets, None if self._shown is None else self._shown.asset
-        return [(f"{row + 1:>3}  {assets[row]}", assets[row] == name) for row in self.valid]
+        assets, name = self._table.assets, None if self._displayed is None else self._displayed.asset
+        return [(f"{row + 1:>3}  {assets[row]}", assets[row] == name) for row in self.valid.rows.tolist()]
 
     @property
     def gap(self) -> str:
@@ -97,9 +97,9 @@ class Readout:
         if self._updated is None or self.valid:
             return ""
         facts = {name: round(fact, 1) if isinstance(fact, float) else fact for name, fact in self._updated.facts.items()}
-        table, known, said = self._gap
+        table, known, text = self._gap
         if table is not self._table or known != facts:
             nearest = self._table.explain(facts, unknown="any").nearest(1)
-            said = str(nearest[0]) if nearest else "the table has no row"
-            self._gap = self._table, facts, said
-        return said
+            text = str(nearest[0]) if nearest else "the table has no row"
+            self._gap = self._table, facts, text
+        return text

@@ -7,9 +7,9 @@ from typing import Any, Literal, Protocol, TypeAlias, TypeGuard, cast
 
 from contextdb.cells.conditions import Condition
 from contextdb.errors import ContextError, Fault
-from contextdb.motion.arguments import HasAssets
+from contextdb.motion.answers import Answer
 from contextdb.motion.characters.facts import FactOf, fact_of_played, is_asked
-from contextdb.motion.selection.asked import OfValid
+from contextdb.motion.selection.search_options import OfValid
 
 Facts = Mapping[str, object]
 Unknown = Literal["error", "any", "never"]
@@ -23,12 +23,12 @@ class CanAnswer(Protocol):
     def asked(self) -> Mapping[str, Condition]:
         """Its conditions, by name."""
 
-    def query(self, context: Any, *, unknown: Any = "error") -> HasAssets:
+    def query(self, context: Any, *, unknown: Any = "error") -> Answer:
         """The valid rows of a context."""
 
 
 class KeepsFacts(Protocol):
-    """A live context: facts that are kept."""
+    """A live context: facts that are stored."""
 
     @property
     def asked(self) -> Mapping[str, Condition]:
@@ -37,14 +37,14 @@ class KeepsFacts(Protocol):
     def update(self, facts: Any) -> None:
         """Set some facts."""
 
-    def matches(self) -> HasAssets:
+    def matches(self) -> Answer:
         """The valid rows now."""
 
 
 class AnswersMany(CanAnswer, Protocol):
     """A compiled table that is asked with many contexts at once."""
 
-    def query_many(self, contexts: Any, *, unknown: Any = "error") -> Iterable[HasAssets]:
+    def query_many(self, contexts: Any, *, unknown: Any = "error") -> Iterable[Answer]:
         """The valid rows of each context, given in columns."""
 
 
@@ -97,13 +97,15 @@ def _by_database(tables: Tables) -> Mapping[str, Table]:
 
 def own_facts_of(tables: Tables, functions: Mapping[str, FactOf]) -> dict[str, FactOf]:
     """The functions whose facts the tables ask for, and those of what plays; of one name the given one."""
-    asked = {name: condition for table in each_of(tables) for name, condition in table.asked.items()}
-    found = {name: of for name, condition in asked.items() if (of := fact_of_played(name, condition)) is not None}
-    given = {name: function for name, function in functions.items() if name in asked and is_asked(name, function, asked[name])}
-    return {**found, **given}
+    conditions = {name: condition for table in each_of(tables) for name, condition in table.asked.items()}
+    own_functions = {name: of for name, condition in conditions.items() if (of := fact_of_played(name, condition)) is not None}
+    given = {
+        name: function for name, function in functions.items() if name in conditions and is_asked(name, function, conditions[name])
+    }
+    return {**own_functions, **given}
 
 
-def valid_of(tables: Tables, answers: Mapping[int, HasAssets]) -> OfValid | None:
+def valid_of(tables: Tables, answers: Mapping[int, Answer]) -> OfValid | None:
     """What may play, for a controller: the answers of the tables, by their ids."""
     if tables is None:
         return None
@@ -112,7 +114,7 @@ def valid_of(tables: Tables, answers: Mapping[int, HasAssets]) -> OfValid | None
     return {database: answers[id(table)] for database, table in _by_database(tables).items()}
 
 
-def answer(table: Table, facts: Facts, unknown: Unknown) -> HasAssets:
+def answer(table: Table, facts: Facts, unknown: Unknown) -> Answer:
     """The rows that are valid with some facts."""
     if keeps_facts(table):
         table.update(facts)

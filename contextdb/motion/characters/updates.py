@@ -15,10 +15,10 @@ from contextdb.motion.clips.trajectory import Trajectory
 from contextdb.motion.output.samples import Place3
 from contextdb.motion.output.stream import Pose, PoseState
 from contextdb.motion.records import quickly_made
-from contextdb.motion.selection.asked import Among, OfPenalties, OfTags, OfValid
 from contextdb.motion.selection.controller_state import ControllerState
 from contextdb.motion.selection.decision import Decision, plays
 from contextdb.motion.selection.root_motion import RootMotion
+from contextdb.motion.selection.search_options import Among, OfPenalties, OfTags, OfValid
 
 UNKNOWN = ("error", "any", "never")
 Paths = ManyTrajectories | Sequence[Trajectory]
@@ -42,7 +42,7 @@ def _at(body: Steered) -> str:
 
 @dataclass(frozen=True, slots=True)
 class CharacterState:
-    """Where a character is: all that its next pose depends on beside what it is then given. Never changed, so it may be kept."""
+    """Where a character is: all that its next pose depends on beside what it is then given. Never changed, so it may be stored."""
 
     body: Steered
     apart: RootMotion
@@ -89,7 +89,7 @@ class Updated:
 
     @property
     def pose(self) -> Pose | None:
-        """The pose, made of the arrays of a crowd when it is asked for; None for a character without a stream."""
+        """The pose, made of the arrays of a crowd when it is requested; None for a character without a stream."""
         return self.poses[self.at] if self.poses else None
 
 

@@ -1,1 +1,1 @@
-"""Clips: BVH files, skeletons, poses, paths, footfalls."""
+"""Clips: files of several formats, skeletons, poses, paths, footfalls."""

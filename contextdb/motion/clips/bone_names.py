@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
-SIDE_WORDS = {"l": "left", "left": "left", "lf": "left", "lt": "left", "r": "right", "right": "right", "rt": "right"}
-NO_WORDS = frozenset(("bone", "bip", "bip01", "bip001", "jnt", "joint", "rig", "def", "ctrl", "skel", "character"))
+SIDE_WORDS = dict.fromkeys(("l", "left", "lf", "lft", "lt"), "left") | dict.fromkeys(("r", "right", "rgt", "rt"), "right")
+NO_WORDS = frozenset(("bone", "bip", "bip01", "bip001", "jnt", "joint", "rig", "def", "ctrl", "skel", "character", "mixamorig"))
 """Words that a rig puts before or behind all its names."""
 SAME = (
     ("hips", "hip", "pelvis"),
@@ -59,13 +59,40 @@ def _alike(bone: str, name: str) -> float:
 
 def side_and_core(name: str) -> tuple[str, str]:
     """The side of a name, "left", "right" or "", and what is left of it without side, namespace and the rig's own words."""
-    side, word = _side_and_word(name)
+    return _side_and_core(list(_words(name)))
+
+
+def _side_and_core(words: list[str]) -> tuple[str, str]:
+    side, word = _side_and_rest(words)
     return side, _FIRST.get(word, word)
+
+
+def without_namespace(name: str) -> str:
+    """What a name is behind the namespaces and paths of tools: `LeftFoot` of `mixamorig:LeftFoot` and `|rig|LeftFoot`."""
+    return re.split("[:|]", name)[-1]
+
+
+def side_words(name: str) -> tuple[str, ...]:
+    """The words of a name, its namespace first, with "left" or "right" for its side in any spelling."""
+    stem = without_namespace(name)
+    return name[: -len(stem) or None], *(SIDE_WORDS.get(word, word) for word in _words(stem))
+
+
+def cores_of(names: Sequence[str]) -> list[tuple[str, str]]:
+    """The side and the core of all names of a rig, without the words that all of them begin with."""
+    split = [list(_words(name)) for name in names]
+    common = 0
+    while len(split) > 1 and all(len(words) > common + 1 for words in split) and len({words[common] for words in split}) == 1:
+        common += 1
+    return [_side_and_core(words[common:]) for words in split]
 
 
 def _side_and_word(name: str) -> tuple[str, str]:
     """The same as the name writes it."""
-    words = list(_words(name))
+    return _side_and_rest(list(_words(name)))
+
+
+def _side_and_rest(words: list[str]) -> tuple[str, str]:
     side = next((SIDE_WORDS[word] for word in words if word in SIDE_WORDS), "")
     core = "".join(word for word in words if word not in SIDE_WORDS and word not in NO_WORDS)
     if not side and len(words) == 1 and words[0][:1] in "lr" and words[0][1:] in _FIRST:  # lhip, rfoot
@@ -74,7 +101,7 @@ def _side_and_word(name: str) -> tuple[str, str]:
 
 
 def _words(name: str) -> Iterator[str]:
-    stem = name.rpartition(":")[2][:MOST_CHARACTERS]
+    stem = without_namespace(name)[:MOST_CHARACTERS]
     for word in _WORDS.findall(stem) if stem.isascii() else [stem]:
         folded = word.casefold()
         side = next((side for side in ("left", "right") if folded.startswith(side)), "")

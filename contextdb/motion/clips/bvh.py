@@ -17,7 +17,7 @@ from itertools import chain
 import numpy as np
 
 from contextdb.errors import ClipError, Fault, Place, in_quotes, plural
-from contextdb.motion.clips.bvh_words import Words, number_fault, said
+from contextdb.motion.clips.bvh_words import Words, number_fault, quoted
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import CHANNELS, POSITIONS, Skeleton
 
@@ -126,7 +126,7 @@ def _refuse_in_joint(words: Words, joints: _Joints, word: str) -> None:
         words.fail(word, f"in joint {joints.inner()}: {IN_JOINT}", JOINT_WORDS)
     opened = joints.lines[joints.open[-1]]
     blocks = plural(len(joints.open), "joint")
-    words.refuse(f"found {said(word)} with {blocks} still open.", f'"}}" to close joint {joints.inner()} of line {opened}', '"}"')
+    words.refuse(f"found {quoted(word)} with {blocks} still open.", f'"}}" to close joint {joints.inner()} of line {opened}', '"}"')
 
 
 def _refuse_after_hierarchy(words: Words, word: str) -> None:
@@ -179,7 +179,7 @@ def _read_channels(words: Words, joints: _Joints) -> None:
         words.refuse(f"joint {joints.inner()} has a second CHANNELS.", "one CHANNELS")
     count = words.take()
     if not COUNT.fullmatch(count):
-        words.refuse(f"the number of channels is {said(count)}.", "a whole number, then as many channel names", '"3"')
+        words.refuse(f"the number of channels is {quoted(count)}.", "a whole number, then as many channel names", '"3"')
     names: list[str] = []
     for _ in range(int(count)):
         names.append(_channel(words, names, count))
@@ -215,21 +215,21 @@ def _read_frame_counts(words: Words) -> tuple[int, float]:
     count = _labelled(words, FRAMES, '"Frames:" and their number')
     if not COUNT.fullmatch(count):
         meant = count.partition(".")[0]
-        words.refuse(f"the number of frames is {said(count)}.", "a whole number", f'"{meant}"' if COUNT.fullmatch(meant) else "")
+        words.refuse(f"the number of frames is {quoted(count)}.", "a whole number", f'"{meant}"' if COUNT.fullmatch(meant) else "")
     time = _labelled(words, FRAME_TIME, '"Frame Time:" and the seconds between two frames')
     if number_fault(time) is not None or not 0.0 < float(time) <= LONGEST_FRAME_S:
         accepted = f"seconds between two frames, more than 0 and at most {LONGEST_FRAME_S:g}"
-        words.refuse(f"the frame time is {said(time)}.", accepted, _meant_frame_time(time))
+        words.refuse(f"the frame time is {quoted(time)}.", accepted, _meant_frame_time(time))
     return int(count), float(time)
 
 
 def _labelled(words: Words, label: re.Pattern[str], accepted: str) -> str:
-    found = label.match(words.text, words.position)
-    if found is None:
+    match = label.match(words.text, words.position)
+    if match is None:
         words.fail(words.take(), accepted)
-    words.move(found.start(1))
-    words.position = found.end(1)
-    return found.group(1)
+    words.move(match.start(1))
+    words.position = match.end(1)
+    return match.group(1)
 
 
 def _meant_frame_time(word: str) -> str:
@@ -279,8 +279,8 @@ def _value_faults(words: Words, lines: list[str], n_frames: int, n_channels: int
             Fault(f"{plural(len(faults) - MOST_FAULTS, 'more line')} of motion cannot be read.", place=Place(words.file))
         ]
     if n_lines != n_frames:
-        found = f"Frames says {n_frames:,}, but {plural(n_lines, 'line')} of motion follow."
-        faults.append(Fault(found, "one line of motion for each frame", f'"Frames: {n_lines}"', Place(words.file, words.line)))
+        problem = f"Frames says {n_frames:,}, but {plural(n_lines, 'line')} of motion follow."
+        faults.append(Fault(problem, "one line of motion for each frame", f'"Frames: {n_lines}"', Place(words.file, words.line)))
     return faults
 
 
@@ -288,7 +288,7 @@ def _line_fault(row: list[str], n_channels: int) -> Fault | None:
     wrong = next(((i, word, meant) for i, word in enumerate(row) if (meant := number_fault(word)) is not None), None)
     if wrong is not None:
         i, word, meant = wrong
-        return Fault(f"value {i + 1} of a motion line is {said(word)}.", "finite numbers, one for each channel", meant)
+        return Fault(f"value {i + 1} of a motion line is {quoted(word)}.", "finite numbers, one for each channel", meant)
     if len(row) == n_channels:
         return None
     return Fault(f"{plural(len(row), 'value')} on a motion line.", f"{n_channels:,}, one for each channel of the hierarchy")

@@ -29,19 +29,19 @@ class Words:
 
     def take(self) -> str:
         """The next word, or "" at the end of the text."""
-        found = WORD.search(self.text, self.position)
-        self.move(found.start() if found else len(self.text))
-        if found is None:
+        match = WORD.search(self.text, self.position)
+        self.move(match.start() if match else len(self.text))
+        if match is None:
             return ""
-        self.position = found.end()
-        return found.group()
+        self.position = match.end()
+        return match.group()
 
     def take_rest(self) -> str:
         """What follows on this line, up to a brace: a name may hold spaces."""
-        found = REST.match(self.text, self.position)
-        assert found is not None, "the expression matches the empty text"
-        self.position = found.end()
-        return found.group().strip()
+        match = REST.match(self.text, self.position)
+        assert match is not None, "the expression matches the empty text"
+        self.position = match.end()
+        return match.group().strip()
 
     def move(self, position: int) -> None:
         """Go forward to a position in the text, and count the lines on the way."""
@@ -59,20 +59,20 @@ class Words:
         word = self.take()
         fault = number_fault(word)
         if fault is not None:
-            self.refuse(f"{what} is {said(word)}.", "a finite number", fault)
+            self.refuse(f"{what} is {quoted(word)}.", "a finite number", fault)
         return float(word)
 
     def fail(self, word: str, accepted: str, known: Sequence[str] = ()) -> NoReturn:
         """Refuse a word where others are accepted; the nearest of `known` is offered."""
         near = nearest(word, known) if word else None
-        self.refuse(f"found {said(word)}.", accepted, in_quotes(near) if near else "")
+        self.refuse(f"found {quoted(word)}.", accepted, in_quotes(near) if near else "")
 
-    def refuse(self, found: str, accepted: str = "", mend: str = "") -> NoReturn:
+    def refuse(self, problem: str, accepted: str = "", mend: str = "") -> NoReturn:
         """Raise a ClipError at the line of the last word."""
-        raise ClipError(Fault(found, accepted, mend, Place(self.file, self.line)))
+        raise ClipError(Fault(problem, accepted, mend, Place(self.file, self.line)))
 
 
-def said(word: str) -> str:
+def quoted(word: str) -> str:
     """A word in quotes, or that the file ended."""
     return in_quotes(word) if word else "the end of the file"
 

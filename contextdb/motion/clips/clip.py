@@ -7,27 +7,33 @@ metres with y up. F frames, C channels.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from numbers import Real
 from os import PathLike, fspath
-from typing import Literal, TextIO, get_args
+from typing import Any, Literal, TextIO, get_args
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from contextdb.cells.arguments import require_kind, require_many, require_path, require_text, require_whole
+from contextdb.cells.arguments import require_kind, require_many_of, require_path, require_real, require_text, require_whole
 from contextdb.disk import read_bytes, write_atomic
 from contextdb.errors import ClipError, ContextError, Fault, FileError, Place, in_quotes, mend_for, some
 from contextdb.files.strangers import line_of
-from contextdb.motion.clips import bvh
+from contextdb.motion.clips import bvh, joint_arrays
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Skeleton
 
 Up = Literal["y", "z", "x"]
 UPS: tuple[Up, ...] = get_args(Up)
 
+BY_SIZE: Literal["size"] = "size"
+Unit = float | Literal["size"]
+"""Metres, or to be taken from the size of each body."""
 CENTIMETRE = 0.01
 """What one unit of most BVH files is, in metres; the format itself does not say."""
+MOST_RATE = 1e6
+"""Frames a second; more are no number to reckon speeds with."""
 MOST_DIGITS = 17
 """A double has no more."""
 
@@ -50,6 +56,8 @@ class Clip:
         What one unit of offsets and positions is.
     up : "y", "z" or "x"
         The file's axis that points up.
+    notes : tuple of str
+        What the reader left out of the file or took for granted, in sentences.
     """
 
     name: str
@@ -58,6 +66,7 @@ class Clip:
     values: Floats
     metres_per_unit: float = CENTIMETRE
     up: Up = "y"
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         faults = list(_faults(self))
@@ -66,6 +75,56 @@ class Clip:
         values = self.values.view()
         values.flags.writeable = False
         object.__setattr__(self, "values", values)
+
+    @classmethod
+    def from_arrays(
+        cls,
+        names: Sequence[str],
+        parents: ArrayLike,
+        offsets: ArrayLike,
+        rotations: ArrayLike,
+        positions: ArrayLike,
+        rate: float,
+        *,
+        name: str = "clip",
+    ) -> Clip:
+        """Make a clip of joints as arrays: metres, y up, in any order.
+
+        Parameters
+        ----------
+        names : J str
+        parents : int array, shape (J,)
+            The number of each joint's parent, -1 of the one root.
+        offsets : float array, shape (J, 3)
+            Where each joint is against its parent in the pose of reference, in which no joint is turned.
+        rotations : float array, shape (F, J, 4)
+            Each joint against its parent, as quaternions (w, x, y, z) of any length above 0.
+        positions : float array, shape (F, 3) or (F, J, 3)
+            Where the root is; or where each joint is against its parent, the root in the world.
+        rate : float
+            Frames a second.
+        name : str
+
+        Returns
+        -------
+        Clip
+            In centimetres, as `write_bvh` writes it. A joint has positions of its own where it does not stay at its offset.
+
+        Raises
+        ------
+        ClipError
+            The arrays do not fit together, are not finite, or the parents are no tree.
+        ContextError
+            An argument of another type.
+        """
+        listed = require_many_of(names, str, "names", "a list of texts")
+        rate = require_real(rate, "rate", 1.0 / bvh.LONGEST_FRAME_S, MOST_RATE)
+        tree, still, turns, places = (_array(each) for each in (parents, offsets, rotations, positions))
+        try:
+            skeleton, values = _of_arrays(listed, tree, still, turns, places)
+        except ClipError as error:
+            raise ClipError(*(fault.at(Place(name)) for fault in error.faults)) from None
+        return cls(name, skeleton, 1.0 / rate, values)
 
     @property
     def n_frames(self) -> int:
@@ -100,7 +159,7 @@ def load_bvh(path: str | PathLike[str], *, metres_per_unit: float = CENTIMETRE, 
     Raises
     ------
     ClipError
-        The text is no BVH: with its line, what was found, what is accepted and the nearest mend.
+        The text is no BVH: with its line, what was read, what is accepted and the nearest mend.
     FileError
         The file cannot be opened; where it is missing, with the nearest name there is.
     ContextError
@@ -120,20 +179,6 @@ def parse_bvh(text: str, name: str, *, file: str | None = None, metres_per_unit:
     require_text(text, "text")
     skeleton, frame_time_s, values = bvh.read(text, file)
     return Clip(name, skeleton, frame_time_s, values, metres_per_unit, up)
-
-
-def load_clips(paths: Iterable[str | PathLike[str]], *, metres_per_unit: float = CENTIMETRE, up: Up = "y") -> list[Clip]:
-    """Read several BVH files; raises one ClipError with the faults of all that are broken or cannot be read."""
-    clips = []
-    faults: list[Fault] = []
-    for path in require_many(paths, "paths", "a list of paths"):
-        try:
-            clips.append(load_bvh(path, metres_per_unit=metres_per_unit, up=up))
-        except (ClipError, FileError) as error:
-            faults.extend(error.faults)
-    if faults:
-        raise ClipError(*faults)
-    return clips
 
 
 def write_bvh(clip: Clip, target: str | PathLike[str] | TextIO, *, digits: int = 6) -> None:
@@ -156,6 +201,44 @@ def write_bvh(clip: Clip, target: str | PathLike[str] | TextIO, *, digits: int =
     write_atomic(fspath(target), text.encode())
 
 
+def _array(given: ArrayLike) -> NDArray[Any]:
+    """An array of numbers, or an empty one in place of what is none."""
+    try:
+        array = np.asarray(given)
+    except ValueError:
+        return np.zeros(0)
+    return array if array.dtype.kind in "iuf" else np.zeros(0)
+
+
+def _of_arrays(
+    names: list[str], parents: NDArray[Any], offsets: NDArray[Any], rotations: NDArray[Any], positions: NDArray[Any]
+) -> tuple[Skeleton, Floats]:
+    faults = list(joint_arrays.tree_faults(names, parents))
+    if faults:
+        raise ClipError(*faults)
+    n = len(names)
+    still, turns, places = (np.asarray(each, np.float64) for each in (offsets, rotations, positions))
+    joint_arrays.require_numbers(still, "offsets", (n, 3))
+    joint_arrays.require_numbers(turns, "rotations", (None, n, 4))
+    if places.ndim == 2:
+        root = int(np.flatnonzero(parents < 0)[0])
+        joint_arrays.require_numbers(places, "positions", (len(turns), 3))
+        places, moved = np.repeat(still[None], len(turns), axis=0), places
+        places[:, root] = moved
+    joint_arrays.require_numbers(places, "positions", (len(turns), n, 3))
+    lengths = np.linalg.norm(turns, axis=-1, keepdims=True)
+    if not lengths.all():
+        raise ClipError(Fault("a rotation is 0 in all four numbers.", "quaternions (w, x, y, z) of any length above 0"))
+    order = joint_arrays.depth_first(parents.astype(np.int64))
+    places, still, turns = places[:, order], still[order], (turns / lengths)[:, order]
+    moving = joint_arrays.moving_joints(still, places)
+    rank = np.argsort(order)
+    above = np.where(parents[order] < 0, -1, rank[np.maximum(parents[order], 0)]).astype(np.int64)
+    channels = joint_arrays.channels_of(n, moving)
+    skeleton = Skeleton(tuple(names[joint] for joint in order), above, still / CENTIMETRE, channels)
+    return skeleton, joint_arrays.values_of(turns, places / CENTIMETRE, moving)
+
+
 def text_of(raw: bytes, file: str) -> str:
     if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise _no_text("the file is UTF-16", 1, file)
@@ -167,8 +250,10 @@ def text_of(raw: bytes, file: str) -> str:
         raise _no_text(f"byte 0x{raw[error.start]:02x} is not UTF-8", line_of(raw, error.start), file) from error
 
 
-def _no_text(found: str, line: int, file: str) -> ClipError:
-    return ClipError(Fault(f"{found}.", "a BVH file in UTF-8 text, which starts with the word HIERARCHY", place=Place(file, line)))
+def _no_text(problem: str, line: int, file: str) -> ClipError:
+    return ClipError(
+        Fault(f"{problem}.", "a BVH file in UTF-8 text, which starts with the word HIERARCHY", place=Place(file, line))
+    )
 
 
 def _faults(clip: Clip) -> Iterable[Fault]:

@@ -55,19 +55,20 @@ def ground_points(poses: Poses, foot: Foot) -> Floats:
 
 
 def stances(
-    feet: tuple[Floats, Floats], rate: float, slowest_mps: float | None = None, *, flat: bool = False
+    feet: tuple[Floats, Floats], rate: float, slowest_mps: float | None = None, *, flat: bool = False, rises_m: float = RISES_M
 ) -> tuple[Floats, Floats]:
     """When each of two feet is down, from the places [F, points, 3] of its heel and toe: seconds, float64 [n, 2] each.
 
     `slowest_mps` is the speed below which a point rests; by default it is a share of the speed of the point nearby.
-    A foot that is `flat` rests on heel and toe at once.
+    A foot that is `flat` rests on heel and toe at once. One that is `rises_m` above the lowest place of its stance is up.
     """
     n_frames = len(feet[0])
     if n_frames < 2:
         return np.zeros((n_frames, 2)), np.zeros((n_frames, 2))
     left, right = (points[:, :, 1].min(axis=1) for points in feet)
-    found = [_joined(points, rate, slowest_mps, flat) for points in feet]
-    return _seconds(_on_ground(found[0], left, right), rate), _seconds(_on_ground(found[1], right, left), rate)
+    intervals = [_foot_rests(points, rate, slowest_mps, flat) for points in feet]
+    sides = (intervals[0], left, right), (intervals[1], right, left)
+    return _seconds(_on_ground(*sides[0], rises_m), rate), _seconds(_on_ground(*sides[1], rises_m), rate)
 
 
 # ---- heel and toe
@@ -105,7 +106,7 @@ def _heel(poses: Poses, foot: Foot, ankle: Floats, toe: Floats) -> Floats:
 # ---- when a point rests
 
 
-def _joined(points: Floats, rate: float, slowest_mps: float | None, flat: bool) -> Spans:
+def _foot_rests(points: Floats, rate: float, slowest_mps: float | None, flat: bool) -> Spans:
     """When a foot rests on heel or toe, or passes from one to the other."""
     each = [_rests(points[:, i], rate, slowest_mps, flat) for i in range(points.shape[1])]
     rests = np.logical_and.reduce(each) if flat else np.logical_or.reduce(each)
@@ -155,17 +156,17 @@ def _most_nearby(values: Floats, reach: int) -> Floats:
     return np.asarray(np.maximum(most[:-rest], most[rest:]) if rest else most)
 
 
-def _on_ground(found: Spans, own: Floats, other: Floats) -> Spans:
+def _on_ground(spans: Spans, own: Floats, other: Floats, rises_m: float) -> Spans:
     """The stances of a foot without what of them is in the air; `own` and `other` are the lowest heights of the two feet [F]."""
     low = np.zeros(len(own), np.bool_)
-    for first, stop in found:
-        low[first : stop + 1] = own[first : stop + 1] <= own[first : stop + 1].min() + RISES_M
-    parts = [(a + first, b - 1 + first) for first, stop in found for a, b in spans_of(low[first : stop + 1])]
+    for first, stop in spans:
+        low[first : stop + 1] = own[first : stop + 1] <= own[first : stop + 1].min() + rises_m
+    parts = [(a + first, b - 1 + first) for first, stop in spans for a, b in spans_of(low[first : stop + 1])]
     return [(a, b) for a, b in parts if (b > a) and (own - other)[a : b + 1].min() <= ABOVE_M]
 
 
-def _seconds(found: Spans, rate: float) -> Floats:
-    return np.array(found, np.float64).reshape(-1, 2) / rate
+def _seconds(spans: Spans, rate: float) -> Floats:
+    return np.array(spans, np.float64).reshape(-1, 2) / rate
 
 
 def spans_of(flags: Flags) -> Spans:

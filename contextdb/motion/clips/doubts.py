@@ -21,6 +21,7 @@ from contextdb.errors import MotionError, plural
 from contextdb.motion.clips import quaternions
 from contextdb.motion.clips.clip import Clip
 from contextdb.motion.clips.feet import footfalls_of
+from contextdb.motion.clips.on_the_spot import ground_motion
 from contextdb.motion.clips.poses import LocalPoses, forward_kinematics, local_poses, poses_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Skeleton
@@ -28,7 +29,10 @@ from contextdb.motion.clips.trajectory import FASTEST_MPS
 
 LEAST_BODY_M, MOST_BODY_M = 0.3, 3.0
 USUAL_BODY_M = 1.7
+LEAST_USUAL_M, MOST_USUAL_M = 0.9, 2.6
+"""How tall a body is, in a unit that may be right."""
 LEAST_RATE, MOST_RATE = 10.0, 240.0
+FARTHEST_M = 1e9
 FEWEST_FRAMES = 3
 """Two frames give one velocity, one frame none."""
 FAR_FROM_GROUND = 0.25
@@ -106,6 +110,8 @@ class Measures:
         How many frames hold zeros only, and the first of these.
     never_down : bool
         Whether no foot is ever down, in a clip of more than `LONGEST_FLIGHT_S`.
+    on_the_spot_mps : float
+        How fast the body would go of which the feet stand, where the hips stay and the ground goes by; else 0.
     bones : mapping of str to float
         The median distance of each joint below the hips from its parent, in metres, where there is one.
     """
@@ -124,6 +130,7 @@ class Measures:
     n_unmoved: int = 0
     unmoved_frame: int = 0
     never_down: bool = False
+    on_the_spot_mps: float = 0.0
     bones: Mapping[str, float] | None = None
 
     @property
@@ -136,8 +143,8 @@ class Measures:
         return asdict(self)
 
     @classmethod
-    def of_json(cls, said: Mapping[str, Any]) -> Measures:
-        return cls(**{**said, "extents": tuple(said["extents"])})
+    def of_json(cls, document: Mapping[str, Any]) -> Measures:
+        return cls(**{**document, "extents": tuple(document["extents"])})
 
 
 def measure(clip: Clip) -> Measures:
@@ -153,6 +160,7 @@ def measure(clip: Clip) -> Measures:
         reach, lows = np.ptp(body, axis=1), body[:, :, 1].min(axis=1)
         hips = _hips(clip)
         steps = np.linalg.norm(np.diff(hips, axis=0), axis=1)
+        ground = ground_motion(clip) if np.isfinite(hips).all() and np.abs(hips).max() < FARTHEST_M else None
     fastest = int(np.argmax(steps)) if len(steps) else 0
     zeros = np.flatnonzero(~clip.values.any(axis=1)) if clip.values.shape[1] else np.zeros(0, np.int64)
     x, y, z = np.median(reach, axis=0).tolist()
@@ -172,8 +180,19 @@ def measure(clip: Clip) -> Measures:
         n_unmoved=len(zeros),
         unmoved_frame=int(zeros[0]) if len(zeros) else 0,
         never_down=_is_never_down(clip),
+        on_the_spot_mps=0.0 if ground is None else ground.speed_mps,
         bones={clip.skeleton.names[joint]: length for joint, length in zip(joints[1:], lengths, strict=True) if length > 0.0},
     )
+
+
+def unit_by_size(clip: Clip) -> float | None:
+    """The unit in which a clip's body is of a usual size: its own if it is, else the nearest; None where there is none."""
+    size = measure(clip).size_m
+    if not 0.0 < size < math.inf:
+        return None
+    unit = min(UNITS, key=lambda unit: abs(math.log(size * unit / clip.metres_per_unit / USUAL_BODY_M)))
+    units = (each for each in (clip.metres_per_unit, unit) if LEAST_USUAL_M <= size * each / clip.metres_per_unit <= MOST_USUAL_M)
+    return next(units, None)
 
 
 def doubts(clips: Iterable[tuple[str, str | None, Measures]]) -> list[ClipFinding]:
@@ -183,9 +202,9 @@ def doubts(clips: Iterable[tuple[str, str | None, Measures]]) -> list[ClipFindin
     usual = _usual_shape([measures for _, _, measures in listed])
     lengths = _usual_lengths([measures.bones for _, _, measures in listed if measures.bones], usual or {})
     return [
-        ClipFinding(rule, asset, **told, file=file)
+        ClipFinding(rule, asset, **doubt, file=file)
         for asset, file, measures in listed
-        for rule, told in _rules(measures, usual, _times(measures.bones or {}, lengths))
+        for rule, doubt in _rules(measures, usual, _times(measures.bones or {}, lengths))
     ]
 
 
@@ -208,13 +227,13 @@ def grouped(findings: Iterable[ClipFinding], n_clips: int) -> Iterator[str]:
 # ---- the rules
 
 
-Told = dict[str, Any]
+Doubt = dict[str, Any]
 """The fields of a finding next to its rule, asset and file."""
 Shape = Mapping[str, float]
 """For each bone its share of the length of all."""
 
 
-def _rules(of: Measures, usual: Shape | None, times: float) -> Iterator[tuple[str, Told]]:
+def _rules(of: Measures, usual: Shape | None, times: float) -> Iterator[tuple[str, Doubt]]:
     """What is doubted of a clip whose bones are so many times as long as those of the others."""
     if of.n_frames < FEWEST_FRAMES:
         yield "few-frames", _few_frames(of)
@@ -239,31 +258,33 @@ def _rules(of: Measures, usual: Shape | None, times: float) -> Iterator[tuple[st
         yield "off-ground", _off_ground(of)
     elif of.raised < -UNDER_GROUND * of.size_m:
         yield "off-ground", _under_ground(of)
-    if of.never_down and of.lying < LYING_SHARE:
+    if of.never_down and of.lying < LYING_SHARE and not of.on_the_spot_mps:
         yield "no-footfalls", _no_footfalls(of)
+    if of.on_the_spot_mps:
+        yield "on-the-spot", _on_the_spot(of)
     difference = None if usual is None else _difference(_shape(of.bones or {}, usual), usual)
     if difference is not None and difference > OTHER_SHAPE:
-        found = f"{100.0 * difference:.0f} % of the body's length is distributed differently from the other clips."
+        problem = f"{100.0 * difference:.0f} % of the body's length is distributed differently from the other clips."
         mend = 'rig = "a clip of the usual body" in [databases.NAME], which puts the others on it, or metres_per_unit'
         yield (
             "odd-proportions",
-            {"found": found, "expected": f"at most {100 * OTHER_SHAPE:g} %", "mend": mend, "measure": difference},
+            {"found": problem, "expected": f"at most {100 * OTHER_SHAPE:g} %", "mend": mend, "measure": difference},
         )
 
 
-def _few_frames(of: Measures) -> Told:
+def _few_frames(of: Measures) -> Doubt:
     none = "so nothing moves and every velocity is 0" if of.n_frames == 1 else "so there is one velocity"
-    found = f"the clip has {plural(of.n_frames, 'frame')}, {none}."
+    problem = f"the clip has {plural(of.n_frames, 'frame')}, {none}."
     return {
-        "found": found,
+        "found": problem,
         "expected": f"at least {FEWEST_FRAMES} frames",
         "mend": "to export the whole take, or leave the clip if a still pose is intended",
         "measure": float(of.n_frames),
     }
 
 
-def _odd_rate(of: Measures, rate: float) -> Told:
-    found = f"the clip has {rate:.3g} frames a second (Frame Time: {of.frame_time_s:g})."
+def _odd_rate(of: Measures, rate: float) -> Doubt:
+    problem = f"the clip has {rate:.3g} frames a second (Frame Time: {of.frame_time_s:g})."
     meant = next(
         (
             t
@@ -273,20 +294,20 @@ def _odd_rate(of: Measures, rate: float) -> Told:
         None,
     )
     return {
-        "found": found,
+        "found": problem,
         "expected": f"{LEAST_RATE:g} to {MOST_RATE:g}",
         "mend": f"Frame Time: {meant:.6g}" if meant else "to export it again at 30 or 60 frames a second",
         "measure": rate,
     }
 
 
-def _zero_poses(of: Measures) -> Told:
+def _zero_poses(of: Measures) -> Doubt:
     if of.n_unmoved == of.n_frames:
-        found = f"every value of all {plural(of.n_frames, 'frame')} is 0: the body stands in its rest pose at the origin."
+        problem = f"every value of all {plural(of.n_frames, 'frame')} is 0: the body stands in its rest pose at the origin."
     else:
-        found = f"{plural(of.n_unmoved, 'frame')} of {of.n_frames:,} hold zeros only, first frame {of.unmoved_frame}."
+        problem = f"{plural(of.n_unmoved, 'frame')} of {of.n_frames:,} hold zeros only, first frame {of.unmoved_frame}."
     return {
-        "found": found,
+        "found": problem,
         "expected": "frames with rotations",
         "mend": "to export the clip again without these frames",
         "measure": float(of.n_unmoved),
@@ -294,7 +315,7 @@ def _zero_poses(of: Measures) -> Told:
     }
 
 
-def _odd_size(of: Measures) -> Told:
+def _odd_size(of: Measures) -> Doubt:
     unit = min(UNITS, key=lambda unit: abs(math.log(of.size_m / of.metres_per_unit * unit / USUAL_BODY_M)))
     size = of.size_m / of.metres_per_unit * unit
     fits = LEAST_BODY_M <= size <= MOST_BODY_M
@@ -306,7 +327,7 @@ def _odd_size(of: Measures) -> Told:
     }
 
 
-def _other_size(of: Measures, times: float) -> Told:
+def _other_size(of: Measures, times: float) -> Doubt:
     unit = min(UNITS, key=lambda unit: abs(math.log(unit / of.metres_per_unit * times)))
     fits = 1.0 / OTHER_SIZE <= unit / of.metres_per_unit * times <= OTHER_SIZE and not math.isclose(unit, of.metres_per_unit)
     return {
@@ -318,7 +339,7 @@ def _other_size(of: Measures, times: float) -> Told:
     }
 
 
-def _jump(of: Measures) -> Told:
+def _jump(of: Measures) -> Doubt:
     where = f"from frame {of.fastest_frame} to {of.fastest_frame + 1}"
     return {
         "found": f"the hips move {_metres(of.farthest_m)} {where}, which is {of.fastest_mps:,.0f} m/s.",
@@ -329,7 +350,7 @@ def _jump(of: Measures) -> Told:
     }
 
 
-def _lying(of: Measures) -> Told:
+def _lying(of: Measures) -> Doubt:
     longest = max(range(3), key=lambda axis: of.extents[axis])
     # The settings turn "z" up into y up, so that the file's y lies along -z, and "x" up so that the file's y lies along x.
     axis = {"y": AXES[longest], "z": {0: "x", 2: "y"}.get(longest, "z"), "x": {0: "y", 2: "z"}.get(longest, "x")}[of.up]
@@ -341,7 +362,16 @@ def _lying(of: Measures) -> Told:
     }
 
 
-def _off_ground(of: Measures) -> Told:
+def _on_the_spot(of: Measures) -> Doubt:
+    return {
+        "found": f"the hips stay, and the standing feet are those of {of.on_the_spot_mps:.2f} m/s: the clip runs on the spot.",
+        "expected": "a clip whose root moves along",
+        "mend": 'root = "feet" in [databases.NAME]',
+        "measure": of.on_the_spot_mps,
+    }
+
+
+def _off_ground(of: Measures) -> Doubt:
     side = "above" if of.lowest > 0.0 else "below"
     what = "no joint comes nearer to it" if of.lowest > 0.0 else "a joint is so far below it"
     return {
@@ -352,7 +382,7 @@ def _off_ground(of: Measures) -> Told:
     }
 
 
-def _under_ground(of: Measures) -> Told:
+def _under_ground(of: Measures) -> Doubt:
     return {
         "found": f"a joint is {_metres(-of.raised)} or more below the ground (0 upwards) in every pose: the body is in the floor.",
         "expected": "a foot that stands on the ground in some frame",
@@ -361,10 +391,10 @@ def _under_ground(of: Measures) -> Told:
     }
 
 
-def _no_footfalls(of: Measures) -> Told:
-    found = f"neither foot is ever on the ground, in {of.n_frames * of.frame_time_s:.3g} s."
+def _no_footfalls(of: Measures) -> Doubt:
+    problem = f"neither foot is ever on the ground, in {of.n_frames * of.frame_time_s:.3g} s."
     return {
-        "found": found,
+        "found": problem,
         "expected": "a foot that rests on the ground now and then",
         "mend": "[features.NAME] feet, or marks Contact.Left and Contact.Right, or nothing where the body flies or slides",
         "measure": 0.0,
@@ -392,11 +422,11 @@ def _is_never_down(clip: Clip) -> bool:
 
 def _body(skeleton: Skeleton) -> list[int]:
     """The hips and all below: a root above them marks a place on the ground, and is no part of the body."""
-    found = {skeleton.hips}
+    joints = {skeleton.hips}
     for joint, parent in enumerate(skeleton.parents.tolist()):
-        if parent in found:
-            found.add(joint)
-    return sorted(found)
+        if parent in joints:
+            joints.add(joint)
+    return sorted(joints)
 
 
 def _some_poses(clip: Clip) -> LocalPoses:

@@ -29,7 +29,9 @@ ContactMarks = tuple[ContactMark | None, ContactMark | None]
 """Those of the left and of the right foot; None of a foot without."""
 NO_MARKS: ContactMarks = (None, None)
 ALIKE_S = 0.05
-"""A mark whose ends are so near to those of a stance that is found says the same."""
+"""A mark whose ends are so near to those of a stance that is detected says the same."""
+TOE_MPS, TOE_RISES_M = 0.6, 0.04
+"""A toe stands that is slower, and no higher over the lowest place of its stance."""
 LONGEST_STEP_S = 1.5
 """A foot that stays down, or up, for longer stands and takes no step."""
 
@@ -112,45 +114,45 @@ def footfalls_of(
     poses: Poses, bones: FootBones = UNDECLARED, marks: ContactMarks = NO_MARKS, *, slowest_mps: float | None = None
 ) -> Footfalls:
     """As `footfalls`, of poses in the world. Of a foot that has marks these count, and nothing is looked for."""
-    feet = bones.found_in(poses.skeleton)
+    feet = bones.feet_in(poses.skeleton)
     left, right = (ground_points(poses, foot) for foot in feet)
     return _with_marks(feet, stances((left, right), poses.rate, slowest_mps), marks, max(0, poses.n_frames - 1) / poses.rate)
 
 
-def flat_feet_of(poses: Poses, bones: FootBones = UNDECLARED, marks: ContactMarks = NO_MARKS) -> Footfalls:
-    """When each foot stands flat, heel and toe on the ground, so that it can be held there.
+def held_feet_of(poses: Poses, bones: FootBones = UNDECLARED, marks: ContactMarks = NO_MARKS) -> Footfalls:
+    """When each foot can be held where it is: it stands flat, heel and toe on the ground, or its toe does, from touch-down to lift,
+    and the foot rolls about it.
 
-    A mark holds its foot all the time; but one that only says when the foot rests, as it is found too, changes nothing.
+    A mark holds its foot all the time; but one that only says when the foot rests, as it is detected too, changes nothing.
     """
-    feet = bones.found_in(poses.skeleton)
-    points = ground_points(poses, feet[0]), ground_points(poses, feet[1])
-    flat = stances(points, poses.rate, flat=True)
-    falls = _with_marks(feet, flat, marks, max(0, poses.n_frames - 1) / poses.rate)
-    if marks == NO_MARKS:
-        return falls
-    rests = stances(points, poses.rate)
-    held = [
-        intervals if mark is None else _held(intervals, *found)
-        for intervals, mark, *found in zip(falls.down.values(), marks, rests, flat, strict=True)
-    ]
-    return Footfalls(falls.duration_s, dict(zip(falls.feet, held, strict=True)))
+    feet = bones.feet_in(poses.skeleton)
+    points, duration_s = tuple(ground_points(poses, foot) for foot in feet), max(0, poses.n_frames - 1) / poses.rate
+    flat = stances((points[0], points[1]), poses.rate, flat=True)
+    toes = stances((points[0][:, -1:], points[1][:, -1:]), poses.rate, TOE_MPS, rises_m=TOE_RISES_M)
+    rests = stances((points[0], points[1]), poses.rate)
+    down = {}
+    for i, foot in enumerate(feet):
+        parts = [*flat[i].tolist(), *(toes[i].tolist() if foot.toe is not None else ())]
+        held, mark = marked([(begin, end, True) for begin, end in parts], duration_s), marks[i]
+        down[foot.bone] = held if mark is None else _held(marked(mark, duration_s), rests[i], held)
+    return Footfalls(duration_s, down)
 
 
-def _held(marked: Floats, rests: Floats, flat: Floats) -> Floats:
-    """The marked intervals [n, 2], those that are found to rest too without what of them is not flat."""
+def _held(marked: Floats, rests: Floats, detected: Floats) -> Floats:
+    """The marked intervals [n, 2], in place of those that are detected to rest too what of them can be held."""
     held: list[list[float]] = []
     for interval in marked:
         is_found = (np.abs(rests - interval) <= ALIKE_S).all(axis=1).any()
-        middles = flat.mean(axis=1)
-        inside = flat[(interval[0] <= middles) & (middles <= interval[1])]
+        middles = detected.mean(axis=1)
+        inside = detected[(interval[0] <= middles) & (middles <= interval[1])]
         held += inside.tolist() if is_found else [interval.tolist()]
     return np.array(held, np.float64).reshape(-1, 2)
 
 
-def _with_marks(feet: tuple[Foot, Foot], found: tuple[Floats, Floats], marks: ContactMarks, duration_s: float) -> Footfalls:
+def _with_marks(feet: tuple[Foot, Foot], detected: tuple[Floats, Floats], marks: ContactMarks, duration_s: float) -> Footfalls:
     down = {
         foot.bone: intervals if mark is None else marked(mark, duration_s)
-        for foot, intervals, mark in zip(feet, found, marks, strict=True)
+        for foot, intervals, mark in zip(feet, detected, marks, strict=True)
     }
     return Footfalls(duration_s, down)
 
@@ -170,8 +172,8 @@ def marked(mark: ContactMark, duration_s: float) -> Floats:
     edges = sorted({0.0, duration_s, *(float(np.clip(t, 0.0, duration_s)) for begin, end, _ in mark for t in (begin, end))})
     down: list[list[float]] = []
     for begin, end in pairwise(edges):
-        said = [is_down for first, last, is_down in mark if first <= (begin + end) / 2.0 <= last]
-        if said and all(said):
+        marked_down = [is_down for first, last, is_down in mark if first <= (begin + end) / 2.0 <= last]
+        if marked_down and all(marked_down):
             if down and down[-1][1] == begin:
                 down[-1][1] = end
             else:
@@ -230,11 +232,11 @@ def _phase(states: list[_State], typical: Mapping[bool, float], times_s: Floats)
     """Sine and cosine of one foot's phase: [times, 2]."""
     begins = np.array([state.begin_s for state in states])
     which = np.clip(np.searchsorted(begins, times_s, side="right") - 1, 0, len(states) - 1)
-    found = np.zeros((len(times_s), 2))
+    phases = np.zeros((len(times_s), 2))
     for i, state in enumerate(states):
         at = which == i
-        found[at] = _phase_in(state, typical[state.is_down], times_s[at])
-    return found
+        phases[at] = _phase_in(state, typical[state.is_down], times_s[at])
+    return phases
 
 
 def _phase_in(state: _State, typical_s: float, times_s: Floats) -> Floats:

@@ -22,7 +22,7 @@ LEG_JOINTS = 2
 
 @dataclass(frozen=True, slots=True)
 class FootBones:
-    """What `[features.NAME]` says of the bones of both feet, left first; None is to be found.
+    """What `[features.NAME]` says of the bones of both feet, left first; None is to be detected.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class FootBones:
     heels: Pair | None = None
     toes: Pair | None = None
 
-    def found_in(self, skeleton: Skeleton) -> tuple[Foot, Foot]:
+    def feet_in(self, skeleton: Skeleton) -> tuple[Foot, Foot]:
         """The two feet of a skeleton; a MotionError when it has none, or lacks a bone that is declared."""
         left, right = feet_of(skeleton) if self.feet is None else self.feet
         return self._foot(skeleton, left, 0), self._foot(skeleton, right, 1)
@@ -59,12 +59,12 @@ def feet_of(skeleton: Skeleton) -> Pair:
     """The sided bones, left first, whose names hold "foot" or "ankle", else the ends of both legs; a MotionError when there are
     none."""
     pairs = sided_pairs(skeleton.names)
-    found = next((pair for pair in pairs if side_and_core(pair[0])[1] == FOOT_WORDS[0]), None)
-    found = found or next((pair for word in FOOT_WORDS for pair in pairs if word in pair[0].casefold()), None)
-    found = found or _ends_of_legs(skeleton, pairs)
-    if found is None:
+    feet = next((pair for pair in pairs if side_and_core(pair[0])[1] == FOOT_WORDS[0]), None)
+    feet = feet or next((pair for word in FOOT_WORDS for pair in pairs if word in pair[0].casefold()), None)
+    feet = feet or _ends_of_legs(skeleton, pairs)
+    if feet is None:
         raise MotionError(Fault("no pair of bones is named like feet.", f"feet=(left, right), of {some(skeleton.names)}"))
-    return found
+    return feet
 
 
 def _ends_of_legs(skeleton: Skeleton, pairs: list[Pair]) -> Pair | None:
@@ -94,4 +94,4 @@ def _below(skeleton: Skeleton, foot: int, words: tuple[str, ...]) -> int | None:
 
 
 UNDECLARED = FootBones()
-"""All bones are to be found."""
+"""All bones are to be detected."""

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from contextdb.cells.arguments import MOST, require_many_of, require_numbers, require_real
+from contextdb.core import move_bodies, steer_paths
 from contextdb.errors import Fault, MotionError
 from contextdb.motion.clips.many_paths import ManyTrajectories
 from contextdb.motion.clips.poses import LEAST_RATE, MOST_RATE
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.clips.steering import STANDING_MPS, Steered, moved_along, turned
+from contextdb.motion.clips.steering import N_NUMBERS, Steered
 from contextdb.motion.clips.trajectory import MOST_REACH_S
 
 
@@ -67,47 +68,33 @@ class ManySteered:
         """The bodies some seconds later, when the sticks ask for velocities [Q, 2] and headings [Q]; by default, to face where they
         go. Raises MotionError for shapes that do not fit, ContextError for what is no number of seconds."""
         require_real(dt_s, "dt_s", 0.0)
-        place, speed, change, heading, turn_rate = self._at(np.array([dt_s]), *self._asked(wanted, facing))
-        return replace(
-            self,
-            positions=place[:, 0],
-            velocities=speed[:, 0],
-            accelerations=change[:, 0],
-            headings=heading[:, 0],
-            turn_rates=turn_rate[:, 0],
-        )
+        moved = np.empty((len(self), N_NUMBERS))
+        move_bodies(self._numbers, self._goals(wanted, facing), float(dt_s), moved)
+        return ManySteered(moved[:, 0:2], moved[:, 2:4], moved[:, 4:6], *moved[:, 6:].T)
 
-    def _at(self, times_s: Floats, wanted: Floats, facing: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-        """Positions, velocities and accelerations, each [Q, T, 2], and headings and turn rates [Q, T] at some moments."""
-        damping = (2.0 * math.log(2.0) / self.velocity_halflives_s)[:, None, None]
-        seconds = times_s[None, :, None]
-        positions, velocities, accelerations = self.positions[:, None], self.velocities[:, None], self.accelerations[:, None]
-        left = np.exp(-damping * seconds)
-        place, speed, change = moved_along(positions, velocities, accelerations, wanted[:, None], damping, left, seconds)
-        apart = facing - self.headings
-        apart = (apart - 2.0 * math.pi * np.rint(apart / (2.0 * math.pi)))[:, None]
-        damping = (2.0 * math.log(2.0) / self.heading_halflives_s)[:, None]
-        left = np.exp(-damping * times_s)
-        return place, speed, change, *turned(self.headings[:, None], self.turn_rates[:, None], -apart, damping, left, times_s)
+    @property
+    def _numbers(self) -> Floats:
+        """The bodies as the core takes them: [Q, 10]."""
+        others = self.headings, self.turn_rates, self.velocity_halflives_s, self.heading_halflives_s
+        return np.column_stack((self.positions, self.velocities, self.accelerations, *others))
 
-    def _asked(self, wanted: ArrayLike, facing: ArrayLike | None) -> tuple[Floats, Floats]:
-        """The velocities and headings that the sticks ask for, checked."""
+    def _goals(self, wanted: ArrayLike, facing: ArrayLike | None) -> Floats:
+        """The velocities and headings that the sticks ask for, checked: [Q, 3], NaN where none is asked for."""
         velocities = require_numbers(wanted, "wanted")
         if velocities.shape != self.positions.shape:
-            found = f"the velocities that are asked for have shape {velocities.shape}."
-            raise MotionError(Fault(found, f"{self.positions.shape}, x and z for each body"))
+            problem = f"the velocities that are requested have shape {velocities.shape}."
+            raise MotionError(Fault(problem, f"{self.positions.shape}, x and z for each body"))
         if (unfit := np.flatnonzero(~(np.abs(velocities) <= MOST).all(axis=1))).size:
-            found = f"the velocity {velocities[unfit[0]].tolist()} is asked of body {unfit[0]}."
-            raise MotionError(Fault(found, f"numbers from {-MOST:g} to {MOST:g}"))
+            problem = f"the velocity {velocities[unfit[0]].tolist()} is asked of body {unfit[0]}."
+            raise MotionError(Fault(problem, f"numbers from {-MOST:g} to {MOST:g}"))
         if facing is None:
-            is_going = np.hypot(velocities[:, 0], velocities[:, 1]) >= STANDING_MPS
-            return velocities, np.where(is_going, np.arctan2(velocities[:, 0], velocities[:, 1]), self.headings)
+            return np.column_stack((velocities, np.full(len(self), math.nan)))
         headings = require_numbers(facing, "facing")
         if headings.shape != self.headings.shape:
             raise MotionError(Fault(f"the facing has shape {headings.shape}.", f"{self.headings.shape}, a heading for each body"))
         if (unfit := np.flatnonzero(~np.isfinite(headings))).size:
             raise MotionError(Fault(f"the facing {headings[unfit[0]]} is asked of body {unfit[0]}.", "radians"))
-        return velocities, headings
+        return np.column_stack((velocities, headings))
 
 
 def steered_paths(
@@ -140,8 +127,10 @@ def steered_paths(
     present = past[-1]
     if any(len(bodies) != len(present) for bodies in past):
         raise MotionError(Fault("the moments are of different numbers of bodies.", "the same bodies at each"))
-    times_s = np.arange(1, math.ceil(reach_s * rate) + 1) / rate
-    place, _, _, heading, _ = present._at(times_s, *present._asked(wanted, facing))
-    positions = np.concatenate((np.stack([bodies.positions for bodies in past], axis=1), place), axis=1)
-    headings = np.concatenate((np.stack([bodies.headings for bodies in past], axis=1), heading), axis=1)
-    return ManyTrajectories(rate, positions, np.unwrap(headings, axis=1), len(past) - 1)
+    n_past = len(past)
+    n_frames = n_past + math.ceil(reach_s * rate)
+    positions, headings = np.empty((len(present), n_frames, 2)), np.empty((len(present), n_frames))
+    for i, bodies in enumerate(past):
+        positions[:, i], headings[:, i] = bodies.positions, bodies.headings
+    steer_paths(present._numbers, present._goals(wanted, facing), rate, n_past, positions, headings)
+    return ManyTrajectories(rate, positions, headings, n_past - 1)

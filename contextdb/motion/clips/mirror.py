@@ -123,8 +123,8 @@ def facing_fault(skeleton: Skeleton, partners: Ints, facing: tuple[str, str] | N
     if pair is None or partners[pair[0]] == pair[1]:
         return None
     left, right = (skeleton.names[joint] for joint in pair)
-    found = f"mirror: the body faces across {in_quotes(left)} and {in_quotes(right)}, which are not a pair."
-    return Fault(found, "pairs that hold these two bones", f'["{left}", "{right}"]')
+    problem = f"mirror: the body faces across {in_quotes(left)} and {in_quotes(right)}, which are not a pair."
+    return Fault(problem, "pairs that hold these two bones", f'["{left}", "{right}"]')
 
 
 def unevenness(skeleton: Skeleton, pairs: Pairs) -> dict[str, float]:
@@ -147,9 +147,9 @@ def _named_by(pair: tuple[str, str], skeleton: Skeleton, faults: list[Fault]) ->
     why = pattern_fault(*pair)
     rests = [_rests(side, skeleton.names) for side in pair]
     if why:
-        faults.append(Fault(f"mirror: {_told(pair)}: {why}.", '["Left*", "Right*"]'))
+        faults.append(Fault(f"mirror: {_pair_text(pair)}: {why}.", '["Left*", "Right*"]'))
     elif "*" in pair[0] and not (rests[0] or rests[1]):
-        faults.append(Fault(f"mirror: no bone fits {_told(pair)}.", f"patterns for {some(skeleton.names)}"))
+        faults.append(Fault(f"mirror: no bone fits {_pair_text(pair)}.", f"patterns for {some(skeleton.names)}"))
     else:
         for rest in dict.fromkeys(rests[0] + rests[1]) if "*" in pair[0] else [""]:
             left, right = (side.replace("*", rest) for side in pair)
@@ -171,8 +171,8 @@ def _rests(pattern: str, names: tuple[str, ...]) -> list[str]:
 
 
 def _missing(bone: str, pair: tuple[str, str], skeleton: Skeleton) -> Fault:
-    found = f"mirror: {_told(pair)} names the bone {in_quotes(bone)}, which does not exist."
-    return Fault(found, some(skeleton.names), mend_for(bone, skeleton.names), rule="unknown-bone")
+    problem = f"mirror: {_pair_text(pair)} names the bone {in_quotes(bone)}, which does not exist."
+    return Fault(problem, some(skeleton.names), mend_for(bone, skeleton.names), rule="unknown-bone")
 
 
 def _unlike_parents(skeleton: Skeleton, partners: Ints) -> Iterator[Fault]:
@@ -183,10 +183,10 @@ def _unlike_parents(skeleton: Skeleton, partners: Ints) -> Iterator[Fault]:
         if int(skeleton.parents[partner]) != wanted and joint <= partner:
             names = skeleton.names
             bone, other = in_quotes(names[joint]), in_quotes(names[partner])
-            found = f"mirror: {bone} is mirrored to {other}, but their parents do not change places as they do."
+            problem = f"mirror: {bone} is mirrored to {other}, but their parents do not change places as they do."
             above = "nothing" if wanted < 0 else in_quotes(names[wanted])
-            yield Fault(found, f"a bone below {above} as the partner of {bone}")
+            yield Fault(problem, f"a bone below {above} as the partner of {bone}")
 
 
-def _told(pair: tuple[str, str]) -> str:
+def _pair_text(pair: tuple[str, str]) -> str:
     return f'["{pair[0]}", "{pair[1]}"]'

@@ -39,7 +39,7 @@ UNEVEN_SHARE = 0.1
 class OwnAxes:
     """How each of the J bones of a skeleton is turned about itself in a mirror: `turns` float64 [J, 4] is D of each, as rotations;
     `apart` float64 [J] how far each joint lies from where the mirror shows it, seen from its parent, when the skeleton's offsets
-    are kept, in the file's units."""
+    are retained, in the file's units."""
 
     turns: Floats
     apart: Floats
@@ -98,16 +98,16 @@ def _fitted(skeleton: Skeleton, partners: Ints) -> Floats:
 
 def _correlations(skeleton: Skeleton, partners: Ints) -> Floats:
     """Of each bone the sum of M o_b' o_b^T over its children and the ends of its chain: float64 [J, 3, 3]."""
-    found = np.zeros((skeleton.n_joints, 3, 3))
+    correlations = np.zeros((skeleton.n_joints, 3, 3))
     for joint in fixed_joints(skeleton).tolist():
-        found[skeleton.parents[joint]] += np.outer(M @ skeleton.offsets[partners[joint]], skeleton.offsets[joint])
+        correlations[skeleton.parents[joint]] += np.outer(M @ skeleton.offsets[partners[joint]], skeleton.offsets[joint])
     ends: dict[int, list[Floats]] = {}
     for joint, end in skeleton.end_sites:
         ends.setdefault(joint, []).append(np.array(end))
     for joint, own in ends.items():
         for offset, other in zip(own, ends.get(int(partners[joint]), []), strict=False):
-            found[joint] += np.outer(M @ other, offset)
-    return found
+            correlations[joint] += np.outer(M @ other, offset)
+    return correlations
 
 
 def _rotation(correlation: Floats, near: Floats) -> Floats:

@@ -82,14 +82,14 @@ def _body_headings(poses: Poses, of_hips: Floats) -> Floats:
 def _chest_pair(skeleton: Skeleton) -> tuple[int, int] | None:
     """The sided joints nearest the hips that do not hang on them: shoulders or arms."""
     pairs = [(skeleton.index(left), skeleton.index(right)) for left, right in sided_pairs(skeleton.names)]
-    found = []
+    candidates = []
     for left, right in pairs:
         above = skeleton.ancestors(left)
         meet = next((joint for joint in skeleton.ancestors(right) if joint in above), skeleton.hips)
         is_trunk = skeleton.hips in skeleton.ancestors(meet)
         if is_trunk and not np.array_equal(skeleton.offsets[left], skeleton.offsets[right]):
-            found.append((left, right))
-    return min(found, key=lambda pair: (skeleton.depths[pair[0]], pair[0]), default=None)
+            candidates.append((left, right))
+    return min(candidates, key=lambda pair: (skeleton.depths[pair[0]], pair[0]), default=None)
 
 
 def _sideways(poses: Poses, hips: Floats, headings: Floats, bones: FootBones, bends: Floats, cycle: float) -> Floats:
@@ -98,7 +98,7 @@ def _sideways(poses: Poses, hips: Floats, headings: Floats, bones: FootBones, be
     In a bend the feet are nearer its middle all the time: there only what changes within a cycle counts.
     """
     try:
-        feet = bones.found_in(poses.skeleton)
+        feet = bones.feet_in(poses.skeleton)
     except MotionError:
         return np.zeros_like(hips)
     soles = [[joint for joint in (foot.joint, foot.toe) if joint is not None] for foot in feet]

@@ -1,4 +1,4 @@
-"""What is found of a rig by names and shape: hips, spine, head, feet, pairs; for people who write settings for it.
+"""What a rig shows by names and shape: hips, spine, head, feet, pairs; for people who write settings for it.
 
 Heights are those of the first frame, in metres, y up.
 """
@@ -19,7 +19,7 @@ from contextdb.motion.clips.skeleton import Skeleton, sided_pairs
 
 @dataclass(frozen=True, slots=True)
 class Rig:
-    """What is found of a skeleton: heights of its bones (none for a clip without frames), the spine from hips to head from below,
+    """What a skeleton shows: heights of its bones (none for a clip without frames), the spine from hips to head from below,
     feet, heels and toes left and right (empty where there are none), the left and right bone across which the body faces, and the
     pairs that change places in a mirror."""
 
@@ -36,7 +36,7 @@ class Rig:
 
     @classmethod
     def of(cls, clip: Clip) -> Rig:
-        """What is found of a clip's skeleton."""
+        """What a clip's skeleton shows."""
         skeleton = clip.skeleton
         names = skeleton.names
         first = Clip(clip.name, skeleton, clip.frame_time_s, clip.values[:1], clip.metres_per_unit, clip.up)
@@ -65,7 +65,7 @@ class Rig:
         return max(self.heights_m) - min(self.heights_m) if self.heights_m else 0.0
 
     def roles(self, bone: str) -> list[str]:
-        """What a bone is found to be."""
+        """What a bone is detected to be."""
         alone = [role for role, name in (("hips", self.hips), ("head", self.head)) if name == bone]
         listed = (("spine", self.spine), ("foot", self.feet), ("heel", self.heels), ("toe", self.toes), ("facing", self.facing))
         return alone + [role for role, names in listed if bone in names]
@@ -75,9 +75,9 @@ class Rig:
 
 
 def _feet(skeleton: Skeleton) -> tuple[Foot, ...]:
-    """The feet, left first; none where none are found."""
+    """The feet, left first; none where none are detected."""
     try:
-        return UNDECLARED.found_in(skeleton)
+        return UNDECLARED.feet_in(skeleton)
     except MotionError:
         return ()
 

@@ -6,6 +6,7 @@ A bone is named by the joint at its start.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.errors import Fault, MotionError, in_quotes, plural, some
-from contextdb.motion.clips.bone_names import meant_bone, nearest_bones
+from contextdb.motion.clips.bone_names import meant_bone, nearest_bones, side_words, without_namespace
 from contextdb.motion.clips.quaternions import Floats
 
 Ints = NDArray[np.int64]
@@ -83,7 +84,11 @@ class Skeleton:
 
     @cached_property
     def _index(self) -> dict[str, int]:
-        return {name: joint for joint, name in enumerate(self.names)}
+        """The joints by their names, and by those without namespace that only one has."""
+        bare = [without_namespace(name) for name in self.names]
+        times = Counter(bare)
+        alone = {name: joint for joint, name in enumerate(bare) if times[name] == 1}
+        return alone | {name: joint for joint, name in enumerate(self.names)}
 
     def __contains__(self, bone: str) -> bool:
         return bone in self._index
@@ -128,17 +133,27 @@ class Skeleton:
 
     def ancestors(self, joint: int) -> list[int]:
         """The joints above one, its parent first."""
-        found: list[int] = []
+        joints: list[int] = []
         while (joint := int(self.parents[joint])) >= 0:
-            found.append(joint)
-        return found
+            joints.append(joint)
+        return joints
 
 
 def sided_pairs(names: Sequence[str]) -> list[tuple[str, str]]:
     """The pairs of bones whose names differ by side alone, left first: LeftFoot and RightFoot, Hip_L and Hip_R, lhip and rhip."""
     known = set(names)
-    pairs = ((name, right) for name in names for right in _right_names(name) if right in known and right != name)
+    spelt = {side_words(name): name for name in reversed(names)}
+    pairs = []
+    for name in names:
+        rights = [right for right in _right_names(name) if right in known and right != name]
+        pairs += [(name, right) for right in rights or filter(None, [spelt.get(_right_words(side_words(name)))])]
     return list(dict.fromkeys(pairs))
+
+
+def _right_words(words: tuple[str, ...]) -> tuple[str, ...]:
+    """The words of a left-hand name as those of the right-hand one; none where it is on no side."""
+    at = words.index("left") if "left" in words else len(words)
+    return (*words[:at], "right", *words[at + 1 :]) if at < len(words) else ()
 
 
 def _right_names(name: str) -> Iterator[str]:

@@ -34,13 +34,23 @@ GDC (sampling by distance, direction to velocity).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, TypeGuard, cast, get_args
+from typing import Literal, TypeGuard, get_args
 
-from contextdb.cells.arguments import as_number
-from contextdb.errors import Fault, MotionError, in_quotes, shown
-from contextdb.files.toml_shapes import Section
+from contextdb.errors import MotionError, in_quotes, safe_text
+from contextdb.files.settings import (
+    Declared,
+    Section,
+    Settings,
+    flag,
+    number,
+    setting,
+    settings_of,
+    settings_with,
+    word,
+)
+from contextdb.files.toml_shapes import Shape, between, filled, numbers_within
 from contextdb.files.toml_text import as_toml, what
 
 ChannelType = Literal[
@@ -52,19 +62,7 @@ Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
 TYPES: tuple[ChannelType, ...] = get_args(ChannelType)
 WHATS: tuple[What, ...] = get_args(What)
 AXES: tuple[Axis, ...] = get_args(Axis)
-BONE_KEYS = ("type", "bone", "relative_to", "at", "permuted", "weight", "group")
-KEYS: dict[str, tuple[str, ...]] = {
-    "position": BONE_KEYS,
-    "velocity": BONE_KEYS,
-    "angular_velocity": BONE_KEYS,
-    "direction": ("type", "bone", "axis", "relative_to", "at", "permuted", "weight", "group"),
-    "orientation": BONE_KEYS,
-    "phase": ("type", "feet", "at", "weight", "group"),
-    "custom": ("type", "function", "size", "at", "weight", "group"),
-    "trajectory": ("type", "what", "at", "along", "weight", "group"),
-    "permutation_time": ("type", "weight", "group"),
-}
-ANY_KEY = tuple(dict.fromkeys(key for keys in KEYS.values() for key in keys))
+OF_BONES: tuple[ChannelType, ...] = ("position", "velocity", "angular_velocity", "direction", "orientation")
 TYPE_SYNONYMS = {
     "pos": "position",
     "vel": "velocity",
@@ -97,54 +95,84 @@ GROUND_AXES = ("left", "ahead")
 PHASE_AXES = ("left sine", "left cosine", "right sine", "right cosine")
 
 
+def is_pair(value: object) -> TypeGuard[Sequence[str]]:
+    """Whether a value is a list of two different names."""
+    return (
+        isinstance(value, (list, tuple))
+        and len(value) == 2
+        and all(isinstance(name, str) and name for name in value)
+        and value[0] != value[1]
+    )
+
+
+def bone_pair(such_as: str) -> Shape:
+    """A left and a right bone."""
+    accepted = f"the left and the right bone, such as {such_as}"
+    return Shape(accepted, lambda value: None if is_pair(value) else "this is not a pair of bones", read=tuple)
+
+
+FEET = bone_pair('["LeftFoot", "RightFoot"]')
+WEIGHT = between("a weight", 0.0, MOST_WEIGHT, 1.0)
+ANOTHER = filled('another bone, such as "Hips"')
+
+
 @dataclass(frozen=True)
-class Channel:
+class Channel(Declared, error=MotionError):
     """A block of features that are weighed together.
 
-    Attributes
-    ----------
-    type : str
-        "position", "velocity", "angular_velocity", "direction", "orientation", "phase", "custom", "trajectory" or
-        "permutation_time".
-    weight : float
-        Multiplies the squared differences of this channel's normalised features.
-    bone : str, optional
-        Whose position, velocity, direction or orientation.
-    what : "position", "direction", "velocity", "speed" or "direction_to_velocity", optional
-        What of a trajectory.
-    at : tuple of float
-        Seconds after the frame. Of a pose, none is the frame itself.
-    along : tuple of float
-        Metres along the path, for a trajectory sampled by distance.
-    group : str, optional
-        Channels of one group share a scale of normalisation. Default: each its own.
-    axis : "x", "y", "z", "-x", "-y" or "-z", optional
-        Which of the bone's own axes a direction is. Default: "z".
-    relative_to : str, optional
-        The bone that stands instead of the body.
-    feet : (left bone, right bone), optional
-        Whose footfalls a phase is of. Default: those of the schema, else the ones that are found.
-    function : str, optional
-        The name of a custom channel's function; see `FeatureSchema.with_functions`.
-    size : int
-        How many features a custom channel has.
-    permuted : bool
-        Whether it looks ahead by the seconds of each permutation of a clip.
+    Raises
+    ------
+    MotionError
+        A value that is not accepted; all faults together.
     """
 
-    type: ChannelType
-    weight: float = 1.0
-    bone: str | None = None
-    what: What | None = None
-    at: tuple[float, ...] = ()
-    along: tuple[float, ...] = ()
-    group: str | None = None
-    axis: Axis | None = None
-    relative_to: str | None = None
-    feet: tuple[str, str] | None = None
-    function: str | None = None
-    size: int = 1
-    permuted: bool = False
+    type: ChannelType = word(TYPES, "What the channel holds.", noun="type", synonyms=TYPE_SYNONYMS)
+    weight: float = setting(WEIGHT, "Multiplies the squared differences of its normalised features.", 1.0)
+    bone: str | None = setting(
+        filled('a bone of the clips, such as "LeftFoot"'),
+        "The bone whose position, velocity, direction or orientation it is.",
+        None,
+        types=OF_BONES,
+        is_needed=True,
+    )
+    what: What | None = word(
+        WHATS, "What of the trajectory.", None, "feature of a trajectory", WHAT_SYNONYMS, types=("trajectory",), is_needed=True
+    )
+    at: tuple[float, ...] = setting(
+        numbers_within("seconds", MOST_SECONDS, "[0.33, 0.67, 1.0]"),
+        "When it looks, counted from the frame; below 0 is before it.",
+        (),
+        without="the frame itself",
+        types=(*OF_BONES, "phase", "custom", "trajectory"),
+    )
+    along: tuple[float, ...] = setting(
+        numbers_within("metres along the path", MOST_METRES, "[0.5, 1.0, 2.0]"),
+        "Where on the path it looks, counted from the frame, instead of `at`; below 0 is behind it.",
+        (),
+        without="none",
+        types=("trajectory",),
+    )
+    group: str | None = setting(
+        filled('a name, such as "feet"'), "Channels of one group share a scale of normalisation.", None, without="each its own"
+    )
+    axis: Axis | None = word(AXES, "Which of the bone's own axes.", None, "axis", without=f'"{DEFAULT_AXIS}"', types=("direction",))
+    relative_to: str | None = setting(
+        ANOTHER, "The bone that takes the place of the body.", None, without="the body", types=OF_BONES
+    )
+    feet: tuple[str, str] | None = setting(
+        FEET, "Whose footfalls.", None, without="the feet of the schema, else those that are detected", types=("phase",)
+    )
+    function: str | None = setting(
+        filled('the name of a function given to with_functions, such as "reach"'),
+        "The name of the function that computes it; see `FeatureSchema.with_functions`.",
+        None,
+        types=("custom",),
+        is_needed=True,
+    )
+    size: int = number(
+        "How many features the function gives.", 1, 1, MOST_FEATURES, "a whole number", 2, is_whole=True, types=("custom",)
+    )
+    permuted: bool = flag("Whether it looks ahead by the seconds of each permutation of a clip.", False, types=OF_BONES)
 
     @property
     def varies(self) -> bool:
@@ -208,137 +236,48 @@ class Channel:
 
 # ---- reading
 
+CHANNEL = settings_of(Channel)
+KEYS: dict[str, Settings] = {kind: settings_with(CHANNEL, kind) for kind in TYPES}
+"""The keys of a channel of each type."""
+
 
 def read_channel(section: Section, i: int, item: object) -> Channel | None:
     """Channel `i` of a section; None when it leaves a fault behind."""
     where = f"{section.where} channel {i + 1}"
     if not isinstance(item, Mapping):
         section.add(
-            f"{where} is {shown(as_toml(item))}: this is {what(item)}, not a table.", '{ type = "position", bone = "LeftFoot" }'
+            f"{where} is {safe_text(as_toml(item))}: this is {what(item)}, not a table.", '{ type = "position", bone = "LeftFoot" }'
         )
         return None
     n_faults = len(section.faults)
     kind = item.get("type")
-    part = Section(where, item, KEYS.get(kind, ANY_KEY) if isinstance(kind, str) else ANY_KEY, section.faults, section.file)
-    known = part.one_of("type", TYPES, "type", TYPE_SYNONYMS) if part.has("type", ", ".join(map(in_quotes, TYPES))) else None
-    weight, group = _read_weight(part), _read_group(part)
-    channel = READERS[known](part, cast(ChannelType, known), weight or 0.0, group) if known in READERS else None
-    return channel if len(section.faults) == n_faults else None
-
-
-def read_pair(section: Section, key: str, accepted: str) -> tuple[str, str] | None:
-    """A left and a right bone."""
-    value = section.part[key]
-    if is_pair(value):
-        return value[0], value[1]
-    section.wrong(key, "this is not a pair of bones", accepted)
-    return None
-
-
-def is_pair(value: object) -> TypeGuard[Sequence[str]]:
-    """Whether a value is a list of two different names."""
-    return (
-        isinstance(value, (list, tuple))
-        and len(value) == 2
-        and all(isinstance(name, str) and name for name in value)
-        and value[0] != value[1]
-    )
-
-
-def _bone_channel(part: Section, kind: ChannelType, weight: float, group: str | None) -> Channel | None:
-    accepted = 'a bone of the clips, such as "LeftFoot"'
-    bone = part.text("bone", accepted) if part.has("bone", accepted) else None
-    other = part.text("relative_to", 'another bone, such as "Hips"') if "relative_to" in part.part else None
-    if bone is not None and bone == other:
-        part.wrong("relative_to", "this is the bone itself", 'another bone, such as "Hips"')
-    axis = part.one_of("axis", AXES, "axis") if "axis" in part.part else DEFAULT_AXIS
-    at = _read_seconds(part)
-    permuted = _read_permuted(part)
-    if bone is None or at is None:
+    keys = KEYS.get(kind) if isinstance(kind, str) else None
+    part = Section(where, item, CHANNEL if keys is None else keys, section.faults, section.file)
+    values = part.values(settings_with(CHANNEL, "") if keys is None else keys)
+    _check_keys_together(part, kind)
+    if len(section.faults) > n_faults:
         return None
-    own = cast(Axis, axis) if kind == "direction" else None
-    return Channel(kind, weight, bone, None, at, (), group, own, relative_to=other, permuted=permuted)
+    return Channel(**({"axis": DEFAULT_AXIS} if kind == "direction" else {}) | values)
 
 
-def _read_permuted(part: Section) -> bool:
-    permuted = "permuted" in part.part and part.flag("permuted") is True
-    if permuted and "at" in part.part:
+def _check_keys_together(part: Section, kind: object) -> None:
+    given = part.part
+    if "bone" in given and given["bone"] == given.get("relative_to"):
+        part.wrong("relative_to", "this is the bone itself", ANOTHER.accepted)
+    if kind in OF_BONES and given.get("permuted") is True and "at" in given:
         part.add(
             f'{part.where} has both "at" and "permuted".', "one of them: a permuted channel looks ahead as its permutation does"
         )
-    return permuted
-
-
-def _permutation_time(part: Section, kind: ChannelType, weight: float, group: str | None) -> Channel | None:
-    return Channel(kind, weight, group=group)
-
-
-def _phase_channel(part: Section, kind: ChannelType, weight: float, group: str | None) -> Channel | None:
-    accepted = 'the left and the right bone, such as ["LeftFoot", "RightFoot"]'
-    feet = read_pair(part, "feet", accepted) if "feet" in part.part else None
-    at = _read_seconds(part)
-    return None if at is None else Channel(kind, weight, at=at, group=group, feet=feet)
-
-
-def _custom_channel(part: Section, kind: ChannelType, weight: float, group: str | None) -> Channel | None:
-    accepted = 'the name of a function given to with_functions, such as "reach"'
-    function = part.text("function", accepted) if part.has("function", accepted) else None
-    accepted = f"how many features the function gives, a whole number from 1 to {MOST_FEATURES}"
-    size = part.whole("size", accepted, 1, MOST_FEATURES) if "size" in part.part else 1
-    at = _read_seconds(part)
-    if function is None or size is None or at is None:
-        return None
-    return Channel(kind, weight, at=at, group=group, function=function, size=size)
-
-
-def _trajectory_channel(part: Section, kind: ChannelType, weight: float, group: str | None) -> Channel | None:
-    what = (
-        part.one_of("what", WHATS, "feature of a trajectory", WHAT_SYNONYMS)
-        if part.has("what", ", ".join(map(in_quotes, WHATS)))
-        else None
-    )
-    if ("at" in part.part) == ("along" in part.part):
-        both = "at" in part.part
-        found = f'{part.where} has both "at" and "along".' if both else f'{part.where} has neither "at" nor "along".'
-        part.add(found, "at = [seconds] or along = [metres], one of them")
-        return None
-    at = _read_seconds(part)
-    accepted = f"metres along the path, at most {MOST_METRES:g} away, such as [0.5, 1.0, 2.0]"
-    along = part.numbers("along", accepted, MOST_METRES) if "along" in part.part else ()
-    if what is None or at is None or along is None:
-        return None
-    return Channel(kind, weight, None, cast(What, what), at, along, group)
-
-
-Reader = Callable[[Section, ChannelType, float, str | None], Channel | None]
-READERS: dict[str | None, Reader] = {
-    **dict.fromkeys(("position", "velocity", "angular_velocity", "direction", "orientation"), _bone_channel),
-    "phase": _phase_channel,
-    "custom": _custom_channel,
-    "trajectory": _trajectory_channel,
-    "permutation_time": _permutation_time,
-}
-
-
-def _read_seconds(part: Section) -> tuple[float, ...] | None:
-    accepted = f"seconds, at most {MOST_SECONDS:g} away, such as [0.33, 0.67, 1.0]"
-    return part.numbers("at", accepted, MOST_SECONDS) if "at" in part.part else ()
-
-
-def _read_weight(part: Section) -> float | None:
-    return part.number("weight", f"from 0 to {MOST_WEIGHT:g}, such as 1.0", 0.0, MOST_WEIGHT) if "weight" in part.part else 1.0
-
-
-def _read_group(part: Section) -> str | None:
-    return part.text("group", 'a name, such as "feet"') if "group" in part.part else None
+    if kind == "trajectory" and ("at" in given) == ("along" in given):
+        amount = 'has both "at" and "along"' if "at" in given else 'has neither "at" nor "along"'
+        part.add(f"{part.where} {amount}.", "at = [seconds] or along = [metres], one of them")
 
 
 def require_weight(weight: object, what: str) -> float:
     """A weight that Python gives; MotionError for what is none."""
-    number = as_number(weight)
-    if number is None or not 0.0 <= number <= MOST_WEIGHT:
-        raise MotionError(Fault(f"{what} is {weight!r}.", f"a number from 0 to {MOST_WEIGHT:,.0f}"))
-    return number
+    if fault := WEIGHT.fault("", what, weight):
+        raise MotionError(fault)
+    return float(weight)  # type: ignore[arg-type]
 
 
 def check_together(section: Section, channels: Sequence[Channel], *, is_whole: bool) -> None:

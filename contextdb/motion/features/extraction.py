@@ -78,7 +78,7 @@ def clip_permutations(
     looping : bool
         The clip continues at its start when it ends: its path continues too, and does not run out straight.
     contacts : (left, right)
-        When each foot of the clip is down, as marks say it: see `Markup.contacts_of`. Default: this is found.
+        When each foot of the clip is down, as marks say it: see `Markup.contacts_of`. Default: this is detected.
 
     Raises
     ------
@@ -113,14 +113,14 @@ def clip_permutations(
         for channel in schema.channels
         if not channel.varies
     }
-    found = []
+    permutations = []
     for ahead_s in schema.permutation_s:
         for channel in schema.channels:
             if channel.varies:
                 blocks[channel.name] = _unbroken_features(channel, poses, path, schema, clip.name, marks, ahead_s)[own]
         features = np.concatenate([blocks[channel.name] for channel in schema.channels], axis=1).astype(np.float32)
-        found.append(ClipFeatures(clip.name, mirrored, features, root))
-    return found
+        permutations.append(ClipFeatures(clip.name, mirrored, features, root))
+    return permutations
 
 
 def features_of(clip: Clip, schema: FeatureSchema) -> Features:
@@ -172,9 +172,9 @@ def query_from(
         raise QueryError(Fault(f"there is no permutation {permutation} in [features.{schema.name}].", f"0 to {len(parts) - 1}"))
     features = parts[permutation].features
     if not 0 <= require_whole(frame, "frame") < len(features):
-        found = f"there is no frame {frame} in {clip.name}."
+        problem = f"there is no frame {frame} in {clip.name}."
         raise QueryError(
-            Fault(found, f"0 to {len(features) - 1}: it has {plural(len(features), 'frame')} at {schema.rate:g} a second")
+            Fault(problem, f"0 to {len(features) - 1}: it has {plural(len(features), 'frame')} at {schema.rate:g} a second")
         )
     return features[frame].copy() if wanted is None else with_path(schema, features[frame], wanted)
 
@@ -188,8 +188,10 @@ def with_path(schema: FeatureSchema, query: Features | Floats, wanted: Trajector
     require_kind(wanted, Trajectory, "wanted", "a Trajectory, such as steady_path(1.4)")
     if np.shape(query) != (schema.n_features,) or not 0 <= wanted.now < len(wanted.headings):
         n_frames = len(wanted.headings)
-        found = f"the query has shape {np.shape(query)}, and the path {plural(n_frames, 'frame')} and its present at {wanted.now}."
-        raise QueryError(Fault(found, f"a query of {schema.n_features} features, and a path that holds its present"))
+        problem = (
+            f"the query has shape {np.shape(query)}, and the path {plural(n_frames, 'frame')} and its present at {wanted.now}."
+        )
+        raise QueryError(Fault(problem, f"a query of {schema.n_features} features, and a path that holds its present"))
     changed = np.array(query, np.float32)
     write_paths(schema, changed[None], ManyTrajectories(wanted.rate, wanted.positions[None], wanted.headings[None], wanted.now))
     return changed
@@ -202,12 +204,12 @@ def _unbroken_features(
     parts = unbroken(path)
     if len(parts) == 1 or channel.type in ("phase", "custom"):
         return _channel_features(channel, poses, path, schema, clip, marks, ahead_s)
-    found = []
+    columns = []
     for own in parts:
         part = replace(poses, positions=poses.positions[own], rotations=poses.rotations[own])
         way = Trajectory(path.rate, path.positions[own], path.headings[own])
-        found.append(_channel_features(channel, part, way, schema, clip, marks, ahead_s))
-    return np.concatenate(found)
+        columns.append(_channel_features(channel, part, way, schema, clip, marks, ahead_s))
+    return np.concatenate(columns)
 
 
 def _channel_features(
@@ -220,12 +222,12 @@ def _channel_features(
         case "trajectory":
             return trajectory_features(channel, path, np.arange(poses.n_frames))
         case "phase":
-            found = phases(footfalls_of(poses, schema.foot_bones(channel.feet), marks), np.arange(poses.n_frames) / poses.rate)
+            values = phases(footfalls_of(poses, schema.foot_bones(channel.feet), marks), np.arange(poses.n_frames) / poses.rate)
         case "custom":
-            found = _custom_features(channel, poses, path, schema.functions, clip)
+            values = _custom_features(channel, poses, path, schema.functions, clip)
         case _:
-            found = _bone_features(channel, poses, path, ahead_s * poses.rate)
-    return found if not channel.at else np.concatenate([_moved(found, seconds * poses.rate) for seconds in channel.at], axis=1)
+            values = _bone_features(channel, poses, path, ahead_s * poses.rate)
+    return values if not channel.at else np.concatenate([_moved(values, seconds * poses.rate) for seconds in channel.at], axis=1)
 
 
 def block_of(channel: Channel, poses: Poses, path: Trajectory, schema: FeatureSchema) -> Floats:
@@ -331,19 +333,19 @@ def _custom_features(
     for array in (poses.positions, poses.rotations, path.positions, path.headings):
         array.flags.writeable = False
     try:
-        found = np.asarray(functions[channel.function](poses, path), np.float64)
+        values = np.asarray(functions[channel.function](poses, path), np.float64)
     except Exception as error:
-        said = f"channel {in_quotes(channel.name)}: its function failed: {type(error).__name__}: {error}."
-        raise MotionError(Fault(said, f"a float array of {poses.n_frames} x {channel.size}", place=place)) from error
-    if found.shape != (poses.n_frames, channel.size):
-        said = f"channel {in_quotes(channel.name)}: its function gives shape {found.shape}."
-        raise MotionError(Fault(said, f"{poses.n_frames} frames x {plural(channel.size, 'feature')}", place=place))
-    wrong = np.argwhere(~(np.abs(found) <= LARGEST_CUSTOM))
+        problem = f"channel {in_quotes(channel.name)}: its function failed: {type(error).__name__}: {error}."
+        raise MotionError(Fault(problem, f"a float array of {poses.n_frames} x {channel.size}", place=place)) from error
+    if values.shape != (poses.n_frames, channel.size):
+        problem = f"channel {in_quotes(channel.name)}: its function gives shape {values.shape}."
+        raise MotionError(Fault(problem, f"{poses.n_frames} frames x {plural(channel.size, 'feature')}", place=place))
+    wrong = np.argwhere(~(np.abs(values) <= LARGEST_CUSTOM))
     if len(wrong):
         frame, feature = wrong[0].tolist()
-        said = f"channel {in_quotes(channel.name)}: its function gives {found[frame, feature]} in frame {frame}."
-        raise MotionError(Fault(said, f"finite numbers, at most {LARGEST_CUSTOM:g}", place=place))
-    return found
+        problem = f"channel {in_quotes(channel.name)}: its function gives {values[frame, feature]} in frame {frame}."
+        raise MotionError(Fault(problem, f"finite numbers, at most {LARGEST_CUSTOM:g}", place=place))
+    return values
 
 
 # ---- checks
@@ -388,8 +390,8 @@ def _mirror_faults(skeleton: Skeleton, schema: FeatureSchema) -> Iterator[Fault]
         yield fault
     turned = [channel.name for channel in schema.channels if channel.type in ("direction", "orientation")]
     if turned and not own_axes.has_even_axes(skeleton, partners):
-        found = f"the bones' own axes are not mirror images of each other, so channel {in_quotes(turned[0])} cannot be mirrored."
-        yield Fault(found, "position, velocity, angular velocity, trajectory and phase, or no mirroring of this clip")
+        problem = f"the bones' own axes are not mirror images of each other, so channel {in_quotes(turned[0])} cannot be mirrored."
+        yield Fault(problem, "position, velocity, angular velocity, trajectory and phase, or no mirroring of this clip")
 
 
 def _check_size(poses: Poses, clip: Clip) -> None:
@@ -397,6 +399,6 @@ def _check_size(poses: Poses, clip: Clip) -> None:
     far = np.argwhere(~(np.abs(poses.positions).max(axis=-1) <= FARTHEST_M))
     if len(far):
         frame, joint = far[0].tolist()
-        found = f"bone {in_quotes(poses.skeleton.names[joint])} is more than {FARTHEST_M / 1000.0:,.0f} km away in frame {frame}."
+        problem = f"bone {in_quotes(poses.skeleton.names[joint])} is more than {FARTHEST_M / 1000.0:,.0f} km away in frame {frame}."
         accepted = f"positions of a body; one unit of the clip is taken to be {clip.metres_per_unit:g} m"
-        raise MotionError(Fault(found, accepted, place=Place(clip.name)))
+        raise MotionError(Fault(problem, accepted, place=Place(clip.name)))

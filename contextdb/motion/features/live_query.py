@@ -1,4 +1,4 @@
-"""A query from the pose that is shown: what the features of a body are now, from it and from the poses before.
+"""A query from the pose that is displayed: what the features of a body are now, from it and from the poses before.
 
 It is what `query_from` gives for the last frame of a clip that ends here: velocities are those since the pose before, and a path
 goes on straight ahead as it came. How much of the past a query needs follows from its schema:
@@ -76,7 +76,7 @@ class LivePose:
 
 
 class PoseHistory:
-    """The poses that were shown, the newest last.
+    """The poses that were displayed, the newest last.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ class PoseHistory:
         return self._positions[seen], self._rotations[seen], self._headings[seen]
 
     def plan(self, schema: FeatureSchema) -> _Plan:
-        """How a schema is asked of this rig; that of the last schema is kept."""
+        """How a schema is asked of this rig; that of the last schema is cached."""
         if self._planned is None or self._planned[0] is not schema:
             self._planned = schema, _plan(schema, self.skeleton, self.rate)
         return self._planned[1]
@@ -140,8 +140,8 @@ class PoseHistory:
             raise QueryError(Fault(f"the pose is {pose!r}.", "a Pose, or a LivePose")) from None
         n = self.skeleton.n_joints
         if positions.shape != (n, 3) or rotations.shape != (n, 4):
-            found = f"the pose has positions of shape {positions.shape} and rotations of shape {rotations.shape}."
-            raise QueryError(Fault(found, f"{plural(n, 'joint')}: ({n}, 3) and ({n}, 4)"))
+            problem = f"the pose has positions of shape {positions.shape} and rotations of shape {rotations.shape}."
+            raise QueryError(Fault(problem, f"{plural(n, 'joint')}: ({n}, 3) and ({n}, 4)"))
         try:
             self._positions[self._end], self._rotations[self._end] = positions, rotations
         except (TypeError, ValueError):
@@ -154,15 +154,15 @@ class PoseHistory:
 
 
 def query_from_pose(schema: FeatureSchema, pose: HasPose, history: PoseHistory) -> Features:
-    """A query: the features of a pose that is shown, wherever it comes from, and of the way it came.
+    """A query: the features of a pose that is displayed, wherever it comes from, and of the way it came.
 
     Parameters
     ----------
     schema : FeatureSchema
     pose : Pose or LivePose
-        What is shown now.
+        What is displayed now.
     history : PoseHistory
-        What was shown before. Add the pose to it afterwards.
+        What was displayed before. Add the pose to it afterwards.
 
     Returns
     -------
@@ -270,7 +270,7 @@ def _plan(schema: FeatureSchema, skeleton: Skeleton, rate: float) -> _Plan:
 
 
 def _frames_needed(schema: FeatureSchema, rate: float) -> int:
-    """How many poses a query looks at; for channels that need all there is, as many as can be kept."""
+    """How many poses a query looks at; for channels that need all there is, as many as can be stored."""
     if (
         any(c.along or c.type in ("phase", "custom") for c in schema.channels)
         or max(schema.facing_smooth_s, schema.root_smooth_s) > 0.0

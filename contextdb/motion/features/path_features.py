@@ -5,12 +5,18 @@ Q queries with a path each, P points of a path, N features.
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Sequence
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from contextdb import core
+from contextdb.cells.arguments import require_kind
+from contextdb.errors import Fault, QueryError, plural
+from contextdb.motion import arguments
 from contextdb.motion.clips.many_paths import ManyTrajectories
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.clips.trajectory import PathPoints, heading_vectors, to_own_frame
+from contextdb.motion.clips.trajectory import PathPoints, Trajectory, heading_vectors, to_own_frame
 from contextdb.motion.features.channels import What
 from contextdb.motion.features.schema import FeatureSchema
 
@@ -33,17 +39,44 @@ def point_features(what: What | None, origins: Floats, headings: Floats, points:
             return np.asarray(np.linalg.norm(points.velocities, axis=-1, keepdims=True))
 
 
-def write_paths(schema: FeatureSchema, queries: Floats | NDArray[np.float32], paths: ManyTrajectories) -> None:
-    """Write what the trajectory channels say of wished paths into queries [Q, N]; the pose stays.
+def with_paths(schema: FeatureSchema, queries: ArrayLike, wanted: ManyTrajectories | Sequence[Trajectory]) -> NDArray[np.float32]:
+    """Queries whose trajectories are wished ones instead; the poses stay. What `with_path` gives for each, for all at once.
 
-    All points of all channels are worked out together, once for each list of seconds or of metres.
+    Parameters
+    ----------
+    schema : FeatureSchema
+    queries : float array, shape (Q, N)
+        In the schema's units, such as `ControllerGroup.poses` or `MotionDatabase.raw_many` give them.
+    wanted : ManyTrajectories, or sequence of Q Trajectory
+        Where each body shall go, such as `steered_paths` gives it; its frame `now` is this moment. Single ones have one rate, one
+        length and one present.
+
+    Returns
+    -------
+    float32 array, shape (Q, N)
+        For `MotionDatabase.search_many`.
+
+    Raises
+    ------
+    QueryError
+        There is not one path for each query, or an argument cannot be used.
     """
-    origins, headings = paths.positions[:, paths.now, None], paths.headings[:, paths.now, None]
-    for seconds, metres, channels in schema.path_points:
-        points = paths.after_seconds(seconds) if seconds else paths.along(metres)
-        for what, columns in channels:
-            found = point_features(what, origins, headings, points)
-            queries[:, columns] = found.reshape(len(queries), columns.stop - columns.start)
+    require_kind(schema, FeatureSchema, "schema", "a FeatureSchema")
+    paths = wanted if isinstance(wanted, ManyTrajectories) else ManyTrajectories.of(wanted)
+    changed = arguments.array_of(queries, "the queries").astype(np.float32)
+    if changed.shape != (len(paths), schema.n_features):
+        problem = (
+            f"the queries have shape {changed.shape}, and there {'is' if len(paths) == 1 else 'are'} {plural(len(paths), 'path')}."
+        )
+        raise QueryError(Fault(problem, f"a path for each query of {plural(schema.n_features, 'feature')}"))
+    write_paths(schema, changed, paths)
+    return changed
+
+
+def write_paths(schema: FeatureSchema, queries: NDArray[np.float32], paths: ManyTrajectories) -> None:
+    """Write what the trajectory channels say of wished paths into queries [Q, N]; the pose stays."""
+    positions, headings = (np.ascontiguousarray(each, np.float64) for each in (paths.positions, paths.headings))
+    core.write_paths(positions, headings, paths.now, paths.rate, *schema.path_features, queries)
 
 
 def _direction_to_velocity(points: PathPoints) -> Floats:

@@ -6,25 +6,27 @@ channel holds.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from contextdb.cells.arguments import require_mapping, require_text
 from contextdb.cells.notebook import one_line
-from contextdb.errors import Fault, SchemaError, in_quotes, mend_for, plural, shown, some
-from contextdb.files.toml_shapes import Mapped, Section
-from contextdb.files.toml_text import as_toml, what
+from contextdb.errors import Fault, MotionError, SchemaError, in_quotes, mend_for, plural, some
+from contextdb.files.settings import Declared, Section, number, setting, settings_of
+from contextdb.files.toml_shapes import Mapped, Shape, filled, listed, nothing
+from contextdb.files.toml_text import what
 from contextdb.motion.clips.foot_bones import FootBones, Pair
 from contextdb.motion.clips.mirror import Pairs, pattern_fault
 from contextdb.motion.clips.poses import Poses
 from contextdb.motion.clips.prepared_root import prepared_path
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.clips.skeleton import Skeleton
+from contextdb.motion.clips.skeleton import Ints, Skeleton
 from contextdb.motion.clips.trajectory import Trajectory, root_trajectory
-from contextdb.motion.features.channels import Channel, What, check_together, is_pair, read_channel, read_pair
+from contextdb.motion.features.channels import FEET, WHATS, Channel, bone_pair, check_together, is_pair, read_channel
 from contextdb.motion.features.permutations import ACCEPTED, Permutations, read_permutations
 
 __all__ = ["Channel", "CustomFunction", "FeatureSchema"]
@@ -32,63 +34,85 @@ __all__ = ["Channel", "CustomFunction", "FeatureSchema"]
 CustomFunction = Callable[[Poses, Trajectory], Floats]
 """Makes the features of a custom channel, [F, size], of a body's poses and its path, both F frames at the schema's rate."""
 
-PathChannels = tuple[tuple[float, ...], tuple[float, ...], tuple[tuple[What | None, slice], ...]]
-
-SCHEMA_KEYS = (
-    "rate", "channels", "root", "facing", "facing_smooth_s", "root_smooth_s", "mirror", "feet", "heels", "toes", "permutations",
-)  # fmt: skip
 MOST_RATE = 1000.0
 ABOUT_S = 0.5
 """How fast a path goes is the mean of about so many seconds."""
-MOST_SMOOTH_S = 2.0
-A_FACING = 'the left and the right bone, such as ["LeftUpLeg", "RightUpLeg"]'
-A_FOOT = 'the left and the right bone, such as ["LeftFoot", "RightFoot"]'
-A_MIRROR = 'pairs of a left and a right bone, such as [["Left*", "Right*"]]'
+SEE_FEET = "See [feet](clips.md#feet-on-the-ground)."
+CHANNELS = listed('a list of channels, such as [{ type = "position", bone = "LeftFoot", weight = 1.0 }]', nothing)
+
+
+def _wrong_pair(value: object) -> str | None:
+    """What is wrong with a pair of names or patterns; whether a skeleton has the bones is asked when a clip is mirrored."""
+    return pattern_fault(value[0], value[1]) if is_pair(value) else "this is not a pair of different names"
+
+
+def _wrong_permutations(value: object) -> str | None:
+    return None if isinstance(value, (Mapping, Permutations)) else f"this is {what(value)}, not a table"
+
+
+def _smooth(about: str, **more: Any) -> Any:
+    return number(about, 0.0, 0.0, 2.0, "seconds", 0.2, **more)
 
 
 @dataclass(frozen=True)
-class FeatureSchema:
-    """What a search compares.
+class FeatureSchema(Declared, error=MotionError):
+    """What a search compares. `functions` compute its custom channels, by name: they are not part of contextdb.toml, see
+    `with_functions`.
 
-    Attributes
-    ----------
-    name : str
-    rate : float
-        Frames a second: clips are resampled to it.
-    channels : tuple of Channel
-    root : str, optional
-        The bone whose place on the ground is the body's. Default: the one above both thighs.
-    facing : (left bone, right bone), optional
-        The body faces across the line between them. Default: the sided pair of bones nearest the root, as a rule the thighs.
-    facing_smooth_s : float
-        Evens out the facing's sway with each step: the standard deviation in seconds of a Gaussian about each frame, which shifts
-        nothing in time. Default: 0, the facing as it is.
-    root_smooth_s : float
-        Above 0, the body's path is made from capture whose hips sway: ahead from the hips, sideways from the feet, heading by hips
-        and chest, and this is the standard deviation in seconds of what evens it out. Starts and stops stay when they are.
-        Default: 0, the hips as they are.
-    mirror : tuple of (left, right)
-        Pairs of bones that change places when a clip is mirrored; a `*` on both sides matches the same rest of the name.
-    feet, heels, toes : (left bone, right bone), optional
-        What touches the ground. Default: feet by their names, the toes below them, and heels worked out from both.
-    permutations : Permutations, optional
-        How often each clip is searched, and how far ahead its permuted channels look each time. Default: once, and none does.
-    functions : mapping of name to function
-        What custom channels are computed by. Not compared, and not part of contextdb.toml: see `with_functions`.
+    Raises
+    ------
+    MotionError
+        A value that is not accepted; all faults together.
     """
 
     name: str
-    rate: float
-    channels: tuple[Channel, ...]
-    root: str | None = None
-    facing: tuple[str, str] | None = None
-    facing_smooth_s: float = 0.0
-    root_smooth_s: float = 0.0
-    mirror: Pairs = ()
-    feet: Pair | None = None
-    heels: Pair | None = None
-    toes: Pair | None = None
-    permutations: Permutations | None = None
+    rate: float = number(
+        "To how many frames a second clips are resampled.", least=1.0, most=MOST_RATE, unit="frames a second", such_as=30.0
+    )
+    channels: tuple[Channel, ...] = setting(
+        CHANNELS, "The channels, each a table.", more="See [features](clips.md#features-what-is-compared) for their keys."
+    )
+    root: str | None = setting(
+        filled('a bone, such as "Hips"'),
+        "The bone whose place on the ground is the body's.",
+        None,
+        without="the bone above both thighs",
+    )
+    facing: tuple[str, str] | None = setting(
+        bone_pair('["LeftUpLeg", "RightUpLeg"]'),
+        "The left and the right bone across whose line the body faces.",
+        None,
+        without="the pair of bones nearest the root, as a rule the thighs",
+    )
+    facing_smooth_s: float = _smooth(
+        "Evens out the facing's sway with each step: the standard deviation of a Gaussian, which shifts nothing in time."
+    )
+    root_smooth_s: float = _smooth(
+        "Above 0 the body's path is made from hips that sway, and this is the standard deviation of what evens it out.",
+        more="See [root motion](preparing.md#root-motion).",
+    )
+    mirror: Pairs = setting(
+        replace(
+            listed('pairs of a left and a right bone, such as [["Left*", "Right*"]]', _wrong_pair),
+            read=lambda pairs: tuple(map(tuple, pairs)),
+        ),
+        "Pairs of bones that change places when a clip is mirrored; a `*` on both sides matches the same rest of the name.",
+        (),
+        more='For example `[["Left*", "Right*"]]`.',
+        without="none",
+    )
+    feet: Pair | None = setting(
+        FEET, "The left and the right bone that touch the ground.", None, without="by their names", more=SEE_FEET
+    )
+    heels: Pair | None = setting(FEET, "The left and the right heel.", None, without="worked out from feet and toes", more=SEE_FEET)
+    toes: Pair | None = setting(FEET, "The left and the right toe.", None, without="the bones below the feet", more=SEE_FEET)
+    permutations: Permutations | None = setting(
+        Shape(ACCEPTED, _wrong_permutations),
+        "Each clip is searched `count` times, with its permuted channels `from_s`, `from_s + step_s`, … seconds ahead.",
+        None,
+        more="See [permutations](choosing.md#a-moment-ahead-permutations).",
+        without="once",
+    )
     functions: Mapping[str, CustomFunction] = field(default_factory=dict, compare=False, repr=False)
 
     def __repr__(self) -> str:
@@ -112,13 +136,19 @@ class FeatureSchema:
         return {channel.name: slice(stop - channel.n_features, stop) for channel, stop in zip(self.channels, stops, strict=True)}
 
     @cached_property
-    def path_points(self) -> tuple[PathChannels, ...]:
-        """Where the trajectory channels look: seconds or metres, and what each channel that looks there says, with its slice."""
-        found: dict[tuple[tuple[float, ...], tuple[float, ...]], list[tuple[What | None, slice]]] = {}
+    def path_features(self) -> tuple[Floats, Ints]:
+        """How far the points of the trajectory channels are from a body, seconds or metres [P]; and of each whether it is metres,
+        what of it is a feature, and in which column: int64 [P, 3], as the core takes them."""
+        steps: list[float] = []
+        features: list[tuple[int, int, int]] = []
         for channel in self.channels:
-            if channel.type == "trajectory":
-                found.setdefault((channel.at, channel.along), []).append((channel.what, self.slices[channel.name]))
-        return tuple((at, along, tuple(channels)) for (at, along), channels in found.items())
+            if channel.type == "trajectory" and channel.what is not None:
+                points = [(0, step) for step in channel.at] + [(1, step) for step in channel.along]
+                part = self.slices[channel.name]
+                size = (part.stop - part.start) // len(points)
+                steps += [step for _, step in points]
+                features += [(is_along, WHATS.index(channel.what), part.start + i * size) for i, (is_along, _) in enumerate(points)]
+        return np.array(steps, np.float64), np.array(features, np.int64).reshape(-1, 3)
 
     @cached_property
     def speed_features(self) -> tuple[slice, float] | None:
@@ -191,8 +221,8 @@ class FeatureSchema:
         It is called on the mirrored poses and path for a mirrored clip, and for a query on those of the query's clip. Raises
         SchemaError where no channel asks for a name; the nearest that one does ask for is reported.
         """
-        asked = [channel.function for channel in self.channels if channel.function is not None]
-        faults = [_unasked(name, asked, self.name) for name in functions if name not in asked]
+        names = [channel.function for channel in self.channels if channel.function is not None]
+        faults = [_unasked(name, names, self.name) for name in functions if name not in names]
         if faults:
             raise SchemaError(*faults)
         return replace(self, functions={**self.functions, **functions})
@@ -205,38 +235,31 @@ class FeatureSchema:
         faults: list[Fault] = []
         require_text(name, "name")
         require_mapping(mapping, "mapping", 'a mapping such as {"rate": 30, "channels": [...]}')
-        schema = _read_schema(cls, name, mapping, faults, file)
+        section = Section(f"[features.{name}]", mapping, SCHEMA, faults, file)
+        values = section.values(SCHEMA)
+        given = values.get("channels", ())
+        read = [read_channel(section, i, item) for i, item in enumerate(given)]
+        channels = tuple(channel for channel in read if channel is not None)
+        check_together(section, channels, is_whole=0 < len(channels) == len(given))
+        if "permutations" in values:
+            values["permutations"] = read_permutations(section, values["permutations"])
+        if not faults:
+            _check_permuted(section, channels, values.get("permutations"))
         if faults:
             raise SchemaError(*faults)
-        assert schema is not None, "a schema that cannot be read leaves a fault"
-        return schema
+        return cls(name, **values | {"channels": channels})
 
 
-def _unasked(name: str, asked: list[str], schema: str) -> Fault:
-    accepted = some(asked) or 'the name in a channel { type = "custom", function = "…" }'
-    return Fault(f"no channel of [features.{schema}] has function = {in_quotes(name)}.", accepted, mend_for(name, asked))
+SCHEMA = settings_of(FeatureSchema)
+"""The keys of `[features.NAME]`."""
 
 
-def _read_schema(
-    cls: type[FeatureSchema], name: str, mapping: Mapped, faults: list[Fault], file: str | None
-) -> FeatureSchema | None:
-    section = Section(f"[features.{name}]", mapping, SCHEMA_KEYS, faults, file)
-    accepted = f"frames a second, from 1 to {MOST_RATE:g}, such as 30.0"
-    rate = section.number("rate", accepted, 1.0, MOST_RATE) if section.has("rate", accepted) else None
-    channels = _read_channels(section)
-    root = section.text("root", 'a bone, such as "Hips"') if "root" in mapping else None
-    facing = read_pair(section, "facing", A_FACING) if "facing" in mapping else None
-    facing_s, root_s = (_read_smooth(section, key) if key in mapping else 0.0 for key in ("facing_smooth_s", "root_smooth_s"))
-    mirror = _read_mirror(section) if "mirror" in mapping else ()
-    feet, heels, toes = (read_pair(section, key, A_FOOT) if key in mapping else None for key in ("feet", "heels", "toes"))
-    permutations = read_permutations(section) if "permutations" in mapping else None
-    if faults or rate is None or facing_s is None or root_s is None:
-        return None
-    _check_permuted(section, channels, permutations)
-    return cls(name, rate, tuple(channels), root, facing, facing_s, root_s, mirror, feet, heels, toes, permutations)
+def _unasked(name: str, names: list[str], schema: str) -> Fault:
+    accepted = some(names) or 'the name in a channel { type = "custom", function = "…" }'
+    return Fault(f"no channel of [features.{schema}] has function = {in_quotes(name)}.", accepted, mend_for(name, names))
 
 
-def _check_permuted(section: Section, channels: list[Channel], permutations: Permutations | None) -> None:
+def _check_permuted(section: Section, channels: Sequence[Channel], permutations: Permutations | None) -> None:
     """Leave a fault where channels look ahead by permutations that there are not, or permutations are all alike."""
     varying = [channel.name for channel in channels if channel.varies]
     if varying and permutations is None:
@@ -245,36 +268,3 @@ def _check_permuted(section: Section, channels: list[Channel], permutations: Per
         section.add(
             f"{section.where} has permutations, but no channel looks ahead by them.", "permuted = true in a channel of a bone"
         )
-
-
-def _read_smooth(section: Section, key: str) -> float | None:
-    return section.number(key, f"seconds, from 0 to {MOST_SMOOTH_S:g}, such as 0.2", 0.0, MOST_SMOOTH_S)
-
-
-def _read_mirror(section: Section) -> Pairs:
-    """The pairs of names or patterns; whether a skeleton has the bones is asked when a clip is mirrored."""
-    value = section.part["mirror"]
-    if not isinstance(value, (list, tuple)) or not value:
-        why = "the list is empty" if isinstance(value, (list, tuple)) else f"this is {what(value)}, not a list"
-        section.wrong("mirror", why, A_MIRROR)
-        return ()
-    for i, item in enumerate(value):
-        why = pattern_fault(item[0], item[1]) if is_pair(item) else "this is not a pair of different names"
-        if why:
-            section.add(f"{section.where} mirror pair {i + 1} is {shown(as_toml(item))}: {why}.", A_MIRROR)
-    return tuple((item[0], item[1]) for item in value if is_pair(item))
-
-
-def _read_channels(section: Section) -> list[Channel]:
-    accepted = 'a list of channels, such as [{ type = "position", bone = "LeftFoot", weight = 1.0 }]'
-    if not section.has("channels", accepted):
-        return []
-    value = section.part["channels"]
-    if not isinstance(value, (list, tuple)) or not value:
-        why = "the list is empty" if isinstance(value, (list, tuple)) else f"this is {what(value)}, not a list"
-        section.wrong("channels", why, accepted)
-        return []
-    read = [read_channel(section, i, item) for i, item in enumerate(value)]
-    channels = [channel for channel in read if channel is not None]
-    check_together(section, channels, is_whole=len(channels) == len(value))
-    return channels

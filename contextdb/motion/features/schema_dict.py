@@ -7,7 +7,7 @@ from dataclasses import asdict, fields
 
 from contextdb.motion.features.channels import KEYS, Channel
 from contextdb.motion.features.permutations import Permutations
-from contextdb.motion.features.schema import SCHEMA_KEYS, FeatureSchema
+from contextdb.motion.features.schema import SCHEMA, FeatureSchema
 
 WEIGHING = ("weight", "group")
 """The keys of a channel that change no feature, only what a difference costs."""
@@ -15,7 +15,7 @@ WEIGHING = ("weight", "group")
 
 def schema_to_dict(schema: FeatureSchema) -> dict[str, object]:
     """The keys of a schema, and their values as JSON and TOML have them; its name and its functions are not among them."""
-    given = {key: _plain(value) for key, value in _given(schema) if key in SCHEMA_KEYS}
+    given = {key: _plain(value) for key, value in _given(schema) if key in SCHEMA}
     return {**given, "channels": [_channel_to_dict(channel) for channel in schema.channels]}
 
 

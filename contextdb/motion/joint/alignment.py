@@ -39,5 +39,5 @@ def aligned(recorded: Floats, places: Floats, gives: Floats) -> Floats:
 
 def moved(place: Floats, wanted: Floats) -> RootMotion:
     """The movement that brings a body from its place to another one, the shorter way round."""
-    found = between(RootMotion(*place.tolist()), RootMotion(*wanted.tolist()))
-    return RootMotion(found.left_m, found.ahead_m, float(np.remainder(found.turn_rad + np.pi, 2.0 * np.pi) - np.pi))
+    correction = between(RootMotion(*place.tolist()), RootMotion(*wanted.tolist()))
+    return RootMotion(correction.left_m, correction.ahead_m, float(np.remainder(correction.turn_rad + np.pi, 2.0 * np.pi) - np.pi))

@@ -1,7 +1,7 @@
-"""Joint frames in boxes of 16, beside the boxes of the motion database, for the compiled joint search.
+"""Joint frames in boxes of 8, beside the boxes of the motion database, as the core searches them.
 
 Each role's range has as many frames as the others', so box i of a joint range is box i of the range of each role, and its lanes are
-the same joint frames. B joint boxes, K roles, P ordered pairs of roles, 16 lanes.
+the same joint frames. B joint boxes, K roles, P ordered pairs of roles, F features of a role, 8 lanes.
 """
 
 from __future__ import annotations
@@ -18,14 +18,16 @@ from contextdb.motion.search.layout import LANES, Features
 
 class JointBoxes(NamedTuple):
     """The joint boxes of a database, B of K roles: `boxes` int64 [B, K], that of each role in the motion database; `ranges`,
-    `firsts` and `sizes` int64 [B], the joint range, the first joint frame, and how many frames there are; `relative` float32 [B, P,
-    4, 16], what roles see of each other, where a box of fewer frames repeats its last one; `lows` and `highs` float32 [P, 4, B],
-    the bounds of that."""
+    `firsts` and `sizes` int64 [B], the joint range, the first joint frame, and how many frames there are; `own_lows` and
+    `own_highs` float32 [K, F, B], the bounds of each role's features; `relative` float32 [B, P, 4, 8], what roles see of each
+    other, where a box of fewer frames repeats its last one; `lows` and `highs` float32 [P, 4, B], the bounds of that."""
 
     boxes: Ints
     ranges: Ints
     firsts: Ints
     sizes: Ints
+    own_lows: Features
+    own_highs: Features
     relative: Features
     lows: Features
     highs: Features
@@ -40,15 +42,25 @@ def boxes_of(joint: JointDatabase) -> JointBoxes:
     sizes = np.minimum(LANES, joint.lengths[ranges] - LANES * within)
     frames = firsts[:, None] + np.minimum(np.arange(LANES), sizes[:, None] - 1)
     relative = joint.relative[:, frames].transpose(1, 0, 3, 2)
-    bounds = [np.ascontiguousarray(each.transpose(1, 2, 0)) for each in (relative.min(axis=3), relative.max(axis=3))]
-    n_pairs = len(joint.pairs)
     boxes = layout.range_boxes[joint.ranges[ranges], 0] + within[:, None]
-    own = np.ascontiguousarray(relative).reshape(-1, n_pairs, N_RELATIVE, LANES)
-    return JointBoxes(np.ascontiguousarray(boxes, np.int64), ranges, firsts, sizes.astype(np.int64), own, bounds[0], bounds[1])
+    own = layout.blocks[boxes][:, :, layout.rank]
+    parts = own.min(axis=3), own.max(axis=3), relative.min(axis=3), relative.max(axis=3)
+    own_lows, own_highs, lows, highs = (np.ascontiguousarray(each.transpose(1, 2, 0)) for each in parts)
+    return JointBoxes(
+        np.ascontiguousarray(boxes, np.int64),
+        ranges,
+        firsts,
+        sizes.astype(np.int64),
+        own_lows,
+        own_highs,
+        np.ascontiguousarray(relative).reshape(-1, len(joint.pairs), N_RELATIVE, LANES),
+        lows,
+        highs,
+    )
 
 
 def in_boxes(boxes: JointBoxes, values: Floats) -> Floats:
-    """A number of each joint frame [M] in boxes, inf in lanes without a frame: [B, 16]."""
+    """A number of each joint frame [M] in boxes, inf in lanes without a frame: [B, 8]."""
     lanes = np.arange(LANES)
     frames = boxes.firsts[:, None] + np.minimum(lanes, boxes.sizes[:, None] - 1)
     return np.where(lanes < boxes.sizes[:, None], values[frames], np.inf)

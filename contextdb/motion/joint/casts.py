@@ -16,6 +16,7 @@ from contextdb import bitmask
 from contextdb.cells.arguments import require_many, require_mapping
 from contextdb.errors import Fault, QueryError, in_quotes, some
 from contextdb.motion import arguments
+from contextdb.motion.answers import Answer, has_casts, is_answer
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.joint.database import JointDatabase
 from contextdb.motion.search.table_ranges import TableRanges
@@ -62,7 +63,7 @@ class CastMaker:
         `actors` are all there are, for casts that neither the answer nor the game lists.
         """
         listed = None if casts is None else _read_casts(casts, self.joint.roles)
-        if hasattr(valid, "table_assets") and not hasattr(valid, "lists"):
+        if is_answer(valid):
             return self._of_answer(valid, listed, actors)
         if listed is None:
             listed = list(permutations(actors, len(self.joint.roles)))
@@ -70,9 +71,9 @@ class CastMaker:
         flags = np.ones(n_ranges, np.bool_) if valid is None else arguments.flags_of(valid, n_ranges, "valid", "joint range")
         return Casts(listed, np.broadcast_to(np.where(flags, 0.0, np.inf), (len(listed), n_ranges)))
 
-    def _of_answer(self, answer: Any, listed: list[Cast] | None, actors: Sequence[Hashable]) -> Casts:
+    def _of_answer(self, answer: Answer, listed: list[Cast] | None, actors: Sequence[Hashable]) -> Casts:
         mirrored = self.joint.mirrored
-        seen = answer.mirrored if mirrored.any() and hasattr(answer, "mirrored") else answer
+        seen = answer.mirrored if mirrored.any() else answer
         both = [_rows_of_casts(answer, self.joint.roles, listed, actors)]
         both.append(_rows_of_casts(seen, self.joint.roles, listed, actors) if seen is not answer else both[0])
         every = list(dict.fromkeys([*both[0], *both[1]]))
@@ -97,11 +98,11 @@ def _rows_of_casts(
 ) -> dict[Cast, tuple[int, Floats | None]]:
     """The rows of each cast, as bits, and what rows cost with it: by the castings of an answer to a query with actors, else those
     of the answer for every cast."""
-    if not hasattr(answer, "casts"):
+    if not has_casts(answer):
         every = list(permutations(actors, len(roles))) if listed is None else listed
-        return dict.fromkeys(every, (answer.bits, answer.penalties if answer.has_penalties else None))
+        return dict.fromkeys(every, (bitmask.to_int(answer.mask), answer.penalties if answer.has_penalties else None))
     wanted = None if listed is None else set(listed)
-    found: dict[Cast, tuple[int, Floats | None]] = {}
+    rows: dict[Cast, tuple[int, Floats | None]] = {}
     known: dict[int, Hashable] = {}
     for cast, bits, penalties in answer.casts(roles):
         for actor, role in zip(cast, roles, strict=True):
@@ -109,20 +110,20 @@ def _rows_of_casts(
                 known[id(actor)] = _id_of(actor, role)
         key = tuple([known[id(actor)] for actor in cast])
         if wanted is None or key in wanted:
-            found[key] = bits, penalties
-    return found
+            rows[key] = bits, penalties
+    return rows
 
 
-def _costs_of_rows(found: Mapping[Cast, tuple[int, Floats | None]], every: Sequence[Cast], answer: Any) -> Floats:
+def _costs_of_rows(rows: Mapping[Cast, tuple[int, Floats | None]], every: Sequence[Cast], answer: Any) -> Floats:
     """What each row costs with each of some casts, inf where it may not be: float64 [C, n_rows]."""
     n_rows = len(answer.table_assets)
     n_bytes = 8 * bitmask.n_words(n_rows)
     nowhere = 0, None
-    octets = b"".join(found.get(cast, nowhere)[0].to_bytes(n_bytes, "little") for cast in every)
+    octets = b"".join(rows.get(cast, nowhere)[0].to_bytes(n_bytes, "little") for cast in every)
     masks = np.frombuffer(octets, "<u8").astype(np.uint64).reshape(len(every), n_bytes // 8)
     costs = np.where(bitmask.unpack(masks, n_rows), 0.0, np.inf)
     for i, cast in enumerate(every):
-        penalties = found.get(cast, nowhere)[1]
+        penalties = rows.get(cast, nowhere)[1]
         if penalties is not None:
             costs[i] += penalties
     return costs
@@ -131,15 +132,17 @@ def _costs_of_rows(found: Mapping[Cast, tuple[int, Floats | None]], every: Seque
 def _id_of(actor: Mapping[str, Any], role: str) -> Hashable:
     known = actor.get("id")
     if known is None or not isinstance(known, Hashable):
-        told = "has no id" if known is None else f"has the id {known!r}"
-        raise QueryError(Fault(f"an actor offered for {in_quotes(role)} {told}.", 'an "id" by which its query and place are given'))
+        id_text = "has no id" if known is None else f"has the id {known!r}"
+        raise QueryError(
+            Fault(f"an actor offered for {in_quotes(role)} {id_text}.", 'an "id" by which its query and place are given')
+        )
     return known
 
 
 def _read_casts(casts: object, roles: Sequence[str]) -> list[Cast]:
     """Casts that a game lists: mappings of all roles to different actors, each once."""
     accepted = "a list of mappings of each role to an actor, such as {" + ", ".join(f"{in_quotes(r)}: …" for r in roles) + "}"
-    found: dict[Cast, None] = {}
+    distinct: dict[Cast, None] = {}
     for cast in require_many(casts, "casts", accepted):
         given = require_mapping(cast, "one of casts", accepted)
         if set(given) != set(roles):
@@ -147,5 +150,5 @@ def _read_casts(casts: object, roles: Sequence[str]) -> list[Cast]:
         actors = tuple(given[role] for role in roles)
         if not all(isinstance(actor, Hashable) for actor in actors) or len(set(actors)) < len(actors):
             raise QueryError(Fault(f"a cast has the actors {actors!r}.", "a different one for each role"))
-        found[actors] = None
-    return list(found)
+        distinct[actors] = None
+    return list(distinct)

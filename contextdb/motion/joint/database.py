@@ -93,19 +93,19 @@ class JointDatabase:
             faults.append(Fault("the root motion of a frame is not finite.", "finite numbers"))
         if faults:
             raise MotionError(*faults)
-        found: dict[tuple[str, bool, int], dict[str, int]] = {}
+        groups: dict[tuple[str, bool, int], dict[str, int]] = {}
         for i, (name, mirrored) in enumerate(zip(database.assets, database.mirrored.tolist(), strict=True)):
             asset, role = divided(name, names)
-            found.setdefault((asset, mirrored, i % database.n_permutations), {})[role] = i
-        if one_sided := [asset for (asset, _, _), each in found.items() if len(each) < len(names)]:
-            told = f"the joint asset {in_quotes(one_sided[0])} is mirrored for some of its roles alone."
-            raise MotionError(Fault(told, "all clips of an asset mirrored, or none", rule="roles"))
-        ranges = np.array([[each[role] for role in names] for each in found.values()], np.int64).reshape(-1, len(names))
+            groups.setdefault((asset, mirrored, i % database.n_permutations), {})[role] = i
+        if one_sided := [asset for (asset, _, _), each in groups.items() if len(each) < len(names)]:
+            problem = f"the joint asset {in_quotes(one_sided[0])} is mirrored for some of its roles alone."
+            raise MotionError(Fault(problem, "all clips of an asset mirrored, or none", rule="roles"))
+        ranges = np.array([[each[role] for role in names] for each in groups.values()], np.int64).reshape(-1, len(names))
         return cls(
             database,
             names,
-            tuple(asset for asset, _, _ in found),
-            np.array([mirrored for _, mirrored, _ in found], np.bool_),
+            tuple(asset for asset, _, _ in groups),
+            np.array([mirrored for _, mirrored, _ in groups], np.bool_),
             ranges,
             require_weight(place_weight, "place_weight"),
             require_weight(facing_weight, "facing_weight"),
@@ -217,7 +217,7 @@ def joint_faults(names: Sequence[str], lengths: Sequence[int], roles: Sequence[s
     if role_fault(roles):
         yield Fault(f"the roles are {some(roles) or 'none'}.", "two names or more, each once and without a dot", rule="roles")
         return
-    found: dict[str, dict[str, int]] = {}
+    clips_of_asset: dict[str, dict[str, int]] = {}
     for name, length in zip(names, lengths, strict=True):
         asset, role = divided(name, roles)
         if not role:
@@ -226,15 +226,15 @@ def joint_faults(names: Sequence[str], lengths: Sequence[int], roles: Sequence[s
             mend = f"{name.rpartition('.')[0]}.{near}" if near else ""
             yield Fault(f"the clip {in_quotes(name)} is of no role.", f"names such as {name}.{roles[0]}", mend, rule="roles")
         else:
-            found.setdefault(asset, {})[role] = length
-    for asset, clips in found.items():
+            clips_of_asset.setdefault(asset, {})[role] = length
+    for asset, clips in clips_of_asset.items():
         if missing := [role for role in roles if role not in clips]:
             there = f"a clip for each role: {', '.join(f'{asset}.{role}' for role in roles)}"
             yield Fault(f"the joint asset {in_quotes(asset)} has no clip for {some(missing)}.", there, rule="roles")
         elif len(set(clips.values())) > 1:
-            told = ", ".join(f"{role} {plural(clips[role], 'frame')}" for role in roles)
+            role_lengths = ", ".join(f"{role} {plural(clips[role], 'frame')}" for role in roles)
             yield Fault(
-                f"the clips of the joint asset {in_quotes(asset)} differ in length: {told}.",
+                f"the clips of the joint asset {in_quotes(asset)} differ in length: {role_lengths}.",
                 "clips that were recorded together, cut at the same frames",
                 rule="roles",
             )

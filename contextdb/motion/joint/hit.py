@@ -75,8 +75,8 @@ class JointHit:
         roles = [f"{actor} as {role} ({math.fsum(self.costs[role].values()):.4f})" for role, actor in self.cast.items()]
         when = f"frame {self.frame}" if self.time_s is None else f"{self.time_s:.2f} s"
         side = " mirrored" if self.mirrored else ""
-        told = f"{', '.join(roles[:-1])} and {roles[-1]} enter {self.asset}{side} together at {when}, at cost {self.cost:.4f}"
-        return f"{told}: {self.why}" if len(self.searches) > 1 else f"{told}."
+        text = f"{', '.join(roles[:-1])} and {roles[-1]} enter {self.asset}{side} together at {when}, at cost {self.cost:.4f}"
+        return f"{text}: {self.why}" if len(self.searches) > 1 else f"{text}."
 
     def explain(self) -> str:
         """The choice in lines for people: who plays what from when, what each role costs and by what, and what is to be made up."""
@@ -89,8 +89,8 @@ class JointHit:
         for role, actor in self.cast.items():
             own = self.costs[role]
             dearest = sorted(own, key=lambda name: -own[name])[:3]
-            told = ", ".join(f"{name} {own[name]:.4f}" for name in dearest)
-            lines.append(f"  {role} is {actor}: cost {math.fsum(own.values()):.4f} ({told}{', …' if len(own) > 3 else ''})")
+            costs = ", ".join(f"{name} {own[name]:.4f}" for name in dearest)
+            lines.append(f"  {role} is {actor}: cost {math.fsum(own.values()):.4f} ({costs}{', …' if len(own) > 3 else ''})")
             way = self.alignment[role]
             lines.append(f"    to make up: {_sided(way)}")
         if self.bias:

@@ -9,40 +9,37 @@ Source: "Casting" in EA's talk, extended to the frame; Unreal's Pose Search inte
 
 from __future__ import annotations
 
-import math
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
-from types import ModuleType
+from functools import cached_property
 from typing import Any, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from contextdb.cells.arguments import as_number, require_kind, require_many_of, require_mapping, require_whole
+from contextdb.core import search_joint
 from contextdb.errors import ContextError, Fault, MotionError, QueryError, in_quotes, nearest, no_such, some
 from contextdb.motion.clips.ground_place import A_BODY, GroundPlace, OfBody, place_of
 from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.features.extraction import FARTHEST_M
-from contextdb.motion.joint import scan
 from contextdb.motion.joint.alignment import aligned, moved
 from contextdb.motion.joint.boxes import boxes_of, in_boxes
 from contextdb.motion.joint.casts import CastMaker, Casts
 from contextdb.motion.joint.database import FACING, PLACE, JointDatabase, seen_by
 from contextdb.motion.joint.hit import JointHit, nothing
-from contextdb.motion.joint.scan import Asked
 from contextdb.motion.markup.left_out import LeftOut, Skip
 from contextdb.motion.markup.marks import TagFilter
 from contextdb.motion.search import cost
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.hit import NOTHING, Hit
-from contextdb.motion.search.searcher import compile_loop
 from contextdb.motion.selection.choice import Choice
 from contextdb.motion.selection.selector import Entry, Selector, choice_of
 
 Queries = Mapping[Any, ArrayLike]
 Places = Mapping[Any, OfBody]
-Found = tuple[float, int, int]
+Least = tuple[float, int, int]
 """A total, its joint frame and its cast; inf, -1, -1 for none."""
 MOST_TAGS = 64
 CASTS_AT_ONCE = 512
@@ -94,8 +91,8 @@ class JointSearcher:
         self.selector = Selector([Entry(name, each.database, limits.get(name)) for name, each in self.databases.items()])
         roles = {joint.roles for joint in self.databases.values()}
         if len(roles) > 1:
-            told = "; ".join(f"{in_quotes(name)} {', '.join(joint.roles)}" for name, joint in self.databases.items())
-            raise MotionError(Fault(f"the databases have different roles: {told}.", "the same roles, in the same order"))
+            roles_text = "; ".join(f"{in_quotes(name)} {', '.join(joint.roles)}" for name, joint in self.databases.items())
+            raise MotionError(Fault(f"the databases have different roles: {roles_text}.", "the same roles, in the same order"))
         self.roles = roles.pop()
         self._engines = {name: _Engine(joint, self.selector.databases[name]) for name, joint in self.databases.items()}
 
@@ -129,14 +126,14 @@ class JointSearcher:
         QueryError
             An actor of a cast without a query, place or id; a query or place that is not finite; anything that does not fit.
         """
-        found: dict[str, tuple[_Question, Found]] = {}
+        results: dict[str, tuple[_Question, Least]] = {}
         hits: dict[str, Hit] = {}
         stopped = None
         for entry in self.selector.entries:
             engine = self._engines[entry.name]
             question = engine.question(queries, places, **self._of_database(entry.name, options))
             total, frame, cast = engine.least(question)
-            found[entry.name] = question, (total, frame, cast)
+            results[entry.name] = question, (total, frame, cast)
             hits[entry.name] = engine.hit(total, frame)
             if entry.threshold is not None and total < entry.threshold:
                 stopped = entry.name
@@ -144,8 +141,8 @@ class JointSearcher:
         choice = choice_of(self.selector.entries, hits, frozenset(self.databases), stopped)
         if choice.database is None:
             return nothing(choice)
-        question, (total, frame, cast) = found[choice.database]
-        return self._engines[choice.database].told(choice.database, question, total, frame, cast, choice)
+        question, (total, frame, cast) = results[choice.database]
+        return self._engines[choice.database].hit_of(choice.database, question, total, frame, cast, choice)
 
     def candidates(self, queries: Queries, places: Places, k: int = 10, **options: Unpack[JointOptions]) -> tuple[JointHit, ...]:
         """The best frame of each clip with each cast, the k cheapest of all databases, cheapest first.
@@ -155,30 +152,48 @@ class JointSearcher:
         """
         if require_whole(k, "k") < 0:
             raise QueryError(Fault(f"k is {k}.", "a whole number from 0 up"))
-        found: list[tuple[float, int, int, int, str, _Question]] = []
+        rows: list[tuple[float, int, int, int, str, _Question]] = []
         for i, (name, engine) in enumerate(self._engines.items()):
             question = engine.question(queries, places, **self._of_database(name, options))
             each = [(total, i, frame, cast, name, question) for total, frame, cast in engine.best_of_each(question)]
-            found += sorted(each, key=lambda one: one[:4])[:k]
-        best = sorted(found, key=lambda one: one[:4])[:k]
-        return tuple(self._engines[name].told(name, question, total, frame, cast) for total, _, frame, cast, name, question in best)
+            rows += sorted(each, key=lambda one: one[:4])[:k]
+        best = sorted(rows, key=lambda one: one[:4])[:k]
+        return tuple(
+            self._engines[name].hit_of(name, question, total, frame, cast) for total, _, frame, cast, name, question in best
+        )
 
     def _of_database(self, name: str, options: JointOptions) -> dict[str, Any]:
         """The options for one database; a mapping of databases leaves those that it does not name unrestricted."""
-        found: dict[str, Any] = {**options}
+        own_options: dict[str, Any] = {**options}
         for key, nothing_said in (("valid", None), ("bias", None), ("skip", ())):
             of_each = options.get(key)
             if isinstance(of_each, Mapping):
                 self.selector.among(of_each)
-                found[key] = of_each.get(name, nothing_said)
-        return found
+                own_options[key] = of_each.get(name, nothing_said)
+        return own_options
+
+
+@dataclass(frozen=True, eq=False)
+class JointInputs:
+    """What one joint search of one database compares; A actors, C casts, J joint ranges, K roles, M joint frames.
+
+    `queries` float64 [A, F] are of each actor, normalised; `seen` float64 [A, A, 4] is what each sees of each other, in the units
+    of costs; `casts` int64 [C, K] the actor of each role; `range_biases` float64 [C, J] what the soft cells of the table cost with
+    each cast in each joint range, inf where it may not play; `frame_biases` float64 [M] is inf where a frame may not be chosen.
+    """
+
+    queries: Floats
+    seen: Floats
+    casts: Ints
+    range_biases: Floats
+    frame_biases: Floats
 
 
 @dataclass(frozen=True, eq=False)
 class _Question:
     """One search of one database: what is compared, and who the actors are."""
 
-    asked: Asked
+    inputs: JointInputs
     casts: Casts
     places: Floats
     """Of each actor of a cast: [A, 3]."""
@@ -211,45 +226,52 @@ class _Engine:
         require_mapping(queries, "queries", "a mapping of actors to queries")
         require_kind(tags, (TagFilter, type(None)), "tags", "a TagFilter, or None")
         require_kind(in_match_range, bool, "in_match_range", "True or False")
-        found = self._casts.make(valid, casts, list(queries))
-        actors = list(dict.fromkeys(actor for cast in found.listed for actor in cast))
+        allowed = self._casts.make(valid, casts, list(queries))
+        actors = list(dict.fromkeys(actor for cast in allowed.listed for actor in cast))
         wanted = self._normalised(queries, actors)
         where = places_of(places, actors)
         numbers = {actor: i for i, actor in enumerate(actors)}
-        cast_numbers = np.array([[numbers[actor] for actor in cast] for cast in found.listed], np.int64)
+        cast_numbers = np.array([[numbers[actor] for actor in cast] for cast in allowed.listed], np.int64)
         frame_biases, box_biases = self._frame_biases(tags, in_match_range, bias, skip)
-        asked = Asked(
+        inputs = JointInputs(
             wanted,
             seen_by(where[:, None], where[None, :]),
             cast_numbers.reshape(-1, len(self.joint.roles)),
-            found.biases,
+            allowed.biases,
             frame_biases,
         )
-        return _Question(asked, found, where, _gives_of(gives, self.joint.roles), box_biases)
+        return _Question(inputs, allowed, where, _gives_of(gives, self.joint.roles), box_biases)
 
-    def least(self, question: _Question) -> Found:
+    def least(self, question: _Question) -> Least:
         """The lowest total, its joint frame and cast; inf, -1, -1 for none."""
-        asked, kernels = question.asked, load_kernels()
-        if not len(asked.casts) or not self.joint.n_frames:
-            return math.inf, -1, -1
-        if kernels is None:
-            return scan.least(self.joint, asked)
-        best, best_frame, best_cast = math.inf, -1, -1
-        for first in range(0, len(asked.casts), CASTS_AT_ONCE):
-            some = slice(first, first + CASTS_AT_ONCE)
-            compared = (asked.queries, asked.seen, asked.casts[some], asked.range_biases[some])
-            given = (*map(np.ascontiguousarray, compared), question.box_biases, best, best_frame)
-            best, best_frame, cast = kernels.search(*self._pack, *given)
-            best_cast = best_cast if cast < 0 else first + cast
-        return best, best_frame, best_cast
+        best, best_frame, best_cast = np.full(1, np.inf), np.full(1, -1), -1
+        for first, casts in self._casts_at_once(question):
+            own_cast = np.full(1, -1)
+            self._search(question, casts, best, best_frame, own_cast)
+            best_cast = best_cast if own_cast[0] < 0 else first + int(own_cast[0])
+        return float(best[0]), int(best_frame[0]), best_cast
 
-    def best_of_each(self, question: _Question) -> Iterator[Found]:
+    def best_of_each(self, question: _Question) -> Iterator[Least]:
         """The best frame of each joint range with each cast that may play it."""
-        for cast, totals in enumerate(scan.totals(self.joint, question.asked) if self.joint.n_frames else ()):
-            for first, length in zip(self.joint.firsts.tolist(), self.joint.lengths.tolist(), strict=True):
-                own = totals[first : first + length]
-                if length and (least := float(own.min())) < np.inf:
-                    yield least, first + int(np.argmin(own)), cast
+        n_ranges = len(self.joint.assets)
+        for first, casts in self._casts_at_once(question):
+            n = (casts.stop - first) * n_ranges
+            bests, frames, own_casts = np.full(n, np.inf), np.full(n, -1), np.full(n, -1)
+            self._search(question, casts, bests, frames, own_casts)
+            for at in np.flatnonzero(frames >= 0).tolist():
+                yield float(bests[at]), int(frames[at]), first + at // n_ranges
+
+    def _casts_at_once(self, question: _Question) -> Iterator[tuple[int, slice]]:
+        """Some casts after the others, and the number of the first; none where there are no frames."""
+        n = len(question.inputs.casts) if self.joint.n_frames else 0
+        for first in range(0, n, CASTS_AT_ONCE):
+            yield first, slice(first, min(n, first + CASTS_AT_ONCE))
+
+    def _search(self, question: _Question, casts: slice, bests: Floats, frames: Ints, best_casts: Ints) -> None:
+        """Lower the best total of all, or of each cast in each joint range, to those of some casts."""
+        inputs = question.inputs
+        compared = (inputs.queries, inputs.seen, inputs.casts[casts], inputs.range_biases[casts], question.box_biases)
+        search_joint(*self._pack, *map(np.ascontiguousarray, compared), bests, frames, best_casts)
 
     def hit(self, total: float, frame: int) -> Hit:
         """What a selector compares."""
@@ -258,11 +280,11 @@ class _Engine:
         at = int(self.joint.frame_ranges[frame])
         return Hit(self.joint.assets[at], at, frame, total)
 
-    def told(self, name: str, question: _Question, total: float, frame: int, cast: int, choice: Choice | None = None) -> JointHit:
-        """What was found, with all that is said of it."""
-        joint, asked = self.joint, question.asked
+    def hit_of(self, name: str, question: _Question, total: float, frame: int, cast: int, choice: Choice | None = None) -> JointHit:
+        """The hit of a search, with its costs and biases."""
+        joint, inputs = self.joint, question.inputs
         at = int(joint.frame_ranges[frame])
-        actors, numbers = question.casts.listed[cast], asked.casts[cast]
+        actors, numbers = question.casts.listed[cast], inputs.casts[cast]
         own = frame - int(joint.firsts[at])
         frames = joint.frames[:, frame]
         places = question.places[numbers]
@@ -279,8 +301,8 @@ class _Engine:
             own / joint.rate if joint.rate else None,
             total,
             dict(zip(joint.roles, actors, strict=True)),
-            self._costs(asked, frame, numbers.tolist()),
-            float(asked.range_biases[cast, at] + asked.frame_biases[frame]),
+            self._costs(inputs, frame, numbers.tolist()),
+            float(inputs.range_biases[cast, at] + inputs.frame_biases[frame]),
             dict(zip(joint.roles, frames.tolist(), strict=True)),
             {role: _place(put[k]) for k, role in enumerate(joint.roles)},
             {role: moved(places[k], put[k]) for k, role in enumerate(joint.roles)},
@@ -298,8 +320,8 @@ class _Engine:
             database = self._known
             chosen = database.filter(None, tags=tags, in_match_range=in_match_range, bias=bias, skip=skip)
             of_frames = chosen.biases(database.layout.frame_ranges, database.marks.kinds)
-            may = chosen.why(database.layout.frame_ranges, database.marks.kinds) == LeftOut.NO
-            biases = np.where(may, of_frames, np.inf)[self.joint.frames].mean(axis=0)
+            playable = chosen.why(database.layout.frame_ranges, database.marks.kinds) == LeftOut.NO
+            biases = np.where(playable, of_frames, np.inf)[self.joint.frames].mean(axis=0)
             known = biases, in_boxes(self._boxes, biases)
             if is_of_moment:
                 return known
@@ -314,51 +336,39 @@ class _Engine:
 
     @cached_property
     def _pack(self) -> tuple[Any, ...]:
-        """What the compiled search takes of the database."""
+        """What the core takes of the database."""
         layout, boxes = self.joint.database.layout, self._boxes
         channels = np.array([0, *(columns.stop for columns in self.joint.database.slices)], np.int64)
         arrays = (
-            *(layout.blocks, layout.lows, layout.highs, layout.order, layout.rank, channels, self.joint.own_weights),
-            *(boxes.boxes, boxes.ranges, boxes.firsts, boxes.relative, boxes.lows, boxes.highs),
+            *(layout.blocks, layout.rank, boxes.boxes, boxes.own_lows, boxes.own_highs, channels, self.joint.own_weights),
+            *(boxes.ranges, boxes.firsts, boxes.relative, boxes.lows, boxes.highs),
             *(np.array(self.joint.pairs, np.int64), np.array(self.joint.relative_weights)),
         )
         return tuple(map(np.ascontiguousarray, arrays))
 
     def _normalised(self, queries: Queries, actors: Sequence[Hashable]) -> Floats:
-        found = np.empty((len(actors), self.joint.database.n_features))
+        normalised = np.empty((len(actors), self.joint.database.n_features))
         for i, actor in enumerate(actors):
             if actor not in queries:
                 raise QueryError(Fault(f"there is no query for the actor {actor!r}.", "one for each actor that may be cast"))
             try:
-                found[i] = self.joint.database.normalised(queries[actor])
+                normalised[i] = self.joint.database.normalised(queries[actor])
             except QueryError as error:
                 raise QueryError(*(_of_actor(fault, actor) for fault in error.faults)) from None
-        return found
+        return normalised
 
-    def _costs(self, asked: Asked, frame: int, cast: Sequence[int]) -> dict[str, dict[str, float]]:
-        """By role and channel."""
+    def _costs(self, inputs: JointInputs, frame: int, cast: Sequence[int]) -> dict[str, dict[str, float]]:
         joint, database = self.joint, self.joint.database
-        found: dict[str, dict[str, float]] = {}
+        costs: dict[str, dict[str, float]] = {}
         for k, role in enumerate(joint.roles):
-            query, at = asked.queries[cast[k]], joint.frames[k, frame : frame + 1]
+            query, at = inputs.queries[cast[k]], joint.frames[k, frame : frame + 1]
             each = cost.channel_costs(database.layout, at, query, database.slices, joint.own_weights)[:, 0]
-            found[role] = dict(zip(database.channel_names, each.tolist(), strict=True))
+            costs[role] = dict(zip(database.channel_names, each.tolist(), strict=True))
         for p, (one, other) in enumerate(joint.pairs):
-            apart = (joint.relative[p, frame] - asked.seen[cast[one], cast[other]]) ** 2
+            apart = (joint.relative[p, frame] - inputs.seen[cast[one], cast[other]]) ** 2
             for what, columns, weight in zip(("place", "facing"), (PLACE, FACING), joint.relative_weights, strict=True):
-                found[joint.roles[one]][f"{joint.roles[other]} {what}"] = float(weight * apart[columns].sum())
-        return found
-
-
-@cache
-def load_kernels() -> ModuleType | None:
-    """The compiled joint search; None where numba is missing, or has no place to keep what it compiles."""
-    try:
-        from contextdb.motion.joint import kernels
-    except (ImportError, RuntimeError):
-        return None
-    compile_loop(kernels.search, kernels.SIGNATURE)
-    return kernels
+                costs[joint.roles[one]][f"{joint.roles[other]} {what}"] = float(weight * apart[columns].sum())
+        return costs
 
 
 def _place(numbers: Floats) -> GroundPlace:
@@ -369,7 +379,7 @@ def _place(numbers: Floats) -> GroundPlace:
 def places_of(places: Places, actors: Sequence[Hashable]) -> Floats:
     """The places of actors: float64 [A, 3]; raises QueryError, which names the actor."""
     require_mapping(places, "places", PLACES)
-    found = np.empty((len(actors), 3))
+    ground_places = np.empty((len(actors), 3))
     for i, actor in enumerate(actors):
         if actor not in places:
             raise QueryError(
@@ -382,8 +392,8 @@ def places_of(places: Places, actors: Sequence[Hashable]) -> Floats:
         if numbers is None or max(map(abs, numbers)) > FARTHEST_M:
             accepted = f"{A_BODY}, at most {FARTHEST_M:,.0f}"
             raise QueryError(Fault(f"the place of the actor {actor!r} is {places[actor]!r}.", accepted))
-        found[i] = numbers
-    return found
+        ground_places[i] = numbers
+    return ground_places
 
 
 def _gives_of(gives: Mapping[str, float] | None, roles: Sequence[str]) -> Floats:

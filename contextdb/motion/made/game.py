@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from contextdb.cells.arguments import require_path
+from contextdb.disk import make_folder
 from contextdb.motion.clips.clip import CENTIMETRE, Clip, write_bvh
 from contextdb.motion.made.joint import column, half_turned
 from contextdb.motion.made.recipes import ABOUT_TURNS, make_clip, write_made_clips
@@ -68,7 +69,7 @@ def write_game_clips(folder: str | PathLike[str]) -> list[Path]:
     """
     place = require_path(folder, "folder")
     for each in (place, place / "once", place / "contest"):
-        each.mkdir(parents=True, exist_ok=True)
+        make_folder(each)
     paths = write_made_clips(place)
     for name, clip in _others():
         paths.append(place / f"{name}.bvh")

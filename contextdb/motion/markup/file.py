@@ -49,27 +49,27 @@ def text_of(raw: bytes, file: str) -> str:
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        found = f"byte 0x{raw[error.start]:02X} on this line is not UTF-8."
-        raise MotionError(Fault(found, _ACCEPTED, "to save it as UTF-8", Place(file, line_of(raw, error.start)))) from None
+        problem = f"byte 0x{raw[error.start]:02X} on this line is not UTF-8."
+        raise MotionError(Fault(problem, _ACCEPTED, "to save it as UTF-8", Place(file, line_of(raw, error.start)))) from None
 
 
 def rows_of(text: str, file: str | None) -> Rows:
     """The rows of a text, blank lines left out, and what is wrong with its header and its lines."""
     lines = [(number, line) for number, line in enumerate(_LINE_END.split(text.removeprefix("\ufeff")), 1) if line.strip()]
-    found = Rows()
+    rows = Rows()
     if not lines:
         what = "the file holds blank lines only." if text.strip("\ufeff") else "the file is empty."
-        found.faults.append(Fault(what, "a header line: asset,tag,from,to,value", place=Place(file)))
-        return found
+        rows.faults.append(Fault(what, "a header line: asset,tag,from,to,value", place=Place(file)))
+        return rows
     conflicts = [number for number, line in lines if _CONFLICT.match(line)]
     if conflicts:
         mend = 'to keep one side and delete the lines "<<<<<<<", "=======" and ">>>>>>>"'
-        found.faults.append(Fault("an unresolved git conflict starts here.", "plain CSV", mend, Place(file, conflicts[0])))
-        return found
-    names = _header(*lines[0], file, found.faults)
+        rows.faults.append(Fault("an unresolved git conflict starts here.", "plain CSV", mend, Place(file, conflicts[0])))
+        return rows
+    names = _header(*lines[0], file, rows.faults)
     if names is not None:
-        _read_rows(lines[1:], names, file, found)
-    return found
+        _read_rows(lines[1:], names, file, rows)
+    return rows
 
 
 # ---- the header
@@ -124,20 +124,20 @@ def _missing_faults(missing: Sequence[str], place: Place) -> Iterator[Fault]:
 # ---- the rows
 
 
-def _read_rows(lines: Sequence[tuple[int, str]], names: Sequence[str], file: str | None, found: Rows) -> None:
+def _read_rows(lines: Sequence[tuple[int, str]], names: Sequence[str], file: str | None, rows: Rows) -> None:
     for number, line in lines:
         place = Place(file, number)
         try:
             fields = _fields(line)
         except csv.Error as error:
-            found.faults.append(_form_fault(line, error, place))
+            rows.faults.append(_form_fault(line, error, place))
             continue
         if not any(fields):  # spreadsheets write empty rows as commas
             continue
         if len(fields) == len(names):
-            found.rows.append(Row(number, dict(zip(names, fields, strict=True))))
+            rows.rows.append(Row(number, dict(zip(names, fields, strict=True))))
         else:
-            found.faults.append(_ragged_fault(line, len(fields), names, place))
+            rows.faults.append(_ragged_fault(line, len(fields), names, place))
 
 
 def _fields(line: str) -> list[str]:
@@ -154,10 +154,10 @@ def _form_fault(line: str, error: csv.Error, place: Place) -> Fault:
 
 
 def _ragged_fault(line: str, n_fields: int, names: Sequence[str], place: Place) -> Fault:
-    found = f"found {plural(n_fields, 'field')}, the header has {len(names)}."
+    problem = f"found {plural(n_fields, 'field')}, the header has {len(names)}."
     accepted = f"one field for each of {', '.join(names)}"
     if line.lstrip().startswith("#"):
-        return Fault(found, accepted, "to delete the line: the file has no comments", place)
+        return Fault(problem, accepted, "to delete the line: the file has no comments", place)
     if n_fields < len(names):
-        return Fault(found, accepted, in_quotes(line + "," * (len(names) - n_fields)), place)
-    return Fault(found, accepted, "to write numbers with a decimal point, and to quote names with a comma in them", place)
+        return Fault(problem, accepted, in_quotes(line + "," * (len(names) - n_fields)), place)
+    return Fault(problem, accepted, "to write numbers with a decimal point, and to quote names with a comma in them", place)

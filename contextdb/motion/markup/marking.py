@@ -51,8 +51,8 @@ class _Stretch:
 
 
 @dataclass(frozen=True, slots=True)
-class _Said:
-    """All that is said of a frame."""
+class _Effect:
+    """All markup of a frame."""
 
     marks: int = int(Mark.MATCH_RANGE)
     tags: frozenset[str] = frozenset()
@@ -84,7 +84,7 @@ def marks_of(
     Parameters
     ----------
     markup : Markup or None
-        None: nothing is said, but for the ends of ranges.
+        None: there is no markup, but for the ends of ranges.
     assets : sequence of str, length R
         The asset of each range.
     starts, stops : integer arrays, shape (R,)
@@ -100,7 +100,7 @@ def marks_of(
     Returns
     -------
     Marks
-        Kind 0 is that of which nothing is said; the others follow in the order in which they are met in the ranges.
+        Kind 0 is that of which there is no markup; the others follow in the order in which they are met in the ranges.
 
     Raises
     ------
@@ -120,7 +120,7 @@ def marks_of(
     first, last, names = check_ranges(starts, stops, assets, total)
     known = Markup() if markup is None else markup
     about = _about(known, names)
-    kinds = {_Said(): 0}
+    kinds = {_Effect(): 0}
     of_frame = np.zeros(total, np.int32)
     times = (np.arange(int((last - first).max(initial=0))) / per_second).tolist()
     cuts: dict[tuple[str, int], list[Cut]] = {}
@@ -182,7 +182,7 @@ def _clip_end(about: _Asset, times: list[float], length: int, end_s: float) -> I
     yield _Stretch(max(1, first), length, int(Mark.CLIP_END))
 
 
-def _cut(about: _Asset, stretches: Sequence[_Stretch], length: int, kinds: dict[_Said, int]) -> list[Cut]:
+def _cut(about: _Asset, stretches: Sequence[_Stretch], length: int, kinds: dict[_Effect, int]) -> list[Cut]:
     """The kinds of a range's frames; a kind that is met for the first time gets the next number."""
     opening, closing = defaultdict[int, list[int]](list), defaultdict[int, list[int]](list)
     for i, stretch in enumerate(stretches):
@@ -190,17 +190,17 @@ def _cut(about: _Asset, stretches: Sequence[_Stretch], length: int, kinds: dict[
             opening[stretch.first].append(i)
             closing[stretch.stop].append(i)
     open_now: dict[int, _Stretch] = {}
-    found = []
+    cuts = []
     for first, stop in pairwise(sorted({0, length, *opening, *closing})):
         for i in closing.get(first, ()):
             del open_now[i]
         open_now.update((i, stretches[i]) for i in opening.get(first, ()))
-        said = _said(open_now.values(), about.has_match_range)
-        found.append((first, stop, kinds.setdefault(said, len(kinds))))
-    return found
+        effect = _effect_of(open_now.values(), about.has_match_range)
+        cuts.append((first, stop, kinds.setdefault(effect, len(kinds))))
+    return cuts
 
 
-def _said(stretches: Iterable[_Stretch], has_match_range: bool) -> _Said:
+def _effect_of(stretches: Iterable[_Stretch], has_match_range: bool) -> _Effect:
     marks = 0 if has_match_range else int(Mark.MATCH_RANGE)
     tags, costs, weights = [], [], []
     for stretch in stretches:
@@ -214,7 +214,7 @@ def _said(stretches: Iterable[_Stretch], has_match_range: bool) -> _Said:
             weights.append(span)
         else:
             tags.append(span.tag)
-    return _Said(marks, frozenset(tags), math.fsum(costs), _strongest_weight(weights))
+    return _Effect(marks, frozenset(tags), math.fsum(costs), _strongest_weight(weights))
 
 
 def _strongest_weight(spans: Sequence[Span]) -> float:
@@ -229,31 +229,31 @@ def _strongest_weight(spans: Sequence[Span]) -> float:
 
 
 def _warps(about: dict[str, _Asset], names: Sequence[str], lengths: Ints, rate: float) -> Floats:
-    found = np.full((len(names), 2, 2), np.nan)
+    warps = np.full((len(names), 2, 2), np.nan)
     for i, (name, length) in enumerate(zip(names, lengths.tolist(), strict=True)):
         last_s = (length - 1) / rate
         for at, tag in enumerate(_WARPS):
             spans = [span for span in about[name].spans if span.tag == tag]
             span = min(spans, key=lambda span: span.is_pattern, default=None)
             if span is not None and span.from_s <= last_s + TOLERANCE_S:
-                found[i, at] = min(span.from_s, last_s), min(span.to_s, last_s)
-    return found
+                warps[i, at] = min(span.from_s, last_s), min(span.to_s, last_s)
+    return warps
 
 
 def _marks(
-    tags: tuple[str, ...], of_frame: NDArray[np.int32], kinds: Sequence[_Said], looping: NDArray[np.bool_], warps: Floats
+    tags: tuple[str, ...], of_frame: NDArray[np.int32], kinds: Sequence[_Effect], looping: NDArray[np.bool_], warps: Floats
 ) -> Marks:
     place = {tag: i for i, tag in enumerate(tags)}
     kind_tags = np.zeros((len(kinds), len(tags)), np.bool_)
-    for kind, said in enumerate(kinds):
-        kind_tags[kind, [place[tag] for tag in said.tags]] = True
+    for kind, effect in enumerate(kinds):
+        kind_tags[kind, [place[tag] for tag in effect.tags]] = True
     return Marks(
         tags,
         of_frame.astype(np.uint16) if len(kinds) <= 1 << 16 else of_frame,
         kind_tags,
-        np.array([said.marks for said in kinds], np.uint8),
-        np.array([said.bias for said in kinds]),
-        np.array([said.root_weight for said in kinds]),
+        np.array([effect.marks for effect in kinds], np.uint8),
+        np.array([effect.bias for effect in kinds]),
+        np.array([effect.root_weight for effect in kinds]),
         looping,
         warps,
     )

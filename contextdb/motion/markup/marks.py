@@ -2,7 +2,7 @@
 
 N frames, R ranges, T tags, K kinds. Frames about which the markup says the same are of one kind, and there are few kinds: what a
 tag filter lets pass is decided kind by kind, so that a new filter costs nothing that grows with the frames; what the last filters
-let pass is kept.
+let pass is cached.
 
 A frame's flags say what is in the way of *choosing* it; the frame that plays now may always play on, unless it is excluded.
 
@@ -33,7 +33,7 @@ __all__ = ["ANY_TAGS", "Mark", "Marks", "TagFilter", "covers", "tags_of"]
 
 
 KEPT_FILTERS = 64
-"""The answers to so many filters are kept; a game asks with a few, again and again."""
+"""The answers to so many filters are cached; a game asks with a few, again and again."""
 
 
 class Mark(IntFlag):
@@ -158,9 +158,9 @@ class Marks:
         return read_only(np.asarray((self.kind_marks & Mark.EXCLUDED) == 0))
 
     def __getstate__(self) -> dict[str, Any]:
-        return {field.name: getattr(self, field.name) for field in fields(self)}  # without the answers that are kept
+        return {field.name: getattr(self, field.name) for field in fields(self)}  # without the cached answers
 
-    # ---- what is said of one frame
+    # ---- the markup of a frame
 
     def mark_of(self, frame: int) -> Mark:
         """The flags of a frame."""
@@ -183,20 +183,20 @@ class Marks:
         return 1.0 if self._moves_all else float(self.kind_root_weights[self._kind_of(frame)])
 
     def events(self, frame: int) -> tuple[str, ...]:
-        """All that is said of a frame, in the words of a markup file: plain tags, then reserved ones, as "CostModifier 0.5".
+        """All markup of a frame, in the words of a markup file: plain tags, then reserved ones, as "CostModifier 0.5".
 
         Beside them stand "ClipEnd" for a frame too near the end, and "NextNaturalOnly entry" for one in an entry zone.
         """
         kind = self._kind_of(frame)
         mark, bias, weight = int(self.kind_marks[kind]), self.kind_biases[kind], self.kind_root_weights[kind]
-        said = [text for bit, text in _MARK_TEXTS if mark & bit]
+        texts = [text for bit, text in _MARK_TEXTS if mark & bit]
         if mark & Mark.NEXT_NATURAL:
-            said.append(str(ReservedTag.NEXT_NATURAL_ONLY) if mark & Mark.PAST_ENTRY else f"{ReservedTag.NEXT_NATURAL_ONLY} entry")
+            texts.append(str(ReservedTag.NEXT_NATURAL_ONLY) if mark & Mark.PAST_ENTRY else f"{ReservedTag.NEXT_NATURAL_ONLY} entry")
         if bias:
-            said.append(f"{ReservedTag.COST_MODIFIER} {bias:g}")
+            texts.append(f"{ReservedTag.COST_MODIFIER} {bias:g}")
         if weight != 1.0:
-            said.append(f"{ReservedTag.ROOT_MOTION_WEIGHT} {weight:g}")
-        return (*self.tags_of(frame), *said)
+            texts.append(f"{ReservedTag.ROOT_MOTION_WEIGHT} {weight:g}")
+        return (*self.tags_of(frame), *texts)
 
     def _kind_of(self, frame: int) -> int:
         return int(self.kinds[frame_of(frame, len(self.kinds), "frame")])
@@ -244,13 +244,13 @@ class _Tags:
 
 
 def _left_out(known: _Tags, marks: NDArray[np.uint8], tags: TagFilter, in_match_range: bool) -> NDArray[np.uint8]:
-    found = np.zeros(len(marks), np.uint8)
+    reasons = np.zeros(len(marks), np.uint8)
     if in_match_range:
-        found[(marks & Mark.MATCH_RANGE) == 0] = LeftOut.MATCH_RANGE
-    found[~known.passes(tags)] = LeftOut.TAGS
+        reasons[(marks & Mark.MATCH_RANGE) == 0] = LeftOut.MATCH_RANGE
+    reasons[~known.passes(tags)] = LeftOut.TAGS
     for mark, why in _REASONS:
-        found[(marks & mark) != 0] = why
-    return found
+        reasons[(marks & mark) != 0] = why
+    return reasons
 
 
 def _tag_biases(known: _Tags, tags: TagFilter) -> Floats:

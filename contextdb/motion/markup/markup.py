@@ -69,7 +69,7 @@ class Markup:
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Markup:
-        """Read a markup file. Raises MotionError with every fault of the file: file, line, column, what was found, what is accepted
+        """Read a markup file. Raises MotionError with every fault of the file: file, line, column, what was read, what is accepted
         and the nearest mend; FileError where the file is missing, or cannot be read."""
         file = str(require_path(path))
         return cls.parse(markup_file.text_of(disk.read_bytes(Path(path)), file), file)
@@ -108,10 +108,10 @@ class Markup:
         indices = [i for i in self._indices_of(asset) if self.spans[i].is_pattern]
         if len({self.spans[i].asset for i in indices}) < 2:
             return []
-        found = conflicts(self.spans, indices)
+        faults = conflicts(self.spans, indices)
         return [
             Fault(f"for the asset {in_quotes(asset)}: {fault.found}", fault.accepted, fault.mend, self._place(i, column))
-            for i, column, fault in found
+            for i, column, fault in faults
         ]
 
     def faults_for(self, assets: Collection[str], durations_s: Mapping[str, float], *, rate: float | None = None) -> list[Fault]:
@@ -133,7 +133,7 @@ class Markup:
         """
         known = dict.fromkeys(assets)
         fitting = {text: _fitting(text, known) for text in self._by_text}
-        lost = [text for text, found in fitting.items() if not found]
+        lost = [text for text, matches in fitting.items() if not matches]
         unknown = [self._unknown(text, known, known if at < MOST_MENDS else ()) for at, text in enumerate(lost)]
         idle = [
             fault
@@ -148,10 +148,10 @@ class Markup:
     @cached_property
     def _by_text(self) -> dict[str, list[int]]:
         """The spans of each name and pattern."""
-        found = defaultdict[str, list[int]](list)
+        assets_by_text = defaultdict[str, list[int]](list)
         for i, span in enumerate(self.spans):
-            found[span.asset].append(i)
-        return dict(found)
+            assets_by_text[span.asset].append(i)
+        return dict(assets_by_text)
 
     @cached_property
     def _patterns(self) -> tuple[str, ...]:
@@ -185,13 +185,13 @@ class Markup:
             return None  # a clip with more frames a second goes on behind its last frame at this rate
         if span.from_s > longest_s + TOLERANCE_S:
             which = "the longest clip that fits" if span.is_pattern else "the clip"
-            found = f"the span starts at {span.from_s:g} s, behind the end of {which}."
-            return Fault(found, f"times up to {longest_s:g} s", place=self._place(i, "from"))
+            problem = f"the span starts at {span.from_s:g} s, behind the end of {which}."
+            return Fault(problem, f"times up to {longest_s:g} s", place=self._place(i, "from"))
         if rate is None or any(_holds_frame(span, duration_s, rate) for duration_s in durations_s):
             return None
-        found = f"the span from {span.from_s:g} to {span.to_s:g} is between two frames and contains none."
+        problem = f"the span from {span.from_s:g} to {span.to_s:g} is between two frames and contains none."
         near = round(span.from_s * rate) / rate
-        return Fault(found, f"times with a frame between them, at {rate:g} frames a second", f"{near:g}", self._place(i, "from"))
+        return Fault(problem, f"times with a frame between them, at {rate:g} frames a second", f"{near:g}", self._place(i, "from"))
 
 
 def _contacts(spans: Sequence[Span], tag: ReservedTag) -> ContactMark | None:
@@ -258,11 +258,11 @@ def _span_faults(spans: Sequence[Span], file: str | None, read: Mapping[int, lis
     placed: list[Fault] = []
     good: list[int] = []
     for i, span in enumerate(spans):
-        found = list(read.get(i, ()))
-        columns = {column for column, _ in found}
-        found += [(column, fault) for column, fault in faults_alone(span) if column not in columns]
-        placed += [fault.at(_place(spans, i, column, file)) for column, fault in found]
-        if not found:
+        faults = list(read.get(i, ()))
+        columns = {column for column, _ in faults}
+        faults += [(column, fault) for column, fault in faults_alone(span) if column not in columns]
+        placed += [fault.at(_place(spans, i, column, file)) for column, fault in faults]
+        if not faults:
             good.append(i)
     return placed + list(_placed_together(spans, good, file))
 

@@ -101,8 +101,10 @@ def name_fault(name: str) -> Fault | None:
         return Fault("there is no tag.", ACCEPTED_NAME)
     near = mistaken_for(name)
     if near:
-        found = f"the tag {in_quotes(name)} is too like the reserved tag {in_quotes(near)}: it would be mistaken for it."
-        return Fault(found, f"{in_quotes(near)}, or a name of your own, such as {in_quotes(f'My.{_plain(name)}')}", in_quotes(near))
+        problem = f"the tag {in_quotes(name)} is too like the reserved tag {in_quotes(near)}: it would be mistaken for it."
+        return Fault(
+            problem, f"{in_quotes(near)}, or a name of your own, such as {in_quotes(f'My.{_plain(name)}')}", in_quotes(near)
+        )
     if not TAG_NAME.fullmatch(name):
         return Fault(
             f"{in_quotes(name)} cannot be the name of a tag.", ACCEPTED_NAME, in_quotes(_plain(name)) if _plain(name) else ""

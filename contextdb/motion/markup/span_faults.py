@@ -12,7 +12,7 @@ from contextdb.errors import Fault, in_quotes
 from contextdb.motion.markup.reserved import MOST_SECONDS, VALUE_RULES, ReservedTag, name_fault, reserved_of
 from contextdb.motion.markup.spans import TOLERANCE_S, Span
 
-Found = tuple[int, str, Fault]
+SpanFault = tuple[int, str, Fault]
 """Which span, in which column, is at fault, and how."""
 
 SECONDS = "seconds from the start of the clip, such as 0.25"
@@ -46,10 +46,10 @@ def _time_faults(span: Span) -> Iterator[tuple[str, Fault]]:
     wrong = [("from", span.from_s)] if not _is_time(span.from_s) else []
     wrong += [("to", span.to_s)] if not _is_time(span.to_s) and span.to_s != math.inf else []
     for column, time_s in wrong:
-        yield column, Fault(f"{_said(time_s)} is not a time in a clip.", SECONDS)
+        yield column, Fault(f"{_quoted(time_s)} is not a time in a clip.", SECONDS)
     if not wrong and span.from_s > span.to_s:
-        found = f"the span ends before it starts: from {span.from_s:g} to {span.to_s:g}."
-        yield "from", Fault(found, "from <= to", f"from {span.to_s:g} to {span.from_s:g}")
+        problem = f"the span ends before it starts: from {span.from_s:g} to {span.to_s:g}."
+        yield "from", Fault(problem, "from <= to", f"from {span.to_s:g} to {span.from_s:g}")
 
 
 def _is_time(value: object) -> bool:
@@ -63,15 +63,15 @@ def _value_faults(span: Span) -> Iterator[tuple[str, Fault]]:
     if rule is None:
         if span.value is not None:
             kind = "reserved" if reserved else "plain"
-            found = f"the {kind} tag {in_quotes(span.tag)} takes no value, but this is {_said(span.value)}."
-            yield "value", Fault(found, "no value", "to leave it empty")
+            problem = f"the {kind} tag {in_quotes(span.tag)} takes no value, but this is {_quoted(span.value)}."
+            yield "value", Fault(problem, "no value", "to leave it empty")
     elif span.value is None:
         if rule.is_required:
             yield "value", Fault(f"{span.tag} has no value.", rule.accepted)
     else:
         number = as_number(span.value)
         if number is None or not rule.least <= number <= rule.most:
-            yield "value", Fault(f"{_said(span.value)} is out of range for {span.tag}.", rule.accepted)
+            yield "value", Fault(f"{_quoted(span.value)} is out of range for {span.tag}.", rule.accepted)
         elif reserved is ReservedTag.NEXT_NATURAL_ONLY:
             yield from _entry_faults(span, number)
 
@@ -79,18 +79,18 @@ def _value_faults(span: Span) -> Iterator[tuple[str, Fault]]:
 def _entry_faults(span: Span, entry_s: float) -> Iterator[tuple[str, Fault]]:
     if _is_time(span.from_s) and _is_time(span.to_s) and span.from_s <= span.to_s < span.from_s + entry_s - TOLERANCE_S:
         length = f"{span.to_s - span.from_s:g}"
-        found = f"the entry zone of {entry_s:g} s is longer than its span, {length} s."
-        yield "value", Fault(found, "at most the length of the span", in_quotes(length))
+        problem = f"the entry zone of {entry_s:g} s is longer than its span, {length} s."
+        yield "value", Fault(problem, "at most the length of the span", in_quotes(length))
 
 
-def _said(value: object) -> str:
+def _quoted(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else repr(value)
 
 
 # ---- several together
 
 
-def faults_together(spans: Sequence[Span], indices: Iterable[int]) -> Iterator[Found]:
+def faults_together(spans: Sequence[Span], indices: Iterable[int]) -> Iterator[SpanFault]:
     """What is wrong between those of the spans that are right in themselves."""
     good = list(indices)
     twice = list(_duplicates(spans, good))
@@ -105,7 +105,7 @@ def faults_together(spans: Sequence[Span], indices: Iterable[int]) -> Iterator[F
         yield from conflicts(spans, indices_of_one)
 
 
-def _duplicates(spans: Sequence[Span], indices: Iterable[int]) -> Iterator[Found]:
+def _duplicates(spans: Sequence[Span], indices: Iterable[int]) -> Iterator[SpanFault]:
     first = dict[Span, int]()
     for i in indices:
         j = first.setdefault(spans[i], i)
@@ -113,32 +113,32 @@ def _duplicates(spans: Sequence[Span], indices: Iterable[int]) -> Iterator[Found
             yield i, "tag", Fault(f"this span is the same as {named(spans, j)}.", "each span once", "to delete one of them")
 
 
-def _case_faults(spans: Sequence[Span], indices: Iterable[int]) -> Iterator[Found]:
+def _case_faults(spans: Sequence[Span], indices: Iterable[int]) -> Iterator[SpanFault]:
     """Plain tags that differ from an earlier one in case only: to a search they would be two."""
     first = dict[str, int]()
-    told = set[str]()
+    reported = set[str]()
     for i in indices:
         tag = spans[i].tag
         j = first.setdefault(tag.casefold(), i)
-        if spans[j].tag != tag and tag not in told:
-            told.add(tag)
-            found = f"the tag {in_quotes(tag)} differs in case only from {in_quotes(spans[j].tag)} of {named(spans, j)}."
-            yield i, "tag", Fault(found, "one spelling of each tag", in_quotes(spans[j].tag))
+        if spans[j].tag != tag and tag not in reported:
+            reported.add(tag)
+            problem = f"the tag {in_quotes(tag)} differs in case only from {in_quotes(spans[j].tag)} of {named(spans, j)}."
+            yield i, "tag", Fault(problem, "one spelling of each tag", in_quotes(spans[j].tag))
 
 
-def conflicts(spans: Sequence[Span], indices: Iterable[int]) -> Iterator[Found]:
+def conflicts(spans: Sequence[Span], indices: Iterable[int]) -> Iterator[SpanFault]:
     """Spans that hold for one asset with the same right, and say different things of one frame, or of its one warp."""
     by_tag = defaultdict[str, list[int]](list)
     for i in indices:
         by_tag[spans[i].tag].append(i)
     for tag in _WARPS:
         for i in by_tag.get(tag, [])[1:]:
-            found = f"{named(spans, by_tag[tag][0])} gives {in_quotes(spans[i].asset)} a {tag} too."
-            yield i, "tag", Fault(found, f"one {tag} for an asset", "to delete one of them")
+            problem = f"{named(spans, by_tag[tag][0])} gives {in_quotes(spans[i].asset)} a {tag} too."
+            yield i, "tag", Fault(problem, f"one {tag} for an asset", "to delete one of them")
     yield from _weight_conflicts(spans, by_tag.get(ReservedTag.ROOT_MOTION_WEIGHT, []))
 
 
-def _weight_conflicts(spans: Sequence[Span], indices: Iterable[int]) -> Iterator[Found]:
+def _weight_conflicts(spans: Sequence[Span], indices: Iterable[int]) -> Iterator[SpanFault]:
     ordered = sorted(indices, key=lambda i: (spans[i].from_s, spans[i].to_s))
     for at, i in enumerate(ordered):
         for j in ordered[at + 1 :]:
@@ -146,8 +146,8 @@ def _weight_conflicts(spans: Sequence[Span], indices: Iterable[int]) -> Iterator
                 break
             if spans[i].value != spans[j].value and not _touch(spans[i], spans[j]):
                 low, high = sorted((i, j))
-                found = f"on some frames {named(spans, low)} says {spans[low].value:g} and this {spans[high].value:g}."
-                yield high, "value", Fault(found, "one weight for a frame", "to end one span where the other begins")
+                problem = f"on some frames {named(spans, low)} says {spans[low].value:g} and this {spans[high].value:g}."
+                yield high, "value", Fault(problem, "one weight for a frame", "to end one span where the other begins")
 
 
 def _touch(first: Span, second: Span) -> bool:

@@ -58,8 +58,8 @@ def fits(pattern: str, asset: str) -> bool:
     if stop < at or not asset.startswith(first) or not asset.endswith(last):
         return False
     for part in middle:
-        found = asset.find(part, at, stop)
-        if found < 0:
+        position = asset.find(part, at, stop)
+        if position < 0:
             return False
-        at = found + len(part)
+        at = position + len(part)
     return True

@@ -32,7 +32,7 @@ class TagFilter:
 
     Notes
     -----
-    A tag covers those below it: `Move` covers `Move.Run`. A filter can be a key, so that what it lets pass is found once and kept.
+    A tag covers those below it: `Move` covers `Move.Run`. A filter can be a key, so that its answer is computed once and cached.
     """
 
     include: tuple[str, ...]

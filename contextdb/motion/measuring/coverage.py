@@ -9,8 +9,8 @@ the markup never lets play do not count.
 A bin is wanted in a context
   - when it lies between filled bins of its row or column. Where the context is the same in a mirror, each filled bin is taken with
     that of the same movement to the other side, as what turns left there may have to turn right;
-  - where the context asks for speeds, turns or directions, only if it is asked for. Turns and directions that are asked for are all
-    wanted at the speeds that are; a speed that is asked for and that no valid clip has is wanted once, as straight as they go.
+  - where the context asks for speeds, turns or directions, only if it is requested. Turns and directions that are requested are all
+    wanted at the speeds that are; a speed that is requested and that no valid clip has is wanted once, as straight as they go.
 
 What goes ahead is judged in the map of turns alone.
 """
@@ -114,7 +114,6 @@ class ToCapture:
         return MAPS[self.map].words(self.row, self.column)
 
     def to_json(self) -> dict[str, object]:
-        """As plain data."""
         return {
             "map": self.map,
             "row": self.row,
@@ -172,17 +171,17 @@ class MotionCoverage:
     @cached_property
     def filled_shares(self) -> dict[str, Floats]:
         """For each bin of each map the share of the contexts in which it is filled."""
-        return self._weighed(lambda found, name: found.filled[name])
+        return self._weighed(lambda each, name: each.filled[name])
 
     @cached_property
     def wanted_shares(self) -> dict[str, Floats]:
         """For each bin of each map the share of the contexts in which it is wanted."""
-        return self._weighed(lambda found, name: found.wanted[name])
+        return self._weighed(lambda each, name: each.wanted[name])
 
     @cached_property
     def hole_shares(self) -> dict[str, Floats]:
         """For each bin of each map the share of the contexts in which it is wanted and not filled."""
-        return self._weighed(lambda found, name: found.holes[name])
+        return self._weighed(lambda each, name: each.holes[name])
 
     @property
     def covered(self) -> float:
@@ -197,17 +196,17 @@ class MotionCoverage:
         return 1.0 - holes / wanted if wanted > 0.0 and holes > 0.0 else 1.0
 
     def _weighed(self, flags_of: Callable[[ContextCoverage, str], Bools]) -> dict[str, Floats]:
-        found = {name: np.zeros(of.shape) for name, of in MAPS.items()}
+        maps = {name: np.zeros(of.shape) for name, of in MAPS.items()}
         for each in self.contexts:
-            for name, total in found.items():
+            for name, total in maps.items():
                 total += each.contexts.share * flags_of(each, name)
-        return {name: np.minimum(total, 1.0) for name, total in found.items()}
+        return {name: np.minimum(total, 1.0) for name, total in maps.items()}
 
     @cached_property
     def to_capture(self) -> tuple[ToCapture, ...]:
         """The holes, those first that a clip would fill most of."""
         wanted = sum(float(shares.sum()) for shares in self.wanted_shares.values())
-        found = []
+        clips = []
         for name, shares in self.hole_shares.items():
             for row, column in np.argwhere(shares > 0.0).tolist():
                 other = MAPS[name].opposite[column]
@@ -216,8 +215,8 @@ class MotionCoverage:
                     continue  # that of the other side is listed
                 fills = float(shares[row, column] + (shares[row, other] if is_both else 0.0)) / wanted
                 elsewhere = self._elsewhere(name, row, column)
-                found.append(ToCapture(name, row, column, fills, float(shares[row, column]), elsewhere, is_both))
-        return tuple(sorted(found, key=lambda each: (-each.fills, each.map != TURN, each.row, each.column)))
+                clips.append(ToCapture(name, row, column, fills, float(shares[row, column]), elsewhere, is_both))
+        return tuple(sorted(clips, key=lambda each: (-each.fills, each.map != TURN, each.row, each.column)))
 
     @property
     def is_mirrored(self) -> bool:
@@ -250,7 +249,7 @@ def coverage(
     databases : mapping of str to MotionDatabase
         By name; built from clips, so that their root motion is known. A clip that is in several counts once.
     contexts : sequence of ClipContexts, optional
-        Which clips are valid when; `contextdb.covering.clip_contexts` gives those of a table. Default: all clips, always.
+        Which clips are valid when; `contextdb.authoring.clip_contexts` gives those of a table. Default: all clips, always.
     table : str, optional
         The name of the table that they are of.
     never_valid : iterable of str
@@ -281,7 +280,7 @@ def coverage(
     for each in listed:
         require_kind(each, ClipContexts, "one of contexts", "a ClipContexts")
     measured = _measured(clips, listed)
-    near = (found for database in given.values() for found in near_clips(database, near_cost, progress))
+    near = (pair for database in given.values() for pair in near_clips(database, near_cost, progress))
     once = {each.asset: each for each in sorted(near, key=lambda each: -each.cost)}
     transitions = transitions_of([clip.asset for clip in clips], pattern)
     return MotionCoverage(
@@ -301,8 +300,8 @@ def _measurable(databases: Mapping[str, MotionDatabase]) -> dict[str, MotionData
     for name, database in given.items():
         require_kind(database, MotionDatabase, "one of databases", "a MotionDatabase")
         if database.root is None or database.schema is None:
-            found = f"the database {in_quotes(str(name))} was made from features, so that nobody knows how its clips move."
-            raise MotionError(Fault(found, "a database built from clips"))
+            problem = f"the database {in_quotes(str(name))} was made from features, so that nobody knows how its clips move."
+            raise MotionError(Fault(problem, "a database built from clips"))
     if not given:
         raise MotionError(Fault("there is no database to measure.", "at least one"))
     return given
@@ -315,7 +314,7 @@ def _all_of(clips: Sequence[ClipFrames]) -> ClipContexts:
 
 def _clips(databases: Mapping[str, MotionDatabase]) -> Iterator[ClipFrames]:
     """Each clip once, of the first database that has it; mirrored if any plays it mirrored."""
-    found: dict[str, ClipFrames] = {}
+    clips: dict[str, ClipFrames] = {}
     for name, database in databases.items():
         assert database.root is not None
         assert database.schema is not None
@@ -328,10 +327,10 @@ def _clips(databases: Mapping[str, MotionDatabase]) -> Iterator[ClipFrames]:
             is_mirrored = bool(database.mirrored[number])
             n_dead = int((~plays[start:stop]).sum())
             new = ClipFrames(asset, name, stop - start, n_dead, NO_FRAMES if is_mirrored else counts, None)
-            known = found.setdefault(asset, new)
+            known = clips.setdefault(asset, new)
             if is_mirrored and known.mirrored is None:
-                found[asset] = replace(known, mirrored=counts)
-    yield from found.values()
+                clips[asset] = replace(known, mirrored=counts)
+    yield from clips.values()
 
 
 def _measured(clips: Sequence[ClipFrames], contexts: Sequence[ClipContexts]) -> Iterator[ContextCoverage]:
@@ -354,11 +353,11 @@ def _tables(counts: Sequence[Mapping[str, Counts]]) -> dict[str, Counts]:
 
 
 def _summed(counts: Iterable[Mapping[str, Counts]]) -> dict[str, Counts]:
-    found = {name: np.zeros(of.shape, np.int64) for name, of in MAPS.items()}
+    sums = {name: np.zeros(of.shape, np.int64) for name, of in MAPS.items()}
     for each in counts:
-        for name, total in found.items():
+        for name, total in sums.items():
             total += each[name]
-    return found
+    return sums
 
 
 # ---- what is wanted

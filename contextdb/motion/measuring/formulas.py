@@ -194,12 +194,12 @@ def changes_of(wanted: Floats, times_s: Floats) -> list[Change]:
         else:
             runs.append([i, i])
     ended = [run for run in runs if times_s[-1] - times_s[run[1] + 1] > SETTLE_S]
-    found = []
+    changes = []
     for k, (first, last) in enumerate(ended):
         until = runs[k + 1][0] + 1 if k + 1 < len(runs) else len(times_s) - 1
         if np.linalg.norm(wanted[last + 1] - wanted[first]) > LEAST_CHANGE_MPS:
-            found.append(Change(first + 1, until, wanted[first], wanted[last + 1]))
-    return found
+            changes.append(Change(first + 1, until, wanted[first], wanted[last + 1]))
+    return changes
 
 
 def velocities(places: Floats, times_s: Floats) -> Floats:

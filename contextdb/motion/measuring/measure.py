@@ -1,6 +1,6 @@
 """How good the motion of a character is, in numbers, beside those of the clips that it is made of.
 
-    session ─► Shown: what played, where the body was ─┐
+    session ─► Displayed: what played, where the body was ─┐
     poses of it, made again or given ──────────────────┼─► Measures
     pose banks ─► RawClips: the clips as they are ─────┘
 
@@ -22,10 +22,11 @@ from contextdb.cells.arguments import require_kind, require_many_of, require_map
 from contextdb.errors import ContextError, Fault, MotionError, plural
 from contextdb.motion.clips.poses import LEAST_RATE, MOST_RATE
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.measuring import parts, shown
+from contextdb.motion.measuring import displayed as displayed_motion
+from contextdb.motion.measuring import parts, postures
+from contextdb.motion.measuring.displayed import Displayed, PoseArrays
 from contextdb.motion.measuring.measures import Measures
 from contextdb.motion.measuring.raw_clips import Banks, Clips
-from contextdb.motion.measuring.shown import PoseArrays, Shown
 from contextdb.motion.output.bank import PoseBank
 from contextdb.motion.output.settings import PoseSettings
 from contextdb.motion.output.stream import Pose, PoseStream
@@ -69,7 +70,7 @@ def measure(
     bodies : float array, shape (T, 3), optional
         Where the game had the body: x, z and heading. Default: what the session says.
     wanted : float array, shape (T, 2), optional
-        The velocity over the ground that the stick asked for at each moment, m/s, x and z. Default: that of the bodies.
+        The velocity over the ground that the stick requested at each moment, m/s, x and z. Default: that of the bodies.
 
     Returns
     -------
@@ -87,28 +88,29 @@ def measure(
     """
     _check(banks, databases, settings)
     clips = None if not banks else Clips.of(banks)
-    found = _shown(session_or_poses, banks, poses, settings, rate)
-    n = len(found.times_s)
+    displayed = _displayed(session_or_poses, banks, poses, settings, rate)
+    n = len(displayed.times_s)
     if n == 0:
         raise MotionError(Fault("there is nothing to measure: no moment.", "a session with updates, or at least one pose"))
     if bodies is not None:
-        found = replace(found, bodies=_rows(bodies, n, 3, "bodies"))
+        displayed = replace(displayed, bodies=_rows(bodies, n, 3, "bodies"))
     if clips is not None:
-        found = found.with_contacts(clips)
-    asked = None if wanted is None else _rows(wanted, n, 2, "wanted")
-    told = {
-        **parts.jumps(found),
-        **parts.steps(found, clips),
-        **parts.skate(found, clips),
+        displayed = displayed.with_contacts(clips)
+    wanted_velocities = None if wanted is None else _rows(wanted, n, 2, "wanted")
+    measured = {
+        **parts.jumps(displayed),
+        **parts.steps(displayed, clips),
+        **parts.skate(displayed, clips),
         **parts.raw_skate(clips),
-        **parts.accelerations(found, clips),
-        **parts.path(found),
-        **parts.reach(found, asked),
-        **parts.usage(found, databases, banks),
+        **parts.accelerations(displayed, clips),
+        **postures.postures(displayed, clips, wanted_velocities),
+        **parts.path(displayed),
+        **parts.reach(displayed, wanted_velocities),
+        **parts.usage(displayed, databases, banks),
     }
-    missing = {name: value for name, value in told.items() if isinstance(value, str)}
-    values: dict[str, Any] = {name: value for name, value in told.items() if name not in missing}
-    return Measures(found.seconds, n, int(found.jumped.sum()), missing=missing, **values)
+    missing = {name: value for name, value in measured.items() if isinstance(value, str)}
+    values: dict[str, Any] = {name: value for name, value in measured.items() if name not in missing}
+    return Measures(displayed.seconds, n, int(displayed.jumped.sum()), missing=missing, **values)
 
 
 def _check(banks: Banks | None, databases: Mapping[str, MotionDatabase] | None, settings: PoseSettings | None) -> None:
@@ -124,7 +126,9 @@ def _check(banks: Banks | None, databases: Mapping[str, MotionDatabase] | None, 
 # ---- what is measured
 
 
-def _shown(given: object, banks: Banks | None, poses: OfPoses | None, settings: PoseSettings | None, rate: float | None) -> Shown:
+def _displayed(
+    given: object, banks: Banks | None, poses: OfPoses | None, settings: PoseSettings | None, rate: float | None
+) -> Displayed:
     if isinstance(given, (str, PathLike)) and Path(given).suffix != NPZ:
         given = Trace.load(given)
     if not isinstance(given, Trace):
@@ -132,13 +136,13 @@ def _shown(given: object, banks: Banks | None, poses: OfPoses | None, settings: 
             raise ContextError(Fault("poses go with a session, and none is given.", "a Trace, or the path of one"))
         return _of_poses(given, _rate_of(banks) if rate is None else rate)
     decisions = list(given.brief())
-    session = shown.of_decisions(decisions)
+    session = displayed_motion.of_decisions(decisions)
     if poses is not None:
-        return shown.with_poses(session, _of_poses(poses, session.rate if rate is None else rate))
+        return displayed_motion.with_poses(session, _of_poses(poses, session.rate if rate is None else rate))
     if not banks or not decisions:
         return session
     made = poses_of(decisions, banks, PoseSettings() if settings is None else settings)
-    return shown.with_poses(session, shown.of_poses(made, session.rate))
+    return displayed_motion.with_poses(session, displayed_motion.of_poses(made, session.rate))
 
 
 def _rate_of(banks: Banks | None) -> float | None:
@@ -148,17 +152,17 @@ def _rate_of(banks: Banks | None) -> float | None:
     return banks.rate if isinstance(banks, PoseBank) else next(iter(banks.values())).rate
 
 
-def _of_poses(given: object, rate: float | None) -> Shown:
+def _of_poses(given: object, rate: float | None) -> Displayed:
     if isinstance(given, (str, PathLike)):
-        return shown.of_arrays(read_pose_arrays(given))
+        return displayed_motion.of_arrays(read_pose_arrays(given))
     if isinstance(given, Mapping):
-        return shown.of_arrays(checked_pose_arrays(given))
+        return displayed_motion.of_arrays(checked_pose_arrays(given))
     listed = require_many_of(given, Pose, "session_or_poses", "a Trace, a list of Pose, or the path of a session or of poses")
     if rate is None:
         raise MotionError(
             Fault("poses do not say how many of them a second has.", "rate=30.0, or another number of poses a second")
         )
-    return shown.of_poses(listed, require_real(rate, "rate", LEAST_RATE, MOST_RATE))
+    return displayed_motion.of_poses(listed, require_real(rate, "rate", LEAST_RATE, MOST_RATE))
 
 
 def poses_of(decisions: Sequence[Decision], banks: Banks, settings: PoseSettings) -> list[Pose]:
@@ -183,7 +187,7 @@ def warped_poses(decisions: Sequence[Decision], banks: Banks, settings: PoseSett
 
 def _rows(given: ArrayLike, n: int, width: int, what: str) -> Floats:
     """An array of numbers, a row for each moment."""
-    found = require_numbers(given, what)
-    if found.shape != (n, width):
-        raise MotionError(Fault(f"{what} have shape {found.shape}.", f"{width} numbers for each of {plural(n, 'moment')}"))
-    return found
+    values = require_numbers(given, what)
+    if values.shape != (n, width):
+        raise MotionError(Fault(f"{what} have shape {values.shape}.", f"{width} numbers for each of {plural(n, 'moment')}"))
+    return values

@@ -31,8 +31,22 @@ class Measures:
         The mean of speed x (2 - 2^(h / H)) over feet at a height h below H = 2.5 cm, contacts aside.
     skate_ratio, skate_ratio_raw : float
         The share of time in which a foot below 5 cm is faster than 0.5 m/s, at once and in the mean over 1/6 s.
-    accel_p99, accel_raw_p99 : float
-        99 % of the accelerations of joints are lower, m/s², over steps of 1/30 s; and those of all clips.
+    skate_worst_cm_s : float
+        The same of planted feet in the worst second.
+    toe_skate_cm_s, toe_skate_raw_cm_s, toe_skate_worst_cm_s : float
+        The mean speed over the ground of what stands of a foot, where it is lower than 3 cm over its floor and slower than 0.5 m/s
+        in the source frame: independent of contacts; that of all clips, and in the worst second.
+    penetration_cm, penetration_raw_cm : float
+        How deep what stands of a foot is at most below the floor of its clip.
+    knee_limit_share, knee_limit_raw_share : float
+        The share of moments with a knee straighter than 178 degrees.
+    dip_cm : float
+        How much lower than in the source frame hips are at most.
+    balance_cm, lean_deg, lean_raw_deg : float
+        From two seconds after each stop on: how far hips are at most, over the ground, from where the source frame has them over
+        its feet; how far the spine leans; and in the source frames.
+    accel_p99, accel_raw_p99, accel_worst : float
+        99 % of the accelerations of joints are lower, m/s², over steps of 1/30 s; those of all clips, and in the worst second.
     snap_share : float
         The share of moments at which a joint's acceleration is above what 99.9 % of the clips' frames have; 0.001 is as the clips.
     path_rms_m, path_p95_m, heading_rms_deg, heading_p95_deg : float
@@ -69,6 +83,19 @@ class Measures:
     skate_weighted_raw_cm_s: float | None = None
     skate_ratio: float | None = None
     skate_ratio_raw: float | None = None
+    skate_worst_cm_s: float | None = None
+    toe_skate_cm_s: float | None = None
+    toe_skate_raw_cm_s: float | None = None
+    toe_skate_worst_cm_s: float | None = None
+    penetration_cm: float | None = None
+    penetration_raw_cm: float | None = None
+    knee_limit_share: float | None = None
+    knee_limit_raw_share: float | None = None
+    dip_cm: float | None = None
+    balance_cm: float | None = None
+    lean_deg: float | None = None
+    lean_raw_deg: float | None = None
+    accel_worst: float | None = None
     accel_p99: float | None = None
     accel_raw_p99: float | None = None
     snap_share: float | None = None
@@ -91,6 +118,6 @@ class Measures:
 
     def to_json(self) -> dict[str, object]:
         """The measures as JSON has them."""
-        told = {each.name: getattr(self, each.name) for each in fields(self)}
+        document = {each.name: getattr(self, each.name) for each in fields(self)}
         never = self.assets_never_used
-        return {**told, "assets_never_used": None if never is None else list(never), "missing": dict(self.missing)}
+        return {**document, "assets_never_used": None if never is None else list(never), "missing": dict(self.missing)}

@@ -76,7 +76,7 @@ class Map:
     """The column of straight ahead."""
     is_round: bool
     """Whether the last column is beside the first."""
-    told: str
+    caption: str
     """What it shows."""
 
     @property
@@ -170,9 +170,9 @@ def _tidy(values: Floats) -> Floats:
 
 
 def _counted(of: Map, rows: Ints, columns: Ints, counted: NDArray[np.bool_]) -> Counts:
-    found = np.zeros(of.shape, np.int64)
-    np.add.at(found, (rows[counted], columns[counted]), 1)
-    return found
+    counts = np.zeros(of.shape, np.int64)
+    np.add.at(counts, (rows[counted], columns[counted]), 1)
+    return counts
 
 
 def _means(values: Floats, half: int) -> Floats:

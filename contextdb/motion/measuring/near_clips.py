@@ -39,7 +39,6 @@ class Near:
     """What 95 % of its frames cost at most with the nearest frame of the other."""
 
     def to_json(self) -> dict[str, object]:
-        """As plain data."""
         return {"asset": self.asset, "other": self.other, "mirrored": self.is_mirrored, "cost": self.cost}
 
 
@@ -59,25 +58,25 @@ def near_clips(database: MotionDatabase, most: float = NEAR_COST, progress: Tell
     squares = (frames * frames).sum(axis=1)
     step = max(1, round(EVERY_S * database.schema.rate))
     plain = [at for at, number in enumerate(filled.tolist()) if not database.mirrored[number]]
-    found = []
+    pairs = []
     for done, at in enumerate(plain, 1):
         asset = database.assets[filled[at]]
-        asked = frames[first[at] : first[at] + stops[at] - starts[at] : step]
-        far = np.round(np.percentile(_least_costs(asked, frames, squares, first), PERCENTILE, axis=0), PLACES)
+        sampled = frames[first[at] : first[at] + stops[at] - starts[at] : step]
+        far = np.round(np.percentile(_least_costs(sampled, frames, squares, first), PERCENTILE, axis=0), PLACES)
         far[[database.assets[number] == asset for number in filled.tolist()]] = np.inf
         best = int(np.argmin(far))
         if far[best] <= most:
             other = int(filled[best])
-            found.append(Near(asset, database.assets[other], bool(database.mirrored[other]), float(far[best])))
+            pairs.append(Near(asset, database.assets[other], bool(database.mirrored[other]), float(far[best])))
         if progress is not None:
             progress(done, len(plain), asset)
-    return sorted(found, key=lambda near: (near.cost, near.asset))
+    return sorted(pairs, key=lambda near: (near.cost, near.asset))
 
 
-def _least_costs(asked: Features, frames: Features, squares: Features, first: Ints) -> Features:
+def _least_costs(queries: Features, frames: Features, squares: Features, first: Ints) -> Features:
     """What each asked frame [A, F] costs with the nearest of each range, of frames [N, F] whose ranges begin at `first`: [A, R]."""
-    costs = asked @ frames.T
+    costs = queries @ frames.T
     costs *= -2.0
     costs += squares
-    least = np.minimum.reduceat(costs, first, axis=1) + (asked * asked).sum(axis=1)[:, None]
+    least = np.minimum.reduceat(costs, first, axis=1) + (queries * queries).sum(axis=1)[:, None]
     return np.asarray(np.maximum(least, 0.0), np.float32)

@@ -10,8 +10,8 @@ import numpy as np
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.measuring import formulas
+from contextdb.motion.measuring.displayed import Displayed
 from contextdb.motion.measuring.raw_clips import Banks, Clips
-from contextdb.motion.measuring.shown import Shown
 from contextdb.motion.measuring.usage import HasRanges, frames_used, permutations_in, usable
 from contextdb.motion.output.bank import PoseBank
 from contextdb.motion.search.database import MotionDatabase
@@ -25,13 +25,13 @@ NO_FEET = "no bones are named like feet"
 TOO_SHORT = "there are too few moments"
 NO_DATABASES = "the databases are not there"
 NO_JUMP, NO_FORCED, NO_CHANGE = "nothing jumps", "no jump is forced", "the wanted velocity never changes"
-NEVER_PLANTED = "no foot is ever down"
+NEVER_PLANTED, NO_REST = "no foot is ever down", "nothing comes to rest for two seconds"
 
 
 # ---- jumps
 
 
-def jumps(it: Shown) -> dict[str, object]:
+def jumps(it: Displayed) -> dict[str, object]:
     """How often something jumps, how often it must, and for how long what was entered stays."""
     forced = it.costs[it.forced]
     n_entered, seconds = int(it.entered.sum()), it.seconds
@@ -45,12 +45,12 @@ def jumps(it: Shown) -> dict[str, object]:
     }
 
 
-def _playing_s(it: Shown) -> float:
+def _playing_s(it: Displayed) -> float:
     plays = np.array([at is not None for at in it.playing[:-1]], np.bool_)
     return float(np.diff(it.times_s)[plays].sum())
 
 
-def steps(it: Shown, clips: Clips | None) -> dict[str, object]:
+def steps(it: Displayed, clips: Clips | None) -> dict[str, object]:
     """How far joints are apart at jumps, and by how much their speeds differ."""
     names = ("jump_cm", "jump_worst_cm", "jump_mps")
     if clips is None:
@@ -70,48 +70,48 @@ def steps(it: Shown, clips: Clips | None) -> dict[str, object]:
         velocities.append(float(np.linalg.norm(taken_v - left_v, axis=-1).mean()))
     if not means:
         return dict.fromkeys(names, NO_JUMP)
-    found = (100.0 * np.mean(means), 100.0 * np.quantile(worst, 0.95), np.mean(velocities))
-    return {name: float(value) for name, value in zip(names, found, strict=True)}
+    figures = (100.0 * np.mean(means), 100.0 * np.quantile(worst, 0.95), np.mean(velocities))
+    return {name: float(value) for name, value in zip(names, figures, strict=True)}
 
 
 # ---- feet and joints
 
 
-def _moving(it: Shown) -> Ints:
+def moving(it: Displayed) -> Ints:
     """The moments at which time has passed, which poses can be measured at: the last of several at one time."""
     return np.flatnonzero(np.diff(it.times_s, append=math.inf) > 0.0)
 
 
-def skate(it: Shown, clips: Clips | None) -> dict[str, object]:
+def skate(it: Displayed, clips: Clips | None) -> dict[str, object]:
     """How much feet slide that are down."""
     planted, height = ("skate_cm_s", "skate_m_min"), ("skate_weighted_cm_s", "skate_ratio")
     played = "skate_played_cm_s"
     if it.positions is None:
         return dict.fromkeys((*planted, *height, played), NO_POSES)
-    at = _moving(it)
+    at = moving(it)
     if it.feet is None or len(at) < 2:
         why = TOO_SHORT if len(at) < 2 else NO_FEET if clips is not None or it.contacts is None else NO_BANKS
         return dict.fromkeys((*planted, *height, played), why)
     places, times_s = it.positions[at][:, it.feet], it.times_s[at]
     contacts = np.zeros(places.shape[:2], np.bool_) if it.contacts is None else it.contacts[at]
     slides = formulas.Slides.of(places, times_s, contacts, formulas.floor_of(places))
-    found: dict[str, object] = {"skate_weighted_cm_s": _scaled(slides.weighted_mps(), 100.0), "skate_ratio": slides.ratio()}
+    values: dict[str, object] = {"skate_weighted_cm_s": _scaled(slides.weighted_mps(), 100.0), "skate_ratio": slides.ratio()}
     if it.contacts is None:
-        return {**found, **dict.fromkeys((*planted, played), NO_CONTACTS)}
+        return {**values, **dict.fromkeys((*planted, played), NO_CONTACTS)}
     skate = slides.skate_mps()
-    found["skate_cm_s"] = NEVER_PLANTED if skate is None else 100.0 * skate
-    found["skate_m_min"] = _scaled(slides.skated_m_per_s(), 60.0)
-    found[played] = NO_BANKS if clips is None else _or(_scaled(_played(it, clips), 100.0), NEVER_PLANTED)
-    return found
+    values["skate_cm_s"] = NEVER_PLANTED if skate is None else 100.0 * skate
+    values["skate_m_min"] = _scaled(slides.skated_m_per_s(), 60.0)
+    values[played] = NO_BANKS if clips is None else _or(_scaled(_played(it, clips), 100.0), NEVER_PLANTED)
+    return values
 
 
-def _played(it: Shown, clips: Clips) -> float | None:
+def _played(it: Displayed, clips: Clips) -> float | None:
     """The mean speed of feet that are down, of the frames that play, as their clips have them."""
     ways, seconds = 0.0, 0.0
     for at, dt_s in zip(it.playing[:-1], np.diff(it.times_s).tolist(), strict=True):
-        if at is None or (found := clips.find(at)) is None:
+        if at is None or (clip := clips.find(at)) is None:
             continue
-        raw, number = found
+        raw, number = clip
         frame = raw.frame_at(number, at.time_s)
         speeds = raw.foot_speeds[frame]
         down = raw.bank.contacts[frame] & ~np.isnan(speeds) & raw.bank.contacts[min(frame + 1, raw.bank.n_frames - 1)]
@@ -136,75 +136,79 @@ def raw_skate(clips: Clips | None) -> dict[str, object]:
     return dict(zip(names, (100.0 * skate, per_min, weighted, slides.ratio()), strict=True))
 
 
-def accelerations(it: Shown, clips: Clips | None) -> dict[str, object]:
+def accelerations(it: Displayed, clips: Clips | None) -> dict[str, object]:
     """How hard joints accelerate, beside the clips, and how often harder than these ever do."""
-    at = _moving(it)
+    at = moving(it)
     times_s = it.times_s[at]
     step = formulas.step_of(times_s)
     step_s = step * float(np.median(np.diff(times_s))) if len(times_s) > 1 else formulas.STEP_S
     raw = [] if clips is None else [each for part in clips.distinct for each in part.accelerations(step_s) if len(each)]
-    found: dict[str, object] = {
+    values: dict[str, object] = {
         "accel_raw_p99": float(np.quantile(np.concatenate([each.ravel() for each in raw]), 0.99)) if raw else NO_BANKS
     }
     if it.positions is None:
-        return {**found, "accel_p99": NO_POSES, "snap_share": NO_POSES}
+        return {**values, "accel_p99": NO_POSES, "snap_share": NO_POSES}
     own = formulas.accelerations(it.positions[at], times_s, step)
     if not len(own):
-        return {**found, "accel_p99": TOO_SHORT, "snap_share": TOO_SHORT}
-    found["accel_p99"] = float(np.quantile(own, 0.99))
+        return {**values, "accel_p99": TOO_SHORT, "snap_share": TOO_SHORT}
+    values["accel_p99"] = float(np.quantile(own, 0.99))
     if not raw:
-        return {**found, "snap_share": NO_BANKS}
+        return {**values, "snap_share": NO_BANKS}
     bar = float(np.quantile(np.concatenate([each.max(axis=1) for each in raw]), 0.999))
-    return {**found, "snap_share": float((own.max(axis=1) > bar).mean())}
+    return {**values, "snap_share": float((own.max(axis=1) > bar).mean())}
 
 
 # ---- the path
 
 
-def path(it: Shown) -> dict[str, object]:
+def path(it: Displayed) -> dict[str, object]:
     """How far the root is from where the game had the body."""
     names = ("path_rms_m", "path_p95_m", "heading_rms_deg", "heading_p95_deg")
     if it.roots is None or it.bodies is None:
         return dict.fromkeys(names, NO_BODY if it.bodies is None else NO_POSES)
     known = ~np.isnan(it.bodies).any(axis=1)
     metres, turns = formulas.apart(it.roots[known], it.bodies[known])
-    found = (formulas.rms(metres), np.quantile(metres, 0.95), *np.rad2deg((formulas.rms(turns), np.quantile(turns, 0.95))))
-    return {name: float(value) for name, value in zip(names, found, strict=True)}
+    figures = (formulas.rms(metres), np.quantile(metres, 0.95), *np.rad2deg((formulas.rms(turns), np.quantile(turns, 0.95))))
+    return {name: float(value) for name, value in zip(names, figures, strict=True)}
 
 
-def reach(it: Shown, wanted: Floats | None) -> dict[str, object]:
+def reach(it: Displayed, wanted: Floats | None) -> dict[str, object]:
     """How long the motion takes to follow a change of what is wanted."""
     kinds = ("direction", "speed", "stop")
     names = ("reach_s", *(f"reach_{kind}_s" for kind in kinds), "n_changes", "n_missed")
-    at = _moving(it)
+    at = moving(it)
     if it.roots is None or (wanted is None and it.bodies is None) or len(at) < 2:
         return dict.fromkeys(names, TOO_SHORT if len(at) < 2 else NO_POSES if it.roots is None else NO_BODY)
-    times_s = it.times_s[at]
-    if wanted is not None:
-        asked = wanted[at]
-    else:
-        assert it.bodies is not None
-        if np.isnan(it.bodies[at]).any():
-            return dict.fromkeys(names, NO_BODY)
-        asked = np.diff(it.bodies[at, :2], axis=0) / np.diff(times_s)[:, None]
-        asked = np.concatenate((asked, asked[-1:]))
+    times_s, target = it.times_s[at], target_of(it, wanted, at)
+    if target is None:
+        return dict.fromkeys(names, NO_BODY)
     moved = formulas.velocities(it.roots[at, :2], times_s)
-    changes = formulas.changes_of(asked, times_s)
-    found: dict[str, list[float]] = {kind: [] for kind in kinds}
+    changes = formulas.changes_of(target, times_s)
+    durations: dict[str, list[float]] = {kind: [] for kind in kinds}
     n_missed = 0
     for change in changes:
         took_s = formulas.reach_s(change, moved, times_s)
         n_missed += took_s is None
-        found[change.kind].append(float(times_s[change.until] - times_s[change.at]) if took_s is None else took_s)
-    every = [took_s for each in found.values() for took_s in each]
-    means = [float(np.mean(each)) if each else NO_CHANGE for each in (every, *found.values())]
+        durations[change.kind].append(float(times_s[change.until] - times_s[change.at]) if took_s is None else took_s)
+    every = [took_s for each in durations.values() for took_s in each]
+    means = [float(np.mean(each)) if each else NO_CHANGE for each in (every, *durations.values())]
     return dict(zip(names, (*means, len(changes), n_missed), strict=True))
+
+
+def target_of(it: Displayed, wanted: Floats | None, at: Ints) -> Floats | None:
+    """The velocity over the ground that is wanted at some moments [n, 2]: the stick's, or else the body's; None without either."""
+    if wanted is not None:
+        return np.asarray(wanted[at])
+    if it.bodies is None or np.isnan(it.bodies[at]).any():
+        return None
+    target = np.diff(it.bodies[at, :2], axis=0) / np.diff(it.times_s[at])[:, None]
+    return np.concatenate((target, target[-1:]))
 
 
 # ---- what is used
 
 
-def usage(it: Shown, databases: Mapping[str, MotionDatabase] | None, banks: Banks | None) -> dict[str, object]:
+def usage(it: Displayed, databases: Mapping[str, MotionDatabase] | None, banks: Banks | None) -> dict[str, object]:
     """How much of the databases plays, and which assets never do."""
     names = ("frames_used_share", "assets_used_share", "assets_never_used", "frames_unusable_share")
     of: Mapping[str, HasRanges] = databases or ({"": banks} if isinstance(banks, PoseBank) else banks or {})
@@ -215,7 +219,7 @@ def usage(it: Shown, databases: Mapping[str, MotionDatabase] | None, banks: Bank
     played = {at.asset for at in it.playing if at is not None}
     never = tuple(asset for asset in known if asset not in played)
     n_frames = sum(each.n_frames // permutations_in(each) for each in of.values())
-    found: dict[str, object] = {
+    values: dict[str, object] = {
         "frames_used_share": sum(int(flags.sum()) for flags in used.values()) / n_frames if n_frames else NO_DATABASES,
         "assets_used_share": (len(known) - len(never)) / len(known) if known else NO_DATABASES,
         "assets_never_used": never,
@@ -223,11 +227,11 @@ def usage(it: Shown, databases: Mapping[str, MotionDatabase] | None, banks: Bank
     }
     if databases and n_frames:
         unusable = sum(int((~usable(each)).sum()) // each.n_permutations for each in databases.values())
-        found["frames_unusable_share"] = unusable / n_frames
-    return found
+        values["frames_unusable_share"] = unusable / n_frames
+    return values
 
 
-def _frames_a_second(of: HasRanges, it: Shown) -> float:
+def _frames_a_second(of: HasRanges, it: Displayed) -> float:
     if isinstance(of, PoseBank):
         return of.rate
     schema = of.schema if isinstance(of, MotionDatabase) else None

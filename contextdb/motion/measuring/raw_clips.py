@@ -1,4 +1,4 @@
-"""The clips of pose banks as they are: what the shown motion is compared with.
+"""The clips of pose banks as they are: what the displayed motion is compared with.
 
 N frames of one bank, J joints, K feet.
 """
@@ -21,6 +21,9 @@ from contextdb.motion.output.samples import Flags
 
 ON_FRAME = 1e-4
 """A moment that is nearer to a frame, in frames, is on it."""
+DOWN_M, DOWN_MPS = 0.03, 0.5
+"""What stands of a foot is down where it is lower over its floor than the first and slower than the second: on purpose another
+definition than that of the contacts, which the foot lock has."""
 Banks: TypeAlias = PoseBank | Mapping[str, PoseBank]
 """One for all databases, or by their names."""
 
@@ -37,7 +40,7 @@ class At:
 
 @dataclass(frozen=True, eq=False)
 class RawClips:
-    """The clips of one bank, each joint in the world of its clip; what was once computed is kept.
+    """The clips of one bank, each joint in the world of its clip; what was once computed is cached.
 
     `of_steps` are the accelerations by the number of frames of a step.
     """
@@ -90,24 +93,50 @@ class RawClips:
         return self.of_steps[step]
 
     @cached_property
+    def paths(self) -> list[tuple[Floats, Floats]]:
+        """The places of the feet [frames, K, 3] and their floors [K], clip by clip."""
+        every = [self.positions[frames][:, self.feet] for frames in self.recorded()]
+        return [(places, floor_of(places)) for places in every]
+
+    @cached_property
     def slides(self) -> list[Slides]:
         """How the feet move, clip by clip."""
-        feet = self.feet
-        parts = []
-        for frames in self.recorded():
-            places = self.positions[frames][:, feet]
-            times_s = np.arange(len(places)) / self.bank.rate
-            parts.append(Slides.of(places, times_s, self.bank.contacts[frames], floor_of(places)))
-        return parts
+        return self._slides(self.bank.contacts)
+
+    @cached_property
+    def toe_slides(self) -> list[Slides]:
+        """The same, with what `toes_down` says."""
+        return self._slides(self.toes_down)
+
+    def _slides(self, down: Flags) -> list[Slides]:
+        every = zip(self.paths, self.recorded(), strict=True)
+        return [Slides.of(places, np.arange(len(places)) / self.bank.rate, down[at], floor) for (places, floor), at in every]
+
+    @cached_property
+    def floors(self) -> Floats:
+        """The height of the floor below each foot in the range of each frame: float64 [N, K]."""
+        floors = np.zeros((self.bank.n_frames, len(self.feet)))
+        for start, stop in zip(self.bank.starts.tolist(), self.bank.stops.tolist(), strict=True):
+            floors[start:stop] = floor_of(self.positions[start:stop, self.feet])
+        return floors
+
+    @cached_property
+    def toes_down(self) -> Flags:
+        """Whether each foot is low and slow in each frame, whatever its contacts say: bool [N, K]."""
+        speeds = self.foot_speeds.copy()
+        last = self.bank.stops - 1
+        speeds[last] = speeds[np.maximum(last - 1, self.bank.starts)]
+        heights = self.positions[:, self.feet, 1] - self.floors
+        return np.asarray((heights < DOWN_M) & ~(speeds >= DOWN_MPS))
 
     @cached_property
     def foot_speeds(self) -> Floats:
         """How fast each foot moves over the ground from each frame to the next of its range: float64 [N, K]; NaN at the last."""
         feet = self.positions[:, self.feet][..., [0, 2]]
-        found = np.full(feet.shape[:2], np.nan)
-        found[:-1] = np.linalg.norm(np.diff(feet, axis=0), axis=-1) * self.bank.rate
-        found[self.bank.stops - 1] = np.nan
-        return found
+        speeds = np.full(feet.shape[:2], np.nan)
+        speeds[:-1] = np.linalg.norm(np.diff(feet, axis=0), axis=-1) * self.bank.rate
+        speeds[self.bank.stops - 1] = np.nan
+        return speeds
 
     def body_at(self, range_number: int, time_s: float) -> tuple[Floats, Floats]:
         """Where the joints are against the body at a moment of a range, and their velocities in its frame: float64 [J, 3]."""
@@ -159,16 +188,16 @@ class Clips:
     @cached_property
     def distinct(self) -> list[RawClips]:
         """Those that are compared with: of databases that share assets the largest alone."""
-        kept: list[RawClips] = []
+        distinct: list[RawClips] = []
         for clips in sorted(self.raw.values(), key=lambda each: -each.bank.n_frames):
-            if not any(set(clips.bank.assets) <= set(other.bank.assets) for other in kept):
-                kept.append(clips)
-        return kept
+            if not any(set(clips.bank.assets) <= set(other.bank.assets) for other in distinct):
+                distinct.append(clips)
+        return distinct
 
 
 @lru_cache(maxsize=4)
 def raw_of(bank: PoseBank) -> RawClips:
-    """The clips of a bank; those of the last banks are kept, as many sessions are measured with the same."""
+    """The clips of a bank; those of the last banks are cached, as many sessions are measured with the same."""
     return RawClips(bank)
 
 

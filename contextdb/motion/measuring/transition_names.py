@@ -30,7 +30,6 @@ class TransitionCoverage:
         return self.pattern.replace("{from}", pair[0]).replace("{to}", pair[1])
 
     def to_json(self) -> dict[str, object]:
-        """As plain data."""
         return {
             "pattern": self.pattern,
             "states": list(self.states),
@@ -44,7 +43,7 @@ def transitions_of(names: Iterable[str], pattern: str = PATTERN) -> TransitionCo
     fits in several ways is divided where the pattern fits first. Raises MotionError where the pattern has not both places, each
     once, with text between."""
     fits = re.compile(_expression(pattern), re.DOTALL)
-    pairs = {(found["a"], found["b"]): None for name in names if (found := fits.fullmatch(name))}
+    pairs = {(match["a"], match["b"]): None for name in names if (match := fits.fullmatch(name))}
     present = [pair for pair in pairs if pair[0] != pair[1]]
     states = tuple(sorted({state for pair in present for state in pair}))
     missing = ((a, b) for a in states for b in states if a != b and (a, b) not in pairs)
@@ -52,8 +51,8 @@ def transitions_of(names: Iterable[str], pattern: str = PATTERN) -> TransitionCo
 
 
 def _expression(pattern: str) -> str:
-    before, found, rest = pattern.partition("{from}")
+    before, separator, rest = pattern.partition("{from}")
     between, found_too, behind = rest.partition("{to}")
-    if not (found and found_too and between) or any("{from}" in part or "{to}" in part for part in (before, between, behind)):
+    if not (separator and found_too and between) or any("{from}" in part or "{to}" in part for part in (before, between, behind)):
         raise MotionError(Fault(f"{in_quotes(pattern)} is not a pattern of transitions.", ACCEPTED, in_quotes(PATTERN)))
     return f"{re.escape(before)}(?P<a>.+?){re.escape(between)}(?P<b>.+){re.escape(behind)}"

@@ -89,12 +89,12 @@ def usable(database: MotionDatabase) -> Flags:
     kinds = np.asarray(marks.kinds)
     enters = (marks.left_out() == LeftOut.NO)[kinds]
     plays = np.asarray(marks.playable())[kinds]
-    found = np.zeros(database.n_frames, np.bool_)
+    flags = np.zeros(database.n_frames, np.bool_)
     for number, (start, stop) in enumerate(zip(database.starts.tolist(), database.stops.tolist(), strict=True)):
         again = 2 if marks.looping[number] else 1
         reached = _reached(np.tile(enters[start:stop], again), np.tile(plays[start:stop], again))
-        found[start:stop] = reached.reshape(again, -1).any(axis=0)
-    return found
+        flags[start:stop] = reached.reshape(again, -1).any(axis=0)
+    return flags
 
 
 def _reached(enters: Flags, plays: Flags) -> Flags:

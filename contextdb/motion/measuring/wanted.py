@@ -29,7 +29,7 @@ class ClipContexts:
     cells : mapping of str to str
         The smallest box of cells that holds these contexts; conditions that it does not restrict are left out.
     asked : mapping of str to spans
-        For "speed" (m/s), "turn" (degrees a second) and "direction" (degrees), as far as the table knows them, the spans asked for.
+        For "speed" (m/s), "turn" (degrees a second) and "direction" (degrees), as far as the table knows them, the spans requested.
     is_symmetric : bool
         Whether they are the same contexts in a mirror.
     """
@@ -63,7 +63,7 @@ def wanted_bins(of: Map, filled: Bools, each: ClipContexts) -> Bools:
     both = filled | filled[:, of.opposite] if each.is_symmetric else filled
     across = TURN if of.name == TURN else DIRECTION
     wanted = both | _between(both, axis=0) | (_beside(both) if of.is_round else _between(both, axis=1))
-    rows, columns = _asked(of.rows, each.asked.get(SPEED)), _asked(of.columns, each.asked.get(across))
+    rows, columns = _bins_within(of.rows, each.asked.get(SPEED)), _bins_within(of.columns, each.asked.get(across))
     needed: Bools = np.zeros(of.shape, np.bool_)
     if rows is not None:
         wanted &= rows[:, None]
@@ -97,8 +97,8 @@ def _beside(flags: Bools) -> Bools:
     return np.asarray(np.roll(flags, 1, axis=1) & np.roll(flags, -1, axis=1))
 
 
-def _asked(bins: Sequence[Bin], spans: Sequence[Span] | None) -> Bools | None:
-    """The bins whose middle is in a span that is asked for; None where nothing is."""
+def _bins_within(bins: Sequence[Bin], spans: Sequence[Span] | None) -> Bools | None:
+    """The bins whose middle is in a span that is requested; None where nothing is."""
     if spans is None:
         return None
     middles = [each.middle for each in bins]

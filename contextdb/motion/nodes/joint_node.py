@@ -82,8 +82,8 @@ class JointPlay:
 
     def at(self, time_s: float) -> dict[str, GroundPlace]:
         """Where in the world each role's actor is some seconds after the entry, as (x, z, heading)."""
-        found = {role: self.starts[role].then(play.at(time_s)) for role, play in self.plays.items()}
-        return {role: (place.left_m, place.ahead_m, place.turn_rad) for role, place in found.items()}
+        places = {role: self.starts[role].then(play.at(time_s)) for role, play in self.plays.items()}
+        return {role: (place.left_m, place.ahead_m, place.turn_rad) for role, place in places.items()}
 
     def decision(self, role: str, database: str = "", *, tick: int = 0, time_s: float | None = None) -> Decision:
         """What a role plays now, for `PoseStream.update` and for `Trace.record`; as `MatchPlay.decision`.
@@ -105,11 +105,11 @@ class JointPlay:
         """
         if require_text(role, "role") not in self.plays:
             raise QueryError(Fault(f"there is no role {in_quotes(role)}.", some(self.plays)))
-        found = self.plays[role].decision(require_text(database, "database") or str(self.hit.database))
-        found = replace(found, tick=require_whole(tick, "tick"))
+        decision = self.plays[role].decision(require_text(database, "database") or str(self.hit.database))
+        decision = replace(decision, tick=require_whole(tick, "tick"))
         if time_s is not None:
-            found = replace(found, time_s=require_real(time_s, "time_s", 0.0, math.inf))
-        return self._entered(found, role) if found.action is Action.JUMP else found
+            decision = replace(decision, time_s=require_real(time_s, "time_s", 0.0, math.inf))
+        return self._entered(decision, role) if decision.action is Action.JUMP else decision
 
     def _entered(self, decision: Decision, role: str) -> Decision:
         """The first decision, with what was chosen."""
@@ -138,8 +138,8 @@ class JointNode:
         require_kind(searcher, JointSearcher, "searcher", "a JointSearcher")
         for name, joint in searcher.databases.items():
             if joint.rate is None:
-                found = f"the database {in_quotes(name)} has no schema that gives its rate."
-                raise MotionError(Fault(found, "a database that was built from clips"))
+                problem = f"the database {in_quotes(name)} has no schema that gives its rate."
+                raise MotionError(Fault(problem, "a database that was built from clips"))
         self.searcher = searcher
 
     def enter(self, queries: Queries, places: Places, **options: Unpack[JointOptions]) -> JointPlay | None:
@@ -185,8 +185,8 @@ def _last_frame(joint: JointDatabase, hit: JointHit) -> int:
     first, marks = int(joint.firsts[hit.range]), joint.database.marks
     length = int(joint.lengths[hit.range])
     frames = joint.frames[:, first + hit.frame + 1 : first + length]
-    may = marks.playable()[marks.kinds[frames]].all(axis=0)
-    return hit.frame + (len(may) if may.all() else int(np.argmin(may)))
+    playable = marks.playable()[marks.kinds[frames]].all(axis=0)
+    return hit.frame + (len(playable) if playable.all() else int(np.argmin(playable)))
 
 
 def _window(joint: JointDatabase, hit: JointHit, last_s: float) -> Window:

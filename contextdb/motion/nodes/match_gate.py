@@ -75,7 +75,7 @@ class MatchGate:
     Parameters
     ----------
     over : MotionDatabase or MatchNode
-        What is asked for its best cost. All frames of a database count, of a match node those of match ranges.
+        What is queried for its best cost. All frames of a database count, of a match node those of match ranges.
     threshold : float
         Below it the gate opens.
     close_above : float, optional
@@ -98,8 +98,8 @@ class MatchGate:
         self.close_above = self.threshold if close_above is None else _bar(close_above, "close_above")
         self.seen: GateLook | None = None
         if self.close_above < self.threshold:
-            found = f"a gate that opens under {self.threshold:g} cannot close above {self.close_above:g}."
-            raise MotionError(Fault(found, f"close_above of {self.threshold:g} or more"))
+            problem = f"a gate that opens under {self.threshold:g} cannot close above {self.close_above:g}."
+            raise MotionError(Fault(problem, f"close_above of {self.threshold:g} or more"))
 
     @property
     def is_open(self) -> bool:

@@ -37,8 +37,7 @@ from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.filtering import Penalties, Tags
 from contextdb.motion.search.hit import Hit
 from contextdb.motion.selection.decision import Action, Decision
-from contextdb.motion.selection.ongoing import playing_at
-from contextdb.motion.selection.playhead import Playhead
+from contextdb.motion.selection.playhead import Playhead, playing_at
 from contextdb.motion.selection.root_motion import RootMotion, between
 
 
@@ -335,14 +334,14 @@ def _checked_root(database: MotionDatabase) -> Floats:
     root = database.root
     accepted = f"x and z in metres and the heading in radians of each of {database.n_frames} frames"
     if root is None or np.shape(root) != (database.n_frames, 3):
-        found = "has no root motion" if root is None else f"has root motion of shape {np.shape(root)}"
-        raise MotionError(Fault(f"a match node's database {found}.", accepted))
+        problem = "has no root motion" if root is None else f"has root motion of shape {np.shape(root)}"
+        raise MotionError(Fault(f"a match node's database {problem}.", accepted))
     frames = database.layout.frames
     wrong = frames[~np.isfinite(root[frames]).all(axis=1)]
     if len(wrong):
         asset = database.assets[database.range_of(int(wrong[0]))]
-        found = f"the root motion of frame {wrong[0]} is {root[wrong[0]].tolist()} (asset {in_quotes(asset)})."
-        raise MotionError(Fault(found, "finite numbers"))
+        problem = f"the root motion of frame {wrong[0]} is {root[wrong[0]].tolist()} (asset {in_quotes(asset)})."
+        raise MotionError(Fault(problem, "finite numbers"))
     return np.asarray(root)
 
 
@@ -350,8 +349,8 @@ def _rate_of(database: MotionDatabase, rate: float | None) -> float:
     known = None if database.schema is None else database.schema.rate
     number = known if rate is None else as_number(rate)
     if number is None or number <= 0.0 or (known is not None and number != known):
-        found = "a match node's database has no schema that gives its rate." if rate is None else f"the rate is {rate!r}."
-        raise MotionError(Fault(found, "frames a second, more than 0" if known is None else f"{known:g}, the schema's"))
+        problem = "a match node's database has no schema that gives its rate." if rate is None else f"the rate is {rate!r}."
+        raise MotionError(Fault(problem, "frames a second, more than 0" if known is None else f"{known:g}, the schema's"))
     return number
 
 

@@ -16,14 +16,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from contextdb.cells.arguments import as_number, require_kind, require_many, require_text
 from contextdb.errors import Fault, MotionError, QueryError, in_quotes, mend_for, some
-from contextdb.motion.arguments import HasAssets, Valid
+from contextdb.motion.answers import Answer, is_answer
+from contextdb.motion.arguments import Valid
 from contextdb.motion.clips.foot_bones import feet_of
 from contextdb.motion.clips.mirror import Pairs
 from contextdb.motion.clips.quaternions import Floats
@@ -104,7 +104,7 @@ def hands_of(skeleton: Skeleton) -> tuple[str, str]:
 def best_start(
     database: MotionDatabase,
     query: ArrayLike,
-    assets: str | Collection[str] | HasAssets | None = None,
+    assets: str | Collection[str] | Answer | None = None,
     *,
     within: Span | Mapping[str, Span] | None = None,
     tags: TagFilter | None = None,
@@ -138,8 +138,8 @@ def best_start(
         An asset that the database lacks, with the nearest that it has, or a part that is none; or as from a search.
     """
     require_kind(database, MotionDatabase, "database", "a MotionDatabase")
-    if assets is None or hasattr(assets, "assets"):
-        valid = cast("Valid | None", assets)
+    if assets is None or is_answer(assets):
+        valid: Valid | None = assets
     else:
         names = [assets] if isinstance(assets, str) else list(require_many(assets, "assets", "names of assets"))
         _check_names(database, names)
@@ -162,9 +162,9 @@ def _outside(database: MotionDatabase, within: Span | Mapping[str, Span]) -> Flo
     ranges = database.layout.frame_ranges[frames]
     times_s = (frames - database.starts[ranges]) / database.schema.rate
     is_inside = (times_s >= limits[ranges, 0] - TOLERANCE_S) & (times_s <= limits[ranges, 1] + TOLERANCE_S)
-    found = np.zeros(database.n_frames)
-    found[frames[~is_inside]] = np.inf
-    return found
+    biases = np.zeros(database.n_frames)
+    biases[frames[~is_inside]] = np.inf
+    return biases
 
 
 def _limits(database: MotionDatabase, within: Span | Mapping[str, Span]) -> Iterator[Span]:
@@ -192,7 +192,7 @@ def _check_names(database: MotionDatabase, names: list[str]) -> None:
     faults = []
     for name in names:
         if not isinstance(name, str) or name not in known:
-            found = f"the database has no asset {in_quotes(str(name))}."
-            faults.append(Fault(found, some(known) or "none: it is empty", mend_for(str(name), known)))
+            problem = f"the database has no asset {in_quotes(str(name))}."
+            faults.append(Fault(problem, some(known) or "none: it is empty", mend_for(str(name), known)))
     if faults:
         raise QueryError(*faults)

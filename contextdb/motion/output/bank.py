@@ -13,26 +13,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
-from functools import cache, cached_property
-from types import ModuleType
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
 
 from contextdb.cells.arguments import require_kind, require_many, require_real, require_text
-from contextdb.console import announce
+from contextdb.core import PoseFrames, place_joints
 from contextdb.errors import Fault, MotionError, Place, in_quotes, mend_for, plural, some
 from contextdb.motion.clips import mirror as mirrors
 from contextdb.motion.clips import quaternions
 from contextdb.motion.clips.clip import Clip
-from contextdb.motion.clips.feet import NO_MARKS, ContactMarks, flat_feet_of
+from contextdb.motion.clips.feet import NO_MARKS, ContactMarks, held_feet_of
 from contextdb.motion.clips.poses import Poses, forward_kinematics, local_poses, resampled
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints, Skeleton
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.output.legs import leg_of, steps_of, travels
-from contextdb.motion.output.samples import Flags, Frames, Moment, Place3, Sample, Singles
+from contextdb.motion.output.samples import Flags, Moment, Place3, Sample, Singles
 
 SAME_M = 1e-6
 """A joint that is never farther from its offset keeps it."""
@@ -40,25 +39,6 @@ FARTHEST_M = 1e6
 RIG_MEND = 'to put the clips on one rig: rig = "clips/idle.bvh" in [databases.NAME], or motion.retargeted'
 STEP_S, USUAL = 1.0 / 30.0, 0.999
 """Accelerations are those over steps of this length, and usual are those of so many frames."""
-
-
-@cache
-def loops() -> ModuleType:
-    """The loops over joints, with a word where they are compiled for the first time on this machine."""
-    from contextdb.motion.output import kernels
-
-    if kernels.IS_COMPILED:
-        announce(kernels.sample)
-    return kernels
-
-
-@cache
-def leg_loops() -> ModuleType:
-    """The loops over the joints of a leg."""
-    from contextdb.motion.output import leg_kernels
-
-    loops()  # says the word
-    return leg_kernels
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +63,7 @@ class PoseBank:
     feet : tuple of str
         Left and right; empty where no bones are named like feet.
     contacts : bool array, shape (N, len(feet))
-        Whether each foot is down in the clip: stands flat, so that it can be held where it is, or is marked.
+        Whether each foot is down in the clip, so that it can be held where it is: stands flat or on its toe, or is marked.
     """
 
     skeleton: Skeleton
@@ -120,7 +100,7 @@ class PoseBank:
         mirror : bool or collection of str
             Whether all clips, or those of these names, are there a second time with left and right exchanged.
         markup : Markup, optional
-            Says which clips loop, and when feet are down where that is not to be found.
+            Says which clips loop, and when feet are down where that is not to be detected.
 
         Raises
         ------
@@ -157,7 +137,7 @@ class PoseBank:
             faults.append(Fault("there is no clip to take poses of.", "at least one clip"))
         if faults:
             raise MotionError(*faults)
-        return _joined(parts, schema.rate)
+        return _bank_of(parts, schema.rate)
 
     def __repr__(self) -> str:
         sizes = plural(len(self.assets), "range"), plural(self.n_frames, "frame"), plural(self.n_joints, "joint")
@@ -175,10 +155,10 @@ class PoseBank:
 
     def range_of(self, asset: str, mirrored: bool = False) -> int:
         """The range of an asset. Raises MotionError when there is none, with the nearest name."""
-        found = self._ranges.get((asset, bool(mirrored)))
-        if found is None:
+        number = self._ranges.get((asset, bool(mirrored)))
+        if number is None:
             raise MotionError(self._unknown(asset))
-        return found
+        return number
 
     def last_s(self, range_number: int) -> float:
         """Seconds from the first frame of a range to its last."""
@@ -192,36 +172,39 @@ class PoseBank:
 
     def sample_of(self, range_number: int, time_s: float) -> Sample:
         """As `sample`, of a range's number, without a look at the arguments."""
-        low, high, share = self._between(range_number, time_s)
-        rotations, positions = self._pose(low, high, share)
+        return self._sampled(range_number, time_s)[0]
+
+    def _sampled(self, range_number: int, time_s: float) -> tuple[Sample, int, int, float]:
+        """A moment, the two frames about it, and the share of the second."""
+        rotations, positions, numbers = np.empty((self.n_joints, 4)), np.empty((len(self.moving), 3)), np.empty(6)
         spins, velocities = np.empty((self.n_joints, 3)), np.empty((len(self.moving), 3))
-        loops().slopes(self.rotations, self.positions, low, high, self.rate, spins, velocities)
-        return Sample(rotations, positions, spins, velocities, self._root_velocity(low, high, share))
+        self.frames.sample(int(range_number), time_s, rotations, positions, spins, velocities, numbers)
+        low, high, share, left, ahead, turn = numbers.tolist()
+        return Sample(rotations, positions, spins, velocities, (left, ahead, turn)), int(low), int(high), share
 
     def moment_of(self, range_number: int, time_s: float) -> Moment:
         """What a range is at a moment."""
-        low, high, share = self._between(range_number, time_s)
-        rotations, positions = self._pose(low, high, share)
+        sample, low, high, share = self._sampled(range_number, time_s)
         (x, z, heading, left, ahead, sway), (to_x, to_z, to_heading, to_left, to_ahead, to_sway) = self._ways[[low, high]].tolist()
         root = x + share * (to_x - x), z + share * (to_z - z), heading + share * (to_heading - heading)
         travel = left + share * (to_left - left), ahead + share * (to_ahead - ahead), sway + share * (to_sway - sway)
         near = high if share >= 0.5 else low
-        return Moment(rotations, positions, root, travel, np.asarray(self.contacts[near]), near)
+        return Moment(sample.rotations, sample.positions, root, travel, np.asarray(self.contacts[near]), near)
+
+    def joints_at(self, range_number: int, time_s: float, heading: float = 0.0) -> Floats:
+        """Where the joints are at a moment of a range [J, 3], with the body at the origin."""
+        sample = self.sample_of(range_number, time_s)
+        return placed(self.skeleton, self.translations(sample.positions), sample.rotations, (0.0, 0.0, heading))[0]
 
     def contacts_at(self, range_number: int, time_s: float) -> Flags:
         """Which feet are down at a moment of a range: in the nearest frame."""
         return self.moment_of(range_number, time_s).contacts
 
-    def steps_at(self, frame: int) -> list[list[float]]:
-        """How far each foot is through its swing in a frame, 0 to 1, and where it comes down, left and ahead of the body."""
-        step: list[list[float]] = self._steps[frame].tolist()
-        return step
-
     def translations(self, positions: Floats) -> Floats:
         """Each joint against its parent [J, 3], of the positions [M, 3] of those that have some of their own."""
-        found = self.skeleton.offsets.copy()
-        found[self.moving] = positions
-        return found
+        translations = self.skeleton.offsets.copy()
+        translations[self.moving] = positions
+        return translations
 
     @cached_property
     def _steps(self) -> Floats:
@@ -233,33 +216,36 @@ class PoseBank:
 
     def _places_of(self, joint: int) -> Floats:
         """Where a joint is against the root in each frame: [N, 3]."""
-        rotations, found = np.tile([1.0, 0.0, 0.0, 0.0], (self.n_frames, 1)), np.zeros((self.n_frames, 3))
+        rotations, places = np.tile([1.0, 0.0, 0.0, 0.0], (self.n_frames, 1)), np.zeros((self.n_frames, 3))
         for each in (*reversed(self.skeleton.ancestors(joint)), joint):
             row = self.places[each]
             own = self.positions[:, row] if row >= 0 else self.skeleton.offsets[each]
-            found = found + quaternions.rotate(rotations, np.broadcast_to(own, found.shape))
+            places = places + quaternions.rotate(rotations, np.broadcast_to(own, places.shape))
             rotations = quaternions.multiply(rotations, self.rotations[:, each].astype(np.float64))
-        return found
+        return places
 
     @cached_property
     def places(self) -> Ints:
         """Which row of positions [M, 3] is each joint's, -1 where it keeps its offset: int64 [J]."""
-        found = np.full(self.n_joints, -1)
-        found[self.moving] = np.arange(len(self.moving))
-        return found
+        columns = np.full(self.n_joints, -1)
+        columns[self.moving] = np.arange(len(self.moving))
+        return columns
 
     @cached_property
     def most_accel(self) -> float:
         """The acceleration that no joint passes in 99.9 % of the frames, over steps of about 1/30 s, m/s²; infinite without any."""
         step, every = max(1, round(STEP_S * self.rate)), [np.zeros(0)]
-        rig, parents = self.skeleton, np.asarray(self.skeleton.parents, np.int64)
-        for start, n_steps, _ in [span for span, side in zip(self._spans, self.mirrored, strict=True) if not side]:
-            found, part = np.zeros(max(0, n_steps + 1 - 2 * step)), slice(start, start + n_steps + 1)
-            of_range = self.rotations[part], self.positions[part], self.root[part], step, 1.0 / self.rate
-            loops().fastest(parents, rig.offsets, self.places, *of_range, found)
-            every.append(found)
-        found = np.concatenate(every)
-        return float(np.quantile(found, USUAL)) if len(found) else math.inf
+        for number in np.flatnonzero(~self.mirrored & (self.stops - self.starts > 2 * step)).tolist():
+            accelerations = np.empty(int(self.stops[number] - self.starts[number]) - 2 * step)
+            self.frames.accelerations(number, *self.joints, step, accelerations)
+            every.append(accelerations)
+        accelerations = np.concatenate(every)
+        return float(np.quantile(accelerations, USUAL)) if len(accelerations) else math.inf
+
+    @cached_property
+    def joints(self) -> tuple[Ints, Floats, Ints]:
+        """Parents [J], offsets [J, 3] and places [J], as the core takes them."""
+        return np.array(self.skeleton.parents, np.int64), np.array(self.skeleton.offsets, np.float64), self.places
 
     @cached_property
     def _ways(self) -> Floats:
@@ -267,12 +253,26 @@ class PoseBank:
         return np.column_stack((self.root, travels(self.root, self.starts, self.stops, self.looping, self.rate)))
 
     @cached_property
-    def frames(self) -> Frames:
-        """What the loops over many characters read."""
-        starts = np.asarray(self.starts, np.int64)
-        steps, ways = np.asarray(self.stops, np.int64) - starts - 1, np.ascontiguousarray(self._ways, np.float64)
-        arrays = self.rotations, self.positions, self.root, ways, np.ascontiguousarray(self.contacts)
-        return Frames(*arrays, starts, steps, np.asarray(self.looping), float(self.rate))
+    def frames(self) -> PoseFrames:
+        """The frames for the core, for those who feel no ground."""
+        return self._frames(None)
+
+    @cached_property
+    def frames_on_ground(self) -> PoseFrames:
+        """The frames for the core, with the steps of feet."""
+        return self._frames(self._steps)
+
+    def _frames(self, steps: Floats | None) -> PoseFrames:
+        rotations, positions, root = (
+            np.require(each, np.float32, ("C", "A")) for each in (self.rotations, self.positions, self.root)
+        )
+        starts, looping, contacts = np.array(self.starts, np.int64), np.array(self.looping), np.ascontiguousarray(self.contacts)
+        n_steps, ways = np.array(self.stops, np.int64) - starts - 1, np.ascontiguousarray(self._ways, np.float64)
+        return PoseFrames(rotations, positions, root, ways, contacts, steps, starts, n_steps, looping, float(self.rate))
+
+    def __getstate__(self) -> dict[str, object]:
+        """The fields alone: what is prepared for the core is prepared again where the bank is unpickled or copied."""
+        return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @cached_property
     def _spans(self) -> list[tuple[int, int, bool]]:
@@ -284,26 +284,19 @@ class PoseBank:
     def _ranges(self) -> dict[tuple[str, bool], int]:
         return {(asset, bool(side)): i for i, (asset, side) in enumerate(zip(self.assets, self.mirrored.tolist(), strict=True))}
 
-    def _between(self, range_number: int, time_s: float) -> tuple[int, int, float]:
-        """The two frames about a moment, and the share of the second."""
-        found: tuple[int, int, float] = loops().between(*self._spans[range_number], time_s * self.rate)
-        return found
-
-    def _pose(self, low: int, high: int, share: float) -> tuple[Floats, Floats]:
-        """Rotations [J, 4] and positions [M, 3] between two frames."""
-        rotations, positions = np.empty((self.n_joints, 4)), np.empty((len(self.moving), 3))
-        loops().sample(self.rotations, self.positions, low, high, share, rotations, positions)
-        return rotations, positions
-
-    def _root_velocity(self, low: int, high: int, share: float) -> Place3:
-        found: Place3 = loops().root_velocity(self.root, low, high, share, self.rate)
-        return found
-
     def _unknown(self, asset: str) -> Fault:
         names = list(dict.fromkeys(self.assets))
         if asset in names:
             return Fault(f"{in_quotes(asset)} has no mirrored poses.", "a bank built with mirror = true, as its database is")
         return Fault(f"there are no poses of {in_quotes(asset)}.", some(names), mend_for(asset, names))
+
+
+def placed(rig: Skeleton, translations: Floats, rotations: Floats, root: Place3) -> tuple[Floats, Floats]:
+    """Joints in the world [J, 3], and their rotations [J, 4], of a pose against parents whose first joint is against a root."""
+    positions, world = np.empty((rig.n_joints, 3)), np.empty((rig.n_joints, 4))
+    parents = np.asarray(rig.parents, np.int64)
+    place_joints(parents, np.ascontiguousarray(translations), np.ascontiguousarray(rotations), np.array(root), positions, world)
+    return positions, world
 
 
 @dataclass(frozen=True, eq=False)
@@ -365,7 +358,7 @@ def _rig(clip: Clip) -> Skeleton:
 def _contacts(poses: Poses, schema: FeatureSchema, marks: ContactMarks) -> tuple[tuple[str, ...], Flags]:
     """The feet, and in which frames each is down."""
     try:
-        falls = flat_feet_of(poses, schema.foot_bones(), marks)
+        falls = held_feet_of(poses, schema.foot_bones(), marks)
     except MotionError:
         return (), np.zeros((poses.n_frames, 0), np.bool_)
     feet = falls.feet
@@ -389,24 +382,24 @@ def _faults(clip: Clip, first: Clip, seen: set[str]) -> Iterator[Fault]:
         )
         yield Fault(f"{differ}.", f"the same {plural(rig.n_joints, 'bone')} in every clip of a bank", RIG_MEND)
     elif not np.array_equal(clip.skeleton.parents, rig.parents):
-        found = f"its bones hang on other parents than those of {in_quotes(first.name)}."
-        yield Fault(found, "one rig for every clip of a bank", RIG_MEND)
+        problem = f"its bones hang on other parents than those of {in_quotes(first.name)}."
+        yield Fault(problem, "one rig for every clip of a bank", RIG_MEND)
 
 
 def moving_alike(banks: Mapping[str, PoseBank]) -> dict[str, PoseBank]:
     """The banks; those of one rig with positions of the same joints: one take moves its root, another its hips."""
-    found = dict(banks)
+    alike = dict(banks)
     for name, bank in banks.items():
         rig = [each.moving for each in banks.values() if each.skeleton.names == bank.skeleton.names]
         moving = np.unique(np.concatenate(rig))
         if len(moving) > len(bank.moving):
             positions = np.tile(bank.skeleton.offsets[moving].astype(np.float32), (bank.n_frames, 1, 1))
             positions[:, np.searchsorted(moving, bank.moving)] = bank.positions
-            found[name] = replace(bank, moving=moving, positions=positions)
-    return found
+            alike[name] = replace(bank, moving=moving, positions=positions)
+    return alike
 
 
-def _joined(parts: list[_Part], rate: float) -> PoseBank:
+def _bank_of(parts: list[_Part], rate: float) -> PoseBank:
     rig = parts[0].rig
     away = [np.abs(part.positions - rig.offsets).max(axis=(0, 2)) for part in parts if not part.is_mirrored]
     moving = sorted({*tops_of(rig), *np.flatnonzero(np.max(away, axis=0) > SAME_M).tolist()})

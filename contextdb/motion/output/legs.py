@@ -43,15 +43,27 @@ def leg_of(rig: Skeleton, foot: str) -> Leg | None:
     return Leg(np.array([above[1], above[0], ankle], np.int64), (toes or [ankle])[0])
 
 
-def hinge_of(rig: Skeleton, leg: Leg, knees: Floats) -> Floats:
+def hinge_of(rig: Skeleton, leg: Ints, knees: Floats) -> Floats:
     """The axis that a knee bends about, against its hip [3]: the mean of poses, of whose knees the rotations are [N, 4].
 
     Of a knee that never bends the axis to the left.
     """
-    thigh, shin = rig.offsets[leg.joints[1]], rig.offsets[leg.joints[2]]
+    thigh, shin = rig.offsets[leg[1]], rig.offsets[leg[2]]
     axis = np.cross(thigh, quaternions.rotate(knees, np.broadcast_to(shin, (len(knees), 3)))).mean(axis=0)
     size = float(np.linalg.norm(axis))
     return np.asarray(axis / size) if size > LEAST_BEND * np.linalg.norm(thigh) * np.linalg.norm(shin) else LEFT
+
+
+def legs_of(rig: Skeleton, feet: Sequence[str]) -> Ints:
+    """The hip, knee, ankle and what stands of each foot, all -1 for one without a leg: [F, 4]."""
+    legs = [leg_of(rig, foot) for foot in feet]
+    return np.array([[-1] * 4 if leg is None else [*leg.joints.tolist(), leg.toe] for leg in legs], np.int64).reshape(-1, 4)
+
+
+def hinges_of(rig: Skeleton, legs: Ints, rotations: NDArray[np.floating]) -> Floats:
+    """The axis that the knee of each leg bends about in some poses, whose rotations are [N, J, 4]: [F, 3]."""
+    each = [LEFT if leg[0] < 0 else hinge_of(rig, leg[:3], rotations[:, leg[1]].astype(np.float64)) for leg in legs]
+    return np.array(each, np.float64).reshape(-1, 3)
 
 
 def steps_of(root: NDArray[np.floating], toes: Floats, contacts: Flags, spans: Sequence[tuple[int, int, bool]]) -> Floats:
@@ -60,12 +72,12 @@ def steps_of(root: NDArray[np.floating], toes: Floats, contacts: Flags, spans: S
     `root` [N, 3], `toes` against it [N, n feet, 3], which feet are down [N, n feet], and the first frame of each range, its
     steps to the last, and whether it loops.
     """
-    found = np.zeros(toes.shape)
+    steps = np.zeros(toes.shape)
     for start, n_steps, loops in spans:
         part = slice(start, start + n_steps + 1)
         for foot in range(toes.shape[1]):
-            found[part, foot] = _steps(np.asarray(root[part], np.float64), toes[part, foot], contacts[part, foot], loops)
-    return found
+            steps[part, foot] = _steps(np.asarray(root[part], np.float64), toes[part, foot], contacts[part, foot], loops)
+    return steps
 
 
 def _steps(root: Floats, toes: Floats, is_down: Flags, loops: bool) -> Floats:
@@ -103,7 +115,7 @@ LEAST_M = 1e-9
 def travels(root: NDArray[np.floating], starts: Ints, stops: Ints, looping: NDArray[np.bool_], rate: float) -> Floats:
     """Metres a second to the left and ahead of the mean facing, and by how many radians the facing differs from the mean: [N, 3],
     of roots [N, 3]: x, z and heading."""
-    found = np.zeros((len(root), 3))
+    travelled = np.zeros((len(root), 3))
     short, long = (max(1, round(seconds * rate)) for seconds in (SPEED_S, WAY_S))
     for start, stop, loops in zip(starts.tolist(), stops.tolist(), looping.tolist(), strict=True):
         n = stop - start
@@ -116,8 +128,8 @@ def travels(root: NDArray[np.floating], starts: Ints, stops: Ints, looping: NDAr
         ways = _ways(path, frames, long)
         mean = _mean(path[:, 2], frames, long)
         own = to_own_frame(ways / np.maximum(np.linalg.norm(ways, axis=-1), LEAST_M)[:, None], mean)
-        found[start:stop] = np.column_stack((own * speeds[:, None], path[frames, 2] - mean))
-    return found
+        travelled[start:stop] = np.column_stack((own * speeds[:, None], path[frames, 2] - mean))
+    return travelled
 
 
 def laps_about(path: Floats, laps: int) -> Floats:

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from contextdb.cells.sequences import Made
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.output.samples import Flags, Place3
+from contextdb.motion.records import quickly_made
 from contextdb.motion.selection.decision import Playing
 
 
+@quickly_made
 @dataclass(frozen=True, eq=False, slots=True)
 class Pose:
     """A pose to show.
@@ -47,7 +49,7 @@ class Pose:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CrowdPoses(Made[Pose]):
-    """The poses of N characters: a sequence, whose poses are made when they are asked for, with their arrays as views.
+    """The poses of N characters: a sequence, whose poses are made when they are requested, with their arrays as views.
 
     Attributes
     ----------

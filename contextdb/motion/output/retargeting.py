@@ -1,41 +1,55 @@
 """A clip of one rig as a clip of another: bones by their names, lengths by those of the legs, feet by bending the legs.
 
-    clip ─► rotations in the world, by names ─► root moved by the scale of the legs ─► legs bent until feet stand ─► clip of the rig
+    clip ─► rotations in the world, by names and shape ─► root moved by the scale of the legs ─► feet stand ─► clip of the rig
 
 Soles are as high above the ground as those of the clip, by scale, however high an ankle is above its own. Both rigs must rest
-alike: their bones point the same way where nothing is turned, as those of one studio do. A bone that the other rig has not is left
-out, and what it turns is in the bone below it; one that the clip has not keeps its rest. F frames, J joints.
+alike: their bones point the same way where nothing is turned, as those of one studio do; or clips are given whose first frames show
+both bodies in one pose. A bone that the other rig has not is left out, and what it turns is in the bone below it; one that the clip
+has not keeps its rest. F frames, J joints.
 
 Source: Forsyth, "How a Character Should Walk", Game Tech 2004.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from math import radians
 
 import numpy as np
 
-from contextdb.cells.arguments import require_kind, require_mapping, require_real
-from contextdb.errors import Fault, MotionError, Place, in_quotes, some
+from contextdb.cells.arguments import require_kind, require_many_of, require_mapping, require_real
+from contextdb.core import bend_legs
+from contextdb.errors import Fault, MotionError, Place, in_quotes
 from contextdb.motion.clips import quaternions
-from contextdb.motion.clips.bone_names import meant_bone
+from contextdb.motion.clips.bone_names import cores_of, without_namespace
 from contextdb.motion.clips.clip import CENTIMETRE, Clip
 from contextdb.motion.clips.foot_bones import feet_of
-from contextdb.motion.clips.poses import LocalPoses, Poses, forward_kinematics, local_poses
+from contextdb.motion.clips.poses import LocalPoses, Poses, forward_kinematics, local_poses, poses_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Skeleton
-from contextdb.motion.output.bank import leg_loops
 from contextdb.motion.output.legs import Leg, leg_of
 from contextdb.motion.output.track import clip_of_tracks
 
 STRAIGHT = radians(170.0)
-ALIKE_AT_REST = 0.5
-"""The least cosine between a bone of the rig and that of a clip."""
+ALIKE_LEGS, ALIKE_ARMS = 0.5, 0.85
+"""The least cosine between a bone of the rig and that of a clip where both are in the pose of reference."""
+SAME_WAY = 0.99
+"""The least cosine between bones that rest alike."""
+ARMS = ("forearm", "hand")
+"""The ends of the bones of an arm."""
+STILL = np.array([1.0, 0.0, 0.0, 0.0])
 LEAST_M, MOST_M = 1e-9, 1e9
 
 
-def retargeted(clip: Clip, rig: Skeleton, *, metres_per_unit: float = CENTIMETRE, names: Mapping[str, str] | None = None) -> Clip:
+def retargeted(
+    clip: Clip,
+    rig: Skeleton,
+    *,
+    metres_per_unit: float = CENTIMETRE,
+    names: Mapping[str, str] | None = None,
+    references: Sequence[Clip] = (),
+) -> Clip:
     """A clip on another rig.
 
     Parameters
@@ -46,7 +60,11 @@ def retargeted(clip: Clip, rig: Skeleton, *, metres_per_unit: float = CENTIMETRE
     metres_per_unit : float
         Of the rig's offsets.
     names : mapping of str to str, optional
-        For bones of the rig those of the clip, where they differ. Default: of the same name, in any case.
+        For bones of the rig those of the clip. Default: hips and legs by the shape of both; others of the same name, in any case
+        and without namespace, of the same side and meaning in any spelling, or as far up the spine.
+    references : list of Clip, optional
+        Clips whose first frames show one pose, such as a T, of the rig, of the clip's body, or of each. A body without one is taken
+        to rest in that pose. Default: both rest alike.
 
     Returns
     -------
@@ -56,7 +74,8 @@ def retargeted(clip: Clip, rig: Skeleton, *, metres_per_unit: float = CENTIMETRE
     Raises
     ------
     MotionError
-        The rig or the clip has no feet or legs, a bone of hips or legs has no counterpart, or points elsewhere at rest.
+        The rig or the clip has no feet or legs, has no bone of one of `names`, or a bone of legs or arms points elsewhere in
+        the pose of reference.
     ContextError
         An argument of another type.
     """
@@ -64,83 +83,165 @@ def retargeted(clip: Clip, rig: Skeleton, *, metres_per_unit: float = CENTIMETRE
     require_kind(rig, Skeleton, "rig", "a Skeleton")
     metres_per_unit = require_real(metres_per_unit, "metres_per_unit", LEAST_M, MOST_M)
     given = {} if names is None else require_mapping(names, "names", "a mapping of the rig's bones to the clip's")
+    shown = require_many_of(references, Clip, "references", "a list of Clip")
     local = local_poses(clip)
-    shown = forward_kinematics(local)
+    source_poses = forward_kinematics(local)
     offsets = np.array(rig.offsets) * metres_per_unit
     offsets[0] = 0.0
-    legs = [(leg, leg_of(clip.skeleton, foot)) for leg, foot in zip(_legs(rig), feet_of(clip.skeleton), strict=True)]
-    own = _counterparts(rig, clip, given, [joint for leg, _ in legs for joint in leg.joints.tolist()])
-    lengths = np.array([(_length(offsets, leg), _length(local.positions[0], other)) for leg, other in legs if other is not None])
-    if len(lengths) < len(legs) or not lengths.min() > 0.0:
-        raise MotionError(
-            Fault("a leg has no hip and knee of its own, or no length.", "legs of thigh, shin and foot", place=Place(clip.name))
-        )
-    _require_alike_at_rest(rig, clip, legs, own)
+    legs = list(zip(_legs(rig), _legs(clip.skeleton, Place(clip.name)), strict=True))
+    own = _counterparts(rig, clip, given, legs)
+    lengths = np.array([(_length(offsets, leg), _length(local.positions[0], other)) for leg, other in legs])
+    if not lengths.min() > 0.0:
+        raise MotionError(Fault("a leg has no length.", "legs of thigh, shin and foot", place=Place(clip.name)))
+    poses = [_reference(body, shown) for body in (rig, clip.skeleton)]
+    _require_alike(rig, clip, legs, own, poses)
+    turned = _turned(rig, clip.skeleton, own, poses)
     scale = float(lengths[:, 0].sum() / lengths[:, 1].sum())
-    rotations = _rotations(rig, shown, own)
+    rotations = _rotations(rig, source_poses, own, turned)
     translations = np.repeat(offsets[None], clip.n_frames, axis=0)
     placed = forward_kinematics(LocalPoses(rig, clip.rate, translations, rotations))
-    translations[:, 0] = scale * shown.positions[:, own[rig.hips]] - placed.positions[:, rig.hips]
+    translations[:, 0] = scale * source_poses.positions[:, own[rig.hips]] - placed.positions[:, rig.hips]
     placed = forward_kinematics(LocalPoses(rig, clip.rate, translations, rotations))
-    lifts = [_lifts(rig, leg, placed, shown, own, scale) for leg, _ in legs]
+    lifts = [_lifts(rig, leg, placed, source_poses, own, scale) for leg, _ in legs]
     lift = float(np.median(lifts))
     translations[:, 0, 1] += lift
     placed.positions[..., 1] += lift
+    ahead = quaternions.rotate(quaternions.inverse(turned[rig.hips]), np.array([0.0, 0.0, 1.0]))
+    aheads = quaternions.rotate(placed.rotations[:, rig.hips], ahead)
     for (leg, _), higher in zip(legs, lifts, strict=True):
-        ankles = scale * shown.positions[:, own[int(leg.joints[2])]]
+        ankles = scale * source_poses.positions[:, own[int(leg.joints[2])]]
         ankles[:, 1] += higher
-        _bend(rig, leg, placed, ankles, rotations)
+        bend_legs(
+            np.asarray(rig.parents, np.int64), placed.positions, placed.rotations, leg.joints, ankles, aheads, STRAIGHT, rotations
+        )
     ends = tuple((joint, (x * metres_per_unit, y * metres_per_unit, z * metres_per_unit)) for joint, (x, y, z) in rig.end_sites)
     metres = Skeleton(rig.names, rig.parents, offsets, rig.channels, ends)
     return clip_of_tracks(rotations, translations, metres, [0], clip.rate, clip.name)
 
 
-def _legs(rig: Skeleton) -> list[Leg]:
-    legs = [leg_of(rig, foot) for foot in feet_of(rig)]
-    found = [leg for leg in legs if leg is not None]
-    if len(found) < len(legs):
-        raise MotionError(Fault("a leg of the rig has no hip and knee of its own.", "legs of thigh, shin and foot"))
-    return found
+def _legs(body: Skeleton, place: Place | None = None) -> list[Leg]:
+    legs = [leg_of(body, foot) for foot in feet_of(body)]
+    complete = [leg for leg in legs if leg is not None]
+    if len(complete) < len(legs):
+        which = "a leg of the rig" if place is None else "a leg"
+        raise MotionError(Fault(f"{which} has no hip and knee of its own.", "legs of thigh, shin and foot", place=place or Place()))
+    return complete
 
 
-def _counterparts(rig: Skeleton, clip: Clip, names: Mapping[str, str], needed: list[int]) -> dict[int, int]:
-    """For joints of the rig those of the clip."""
-    known = {name.casefold(): joint for joint, name in enumerate(clip.skeleton.names)}
-    wanted = {bone: str(names.get(bone, bone)) for bone in rig.names}
-    for bone, other in names.items():
+def _counterparts(rig: Skeleton, clip: Clip, names: Mapping[str, str], legs: Sequence[tuple[Leg, Leg]]) -> dict[int, int]:
+    """For joints of the rig those of the clip: of the same name, core or height in the spine, of legs by the shape, or as given."""
+    other = clip.skeleton
+    own: dict[int, int] = {}
+    spines = [_spine(body) for body in (rig, other)]
+    for i, joint in enumerate(spines[0]):
+        if spines[1]:
+            own[joint] = spines[1][round(i * (len(spines[1]) - 1) / max(len(spines[0]) - 1, 1))]
+    plain = [[("", without_namespace(name).casefold()) for name in body.names] for body in (rig, other)]
+    for mine, theirs in ((cores_of(rig.names), cores_of(other.names)), plain):
+        own |= {mine.index(name): theirs.index(name) for name in mine if mine.count(name) == theirs.count(name) == 1}
+    own[rig.hips] = other.hips
+    for leg, source_leg in legs:
+        own |= zip([*leg.joints.tolist(), leg.toe], [*source_leg.joints.tolist(), source_leg.toe], strict=True)
+    for bone, name in names.items():
         if bone not in rig:
             raise MotionError(rig.missing_bone(str(bone)))
-        if other not in clip.skeleton:
-            raise MotionError(clip.skeleton.missing_bone(str(other)).at(Place(clip.name)))
-    found = {joint: known[wanted[bone].casefold()] for joint, bone in enumerate(rig.names) if wanted[bone].casefold() in known}
-    missing = [rig.names[joint] for joint in dict.fromkeys([rig.hips, *needed]) if joint not in found]
-    if missing:
-        near = meant_bone(missing[0], clip.skeleton.names)
-        told = f"there is no bone for {some(missing)} of the rig."
-        accepted = f"a bone of the same name; else names={{{missing[0]!r}: BONE}}, or rig_bones in contextdb.toml"
-        raise MotionError(Fault(told, accepted, in_quotes(near) if near else "", Place(clip.name)))
-    return found
+        if name not in other:
+            raise MotionError(other.missing_bone(str(name)).at(Place(clip.name)))
+        own[rig.index(bone)] = other.index(name)
+    return own
 
 
-def _require_alike_at_rest(rig: Skeleton, clip: Clip, legs: list[tuple[Leg, Leg | None]], own: Mapping[int, int]) -> None:
-    """Refuse rigs whose legs point another way where nothing is turned: one lies, or has its axes otherwise."""
-    for leg, _ in legs:
-        for joint in leg.joints[1:].tolist():
-            one, other = rig.offsets[joint], clip.skeleton.offsets[own[joint]]
-            if float(one @ other) < ALIKE_AT_REST * float(np.linalg.norm(one) * np.linalg.norm(other)):
-                told = f"{in_quotes(rig.names[joint])} of the rig points another way at rest than that of the clip."
-                raise MotionError(Fault(told, "a rig that rests as the clip does, with the same axis up", place=Place(clip.name)))
+def _spine(body: Skeleton) -> list[int]:
+    """The joints above the hips up to where the neck begins, from below; none where no bone is named as a head."""
+    head = next((joint for joint, core in enumerate(cores_of(body.names)) if core == ("", "head")), None)
+    above = [] if head is None else body.ancestors(head)
+    spine = above[: above.index(body.hips)][::-1] if body.hips in above else []
+    return [joint for joint in spine if "neck" not in body.names[joint].casefold()]
 
 
-def _lifts(rig: Skeleton, leg: Leg, placed: Poses, shown: Poses, own: Mapping[int, int], scale: float) -> Floats:
+def _reference(body: Skeleton, references: Sequence[Clip]) -> Floats | None:
+    """The rotations in the world [J, 4] of the first frame that shows a body; None where it is to be at rest."""
+    for clip in references:
+        if clip.n_frames and _is_same_body(body, clip.skeleton):
+            return np.asarray(poses_of(replace(clip, values=clip.values[:1])).rotations[0])
+    return None
+
+
+def _is_same_body(one: Skeleton, other: Skeleton) -> bool:
+    """Whether two skeletons have the same bones, which rest alike."""
+    names = [[without_namespace(name) for name in body.names] for body in (one, other)]
+    if names[0] != names[1] or one.parents.tolist() != other.parents.tolist():
+        return False
+    lengths = np.linalg.norm(one.offsets, axis=1) * np.linalg.norm(other.offsets, axis=1)
+    return bool(((one.offsets * other.offsets).sum(axis=1) >= SAME_WAY * lengths)[1:].all())
+
+
+def _turned(rig: Skeleton, other: Skeleton, own: Mapping[int, int], poses: Sequence[Floats | None]) -> Floats:
+    """For each joint of the rig the rotation [4] that, behind that of its counterpart, makes it that of the rig: [J, 4]."""
+    turned = np.tile(STILL, (rig.n_joints, 1))
+    if poses[0] is poses[1] is None:
+        return turned
+    mine, theirs = _rotations_in(rig, poses[0]), _rotations_in(other, poses[1])
+    headings = [_heading(body, pose) for body, pose in ((rig, mine), (other, theirs))]
+    to_theirs = quaternions.about_axis("y", np.array(headings[1] - headings[0]))
+    for joint, source in own.items():
+        turned[joint] = quaternions.multiply(quaternions.inverse(theirs[source]), quaternions.multiply(to_theirs, mine[joint]))
+    return turned
+
+
+def _rotations_in(body: Skeleton, pose: Floats | None) -> Floats:
+    return np.tile(STILL, (body.n_joints, 1)) if pose is None else pose
+
+
+def _heading(body: Skeleton, pose: Floats) -> float:
+    """Which way a body faces in a pose, by its thighs."""
+    if body.facing_pair is None:
+        return 0.0
+    left, right = (_place(body, pose, joint) for joint in body.facing_pair)
+    return float(np.arctan2(-(left - right)[2], (left - right)[0]))
+
+
+def _place(body: Skeleton, pose: Floats, joint: int) -> Floats:
+    """Where a joint is in a pose of rotations in the world, against the root: [3]."""
+    chain = [joint, *body.ancestors(joint)][:-1]
+    return np.asarray(sum((_along(body, pose, each) for each in chain), np.zeros(3)))
+
+
+def _along(body: Skeleton, pose: Floats, joint: int) -> Floats:
+    """The bone that ends at a joint, in a pose of rotations in the world: [3]."""
+    return np.asarray(quaternions.rotate(pose[body.parents[joint]], body.offsets[joint]))
+
+
+def _require_alike(
+    rig: Skeleton, clip: Clip, legs: Sequence[tuple[Leg, Leg]], own: Mapping[int, int], poses: Sequence[Floats | None]
+) -> None:
+    """Refuse bodies whose legs or arms point elsewhere in the pose of reference: one lies, has other axes, or its arms lower."""
+    mine, theirs = _rotations_in(rig, poses[0]), _rotations_in(clip.skeleton, poses[1])
+    back = -_heading(rig, mine), -_heading(clip.skeleton, theirs)
+    to_front = [quaternions.about_axis("y", np.array(each)) if any(p is not None for p in poses) else STILL for each in back]
+    least = {joint: ALIKE_LEGS for leg, _ in legs for joint in leg.joints[1:].tolist()}
+    least |= {joint: ALIKE_ARMS for joint, (_, core) in enumerate(cores_of(rig.names)) if core in ARMS and joint in own}
+    for joint, cosine in least.items():
+        if own[joint] == 0 or own.get(int(rig.parents[joint])) != clip.skeleton.parents[own[joint]]:
+            continue
+        one = quaternions.rotate(to_front[0], _along(rig, mine, joint))
+        other = quaternions.rotate(to_front[1], _along(clip.skeleton, theirs, own[joint]))
+        if float(one @ other) < cosine * float(np.linalg.norm(one) * np.linalg.norm(other)):
+            problem = f"{in_quotes(rig.names[joint])} of the rig points another way at rest than that of the clip."
+            accepted = "a rig that rests as the clip does, with the same axis up"
+            mend = "rig_pose in [databases.NAME], with files whose first frames show both bodies in one pose"
+            raise MotionError(Fault(problem, accepted, mend, Place(clip.name)))
+
+
+def _lifts(rig: Skeleton, leg: Leg, placed: Poses, retargeted: Poses, own: Mapping[int, int], scale: float) -> Floats:
     """How much higher than by scale an ankle is to be in each frame, so that its sole is as high as by scale: [F]."""
     ankle = int(leg.joints[2])
     soles = [joint for joint in range(rig.n_joints) if joint in own and ankle in rig.ancestors(joint)]
-    soles = [joint for joint in soles if own[ankle] in shown.skeleton.ancestors(own[joint])]
+    soles = [joint for joint in soles if own[ankle] in retargeted.skeleton.ancestors(own[joint])]
     if not soles:
         return np.zeros(placed.n_frames)
     drop = _drop(placed.positions[..., 1], ankle, soles)
-    return drop - scale * _drop(shown.positions[..., 1], own[ankle], [own[joint] for joint in soles])
+    return drop - scale * _drop(retargeted.positions[..., 1], own[ankle], [own[joint] for joint in soles])
 
 
 def _drop(heights: Floats, ankle: int, soles: list[int]) -> Floats:
@@ -148,27 +249,18 @@ def _drop(heights: Floats, ankle: int, soles: list[int]) -> Floats:
     return np.asarray(np.maximum(heights[:, ankle] - heights[:, soles].min(axis=1), 0.0))
 
 
-def _length(offsets: Floats, leg: Leg | None) -> float:
+def _length(offsets: Floats, leg: Leg) -> float:
     """How long thigh and shin are together."""
-    return 0.0 if leg is None else float(np.linalg.norm(offsets[leg.joints[1:]], axis=-1).sum())
+    return float(np.linalg.norm(offsets[leg.joints[1:]], axis=-1).sum())
 
 
-def _rotations(rig: Skeleton, shown: Poses, own: Mapping[int, int]) -> Floats:
-    """Against their parents, so that each joint is turned in the world as its counterpart: [F, J, 4]."""
-    still = np.broadcast_to(np.array([1.0, 0.0, 0.0, 0.0]), (shown.n_frames, 4))
+def _rotations(rig: Skeleton, source: Poses, own: Mapping[int, int], turned: Floats) -> Floats:
+    """Against their parents, so that each joint is turned in the world as its counterpart, and then its own way: [F, J, 4]."""
+    still = np.broadcast_to(STILL, (source.n_frames, 4))
     world: list[Floats] = []
-    found = np.empty((shown.n_frames, rig.n_joints, 4))
+    rotations = np.empty((source.n_frames, rig.n_joints, 4))
     for joint, parent in enumerate(rig.parents.tolist()):
         above = still if parent < 0 else world[parent]
-        world.append(shown.rotations[:, own[joint]] if joint in own else above)
-        found[:, joint] = quaternions.multiply(quaternions.inverse(above), world[joint])
-    return found
-
-
-def _bend(rig: Skeleton, leg: Leg, placed: Poses, ankles: Floats, rotations: Floats) -> None:
-    """Bend a leg in each frame so that its ankle is where it is to be."""
-    kernels, parents = leg_loops(), np.asarray(rig.parents, np.int64)
-    ahead = quaternions.rotate(placed.rotations[:, rig.hips], np.array([0.0, 0.0, 1.0]))
-    for frame in range(placed.n_frames):
-        of_frame = placed.positions[frame], placed.rotations[frame], leg.joints, ankles[frame], ahead[frame]
-        kernels.bend_leg(parents, *of_frame, STRAIGHT, rotations[frame])
+        world.append(quaternions.multiply(source.rotations[:, own[joint]], turned[joint]) if joint in own else above)
+        rotations[:, joint] = quaternions.multiply(quaternions.inverse(above), world[joint])
+    return rotations

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.clips.skeleton import Ints
 
 Flags = NDArray[np.bool_]
 Singles = NDArray[np.float32]
@@ -33,7 +31,7 @@ class Sample:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Moment:
-    """A moment of a clip to be shown.
+    """A moment of a clip to be displayed.
 
     Rotations [J, 4] and positions [M, 3]; where the clip has the body; how fast it goes to the left and ahead of its mean facing,
     and how far it is turned from that; which feet are down; the nearest frame.
@@ -45,18 +43,3 @@ class Moment:
     travel: Place3
     contacts: Flags
     frame: int
-
-
-class Frames(NamedTuple):
-    """A bank as loops read it: its arrays, root and travel of each frame [N, 6], and of each range the first frame, the steps to
-    the last, and whether it loops."""
-
-    rotations: Singles
-    positions: Singles
-    root: Singles
-    ways: Floats
-    contacts: Flags
-    starts: Ints
-    n_steps: Ints
-    looping: Flags
-    rate: float

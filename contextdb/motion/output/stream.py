@@ -1,7 +1,7 @@
 """A pose stream: what a controller decides, tick by tick, as poses.
 
 The decision says which clip plays and when in it. The clip's pose is sampled between frames, goes through the stages of
-`contextdb.motion.output.stages`, and is placed joint by joint. A stream reads no clock and draws no random number: the same
+the core (`pose.h`), and is placed joint by joint. A stream reads no clock and draws no random number: the same
 decisions give the same poses. One stream is a crowd of one: see `contextdb.motion.output.streams`.
 """
 
@@ -18,11 +18,10 @@ from contextdb.motion.clips.ground_place import A_BODY, OfBody, place_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.steering import Steered
 from contextdb.motion.output.bank import PoseBank
-from contextdb.motion.output.ground import A_GROUND
-from contextdb.motion.output.pipeline import Pipeline, Rows
+from contextdb.motion.output.ground import A_GROUND, Ground
+from contextdb.motion.output.pipeline import COLUMNS, Pipeline, Rows
 from contextdb.motion.output.pose import Pose
 from contextdb.motion.output.settings import PoseSettings
-from contextdb.motion.output.stages import STRIDE, TURN, Ground
 from contextdb.motion.selection.decision import Decision, Playing, plays
 
 __all__ = ["Pose", "PoseState", "PoseStream"]
@@ -33,16 +32,16 @@ OTHER_STATE = Fault("the state is of a stream of other settings or of another ri
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PoseState:
-    """Where a stream is: all that its next pose depends on beside the next decision. Never changed, so it may be kept as it is.
+    """Where a stream is: all that its next pose depends on beside the next decision. Never changed, so it may be stored as it is.
 
     Attributes
     ----------
     settings : PoseSettings
     n_joints : int
     playing : Playing or None
-        What was shown last.
+        What was displayed last.
     row : float64 array, shape (W,)
-        All else; see `contextdb.motion.output.stages`.
+        All else: the columns of the stages, see the core's pose.h.
     """
 
     settings: PoseSettings
@@ -56,7 +55,7 @@ class PoseState:
     @property
     def warp(self) -> tuple[float, float]:
         """How many times as long steps are as the clip's, and by how many radians hips and legs are turned against the root."""
-        return float(self.row[STRIDE]), float(self.row[TURN])
+        return float(self.row[COLUMNS["stride"]]), float(self.row[COLUMNS["turn"]])
 
 
 class PoseStream:

@@ -1,7 +1,7 @@
 """The pose streams of a crowd: each gives what it gives alone, and all are worked out together, in arrays with a row a character.
 
 What a character costs is then a little of Python for its decision and loops over numbers: no object is made for a pose until it is
-asked for. The streams go on from where the crowd left them, and the crowd from where they are.
+requested. The streams go on from where the crowd left them, and the crowd from where they are.
 """
 
 from __future__ import annotations
@@ -12,15 +12,14 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from contextdb.cells.arguments import require_many_of, require_real
-from contextdb.cells.sequences import Kept
+from contextdb.cells.sequences import ListSequence
 from contextdb.errors import ContextError, Fault, MotionError, Place, plural
 from contextdb.motion.clips.ground_place import OfBody
 from contextdb.motion.clips.many_steered import ManySteered
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.output.ground import MANY_GROUND, ManyGround
-from contextdb.motion.output.pipeline import Grounds, Rows
+from contextdb.motion.output.ground import MANY_GROUND, Ground, Grounds, ManyGround
+from contextdb.motion.output.pipeline import Rows
 from contextdb.motion.output.pose import CrowdPoses
-from contextdb.motion.output.stages import Ground
 from contextdb.motion.output.stream import PoseState, PoseStream, checked_place
 from contextdb.motion.selection.decision import Decision
 
@@ -29,7 +28,7 @@ UNKNOWN = (math.nan, math.nan, math.nan)
 OfBodies = ManySteered | Sequence[OfBody | None] | Floats
 
 
-class PoseStreams(Kept[PoseStream]):
+class PoseStreams(ListSequence[PoseStream]):
     """The streams of a crowd, in order: a sequence, with whose numbers decisions, bodies and poses go.
 
     Parameters
@@ -106,7 +105,7 @@ class PoseStreams(Kept[PoseStream]):
         return poses
 
     def updated(
-        self, decisions: Sequence[Decision], dt: float, places: Floats | None, grounds: Grounds = None
+        self, decisions: Sequence[Decision], dt: float, places: Floats | None, grounds: Grounds | None = None
     ) -> tuple[CrowdPoses, Rows]:
         """The same unchecked, with the places [N, 3] of bodies, NaN for none; the streams stand where they stood until `go_on`."""
         rows, poses = self._pipeline.update(self._rows(), decisions, dt, places, grounds)
@@ -150,7 +149,7 @@ class PoseStreams(Kept[PoseStream]):
                 raise type(error)(*(fault.at(Place(f"character {i}")) for fault in error.faults)) from None
         return np.array([UNKNOWN if place is None else place for place in places], np.float64)
 
-    def _grounds(self, ground: object) -> Grounds:
+    def _grounds(self, ground: object) -> Grounds | None:
         if ground is None or callable(ground):
             return ground
         if not isinstance(ground, (list, tuple)) or len(ground) != len(self):

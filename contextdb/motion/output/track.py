@@ -14,14 +14,12 @@ from numpy.typing import NDArray
 from contextdb.cells.arguments import require_kind, require_many_of, require_real
 from contextdb.motion.clips import quaternions
 from contextdb.motion.clips.clip import CENTIMETRE, Clip
+from contextdb.motion.clips.joint_arrays import channels_of, values_of
 from contextdb.motion.clips.poses import LEAST_RATE, MOST_RATE
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.clips.skeleton import POSITIONS, Skeleton
+from contextdb.motion.clips.skeleton import Skeleton
 from contextdb.motion.output.bank import PoseBank
 from contextdb.motion.output.stream import Pose
-
-TURNS = ("Zrotation", "Xrotation", "Yrotation")
-AXES = "zxy"
 
 
 def clip_of_poses(poses: Sequence[Pose], bank: PoseBank, rate: float, *, name: str = "poses") -> Clip:
@@ -52,16 +50,9 @@ def clip_of_rig(poses: list[Pose], rig: Skeleton, moving: Iterable[int], rate: f
 def clip_of_tracks(rotations: Floats, translations: Floats, rig: Skeleton, moving: Iterable[int], rate: float, name: str) -> Clip:
     """The same of joints against their parents: rotations [T, J, 4], translations [T, J, 3] in metres, the first in the world."""
     placed = sorted({0, *moving})
-    angles = np.rad2deg(quaternions.to_euler(AXES, rotations))
-    columns: list[Floats] = []
-    for joint in range(rig.n_joints):
-        if joint in placed:
-            columns.append(translations[:, joint] / CENTIMETRE)
-        columns.append(angles[:, joint])
-    channels = tuple((*POSITIONS, *TURNS) if joint in placed else TURNS for joint in range(rig.n_joints))
     ends = tuple((joint, (x / CENTIMETRE, y / CENTIMETRE, z / CENTIMETRE)) for joint, (x, y, z) in rig.end_sites)
-    skeleton = Skeleton(rig.names, rig.parents, rig.offsets / CENTIMETRE, channels, ends)
-    return Clip(name, skeleton, 1.0 / rate, np.concatenate(columns, axis=1))
+    skeleton = Skeleton(rig.names, rig.parents, rig.offsets / CENTIMETRE, channels_of(rig.n_joints, placed), ends)
+    return Clip(name, skeleton, 1.0 / rate, values_of(rotations, translations / CENTIMETRE, placed))
 
 
 def pose_arrays(poses: Sequence[Pose], bank: PoseBank, rate: float) -> dict[str, NDArray[Any]]:

@@ -1,1 +1,1 @@
-"""What clips are found to show, as rows of a table and as proposed markup."""
+"""What clips show, as rows of a table and as proposed markup."""

@@ -54,18 +54,18 @@ def cells_of(facts: Sequence[ClipFacts], rigs: Sequence[Hashable], mirrored: boo
     """For each clip the cells of its row, conditions and outputs. `rigs` says of each clip what its rig is called: clips of
     different rigs are not told apart. `mirrored`: every clip plays mirrored too, so that a turn to the left serves one to the
     right."""
-    found = [{**dict.fromkeys(CONDITIONS, ANY), "gait": " ".join(each.gaits), **_outputs(each)} for each in facts]
+    cells = [{**dict.fromkeys(CONDITIONS, ANY), "gait": " ".join(each.gaits), **_outputs(each)} for each in facts]
     groups = _grouped(range(len(facts)), lambda i: (rigs[i], facts[i].gait, facts[i].style))
     for members in groups.values():
         moving = [i for i in members if facts[i].direction_deg is not None]
-        kinds = _cut(found, "direction", moving, {i: facts[i].direction_deg for i in moving}, DIRECTION, mirrored)
+        kinds = _cut(cells, "direction", moving, {i: facts[i].direction_deg for i in moving}, DIRECTION, mirrored)
         kinds += [[i for i in members if facts[i].direction_deg is None]]
         for kind in kinds:
-            for alike in _cut(found, "turn", kind, {i: facts[i].turn_dps for i in kind}, TURN, mirrored):
-                _cut(found, "speed", alike, {i: facts[i].speed_mps for i in alike}, SPEED, mirrored)
+            for alike in _cut(cells, "turn", kind, {i: facts[i].turn_dps for i in kind}, TURN, mirrored):
+                _cut(cells, "speed", alike, {i: facts[i].speed_mps for i in alike}, SPEED, mirrored)
     for i, style in _styles(facts, rigs).items():
-        found[i]["style"] = style
-    return found
+        cells[i]["style"] = style
+    return cells
 
 
 def _outputs(facts: ClipFacts) -> dict[str, str]:
@@ -73,10 +73,10 @@ def _outputs(facts: ClipFacts) -> dict[str, str]:
 
 
 def _grouped(members: Iterable[int], key: Callable[[int], Key]) -> dict[Key, list[int]]:
-    found = defaultdict[Key, list[int]](list)
+    groups = defaultdict[Key, list[int]](list)
     for i in members:
-        found[key(i)].append(i)
-    return dict(found)
+        groups[key(i)].append(i)
+    return dict(groups)
 
 
 # ---- style
@@ -92,20 +92,20 @@ def _styles(facts: Sequence[ClipFacts], rigs: Sequence[Hashable]) -> dict[int, s
     for rig, each in zip(rigs, facts, strict=True):
         of_rig[rig].add(each.style)
         has |= {(rig, gait, each.style) for gait in each.gaits}
-    found = {}
+    style_of = {}
     for i, each in enumerate(facts):
         also = {style for style in of_rig[rigs[i]] if each.style == NORMAL and (rigs[i], each.gait, style) not in has}
         own = [style for style in styles if style in {each.style, *also}]
         others = [style for style in styles if style not in own]
-        found[i] = " ".join(own) if len(own) <= len(others) + 1 else " ".join(("not", *others)) if others else ANY
-    return found
+        style_of[i] = " ".join(own) if len(own) <= len(others) + 1 else " ".join(("not", *others)) if others else ANY
+    return style_of
 
 
 # ---- numbers
 
 
 def _cut(
-    found: Sequence[dict[str, str]],
+    cells: Sequence[dict[str, str]],
     column: str,
     members: Sequence[int],
     spreads: Mapping[int, Spread | None],
@@ -117,7 +117,7 @@ def _cut(
     steady = {i: spread for i, spread in known.items() if _is_steady(spread, scale)} or known
     passing = [i for i in known if i not in steady]
     bins = _grouped(steady, lambda i: _bin(steady[i].middle, scale))
-    spread_of = {at: _joined([steady[i] for i in each]) for at, each in bins.items()}
+    spread_of = {at: _common_spread([steady[i] for i in each]) for at, each in bins.items()}
     if mirrored and scale.is_signed:
         for spread in list(spread_of.values()):
             spread_of.setdefault(_bin(-spread.middle, scale), Spread(-spread.high, -spread.middle, -spread.low))
@@ -126,9 +126,9 @@ def _cut(
     intervals = _intervals(spread_of, scale)
     for at, each in bins.items():
         for i in each:
-            found[i][column] = _text(intervals[at], scale)
+            cells[i][column] = _text(intervals[at], scale)
     for i in passing:
-        found[i][column] = _text(_passing(known[i], ends, scale), scale)
+        cells[i][column] = _text(_passing(known[i], ends, scale), scale)
     return [*(each for each in bins.values()), *([passing] if passing else [])]
 
 
@@ -165,7 +165,7 @@ def _bin(value: float, scale: Scale) -> int:
     return abs(at) if scale.is_circular and 2 * abs(at) == n_bins else at
 
 
-def _joined(spreads: Sequence[Spread]) -> Spread:
+def _common_spread(spreads: Sequence[Spread]) -> Spread:
     """The middles of some clips of one kind: the least, their mean, and the largest."""
     middles = [spread.middle for spread in spreads]
     if max(middles) - min(middles) > 180.0:  # both sides of straight back

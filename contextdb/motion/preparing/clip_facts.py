@@ -20,6 +20,7 @@ import numpy as np
 from contextdb.errors import Fault, MotionError, in_quotes
 from contextdb.motion.clips.clip import Clip
 from contextdb.motion.clips.feet import Footfalls, footfalls_of
+from contextdb.motion.clips.on_the_spot import ground_motion
 from contextdb.motion.clips.poses import Poses, poses_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.trajectory import Trajectory, root_trajectory, to_own_frame
@@ -38,7 +39,7 @@ SLOW_SHARE = 0.3
 ENDS_S = 0.2
 """How much of a clip's beginning and end its first and last state are taken from."""
 RUNNING_MPS = 2.2
-"""Faster than this is a run, where no feet are found."""
+"""Faster than this is a run, where no feet are detected."""
 LEAST_RUNNING_MPS = 1.0
 """Slower than this is no run, whether feet are down or not: jumps and hops."""
 FLIGHT_SHARE = 0.1
@@ -95,6 +96,8 @@ class ClipFacts:
         "Idle", or the gait and which foot is down: "Walk.Left", "Walk.Right", "Walk.Both", "Run.None".
     step_s : float
         How long a step with each foot takes.
+    on_the_spot_mps : float
+        How fast the body of a clip that runs on the spot would go, by its standing feet, though its hips show "Idle"; else 0.
     """
 
     asset: str
@@ -107,6 +110,7 @@ class ClipFacts:
     start: str
     end: str
     step_s: float
+    on_the_spot_mps: float = 0.0
 
     @property
     def gait(self) -> str:
@@ -114,7 +118,6 @@ class ClipFacts:
         return self.gaits[-1]
 
     def to_json(self) -> dict[str, Any]:
-        """As plain data."""
         return asdict(self) | {"gaits": list(self.gaits)}
 
 
@@ -163,6 +166,7 @@ def facts_of(clip: Clip, common: Iterable[str] = ()) -> ClipFacts:
     moves = moments.speeds >= STANDING_MPS
     gait = gait_of(clip.name, speed, falls) if is_moving(clip.name, speed, float(np.mean(moves))) else "Idle"
     stands = min(STANDING_MPS, SLOW_SHARE * speed.middle)
+    ground = ground_motion(clip)
     ends = [_end_state(path, falls, gait, stands, is_end=is_end) for is_end in (False, True)]
     stops = gait != "Idle" and ends[1] == "Idle" and ends[0] != "Idle"
     return ClipFacts(
@@ -176,14 +180,15 @@ def facts_of(clip: Clip, common: Iterable[str] = ()) -> ClipFacts:
         ends[0],
         ends[1],
         step_s,
+        0.0 if ground is None else round(ground.speed_mps, 3),
     )
 
 
 def require_finite(clip: Clip, poses: Poses) -> None:
     """Raise MotionError when the joints of a clip are too far away to be measured."""
     if not np.isfinite(poses.positions).all() or np.abs(poses.positions).max(initial=0.0) > FARTHEST_M:
-        found = f"the clip {in_quotes(clip.name)} has joints too far away to be measured."
-        raise MotionError(Fault(found, f"places within {FARTHEST_M:g} m"))
+        problem = f"the clip {in_quotes(clip.name)} has joints too far away to be measured."
+        raise MotionError(Fault(problem, f"places within {FARTHEST_M:g} m"))
 
 
 def falls_of(poses: Poses) -> Footfalls | None:
@@ -211,7 +216,7 @@ def words_of(name: str) -> list[str]:
     """The words of a clip's name, in lower case, without numbers."""
     name = unicodedata.normalize("NFC", name)  # an accented letter is two characters in the names that macOS gives to files
     sizes = "".join("U" if c.isupper() else "l" if c.islower() else "o" if c.isalpha() else " " for c in name)
-    return [name[found.start() : found.end()].lower() for found in _WORD.finditer(sizes)]
+    return [name[match.start() : match.end()].lower() for match in _WORD.finditer(sizes)]
 
 
 def style_of(name: str, common: Iterable[str] = ()) -> str:
@@ -227,18 +232,18 @@ def common_words(names: Sequence[str]) -> set[str]:
 
 def is_moving(name: str, speed: Spread, share: float) -> bool:
     """Whether a clip moves that does so for a share of its moments; where the name says a gait, its fastest tenth is enough."""
-    return share > HIGH / 2.0 or speed.high > (STANDING_MPS if _gait_said(name) is not None else 2.0 * STANDING_MPS)
+    return share > HIGH / 2.0 or speed.high > (STANDING_MPS if _gait_word(name) is not None else 2.0 * STANDING_MPS)
 
 
-def _gait_said(name: str) -> str | None:
+def _gait_word(name: str) -> str | None:
     return next((_GAIT_WORDS[word] for word in words_of(name) if word in _GAIT_WORDS), None)
 
 
 def gait_of(name: str, speed: Spread, falls: Footfalls | None) -> str:
     """The gait of a clip that moves: as its name says, else by whether the body leaves the ground; who hops slowly does not run."""
-    said = _gait_said(name)
-    if said is not None:
-        return said
+    named = _gait_word(name)
+    if named is not None:
+        return named
     if falls is None or not any(len(falls.down[foot]) for foot in falls.feet):
         return "Run" if speed.middle > RUNNING_MPS else "Walk"
     return "Run" if _flight_share(falls) > FLIGHT_SHARE and speed.middle > LEAST_RUNNING_MPS else "Walk"

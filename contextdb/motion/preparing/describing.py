@@ -47,7 +47,6 @@ class Described:
     facts: ClipFacts
 
     def to_json(self) -> dict[str, Any]:
-        """As plain data."""
         return {"asset": self.asset, "cells": dict(self.cells), "facts": self.facts.to_json()}
 
 
@@ -93,21 +92,21 @@ def describe(clips: Sequence[Clip], *, mirrored: bool = False, progress: Tell | 
             progress(i, len(clips), clip.name)
         facts.append(facts_of(clip, common))
     cells = cells_of(facts, [clip.skeleton.names for clip in clips], mirrored)
-    return [Described(each.asset, found, each) for each, found in zip(facts, cells, strict=True)]
+    return [Described(each.asset, row, each) for each, row in zip(facts, cells, strict=True)]
 
 
 def joint_clips(clips: Sequence[Clip]) -> dict[str, dict[str, int]]:
     """The clips that were recorded together, named ASSET.ROLE and of one length: asset to role to place in `clips`."""
-    found = defaultdict[str, dict[str, int]](dict)
+    clips_of_asset = defaultdict[str, dict[str, int]](dict)
     for i, clip in enumerate(clips):
         asset, dot, role = clip.name.rpartition(".")
         if dot and asset and role.isidentifier():
-            found[asset][role] = i
+            clips_of_asset[asset][role] = i
     names = {clip.name for clip in clips}
-    sizes = {asset: {(clips[i].n_frames, clips[i].frame_time_s) for i in roles.values()} for asset, roles in found.items()}
+    sizes = {asset: {(clips[i].n_frames, clips[i].frame_time_s) for i in roles.values()} for asset, roles in clips_of_asset.items()}
     return {
         asset: dict(sorted(roles.items()))
-        for asset, roles in found.items()
+        for asset, roles in clips_of_asset.items()
         if len(roles) > 1 and len(sizes[asset]) == 1 and asset not in names
     }
 
@@ -164,8 +163,8 @@ def table_section(rows: Sequence[Described], asset_column: str) -> dict[str, obj
     outputs = {"duration_s": {"type": "number", "default": 0.0}, "start": {"type": "text"}, "end": {"type": "text"}}
     alone = [row for row in rows if row.cells["gait"]]
     fallback = min(alone, key=lambda row: (row.facts.style != NORMAL, row.facts.speed_mps.middle), default=None)
-    said: dict[str, object] = {"asset": asset_column, "policy": "collect", "outputs": outputs}
-    return said | ({"fallback": fallback.asset} if fallback is not None else {})
+    section: dict[str, object] = {"asset": asset_column, "policy": "collect", "outputs": outputs}
+    return section | ({"fallback": fallback.asset} if fallback is not None else {})
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,11 +183,11 @@ def by_rig(clips: Sequence[Clip], paths: Sequence[str]) -> list[RigClips]:
     roles_of = {i: tuple(roles) for roles in joint_clips(clips).values() for i in roles.values()}
     for i, clip in enumerate(clips):
         groups[clip.skeleton.names, clip.metres_per_unit, clip.up, roles_of.get(i, ())].append(i)
-    found = []
+    rigs = []
     for members in sorted(groups.values(), key=lambda members: (members[0] in roles_of, -len(members), members[0])):
         own = {paths[i] for i in members}
-        found.append(RigClips([clips[i] for i in members], patterns_of(sorted(own), {*paths} - own), roles_of.get(members[0], ())))
-    return found
+        rigs.append(RigClips([clips[i] for i in members], patterns_of(sorted(own), {*paths} - own), roles_of.get(members[0], ())))
+    return rigs
 
 
 def patterns_of(own: Sequence[str], others: set[str]) -> list[str]:
@@ -198,12 +197,12 @@ def patterns_of(own: Sequence[str], others: set[str]) -> list[str]:
         folder, _, name = path.rpartition("/")
         stem, dot, ending = name.rpartition(".")
         folders[f"{folder}/" if folder else "", f"{dot}{ending}"].append(stem)
-    found = []
+    patterns = []
     for (folder, ending), stems in folders.items():
         beside = [path.removeprefix(folder).removesuffix(ending) for path in others if path.startswith(folder)]
         beside = [stem for stem in beside if "/" not in stem]
-        found += [f"{_escaped(folder)}{pattern}{_escaped(ending)}" for pattern in _parted(stems, beside, "")]
-    return found
+        patterns += [f"{_escaped(folder)}{pattern}{_escaped(ending)}" for pattern in _parted(stems, beside, "")]
+    return patterns
 
 
 def _parted(own: Sequence[str], others: Sequence[str], start: str) -> Iterator[str]:
@@ -224,14 +223,14 @@ def _escaped(text: str) -> str:
 
 def motion_sections(rigs: Sequence[RigClips], table: str, markup: str | None = None) -> Sections:
     """What is compared, which databases there are, and a controller for each rig: "player", then "player_2" and so on."""
-    found: Sections = {}
+    sections: Sections = {}
     for i, rig in enumerate(rigs):
         behind = "" if i == 0 else f"_{i + 1}"
         mirror = mirror_of(rig.clips[0])
-        found["features", f"{table}{behind}"] = _features(rig.clips[0], mirror)
+        sections["features", f"{table}{behind}"] = _features(rig.clips[0], mirror)
         names = [f"{table}{behind}" + ("" if j == 0 else f"_part{j + 1}") for j in range(len(rig.patterns))]
         for name, pattern in zip(names, rig.patterns, strict=True):
-            found["databases", name] = {
+            sections["databases", name] = {
                 "table": table,
                 "clips": pattern,
                 "features": f"{table}{behind}",
@@ -244,9 +243,9 @@ def motion_sections(rigs: Sequence[RigClips], table: str, markup: str | None = N
         if rig.roles:
             continue
         order = [{"database": name, "threshold": 0.0} for name in names[:-1]] + [{"database": names[-1]}]
-        found["selectors", f"{table}{behind}"] = {"order": order}
-        found["controllers", f"player{behind}"] = {"selector": f"{table}{behind}", "search_every_s": 0.1}
-    return found
+        sections["selectors", f"{table}{behind}"] = {"order": order}
+        sections["controllers", f"player{behind}"] = {"selector": f"{table}{behind}", "search_every_s": 0.1}
+    return sections
 
 
 def mirror_of(clip: Clip) -> list[list[str]]:

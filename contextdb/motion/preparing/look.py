@@ -97,7 +97,7 @@ class Look:
     def usual_mps(self) -> float:
         return float(np.median(self.moments.speeds))
 
-    def said(self, kind: Kind, tag: str | None, first: int | None, last: int | None, reason: str, measure: float) -> Proposal:
+    def proposal(self, kind: Kind, tag: str | None, first: int | None, last: int | None, reason: str, measure: float) -> Proposal:
         """A proposal about frames from `first` to `last`."""
         begin, end = span_of_frames(first, last, self.rate)
         if tag == ReservedTag.EXCLUDED:

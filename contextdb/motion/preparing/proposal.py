@@ -1,4 +1,4 @@
-"""One thing that is proposed for a clip, and what was found of clips, kept so that only those that changed are looked at again."""
+"""One thing that is proposed for a clip, and what clips showed, stored so that only those that changed are looked at again."""
 
 from __future__ import annotations
 
@@ -51,13 +51,12 @@ class Proposal:
     measure: float
 
     def to_json(self) -> dict[str, Any]:
-        """As plain data."""
         return asdict(self)
 
 
 @dataclass
 class KeptClip:
-    """What was found of a clip before it is compared with the markup: by kind, and its shape; as far as it was looked for."""
+    """What a clip showed before it is compared with the markup: by kind, and its shape; as far as it was looked for."""
 
     key: str
     found: dict[str, list[Proposal]] = field(default_factory=dict)
@@ -65,13 +64,13 @@ class KeptClip:
 
 
 @dataclass
-class Kept:
-    """What was found of clips, by their names. That of a clip that changed since is forgotten when it is asked for."""
+class KnownProposals:
+    """What clips showed, by their names. That of a clip that changed since is forgotten when it is requested."""
 
     clips: dict[str, KeptClip] = field(default_factory=dict)
 
     def of(self, clip: Clip) -> KeptClip:
-        """What was found of a clip as it is now; nothing of one that is new."""
+        """What a clip shows as it is now; nothing of one that is new."""
         key = key_of(clip)
         if clip.name not in self.clips or self.clips[clip.name].key != key:
             self.clips[clip.name] = KeptClip(key)

@@ -27,7 +27,7 @@ from contextdb.motion.markup.markup import Markup
 from contextdb.motion.markup.reserved import CONTACTS, ReservedTag
 from contextdb.motion.preparing.clip_facts import ENDS_S, STANDING_MPS, step_of
 from contextdb.motion.preparing.look import LOOP_M, Look
-from contextdb.motion.preparing.proposal import KINDS, N_SAMPLES, Kept, Kind, Proposal, Shape
+from contextdb.motion.preparing.proposal import KINDS, N_SAMPLES, Kind, KnownProposals, Proposal, Shape
 
 ROOT_SMOOTH_S = 0.2
 """What is proposed for `root_smooth_s`: it evens out a step, and keeps a start and a bend."""
@@ -76,7 +76,7 @@ def prepare(
     clips : sequence of Clip
         Each with at least one frame.
     markup : Markup, optional
-        What is said already: nothing is proposed where it has a mark of the same tag.
+        The markup so far: nothing is proposed where it has a mark of the same tag.
     kinds : sequence of str, optional
         Of `KINDS` those that are wanted: "roots", "contacts", "loops", "cuts", "tails", "noise", "starts", "turns", "targets",
         "duplicates". Default: all.
@@ -96,7 +96,7 @@ def prepare(
     ContextError
         An argument is wrong, or there is no such kind.
     """
-    return prepare_again(clips, markup, kinds, progress, Kept())
+    return prepare_again(clips, markup, kinds, progress, KnownProposals())
 
 
 def prepare_again(
@@ -104,9 +104,9 @@ def prepare_again(
     markup: Markup | None,
     kinds: Sequence[str] | None,
     progress: Callable[[int, int, str], None] | None,
-    kept: Kept,
+    previous: KnownProposals,
 ) -> list[Proposal]:
-    """What `prepare` proposes; only clips that are not as they were when they were kept are looked at, and then kept."""
+    """What `prepare` proposes; only clips that are not as they were when they were stored are looked at, and then stored."""
     clips = require_many_of(clips, Clip, "clips", "a list of Clip")
     if markup is not None:
         require_kind(markup, Markup, "markup", "a Markup")
@@ -115,23 +115,25 @@ def prepare_again(
     wanted = _wanted(kinds)
     if faults := [Fault(f"the clip {in_quotes(clip.name)} has no frame.", "at least one") for clip in clips if not clip.n_frames]:
         raise MotionError(*faults)
-    found = defaultdict[str, list[Proposal]](list)
+    proposals = defaultdict[str, list[Proposal]](list)
     shapes: list[tuple[Clip, Shape]] = []
     for i, clip in enumerate(clips):
         if progress is not None:
             progress(i, len(clips), clip.name)
-        known, look = kept.of(clip), cache(partial(Look.at, clip))
+        known, look = previous.of(clip), cache(partial(Look.at, clip))
         for kind in (kind for kind in KINDS if kind in wanted and kind in _OF_ONE):
             if kind not in known.found:
                 known.found[kind] = list(_OF_ONE[kind](look()))
-            found[clip.name] += known.found[kind]
+            proposals[clip.name] += known.found[kind]
         if "duplicates" in wanted:
             known.shape = _shape(look()) if known.shape is None else known.shape
             shapes.append((clip, known.shape))
     for each in _duplicates(shapes):
-        found[each.asset].append(each)
-    said = markup or Markup()
-    return [each for clip in dict.fromkeys(clip.name for clip in clips) for each in found[clip] if not _is_said(each, said)]
+        proposals[each.asset].append(each)
+    current = markup or Markup()
+    return [
+        each for clip in dict.fromkeys(clip.name for clip in clips) for each in proposals[clip] if not _is_marked(each, current)
+    ]
 
 
 def _wanted(kinds: Sequence[str] | None) -> set[str]:
@@ -144,7 +146,7 @@ def _wanted(kinds: Sequence[str] | None) -> set[str]:
     return set(wanted)
 
 
-def _is_said(proposal: Proposal, markup: Markup) -> bool:
+def _is_marked(proposal: Proposal, markup: Markup) -> bool:
     """Whether the markup has a mark of the same tag where one is proposed; of a foot, anywhere."""
     first, last = proposal.from_s or 0.0, math.inf if proposal.to_s is None else proposal.to_s
     stronger = {ReservedTag.EXCLUDED} if proposal.tag == ReservedTag.DO_NOT_CHOOSE else set()
@@ -166,7 +168,7 @@ def _roots(look: Look) -> Iterator[Proposal]:
     metres = float(np.quantile(np.linalg.norm(path.positions - look.path.positions, axis=-1), 0.95))
     degrees = float(np.rad2deg(np.quantile(np.abs(path.headings - look.path.headings), 0.95)))
     if metres >= SWAY_M or degrees >= SWAY_DEG:
-        yield look.said("roots", None, None, None, f"its hips sway by {100.0 * metres:.1f} cm and {degrees:.0f}°", metres)
+        yield look.proposal("roots", None, None, None, f"its hips sway by {100.0 * metres:.1f} cm and {degrees:.0f}°", metres)
 
 
 def _contacts(look: Look) -> Iterator[Proposal]:
@@ -176,7 +178,7 @@ def _contacts(look: Look) -> Iterator[Proposal]:
         for begin, end in look.falls.down[foot].tolist():
             reason = f"{foot} rests for {end - begin:.2f} s"
             first, last = round(begin * look.rate) or None, round(end * look.rate)
-            yield look.said("contacts", tag, first, last if last < look.poses.n_frames - 1 else None, reason, end - begin)
+            yield look.proposal("contacts", tag, first, last if last < look.poses.n_frames - 1 else None, reason, end - begin)
 
 
 # ---- loops
@@ -188,7 +190,7 @@ def _loops(look: Look) -> Iterator[Proposal]:
         apart_m, apart_mps = _apart(look, 0, -1)
         if apart_m <= LOOP_M and (apart_mps <= look.loop_mps or _is_smooth(look)):
             reason = f"its ends are {100.0 * apart_m:.1f} cm and {apart_mps:.2f} m/s apart"
-            yield look.said("loops", ReservedTag.LOOPING, None, None, reason, apart_m)
+            yield look.proposal("loops", ReservedTag.LOOPING, None, None, reason, apart_m)
 
 
 def _is_smooth(look: Look) -> bool:
@@ -219,7 +221,7 @@ def _cuts(look: Look) -> Iterator[Proposal]:
     i, j = int(at[first[best]]), int(at[last[best]])
     apart_m, mps = _apart(look, i, j)[0], float(apart_mps[first[best], last[best]])
     reason = f"these {(j - i) / look.rate:.2f} s loop: their ends are {100.0 * apart_m:.1f} cm and {mps:.2f} m/s apart"
-    yield look.said("cuts", None, i, j, reason, apart_m)
+    yield look.proposal("cuts", None, i, j, reason, apart_m)
 
 
 def _apart(look: Look, i: int, j: int) -> tuple[float, float]:
@@ -257,12 +259,12 @@ def _tails(look: Look) -> Iterator[Proposal]:
     n = look.poses.n_frames
     head = first - round(NEAR_STANDING_S * look.rate)
     if head / look.rate >= LEAST_TAIL_S:
-        yield look.said(
+        yield look.proposal(
             "tails", ReservedTag.DO_NOT_CHOOSE, None, head, f"stands for {head / look.rate:.2f} s first", head / look.rate
         )
     tail_s = (n - 1 - last) / look.rate
     if tail_s >= LEAST_TAIL_S:
-        yield look.said("tails", ReservedTag.DO_NOT_CHOOSE, last, None, f"stands for its last {tail_s:.2f} s", tail_s)
+        yield look.proposal("tails", ReservedTag.DO_NOT_CHOOSE, last, None, f"stands for its last {tail_s:.2f} s", tail_s)
 
 
 def _starts(look: Look) -> Iterator[Proposal]:
@@ -275,7 +277,7 @@ def _starts(look: Look) -> Iterator[Proposal]:
         stop = first + int(fast[0])
         seconds = (stop - first) / look.rate
         reason = f"speeds up from a stand to {look.speeds[stop]:.2f} m/s within {seconds:.2f} s"
-        yield look.said("starts", ReservedTag.NEXT_NATURAL_ONLY, first, stop, reason, seconds)
+        yield look.proposal("starts", ReservedTag.NEXT_NATURAL_ONLY, first, stop, reason, seconds)
 
 
 def _moving(look: Look) -> tuple[int | None, int | None]:
@@ -297,7 +299,7 @@ def _turns(look: Look) -> Iterator[Proposal]:
         if np.abs(turns).max() >= TURNING_DPS and abs(turned) >= LEAST_TURN_DEG and 0.0 < seconds <= LONGEST_TURN_S:
             reason = f"turns by {abs(turned):.0f}° to the {'left' if turned > 0.0 else 'right'} within {seconds:.2f} s"
             first, last = first + half, stop - 1 + half
-            yield look.said("turns", ReservedTag.NEXT_NATURAL_ONLY, first, last, reason, abs(turned))
+            yield look.proposal("turns", ReservedTag.NEXT_NATURAL_ONLY, first, last, reason, abs(turned))
 
 
 def _targets(look: Look) -> Iterator[Proposal]:
@@ -312,8 +314,8 @@ def _targets(look: Look) -> Iterator[Proposal]:
     slows = first + int(fast[-1])
     begin = first or None
     reason = f"from {slows / look.rate:.2f} s on it slows down to a stand"
-    yield look.said("targets", ReservedTag.MATCH_RANGE, begin, slows, reason, slows / look.rate)
-    yield look.said("targets", ReservedTag.WARP_POSITION, begin, last, f"comes {metres:.2f} m far and then stands", metres)
+    yield look.proposal("targets", ReservedTag.MATCH_RANGE, begin, slows, reason, slows / look.rate)
+    yield look.proposal("targets", ReservedTag.WARP_POSITION, begin, last, f"comes {metres:.2f} m far and then stands", metres)
 
 
 # ---- noise
@@ -330,16 +332,16 @@ def _noise(look: Look) -> Iterator[Proposal]:
         fastest = float(steps[first:stop].max())
         reason = f"a joint moves at {fastest:.0f} m/s from one frame to the next"
         if stop <= END_SHARE * n:
-            yield look.said(
+            yield look.proposal(
                 "noise", ReservedTag.EXCLUDED, None, stop - 1, f"{reason}: what is before is not part of the clip", fastest
             )
         elif first >= (1.0 - END_SHARE) * n:
-            yield look.said(
+            yield look.proposal(
                 "noise", ReservedTag.EXCLUDED, first + 1, None, f"{reason}: what is after is not part of the clip", fastest
             )
         else:
             last = max(first + 1, stop - 1)
-            yield look.said("noise", ReservedTag.EXCLUDED, first + 1, last, reason, fastest)
+            yield look.proposal("noise", ReservedTag.EXCLUDED, first + 1, last, reason, fastest)
 
 
 def _moved_by(values: Floats, n: int) -> Floats:

@@ -20,7 +20,6 @@ from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.search import cost
 from contextdb.motion.search.filters import Filter
-from contextdb.motion.search.scan import Scan
 from contextdb.motion.search.searched import Searched
 
 
@@ -93,7 +92,7 @@ def of(database: Searched, query: Floats, chosen: Filter, k: int, with_left_out:
     why = chosen.why(lay.frame_ranges, kinds)
     in_ranges = lay.frames
     frames = in_ranges if with_left_out else in_ranges[why[in_ranges] == LeftOut.NO]
-    totals = Scan(lay, kinds, database.slices, database.cost_weights).totals(query, chosen, frames)
+    totals = _totals(database, query, chosen, frames)
     is_other = frames != chosen.playing(lay.frame_ranges, kinds)
     best = _least_first(totals, is_other, k)
     counted = np.bincount(why[in_ranges], minlength=len(LeftOut))
@@ -113,6 +112,17 @@ def of_frames(
 ) -> list[Candidate]:
     """Some frames, their totals and the reason of every frame known; `wanted` is a normalised query."""
     return list(_candidates(database, wanted, chosen, frames, totals, why))
+
+
+def _totals(database: Searched, query: Floats, chosen: Filter, frames: Ints) -> Floats:
+    """Cost and bias of some frames, each in a range, added as the search adds them: float64 [len(frames)]."""
+    lay, kinds = database.layout, database.marks.kinds
+    biases = chosen.range_biases[lay.ranges_of(frames)] + chosen.kinds.biases[kinds[frames]]
+    if len(chosen.frame_biases):
+        biases += chosen.frame_biases[frames]
+    if chosen.current >= 0:
+        biases[frames == chosen.playing(lay.frame_ranges, kinds)] += chosen.continuing
+    return np.asarray(cost.costs(lay, frames, query, database.slices, database.cost_weights) + biases)
 
 
 def _least_first(totals: Floats, is_other: NDArray[np.bool_], k: int) -> Ints:

@@ -7,8 +7,6 @@ costs to the last bit and a tie is a tie.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import reduce
-from operator import add
 
 import numpy as np
 
@@ -28,10 +26,10 @@ def channel_costs(layout: Layout, frames: Ints, query: Floats, slices: Sequence[
     block = layout.take(frames).T.astype(np.float64, order="C")
     block -= np.atleast_2d(query).T
     block *= block
-    found = np.empty((len(weights), len(frames)))
-    for row, columns, weight in zip(found, slices, weights.tolist(), strict=True):
+    costs = np.empty((len(weights), len(frames)))
+    for row, columns, weight in zip(costs, slices, weights.tolist(), strict=True):
         np.multiply(_sum(block[columns]), weight, out=row)
-    return found
+    return costs
 
 
 def costs(layout: Layout, frames: Ints, query: Floats, slices: Sequence[slice], weights: Floats) -> Floats:
@@ -41,15 +39,6 @@ def costs(layout: Layout, frames: Ints, query: Floats, slices: Sequence[slice], 
         block = slice(start, start + FRAMES_AT_ONCE)
         own = query[block] if query.ndim == 2 else query
         total[block] = _sum(channel_costs(layout, frames[block], own, slices, weights))
-    return total
-
-
-def cost_of(layout: Layout, box: int, lane: int, query: Floats, slices: Sequence[slice], weights: Sequence[float]) -> float:
-    """The cost of one frame, added in the order of `costs`, without the calls of numpy that many frames are worth."""
-    apart = layout.blocks[box, :, lane][layout.rank] - query
-    squares, total = (apart * apart).tolist(), 0.0
-    for columns, weight in zip(slices, weights, strict=True):
-        total += reduce(add, squares[columns], 0.0) * weight
     return total
 
 

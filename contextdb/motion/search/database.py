@@ -32,6 +32,7 @@ from contextdb.cells.arguments import (
     require_number,
     require_text,
 )
+from contextdb.core import Frames
 from contextdb.errors import Fault, MotionError, QueryError, in_quotes, no_such, plural
 from contextdb.motion import arguments
 from contextdb.motion.arguments import Currents, Flags, Valid, ValidForMany, ValidRanges
@@ -253,15 +254,14 @@ class MotionDatabase(Searched):
 
         Notes
         -----
-        A box is skipped when its lower bound plus its least bias is above the best total so far; see
-        `contextdb.motion.search.kernels`.
+        A box is skipped when its lower bound plus its least bias is above the best total so far; see `contextdb/core/search.h`.
         """
         return self.search_filtered(query, self._filters.make(valid, tags, current, bias, skip, in_match_range, penalties))
 
     def search_filtered(self, query: ArrayLike, chosen: Filter) -> Hit:
         """The frame that a search chooses from what a filter lets pass; see `search` and `filter`."""
-        found, totals, frames = self._searcher.least(query, chosen, math.inf, 1)
-        return self._hit(found, int(frames[0]), float(totals[0]))
+        range_number, totals, frames = self._searcher.least(query, chosen, math.inf, 1)
+        return self._hit(range_number, int(frames[0]), float(totals[0]))
 
     def best_of_ranges(
         self, query: ArrayLike, within: float, valid: Valid | None = None, **options: Unpack[SearchOptions]
@@ -272,7 +272,10 @@ class MotionDatabase(Searched):
         """
         if not isinstance(within, Real) or not within >= 0.0:
             raise QueryError(Fault(f"the costs may differ by {within!r}.", "a number, 0 or more"))
-        chosen = self.filter(valid, **options)
+        return self.best_of_ranges_filtered(query, within, self.filter(valid, **options))
+
+    def best_of_ranges_filtered(self, query: ArrayLike, within: float, chosen: Filter) -> list[Hit]:
+        """The same of what a filter lets pass."""
         best = float(self._searcher.least(query, chosen, math.inf, 1)[1][0])
         if best == math.inf:
             return []
@@ -315,19 +318,19 @@ class MotionDatabase(Searched):
         filters = self._filters.make_many(len(wanted), valid, current, tags)
         return self._hits(*self._searcher.least_of_many(wanted, filters))
 
-    def search_each(self, queries: Floats, asked: Sequence[Mapping[str, Any]]) -> list[Hit]:
+    def search_each(self, queries: Floats, options: Sequence[Mapping[str, Any]]) -> list[Hit]:
         """Search for many characters at once, each with parameters of `search` of its own; queries [Q, F]. Exact, as `search_many`.
 
         Those that share tags, and give no biases of frames, are searched together.
         """
-        filters = [self._filters.make(**each) for each in asked]
-        found: list[Hit] = [NOTHING] * len(filters)
+        filters = [self._filters.make(**each) for each in options]
+        best: list[Hit] = [NOTHING] * len(filters)
         for numbers in together(filters):
             many = ManyFilters.of([filters[i] for i in numbers])
             hits = self._hits(*self._searcher.least_of_many(queries[numbers], many))
             for i, hit in zip(numbers, hits, strict=True):
-                found[i] = hit
-        return found
+                best[i] = hit
+        return best
 
     def candidates(
         self, query: ArrayLike, k: int = 10, valid: Valid | None = None, *, left_out: bool = False, **options: Unpack[SearchOptions]
@@ -356,8 +359,8 @@ class MotionDatabase(Searched):
         """What each channel adds to the cost of one frame. Their sum, in order, is the frame's cost without its
         biases. Raises QueryError for a frame that is in no range, or a query that does not fit."""
         frames = np.array([self._number(frame)])
-        found = cost.channel_costs(self.layout, frames, self._searcher.normalised(query), self.slices, self.cost_weights)
-        return dict(zip(self.channel_names, found[:, 0].tolist(), strict=True))
+        costs = cost.channel_costs(self.layout, frames, self._searcher.normalised(query), self.slices, self.cost_weights)
+        return dict(zip(self.channel_names, costs[:, 0].tolist(), strict=True))
 
     def normalised(self, query: ArrayLike) -> Floats:
         """A query [F] in the schema's units, checked, as costs are computed with it: float64. Raises QueryError for another."""
@@ -398,6 +401,20 @@ class MotionDatabase(Searched):
         not fit."""
         return self._filters.ranges_of(valid)
 
+    def ranges_of_many(self, valid: ValidForMany | None, n: int) -> tuple[Flags, Floats | None]:
+        """Which ranges may play in each of n searches, bool [n or 1, R], and their biases, float64 [n or 1, R], None for the
+        database's own."""
+        return self._filters.ranges_of_many(valid, n)
+
+    def range_penalties(self, penalties: Penalties) -> Floats:
+        """What penalties add to the cost of each range: float64 [R]."""
+        return self._filters.range_penalties(penalties)
+
+    @property
+    def frames(self) -> Frames:
+        """What the core searches."""
+        return self._searcher.frames
+
     def valid_of_each(self, valid: ValidForMany | None, n: int) -> list[ValidRanges]:
         """What the masks of n characters mean to this database, see `search_many`: each serves as `valid` of `search`."""
         return self._filters.valid_of_each(valid, n)
@@ -410,9 +427,9 @@ class MotionDatabase(Searched):
     def _searcher(self) -> Searcher:
         return Searcher(self.layout, self.marks.kinds, self.normalisation, self.slices, self.cost_weights, self.feature_names)
 
-    def _hit(self, found: int, frame: int, total: float) -> Hit:
+    def _hit(self, range_number: int, frame: int, total: float) -> Hit:
         """The answer for a range, or for -1, none."""
-        return Hit(self.assets[found], found, frame, total) if found >= 0 else NOTHING
+        return Hit(self.assets[range_number], range_number, frame, total) if range_number >= 0 else NOTHING
 
     def _hits(self, ranges: Ints, frames: Ints, totals: Floats) -> list[Hit]:
         assets = self.assets

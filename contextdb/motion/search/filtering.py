@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from contextdb.cells.arguments import require_many_of
 from contextdb.errors import Fault, QueryError, plural
 from contextdb.motion import arguments
+from contextdb.motion.answers import Answer, are_answers, is_answer
 from contextdb.motion.arguments import Currents, Flags, Valid, ValidForMany, ValidRanges
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.markup.left_out import LeftOut, Skip
@@ -29,7 +30,7 @@ Penalties = Mapping[str, float] | NDArray[np.floating]
 
 NO_SKIP: tuple[Skip, ...] = ()
 MOST_FILTERS, MOST_TABLES = 64, 16
-"""What is kept of tag filters and tables; past that all are forgotten and it begins again."""
+"""So many answers of tag filters and tables are cached; past that all are forgotten."""
 
 
 class SearchOptions(TypedDict, total=False):
@@ -51,7 +52,6 @@ class FilterMaker:
         self._has_mirrored = bool(mirrored.any())
         self._all_ranges: Flags = np.ones(len(assets), np.bool_)
         self._range_biases: Floats = np.where(marks.looping, biases.base + biases.looping, biases.base)
-        self._least_bias = float(self._range_biases.min(initial=np.inf))
         self._kinds: dict[tuple[TagFilter, bool], Kinds] = {}
         self._tables: dict[int, TableRanges] = {}
 
@@ -68,13 +68,12 @@ class FilterMaker:
         """The filter for one search; see `MotionDatabase.search` for what is given."""
         ranges, range_biases = self._ranges(valid)
         if penalties is not None:
-            range_biases = range_biases + self._range_penalties(penalties)
+            range_biases = range_biases + self.range_penalties(penalties)
         is_filter = tags is None or isinstance(tags, TagFilter)
         return Filter(
             ranges,
             ranges is self._all_ranges,
             range_biases,
-            self._least_of(range_biases),
             self._kinds_of(tags or ANY_TAGS if is_filter else ANY_TAGS, in_match_range),  # type: ignore[arg-type]
             NO_FLAGS if is_filter else arguments.flags_of(tags, self.n_frames, "tags", "frame"),
             arguments.bias_of(bias, self.n_frames),
@@ -89,7 +88,7 @@ class FilterMaker:
 
     def make_many(self, n: int, valid: ValidForMany | None, current: Currents | None, tags: Tags | None) -> ManyFilters:
         """The filters of n searches; see `MotionDatabase.search_many` for what is given."""
-        ranges, biases = self._ranges_of_many(valid, n)
+        ranges, biases = self.ranges_of_many(valid, n)
         return ManyFilters(
             self.make(None, tags),
             ranges,
@@ -99,7 +98,7 @@ class FilterMaker:
 
     def valid_of_each(self, valid: ValidForMany | None, n: int) -> list[ValidRanges]:
         """What the masks of n searches mean, read once, to be given to searches as `valid`."""
-        ranges, biases = self._ranges_of_many(valid, n)
+        ranges, biases = self.ranges_of_many(valid, n)
         all_biases = [self._range_biases] * n if biases is None else biases
         wide = _widened_of_each(valid)
         return [
@@ -107,7 +106,7 @@ class FilterMaker:
             for i in range(n)
         ]
 
-    def _ranges_of_many(self, valid: ValidForMany | None, n: int) -> tuple[Flags, Floats | None]:
+    def ranges_of_many(self, valid: ValidForMany | None, n: int) -> tuple[Flags, Floats | None]:
         """Which ranges may play in each of n searches, bool [n, R], and the biases of ranges, float64 [n, R], None where they are
         those of the database; or [1, R], the same for all."""
         n_ranges = len(self.assets)
@@ -130,18 +129,15 @@ class FilterMaker:
 
     def _of_answers(self, answers: Sequence[Any]) -> Flags | None:
         """The ranges of many answers of one table at once; None where they are not, or have costs of their own."""
-        if (found := masks_of(answers)) is None:
+        if (masks := masks_of(answers)) is None:
             return None
-        flags = self._table_ranges(found[0]).valid_of_many(found[1])
+        flags = self._table_ranges(masks[0]).valid_of_many(masks[1])
         if self._has_mirrored:
-            seen = answers.mirrored if hasattr(answers, "mirrored") else [getattr(each, "mirrored", each) for each in answers]
+            seen = answers.mirrored if are_answers(answers) else [each.mirrored for each in answers]
             if (in_mirror := masks_of(seen)) is None:
                 return None
             flags = np.where(self.mirrored, self._table_ranges(in_mirror[0]).valid_of_many(in_mirror[1]), flags)
         return flags
-
-    def _least_of(self, range_biases: Floats) -> float:
-        return self._least_bias if range_biases is self._range_biases else float(range_biases.min(initial=np.inf))
 
     def _ranges(self, valid: Valid | None) -> tuple[Flags, Floats]:
         """Which ranges may play, bool [R], and the biases of ranges, float64 [R]."""
@@ -151,24 +147,19 @@ class FilterMaker:
             return valid.flags, valid.biases
         if type(valid) is np.ndarray and valid.dtype == np.bool_ and valid.shape == self._all_ranges.shape:
             return np.ascontiguousarray(valid), self._range_biases
-        if not hasattr(valid, "assets"):
+        if not is_answer(valid):
             return arguments.flags_of(valid, len(self.assets), "valid", "range"), self._range_biases
         flags, costs = self._of_answer(valid)
-        if self._has_mirrored and (in_mirror := getattr(valid, "mirrored", valid)) is not valid:
+        if self._has_mirrored and (in_mirror := valid.mirrored) is not valid:
             mirrored_flags, mirrored_costs = self._of_answer(in_mirror)
             flags = np.where(self.mirrored, mirrored_flags, flags)
             if costs is not None and mirrored_costs is not None:
                 costs = np.where(self.mirrored, mirrored_costs, costs)
         return flags, self._range_biases if costs is None else self._range_biases + np.where(flags, costs, 0.0)
 
-    def _of_answer(self, answer: Any) -> tuple[Flags, Floats | None]:
+    def _of_answer(self, answer: Answer) -> tuple[Flags, Floats | None]:
         """The ranges of the valid assets of a table's answer, and what each costs beside, None where nothing does; of several valid
         rows of one asset, the cheapest counts."""
-        if not hasattr(answer, "table_assets"):
-            flags = np.zeros(len(self.assets), np.bool_)
-            for name in set(answer.assets):
-                flags[self._ranges_of_asset.get(name, [])] = True
-            return flags, None
         return self._table_ranges(answer.table_assets).valid(answer)
 
     def _table_ranges(self, table_assets: Sequence[str]) -> TableRanges:
@@ -181,18 +172,18 @@ class FilterMaker:
             self._tables[id(table_assets)] = known
         return known
 
-    def _range_penalties(self, penalties: Penalties) -> Floats:
+    def range_penalties(self, penalties: Penalties) -> Floats:
         if isinstance(penalties, Mapping):
-            found = np.zeros(len(self.assets))
+            costs = np.zeros(len(self.assets))
             for asset, penalty in penalties.items():
-                found[self._ranges_of_asset.get(asset, [])] = penalty
+                costs[self._ranges_of_asset.get(asset, [])] = penalty
         else:
-            found = arguments.numbers_of(penalties, "the penalties")
-        if found.shape != self._all_ranges.shape or np.isnan(found).any() or np.isneginf(found).any():
+            costs = arguments.numbers_of(penalties, "the penalties")
+        if costs.shape != self._all_ranges.shape or np.isnan(costs).any() or np.isneginf(costs).any():
             ranges = plural(len(self.assets), "range")
             accepted = f"a number for each of {ranges}, or for some assets; positive infinity forbids one"
-            raise QueryError(Fault(f"the penalties have shape {found.shape}, or one is not a number.", accepted))
-        return found
+            raise QueryError(Fault(f"the penalties have shape {costs.shape}, or one is not a number.", accepted))
+        return costs
 
     def _kinds_of(self, tags: TagFilter, in_match_range: bool) -> Kinds:
         known = self._kinds.get((tags, in_match_range))
@@ -207,10 +198,10 @@ class FilterMaker:
 
     @cached_property
     def _ranges_of_asset(self) -> dict[str, list[int]]:
-        found: dict[str, list[int]] = {}
+        ranges: dict[str, list[int]] = {}
         for i, asset in enumerate(self.assets):
-            found.setdefault(asset, []).append(i)
-        return found
+            ranges.setdefault(asset, []).append(i)
+        return ranges
 
 
 def _widened_of_each(valid: ValidForMany | None) -> Callable[[int], Valid | None] | None:
@@ -221,8 +212,8 @@ def _widened_of_each(valid: ValidForMany | None) -> Callable[[int], Valid | None
         one = cast("Valid", valid)
         return (lambda i: arguments.widened_of(one)) if _widens(one) else None
     answers = cast("Sequence[Any]", valid)
-    if hasattr(answers, "lists"):
-        return (lambda i: arguments.widened_of(answers[i])) if _widens(answers) else None
+    if are_answers(answers):
+        return (lambda i: arguments.widened_of(answers[i])) if answers.is_widening else None
     return (lambda i: arguments.widened_of(answers[i])) if any(map(_widens, answers)) else None
 
 
@@ -230,4 +221,4 @@ def _widens(valid: object) -> bool:
     """Whether an answer, or many of one table, may be another one for what plays already."""
     if isinstance(valid, ValidRanges):
         return valid.widened is not None
-    return bool(getattr(valid, "is_widening", hasattr(valid, "widened")))
+    return is_answer(valid) and valid.is_widening

@@ -1,7 +1,7 @@
 """What one search may choose from, and what is added to the cost of each frame: everything but the query.
 
-N frames, R ranges, K kinds of frames (see `contextdb.motion.markup.marks`). The fast search, the full scan, the candidates and the
-reasons are all read off one `Filter`, so that they cannot disagree.
+N frames, R ranges, K kinds of frames (see `contextdb.motion.markup.marks`). The search, the candidates and the reasons are all read
+off one `Filter`, so that they cannot disagree.
 
     bias of a frame = its range's + its kind's + its own, and the continuing bias for the frame that would play on
 
@@ -23,7 +23,6 @@ from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.markup.left_out import LeftOut, Skip
 
 NO_FLAGS: Flags = np.empty(0, np.bool_)
-NO_SKIPS: Ints = np.empty((0, 2), np.int64)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,8 +77,6 @@ class Filter(NamedTuple):
     is_whole : bool
         Whether that is all of them.
     range_biases : float64 array, shape (R,)
-    least_of_ranges : float
-        The least of them; 0 where there is no range.
     kinds : Kinds
     frames : bool array, shape (N,) or (0,)
         The frames that the caller lets pass; empty: all.
@@ -95,7 +92,6 @@ class Filter(NamedTuple):
     ranges: Flags
     is_whole: bool
     range_biases: Floats
-    least_of_ranges: float
     kinds: Kinds
     frames: Flags
     frame_biases: Floats
@@ -104,9 +100,9 @@ class Filter(NamedTuple):
     continuing: float
 
     @property
-    def skip_spans(self) -> Ints:
-        """The skips as spans: int64 [S, 2]."""
-        return np.array([(skip.start, skip.stop) for skip in self.skips], np.int64) if self.skips else NO_SKIPS
+    def skip_spans(self) -> Ints | None:
+        """The skips as spans: int64 [S, 2]; None where there are none."""
+        return np.array([(skip.start, skip.stop) for skip in self.skips], np.int64) if self.skips else None
 
     def copied(self) -> Filter:
         """The same, of arrays that no caller changes later."""

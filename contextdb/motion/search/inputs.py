@@ -68,8 +68,8 @@ def check_permutations(parts: Sequence[ClipFeatures], schema: FeatureSchema) -> 
     for first in range(0, len(parts), n):
         same = {(part.asset, part.mirrored, len(part.features)) for part in parts[first : first + n]}
         if len(same) > 1 or len(parts) - first < n:
-            found = f"the features of {in_quotes(parts[first].asset)} are not those of its {n} permutations."
-            raise MotionError(Fault(found, "all that `clip_permutations` gives of a clip, in order"))
+            problem = f"the features of {in_quotes(parts[first].asset)} are not those of its {n} permutations."
+            raise MotionError(Fault(problem, "all that `clip_permutations` gives of a clip, in order"))
 
 
 def check_finite(features: Features, starts: Ints, stops: Ints, assets: Sequence[str]) -> None:
@@ -79,5 +79,5 @@ def check_finite(features: Features, starts: Ints, stops: Ints, assets: Sequence
         if is_wrong[start:stop].any():
             frame = start + int(np.argmax(is_wrong[start:stop]))
             feature = int(np.argmin(np.isfinite(features[frame])))
-            found = f"feature {feature} of frame {frame} is {features[frame, feature]} (range {i}, asset {in_quotes(assets[i])})."
-            raise MotionError(Fault(found, "finite numbers within every range"))
+            problem = f"feature {feature} of frame {frame} is {features[frame, feature]} (range {i}, asset {in_quotes(assets[i])})."
+            raise MotionError(Fault(problem, "finite numbers within every range"))

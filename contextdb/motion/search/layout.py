@@ -1,13 +1,11 @@
-"""Where a database keeps its features, so that a search reads as little as possible: boxes of frames, and bounds of boxes.
+"""Where a database keeps its features: boxes of frames, as the core searches them.
 
-N frames, F features, R ranges, B boxes, G groups, S clusters, L = 16 lanes. A box is up to 16 frames of one range, one after
-another; it never straddles two ranges, so that a mask over ranges is a mask over boxes. Its features lie feature by feature, 16
-frames next to each other; a box of fewer frames repeats its last one. A group is 16 boxes, which may be of several ranges, and a
-cluster 16 groups; the least and greatest value of each feature in each box of a group, and in each group of a cluster, lie beside
-each other in the same way. So one instruction works on 16 frames, 16 boxes or 16 groups.
+N frames, F features, R ranges, B boxes, L = 8 lanes. A box is up to 8 frames of one range, one after another; it never straddles
+two ranges, so that a mask over ranges is a mask over boxes. Its features lie feature by feature, 8 frames next to each other, so
+that one instruction works on all; a box of fewer frames repeats its last one. The core makes the bounds of boxes; see
+`contextdb/core/frame_boxes.h`.
 
-Everywhere the features are in the order of `order`: those first that tell most boxes from a query, so that most frames are given
-up after a few features.
+The features are in the order of `order`: those first that tell most boxes from a query, so that most frames are given up early.
 
 Source: the boxes of 16 frames of orangeduck/Motion-Matching, `database.h`; the lanes are ours.
 """
@@ -26,7 +24,7 @@ from contextdb.motion.ranges import frames_between
 
 Features = NDArray[np.float32]
 
-LANES = 16
+LANES = 8
 BOXES_AT_ONCE = 4096
 N_FRAMES, N_BOXES = 32, 2048
 """So many frames and boxes, spread evenly, are compared to find the order of features."""
@@ -42,10 +40,6 @@ class Layout:
         N; frames between ranges are counted, but not kept.
     blocks : float32 array, shape (B, F, L)
         The features of each box's frames.
-    lows, highs : float32 array, shape (G, F, L)
-        The bounds of each box. Lanes without a box hold inf and -inf.
-    cluster_lows, cluster_highs : float32 array, shape (S, F, L)
-        The bounds of each group.
     order : int64 array, shape (F,)
         Which feature is at each place.
     box_starts : int64 array, shape (B,)
@@ -54,26 +48,19 @@ class Layout:
         How many frames it has, and of which range they are.
     range_boxes : int64 array, shape (R, 2)
         The boxes of each range: from the first up to, not including, the second.
-    range_order : int64 array
-        The ranges that have frames, in the order of their frames.
     """
 
     n_frames: int
     blocks: Features
-    lows: Features
-    highs: Features
-    cluster_lows: Features
-    cluster_highs: Features
     order: Ints
     box_starts: Ints
     box_sizes: NDArray[np.int32]
     box_ranges: NDArray[np.int32]
     range_boxes: Ints
-    range_order: Ints
 
     @classmethod
     def of(cls, features: Features, starts: Ints, stops: Ints, feature_weights: Floats) -> Layout:
-        """Lay out features [N, F]; the weights [F] only decide the order of features in the bounds."""
+        """Lay out features [N, F]; the weights [F] only decide the order of features."""
         filled = np.flatnonzero(stops > starts)
         ranges = filled[np.argsort(starts[filled], kind="stable")]
         counts = -(-(stops[ranges] - starts[ranges]) // LANES)
@@ -85,21 +72,14 @@ class Layout:
         range_boxes = np.zeros((len(starts), 2), np.int64)
         range_boxes[ranges] = np.stack((ends - counts, ends), axis=1)
         order = _order(features, box_starts, box_sizes, feature_weights)
-        blocks = _blocks(features, order, box_starts, box_sizes)
-        lows, highs = _in_lanes(blocks.min(axis=2), np.inf), _in_lanes(blocks.max(axis=2), -np.inf)
         return cls(
             len(features),
-            blocks,
-            lows,
-            highs,
-            _in_lanes(lows.min(axis=2), np.inf),
-            _in_lanes(highs.max(axis=2), -np.inf),
+            _blocks(features, order, box_starts, box_sizes),
             order,
             box_starts.astype(np.int64),
             box_sizes.astype(np.int32),
             ranges[of_range].astype(np.int32),
             range_boxes,
-            ranges.astype(np.int64),
         )
 
     @property
@@ -120,11 +100,6 @@ class Layout:
         """Where each feature is: int64 [F]."""
         return np.argsort(self.order)
 
-    def place_of(self, frame: int) -> tuple[int, int]:
-        """The box and the lane of a frame that is in a range."""
-        box = int(self.box_starts.searchsorted(frame, side="right")) - 1
-        return box, frame - int(self.box_starts[box])
-
     def range_of(self, frame: int) -> int:
         """The range that holds a frame, or -1 for a frame between ranges."""
         box = int(self.box_starts.searchsorted(frame, side="right")) - 1
@@ -141,12 +116,12 @@ class Layout:
 
     def kinds_of_boxes(self, kinds: NDArray[np.integer]) -> NDArray[np.int32]:
         """The kind of all frames of each box, -1 where they are of several: int32 [B], from the kind of every frame."""
-        found = np.empty(len(self.box_starts), np.int32)
-        for box in range(0, len(found), BOXES_AT_ONCE):
+        box_kinds = np.empty(len(self.box_starts), np.int32)
+        for box in range(0, len(box_kinds), BOXES_AT_ONCE):
             part = slice(box, box + BOXES_AT_ONCE)
             own = kinds[_frames_of(self.box_starts[part], self.box_sizes[part])]
-            found[part] = np.where((own == own[:, :1]).all(axis=1), own[:, 0].astype(np.int64), -1)
-        return found
+            box_kinds[part] = np.where((own == own[:, :1]).all(axis=1), own[:, 0].astype(np.int64), -1)
+        return box_kinds
 
     @cached_property
     def frame_ranges(self) -> Ints:
@@ -187,12 +162,3 @@ def _order(features: Features, box_starts: Ints, box_sizes: Ints, weights: Float
             apart = np.maximum(np.maximum(low - frame, frame - high), np.float32(0.0))
         distance += np.einsum("bf,bf->f", apart, apart, dtype=np.float64)
     return np.argsort(-distance * weights, kind="stable").astype(np.int64)
-
-
-def _in_lanes(bounds: Features, nothing: float) -> Features:
-    """Bounds [n, F], 16 next to each other: [ceil(n / 16), F, L]."""
-    n_features = bounds.shape[1]
-    n_rows = -(-len(bounds) // LANES)
-    padded = np.full((n_rows * LANES, n_features), nothing, np.float32)
-    padded[: len(bounds)] = bounds
-    return np.ascontiguousarray(padded.reshape(n_rows, LANES, n_features).transpose(0, 2, 1))

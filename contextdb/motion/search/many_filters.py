@@ -14,7 +14,7 @@ from contextdb.motion.arguments import Flags
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.markup.left_out import Skip
-from contextdb.motion.search.filters import NO_SKIPS, Filter
+from contextdb.motion.search.filters import Filter
 
 
 class ManyFilters(NamedTuple):
@@ -49,39 +49,19 @@ class ManyFilters(NamedTuple):
             tuple(each.skips for each in filters) if any(each.skips for each in filters) else (),
         )
 
-    @classmethod
-    def alone(cls, chosen: Filter) -> ManyFilters:
-        skips = (chosen.skips,) if chosen.skips else ()
-        return cls(chosen, chosen.ranges[None], chosen.range_biases[None], np.array([chosen.current]), skips)
-
     @property
-    def least_of_ranges(self) -> Floats:
-        """The least of each row of `range_biases`."""
-        return np.asarray(self.range_biases.min(axis=1, initial=np.inf))
-
-    @property
-    def skip_spans(self) -> tuple[Ints, Ints]:
-        """All skips as spans, int64 [S, 2], and where those of each search begin and end among them, int64 [Q + 1]."""
+    def skip_spans(self) -> tuple[Ints, Ints] | tuple[None, None]:
+        """All skips as spans, int64 [S, 2], and where those of each search begin and end among them, int64 [Q + 1]; None where
+        nobody skips anything."""
         if not self.skips:
-            return NO_SKIPS, np.zeros(len(self.currents) + 1, np.int64)
+            return None, None
         spans = [(skip.start, skip.stop) for skips in self.skips for skip in skips]
-        return np.array(spans, np.int64), np.cumsum([0, *map(len, self.skips)])
-
-    def one(self, i: int) -> Filter:
-        biases = self.range_biases[i if len(self.range_biases) > 1 else 0]
-        return self.shared._replace(
-            ranges=self.ranges[i if len(self.ranges) > 1 else 0],
-            is_whole=False,
-            range_biases=biases,
-            least_of_ranges=float(biases.min(initial=np.inf)),
-            current=int(self.currents[i]),
-            skips=self.skips[i] if self.skips else (),
-        )
+        return np.array(spans, np.int64).reshape(-1, 2), np.cumsum([0, *map(len, self.skips)])
 
 
 def together(filters: Sequence[Filter]) -> Iterable[list[int]]:
     """The numbers of filters that differ in their ranges, current frames and skips alone, so that they can be searched at once."""
-    found: dict[tuple[int, ...], list[int]] = {}
+    groups: dict[tuple[int, ...], list[int]] = {}
     for i, each in enumerate(filters):
-        found.setdefault((id(each.kinds), id(each.frames), id(each.frame_biases)), []).append(i)
-    return found.values()
+        groups.setdefault((id(each.kinds), id(each.frames), id(each.frame_biases)), []).append(i)
+    return groups.values()

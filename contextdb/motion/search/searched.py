@@ -90,9 +90,9 @@ class Searched:
     @property
     def features(self) -> Features:
         """The features as rows: float32 [N, F], gathered again; frames between ranges hold zeros."""
-        found = np.zeros((self.n_frames, self.n_features), np.float32)
-        found[self.layout.frames] = self.layout.take(self.layout.frames)
-        return found
+        features = np.zeros((self.n_frames, self.n_features), np.float32)
+        features[self.layout.frames] = self.layout.take(self.layout.frames)
+        return features
 
     def raw(self, frame: Hit | int) -> Floats:
         """The features of one frame in the schema's units, as a query has them: float64 [F]. Raises QueryError for a frame
@@ -109,7 +109,7 @@ class Searched:
         return self.normalisation.undo(self.layout.take(numbers))
 
     def path_speed(self, frame: int) -> float | None:
-        """How fast the path of a frame goes, m/s, by the features that say so; None where the schema has none. Kept once asked."""
+        """How fast the path of a frame goes, m/s, by the features that say so; None where the schema has none. Cached."""
         if frame not in self._path_speeds:
             where = None if self.schema is None else self.schema.speed_features
             self._path_speeds[frame] = None if where is None else math.hypot(*self.raw(frame)[where[0]].tolist()) / where[1]
@@ -132,8 +132,8 @@ class Searched:
         is no such range, or no time, and for a database of arrays."""
         range_number, time_s = require_whole(range_number, "range_number"), require_real(time_s, "time_s")
         if self.schema is None or not 0 <= range_number < len(self.assets) or not math.isfinite(time_s):
-            found = f"there is no frame at {time_s!r} s of range {range_number}."
-            raise QueryError(Fault(found, "a range of this database, built from clips, and seconds"))
+            problem = f"there is no frame at {time_s!r} s of range {range_number}."
+            raise QueryError(Fault(problem, "a range of this database, built from clips, and seconds"))
         start, stop = int(self.starts[range_number]), int(self.stops[range_number])
         return min(max(start, start + round(time_s * self.schema.rate)), stop - 1)
 

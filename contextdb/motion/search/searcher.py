@@ -1,4 +1,4 @@
-"""Ask the compiled search, or the one of numpy where numba is missing. Both give the same frames at the same costs.
+"""Put a search to the core, in numbers that it can read; see `contextdb/core/search.h`.
 
 N frames, F features, R ranges.
 """
@@ -8,28 +8,27 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache, cached_property
+from functools import cached_property, partial
 from itertools import pairwise
-from types import ModuleType
-from typing import Any
+from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from contextdb.console import announce
+from contextdb.core import Frames
 from contextdb.motion import arguments
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.features.normalisation import Normalisation
-from contextdb.motion.search import scan
+from contextdb.motion.search import cost
 from contextdb.motion.search.filters import Filter
 from contextdb.motion.search.layout import Layout
 from contextdb.motion.search.many_filters import ManyFilters
 
-MOST_KINDS = 65536
-"""With more kinds of frames than this, numpy searches."""
+REFUSED = -2
+"""The range of a query that cannot be compared."""
 BLOCK_QUERIES = 512
-"""So many queries at most go through the frames together."""
+"""So many queries at most are given to a thread together."""
 THREAD_QUERIES = 32
 """Fewer queries than this are not worth a second thread."""
 
@@ -56,43 +55,26 @@ class Searcher:
         Gives the range of the best frame too, -1 for none; it means nothing where there is one for each range.
         """
         totals, frames = np.empty(n), np.empty(n, np.int64)
-        if self._compiled is None:
-            wanted = self.normalised(query)
-            totals[:], frames[:] = within, -1
-            if n == 1:
-                own_range, frames[0], totals[0] = self._scan.best(wanted, chosen)
-                return own_range, totals, frames
-            at, found, own = self._scan.least(wanted, chosen, within)
-            totals[at], frames[at] = own, found
-            return 0, totals, frames
-        kernels, pack = self._compiled
         is_plain = type(query) is np.ndarray and query.dtype == np.float64 and query.flags.c_contiguous
-        raw = query if is_plain else np.ascontiguousarray(arguments.numbers_of(query, "the query"))
-        found = kernels.REFUSED
-        if raw.shape == self._shape:  # type: ignore[union-attr]
-            of_kinds = (chosen.kinds.allowed, chosen.kinds.biases, chosen.kinds.playable)
-            of_frames = (chosen.frames, chosen.frame_biases, chosen.skip_spans, chosen.current, chosen.continuing)
-            given = (chosen.ranges, chosen.is_whole, chosen.range_biases, chosen.least_of_ranges, *of_kinds, *of_frames)
-            found = kernels.search(pack.numbers, raw, *given, within, totals, frames)
-        if found == kernels.REFUSED:
+        raw = cast("Floats", query) if is_plain else np.ascontiguousarray(arguments.numbers_of(query, "the query"))
+        best_range = REFUSED
+        if raw.shape == self._shape:
+            own = (chosen.skip_spans, chosen.current, chosen.continuing, within, totals, frames)
+            best_range = self.frames.search(raw, chosen.ranges, chosen.range_biases, *shared_parts(chosen), *own)
+        if best_range == REFUSED:
             self.normalised(query)  # says what is wrong
-        return found, totals, frames
+        return best_range, totals, frames
 
     def least_of_many(self, queries: Floats, filters: ManyFilters) -> tuple[Ints, Ints, Floats]:
         """For each query [Q, F] and its filter the best frame's range (-1 for none), its number and its total: arrays [Q]."""
         n = len(queries)
-        totals, frames, ranges = np.empty(n), np.empty(n, np.int64), np.empty(n, np.int64)
-        if self._compiled_for_many is None or queries.shape[1:] != self._shape:
-            wanted = np.array([self.normalised(query) for query in queries]).reshape(n, *self._shape)
-            return self._scan.least_of_many(wanted, filters)
-        kernels, arrays = self._compiled_for_many
-        shared = filters.shared
-        of_kinds = (shared.kinds.allowed, shared.kinds.biases, shared.kinds.playable)
-        of_ranges = (filters.ranges, filters.range_biases, filters.least_of_ranges)
-        of_frames = (shared.frames, shared.frame_biases, *filters.skip_spans, filters.currents, shared.continuing)
-        given = (*arrays, queries, *of_ranges, *of_kinds, *of_frames, totals, frames, ranges)
-        in_blocks(n, lambda start, stop: kernels.search_block(start, stop, *given))
-        for i in np.flatnonzero(ranges == kernels.REFUSED)[:1]:
+        totals, frames, ranges = np.empty(n), np.empty(n, np.int64), np.full(n, REFUSED, np.int64)
+        if queries.shape[1:] == self._shape:
+            of_ranges, of_frames = (filters.ranges, filters.range_biases), shared_parts(filters.shared)
+            own = (*filters.skip_spans, filters.currents, filters.shared.continuing)
+            search = partial(self.frames.search_many, np.ascontiguousarray(queries), *of_ranges, *of_frames, *own)
+            in_blocks(n, lambda start, stop: search(start, stop, totals, frames, ranges))
+        for i in np.flatnonzero(ranges == REFUSED)[:1]:
             self.normalised(queries[i])  # says what is wrong
         return ranges, frames, totals
 
@@ -104,54 +86,27 @@ class Searcher:
         return wanted
 
     @cached_property
-    def _scan(self) -> scan.Scan:
-        """The search by numpy."""
-        return scan.Scan(self.layout, self.kinds, self.slices, self.weights)
-
-    @cached_property
-    def _compiled(self) -> tuple[ModuleType, Any] | None:
-        """The kernels and what they take of the database; None where they cannot be used."""
-        kernels = load_kernels()
-        if kernels is None or int(self.kinds.max(initial=0)) >= MOST_KINDS:
-            return None
-        offset, scale = self.normalisation.offset, self.normalisation.scale
-        return kernels, kernels.pack(self.layout, self.kinds.astype(np.uint16), offset, scale, self.slices, self.weights)
-
-    @property
-    def _compiled_for_many(self) -> tuple[ModuleType, tuple[NDArray[Any], ...]] | None:
-        """The kernels for many queries and the database's arrays; None where they cannot be used."""
-        if self._compiled is None or (kernels := load_many_kernels()) is None:
-            return None
-        return kernels, self._compiled[1].arrays
+    def frames(self) -> Frames:
+        """What the core searches; it is handed over once, as that takes longer than some searches."""
+        lay, kinds = self.layout, self.kinds.astype(np.int32)
+        most = int(kinds.max(initial=0))
+        own = (lay.blocks, lay.order, lay.rank, lay.box_starts, lay.box_sizes, lay.box_ranges, lay.kinds_of_boxes(kinds))
+        channels = np.array([0, *(columns.stop for columns in self.slices)], np.int64)
+        roots = np.sqrt(cost.weights_of_features(self.slices, self.weights))
+        scaling = (self.normalisation.offset, self.normalisation.scale)
+        return Frames(
+            *map(np.ascontiguousarray, (*own, lay.range_boxes)),
+            kinds if most else None,
+            len(kinds),
+            most + 1,
+            *map(np.ascontiguousarray, (*scaling, channels, self.weights, roots)),
+        )
 
 
-@cache
-def load_kernels() -> ModuleType | None:
-    """The compiled search; None where numba is missing, or has no place to keep what it compiles."""
-    try:
-        from contextdb.motion.search import kernels
-    except (ImportError, RuntimeError):
-        return None
-    compile_loop(kernels.search, kernels.SIGNATURE)
-    return kernels
-
-
-@cache
-def load_many_kernels() -> ModuleType | None:
-    """The compiled search for many queries; None where `load_kernels` gives none."""
-    if load_kernels() is None:
-        return None
-    from contextdb.motion.search import many_kernels
-
-    compile_loop(many_kernels.search_block, many_kernels.SIGNATURE)
-    return many_kernels
-
-
-def compile_loop(loop: Any, signature: str) -> None:
-    """Compile a loop for the one signature that it is called with, and for no other."""
-    announce(loop)
-    loop.compile(signature)
-    loop.disable_compile()
+def shared_parts(chosen: Filter) -> tuple[NDArray[np.bool_] | Floats | None, ...]:
+    """What the core is told of frames and their kinds."""
+    kinds, flags, biases = chosen.kinds, chosen.frames, chosen.frame_biases
+    return kinds.allowed, kinds.biases, kinds.playable, flags if len(flags) else None, biases if len(biases) else None
 
 
 def in_blocks(n: int, work: Callable[[int, int], object]) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 
 from contextdb import bitmask
 from contextdb.bitmask import Words
+from contextdb.motion.answers import Answer, Answers, are_answers, is_answer
 from contextdb.motion.arguments import Flags
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
@@ -46,13 +47,13 @@ class TableRanges:
         ranges, rows = np.array(pairs, np.int64).reshape(-1, 2).T.copy()
         return cls(assets, n_ranges, rows, ranges, np.unique(ranges, return_index=True)[1])
 
-    def valid(self, answer: Any) -> tuple[Flags, Floats | None]:
+    def valid(self, answer: Answer) -> tuple[Flags, Floats | None]:
         """The ranges of an answer's rows, bool [R], and what each costs beside, float64 [R], None where nothing does; of several
         valid rows of one asset, the cheapest counts."""
         flags = np.zeros(self.n_ranges, np.bool_)
         is_valid = answer.flags[self.rows]
         flags[self.ranges[is_valid]] = True
-        if not has_penalties(answer):
+        if not answer.has_penalties:
             return flags, None
         least = np.full(self.n_ranges, np.inf)
         np.minimum.at(least, self.ranges[is_valid], answer.penalties[self.rows[is_valid]])
@@ -60,37 +61,33 @@ class TableRanges:
 
     def valid_of_many(self, masks: Words) -> Flags:
         """The ranges of the rows of many answers, uint64 [Q, W]: bool [Q, R]."""
-        found = np.zeros((len(masks), self.n_ranges), np.bool_)
+        valid = np.zeros((len(masks), self.n_ranges), np.bool_)
         if not len(self.rows):
-            return found
+            return valid
         own = np.take(bitmask.unpack(masks, len(self.assets)), self.rows, axis=1)
         if len(self.firsts) < len(self.rows):
             own = np.logical_or.reduceat(own, self.firsts, axis=1)
-        found[:, self.ranges[self.firsts]] = own
-        return found
+        valid[:, self.ranges[self.firsts]] = own
+        return valid
 
     def least_of_each(self, costs: Floats) -> Floats:
         """What each range costs when rows cost as much, float64 [Q, n_rows]: that of the cheapest row of its asset, inf for a range
         without a row: float64 [Q, R]."""
-        found = np.full((len(costs), self.n_ranges), np.inf)
+        least = np.full((len(costs), self.n_ranges), np.inf)
         if len(self.rows) and len(costs):
-            found[:, self.ranges[self.firsts]] = np.minimum.reduceat(costs[:, self.rows], self.firsts, axis=1)
-        return found
+            least[:, self.ranges[self.firsts]] = np.minimum.reduceat(costs[:, self.rows], self.firsts, axis=1)
+        return least
 
 
-def masks_of(answers: Sequence[Any]) -> tuple[Sequence[str], Words] | None:
+def masks_of(answers: Sequence[Any] | Answers) -> tuple[Sequence[str], Words] | None:
     """The assets of a table's rows and the rows of many answers as bits, uint64 [Q, W]; None where they are answers of several
     tables, or some cost something beside."""
-    if not len(answers) or not hasattr(answers[0], "table_assets"):
+    if not len(answers) or not is_answer(answers[0]):
         return None
     assets = answers[0].table_assets
-    if hasattr(answers, "mask"):  # the answers of one table
-        return None if has_penalties(answers[0]) else (assets, answers.mask)
-    if any(getattr(each, "table_assets", None) is not assets or has_penalties(each) for each in answers):
+    if are_answers(answers):
+        return None if answers[0].has_penalties else (assets, answers.mask)
+    each_one = [answers[i] for i in range(len(answers))]
+    if any(not is_answer(each) or each.table_assets is not assets or each.has_penalties for each in each_one):
         return None
-    return assets, np.array([each.mask for each in answers], np.uint64).reshape(len(answers), -1)
-
-
-def has_penalties(answer: Any) -> bool:
-    """Whether soft cells cost something beside."""
-    return bool(getattr(answer, "has_penalties", False))
+    return assets, np.array([each.mask for each in each_one], np.uint64).reshape(len(answers), -1)

@@ -46,10 +46,10 @@ class Search:
     def __str__(self) -> str:
         if self.hit is None or not self.hit:
             return f"{self.database}: {self.status}"
-        told = f"{self.database}: cost {self.hit.cost:.4g}"
+        text = f"{self.database}: cost {self.hit.cost:.4g}"
         if self.threshold is None:
-            return told
-        return f"{told}, {'under' if self.is_under_threshold else 'not under'} its threshold {self.threshold:g}"
+            return text
+        return f"{text}, {'under' if self.is_under_threshold else 'not under'} its threshold {self.threshold:g}"
 
 
 @quickly_made
@@ -78,8 +78,8 @@ class Choice:
     @property
     def why(self) -> str:
         """The choice in one sentence for people."""
-        told = "; ".join(map(str, self.searches))
+        text = "; ".join(map(str, self.searches))
         if self.database is None:
-            return f"{told}. Nothing may play."
+            return f"{text}. Nothing may play."
         ends = {Reason.UNDER_THRESHOLD: "wins outright", Reason.LOWEST: "has the lowest cost and wins"}
-        return f"{told}. {self.database} {ends[self.reason]}."
+        return f"{text}. {self.database} {ends[self.reason]}."

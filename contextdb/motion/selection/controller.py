@@ -3,7 +3,7 @@
 At each update the playing animation moves on. A search follows when one is due or forced, when the clip has ended, and when what
 plays is no longer valid, loaded or among the databases of the moment. What would play on takes part in the search as the continuing
 pose, with its bias; some frames are not candidates because of what plays and what was played (see
-`contextdb.motion.selection.history`). When nothing is found, the character plays on, or holds the last frame of a clip that has
+`contextdb/core/controller.h`). Without a result the character plays on, or holds the last frame of a clip that has
 ended. What is no longer valid may play on for a while too: see `contextdb.motion.selection.guards`.
 
 A controller reads no clock and draws no random number of its own: the same calls give the same decisions.
@@ -17,59 +17,65 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
+from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from contextdb.cells.arguments import as_number, require_kind
 from contextdb.errors import Fault, MotionError, QueryError
 from contextdb.motion import arguments
+from contextdb.motion.arguments import Flags
 from contextdb.motion.clips.ground_place import GroundPlace, OfBody, place_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.markup.tag_filter import TagFilter
-from contextdb.motion.records import quickly_made
-from contextdb.motion.search.candidates import Candidates
-from contextdb.motion.search.filtering import Tags
-from contextdb.motion.search.filters import Filter
+from contextdb.motion.search.hit import Hit
 from contextdb.motion.selection import variation
-from contextdb.motion.selection.asked import Among, Asked, OfPenalties, OfTags, OfValid
-from contextdb.motion.selection.choice import Choice
+from contextdb.motion.selection.chooser import (
+    ASK,
+    CAUSE,
+    CHOOSE,
+    CHOSEN,
+    DECIDE,
+    GO_ON,
+    GONE,
+    N_DECISION,
+    PLAYING,
+    WINNER,
+    Chooser,
+    Given,
+    Updates,
+    own_valid,
+    widens,
+)
 from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.controller_state import ControllerState
-from contextdb.motion.selection.decision import Action, Decision, Playing, Recorder, plays
-from contextdb.motion.selection.guards import Held
-from contextdb.motion.selection.history import played_spans, remembered
-from contextdb.motion.selection.inputs import Inputs
-from contextdb.motion.selection.ongoing import Ongoing
-from contextdb.motion.selection.play_rate import eased, play_rate
-from contextdb.motion.selection.playhead import Playhead
-from contextdb.motion.selection.root_motion import NO_MOTION
+from contextdb.motion.selection.decided import Told, decision_of
+from contextdb.motion.selection.decision import Action, Decision, Playing, Recorder, Watcher, plays
+from contextdb.motion.selection.search_options import Among, OfPenalties, OfTags, OfValid, OfValidForMany, SearchOptions
 from contextdb.motion.selection.selector import Selector
-from contextdb.motion.selection.step import Outcome, Step
-from contextdb.motion.selection.trigger import Trigger
 from contextdb.motion.selection.variation import Rng
-from contextdb.motion.selection.worked_out import WorkedOut
 
 Clock = Callable[[], float]
+Place = tuple[Floats, int, Playing | None, bool, tuple[str, ...], object]
+FORCE, INTERRUPT = 1, 2
 
 
-@quickly_made
 @dataclass(frozen=True, slots=True)
-class Asking:
-    """Half an update: what is to be searched, and why; `wanted` is None where nothing is. `held` is the guard that saw to that."""
+class Asked:
+    """What n controllers are asked with beside their queries: one for each, and `valid` as for many."""
 
-    step: Step
-    cause: Trigger | None
-    wanted: Asked | None
-    context: Mapping[str, object] | None
-    force: bool = False
-    interrupt: bool = False
-    body: GroundPlace | None = None
-    held: Held = Held.NOTHING
+    valid: OfValidForMany | None
+    tags: Sequence[OfTags | None]
+    bias: Sequence[Mapping[str, ArrayLike] | None]
+    among: Sequence[Among | None]
+    penalties: Sequence[OfPenalties | None]
+    force: Sequence[bool]
+    interrupt: Sequence[bool]
 
-    @property
-    def query(self) -> Floats:
-        """The query, checked: float64 [F]."""
-        return self.step.query
+    def options(self, i: int) -> SearchOptions:
+        """Those of one, checked."""
+        return SearchOptions(None, self.tags[i], None, self.bias[i], self.among[i], None, self.penalties[i])
 
 
 DEFAULT_SETTINGS = ControllerSettings()
@@ -113,14 +119,21 @@ class Controller:
             raise MotionError(Fault("the settings request variation, but there is no generator.", "rng=random.Random(seed)"))
         self.selector, self.settings, self.recorder = selector, settings, recorder
         self._rng, self._clock = rng, clock
-        self._state = ControllerState()
-        self._moved: tuple[object, object, float, float, Ongoing | None] | None = None
-        self._head: Playhead | None = None
+        self._watcher: Watcher | None = None
+        """The link that watches the controller."""
+        self._playing: Playing | None = None
+        self._is_decoded = False
+        self._moved: tuple[Floats, int, float, Floats] | None = None
+        self._stand(Chooser.of(selector, settings), ControllerState())
 
     @property
     def playing(self) -> Playing | None:
         """What plays now."""
-        return self._state.playing
+        if not self._is_decoded:
+            numbers = self._rows[self._at, PLAYING].tolist()
+            self._playing = self._playing if numbers[0] == GONE else self._chooser.playing(numbers)
+            self._is_decoded = True
+        return self._playing
 
     def upcoming(self, dt_s: float) -> Playing | None:
         """What plays in some seconds if it plays on: the pose that the query of the next update is to be made of.
@@ -128,23 +141,53 @@ class Controller:
         A query with the pose of the last update lags behind, and the frame that it fits best is always one that steps back.
         Raises QueryError for what is no time.
         """
-        ongoing = self._ongoing(_seconds(dt_s))
-        return None if ongoing is None else ongoing.playing
+        seconds, chooser = seconds_of(dt_s), self.chooser
+        moved, _ = chooser.move(self._row, seconds)
+        return chooser.playing(moved[0, :4].tolist())
 
-    def _ongoing(self, dt_s: float) -> Ongoing | None:
-        """What plays, moved on; kept until `answer`, for an update mostly follows what was asked of `upcoming`."""
-        playing, selector, rate, passed_s = self._state.playing, self.selector, self.settings.rate, dt_s * self._state.play_rate
-        kept = self._moved
-        if kept is not None and kept[0] is playing and kept[1] is selector and kept[2] == rate and kept[3] == passed_s:
-            return kept[4]
-        ongoing = Ongoing.of(playing, selector, rate, passed_s, self._head)
-        self._moved = playing, selector, rate, passed_s, ongoing
-        return ongoing
+    def upcoming_features(self, dt_s: float) -> Floats | None:
+        """The features of that frame, in the schema's units: float64 [F]; None where nothing plays. For a time that is checked."""
+        moved, poses = self.chooser.move(self._row, dt_s, poses=True)
+        self._moved = self._rows, self._at, dt_s, moved
+        return None if poses is None or moved[0, 0] < 0.0 else poses[0]
+
+    @property
+    def chooser(self) -> Chooser:
+        """What the core knows of the selector and the settings, which may have been exchanged."""
+        if self._chooser.selector is not self.selector or self._settings is not self.settings:
+            self._stand(Chooser.of(self.selector, self.settings), self._state)
+        return self._chooser
+
+    def _stand(self, chooser: Chooser, state: ControllerState) -> None:
+        """Stand where a state says."""
+        self._chooser, self._settings, self._moved = chooser, self.settings, None
+        self._rows, self._at = chooser.encode(state), 0
+        self._playing, self._recent, self._is_decoded = state.playing, state.recent, False
+
+    @property
+    def _row(self) -> Floats:
+        """The controller's row: [1, W]."""
+        return self._rows[self._at : self._at + 1]
+
+    @property
+    def _state(self) -> ControllerState:
+        return self._chooser.state(self._rows[self._at].tolist(), self.playing, self._recent)
+
+    @property
+    def place(self) -> Place:
+        """Where the controller is, to `put_back` this one with the same selector and settings; it costs less than `state`."""
+        rng = None if self._rng is None else variation.state_of(self._rng)
+        return self._rows, self._at, self._playing, self._is_decoded, self._recent, rng
+
+    def put_back(self, place: Place) -> None:
+        """Go back to where the controller was."""
+        self._rows, self._at, self._playing, self._is_decoded, self._recent, rng = place
+        variation.restore(self._rng, rng)
 
     def copy(self) -> Controller:
         """Another controller that stands where this one does, with the same selector and settings, and no recorder."""
         copied = Controller(self.selector, self.settings, rng=deepcopy(self._rng), clock=self._clock)
-        copied._state = self._state
+        copied._stand(self.chooser, self._state)
         return copied
 
     __copy__ = copy
@@ -155,7 +198,8 @@ class Controller:
     @property
     def state(self) -> ControllerState:
         """Where the controller is, to come back to with `restore`."""
-        return self._state if self._rng is None else replace(self._state, rng=variation.state_of(self._rng))
+        state = self._state
+        return state if self._rng is None else replace(state, rng=variation.state_of(self._rng))
 
     def restore(self, state: ControllerState) -> None:
         """Go on from a state of this controller, or of another one with the same selector and settings.
@@ -164,7 +208,7 @@ class Controller:
         """
         require_kind(state, ControllerState, "state", "a ControllerState, what `state` gives")
         variation.restore(self._rng, state.rng)
-        self._state = state if state.rng is None else replace(state, rng=None)
+        self._stand(self.chooser, state)
 
     def update(
         self,
@@ -209,133 +253,9 @@ class Controller:
         ContextError
             `body` is none.
         """
-        asked = Asked(valid, tags, None, bias, among, None, penalties)
-        asking = self._ask(dt_s, self._checked(query), asked, context, force, interrupt, place_of(body))
-        if asking.wanted is None:
-            return self._answer(asking)
-        began_s = self._now_s()
-        choice = self.selector.search(asking.query, **asking.wanted.options())
-        return self._answer(asking, choice, (self._now_s() - began_s) * 1e6)
-
-    def _ask(
-        self,
-        dt_s: float,
-        query: Floats,
-        asked: Asked,
-        context: Mapping[str, object] | None,
-        force: bool,
-        interrupt: bool,
-        body: GroundPlace | None = None,
-    ) -> Asking:
-        """The first half of an update, of a checked query: move what plays on, say what is to be searched. Changes nothing."""
-        dt_s = _seconds(dt_s)
-        step = Step.of(self.selector, self.settings, self._state, dt_s, query, asked, self._ongoing(dt_s))
-        cause = step.trigger(force, interrupt)
-        held = step.held(cause)
-        if held:
-            cause = None
-        step = step if cause is None else step.permuted()
-        wanted = None if cause is None else step.wanted(cause)
-        return Asking(step, cause, wanted, context, force, interrupt, body, held)
-
-    def _answer(self, asking: Asking, choice: Choice | None = None, search_us: float = 0.0) -> Decision:
-        """The second half: decide by what the selector chose, None where nothing was to be searched."""
-        decision = self._decided(asking, choice, search_us if self._clock else None)
-        if self.recorder is not None:
-            self.recorder.record(decision)
-        self._state = self._state_after(asking.step, decision)
-        self._moved, self._head = None, None if asking.step.ongoing is None else asking.step.ongoing.head
-        return decision
-
-    def _now_s(self) -> float:
-        """What the clock says; 0 without one."""
-        return self._clock() if self._clock else 0.0
-
-    def _decided(self, asking: Asking, choice: Choice | None, search_us: float | None) -> Decision:
-        step, cause, wanted = asking.step, asking.cause, asking.wanted
-        candidates: Sequence[tuple[str, Candidates]] = ()
-        filters: tuple[tuple[str, Filter], ...] = ()
-        if cause is None or wanted is None or choice is None:
-            assert step.ongoing is not None, "without anything playing there is a cause to search"
-            outcome = step.unsearched(step.ongoing, asking.held)
-        else:
-            outcome = step.searched(cause, wanted, choice, self._rng)
-            filters = self._filters(wanted)
-            if filters:
-                candidates = WorkedOut(self.selector.databases, step.query, filters, choice, self._n_candidates)
-        return Decision(
-            tick=self._state.tick,
-            time_s=step.now_s,
-            action=outcome.action,
-            why=outcome.why,
-            searched=cause is not None,
-            playing=outcome.playing,
-            before=step.before,
-            cost=outcome.cost,
-            continuing_cost=outcome.continuing_cost,
-            choice=outcome.choice,
-            context=asking.context,
-            query=step.query,
-            candidates=candidates,
-            search_us=None if cause is None else search_us,
-            root_motion=NO_MOTION if step.ongoing is None else step.ongoing.move.motion,
-            root_weight=self._root_weight(outcome.playing),
-            body=asking.body,
-            held=str(outcome.held),
-            play_rate=self._play_rate(step, outcome),
-            filters=filters,
-            inputs=self._inputs(asking),
-        )
-
-    def _state_after(self, step: Step, decision: Decision) -> ControllerState:
-        state, playing, for_s = self._state, decision.playing, self.settings.history_s
-        history, recent = step.history, state.recent
-        if playing is not None and decision.action in (Action.START, Action.JUMP):
-            database, frame = self.selector.databases[playing.database], playing.frame
-            spans = played_spans(database, playing.range, [(frame, frame + 1)])
-            history = remembered(history, playing.database, spans, step.now_s, for_s)
-            if self.settings.variation is not None:
-                recent = self.settings.variation.remember(recent, playing.asset)
-        since_s = 0.0 if decision.searched else state.since_search_s + step.dt_s
-        waiting_since_s = state.waiting_since_s if decision.held not in ("", Held.HYSTERESIS) else None
-        if decision.held == Held.COST_BAR and waiting_since_s is None:
-            waiting_since_s = step.now_s
-        return ControllerState(state.tick + 1, step.now_s, playing, since_s, history, recent, decision.play_rate, waiting_since_s)
-
-    @property
-    def _n_candidates(self) -> int:
-        return 0 if self.recorder is None else self.recorder.n_candidates
-
-    def _filters(self, wanted: Asked) -> tuple[tuple[str, Filter], ...]:
-        """For the recorder, what could be chosen from in each database of the moment."""
-        if self._n_candidates <= 0:
-            return ()
-        among = self.selector.among(wanted.among)
-        databases = ((name, database) for name, database in self.selector.databases.items() if name in among)
-        return tuple((name, database.filter(**wanted.of(name)).copied()) for name, database in databases)
-
-    def _inputs(self, asking: Asking) -> Inputs | None:
-        """For the recorder, what else the update was given."""
-        if self._n_candidates <= 0:
-            return None
-        step, asked = asking.step, asking.step.asked
-        among = None if asked.among is None else tuple(sorted(self.selector.among(asked.among)))
-        tags = asked.tags
-        filters = tags if tags is None or isinstance(tags, TagFilter) else _filters_in(tags)
-        return Inputs(step.dt_s, asking.force, asking.interrupt, among, filters, self.settings)
-
-    def _root_weight(self, playing: Playing | None) -> float:
-        return 1.0 if playing is None else self.selector.databases[playing.database].marks.root_weight(playing.frame)
-
-    def _play_rate(self, step: Step, outcome: Outcome) -> float:
-        """How fast what plays goes on."""
-        playing = outcome.playing
-        if playing is None or outcome.action is Action.HOLD:
-            return 1.0
-        limits = self.settings.min_play_rate, self.settings.max_play_rate
-        wanted = play_rate(self.selector.databases[playing.database], playing.frame, step.query, limits)
-        is_new = outcome.action in (Action.START, Action.JUMP)
-        return wanted if is_new else eased(self._state.play_rate, wanted, step.dt_s)
+        wanted = self._checked(query)
+        asked = Asked(valid, [tags], [bias], [among], [penalties], [force], [interrupt])
+        return update_all([self], seconds_of(dt_s), wanted[None], asked, [context], [place_of(body)])[0]
 
     def _checked(self, query: ArrayLike) -> Floats:
         """The query as float64 [F], checked as long as any database is there to say how long it must be."""
@@ -343,19 +263,171 @@ class Controller:
             return arguments.query_of(query, database.feature_names)
         return arguments.numbers_of(query, "the query")
 
+    def check(self, asked: Asked, i: int) -> None:
+        """Refuse what a controller cannot be asked with."""
+        options, chooser = asked.options(i), self.chooser
+        chooser.check_names(options, None)
+        chooser.shared(options.tags, options.bias)
+        chooser.among(options.among)
 
-def halves_of(controller: Controller) -> tuple[Callable[..., Asking], Callable[..., Decision]]:
-    """The two halves of an update, for a search between them that is not the selector's."""
-    return controller._ask, controller._answer
+    @property
+    def _n_candidates(self) -> int:
+        n_recorded = 0 if self.recorder is None else self.recorder.n_candidates
+        return n_recorded if self._watcher is None else max(n_recorded, self._watcher.n_candidates)
+
+    def _hand_over(self, decision: Decision) -> None:
+        if self.recorder is not None:
+            self.recorder.record(decision)
+        if self._watcher is not None and self._watcher.feed.is_open:
+            self._watcher.decided(decision)
+
+    def _now_s(self) -> float:
+        """What the clock says; 0 without one."""
+        return self._clock() if self._clock else 0.0
+
+    def _go_on(self, updates: Updates, at: int, decision: Decision) -> None:
+        self._rows, self._at = updates.after, at
+        self._playing, self._is_decoded = decision.playing, True
+        if self.settings.variation is not None and decision.action in (Action.START, Action.JUMP):
+            self._recent = self.settings.variation.remember(self._recent, str(decision.playing and decision.playing.asset))
 
 
-def _filters_in(tags: Mapping[str, Tags]) -> dict[str, TagFilter]:
-    """The tag filters of databases, without flags of frames."""
-    return {name: each for name, each in tags.items() if isinstance(each, TagFilter)}
+# ---- many: one is many of length one
 
 
-def _seconds(dt_s: float) -> float:
-    found = as_number(dt_s)
-    if found is None or found < 0.0:
+def update_all(
+    controllers: Sequence[Controller],
+    dt_s: float,
+    queries: Floats,
+    asked: Asked,
+    contexts: Sequence[Mapping[str, object] | None],
+    bodies: Sequence[GroundPlace | None],
+) -> list[Decision]:
+    """The decision of each of some controllers, with checked queries [Q, F]. If it raises, all stand where they stood."""
+    decisions: list[Any] = [None] * len(controllers)
+    made = []
+    for numbers in _together(controllers, asked):
+        own = [controllers[i] for i in numbers]
+        updates, search_us = _updates(own, dt_s, queries if len(own) == len(controllers) else queries[numbers], asked, numbers)
+        made.append((numbers, updates))
+        for k, i in enumerate(numbers):
+            one = own[k]
+            options = asked.options(i) if one._n_candidates > 0 else None
+            how = (contexts[i], bodies[i], search_us if one._clock else None, one._n_candidates, options)
+            told = Told(queries[i], *how, bool(asked.force[i]), bool(asked.interrupt[i]))
+            decisions[i] = decision_of(updates, k, one.playing, told)
+    for numbers, updates in made:
+        for k, i in enumerate(numbers):
+            controllers[i]._go_on(updates, k, decisions[i])
+            controllers[i]._hand_over(decisions[i])
+    return decisions
+
+
+def _together(controllers: Sequence[Controller], asked: Asked) -> list[list[int]]:
+    """The numbers of those that share selector, settings, tags and biases of frames."""
+    if len(controllers) == 1:
+        return [[0]]
+    groups: dict[object, list[int]] = {}
+    for i, (one, tags, bias) in enumerate(zip(controllers, asked.tags, asked.bias, strict=True)):
+        key = id(one.chooser), tags if isinstance(tags, TagFilter) else id(tags), id(bias)
+        groups.setdefault(key, []).append(i)
+    return list(groups.values())
+
+
+def _updates(
+    own: Sequence[Controller], dt_s: float, queries: Floats, asked: Asked, numbers: Sequence[int]
+) -> tuple[Updates, float]:
+    """The updates of controllers that go together, whose numbers among all are these; and the microseconds of a search."""
+    chooser, n, first = own[0].chooser, len(own), asked.options(numbers[0])
+    rows = rows_of(own)
+    moved = _moved_of(own, rows, dt_s)
+    is_all = len(numbers) == len(asked.tags)
+    valid: Any = asked.valid if is_all or asked.valid is None else [own_valid(asked.valid, i) for i in numbers]
+    chooser.check_names(first, valid)
+    ranges, biases = chooser.ranges(valid, n)
+    penalties = [asked.penalties[i] for i in numbers]
+    if any(each is not None for each in penalties):
+        biases = chooser.penalised(biases, [asked.options(i).penalties for i in numbers])
+    among = [asked.among[i] for i in numbers]
+    is_one = all(each is None for each in among)
+    flags = chooser.among(None) if is_one else np.concatenate([chooser.among(each) for each in among])
+    urgent = np.array([FORCE * bool(asked.force[i]) + INTERRUPT * bool(asked.interrupt[i]) for i in numbers], np.uint8)
+    wide = _wide(chooser, moved, ranges, valid, penalties) if widens(valid) else None
+    wanted = np.ascontiguousarray(queries[:, : chooser.n_features])
+    given = Given(wanted, dt_s, ranges, biases, chooser.shared(first.tags, first.bias), flags, urgent, wide)
+    found = np.empty((n, len(chooser.names), 3))
+    updates = Updates(chooser, rows, moved, given, np.empty_like(rows), np.empty((n, N_DECISION)), found)
+    return updates, _run(updates, own)
+
+
+def _run(updates: Updates, own: Sequence[Controller]) -> float:
+    """Ask, choose and decide; the microseconds of the search of each who searched, as the first one's clock says."""
+    if updates.chooser.settings.variation is None and not own[0]._clock:
+        updates.run(ASK | CHOOSE | DECIDE)
+        return 0.0
+    updates.run(ASK)
+    n_searched = int((updates.decisions[:, CAUSE] > 0.0).sum())
+    began_s = own[0]._now_s() if n_searched else 0.0
+    updates.run(CHOOSE)
+    search_us = (own[0]._now_s() - began_s) * 1e6 / n_searched if n_searched else 0.0
+    for k, one in enumerate(own):
+        _vary(updates, k, one)
+    updates.run(DECIDE)
+    return search_us
+
+
+def _moved_of(own: Sequence[Controller], rows: Floats, dt_s: float) -> Floats:
+    """What has moved: of one mostly what its query was made of."""
+    known = own[0]._moved if len(own) == 1 else None
+    if known is not None and known[0] is own[0]._rows and known[1:3] == (own[0]._at, dt_s):
+        own[0]._moved = None  # an update changes it
+        return known[3]
+    return own[0].chooser.move(rows, dt_s)[0]
+
+
+def rows_of(controllers: Sequence[Controller]) -> Floats:
+    """The rows of controllers of one selector and settings: [Q, W]."""
+    first = controllers[0]._rows
+    if len(first) == len(controllers) and all(each._rows is first and each._at == i for i, each in enumerate(controllers)):
+        return first
+    return np.concatenate([each._row for each in controllers])
+
+
+def _wide(chooser: Chooser, moved: Floats, ranges: Flags, valid: Any, penalties: Sequence[OfPenalties | None]) -> Floats:
+    """The bias of what plays by hysteresis alone, NaN where that does not hold: float64 [Q]."""
+    wide = np.full(len(moved), np.nan)
+    for i, (d, at) in enumerate(moved[:, :2].astype(np.int64).tolist()):
+        database = chooser.databases[d] if d >= 0 else None
+        if database is None or ranges[i if len(ranges) > 1 else 0, chooser.ranges_at[d].start + at]:
+            continue
+        own = own_valid(valid, i)
+        widened = arguments.widened_of(own.get(chooser.names[d]) if isinstance(own, Mapping) else own)
+        if widened is not None and database.ranges_of(widened)[at]:
+            penalty = SearchOptions(penalties=penalties[i]).of(chooser.names[d])["penalties"]
+            wide[i] = database.filter(widened, penalties=penalty).range_biases[at]
+    return wide
+
+
+def _vary(updates: Updates, i: int, one: Controller) -> None:
+    """Exchange what was chosen for another frame that is about as good; to play on comes before all of them."""
+    varies, row, chooser = one.settings.variation, updates.decisions[i], updates.chooser
+    if varies is None or one._rng is None or row[CAUSE] == 0.0 or row[WINNER] < 0.0:
+        return
+    choice, d = updates.choice(i), int(row[WINNER])
+    entry, database = chooser.selector.entries[d], chooser.databases[d]
+    is_under, limit, continuing = bool(row[WINNER + 1]), choice.hit.cost + varies.within, float(row[WINNER - 1])
+    if (not is_under or updates.moved[i, 0] == d) and continuing <= limit:
+        row[CHOSEN.start] = GO_ON
+        return
+    assert database is not None, "what wins is of a database that is there"
+    ties = database.best_of_ranges_filtered(updates.given.queries[i], varies.within, updates.filter_of(i, d))
+    near: list[Hit] = [hit for hit in ties if not is_under or entry.threshold is None or hit.cost < entry.threshold]
+    hit = varies.choose(near, one._recent, one._rng)
+    row[CHOSEN] = d, hit.range, hit.frame, hit.cost
+
+
+def seconds_of(dt_s: float) -> float:
+    seconds = as_number(dt_s)
+    if seconds is None or seconds < 0.0:
         raise QueryError(Fault(f"an update of {dt_s!r} seconds.", "a finite number, 0 or more"))
-    return found
+    return seconds

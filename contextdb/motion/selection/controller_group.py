@@ -1,30 +1,38 @@
 """A crowd: many characters that are updated together, each decided as its own controller decides.
 
-An update asks every controller first what is to be searched, searches for all of them at once, and hands each its answer; the rules
-are those of `contextdb.motion.selection.controller`, and there is no second copy of them.
+Those that share a selector and settings are asked, searched for and decided together, in the core; a controller that is updated
+alone is such a crowd of one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from contextdb.cells.arguments import require_many_of
-from contextdb.cells.sequences import Kept
+from contextdb.cells.sequences import ListSequence
 from contextdb.errors import ContextError, Fault, MotionError, Place, QueryError, plural
 from contextdb.motion import arguments
+from contextdb.motion.answers import are_answers
 from contextdb.motion.clips.ground_place import GroundPlace, OfBody, place_of
 from contextdb.motion.clips.many_steered import ManySteered
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.records import collector_at_rest
-from contextdb.motion.selection.asked import Among, Asked, OfPenalties, OfTags, OfValidForMany, each_of, valid_of_each
-from contextdb.motion.selection.choice import Choice
-from contextdb.motion.selection.controller import Asking, Controller
+from contextdb.motion.selection.chooser import are_mappings
+from contextdb.motion.selection.controller import Asked, Controller, rows_of, seconds_of, update_all
 from contextdb.motion.selection.controller_state import ControllerState
 from contextdb.motion.selection.decision import Decision, Playing
-from contextdb.motion.selection.selector import Selector
+from contextdb.motion.selection.search_options import (
+    Among,
+    OfPenalties,
+    OfTags,
+    OfValidForMany,
+    each_of,
+)
 
 HAS_IT = Fault("the group has this controller already.", "a controller of its own for each character")
 
@@ -32,7 +40,7 @@ Flag = bool | Sequence[bool] | NDArray[np.bool_]
 OfBodies = ManySteered | Sequence[OfBody | None] | NDArray[np.float64]
 
 
-class ControllerGroup(Kept[Controller]):
+class ControllerGroup(ListSequence[Controller]):
     """The controllers of a crowd, in order: a sequence, with whose numbers queries, masks and decisions go.
 
     Parameters
@@ -59,10 +67,10 @@ class ControllerGroup(Kept[Controller]):
 
     def remove(self, controller: Controller) -> None:
         """Let a character go; those after it move up by one."""
-        kept = [own for own in self._items if own is not controller]
-        if len(kept) == len(self._items):
+        remaining = [own for own in self._items if own is not controller]
+        if len(remaining) == len(self._items):
             raise MotionError(Fault("the group does not have this controller.", "one that was added"))
-        self._items = kept
+        self._items = remaining
 
     def __repr__(self) -> str:
         return f"<ControllerGroup: {plural(len(self), 'character')}>"
@@ -91,20 +99,18 @@ class ControllerGroup(Kept[Controller]):
 
         Zeros for a character that plays nothing.
         """
-        frames: dict[int, tuple[Selector, str, list[int], list[int]]] = {}
-        for i, (controller, playing) in enumerate(zip(self, self.upcoming(dt_s), strict=True)):
-            if playing is not None:
-                database = controller.selector.databases[playing.database]
-                found = frames.setdefault(id(database), (controller.selector, playing.database, [], []))
-                found[2].append(i)
-                found[3].append(playing.frame)
-        selectors = {controller.selector for controller in self}
-        widths = {database.n_features for selector in selectors for database in selector.databases.values()}
+        seconds, groups = seconds_of(dt_s), dict[int, list[int]]()
+        for i, controller in enumerate(self):
+            groups.setdefault(id(controller.chooser), []).append(i)
+        widths = {self[numbers[0]].chooser.n_features for numbers in groups.values()} - {0}
         if len(widths) > 1:
             raise MotionError(Fault(f"the databases have {sorted(widths)} features.", "databases of one schema"))
         poses = np.zeros((len(self), max(widths, default=0)))
-        for selector, name, numbers, at in frames.values():
-            poses[numbers] = selector.databases[name].raw_many(at)
+        for numbers in groups.values():
+            own = [self[i] for i in numbers]
+            features = own[0].chooser.move(rows_of(own), seconds, poses=True)[1]
+            if features is not None and features.size:
+                poses[numbers] = features
         return poses
 
     @collector_at_rest()
@@ -150,67 +156,53 @@ class ControllerGroup(Kept[Controller]):
         wanted = arguments.numbers_of(queries, "the queries")
         if wanted.ndim != 2 or len(wanted) != n:
             raise QueryError(Fault(f"the queries have shape {wanted.shape}.", f"one for each of {plural(n, 'character')}"))
-        masks = {selector: valid_of_each(selector.databases, valid, n) for selector in {each.selector for each in self}}
-        each = zip(
-            self,
-            wanted,
+        if arguments.is_one_for_each(valid) or are_mappings(valid):
+            each_of(valid, n, "mask", is_one=False)
+        asked = Asked(
+            valid,
             _each(tags, n, "tag filter"),
             _each(bias, n, "bias"),
             _each_among(among, n),
             _each(penalties, n, "penalty"),
-            _each(contexts, n, "context"),
             _each_flag(force, n, "flag to force"),
             _each_flag(interrupt, n, "flag to interrupt"),
-            _each_place(body, n),
-            strict=True,
         )
-        asking = []
-        nothing = Asked() if all(given is None for given in (valid, tags, bias, among, penalties)) else None
-        are_checked = self._have_width(wanted.shape[1]) and arguments.are_finite(wanted)
-        for i, (controller, query, own_tags, own_bias, own_among, own_penalties, *others) in enumerate(each):
-            try:
-                asked = nothing or Asked(masks[controller.selector][i], own_tags, None, own_bias, own_among, None, own_penalties)
-                own_query = query if are_checked else controller._checked(query)
-                asking.append(controller._ask(dt_s, own_query, asked, *others))
-            except QueryError as error:
-                raise QueryError(*(fault.at(Place(f"character {i}")) for fault in error.faults)) from None
-        answers = self._searched(asking)
-        return [controller._answer(*given) for controller, given in zip(self, answers, strict=True)]
+        facts, places = _each(contexts, n, "context"), _each_place(body, n)
+        if not self._have_width(wanted.shape[1]) or not arguments.are_finite(wanted):
+            for i, controller in enumerate(self):
+                with _of_character(i):
+                    controller._checked(wanted[i])
+        with _of_character(0):
+            seconds = seconds_of(dt_s)
+        if any(each is not None for each in (tags, bias, among, penalties)):
+            for i, controller in enumerate(self):
+                with _of_character(i):
+                    controller.check(asked, i)
+        return update_all(self, seconds, wanted, asked, facts, places)
 
     def _have_width(self, n_features: int) -> bool:
         """Whether queries of so many features fit all databases."""
         selectors = {controller.selector for controller in self}
         return all(database.n_features == n_features for selector in selectors for database in selector.databases.values())
 
-    def _searched(self, asking: Sequence[Asking]) -> list[tuple[Asking, Choice | None, float]]:
-        """What is asked, the selector's choice, None where nothing was to be searched, and the microseconds of its share."""
-        found: list[tuple[Asking, Choice | None, float]] = [(each, None, 0.0) for each in asking]
-        of_selector: dict[Selector, list[int]] = {}
-        for i, controller in enumerate(self):
-            if asking[i].wanted is not None:
-                of_selector.setdefault(controller.selector, []).append(i)
-        for selector, numbers in of_selector.items():
-            began_s = self[numbers[0]]._now_s()
-            wanted = [asking[i].wanted for i in numbers]
-            choices = selector.search_each(
-                np.array([asking[i].query for i in numbers]), [each for each in wanted if each is not None]
-            )
-            each_us = (self[numbers[0]]._now_s() - began_s) * 1e6 / len(numbers)
-            for i, choice in zip(numbers, choices, strict=True):
-                found[i] = asking[i], choice, each_us
-        return found
+
+@contextmanager
+def _of_character(i: int) -> Iterator[None]:
+    """Say which character an error is of."""
+    try:
+        yield
+    except QueryError as error:
+        raise QueryError(*(fault.at(Place(f"character {i}")) for fault in error.faults)) from None
 
 
-def _each(given: object, n: int, what: str) -> Sequence[object]:
+def _each(given: object, n: int, what: str) -> Sequence[Any]:
     """Lists are of one for each, everything else is for all."""
     return each_of(given, n, what, is_one=not isinstance(given, (list, tuple)))
 
 
-def _each_among(among: object, n: int) -> Sequence[object]:
+def _each_among(among: object, n: int) -> Sequence[Any]:
     """Names are for all, lists of names and many answers of a table one for each."""
-    is_for_each = hasattr(among, "lists") or (
-        isinstance(among, (list, tuple)) and not hasattr(among, "assets") and not all(isinstance(name, str) for name in among)
-    )
+    is_for_each = are_answers(among) or (isinstance(among, (list, tuple)) and not all(isinstance(name, str) for name in among))
     return each_of(among, n, "choice of databases", is_one=not is_for_each)
 
 

@@ -1,4 +1,4 @@
-"""Where a controller is: all that its next decision depends on beside what it is then asked. Small, frozen, to be kept and put
+"""Where a controller is: all that its next decision depends on beside what it is then asked. Small, frozen, to be stored and put
 back, as rollback over a network does."""
 
 from __future__ import annotations
@@ -7,7 +7,17 @@ from dataclasses import dataclass
 
 from contextdb.motion.records import quickly_made
 from contextdb.motion.selection.decision import Playing
-from contextdb.motion.selection.history import Played
+
+
+@quickly_made
+@dataclass(frozen=True, slots=True)
+class Played:
+    """Frames [start, stop) of a database, and the moment at which they were played; of permutations those of the first."""
+
+    database: str
+    start: int
+    stop: int
+    time_s: float
 
 
 @quickly_made

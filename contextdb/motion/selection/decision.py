@@ -111,7 +111,7 @@ class Decision:
     playing, before : Playing or None
         What plays after the update; and what would play without a search: what played before, moved on.
     cost : float or None
-        Of the chosen frame, its biases in it; None without a search, or when nothing was found.
+        Of the chosen frame, its biases in it; None without a search, or where the search had no result.
     continuing_cost : float or None
         Of the frame that would play on, the continuing bias in it; None without a search, or when nothing may play on.
     choice : Choice or None
@@ -119,9 +119,9 @@ class Decision:
     context : mapping of str to object, or None
         The facts of the moment, as they were given.
     query : float64 array, shape (F,), or None
-        What was asked for.
+        What was requested.
     candidates : sequence of (database name, Candidates)
-        Of the databases that were searched, worked out when they are first asked for; empty unless the recorder asks for them.
+        Of the databases that were searched, worked out when they are first requested; empty unless the recorder asks for them.
     search_us : float or None
         Microseconds that searching took; None without a search, or without a clock.
     root_motion : RootMotion
@@ -137,9 +137,9 @@ class Decision:
         Seconds of the clip that pass in a second, from here to the next update.
     filters : tuple of (database name, Filter)
         What could be chosen from in each database that was, or could have been, searched; empty without a search, and where no
-        candidates are asked for.
+        candidates are requested.
     inputs : Inputs or None
-        What else the update was given; None where no candidates are asked for.
+        What else the update was given; None where no candidates are requested.
     together : Together or None
         Where a clip of several characters is entered: who plays it, and what each role costs.
     """
@@ -166,6 +166,29 @@ class Decision:
     filters: tuple[tuple[str, Filter], ...] = field(default=(), compare=False, repr=False)
     inputs: Inputs | None = field(default=None, compare=False, repr=False)
     together: Together | None = None
+
+
+class Feed(Protocol):
+    """Where a watcher puts decisions."""
+
+    is_open: bool
+    """Whether somebody listens."""
+
+
+class Watcher(Protocol):
+    """The link of a running game that watches a controller."""
+
+    @property
+    def feed(self) -> Feed: ...
+
+    @property
+    def n_candidates(self) -> int:
+        """As for a recorder."""
+        ...
+
+    def decided(self, decision: Decision) -> None:
+        """Take one decision, while the feed is open."""
+        ...
 
 
 class Recorder(Protocol):

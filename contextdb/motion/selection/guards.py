@@ -17,9 +17,6 @@ from __future__ import annotations
 
 from enum import StrEnum
 
-from contextdb.motion.selection.controller_settings import ControllerSettings
-from contextdb.motion.selection.ongoing import Ongoing
-
 
 class Held(StrEnum):
     """Which guard let an asset play on, as `Decision.held` tells it."""
@@ -31,14 +28,6 @@ class Held(StrEnum):
     HYSTERESIS = "hysteresis"
 
     @property
-    def told(self) -> str:
+    def sentence(self) -> str:
         """What lets it play on without a search, in words."""
         return "while its NextNaturalOnly span lasts" if self is Held.NEXT_NATURAL else "to its natural end"
-
-
-def held_without_search(ongoing: Ongoing, settings: ControllerSettings) -> Held:
-    """Which guard lets an asset that is not valid play on, whatever else there is."""
-    head, move = ongoing.head, ongoing.move
-    if head.database.marks.is_next_natural(move.frame) and not move.n_loops:
-        return Held.NEXT_NATURAL
-    return Held.UNTIL_NATURAL if settings.until_natural and not head.is_looping else Held.NOTHING

@@ -27,24 +27,25 @@ from numpy.typing import ArrayLike
 from contextdb.cells.arguments import require_kind, require_many_of, require_text
 from contextdb.errors import Fault, MotionError, QueryError, in_quotes, mend_for, some
 from contextdb.motion import arguments
+from contextdb.motion.answers import is_answer
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.markup.left_out import Skip
 from contextdb.motion.search.candidates import Candidates
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.hit import NOTHING, Hit
-from contextdb.motion.selection.asked import (
+from contextdb.motion.selection.choice import Choice, Reason, Search, Status
+from contextdb.motion.selection.search_options import (
     Among,
-    Asked,
     Current,
     OfPenalties,
     OfTags,
     OfValid,
     OfValidForMany,
     Options,
+    SearchOptions,
     each_of,
     valid_of_each,
 )
-from contextdb.motion.selection.choice import Choice, Reason, Search, Status
 
 __all__ = ["Choice", "Entry", "Reason", "Search", "Selector", "Status"]
 
@@ -93,6 +94,11 @@ class Selector:
         known = (tag for database in loaded.values() for tag in database.marks.tags)
         self.tags: tuple[str, ...] = tuple(dict.fromkeys((*known, *tags)))
         self._databases = {name: with_tags(database, self.tags) for name, database in loaded.items()}
+        self.choosers: dict[object, object] = {}
+        """What the core was told of it, with the settings of controllers."""
+
+    def __reduce__(self) -> tuple[type[Selector], tuple[object, ...]]:
+        return Selector, (self.entries, self.tags)
 
     def __repr__(self) -> str:
         return f"<Selector: {some(self.names)}>"
@@ -104,7 +110,7 @@ class Selector:
 
     def with_database(self, name: str, database: MotionDatabase | None) -> Selector:
         """The same selector with one database loaded, exchanged or, with None, dropped; tags once known stay known."""
-        self._check_names([name])
+        self.check_names([name])
         return Selector([Entry(e.name, database, e.threshold) if e.name == name else e for e in self.entries], self.tags)
 
     def search(
@@ -144,10 +150,10 @@ class Selector:
         QueryError
             A database that the selector lacks, with the nearest that it has; or what a database cannot be searched with.
         """
-        asked = Asked(valid, tags, current, bias, among, skip, penalties)
+        inputs = SearchOptions(valid, tags, current, bias, among, skip, penalties)
         among = self.among(among)
         hits: dict[str, Hit] = {}
-        for entry, database, given in self._searched(asked):
+        for entry, database, given in self._searched(inputs):
             hits[entry.name] = hit = database.search(query, **given)
             if entry.threshold is not None and hit.cost < entry.threshold:
                 return choice_of(self.entries, hits, among, entry.name)
@@ -188,23 +194,23 @@ class Selector:
             raise QueryError(Fault(f"the queries have shape {wanted.shape}.", "queries x features"))
         playing = each_of(current, len(wanted), "current frame", is_one=current is None)
         masks = valid_of_each(self.databases, valid, len(wanted))
-        asked = [Asked(mask, tags, now, None, among, None, penalties) for mask, now in zip(masks, playing, strict=True)]
-        return self.search_each(wanted, asked)
+        inputs = [SearchOptions(mask, tags, now, None, among, None, penalties) for mask, now in zip(masks, playing, strict=True)]
+        return self.search_each(wanted, inputs)
 
-    def search_each(self, queries: Floats, asked: Sequence[Asked]) -> list[Choice]:
+    def search_each(self, queries: Floats, inputs: Sequence[SearchOptions]) -> list[Choice]:
         """Choose for many characters at once, each with parameters of `search` of its own; queries [Q, F]."""
-        for each in asked:
-            self._check_names(each.databases())
-        among = [self.among(each.among) for each in asked]
-        hits: list[dict[str, Hit]] = [{} for _ in asked]
-        stopped: list[str | None] = [None for _ in asked]
+        for each in inputs:
+            self.check_names(each.databases())
+        among = [self.among(each.among) for each in inputs]
+        hits: list[dict[str, Hit]] = [{} for _ in inputs]
+        stopped: list[str | None] = [None for _ in inputs]
         for entry in self.entries:
             database = self.databases.get(entry.name)
             numbers = [i for i, names in enumerate(among) if entry.name in names and stopped[i] is None]
             if database is None or not numbers:
                 continue
-            found = database.search_each(queries[numbers], [asked[i].of(entry.name) for i in numbers])
-            for i, hit in zip(numbers, found, strict=True):
+            own_hits = database.search_each(queries[numbers], [inputs[i].of(entry.name) for i in numbers])
+            for i, hit in zip(numbers, own_hits, strict=True):
                 hits[i][entry.name] = hit
                 if entry.threshold is not None and hit.cost < entry.threshold:
                     stopped[i] = entry.name
@@ -217,20 +223,20 @@ class Selector:
 
         `options` are the parameters of `search`, by name; `left_out` is that of `MotionDatabase.candidates`.
         """
-        found: list[tuple[str, Candidates]] = []
-        for entry, database, given in self._searched(Asked(**options)):
-            found.append((entry.name, database.candidates(query, k, **given, left_out=left_out)))
+        candidates: list[tuple[str, Candidates]] = []
+        for entry, database, given in self._searched(SearchOptions(**options)):
+            candidates.append((entry.name, database.candidates(query, k, **given, left_out=left_out)))
             if entry.threshold is not None and database.search(query, **given).cost < entry.threshold:
                 break
-        return tuple(found)
+        return tuple(candidates)
 
     def best_of_ranges(self, name: str, query: ArrayLike, within: float, **options: Unpack[Options]) -> list[Hit]:
         """The best frame of each range of one database that costs at most `within` more than the best of it, cheapest first.
 
         `options` are the parameters of `search`, by name. Empty for a database that a search with these passes over.
         """
-        self._check_names([name])
-        for entry, database, given in self._searched(Asked(**options)):
+        self.check_names([name])
+        for entry, database, given in self._searched(SearchOptions(**options)):
             if entry.name == name:
                 return database.best_of_ranges(query, within, **given)
         return []
@@ -239,29 +245,29 @@ class Selector:
         """The names of the databases that some names, or the assets of some Matches, stand for: of all for None."""
         if among is None:
             return self._all
-        assets = getattr(among, "assets", None)
-        if assets is not None:
-            return frozenset(assets).intersection(self.names)
+        if is_answer(among):
+            return frozenset(among.assets).intersection(self.names)
         if not isinstance(among, Collection):
             raise QueryError(Fault(f"the databases of the moment are {among!r}.", some(self.names)))
         names = [among] if isinstance(among, str) else list(among)
-        self._check_names(names)
+        self.check_names(names)
         return frozenset(names)
 
-    def _searched(self, asked: Asked) -> Iterator[tuple[Entry, MotionDatabase, dict[str, Any]]]:
+    def _searched(self, inputs: SearchOptions) -> Iterator[tuple[Entry, MotionDatabase, dict[str, Any]]]:
         """The databases that may be searched, in order, each with what it is given."""
-        self._check_names(asked.databases())
-        among = self.among(asked.among)
+        self.check_names(inputs.databases())
+        among = self.among(inputs.among)
         for entry in self.entries:
             database = self.databases.get(entry.name)
             if database is not None and entry.name in among:
-                yield entry, database, asked.of(entry.name)
+                yield entry, database, inputs.of(entry.name)
 
-    def _check_names(self, names: Iterable[str]) -> None:
+    def check_names(self, names: Iterable[str]) -> None:
+        """Raise QueryError for a database that the selector lacks, with the nearest that it has."""
         for name in names:
             if not isinstance(name, str) or name not in self.names:
-                found = f"the selector has no database {in_quotes(str(name))}."
-                raise QueryError(Fault(found, some(self.names), mend_for(str(name), self.names)))
+                problem = f"the selector has no database {in_quotes(str(name))}."
+                raise QueryError(Fault(problem, some(self.names), mend_for(str(name), self.names)))
 
 
 def choice_of(entries: Sequence[Entry], hits: Mapping[str, Hit], among: frozenset[str], stopped: str | None) -> Choice:
@@ -302,10 +308,10 @@ def _check_entries(entries: Sequence[Entry]) -> None:
     for name, database in loaded[1:]:
         first, other = loaded[0]
         if (database.channel_names, database.n_features) != (other.channel_names, other.n_features):
-            found = (
+            problem = (
                 f"the databases {in_quotes(first)} and {in_quotes(name)} have different channels: their costs cannot be compared."
             )
-            raise MotionError(Fault(found, "databases of one schema"))
+            raise MotionError(Fault(problem, "databases of one schema"))
 
 
 # ---- databases that know each other's tags, so that one tag filter can be asked of all

@@ -8,31 +8,23 @@ Source: "RandomVariation" in the settings of EA's diagnostics; reproducible, bec
 
 from __future__ import annotations
 
-import math
 import random
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from numbers import Real
 from typing import TypeAlias
 
 import numpy as np
 
-from contextdb.errors import Fault, MotionError
+from contextdb.errors import MotionError
+from contextdb.files.settings import Declared, number
 from contextdb.motion.search.hit import Hit
 
 Rng: TypeAlias = random.Random | np.random.Generator
 
 
 @dataclass(frozen=True, slots=True)
-class Variation:
+class Variation(Declared, error=MotionError):
     """How a frame is chosen among near ties.
-
-    Attributes
-    ----------
-    within : float
-        So much more than the best a frame may cost.
-    memory : int
-        None of the assets chosen at the last so many changes is chosen again while another one is near enough.
 
     Raises
     ------
@@ -40,14 +32,12 @@ class Variation:
         `within` is not a finite number of 0 or more, or `memory` no whole one.
     """
 
-    within: float
-    memory: int = 1
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.within, Real) or not (math.isfinite(self.within) and self.within >= 0.0):
-            raise MotionError(Fault(f"variation within {self.within!r} of the best cost.", "a cost, 0 or more, such as 0.005"))
-        if not isinstance(self.memory, int) or self.memory < 0:
-            raise MotionError(Fault(f"variation with a memory of {self.memory!r}.", "a whole number of assets, 0 or more"))
+    within: float = number(
+        "Frames that cost at most so much more than the best are as good as it.", least=0.0, unit="a cost", such_as=0.05
+    )
+    memory: int = number(
+        "None of the last so many assets is chosen while another is as good.", 1, 0, 1000, "a whole number", 2, is_whole=True
+    )
 
     def choose(self, ties: Sequence[Hit], recent: Collection[str], rng: Rng) -> Hit:
         """One of some near ties, each equally likely; of the assets played recently only when there is no other."""

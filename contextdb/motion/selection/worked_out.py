@@ -1,4 +1,4 @@
-"""The candidates of a decision, worked out when they are first asked for: what a recorder keeps costs next to nothing.
+"""The candidates of a decision, worked out when they are first requested: what a recorder keeps costs next to nothing.
 
 With the databases that were searched, the query and the filters the costs are to the last bit those of the search.
 """
@@ -35,10 +35,10 @@ class WorkedOut(Sequence[Named]):
         self._filters = filters
 
     @cached_property
-    def _found(self) -> tuple[Named, ...]:
-        found = ((name, self.databases[name], chosen) for name, chosen in of_searched(self._filters, self._choice))
+    def _pairs(self) -> tuple[Named, ...]:
+        searched = ((name, self.databases[name], chosen) for name, chosen in of_searched(self._filters, self._choice))
         return tuple(
-            (name, candidates.with_left_out(each, each.normalised(self._query), chosen, self._k)) for name, each, chosen in found
+            (name, candidates.with_left_out(each, each.normalised(self._query), chosen, self._k)) for name, each, chosen in searched
         )
 
     @overload
@@ -46,21 +46,21 @@ class WorkedOut(Sequence[Named]):
     @overload
     def __getitem__(self, index: slice) -> tuple[Named, ...]: ...
     def __getitem__(self, index: int | slice) -> Named | tuple[Named, ...]:
-        return self._found[index]
+        return self._pairs[index]
 
     def __len__(self) -> int:
         return len(of_searched(self._filters, self._choice))
 
     def __iter__(self) -> Iterator[Named]:
-        return iter(self._found)
+        return iter(self._pairs)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Sequence) and self._found == tuple(other)
+        return isinstance(other, Sequence) and self._pairs == tuple(other)
 
     __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:
-        return repr(self._found)
+        return repr(self._pairs)
 
 
 def of_searched(filters: Sequence[tuple[str, Filter]], choice: Choice) -> list[tuple[str, Filter]]:

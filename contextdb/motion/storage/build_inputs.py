@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from contextdb.disk import read_bytes
+from contextdb.disk.boundary import inside
 from contextdb.errors import ClipError, ContextDBError, Fault, FileError, MotionError, Place, plural
 from contextdb.motion.features.schema_dict import schema_to_dict
 from contextdb.motion.markup.markup import Markup
@@ -51,8 +51,8 @@ class Inputs:
 
         A database of which something is wrong has no files.
         """
-        asked = config.databases if names is None else [config.database(name).name for name in names]
-        wanted = [name for name in config.databases if name in asked]
+        queried = config.databases if names is None else [config.database(name).name for name in names]
+        wanted = [name for name in config.databases if name in queried]
         schemas = {config.databases[name].features for name in wanted}
         collected = Faults() if faults is None else faults
         files, markups = {}, {}
@@ -60,15 +60,15 @@ class Inputs:
             if settings.features in schemas:
                 with collected.of(name):
                     if settings.markup is not None:
-                        markups[name] = Markup.load(root / settings.markup)
+                        markups[name] = Markup.load(inside(root / settings.markup, root))
                 with collected.of(name):
-                    found = assets.get(settings.table or "")
+                    own_files = assets.get(settings.table or "")
                     schema = config.features[settings.features]
-                    files[name] = clip_files(settings, schema, root, found, config.file, markups.get(name))
+                    files[name] = clip_files(settings, schema, root, own_files, config.file, markups.get(name))
         if faults is None:
             collected.tell()
         unmarked = {name for name in files if config.databases[name].markup is not None and name not in markups}
-        files = {name: found for name, found in files.items() if name not in unmarked}
+        files = {name: own_files for name, own_files in files.items() if name not in unmarked}
         return cls(config, root, [name for name in wanted if name in files], files, markups)
 
     @property
@@ -79,14 +79,14 @@ class Inputs:
     def keys(self, collected: Faults | None = None) -> Keys:
         """The keys of all clips, from the contents of their files."""
         faults = Faults() if collected is None else collected
-        found: dict[str, list[list[str]]] = {name: [] for name in self.files}
+        keys: dict[str, list[list[str]]] = {name: [] for name in self.files}
         for name, files in self.files.items():
             for file in files:
                 with faults.of(name):
-                    found[name].append(file.keys(read_bytes(file.path)))
+                    keys[name].append(file.keys(file.source()))
         if collected is None:
             faults.tell()
-        return found
+        return keys
 
     def digests(self, keys: Keys) -> dict[str, str]:
         """The digest of each wanted database, from the keys of all clips; empty where a schema has functions."""
@@ -109,7 +109,7 @@ class Inputs:
         return hashlib.blake2b(json.dumps(about, sort_keys=True).encode(), digest_size=16).hexdigest()
 
 
-def told_once(faults: Iterable[Fault]) -> list[Fault]:
+def distinct_faults(faults: Iterable[Fault]) -> list[Fault]:
     """The faults; one that all clips of a rig share is reported for the first, with how many others have it. Each once."""
     clips: dict[Fault, list[Place]] = {}
     for fault in dict.fromkeys(faults):  # a clip may be in several databases
@@ -152,6 +152,6 @@ class Faults:
         """Raise what was collected, if anything."""
         if not self.errors:
             return
-        faults = told_once(fault for error in self.errors for fault in error.faults)
+        faults = distinct_faults(fault for error in self.errors for fault in error.faults)
         kinds = {type(error) for error in self.errors}
         raise (kinds.pop() if len(kinds) == 1 else ClipError if ClipError in kinds else MotionError)(*faults)

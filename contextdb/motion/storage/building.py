@@ -14,7 +14,8 @@ from os import PathLike
 from pathlib import Path
 
 from contextdb.cells.arguments import require_kind, require_many, require_mapping, require_path, require_text
-from contextdb.disk import matching
+from contextdb.disk import matching, real_path
+from contextdb.disk.boundary import inside
 from contextdb.errors import ArtefactError, Fault, FileError, MotionError, Place, in_quotes, plural, some
 from contextdb.motion.clips.doubts import ClipFinding, doubts
 from contextdb.motion.features.normalisation import Normalisation
@@ -92,7 +93,7 @@ def build(
     names : collection of str, optional
         Which databases to give. Default: all.
     cache : path, optional
-        The folder of the cache; a relative one lies in `folder`. None: nothing is kept.
+        The folder of the cache; a relative one lies in `folder`. None: nothing is stored.
 
     Raises
     ------
@@ -122,14 +123,14 @@ def build_all(
     Raises what `build` raises.
     """
     root = checked(config, folder, assets, names)
-    kept = None if cache is None else FeatureCache(root / require_path(cache, "cache"))
+    feature_cache = None if cache is None else FeatureCache(_cache_folder(root, require_path(cache, "cache")))
     faults, built = Faults(tolerates), {}
     inputs = Inputs.of(config, root, assets or {}, names, faults)
-    extracted = _extract_all(inputs.files, kept, progress, faults)
+    extracted = _extract_all(inputs.files, feature_cache, progress, faults)
     faults.tell()
     had_clips = {name: bool(files) for name, files in inputs.files.items()}
-    inputs = replace(inputs, files={name: [each.file for each in found] for name, found in extracted.items()})
-    digests = inputs.digests({name: [each.keys for each in found] for name, found in extracted.items()})
+    inputs = replace(inputs, files={name: [each.file for each in parts] for name, parts in extracted.items()})
+    digests = inputs.digests({name: [each.keys for each in parts] for name, parts in extracted.items()})
     shared = {schema: _shared_normalisation(config, schema, extracted) for schema in inputs.schemas}
     for name in inputs.wanted:
         if had_clips[name] and not extracted[name]:
@@ -137,8 +138,8 @@ def build_all(
         with faults.of(name):
             built[name] = _built(inputs, name, extracted[name], shared, digests[name])
     faults.tell()
-    if kept is not None:
-        _prune(kept, config, extracted)
+    if feature_cache is not None:
+        _prune(feature_cache, config, extracted)
     return built
 
 
@@ -172,8 +173,10 @@ def open_or_build(
     opened = _opened(config, root, root / (require_path(saved, "saved") if saved else ""), assets or {}, names)
     missing = [name for name, database in opened.items() if database is None]
     built = build_all(config, root, assets, progress, names=missing, cache=cache, tolerates=tolerates) if missing else {}
-    kept = {name: built[name].database if database is None and name in built else database for name, database in opened.items()}
-    return {name: database for name, database in kept.items() if database is not None}
+    databases = {
+        name: built[name].database if database is None and name in built else database for name, database in opened.items()
+    }
+    return {name: database for name, database in databases.items() if database is not None}
 
 
 def _opened(
@@ -181,17 +184,24 @@ def _opened(
 ) -> dict[str, MotionDatabase | None]:
     """The saved databases that are up to date, None for one that is not or of which something is wrong."""
     faults = Faults(lambda name, error: True)
-    asked = config.databases if names is None else [config.database(name).name for name in names]
-    inputs = Inputs.of(config, root, assets, asked, faults)
+    wanted = config.databases if names is None else [config.database(name).name for name in names]
+    inputs = Inputs.of(config, root, assets, wanted, faults)
     keys = inputs.keys(faults)
     whole = {name for name, files in inputs.files.items() if len(keys[name]) == len(files)}
     digests = inputs.digests(keys) if whole == set(inputs.files) else {}
-    return {name: _open(saved_path(saved, name), digests.get(name, "")) for name in config.databases if name in asked}
+    return {name: _open(saved_path(saved, name), digests.get(name, "")) for name in config.databases if name in wanted}
+
+
+def _cache_folder(root: Path, cache: Path) -> Path:
+    """The folder of a cache: our own in a project is no link, while another that somebody names may be one."""
+    return root / cache if cache == Path(CACHE_FOLDER) else real_path(root / cache)
 
 
 def saved_path(folder: Path, name: str) -> Path:
-    """Where a database of a name is saved. Raises ContextError for what is no path and no name."""
-    return require_path(folder, "folder") / file_name(require_text(name, "name"), SAVED_SUFFIX)
+    """Where a database of a name is saved. Raises ContextError for what is no path and no name, FileError where a link there leads
+    out of the folder."""
+    place = require_path(folder, "folder")
+    return inside(place / file_name(require_text(name, "name"), SAVED_SUFFIX), place)
 
 
 def checked(config: object, folder: object, assets: object, names: object) -> Path:
@@ -219,15 +229,15 @@ def _extract_all(
 ) -> dict[str, list[Extracted]]:
     """The features of all clips that can be read."""
     total, done = sum(map(len, files.values())), 0
-    found: dict[str, list[Extracted]] = {name: [] for name in files}
+    extracted: dict[str, list[Extracted]] = {name: [] for name in files}
     for name, listed in files.items():
         for file in listed:
             with faults.of(name):
-                found[name].append(extract(file, cache))
+                extracted[name].append(extract(file, cache))
             done += 1
             if progress is not None:
                 progress(done, total, file.asset)
-    return found
+    return extracted
 
 
 def _shared_normalisation(config: MotionConfig, schema: str, extracted: Mapping[str, list[Extracted]]) -> Normalisation:
@@ -236,10 +246,10 @@ def _shared_normalisation(config: MotionConfig, schema: str, extracted: Mapping[
     return Normalisation.of(blocks, config.features[schema])
 
 
-def _built(inputs: Inputs, name: str, found: list[Extracted], shared: Mapping[str, Normalisation], digest: str) -> Built:
+def _built(inputs: Inputs, name: str, extracted: list[Extracted], shared: Mapping[str, Normalisation], digest: str) -> Built:
     settings, markup = inputs.config.databases[name], inputs.markups.get(name)
     database = MotionDatabase.from_parts(
-        [part for each in found for part in each.parts],
+        [part for each in extracted for part in each.parts],
         inputs.config.features[settings.features],
         normalisation=shared[settings.features],
         markup=markup,
@@ -253,26 +263,26 @@ def _built(inputs: Inputs, name: str, found: list[Extracted], shared: Mapping[st
     return Built(
         database.with_weights(settings.weights) if settings.weights else database,
         digest,
-        tuple(each.file.asset for each in found if each.is_computed),
-        tuple(each.file.asset for each in found if not each.is_computed),
+        tuple(each.file.asset for each in extracted if each.is_computed),
+        tuple(each.file.asset for each in extracted if not each.is_computed),
         () if markup is None else tuple(_markup_faults(inputs, markup, settings, database)),
-        tuple(_mirror_faults(name, found)),
+        tuple(_mirror_faults(name, extracted)),
         tuple(_scale_faults(settings.features, shared[settings.features])),
-        tuple(doubts((each.file.asset, str(each.file.path), each.measures) for each in found)),
+        tuple(doubts((each.file.asset, str(each.file.path), each.measures) for each in extracted)),
     )
 
 
-def _mirror_faults(name: str, found: Sequence[Extracted]) -> Iterator[Fault]:
+def _mirror_faults(name: str, extracted: Sequence[Extracted]) -> Iterator[Fault]:
     """One fault for all clips of a database whose rig has two sides that differ: of the clip in which they do most."""
-    uneven = [each for each in found if each.unevenness]
+    uneven = [each for each in extracted if each.unevenness]
     if uneven:
         worst = max(uneven, key=lambda each: max(each.unevenness.values()))
-        told = ", ".join(f"{in_quotes(bone)} by {metres:.3f} m" for bone, metres in list(worst.unevenness.items())[:MOST_BONES])
+        bones = ", ".join(f"{in_quotes(bone)} by {metres:.3f} m" for bone, metres in list(worst.unevenness.items())[:MOST_BONES])
         more = f" and {len(worst.unevenness) - MOST_BONES} more" if len(worst.unevenness) > MOST_BONES else ""
         differ = f"the two sides of the rig differ in {plural(len(uneven), 'clip')}, most in {in_quotes(worst.file.asset)}"
         so = "So far off are mirrored rotations that are played on the rig; searches are exact."
         accepted = "a rig with equal sides, mirror = false, or to leave it where so little cannot be seen"
-        yield Fault(f"[databases.{name}] mirror: {differ}: {told}{more}. {so}", accepted, rule="uneven-sides")
+        yield Fault(f"[databases.{name}] mirror: {differ}: {bones}{more}. {so}", accepted, rule="uneven-sides")
 
 
 def _scale_faults(schema: str, normalisation: Normalisation) -> Iterator[Fault]:
@@ -297,6 +307,6 @@ def _markup_faults(inputs: Inputs, markup: Markup, settings: DatabaseSettings, d
 
 def _prune(cache: FeatureCache, config: MotionConfig, extracted: Mapping[str, list[Extracted]]) -> None:
     """Forget clips that changed or are gone."""
-    for name, found in extracted.items():
-        cache.prune(name, {key for each in found for key in each.keys})
+    for name, parts in extracted.items():
+        cache.prune(name, {key for each in parts for key in each.keys})
     cache.prune_databases(config.databases)

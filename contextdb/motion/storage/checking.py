@@ -15,10 +15,11 @@ from pathlib import Path
 from contextdb.disk import matching
 from contextdb.errors import ContextDBError, Fault, MotionError, Place, nearest, plural, some
 from contextdb.findings import Finding
-from contextdb.motion.clips.clip import CENTIMETRE, load_bvh
+from contextdb.motion.clips.clip import CENTIMETRE
 from contextdb.motion.clips.doubts import ClipFinding, Measures, doubts, measure
+from contextdb.motion.clips.source import load_clips
 from contextdb.motion.storage import building
-from contextdb.motion.storage.build_inputs import Assets, Faults, Inputs, told_once
+from contextdb.motion.storage.build_inputs import Assets, Faults, Inputs, distinct_faults
 from contextdb.motion.storage.building import Built, Progress
 from contextdb.motion.storage.clip_files import ClipFile, read_clip, unmatched
 from contextdb.motion.storage.config import MotionConfig
@@ -26,7 +27,7 @@ from contextdb.motion.storage.config import MotionConfig
 
 @dataclass(frozen=True, slots=True)
 class MotionFindings:
-    """What was found, and of each database how many clips could be used."""
+    """The findings, and of each database how many clips could be used."""
 
     findings: tuple[Finding, ...]
     n_clips: dict[str, int]
@@ -49,11 +50,11 @@ def check_motion(
 
     built = building.build_all(config, folder, assets, progress, cache=cache, tolerates=takes)
     files = Inputs.of(config, folder, assets, None, Faults(lambda name, error: True)).files
-    found = [Finding.of(fault) for fault in _in_files(told_once(refused), files)]
-    found += _of_clips(built, _left_out(files, built), config)
-    found += _of_settings(config)
-    found += _of_assets(config, folder, assets)
-    return MotionFindings(tuple(found), {name: len(each.computed) + len(each.cached) for name, each in built.items()})
+    findings = [Finding.of(fault) for fault in _in_files(distinct_faults(refused), files)]
+    findings += _of_clips(built, _left_out(files, built), config)
+    findings += _of_settings(config)
+    findings += _of_assets(config, folder, assets)
+    return MotionFindings(tuple(findings), {name: len(each.computed) + len(each.cached) for name, each in built.items()})
 
 
 def check_clips(paths: Sequence[Path], progress: Progress | None = None, metres_per_unit: float = CENTIMETRE) -> MotionFindings:
@@ -61,22 +62,26 @@ def check_clips(paths: Sequence[Path], progress: Progress | None = None, metres_
 
     `metres_per_unit` is what one unit of the files is taken to be.
     """
-    found: list[Finding] = []
+    findings: list[Finding] = []
     rigs: dict[tuple[str, ...], list[tuple[str, str, Measures]]] = {}
     for i, path in enumerate(paths):
         if progress is not None:
             progress(i, len(paths), path.name)
         try:
-            clip = load_bvh(path, metres_per_unit=metres_per_unit)
-            if not clip.n_frames:
+            clips = load_clips([path], metres_per_unit=metres_per_unit)
+            if not all(clip.n_frames for clip in clips):
                 raise MotionError(Fault("the clip has no frame (Frames: 0).", "one frame or more", place=Place(str(path))))
         except ContextDBError as error:
-            found += [Finding.of(fault if fault.place.file else fault.at(Place(str(path)))) for fault in error.faults]
+            findings += [Finding.of(fault if fault.place.file else fault.at(Place(str(path)))) for fault in error.faults]
             continue
-        rigs.setdefault(clip.skeleton.names, []).append((path.stem, str(path), measure(clip)))
+        for clip in clips:
+            rigs.setdefault(clip.skeleton.names, []).append((clip.name, str(path), measure(clip)))
+            findings += [Finding("left-out", "info", note, file=str(path), asset=clip.name) for note in clip.notes]
     for measured in rigs.values():
-        found += [Finding(doubt.rule, "warning", doubt.message, file=doubt.file, asset=doubt.asset) for doubt in doubts(measured)]
-    return MotionFindings(tuple(found), {"": sum(map(len, rigs.values()))})
+        findings += [
+            Finding(doubt.rule, "warning", doubt.message, file=doubt.file, asset=doubt.asset) for doubt in doubts(measured)
+        ]
+    return MotionFindings(tuple(findings), {"": sum(map(len, rigs.values()))})
 
 
 def _in_files(faults: Iterable[Fault], files: Mapping[str, list[ClipFile]]) -> Iterator[Fault]:
@@ -122,11 +127,11 @@ def _of_settings(config: MotionConfig) -> Iterator[Finding]:
         yield _unused(config, f"[output.{name}] there is no controller of this name.", name, config.controllers, "output")
 
 
-def _unused(config: MotionConfig, found: str, name: str, known: Collection[str], section: str) -> Finding:
+def _unused(config: MotionConfig, problem: str, name: str, known: Collection[str], section: str) -> Finding:
     names = sorted(known)
     near = nearest(name, names)
     mend = f"[{section}.{near}]" if near else ""
-    return Finding.of(Fault(found, some(names) or "none: there are none", mend, Place(config.file), "unused-section"), "warning")
+    return Finding.of(Fault(problem, some(names) or "none: there are none", mend, Place(config.file), "unused-section"), "warning")
 
 
 def _of_assets(config: MotionConfig, folder: Path, assets: Assets) -> Iterator[Finding]:
@@ -134,15 +139,15 @@ def _of_assets(config: MotionConfig, folder: Path, assets: Assets) -> Iterator[F
     with_files = [settings for settings in config.databases.values() if _has_pattern(folder, settings.clips)]
     missing, unlisted = unmatched(with_files, folder, {table: list(names) for table, names in assets.items()})
     for table, names in missing.items():
-        told = f"no database has a clip of {plural(len(names), 'asset')}: {some(names)}."
-        yield Finding("no-clip", "warning", told, table=table)
+        problem = f"no database has a clip of {plural(len(names), 'asset')}: {some(names)}."
+        yield Finding("no-clip", "warning", problem, table=table)
     if unlisted:
-        told = f"no table has a row for {plural(len(unlisted), 'clip')}: {some(unlisted)}."
-        yield Finding("no-row", "info", told, file=config.file)
+        problem = f"no table has a row for {plural(len(unlisted), 'clip')}: {some(unlisted)}."
+        yield Finding("no-row", "info", problem, file=config.file)
 
 
 def _has_pattern(folder: Path, clips: str) -> bool:
-    """Whether a pattern can be looked for; one that cannot is refused where files are found."""
+    """Whether a pattern can be looked for; one that cannot is refused where files are listed."""
     try:
         matching(folder, clips)
     except (ValueError, NotImplementedError):

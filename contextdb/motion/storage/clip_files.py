@@ -1,6 +1,6 @@
 """The files of a database's clips, and their features: computed, or from the cache.
 
-A file is read once, and what is computed from it is kept under the digest of just these bytes, so that a file that changes
+A file is read once, and what is computed from it is stored under the digest of just these bytes, so that a file that changes
 meanwhile does no harm. An edge: this touches the disk.
 """
 
@@ -11,14 +11,16 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from contextdb.disk import matching, path_in_quotes, read_bytes
+from contextdb.disk import matching, path_in_quotes
 from contextdb.errors import Fault, MotionError, Place, in_quotes
 from contextdb.files.toml_text import as_toml
-from contextdb.motion.clips import bvh, mirror
-from contextdb.motion.clips import clip as clips
+from contextdb.motion.clips import mirror
+from contextdb.motion.clips.clip import Clip
 from contextdb.motion.clips.doubts import Measures, measure
 from contextdb.motion.clips.feet import NO_MARKS, ContactMarks
+from contextdb.motion.clips.on_the_spot import by_feet
 from contextdb.motion.clips.skeleton import Skeleton
+from contextdb.motion.clips.source import ClipSource, clip_name, takes_of
 from contextdb.motion.features.extraction import ClipFeatures, clip_permutations
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.markup.markup import Markup
@@ -26,6 +28,8 @@ from contextdb.motion.storage.database_settings import DatabaseSettings
 from contextdb.motion.storage.feature_cache import FeatureCache, key_of
 from contextdb.motion.storage.rigs import Rig
 
+ON_THE_SPOT = "feet 2"
+"""The version of the motion that standing feet give: another whenever the same clip would become another."""
 UNEVEN_M = 0.005
 """Sides that differ by more metres are reported."""
 
@@ -41,10 +45,12 @@ class ClipFile:
     contacts: ContactMarks = NO_MARKS
     rig: Rig | None = None
     """What the clip is put on."""
+    take: str = ""
+    """Which one it is of a file with several."""
 
     @property
     def asset(self) -> str:
-        return self.path.stem
+        return clip_name(self.path, self.take)
 
     @property
     def sides(self) -> tuple[bool, ...]:
@@ -56,10 +62,17 @@ class ClipFile:
         """For each range of the clip whether it is mirrored, and which permutation it is."""
         return [(side, i) for side in self.sides for i in range(len(self.schema.permutation_s))]
 
-    def keys(self, content: bytes) -> list[str]:
+    def source(self) -> ClipSource:
+        """The file, read; raises FileError or ClipError."""
+        return ClipSource.of(self.path)
+
+    def keys(self, source: ClipSource) -> list[str]:
         """For each range the key of its features."""
-        unit, up = self.settings.metres_per_unit, self.settings.up
-        key = partial(key_of, content, self.schema, metres_per_unit=unit, up=up, looping=self.is_looping, contacts=self.contacts)
+        unit, up, of = self.settings.metres_per_unit, self.settings.up, source.format
+        reader = "" if of.name == "BVH" else f"{of.name} {of.version} {self.take}"
+        reader += f" {ON_THE_SPOT}" if self.settings.root == "feet" else ""
+        key = partial(key_of, source.content, self.schema, metres_per_unit=unit, up=up, reader=reader)
+        key = partial(key, looping=self.is_looping, contacts=self.contacts)
         rig = "" if self.rig is None else self.rig.digest
         return [key(mirrored=side, permutation=i, rig=rig) for side, i in self.ranges]
 
@@ -89,18 +102,18 @@ def clip_files(
     """The clips of a database in the order of their paths; with `assets` those of these names alone. The markup says which loop,
     and when feet are down. Raises MotionError where no file fits the pattern, or two of the files have one name; `file` is that of
     the settings in messages; FileError or MotionError where the rig cannot be read; see `Rig.of`."""
-    paths = paths_of(settings, folder, file)
-    if not paths:
-        found = f"[databases.{settings.name}] no file matches clips = {as_toml(settings.clips)}."
-        raise MotionError(Fault(found, place=Place(file), rule="file"))
-    wanted = [path for path in paths if assets is None or settings.asset_of(path.stem) in assets]
+    named = named_takes(settings, folder, file)
+    if not named:
+        problem = f"[databases.{settings.name}] no file matches clips = {as_toml(settings.clips)}."
+        raise MotionError(Fault(problem, place=Place(file), rule="file"))
+    wanted = [(name, path, take) for name, path, take in named if assets is None or settings.asset_of(name) in assets]
     faults = list(_twice_named(settings.name, wanted, file))
     if faults:
         raise MotionError(*faults)
-    loops = {path.stem for path in wanted if markup is not None and markup.is_looping(path.stem)}
-    marks = {path.stem: NO_MARKS if markup is None else markup.contacts_of(path.stem) for path in wanted}
+    loops = {name for name, _, _ in wanted if markup is not None and markup.is_looping(name)}
+    marks = {name: NO_MARKS if markup is None else markup.contacts_of(name) for name, _, _ in wanted}
     rig = Rig.of(settings, folder, file)
-    return [ClipFile(path, settings, schema, path.stem in loops, marks[path.stem], rig) for path in wanted]
+    return [ClipFile(path, settings, schema, name in loops, marks[name], rig, take) for name, path, take in wanted]
 
 
 def paths_of(settings: DatabaseSettings, folder: Path, file: str | None = None) -> list[Path]:
@@ -108,8 +121,13 @@ def paths_of(settings: DatabaseSettings, folder: Path, file: str | None = None) 
     try:
         return matching(folder, settings.clips)
     except (ValueError, NotImplementedError):
-        found = f"[databases.{settings.name}] clips = {as_toml(settings.clips)} is not a pattern."
-        raise MotionError(Fault(found, '"clips/*.bvh", "clips/**/*.bvh"', place=Place(file), rule="file")) from None
+        problem = f"[databases.{settings.name}] clips = {as_toml(settings.clips)} is not a pattern."
+        raise MotionError(Fault(problem, '"clips/*.bvh", "clips/**/*.bvh"', place=Place(file), rule="file")) from None
+
+
+def named_takes(settings: DatabaseSettings, folder: Path, file: str | None = None) -> list[tuple[str, Path, str]]:
+    """The clips of a database in the order of their paths: the name of each, its file, and its take in a file with several."""
+    return [(clip_name(path, take), path, take) for path in paths_of(settings, folder, file) for take in takes_of(path) or ("",)]
 
 
 def unmatched(
@@ -120,33 +138,33 @@ def unmatched(
     `assets` gives for a table's name the assets in it. A table that no database names is passed over.
     """
     clips: dict[str, set[str]] = {}
-    found: set[str] = set()
+    matched: set[str] = set()
     held: set[str] = set()
     for settings in databases:
-        names = {settings.asset_of(path.stem) for path in paths_of(settings, folder)}
-        found |= names
+        names = {settings.asset_of(name) for name, _, _ in named_takes(settings, folder)}
+        matched |= names
         if settings.table is not None:
             clips.setdefault(settings.table, set()).update(names)
         held |= names if settings.table is None else names.intersection(assets[settings.table])
     missing = {table: [asset for asset in dict.fromkeys(assets[table]) if asset not in names] for table, names in clips.items()}
-    return {table: names for table, names in missing.items() if names}, sorted(found - held)
+    return {table: names for table, names in missing.items() if names}, sorted(matched - held)
 
 
 def extract(file: ClipFile, cache: FeatureCache | None = None) -> Extracted:
-    """The features of a clip's ranges: from the cache, or computed and then kept in it.
+    """The features of a clip's ranges: from the cache, or computed and then stored in it.
 
-    Nothing is kept of a schema with functions: whether they still are what they were cannot be reported. Raises MotionError or
+    Nothing is stored of a schema with functions: whether they still are what they were cannot be reported. Raises MotionError or
     FileError where the clip cannot be read, has no frame, or lacks a bone of the schema.
     """
-    content = read_bytes(file.path)
-    keys = file.keys(content)
+    source = file.source()
+    keys = file.keys(source)
     cache = None if file.schema.functions else cache
-    kept = [_kept(file, key, side, cache) for key, (side, _) in zip(keys, file.ranges, strict=True)]
-    parts = [part for part in kept if part is not None]
-    if len(parts) == len(kept):
-        unevenness = _unevenness(file, *_rest_of(file, content)) if file.settings.mirror else {}
+    cached = [_cached(file, key, side, cache) for key, (side, _) in zip(keys, file.ranges, strict=True)]
+    parts = [part for part in cached if part is not None]
+    if len(parts) == len(cached):
+        unevenness = _unevenness(file, *_rest_of(file, source)) if file.settings.mirror else {}
         return Extracted(file, [part for part, _ in parts], parts[0][1], keys, is_computed=False, unevenness=unevenness)
-    clip = _parsed(file, content)
+    clip = _parsed(file, source)
     if clip.n_frames == 0:
         accepted = "a clip with at least one frame, and three for its velocities"
         mend = "to export it again, or take it out of the folder"
@@ -164,16 +182,17 @@ def extract(file: ClipFile, cache: FeatureCache | None = None) -> Extracted:
     return Extracted(file, computed, measures, keys, is_computed=True, unevenness=unevenness)
 
 
-def read_clip(file: ClipFile) -> clips.Clip:
+def read_clip(file: ClipFile) -> Clip:
     """The clip itself, on the rig of its database; raises ClipError, MotionError and FileError."""
-    return _parsed(file, read_bytes(file.path))
+    return _parsed(file, file.source())
 
 
-def _rest_of(file: ClipFile, content: bytes) -> tuple[Skeleton, float]:
+def _rest_of(file: ClipFile, source: ClipSource) -> tuple[Skeleton, float]:
     """The skeleton and its unit of a clip whose features are known, so that it could be read."""
     if file.rig is not None:
         return file.rig.skeleton, file.rig.metres_per_unit
-    return bvh.read_skeleton(clips.text_of(content, str(file.path))), file.settings.metres_per_unit
+    clip = _parsed(file, source)
+    return clip.skeleton, clip.metres_per_unit
 
 
 def _unevenness(file: ClipFile, skeleton: Skeleton, metres_per_unit: float) -> dict[str, float]:
@@ -181,22 +200,21 @@ def _unevenness(file: ClipFile, skeleton: Skeleton, metres_per_unit: float) -> d
     return {bone: metres for bone, units in apart.items() if (metres := units * metres_per_unit) > UNEVEN_M}
 
 
-def _kept(file: ClipFile, key: str, is_mirrored: bool, cache: FeatureCache | None) -> tuple[ClipFeatures, Measures] | None:
+def _cached(file: ClipFile, key: str, is_mirrored: bool, cache: FeatureCache | None) -> tuple[ClipFeatures, Measures] | None:
     return None if cache is None else cache.read(file.settings.name, key, file.asset, mirrored=is_mirrored)
 
 
-def _parsed(file: ClipFile, content: bytes) -> clips.Clip:
-    place = str(file.path)
-    text = clips.text_of(content, place)
-    clip = clips.parse_bvh(text, file.asset, file=place, metres_per_unit=file.settings.metres_per_unit, up=file.settings.up)
+def _parsed(file: ClipFile, source: ClipSource) -> Clip:
+    clip = source.clip(file.take, metres_per_unit=file.settings.metres_per_unit, up=file.settings.up)
+    clip = by_feet(clip) if file.settings.root == "feet" else clip
     return clip if file.rig is None or not clip.n_frames else file.rig.clip(clip)
 
 
-def _twice_named(database: str, paths: Sequence[Path], file: str | None) -> Iterator[Fault]:
+def _twice_named(database: str, named: Sequence[tuple[str, Path, str]], file: str | None) -> Iterator[Fault]:
     first: dict[str, Path] = {}
-    for path in paths:
-        other = first.setdefault(path.stem, path)
+    for name, path, _ in named:
+        other = first.setdefault(name, path)
         if other is not path:
             both = f"{path_in_quotes(other)} and {path_in_quotes(path)}"
-            found = f"[databases.{database}] two clips are named {in_quotes(path.stem)}: {both}."
-            yield Fault(found, "a different name for each asset", place=Place(file), rule="duplicate")
+            problem = f"[databases.{database}] two clips are named {in_quotes(name)}: {both}."
+            yield Fault(problem, "a different name for each asset", place=Place(file), rule="duplicate")

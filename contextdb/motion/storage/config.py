@@ -11,8 +11,9 @@ Reading touches no file; only `load_clips` and what builds do.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TypedDict, TypeVar, Unpack
 
@@ -28,10 +29,11 @@ from contextdb.errors import (
     in_quotes,
     mend_for,
     plural,
-    shown,
+    safe_text,
     some,
 )
-from contextdb.files.toml_shapes import Mapped, Section
+from contextdb.files.settings import Section, Setting
+from contextdb.files.toml_shapes import Mapped, between, filled, listed, nothing, one_of
 from contextdb.files.toml_text import as_toml, what
 from contextdb.motion.clips.clip import Clip
 from contextdb.motion.features.schema import CustomFunction, FeatureSchema
@@ -50,8 +52,22 @@ from contextdb.motion.storage.database_settings import DatabaseSettings, read_da
 __all__ = ["DatabaseSettings", "MotionConfig", "SelectorSettings"]
 
 SECTIONS = ("features", "databases", "selectors", "controllers", "output")
-STEP_KEYS = ("database", "threshold")
-MOST_COST = 1e30
+SELECTOR = {
+    "order": Setting(
+        listed('databases in order, such as [{ database = "jog_tired", threshold = 0.1 }, { database = "jog" }]', nothing),
+        "Databases in order.",
+        more="Each wins outright under its `threshold`, a [cost](choosing.md#the-scale-of-costs), and the last has none.",
+    )
+}
+"""The keys of `[selectors.NAME]`."""
+A_THRESHOLD = between("a cost", such_as=0.1)
+STEP = {
+    "database": Setting(filled("the name of a database"), "The name of a database."),
+    "threshold": Setting(
+        A_THRESHOLD, "Under it this database wins outright, before those behind it.", None, without="on the last alone"
+    ),
+}
+"""The keys of one entry of `order`."""
 JOINTLY = "motion.JointSearcher in Python, for databases with roles"
 
 Part = TypeVar("Part")
@@ -96,7 +112,7 @@ class MotionConfig:
         faults: list[Fault] = []
         require_mapping(mapping, "mapping", 'a mapping such as {"features": {...}, "databases": {...}}')
         parts = {section: _named_parts(mapping, section, faults, file) for section in SECTIONS}
-        schemas = dict(_read_schemas(parts["features"], faults, file))
+        schemas = _collected(parts["features"], partial(FeatureSchema.from_dict, file=file), faults)
         databases = {
             settings.name: settings
             for settings in read_databases(parts["databases"], parts["features"], schemas, tables, faults, file)
@@ -104,7 +120,7 @@ class MotionConfig:
         selectors = dict(_read_selectors(parts, faults, file))
         known = read_controllers(parts["controllers"], parts["selectors"], faults, file)
         controllers = {name: (selector, settings) for name, selector, settings in known}
-        output = dict(_read_output(parts["output"], faults, file))
+        output = _collected(parts["output"], lambda name, part: PoseSettings.from_dict(part, name=name, file=file), faults)
         if faults:
             raise SchemaError(*faults)
         return cls(schemas, databases, selectors, controllers, output, file)
@@ -121,27 +137,27 @@ class MotionConfig:
         """
         settings = self.database(name)
         files = clip_files(settings, self.features[settings.features], Path(folder), assets, self.file)
-        found: list[Clip] = []
+        clips: list[Clip] = []
         faults: list[Fault] = []
         for each in files:
             try:
-                found.append(read_clip(each))
+                clips.append(read_clip(each))
             except (MotionError, FileError) as error:
                 faults.extend(error.faults)
         if faults:
             raise ClipError(*faults)
-        return found
+        return clips
 
     def with_functions(self, functions: Mapping[str, CustomFunction]) -> MotionConfig:
         """The same with functions for custom channels, by the names that the channels of any schema give. Raises SchemaError where
         no channel asks for a name."""
-        asked = {name: {channel.function for channel in schema.channels} for name, schema in self.features.items()}
-        every = {function for names in asked.values() for function in names if function is not None}
+        wanted = {name: {channel.function for channel in schema.channels} for name, schema in self.features.items()}
+        every = {function for names in wanted.values() for function in names if function is not None}
         for unknown in (function for function in functions if function not in every):
-            found = f"no channel has function = {in_quotes(unknown)}."
-            raise SchemaError(Fault(found, some(sorted(every)), mend_for(unknown, every), Place(self.file)))
+            problem = f"no channel has function = {in_quotes(unknown)}."
+            raise SchemaError(Fault(problem, some(sorted(every)), mend_for(unknown, every), Place(self.file)))
         given = {
-            name: schema.with_functions({each: functions[each] for each in functions if each in asked[name]})
+            name: schema.with_functions({each: functions[each] for each in functions if each in wanted[name]})
             for name, schema in self.features.items()
         }
         return replace(self, features=given)
@@ -154,8 +170,8 @@ class MotionConfig:
         settings = _known("selectors", name, self.selectors, self.file)
         for database, _ in settings.order:
             if self.databases[database].roles:
-                found = f"[selectors.{name}] has the database {in_quotes(database)} of clips that are cast and chosen together."
-                raise SchemaError(Fault(found, JOINTLY, place=Place(self.file)))
+                problem = f"[selectors.{name}] has the database {in_quotes(database)} of clips that are cast and chosen together."
+                raise SchemaError(Fault(problem, JOINTLY, place=Place(self.file)))
         return Selector([Entry(database, databases.get(database), threshold) for database, threshold in settings.order])
 
     def joint(self, name: str, database: MotionDatabase) -> JointDatabase:
@@ -217,64 +233,51 @@ def _named_parts(mapping: Mapped, section: str, faults: list[Fault], file: str |
         faults.append(Fault(f"{section} is {what(whole)}, not a table.", f"[{section}.NAME] and its keys", place=Place(file)))
     for name, part in parts.items():
         if not isinstance(part, Mapping):
-            found = f"{section}.{name} = {shown(as_toml(part))}: this is {what(part)}, not a table."
+            found = f"{section}.{name} = {safe_text(as_toml(part))}: this is {what(part)}, not a table."
             faults.append(Fault(found, f"[{section}.{name}] and its keys", place=Place(file)))
     return {name: part for name, part in parts.items() if isinstance(part, Mapping)}
 
 
-def _read_schemas(parts: Mapping[str, Mapped], faults: list[Fault], file: str | None) -> Iterator[tuple[str, FeatureSchema]]:
+def _collected(parts: Mapping[str, Mapped], read: Callable[[str, Mapped], Part], faults: list[Fault]) -> dict[str, Part]:
+    """What each part reads as; the faults of those that do not are collected."""
+    values = {}
     for name, part in parts.items():
         try:
-            yield name, FeatureSchema.from_dict(name, part, file=file)
+            values[name] = read(name, part)
         except SchemaError as error:
             faults.extend(error.faults)
-
-
-def _read_output(parts: Mapping[str, Mapped], faults: list[Fault], file: str | None) -> Iterator[tuple[str, PoseSettings]]:
-    for name, part in parts.items():
-        try:
-            yield name, PoseSettings.from_dict(part, name=name, file=file)
-        except SchemaError as error:
-            faults.extend(error.faults)
+    return values
 
 
 def _read_selectors(
     parts: Mapping[str, Mapping[str, Mapped]], faults: list[Fault], file: str | None
 ) -> Iterator[tuple[str, SelectorSettings]]:
-    accepted = 'databases in order, such as [{ database = "jog_tired", threshold = 0.1 }, { database = "jog" }]'
     for name, part in parts["selectors"].items():
-        section = Section(f"[selectors.{name}]", part, ("order",), faults, file)
-        steps = part.get("order") if section.has("order", accepted) else ()
-        if not isinstance(steps, (list, tuple)) or (not steps and "order" in part):
-            section.wrong("order", "this is not a list, or empty", accepted)
-            continue
         n_faults = len(faults)
+        section = Section(f"[selectors.{name}]", part, SELECTOR, faults, file)
+        steps = section.values(SELECTOR).get("order", ())
         order = [_read_step(section, i, step, len(steps), list(parts["databases"])) for i, step in enumerate(steps)]
         _check_once(section, [database for database, _ in order])
         _check_one_schema(section, [database for database, _ in order], parts["databases"])
         if len(faults) == n_faults:
-            yield (
-                name,
-                SelectorSettings(name, tuple((database, threshold) for database, threshold in order if database is not None)),
-            )
+            yield name, SelectorSettings(name, tuple((database, cost) for database, cost in order if database is not None))
 
 
 def _read_step(section: Section, i: int, step: object, n_steps: int, known: list[str]) -> tuple[str | None, float | None]:
     if not isinstance(step, Mapping):
         section.add(
-            f"{section.where} order {i + 1} is {shown(as_toml(step))}: this is {what(step)}, not a table.", '{ database = "jog" }'
+            f"{section.where} order {i + 1} is {safe_text(as_toml(step))}: this is {what(step)}, not a table.",
+            '{ database = "jog" }',
         )
         return None, None
-    part = section.inside(f"order {i + 1}", step, STEP_KEYS)
-    database = part.one_of("database", known, "database") if part.has("database", some(known) or "the name of a database") else None
-    accepted = "a cost, such as 0.1"
-    if "threshold" in step:
-        if i == n_steps - 1:
-            part.wrong("threshold", "nothing follows that it could spare a search", "no threshold on the last database")
-        return database, part.number("threshold", accepted, -MOST_COST, MOST_COST)
-    if i < n_steps - 1:
-        part.has("threshold", f"{accepted}: under it this database wins outright, before those behind it")
-    return database, None
+    part, is_last = section.inside(f"order {i + 1}", step, STEP), i == n_steps - 1
+    values = part.values(STEP, database=one_of(known, "database"))
+    if is_last and "threshold" in step:
+        part.wrong("threshold", "nothing follows that it could spare a search", "no threshold on the last database")
+    elif not is_last and "threshold" not in step:
+        about = STEP["threshold"].about
+        part.add(f'{part.where} has no "threshold".', f"{A_THRESHOLD.accepted}: {about[0].lower()}{about[1:-1]}")
+    return values.get("database"), values.get("threshold")
 
 
 def _check_once(section: Section, databases: list[str | None]) -> None:
@@ -287,7 +290,8 @@ def _check_one_schema(section: Section, databases: list[str | None], parts: Mapp
     """Costs can be compared when they come from one feature schema."""
     schemas = {name: parts[name].get("features") for name in databases if name is not None}
     if len(set(map(as_toml, schemas.values()))) > 1:
-        told = ", ".join(f"{in_quotes(name)} {shown(as_toml(schema))}" for name, schema in schemas.items())
+        schemas_text = ", ".join(f"{in_quotes(name)} {safe_text(as_toml(schema))}" for name, schema in schemas.items())
         section.add(
-            f"{section.where} has databases of different features: {told}.", "one feature schema, so that costs can be compared"
+            f"{section.where} has databases of different features: {schemas_text}.",
+            "one feature schema, so that costs can be compared",
         )

@@ -3,7 +3,7 @@
     FOLDER/DATABASE.features/KEY.safetensors      one clip, as recorded or mirrored, in one permutation: features
                                                   and root, in raw units; its measures in the metadata
 
-The key is a digest of all that the features depend on: the bytes of the BVH file, what the settings say of its unit and axis, the
+The key is a digest of all that the features depend on: the bytes of the file, what the settings say of its unit and axis, the
 channels without their weights, and `EXTRACTION`. An entry is written in one step and checked when it is read; one that is missing,
 broken or of another version is as if it were not there; so is one that another version of numpy made, which may round otherwise.
 So builds may be interrupted, and run next to each other.
@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import re
 from collections.abc import Collection
 from contextlib import suppress
@@ -22,17 +21,25 @@ from pathlib import Path
 
 import numpy as np
 
-from contextdb.disk import write_atomic
+from contextdb.disk.own_files import (
+    has_own,
+    is_own_folder,
+    make_own_folder,
+    own_names,
+    remove_own,
+    remove_own_folder,
+    write_own,
+)
 from contextdb.errors import ArtefactError, FileError
 from contextdb.files.tensors import SUFFIX, FileKind, Tensors, digest_of, read_tensors, to_bytes
-from contextdb.motion.clips.clip import Up
+from contextdb.motion.clips.clip import BY_SIZE, Unit, Up
 from contextdb.motion.clips.doubts import Measures
 from contextdb.motion.clips.feet import NO_MARKS, ContactMarks
 from contextdb.motion.features.extraction import ClipFeatures
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.features.schema_dict import unweighted
 
-EXTRACTION = 5
+EXTRACTION = 6
 """The version of what features are made of a clip: one more whenever the same clip would give other features."""
 
 CLIP_FEATURES = FileKind(
@@ -47,19 +54,20 @@ def key_of(
     content: bytes,
     schema: FeatureSchema,
     *,
-    metres_per_unit: float,
+    metres_per_unit: Unit,
     up: Up,
     mirrored: bool,
     looping: bool,
     contacts: ContactMarks = NO_MARKS,
     permutation: int = 0,
     rig: str = "",
+    reader: str = "",
 ) -> str:
     """The key of a clip's features, from the bytes of its file and all else that they depend on."""
     about = {
         "extraction": EXTRACTION,
         "features": unweighted(schema),
-        "unit": float(metres_per_unit).hex(),
+        "unit": metres_per_unit if metres_per_unit == BY_SIZE else float(metres_per_unit).hex(),
         "up": up,
         "mirrored": mirrored,
         "looping": looping,
@@ -69,6 +77,8 @@ def key_of(
         about["permutation"] = permutation
     if rig:
         about["rig"] = rig
+    if reader:
+        about["reader"] = reader
     digest = hashlib.blake2b(json.dumps(about, sort_keys=True).encode(), digest_size=16)
     digest.update(content)
     return digest.hexdigest()
@@ -76,23 +86,23 @@ def key_of(
 
 @dataclass(frozen=True)
 class FeatureCache:
-    """A folder of features. One that cannot be written is no error: nothing is kept then."""
+    """A folder of features. One that cannot be written is no error: nothing is stored then."""
 
     folder: Path
 
     def read(self, database: str, key: str, asset: str, *, mirrored: bool) -> tuple[ClipFeatures, Measures] | None:
         """The features of a key and the measures of its clip; None when they are missing, or not whole."""
         entry = self._entry(database, key)
-        if not os.path.isfile(entry):  # the error of a missing file would look for the nearest name
-            return None
         try:
+            if not (is_own_folder(self.folder) and has_own(entry)):
+                return None
             tensors, metadata = read_tensors(entry, CLIP_FEATURES)
         except (ArtefactError, FileError, OSError):
             return None
-        said = metadata.get("measures", "")
-        if not said or metadata.get("digest") != _digest(tensors, key, said):
+        text = metadata.get("measures", "")
+        if not text or metadata.get("digest") != _digest(tensors, key, text):
             return None
-        return ClipFeatures(asset, mirrored, tensors["features"], tensors["root"]), Measures.of_json(json.loads(said))
+        return ClipFeatures(asset, mirrored, tensors["features"], tensors["root"]), Measures.of_json(json.loads(text))
 
     def write(self, database: str, key: str, part: ClipFeatures, measures: Measures) -> None:
         """Keep the features of a key, and the measures of its clip.
@@ -101,44 +111,39 @@ class FeatureCache:
         of power spoils is seen when it is read.
         """
         tensors = {"features": part.features, "root": part.root}
-        said = json.dumps(measures.to_json())
-        metadata = CLIP_FEATURES.metadata({"measures": said, "digest": _digest(tensors, key, said)})
+        text = json.dumps(measures.to_json())
+        metadata = CLIP_FEATURES.metadata({"measures": text, "digest": _digest(tensors, key, text)})
         entry = self._entry(database, key)
         with suppress(FileError, OSError, ValueError):  # ValueError: no system can have a file of this name
-            make_cache_folder(self.folder)
-            entry.parent.mkdir(exist_ok=True)
-            write_atomic(entry, to_bytes(tensors, metadata), syncs=False)
+            make_own_folder(self.folder, is_ignored=not is_own_folder(self.folder))  # one that a person made stays as it is
+            make_own_folder(entry.parent, is_ignored=False)
+            write_own(entry, to_bytes(tensors, metadata), syncs=False)
 
     def prune(self, database: str, keys: Collection[str]) -> None:
-        """Remove all that is kept of a database but some keys."""
-        _remove(self.folder / file_name(database, FOLDER_SUFFIX), {key + SUFFIX for key in keys})
+        """Remove all that is stored of a database but some keys."""
+        name = file_name(database, FOLDER_SUFFIX)
+        if name in own_names(self.folder):
+            _remove(self.folder / name, {key + SUFFIX for key in keys})
 
     def prune_databases(self, databases: Collection[str]) -> None:
-        """Remove what is kept of all databases but some."""
-        kept = {file_name(database, FOLDER_SUFFIX).casefold() for database in databases}
+        """Remove what is stored of all databases but some."""
+        retained = {file_name(database, FOLDER_SUFFIX).casefold() for database in databases}
         with suppress(OSError):
-            for folder in sorted(self.folder.iterdir()):
-                if folder.name.casefold() not in kept and folder.name.endswith(FOLDER_SUFFIX):
-                    _remove(folder)
-                    folder.rmdir()
+            for name in own_names(self.folder):
+                if name.casefold() not in retained and name.endswith(FOLDER_SUFFIX):
+                    _remove(self.folder / name)
+                    remove_own_folder(self.folder / name)
 
     def _entry(self, database: str, key: str) -> Path:
         return self.folder / file_name(database, FOLDER_SUFFIX) / (key + SUFFIX)
 
 
-def make_cache_folder(folder: Path) -> None:
-    """Make the folder of a cache, which no version control takes; raises OSError."""
-    if not folder.exists():
-        folder.mkdir(parents=True, exist_ok=True)
-        write_atomic(folder / ".gitignore", b"*\n", syncs=False)
-
-
-def _remove(folder: Path, kept: Collection[str] = ()) -> None:
+def _remove(folder: Path, retained: Collection[str] = ()) -> None:
     """Remove the entries of a folder but some; what is no entry stays."""
     with suppress(OSError):
-        for entry in sorted(folder.iterdir()):
-            if entry.name not in kept and _ENTRY.fullmatch(entry.name):
-                entry.unlink(missing_ok=True)
+        for name in own_names(folder):
+            if name not in retained and _ENTRY.fullmatch(name):
+                remove_own(folder / name)
 
 
 def _digest(tensors: Tensors, key: str, measures: str) -> str:

@@ -33,9 +33,9 @@ def require_gltf() -> None:
     try:
         import pygltflib  # noqa: F401
     except ImportError:
-        found = "poses cannot be written as glTF: pygltflib is not installed."
+        problem = "poses cannot be written as glTF: pygltflib is not installed."
         raise MotionError(
-            Fault(found, ".bvh and .npz, which need nothing more", 'to install it: pip install "contextdb[gltf]"')
+            Fault(problem, ".bvh and .npz, which need nothing more", 'to install it: pip install "contextdb[gltf]"')
         ) from None
 
 

@@ -26,6 +26,7 @@ from pathlib import Path
 from typing import Any
 
 from contextdb.cells.arguments import require_kind, require_path, require_text
+from contextdb.disk.boundary import inside
 from contextdb.errors import ArtefactError, ContextDBError, FileError
 from contextdb.files.tensors import (
     FileKind,
@@ -87,7 +88,7 @@ def open_poses(path: str | PathLike[str], *, verify: bool = False) -> PoseBank:
     read.
     """
     file = require_path(path)
-    tensors, metadata = read_tensors(file, STORED_POSES, writeable=True)  # as built ones are: compiled loops tell the two apart
+    tensors, metadata = read_tensors(file, STORED_POSES, writeable=True)
     with STORED_POSES.reading(file):
         small, large = divided(tensors, LARGE)
         is_whole = digest_of(small, metadata["about"], metadata["inputs"]) == metadata["digest"]
@@ -103,13 +104,15 @@ def open_poses(path: str | PathLike[str], *, verify: bool = False) -> PoseBank:
 
 
 def poses_path(folder: str | PathLike[str], name: str) -> Path:
-    """Where the bank of the database of a name is saved. Raises ContextError for what is no path and no name."""
-    return require_path(folder, "folder") / file_name(require_text(name, "name"), SAVED_SUFFIX)
+    """Where the bank of the database of a name is saved. Raises ContextError for what is no path and no name, FileError where a
+    link there leads out of the folder."""
+    place = require_path(folder, "folder")
+    return inside(place / file_name(require_text(name, "name"), SAVED_SUFFIX), place)
 
 
 def saved_poses(folder: str | PathLike[str], databases: Mapping[str, MotionDatabase]) -> dict[str, PoseBank]:
     """The banks that are saved in a folder and hold the frames of these databases; the others are left out."""
-    found = {}
+    banks = {}
     for name, database in databases.items():
         try:
             bank = open_poses(poses_path(folder, name))
@@ -117,8 +120,8 @@ def saved_poses(folder: str | PathLike[str], databases: Mapping[str, MotionDatab
             continue
         once = slice(None, None, database.n_permutations)
         if bank.assets == database.assets[once] and bank.n_frames == int((database.stops - database.starts)[once].sum()):
-            found[name] = bank
-    return moving_alike(found)
+            banks[name] = bank
+    return moving_alike(banks)
 
 
 def open_or_build_poses(

@@ -14,7 +14,7 @@ Tensors, R ranges, F features, C channels; every number little-endian:
 The metadata hold `contextdb.motion` (the version of this layout), `about` (JSON: schema, channels, biases and what of layout and
 marks is no array), `inputs` (the digest of what the database was built of), `digest` of all but the large arrays, and
 `large_digest` of these. Opening checks `digest`, so that no index leads astray; the large arrays, which hold no index, are read
-when a search needs them, and checked when that is asked for.
+when a search needs them, and checked when that is requested.
 """
 
 from __future__ import annotations
@@ -51,13 +51,12 @@ from contextdb.motion.search.layout import Layout
 
 STORED = FileKind(
     "contextdb.motion",
-    2,
+    3,
     "a motion database of contextdb",
     "a motion database that this version of contextdb built",
     "to build it again with `contextdb motion build`",
-    since="Since layout 2 costs are divided by the sum of weight x features, and scales have a floor.",
 )
-LARGE = ("layout.blocks", "layout.lows", "layout.highs", "root")
+LARGE = ("layout.blocks", "root")
 """What grows with frames times features, and holds no index."""
 
 Part = TypeVar("Part", Layout, Marks)
@@ -127,7 +126,7 @@ def open_database(path: str | PathLike[str], *, verify: bool = False) -> MotionD
     `save_database` does, and not written into.
     """
     file = require_path(path)
-    tensors, metadata = read_tensors(file, STORED, writeable=True)  # as built ones are: the compiled search tells the two apart
+    tensors, metadata = read_tensors(file, STORED, writeable=True)  # as built ones are
     with STORED.reading(file):
         small, large = divided(tensors, LARGE)
         expected = digest_of(small, metadata["about"], metadata["inputs"], _shapes(large))
@@ -174,8 +173,8 @@ def _schema_to_json(schema: FeatureSchema) -> dict[str, object]:
     try:
         FeatureSchema.from_dict(schema.name, keys)
     except SchemaError as error:
-        found = f"the schema {in_quotes(schema.name)} cannot be saved: {error.faults[0].found}"
-        raise MotionError(Fault(found, "a schema that contextdb.toml could hold")) from error
+        problem = f"the schema {in_quotes(schema.name)} cannot be saved: {error.faults[0].found}"
+        raise MotionError(Fault(problem, "a schema that contextdb.toml could hold")) from error
     return {"name": schema.name, "keys": keys}
 
 

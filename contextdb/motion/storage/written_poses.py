@@ -131,6 +131,6 @@ def checked_pose_arrays(given: Mapping[str, NDArray[Any]], file: str = "") -> di
     return arrays
 
 
-def _refused(found: str, file: str) -> ArtefactError:
+def _refused(problem: str, file: str) -> ArtefactError:
     accepted = "poses that `contextdb motion run --poses FILE.npz` wrote"
-    return ArtefactError(Fault(found, accepted, "to write them again", Place(file or None), "bad-artefact"))
+    return ArtefactError(Fault(problem, accepted, "to write them again", Place(file or None), "bad-artefact"))

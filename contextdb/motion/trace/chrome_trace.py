@@ -19,8 +19,9 @@ Event = dict[str, object]
 
 
 def chrome_trace(decisions: Iterable[Decision]) -> dict[str, object]:
-    found = list(decisions)
-    events = [*_names(), *_slices(found), *(event for each in found for event in _events(each))]
+    """The session as a document of the Trace Event Format, which trace viewers read."""
+    recorded = list(decisions)
+    events = [*_names(), *_slices(recorded), *(event for each in recorded for event in _events(each))]
     return {"format": 1, "displayTimeUnit": "ms", "traceEvents": events}
 
 
@@ -57,9 +58,9 @@ def _slices(decisions: Sequence[Decision]) -> Iterator[Event]:
 def _events(decision: Decision) -> Iterator[Event]:
     at = {"ts": _us(decision.time_s)}
     costs = {"cost": decision.cost, "playing on": decision.continuing_cost}
-    told = {name: cost for name, cost in costs.items() if cost is not None and math.isfinite(cost)}
-    if told:
-        yield {"ph": "C", "name": "cost", **at, "pid": 1, "args": told}
+    finite = {name: cost for name, cost in costs.items() if cost is not None and math.isfinite(cost)}
+    if finite:
+        yield {"ph": "C", "name": "cost", **at, "pid": 1, "args": finite}
     if decision.searched and decision.search_us is not None:
         dur = max(1, round(decision.search_us))
         yield {"ph": "X", "name": "search", "cat": "search", **at, "dur": dur, **_on(SEARCHES), "args": {"why": decision.why}}

@@ -25,7 +25,7 @@ SMALLEST = 5e-7
 
 
 class View(StrEnum):
-    """Which costs of a candidate are shown next to its total."""
+    """Which costs of a candidate are displayed next to its total."""
 
     ALL = "all"
     SUMMARY = "summary"
@@ -124,4 +124,5 @@ def cost_text(cost: float | None) -> str:
 
 
 def seconds(time_s: float | None) -> str:
+    """A time with two decimals; empty for None."""
     return "" if time_s is None else f"{time_s:.2f}"

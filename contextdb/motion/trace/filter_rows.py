@@ -1,7 +1,7 @@
 """The filters of searches as rows of a recorded session, and back: with the query and the database they give every cost again.
 
-A filter is a few numbers for each range and each kind of frames, so that it is small. What a caller gives for each frame is kept as
-runs: where the value changes, and the values between. Format 1 had a value for each frame and no runs.
+A filter is only a few numbers for each range and each kind of frames. What a caller gives for each frame is stored as runs: where
+the value changes, and the values between.
 """
 
 from __future__ import annotations
@@ -21,11 +21,10 @@ if TYPE_CHECKING:
     from polars import DataType as PolarsType
 
 Row = dict[str, Any]
-RUNS = ("frame_runs", "bias_runs")
-"""The fields that format 1 lacks: the frame behind each run of flags, and of biases."""
 
 
 def filter_type() -> PolarsType:
+    """The polars type of the column of filters."""
     import polars as pl
 
     flags, numbers = pl.List(pl.Boolean()), pl.List(pl.Float64())
@@ -41,12 +40,13 @@ def filter_type() -> PolarsType:
         "skips": pl.List(skip),
         "current": pl.Int64(),
         "continuing": pl.Float64(),
-        **{name: pl.List(pl.Int64()) for name in RUNS},
+        **dict.fromkeys(("frame_runs", "bias_runs"), pl.List(pl.Int64())),
     }
     return pl.List(pl.Struct(fields))
 
 
 def filter_row(database: str, chosen: Filter) -> Row:
+    """The filter of the search of a database, as a row."""
     (frame_runs, frames), (bias_runs, biases) = _runs(chosen.frames), _runs(np.asarray(chosen.frame_biases, np.float64))
     return {
         "database": database,
@@ -71,10 +71,9 @@ def _runs(values: NDArray[Any]) -> tuple[list[int], list[Any]]:
     return ends.tolist(), values[ends - 1].tolist()
 
 
-def _unrolled(values: list[Any], runs: list[int] | None, dtype: type[np.generic]) -> NDArray[Any]:
-    """A value for each frame, from runs or, in format 1, from such values."""
-    found = np.array(values, dtype)
-    return found if not runs else np.repeat(found, np.diff(runs, prepend=0))
+def _unrolled(values: list[Any], runs: list[int], dtype: type[np.generic]) -> NDArray[Any]:
+    """A value for each frame, from runs."""
+    return np.repeat(np.array(values, dtype), np.diff([0, *runs]))
 
 
 def filter_of(row: Row) -> Filter:
@@ -85,7 +84,6 @@ def filter_of(row: Row) -> Filter:
         ranges=ranges,
         is_whole=bool(ranges.all()),
         range_biases=biases,
-        least_of_ranges=float(biases.min(initial=np.inf)),
         kinds=Kinds(
             np.array(kinds["allowed"], np.bool_),
             np.array(kinds["biases"], np.float64),
@@ -123,5 +121,5 @@ def markup_digest(database: MotionDatabase) -> str:
 
 
 def is_recorded(about: Mapping[str, Any], database: MotionDatabase) -> bool:
-    """Whether a database is the one that a session was recorded with; sessions of format 1 have no digest of the markup."""
-    return about.get("digest") == fingerprint(database) and about.get("markup") in (None, markup_digest(database))
+    """Whether a database is the one that a session was recorded with."""
+    return about.get("digest") == fingerprint(database) and about.get("markup") == markup_digest(database)

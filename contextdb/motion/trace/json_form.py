@@ -25,23 +25,23 @@ Events = Mapping[tuple[str, int], Sequence[str]]
 
 def decision_json(decision: Decision, events: Events | None = None) -> Json:
     """A decision; its candidates are a list of databases, each with its `rows` and how many frames were `left_out`."""
-    told = {field.name: as_plain(getattr(decision, field.name)) for field in fields(decision) if field.name not in LEFT}
+    document = {field.name: as_plain(getattr(decision, field.name)) for field in fields(decision) if field.name not in LEFT}
     if decision.together is None:
-        del told["together"]
-    told["candidates"] = [candidates_json(name, found, events) for name, found in decision.candidates]
-    return told
+        del document["together"]
+    document["candidates"] = [candidates_json(name, candidates, events) for name, candidates in decision.candidates]
+    return document
 
 
-def candidates_json(database: str, found: Candidates, events: Events | None = None) -> Json:
-    rows = [_candidate_json(rank, row, (events or {}).get((database, row.frame), ())) for rank, row in enumerate(found, 1)]
-    return {"database": database, "left_out": {reason.text: count for reason, count in found.counts.items()}, "rows": rows}
+def candidates_json(database: str, candidates: Candidates, events: Events | None = None) -> Json:
+    rows = [_candidate_json(rank, row, (events or {}).get((database, row.frame), ())) for rank, row in enumerate(candidates, 1)]
+    return {"database": database, "left_out": {reason.text: count for reason, count in candidates.counts.items()}, "rows": rows}
 
 
 def ranked_json(rows: Sequence[Ranked], events: Events | None = None) -> list[Json]:
     """Frames with their ranks and databases."""
-    told = events or {}
+    known_events = events or {}
     return [
-        {"database": each.database, **_candidate_json(each.rank, each.row, told.get((each.database, each.row.frame), ()))}
+        {"database": each.database, **_candidate_json(each.rank, each.row, known_events.get((each.database, each.row.frame), ()))}
         for each in rows
     ]
 
@@ -73,5 +73,5 @@ def as_plain(value: object) -> object:
 
 def _by_field(value: DataclassInstance) -> Json:
     """The fields of a dataclass; `permutation_s` only where there are permutations."""
-    told = {field.name: as_plain(getattr(value, field.name)) for field in fields(value)}
-    return {name: plain for name, plain in told.items() if plain is not None or name != "permutation_s"}
+    document = {field.name: as_plain(getattr(value, field.name)) for field in fields(value)}
+    return {name: plain for name, plain in document.items() if plain is not None or name != "permutation_s"}

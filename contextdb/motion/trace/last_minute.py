@@ -14,7 +14,7 @@ from contextdb.motion.trace.session_file import frame_of_rows
 
 KEPT_S = 60.0
 MOST_ROWS = 7200
-"""So many rows are kept at most: a minute at 120 a second."""
+"""So many rows are stored at most: a minute at 120 a second."""
 
 
 class LastMinute(Trace):
@@ -29,9 +29,9 @@ class LastMinute(Trace):
         self._new: list[Row] = []
         self._last_tick = -1
 
-    def made_with(self, told: Mapping[str, Mapping[str, Any]]) -> None:
+    def made_with(self, settings: Mapping[str, Mapping[str, Any]]) -> None:
         """Learn the digests of the game's databases; `missing` says why some cannot be asked, "" when all can."""
-        self.about = {name: dict(each) for name, each in told.items()}
+        self.about = {name: dict(each) for name, each in settings.items()}
         self.missing = self.use(self.own).replace("the session was recorded with", "the game has")
         self.about = {name: self._own_about[name] if name in self._databases else each for name, each in self.about.items()}
         self.missing = self.missing or missing(self.about, self.own, self._databases)

@@ -19,7 +19,7 @@ from contextdb.motion.markup.tag_filter import TagFilter
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.filters import Biases, Filter
 from contextdb.motion.selection.selector import with_tags
-from contextdb.motion.trace.stock import Asked
+from contextdb.motion.trace.stock import Queryable
 
 UNKNOWN = "any"
 """How a table is asked where the recorded facts leave one out: the condition is ignored."""
@@ -30,23 +30,19 @@ def with_biases(database: MotionDatabase, chosen: Filter, old: Biases) -> Filter
     """A filter of a database that had other biases; what was added beside stays."""
     looping = database.marks.looping
     biases = _own(looping, database.biases) + (chosen.range_biases - _own(looping, old))
-    return chosen._replace(
-        range_biases=biases, least_of_ranges=float(biases.min(initial=np.inf)), continuing=database.biases.continuing
-    )
+    return chosen._replace(range_biases=biases, continuing=database.biases.continuing)
 
 
-def asked_of_table(database: MotionDatabase, chosen: Filter, table: Asked, context: Mapping[str, object]) -> Filter:
+def filter_by_table(database: MotionDatabase, chosen: Filter, table: Queryable, context: Mapping[str, object]) -> Filter:
     """A filter with the ranges that a table's answer lets play, and what its soft cells cost; costs given beside are gone."""
     own = database.filter(table.query(dict(context), unknown=UNKNOWN))
-    return chosen._replace(
-        ranges=own.ranges, is_whole=own.is_whole, range_biases=own.range_biases, least_of_ranges=own.least_of_ranges
-    )
+    return chosen._replace(ranges=own.ranges, is_whole=own.is_whole, range_biases=own.range_biases)
 
 
 def moved_to(
     database: MotionDatabase, chosen: Filter, about: Mapping[str, Any], tags: TagFilter | None
 ) -> tuple[MotionDatabase, Filter]:
-    """A filter of the database that `about` tells of, for another one; and that one, knowing the tags that are asked for.
+    """A filter of the database that `about` tells of, for another one; and that one, knowing the tags that are requested.
 
     Assets that the recorded database did not have may play only where all might.
     """
@@ -107,9 +103,9 @@ class _Moved:
 
     def of_frames(self, values: NDArray[Any], otherwise: object) -> NDArray[Any]:
         """A value for each frame; frames that there were not have another."""
-        found = np.full(self.database.n_frames, otherwise, values.dtype)
+        moved = np.full(self.database.n_frames, otherwise, values.dtype)
         for old, new in self.ranges.items():
             first, start = int(self.database.starts[new]), int(self.starts[old])
             n = min(int(self.database.stops[new]) - first, int(self.stops[old]) - start)
-            found[first : first + n] = values[start : start + n]
-        return found
+            moved[first : first + n] = values[start : start + n]
+        return moved

@@ -1,4 +1,4 @@
-"""Recorded searches asked again: what every frame cost by channel and bias, where any asset stood, and what other settings choose.
+"""Recorded searches repeated: what every frame cost by channel and bias, where any asset stood, and what other settings choose.
 
 A session keeps of each search the query and what could be chosen from. With the databases that it was recorded with, these give
 every cost again, bit for bit. Databases with other clips, markup or settings are asked with the same ranges, skips and biases,
@@ -24,7 +24,7 @@ from contextdb.motion.search.filters import Biases, Filter
 from contextdb.motion.selection.decision import Decision
 from contextdb.motion.selection.selector import Entry
 from contextdb.motion.trace.filter_rows import is_recorded
-from contextdb.motion.trace.other_filters import asked_of_table, moved_to, with_biases
+from contextdb.motion.trace.other_filters import filter_by_table, moved_to, with_biases
 from contextdb.motion.trace.reasked_decision import ReaskedDecision, chosen_of
 from contextdb.motion.trace.reasked_search import ReaskedSearch
 from contextdb.motion.trace.stock import Edited, Stock, require_name
@@ -34,7 +34,7 @@ About = Mapping[str, Mapping[str, Any]]
 
 
 class Changes(TypedDict, total=False):
-    """What is asked otherwise; see `Trace.reasked`."""
+    """What is changed; see `Trace.reasked`."""
 
     weights: Mapping[str, float] | None
     biases: Mapping[str, Biases] | None
@@ -43,7 +43,7 @@ class Changes(TypedDict, total=False):
 
 
 class Reasked(Made[ReaskedDecision]):
-    """A session asked again: one `ReaskedDecision` for each decision, worked out when it is asked for.
+    """A session repeated: one `ReaskedDecision` for each decision, worked out when it is requested.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class Reasked(Made[ReaskedDecision]):
     stock : Stock
         What is asked.
     changes : Changes
-        What is asked otherwise.
+        What is changed.
     """
 
     def __init__(self, decisions: Sequence[Decision], about: About, stock: Stock, changes: Changes) -> None:
@@ -81,9 +81,9 @@ class Reasked(Made[ReaskedDecision]):
 
     def over(self, decisions: Sequence[Decision]) -> Reasked:
         """The same of other decisions, such as those of the session read once."""
-        found = copy(self)
-        found.decisions = decisions
-        return found
+        other = copy(self)
+        other.decisions = decisions
+        return other
 
     def _at(self, index: int) -> ReaskedDecision:
         return self.of(self.decisions[require_place(index, len(self), "decision")])
@@ -100,10 +100,10 @@ class Reasked(Made[ReaskedDecision]):
     def why_not(self, index: int, asset: str) -> WhyNot:
         """Why an asset was not chosen by one decision, and what would have to change for it to be; see `WhyNot`. Raises MotionError
         where no database has the asset, with the nearest; or nothing was searched."""
-        asked = self[index]
-        if asked.choice is None:
-            raise MotionError(self._unsearched(asked.decision.tick))
-        return why_not(asked, asset)
+        decision = self[index]
+        if decision.choice is None:
+            raise MotionError(self._unsearched(decision.decision.tick))
+        return why_not(decision, asset)
 
     def _unsearched(self, tick: int) -> Fault:
         """An update without a search is asked about; the nearest with one is told."""
@@ -113,10 +113,10 @@ class Reasked(Made[ReaskedDecision]):
         return Fault(f"nothing was searched at tick {tick:,}: what played, played on.", "an update with a search", mend)
 
     def of(self, decision: Decision) -> ReaskedDecision:
-        """A decision of the session, asked again."""
-        why = self._why_not_asked(decision)
+        """A decision of the session, repeated."""
+        why = self._obstacle(decision)
         if why:
-            raise MotionError(Fault(f"the search at tick {decision.tick:,} cannot be asked again: {why}"))
+            raise MotionError(Fault(f"the search at tick {decision.tick:,} cannot be repeated: {why}"))
         if decision.choice is None:
             return ReaskedDecision(decision, (), {}, self.stock)
         entries = tuple(
@@ -133,7 +133,7 @@ class Reasked(Made[ReaskedDecision]):
         same = {name: each.starts.tolist() for name, each in self.databases.items() if name not in self.changed}
         return {**{name: about["starts"] for name, about in self.about.items() if "starts" in about}, **same}
 
-    def _why_not_asked(self, decision: Decision) -> str:
+    def _obstacle(self, decision: Decision) -> str:
         return "" if decision.choice is None else why_not_asked(decision, self.about, self.databases, self.changed)
 
     def _search(self, name: str, decision: Decision, chosen: Filter) -> ReaskedSearch:
@@ -144,7 +144,7 @@ class Reasked(Made[ReaskedDecision]):
             database, chosen = moved_to(database, chosen, self.about[name], tags)
         table = self.tables.get(self.stock.table_of.get(name, ""))
         if table is not None and decision.context is not None:
-            chosen = asked_of_table(database, chosen, table, decision.context)
+            chosen = filter_by_table(database, chosen, table, decision.context)
         if name in self._of_biases:
             chosen = with_biases(database, chosen, self.stock.databases[name].biases)
         return ReaskedSearch(name, database, decision.query, chosen)
@@ -153,7 +153,7 @@ class Reasked(Made[ReaskedDecision]):
 def why_not_asked(
     decision: Decision, about: About, databases: Mapping[str, MotionDatabase], changed: frozenset[str] | None = None
 ) -> str:
-    """Why a decision cannot be asked again, in a sentence; "" when it can.
+    """Why a decision cannot be repeated, in a sentence; "" when it can.
 
     `changed` are the databases that may differ from those of the session; None: none may.
     """

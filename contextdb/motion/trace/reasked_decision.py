@@ -1,8 +1,9 @@
-"""A recorded decision asked again: what its databases choose, and where any asset stands."""
+"""A recorded decision repeated: what its databases choose, and where any asset stands."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -13,11 +14,12 @@ from contextdb.motion.arguments import query_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.search import candidates
+from contextdb.motion.search.database import MotionDatabase
+from contextdb.motion.search.filters import Filter
 from contextdb.motion.search.hit import Hit
 from contextdb.motion.selection.choice import Choice, Status
 from contextdb.motion.selection.decision import Decision
 from contextdb.motion.selection.selector import Entry, choice_of
-from contextdb.motion.selection.step import continuing_cost
 from contextdb.motion.trace.cost_views import Ranked
 from contextdb.motion.trace.reasked_search import ReaskedSearch
 from contextdb.motion.trace.stock import Stock
@@ -29,7 +31,7 @@ Chosen = tuple[str, str | None, int] | None
 
 @dataclass(frozen=True, eq=False)
 class ReaskedDecision:
-    """A recorded decision asked again.
+    """A recorded decision repeated.
 
     Attributes
     ----------
@@ -100,14 +102,14 @@ class ReaskedDecision:
         Raises ContextError for what is no text.
         """
         require_text(text, "text")
-        found: list[Ranked] = []
+        best: list[Ranked] = []
         for name, search in self.searched.items():
             ranges = [i for i, asset in enumerate(search.database.assets) if text.casefold() in asset.casefold()]
             frames = np.array([frame for i in ranges if (frame := search.best_of_range(i)) >= 0], np.int64)
             wanted = search.database.normalised(search.query)
             rows = candidates.of_frames(search.database, wanted, search.chosen, frames, search.costs[frames], search.left_out)
-            found += [Ranked(self._rank(row.cost), name, row, role_of(self.decision, name, row.frame)) for row in rows]
-        return sorted(found, key=lambda each: each.row.cost)
+            best += [Ranked(self._rank(row.cost), name, row, role_of(self.decision, name, row.frame)) for row in rows]
+        return sorted(best, key=lambda each: each.row.cost)
 
     def rank(self, asset: str) -> int | None:
         """How many frames that may be chosen cost less than the asset's best, and one; None where no database searched has it.
@@ -151,3 +153,41 @@ def chosen_of(choice: Choice | None, starts: Mapping[str, Sequence[int]]) -> Cho
 def asset_of(choice: Choice | None) -> str | None:
     """The asset that was chosen, if one was."""
     return None if choice is None else choice.hit.asset
+
+
+# ---- what it would cost to play on
+
+
+def continuing_cost(database: MotionDatabase, query: Floats, chosen: Filter) -> float | None:
+    """The cost of the current frame of a filter that `database.filter` made with it, the continuing bias in it; None when there is
+    none or it may not play on. `query` float64 [F] is checked, and in the schema's units."""
+    frame = chosen.current
+    at = database.range_of(frame) if frame >= 0 else -1
+    if at < 0 or not chosen.ranges[at] or (len(chosen.frames) and not chosen.frames[frame]):
+        return None
+    kind = int(database.marks.kinds[frame])
+    if not chosen.kinds.playable[kind]:
+        return None
+    bias = float(chosen.range_biases[at] + chosen.kinds.biases[kind])
+    if len(chosen.frame_biases):
+        bias += float(chosen.frame_biases[frame])
+    wanted = database.normalisation.apply(query)
+    total = _cost(database, frame, wanted) + (bias + chosen.continuing)
+    return total if total < math.inf else None
+
+
+def _cost(database: MotionDatabase, frame: int, query: Floats) -> float:
+    """The cost of one frame for a normalised query: the sums of `search.cost`, in their order, without their arrays."""
+    values, wanted = database.layout.take(np.array([frame]))[0].tolist(), query.tolist()
+    squares = [(value - want) * (value - want) for value, want in zip(values, wanted, strict=True)]
+    return _sum(
+        weight * _sum(squares[columns]) for columns, weight in zip(database.slices, database.cost_weights.tolist(), strict=True)
+    )
+
+
+def _sum(values: Iterable[float]) -> float:
+    """A sum added one by one, each step rounded: Python's own keeps what is rounded away, from 3.12 on."""
+    total = 0.0
+    for value in values:
+        total += value
+    return total

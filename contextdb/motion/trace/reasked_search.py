@@ -1,6 +1,6 @@
-"""One database in a recorded search, asked again: what every frame costs, channel by channel, and why it may not be chosen.
+"""One database in a recorded search, repeated: what every frame costs, channel by channel, and why it may not be chosen.
 
-N frames of the database, C channels. The sums of each channel are kept, so that another weight only weighs them again.
+N frames of the database, C channels. The sums of each channel are stored, so that another weight only weighs them again.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from contextdb.motion.search.hit import Hit
 
 @dataclass(frozen=True, eq=False)
 class ReaskedSearch:
-    """One database in a search asked again.
+    """One database in a search repeated.
 
     Attributes
     ----------
@@ -51,11 +51,11 @@ class ReaskedSearch:
         if "sums" not in self._sums:
             lay, database = self.database.layout, self.database
             wanted, ones = database.normalised(self.query), np.ones(len(database.slices))
-            found, frames = np.zeros((len(ones), lay.n_frames)), lay.frames
+            sums, frames = np.zeros((len(ones), lay.n_frames)), lay.frames
             for start in range(0, len(frames), cost.FRAMES_AT_ONCE):
                 block = frames[start : start + cost.FRAMES_AT_ONCE]
-                found[:, block] = cost.channel_costs(lay, block, wanted, database.slices, ones)
-            self._sums["sums"] = found
+                sums[:, block] = cost.channel_costs(lay, block, wanted, database.slices, ones)
+            self._sums["sums"] = sums
         return self._sums["sums"]
 
     @property

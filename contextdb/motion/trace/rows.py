@@ -6,8 +6,8 @@ may leave out: all other columns are the same whenever the same session is recor
 A context becomes JSON: tags a sorted list, a NaN fact null, and what JSON has no word for its text. What else an update was given
 is JSON too.
 
-Candidates are not kept: they are worked out again from the query, the filters and the databases. The column `candidates` holds
-those that sessions of format 1 kept; of their frames `Candidates.why` comes back empty, its sums are in `counts`.
+Candidates are worked out again from the query, the filters and the databases. The column `candidates` holds those of code of your
+own, which cannot; of their frames `Candidates.why` comes back empty, its sums are in `counts`.
 """
 
 from __future__ import annotations
@@ -49,11 +49,10 @@ PERMUTATION_S = "permutation_s"
 """Of a database with permutations: how far ahead each looks."""
 PLAYING = ("database", "asset", "range", "frame", "time_s", "mirrored")
 BODY = ("body_x", "body_z", "body_heading")
-OPTIONAL = (TIMINGS, FILTERS, INPUTS, *BODY, HELD, PLAY_RATE, TOGETHER)
-"""The columns that a file may lack: another recording has other timings, and older versions kept none of the others."""
 
 
 def columns() -> dict[str, PolarsType]:
+    """The polars type of each column of a session."""
     import polars as pl
 
     text, whole, number, flag = pl.String(), pl.Int64(), pl.Float64(), pl.Boolean()
@@ -82,7 +81,7 @@ def columns() -> dict[str, PolarsType]:
         "events": pl.List(text),
     }
     counts = pl.List(pl.Struct({"left_out": text, "frames": whole}))
-    found = {"database": text, "channels": pl.List(text), "counts": counts, "rows": pl.List(pl.Struct(candidate))}
+    fields = {"database": text, "channels": pl.List(text), "counts": counts, "rows": pl.List(pl.Struct(candidate))}
     return {
         "tick": whole,
         "time_s": number,
@@ -96,7 +95,7 @@ def columns() -> dict[str, PolarsType]:
         "choice": pl.Struct({"hit": hit, "database": text, "reason": text, "searches": pl.List(search)}),
         "context": text,
         "query": pl.List(number),
-        "candidates": pl.List(pl.Struct(found)),
+        "candidates": pl.List(pl.Struct(fields)),
         "root_motion": pl.Struct({"left_m": number, "ahead_m": number, "turn_rad": number}),
         "root_weight": number,
         **dict.fromkeys(BODY, number),
@@ -113,6 +112,7 @@ def columns() -> dict[str, PolarsType]:
 
 
 def row_of(decision: Decision, events_of: EventsOf) -> Row:
+    """A decision as a row; `events_of` says what the markup says of a frame."""
     move = decision.root_motion
     return {
         "tick": int(decision.tick),
@@ -127,7 +127,7 @@ def row_of(decision: Decision, events_of: EventsOf) -> Row:
         "choice": None if decision.choice is None else _choice_row(decision.choice),
         "context": None if decision.context is None else context_json(decision.context),
         "query": None if decision.query is None else np.asarray(decision.query, np.float64).tolist(),
-        "candidates": _kept(decision, events_of),
+        "candidates": _candidates_rows(decision, events_of),
         "root_motion": {"left_m": float(move.left_m), "ahead_m": float(move.ahead_m), "turn_rad": float(move.turn_rad)},
         "root_weight": float(decision.root_weight),
         **dict(zip(BODY, (None, None, None) if decision.body is None else map(float, decision.body), strict=True)),
@@ -140,11 +140,11 @@ def row_of(decision: Decision, events_of: EventsOf) -> Row:
     }
 
 
-def _kept(decision: Decision, events_of: EventsOf) -> list[Row]:
-    """Candidates that cannot be worked out again, as a session of format 1 or code of your own has them."""
+def _candidates_rows(decision: Decision, events_of: EventsOf) -> list[Row]:
+    """Candidates that cannot be worked out again, as code of your own has them."""
     if isinstance(decision.candidates, WorkedOut):
         return []
-    return [_candidates_row(name, found, events_of) for name, found in decision.candidates]
+    return [_candidates_row(name, candidates, events_of) for name, candidates in decision.candidates]
 
 
 def context_json(context: Mapping[str, object]) -> str:
@@ -209,13 +209,13 @@ def _hit_row(hit: Hit) -> Row:
     return {"asset": asset, "range": int(hit.range), "frame": int(hit.frame), "cost": float(hit.cost)}
 
 
-def _candidates_row(name: str, found: Candidates, events_of: EventsOf) -> Row:
-    channels = list(found.rows[0].channels) if found.rows else []
+def _candidates_row(name: str, candidates: Candidates, events_of: EventsOf) -> Row:
+    channels = list(candidates.rows[0].channels) if candidates.rows else []
     return {
         "database": _text(name),
         "channels": list(map(_text, channels)),
-        "counts": [{"left_out": reason.name, "frames": int(count)} for reason, count in found.counts.items()],
-        "rows": [_candidate_row(row, list(events_of(name, row.frame))) for row in found.rows],
+        "counts": [{"left_out": reason.name, "frames": int(count)} for reason, count in candidates.counts.items()],
+        "rows": [_candidate_row(row, list(events_of(name, row.frame))) for row in candidates.rows],
     }
 
 
@@ -257,29 +257,29 @@ def decision_of(row: Row) -> Decision:
         root_motion=RootMotion(*(float(row["root_motion"][key]) for key in ("left_m", "ahead_m", "turn_rad"))),
         root_weight=float(row["root_weight"]),
         body=_body(row),
-        held=row.get(HELD) or "",
-        play_rate=1.0 if row.get(PLAY_RATE) is None else float(row[PLAY_RATE]),
-        filters=tuple((_known(each["database"]), filter_of(each)) for each in row.get(FILTERS) or ()),
-        inputs=None if row.get(INPUTS) is None else inputs_of(row[INPUTS]),
-        together=None if row.get(TOGETHER) is None else Together(**json.loads(row[TOGETHER])),
+        held=row[HELD],
+        play_rate=float(row[PLAY_RATE]),
+        filters=tuple((_known(each["database"]), filter_of(each)) for each in row[FILTERS]),
+        inputs=None if row[INPUTS] is None else inputs_of(row[INPUTS]),
+        together=None if row[TOGETHER] is None else Together(**json.loads(row[TOGETHER])),
     )
 
 
 def events_in(row: Row) -> Events:
     """What the markup says of each frame that a row mentions, as far as it says anything."""
-    return {(database, frame): tuple(events) for database, frame, events in _told(row) if events}
+    return {(database, frame): tuple(events) for database, frame, events in _events_of_frames(row) if events}
 
 
-def _told(row: Row) -> Iterator[tuple[str, int, list[str]]]:
+def _events_of_frames(row: Row) -> Iterator[tuple[str, int, list[str]]]:
     for each in (row["playing"], row["before"]):
         if each is not None:
             yield each["database"], each["frame"], each["events"]
-    for found in row["candidates"]:
-        yield from ((found["database"], each["frame"], each["events"]) for each in found["rows"])
+    for candidates in row["candidates"]:
+        yield from ((candidates["database"], each["frame"], each["events"]) for each in candidates["rows"])
 
 
 def _body(row: Row) -> GroundPlace | None:
-    x, z, heading = (row.get(name) for name in BODY)
+    x, z, heading = (row[name] for name in BODY)
     return None if x is None or z is None or heading is None else (float(x), float(z), float(heading))
 
 
@@ -337,7 +337,7 @@ def inputs_json(inputs: Inputs) -> str:
     """Inputs as JSON; the same inputs give the same text."""
     tags = inputs.tags
     of_each = {name: _tags_row(each) for name, each in tags.items()} if isinstance(tags, Mapping) else None
-    told = {
+    document = {
         "dt_s": float(inputs.dt_s),
         "force": bool(inputs.force),
         "interrupt": bool(inputs.interrupt),
@@ -345,7 +345,7 @@ def inputs_json(inputs: Inputs) -> str:
         "tags": _tags_row(tags) if isinstance(tags, TagFilter) else None,
         "tags_of": of_each,
     }
-    return f'{json.dumps(told)[:-1]}, "settings": {_settings_json(inputs.settings)}}}'
+    return f'{json.dumps(document)[:-1]}, "settings": {_settings_json(inputs.settings)}}}'
 
 
 @lru_cache(64)

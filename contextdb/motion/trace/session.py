@@ -1,17 +1,16 @@
-"""A recorded session: every decision of a controller, kept compactly, and saved as one Parquet file.
+"""A recorded session: every decision of a controller, stored compactly, and saved as one Parquet file.
 
     trace = Trace(databases=selector.databases)
     controller = Controller(selector, settings, recorder=trace)
     ...
     trace.save("session.parquet")
 
-Each decision is packed at once, so that no update waits for the work of others. Candidates are not kept: of a search the query and
-what could be chosen from are, and the databases give the costs of every frame again, bit for bit, when they are asked for. Of a
-session that continues and on, the last `most` decisions stay.
+Each decision is packed at once, so that no update waits for the work of others. Candidates are not stored: the query and the inputs
+of a search are, and the databases give the costs of every frame again, bit for bit, when they are requested. Of a session that
+continues and on, the last `most` decisions stay.
 
 A file has one row a decision, its columns as `contextdb.motion.trace.rows` says, and in its metadata the format's number and what
-the databases' ranges, features and channels are. The same session gives the same bytes, if the timings are left out. Format 2 keeps
-no candidates; sessions of format 1, which did, are read with theirs.
+the databases' ranges, features and channels are. The same session gives the same bytes, if the timings are left out.
 """
 
 from __future__ import annotations
@@ -90,7 +89,7 @@ class Trace(Made[Decision]):
     ----------
     n_candidates : int
         How many candidates of each searched database a decision shows. With 0 it shows none, and nothing is recorded by which it
-        could be asked again.
+        could be repeated.
     databases : mapping of name to MotionDatabase, optional
         Those of the selector. Default: those that the first decisions were made with.
     most : int
@@ -99,7 +98,7 @@ class Trace(Made[Decision]):
     Attributes
     ----------
     n_forgotten : int
-        How many decisions came before the first that is kept.
+        How many decisions came before the first that is stored.
     about : mapping
         For the name of each database `rate`, `features`, `channels`, its ranges (`assets`, `starts`, `stops`, `mirrored`), the
         `digest` of what costs come from, and `permutation_s` where it has permutations.
@@ -165,18 +164,18 @@ class Trace(Made[Decision]):
         names = [require_text(name, "one of names") for name in require_many(names, "names", "a list of names")]
         for name in names:
             if name not in frames[0].columns:
-                near, found = nearest(name, frames[0].columns), f"a session has no column {in_quotes(name)}."
-                raise ContextError(Fault(found, some(frames[0].columns), in_quotes(near) if near else ""))
+                near, problem = nearest(name, frames[0].columns), f"a session has no column {in_quotes(name)}."
+                raise ContextError(Fault(problem, some(frames[0].columns), in_quotes(near) if near else ""))
         return pl.concat([frame.select(names) for frame in frames])
 
     def events(self, index: int) -> Events:
         """What the markup says of the frames that a decision mentions, by (database, frame), as far as it says anything. Raises
         NoSuchPlace where there is no such decision."""
         place = self._place(index)
-        told = events_in(self._row(place))
-        for name, found in self._decision(place).candidates:
-            told |= {(name, row.frame): said for row in found if (said := self._events_of(name, row.frame))}
-        return told
+        events = events_in(self._row(place))
+        for name, candidates in self._decision(place).candidates:
+            events |= {(name, row.frame): texts for row in candidates if (texts := self._events_of(name, row.frame))}
+        return events
 
     def use(self, databases: Mapping[str, MotionDatabase]) -> str:
         """Work candidates out from these databases, and say in a sentence why some cannot be; "" when all can.
@@ -196,7 +195,7 @@ class Trace(Made[Decision]):
         return self._databases
 
     def reasked(self, project: object = None, **changes: Unpack[Changes]) -> Reasked:
-        """Every search of the session asked again, of the same databases or of changed ones; see `Reasked`.
+        """Every search of the session repeated, of the same databases or of changed ones; see `Reasked`.
 
         Parameters
         ----------
@@ -252,14 +251,14 @@ class Trace(Made[Decision]):
         whole = pl.concat(frames)
         frame, about = whole if timings else whole.drop(TIMINGS), json.dumps(self.about)
         out = io.BytesIO()
-        shown = str(self.n_candidates)
-        frame.write_parquet(out, metadata={FORMAT_KEY: str(FORMAT), ABOUT_KEY: about, SHOWN_KEY: shown, **UNSEALED})
+        count_text = str(self.n_candidates)
+        frame.write_parquet(out, metadata={FORMAT_KEY: str(FORMAT), ABOUT_KEY: about, SHOWN_KEY: count_text, **UNSEALED})
         return sealed(out.getvalue())
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Trace:
         """Read a saved session. Raises ArtefactError where the file is no session, cut off, damaged or of another version; with the
-        reason. A row that holds no decision is told when it is asked for. FileError where the file cannot be read."""
+        reason. A row that holds no decision is reported when it is requested. FileError where the file cannot be read."""
         return cls.from_bytes(read_bytes(require_path(path)), str(path))
 
     @classmethod
@@ -271,7 +270,7 @@ class Trace(Made[Decision]):
         trace._file = file
         return trace
 
-    # ---- what is kept
+    # ---- what is stored
 
     @property
     def _n_loaded(self) -> int:
@@ -284,12 +283,12 @@ class Trace(Made[Decision]):
         yield from map(_unpacked, self._rows)
 
     def _events_of(self, database: str, frame: int) -> tuple[str, ...]:
-        told = self._events.get((database, frame))
-        if told is None:
+        events = self._events.get((database, frame))
+        if events is None:
             known = self._databases.get(database)
-            told = () if known is None or not 0 <= frame < known.n_frames else known.marks.events(frame)
-            self._events[database, frame] = told
-        return told
+            events = () if known is None or not 0 <= frame < known.n_frames else known.marks.events(frame)
+            self._events[database, frame] = events
+        return events
 
     def _place(self, index: int) -> int:
         return require_place(index, len(self), "decision")
@@ -313,14 +312,14 @@ class Trace(Made[Decision]):
         return replace(playing, permutation_s=looks[playing.range % len(looks)]) if playing is not None and looks else playing
 
     def _with_candidates(self, decision: Decision) -> Decision:
-        """A decision with candidates that are worked out when they are asked for, where all that they need is there."""
+        """A decision with candidates that are worked out when they are requested, where all that they need is there."""
         if decision.candidates or decision.choice is None or decision.query is None or not self.n_candidates:
             return decision
         searched = of_searched(decision.filters, decision.choice)
         if not searched or not all(name in self._databases for name, _ in searched):
             return decision
-        found = WorkedOut(self._databases, decision.query, decision.filters, decision.choice, self.n_candidates)
-        return replace(decision, candidates=found)
+        worked_out = WorkedOut(self._databases, decision.query, decision.filters, decision.choice, self.n_candidates)
+        return replace(decision, candidates=worked_out)
 
     def _is_recorded(self, name: str, database: MotionDatabase) -> bool:
         return name in self.about and is_recorded(self.about[name], database)

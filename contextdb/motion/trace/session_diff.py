@@ -49,7 +49,6 @@ class SessionDiff:
     other: Mapping[str, float | None]
 
     def to_json(self) -> dict[str, object]:
-        """As plain data."""
         parting = None if self.parting is None else vars(self.parting)
         return {**vars(self), "parting": parting, "one": dict(self.one), "other": dict(self.other)}
 
@@ -76,7 +75,7 @@ def diff_sessions(
 
 
 def _parting(one: Decision, other: Decision) -> Parting:
-    return Parting(one.tick, one.time_s, _told(one.playing), _told(other.playing), one.why, other.why)
+    return Parting(one.tick, one.time_s, _playing_text(one.playing), _playing_text(other.playing), one.why, other.why)
 
 
 def _frame(playing: Playing | None) -> object:
@@ -88,5 +87,5 @@ def _asset(playing: Playing | None) -> str | None:
     return None if playing is None else playing.asset
 
 
-def _told(playing: Playing | None) -> str | None:
+def _playing_text(playing: Playing | None) -> str | None:
     return None if playing is None else f"{playing.asset} at {playing.time_s:.2f} s"

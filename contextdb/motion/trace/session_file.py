@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import io
 import json
 from collections.abc import Mapping
@@ -15,21 +14,14 @@ from contextdb.errors import (
     in_quotes,
     plural,
 )
-from contextdb.files.parquet_frame import MAGIC, DamagedFrame, Frame, require_whole
-from contextdb.motion.trace.filter_rows import RUNS
-from contextdb.motion.trace.rows import (
-    FILTERS,
-    OPTIONAL,
-    Row,
-    columns,
-)
+from contextdb.files.parquet_frame import MAGIC, DamagedFrame, require_whole
+from contextdb.motion.trace.rows import TIMINGS, Row, columns
 
 if TYPE_CHECKING:
     import polars as pl
 
-FORMAT, READ = 2, ("1", "2")
-"""Since 2 the costs of databases built with a schema are divided by the sum of weight x features, and the inputs are kept."""
-FORMAT_KEY, ABOUT_KEY, DIGEST_KEY, SHOWN_KEY = "contextdb.trace", "about", "digest", "candidates"
+FORMAT = 2
+FORMAT_KEY, ABOUT_KEY, SHOWN_KEY = "contextdb.trace", "about", "candidates"
 
 
 N_CANDIDATES = 12
@@ -45,11 +37,6 @@ def frame_of_rows(rows: list[Row]) -> pl.DataFrame:
     return pl.DataFrame(rows, schema=columns())
 
 
-def _old_digest(raw: bytes, frame: Frame) -> str:
-    """What the sessions of versions without a seal hold: the digest of the columns and of what the databases' features are."""
-    return hashlib.blake2b(raw[: frame.start] + frame.metadata[ABOUT_KEY].encode(), digest_size=16).hexdigest()
-
-
 def read_rows(raw: bytes, file: str) -> tuple[pl.DataFrame, dict[str, dict[str, Any]], int]:
     """The rows of a file, what it says of databases, and how many candidates its decisions show; checked."""
     import polars as pl
@@ -61,32 +48,21 @@ def read_rows(raw: bytes, file: str) -> tuple[pl.DataFrame, dict[str, dict[str, 
         parquet = require_whole(raw)
         metadata = parquet.metadata
         _check_format(metadata, file)
-        if metadata.get(DIGEST_KEY, expected := _old_digest(raw, parquet)) != expected:
-            raise refused("the file was altered after it was saved.", file)
+        if not parquet.is_sealed:
+            raise refused("the session has no digest: another program wrote it again.", file)
         about = {name: dict(part) for name, part in json.loads(metadata[ABOUT_KEY]).items()}
         n_candidates = int(metadata.get(SHOWN_KEY, N_CANDIDATES))
-        frame = _with_runs(pl.read_parquet(io.BytesIO(raw)))
-    except ArtefactError:
+        frame = pl.read_parquet(io.BytesIO(raw))
+    except (ArtefactError, MemoryError):
         raise
     except DamagedFrame as error:
         raise refused(f"the file is damaged: {error}.", file) from None
     except (Exception, pl.exceptions.PanicException) as error:  # some damage makes polars panic instead of raise
         raise refused(f"the file is damaged ({type(error).__name__}).", file) from None
     _check_columns(frame, file)
-    lacking = [pl.lit(None, dtype).alias(name) for name, dtype in columns().items() if name not in frame.columns]
-    return frame.with_columns(lacking).select(list(columns())), about, n_candidates
-
-
-def _with_runs(frame: pl.DataFrame) -> pl.DataFrame:
-    """Filters with the fields that format 1 lacks."""
-    import polars as pl
-
-    held = frame.schema.get(FILTERS)
-    inner = held.inner if isinstance(held, pl.List) else None
-    if not isinstance(inner, pl.Struct) or any(each.name in RUNS for each in inner.fields):
-        return frame
-    runs = [pl.lit(None, pl.List(pl.Int64())).alias(name) for name in RUNS]
-    return frame.with_columns(pl.col(FILTERS).list.eval(pl.element().struct.with_fields(runs)))
+    if TIMINGS not in frame.columns:
+        frame = frame.with_columns(pl.lit(None, columns()[TIMINGS]).alias(TIMINGS))
+    return frame.select(list(columns())), about, n_candidates
 
 
 def _no_parquet(raw: bytes) -> str:
@@ -101,20 +77,20 @@ def _no_parquet(raw: bytes) -> str:
 def _check_format(metadata: Mapping[str, str], file: str) -> None:
     if FORMAT_KEY not in metadata:
         raise refused("this Parquet file is not a recorded session.", file)
-    if metadata[FORMAT_KEY] not in READ:
-        found = f"the session has format {in_quotes(metadata[FORMAT_KEY])}; this version reads formats {' and '.join(READ)}."
-        raise refused(found, file)
+    if metadata[FORMAT_KEY] != str(FORMAT):
+        problem = f"the session has format {in_quotes(metadata[FORMAT_KEY])}; this version reads format {FORMAT}."
+        raise refused(problem, file)
 
 
 def _check_columns(frame: pl.DataFrame, file: str) -> None:
     wanted = columns()
-    present = [name for name in wanted if name in frame.columns or name not in OPTIONAL]
+    present = [name for name in wanted if name in frame.columns or name != TIMINGS]
     wrong = [name for name in present if frame.schema.get(name) != wanted[name]]
     if wrong:
-        found = f"{plural(len(wrong), 'column')} of the session missing, or of another type: {', '.join(map(in_quotes, wrong))}."
-        raise refused(found, file)
+        problem = f"{plural(len(wrong), 'column')} of the session missing, or of another type: {', '.join(map(in_quotes, wrong))}."
+        raise refused(problem, file)
 
 
-def refused(found: str, file: str) -> ArtefactError:
+def refused(problem: str, file: str) -> ArtefactError:
     """The error for a file that is no whole session."""
-    return ArtefactError(Fault(found, ACCEPTED, MEND, Place(file or None), "bad-artefact"))
+    return ArtefactError(Fault(problem, ACCEPTED, MEND, Place(file or None), "bad-artefact"))

@@ -70,55 +70,54 @@ class SessionStats:
     frames_used_share: float | None = None
 
     def to_json(self) -> dict[str, object]:
-        """The figures by name."""
-        told = asdict(self)
-        told["gains"] = list(self.gains)
-        told["assets_never_used"] = None if self.assets_never_used is None else list(self.assets_never_used)
-        return told
+        document = asdict(self)
+        document["gains"] = list(self.gains)
+        document["assets_never_used"] = None if self.assets_never_used is None else list(self.assets_never_used)
+        return document
 
 
 def stats_of(decisions: Iterable[Decision], about: About) -> SessionStats:
     """The figures of a session; `about` is what a `Trace` says of its databases."""
-    found = list(decisions)
-    jumps = [each for each in found if each.action is Action.JUMP]
-    seconds = found[-1].time_s - found[0].time_s if found else 0.0
+    recorded = list(decisions)
+    jumps = [each for each in recorded if each.action is Action.JUMP]
+    seconds = recorded[-1].time_s - recorded[0].time_s if recorded else 0.0
     pairs = [(each.continuing_cost, each.cost) for each in jumps if each.cost is not None and each.continuing_cost is not None]
     gains: list[float] = gains_of(*np.array(pairs).reshape(-1, 2).T).tolist()
     causes: dict[str, int] = {}
-    for each in found:
+    for each in recorded:
         if each.searched:
             cause = cause_of(each) or "other"
             causes[cause] = causes.get(cause, 0) + 1
-    used = {each.playing.asset for each in found if each.playing is not None}
+    used = {each.playing.asset for each in recorded if each.playing is not None}
     known = [asset for each in about.values() for asset in each.get("assets", ())]
     return SessionStats(
         seconds=seconds,
-        updates=len(found),
-        searches=sum(each.searched for each in found),
+        updates=len(recorded),
+        searches=sum(each.searched for each in recorded),
         jumps=len(jumps),
         forced_jumps=sum(each.continuing_cost is None for each in jumps),
-        loops=sum(each.action is Action.LOOP for each in found),
+        loops=sum(each.action is Action.LOOP for each in recorded),
         jumps_per_s=len(jumps) / seconds if seconds > 0.0 else 0.0,
         causes=dict(sorted(causes.items(), key=lambda item: (-item[1], item[0]))),
         gain_median=median(gains) if gains else None,
         gain_small_share=sum(gain < SMALL_GAIN for gain in gains) / len(gains) if gains else None,
         gains=tuple(int(n) for n in np.bincount(np.searchsorted(GAINS, gains), minlength=len(GAINS))[: len(GAINS)]),
-        stay_s=_stay_s(found),
+        stay_s=_stay_s(recorded),
         assets_used=len(used),
         assets_never_used=tuple(asset for asset in dict.fromkeys(known) if asset not in used) if known else None,
-        frames_used_share=_frames_used(found, about),
+        frames_used_share=_frames_used(recorded, about),
     )
 
 
 def measures_of(decisions: Sequence[Decision], about: About) -> dict[str, float | None]:
     """What is compared before and after a change, by the names that `motion measure` gives them."""
-    found = stats_of(decisions, about)
-    never = None if found.assets_never_used is None else float(len(found.assets_never_used))
+    stats = stats_of(decisions, about)
+    never = None if stats.assets_never_used is None else float(len(stats.assets_never_used))
     return {
-        "jumps_per_s": found.jumps_per_s,
-        "forced_jumps": float(found.forced_jumps),
-        "stay_s": found.stay_s,
-        "frames_used_share": found.frames_used_share,
+        "jumps_per_s": stats.jumps_per_s,
+        "forced_jumps": float(stats.forced_jumps),
+        "stay_s": stats.stay_s,
+        "frames_used_share": stats.frames_used_share,
         "assets_never_used": never,
     }
 

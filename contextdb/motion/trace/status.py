@@ -46,9 +46,8 @@ class Compared:
         return self._off(self.got)
 
     def to_json(self) -> dict[str, float | None]:
-        """All five numbers."""
-        told = {"wanted": self.wanted, "clip": self.clip, "got": self.got, "clip_off": self.clip_off, "got_off": self.got_off}
-        return {name: None if value is None else round(value, 4) for name, value in told.items()}
+        document = {"wanted": self.wanted, "clip": self.clip, "got": self.got, "clip_off": self.clip_off, "got_off": self.got_off}
+        return {name: None if value is None else round(value, 4) for name, value in document.items()}
 
     @property
     def text(self) -> str:
@@ -62,8 +61,8 @@ class Compared:
         ):
             if value is not None:
                 parts.append(
-                    f"{name} {form.format(_shown(value, digits))}"
-                    + ("" if off is None else f" ({sign.format(_shown(off, digits))})")
+                    f"{name} {form.format(_rounded(value, digits))}"
+                    + ("" if off is None else f" ({sign.format(_rounded(off, digits))})")
                 )
         return ", ".join(parts)
 
@@ -78,7 +77,7 @@ class Status:
     """How it stands at an update: speeds in m/s, angles in degrees, seconds of the clip that pass in a second (`time_scale`).
 
     `frames_evaluated` could be chosen in the databases that were searched; None without a search. The steps became `stride` times
-    as long, and hips and legs were turned by `warp_deg`; None without the poses that were shown.
+    as long, and hips and legs were turned by `warp_deg`; None without the poses that were displayed.
     """
 
     speed: Compared
@@ -90,7 +89,6 @@ class Status:
     warp_deg: float | None = None
 
     def to_json(self) -> dict[str, object]:
-        """The numbers by name."""
         return {
             "speed_mps": self.speed.to_json(),
             "move_deg": self.move.to_json(),
@@ -111,7 +109,7 @@ class Status:
         yield "time scale", f"{self.time_scale:.2f}"
         if self.stride is not None and self.warp_deg is not None:
             yield "stride", f"{self.stride:.2f}"
-            yield "warp", f"{_shown(self.warp_deg):.0f}°"
+            yield "warp", f"{_rounded(self.warp_deg):.0f}°"
 
 
 def status_of(
@@ -121,7 +119,7 @@ def status_of(
     warp: tuple[float, float] | None = None,
 ) -> Status:
     """The status of an update after the `last` decision, None for the first. `databases` are those that it was made with, by name;
-    what is not among them is not known. `warp` is (stride, radians) of the pose that was shown."""
+    what is not among them is not known. `warp` is (stride, radians) of the pose that was displayed."""
     playing = decision.playing
     database = None if playing is None else databases.get(playing.database)
     schema = None if database is None else database.schema
@@ -136,7 +134,7 @@ def status_of(
     return Status(speed, move, facing, _n_evaluated(decision, databases), decision.play_rate, stride, turned)
 
 
-def _shown(value: float, digits: int = 0) -> float:
+def _rounded(value: float, digits: int = 0) -> float:
     """A number rounded, without the sign of a zero."""
     return round(value, digits) + 0.0
 

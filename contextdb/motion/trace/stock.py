@@ -36,7 +36,7 @@ class Row(Protocol):
     failures: Sequence[Failing]
 
 
-class Asked(Protocol):
+class Queryable(Protocol):
     """A compiled table."""
 
     @property
@@ -54,7 +54,7 @@ class Asked(Protocol):
 class Edited(Protocol):
     """A table."""
 
-    def compile(self) -> Asked: ...
+    def compile(self) -> Queryable: ...
 
     def with_cell(self, row: int, column: str, text: str) -> Edited: ...
 

@@ -56,15 +56,15 @@ def shortened(text: str, most: int) -> str:
     """A text in at most so many cells: what is too long loses its middle, for names differ at their ends."""
     if width_of(text) <= most:
         return text
-    kept = max(0, min(len(text), most) - 1)
-    while kept and width_of(_without_middle(text, kept)) > most:
-        kept -= 1
-    return _without_middle(text, kept)
+    length = max(0, min(len(text), most) - 1)
+    while length and width_of(_without_middle(text, length)) > most:
+        length -= 1
+    return _without_middle(text, length)
 
 
-def _without_middle(text: str, kept: int) -> str:
-    tail = kept // 2
-    return f"{text[: kept - tail]}…{text[len(text) - tail :]}"
+def _without_middle(text: str, length: int) -> str:
+    tail = length // 2
+    return f"{text[: length - tail]}…{text[len(text) - tail :]}"
 
 
 def table_lines(columns: Sequence[Column], width: int = WIDTH, indent: str = "") -> Iterator[str]:

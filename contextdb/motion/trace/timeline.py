@@ -88,7 +88,7 @@ def timeline_of(trace: Trace) -> Timeline:
     playing, ranges = pl.col("playing").struct, pl.element().struct.field("ranges")
     motion = [pl.col("root_motion").struct.field(name).fill_null(0.0) for name in ("left_m", "ahead_m", "turn_rad")]
     action = pl.col("action")
-    found = trace.columns(READ).select(
+    frame = trace.columns(READ).select(
         "tick",
         "time_s",
         playing.field("asset"),
@@ -105,20 +105,20 @@ def timeline_of(trace: Trace) -> Timeline:
         ahead=motion[1],
         turn=motion[2],
     )
-    names = found["asset"].drop_nulls().unique(maintain_order=True).to_list()
+    names = frame["asset"].drop_nulls().unique(maintain_order=True).to_list()
     numbers = {name: i for i, name in enumerate(names)}
-    roots = found.select(*BODY).to_numpy().astype(np.float64)
+    roots = frame.select(*BODY).to_numpy().astype(np.float64)
     if np.isnan(roots).any():
-        roots = _moved(*(found[name].to_numpy() for name in ("left", "ahead", "turn")))
+        roots = _moved(*(frame[name].to_numpy() for name in ("left", "ahead", "turn")))
     return Timeline(
-        ticks=found["tick"].to_numpy().astype(np.int64),
-        times_s=found["time_s"].to_numpy().astype(np.float64),
+        ticks=frame["tick"].to_numpy().astype(np.int64),
+        times_s=frame["time_s"].to_numpy().astype(np.float64),
         assets=tuple(names),
-        playing=np.array([-1 if name is None else numbers[name] for name in found["asset"]], np.int64),
-        **{name: found[name].to_numpy().astype(np.bool_) for name in ("mirrored", "searched", "jumped", "forced", "new_facts")},
-        costs=_numbers(found["cost"]),
-        continuing=_numbers(found["continuing"]),
-        n_valid=_numbers(found["n_valid"]),
+        playing=np.array([-1 if name is None else numbers[name] for name in frame["asset"]], np.int64),
+        **{name: frame[name].to_numpy().astype(np.bool_) for name in ("mirrored", "searched", "jumped", "forced", "new_facts")},
+        costs=_numbers(frame["cost"]),
+        continuing=_numbers(frame["continuing"]),
+        n_valid=_numbers(frame["n_valid"]),
         roots=roots,
     )
 

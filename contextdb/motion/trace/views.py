@@ -48,8 +48,8 @@ def summary_line(decisions: Iterable[Decision]) -> str:
         n, n_searches, last_s = n + 1, n_searches + decision.searched, decision.time_s
         actions[decision.action] += 1
     counts = [(n, "update"), (n_searches, "search"), (actions[Action.JUMP], "jump"), (actions[Action.LOOP], "loop")]
-    told = [f"{count:,} {noun}{'' if count == 1 else 'es' if noun == 'search' else 's'}" for count, noun in counts]
-    return f"{last_s:.2f} s: {', '.join(told)}"
+    parts = [f"{count:,} {noun}{'' if count == 1 else 'es' if noun == 'search' else 's'}" for count, noun in counts]
+    return f"{last_s:.2f} s: {', '.join(parts)}"
 
 
 def session_lines(decisions: Iterable[Decision], *, name: str = "", width: int = WIDTH) -> Iterator[str]:
@@ -118,7 +118,7 @@ def cause_of(decision: Decision) -> str:
     """Why there was a search, in a word or two: what the decision's sentence begins with."""
     if decision.together is not None:
         return "joint"
-    causes = (words for cause, words in CAUSES.items() if decision.why.startswith(cause.told(decision.before)))
+    causes = (words for cause, words in CAUSES.items() if decision.why.startswith(cause.sentence(decision.before)))
     return next(causes, "") if decision.searched else ""
 
 
@@ -132,27 +132,27 @@ def decision_lines(
     name: str = "",
     events: EventTexts | None = None,
     width: int = WIDTH,
-    asked: Sequence[Ranked] | None = None,
+    ranked: Sequence[Ranked] | None = None,
 ) -> Iterator[str]:
     """One decision in full: what came of it, what was searched, and what the best candidates cost.
 
-    Only candidates whose asset's name holds `name` are shown, with the costs of a view, or instead of them the frames `asked`.
+    Only candidates whose asset's name holds `name` are displayed, with the costs of a view, or instead of them the frames `ranked`.
     `events` is what the markup says of frames, by (database, frame); `width` is in cells of a line.
     """
-    told = {} if events is None else events
+    known_events = {} if events is None else events
     yield f"tick {decision.tick:,} at {decision.time_s:.2f} s: {decision.action}"
     yield from wrapped(decision.why, width)
     yield ""
-    for label, text in _status(decision, told):
+    for label, text in _status(decision, known_events):
         lines = wrapped(text, width - LABEL) or [""]
         yield from (f"{label if i == 0 else '':<{LABEL}}{line}" for i, line in enumerate(lines))
     if decision.choice is not None:
         yield from ("", "searches", "", *search_lines(decision, width))
-    if asked is not None:
+    if ranked is not None:
         yield from ("", f"the best frames of assets whose name contains {in_quotes(name)} ({view})", "")
-        yield from candidate_lines(asked, view, told, width)
+        yield from candidate_lines(ranked, view, known_events, width)
     elif decision.candidates:
-        yield from ("", f"top candidates ({view})", "", *_top_lines(decision, view, name, told, width))
+        yield from ("", f"top candidates ({view})", "", *_top_lines(decision, view, name, known_events, width))
 
 
 def _status(decision: Decision, events: EventTexts) -> Iterator[tuple[str, str]]:
@@ -240,8 +240,8 @@ def _search_texts(decision: Decision, choice: Choice, search: Search) -> tuple[s
     result = f"{search.status}, {choice.reason}" if search.status is Status.WINNER else str(search.status)
     if hit is None or not hit:
         return search.database, "", "", "", "", threshold, result
-    found = (each.row for each in _ranked(decision) if each.database == search.database and each.row.frame == hit.frame)
-    row = next(found, None)
+    rows = (each.row for each in _ranked(decision) if each.database == search.database and each.row.frame == hit.frame)
+    row = next(rows, None)
     asset = str(hit.asset) + (" (mirrored)" if row is not None and row.mirrored else "")
     return search.database, asset, seconds(row.time_s if row else None), f"{hit.frame:,}", cost_text(hit.cost), threshold, result
 
@@ -254,9 +254,9 @@ def _top_lines(decision: Decision, view: View, name: str, events: EventTexts, wi
         yield f"none whose name contains {in_quotes(name)}" if name else "none"
     several = len(decision.candidates) > 1
     yield ""
-    for database, found in decision.candidates:
-        if found.counts:
-            yield from wrapped(f"left out{f' of {database}' if several else ''}: {left_out_text(found)}", width)
+    for database, candidates in decision.candidates:
+        if candidates.counts:
+            yield from wrapped(f"left out{f' of {database}' if several else ''}: {left_out_text(candidates)}", width)
 
 
 def wrapped(text: str, width: int) -> list[str]:
@@ -264,20 +264,21 @@ def wrapped(text: str, width: int) -> list[str]:
     return textwrap.wrap(printable(text), width, break_long_words=False, break_on_hyphens=False)
 
 
-def left_out_text(found: Candidates) -> str:
+def left_out_text(candidates: Candidates) -> str:
     """How many frames were left out for each reason, the most first."""
-    counts = sorted(found.counts.items(), key=lambda item: (-item[1], item[0]))
+    counts = sorted(candidates.counts.items(), key=lambda item: (-item[1], item[0]))
     return ", ".join(f"{count:,} {LeftOut(reason).text}" for reason, count in counts)
 
 
 def _ranked(decision: Decision) -> list[Ranked]:
     """The candidates of all databases, cheapest first."""
-    every = [(row.cost, database, row) for database, found in decision.candidates for row in found]
+    every = [(row.cost, database, row) for database, candidates in decision.candidates for row in candidates]
     every.sort(key=lambda each: each[0])
     return [Ranked(i, database, row, role_of(decision, database, row.frame)) for i, (_, database, row) in enumerate(every, 1)]
 
 
 def role_of(decision: Decision, database: str, frame: int) -> str:
+    """What a frame is to the decision: "chosen", "plays on", or nothing."""
     here = (database, frame)
     playing, before = ((each.database, each.frame) if each else None for each in (decision.playing, decision.before))
     if here == playing and decision.action in (Action.START, Action.JUMP):

@@ -1,6 +1,6 @@
 """Why an asset was not chosen by a recorded search, and the smallest changes with which it would have been.
 
-The reasons follow the way of a frame: the cells of its table, its markup, the tags that were asked for, what was played, its cost.
+The reasons follow the way of a frame: the cells of its table, its markup, the tags that were requested, what was played, its cost.
 """
 
 from __future__ import annotations
@@ -81,23 +81,23 @@ class WhyNot:
         }
 
 
-def why_not(asked: ReaskedDecision, asset: str) -> WhyNot:
+def why_not(decision: ReaskedDecision, asset: str) -> WhyNot:
     """Why an asset was not chosen, and what would have to change for it to be. Raises MotionError where no database has the asset,
     with the nearest; or nothing was searched."""
     require_text(asset, "asset")
-    if asked.choice is None:
-        raise MotionError(Fault(f"nothing was searched at tick {asked.decision.tick:,}: what played, played on."))
-    require_name(asset, "asset", dict.fromkeys(each for search in asked.searches.values() for each in search.database.assets))
-    at, choice = place_of(asked, asset), asked.choice
+    if decision.choice is None:
+        raise MotionError(Fault(f"nothing was searched at tick {decision.decision.tick:,}: what played, played on."))
+    require_name(asset, "asset", dict.fromkeys(each for search in decision.searches.values() for each in search.database.assets))
+    at, choice = place_of(decision, asset), decision.choice
     winner_cost = choice.hit.cost if choice else None
     rate = None if at.search.database.schema is None else at.search.database.schema.rate
     time_s = None if rate is None else (at.frame - int(at.search.database.starts[at.range])) / rate
     has_won = bool(choice) and choice.hit.asset == asset
-    reasons = () if has_won else tuple(_reasons(asked, at, choice))
-    changes = () if has_won else tuple(winning_changes(asked, at))
+    reasons = () if has_won else tuple(_reasons(decision, at, choice))
+    changes = () if has_won else tuple(winning_changes(decision, at))
     rank = 1 + sum(
         int(np.count_nonzero((each.costs < at.cost) & (each.left_out == LeftOut.NO)))
-        for each in {**asked.searched, at.name: at.search}.values()
+        for each in {**decision.searched, at.name: at.search}.values()
     )
     return WhyNot(asset, at.name, at.frame, time_s, rank, at.cost, choice.hit.asset, winner_cost, reasons, changes)
 
@@ -105,34 +105,34 @@ def why_not(asked: ReaskedDecision, asset: str) -> WhyNot:
 # ---- reasons
 
 
-def _reasons(asked: ReaskedDecision, at: Place, choice: Choice) -> Iterator[str]:
+def _reasons(decision: ReaskedDecision, at: Place, choice: Choice) -> Iterator[str]:
     if at.left_out is LeftOut.NOT_VALID:
-        yield from _invalid(asked, at)
+        yield from _invalid(decision, at)
     inner = _reason_within(at)
     if inner in OF_MARKUP:
         yield f"markup: {inner.text}"
     elif inner is LeftOut.TAGS:
-        yield "tags: its frames do not have the tags that were asked for"
+        yield "tags: its frames do not have the tags that were requested"
     elif inner in OF_TIME:
         yield f"history: {inner.text}"
     elif inner is LeftOut.FORBIDDEN:
         yield "bias: an infinite one forbids it"
-    if at.name not in asked.searched and choice.reason is Reason.UNDER_THRESHOLD:
+    if at.name not in decision.searched and choice.reason is Reason.UNDER_THRESHOLD:
         yield f"threshold: {choice.database} won outright, {at.name} was not searched"
     if choice and at.cost >= choice.hit.cost:
         yield f"cost: {cost_text(at.cost)}, {cost_text(at.cost - choice.hit.cost)} more than {choice.hit.asset}"
 
 
-def _invalid(asked: ReaskedDecision, at: Place) -> Iterator[str]:
-    rows = rows_of(asked, at)
+def _invalid(decision: ReaskedDecision, at: Place) -> Iterator[str]:
+    rows = rows_of(decision, at)
     if not rows:
         yield "valid: the asset was not among the valid ones"
     for row in rows[:1]:
         for failing in row.failures:
             mirrored = ", with mirrored facts" if is_mirrored(at) else ""
-            yield f"table: {row_name(row.row)} of {asked.stock.table_of[at.name]}{mirrored}: {failing}"
+            yield f"table: {row_name(row.row)} of {decision.stock.table_of[at.name]}{mirrored}: {failing}"
         if not row.is_enabled:
-            yield f"table: {row_name(row.row)} of {asked.stock.table_of[at.name]} is disabled"
+            yield f"table: {row_name(row.row)} of {decision.stock.table_of[at.name]} is disabled"
 
 
 def _reason_within(at: Place) -> LeftOut:

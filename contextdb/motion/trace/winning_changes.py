@@ -22,7 +22,7 @@ from contextdb.errors import ContextDBError, Fault, MotionError, in_quotes, row_
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.search.filters import Filter
 from contextdb.motion.selection.choice import Choice
-from contextdb.motion.trace.other_filters import UNKNOWN, asked_of_table
+from contextdb.motion.trace.other_filters import UNKNOWN, filter_by_table
 from contextdb.motion.trace.reasked_decision import ReaskedDecision
 from contextdb.motion.trace.reasked_search import ReaskedSearch
 from contextdb.motion.trace.stock import Edited, Row
@@ -81,11 +81,11 @@ Step = tuple[ChangePart, ReaskedDecision]
 """A change, and the decision with it."""
 
 
-def winning_changes(asked: ReaskedDecision, at: Place) -> Iterator[Change]:
+def winning_changes(decision: ReaskedDecision, at: Place) -> Iterator[Change]:
     """What lets the asset be chosen, and, where that is not enough, what makes it cheaper beside."""
     parts: tuple[ChangePart, ...] = ()
-    now = asked
-    for part, freed in _free(asked, at):
+    now = decision
+    for part, freed in _free(decision, at):
         parts, now = (*parts, part), freed
         yield Change(parts, _wins(now, at.asset))
     if not _wins(now, at.asset):
@@ -93,36 +93,36 @@ def winning_changes(asked: ReaskedDecision, at: Place) -> Iterator[Change]:
             yield Change((*parts, part), _wins(cheaper, at.asset))
 
 
-def _wins(asked: ReaskedDecision, asset: str) -> bool:
-    return bool(asked.choice) and asked.choice is not None and asked.choice.hit.asset == asset
+def _wins(decision: ReaskedDecision, asset: str) -> bool:
+    return bool(decision.choice) and decision.choice is not None and decision.choice.hit.asset == asset
 
 
-def _free(asked: ReaskedDecision, at: Place) -> Iterator[Step]:
+def _free(decision: ReaskedDecision, at: Place) -> Iterator[Step]:
     """What lets the asset be chosen: each step goes on from the one before."""
     for step in (_valid, _unmarked, *[_in_time] * len(OF_TIME), _in_turn):
-        done = step(asked, at)
+        done = step(decision, at)
         if done is not None:
-            asked = done[1]
+            decision = done[1]
             yield done
 
 
-def _valid(asked: ReaskedDecision, at: Place) -> Step | None:
+def _valid(decision: ReaskedDecision, at: Place) -> Step | None:
     """The cells that would have to accept the facts; or, without a table, the mask."""
     if at.left_out is not LeftOut.NOT_VALID:
         return None
-    table, rows = asked.stock.table(at.name), rows_of(asked, at)
+    table, rows = decision.stock.table(at.name), rows_of(decision, at)
     if table is not None and rows:
         edited = _edited(table, rows[0])
         if edited is not None:
-            search = asked.searches[at.name]
-            chosen = asked_of_table(search.database, search.chosen, edited.compile(), asked.decision.context or {})
+            search = decision.searches[at.name]
+            chosen = filter_by_table(search.database, search.chosen, edited.compile(), decision.decision.context or {})
             if chosen.ranges[at.range]:
                 failures = rows[0].failures
-                name, row = asked.stock.table_of[at.name], row_name(rows[0].row)
+                name, row = decision.stock.table_of[at.name], row_name(rows[0].row)
                 what = f"{row} of {name}: {', '.join(failing.condition for failing in failures)}"
                 kind = "cell" if len(failures) == 1 else "cells"
-                return ChangePart(kind, what, "; ".join(failing.mend for failing in failures)), _with(asked, at, chosen)
-    return ChangePart("mask", at.asset, "valid"), _with(asked, at, let_in(at.search.chosen, at.range))
+                return ChangePart(kind, what, "; ".join(failing.mend for failing in failures)), _with(decision, at, chosen)
+    return ChangePart("mask", at.asset, "valid"), _with(decision, at, let_in(at.search.chosen, at.range))
 
 
 def _edited(table: Edited, row: Row) -> Edited | None:
@@ -139,15 +139,15 @@ def _edited(table: Edited, row: Row) -> Edited | None:
     return table
 
 
-def _unmarked(asked: ReaskedDecision, at: Place) -> Step | None:
+def _unmarked(decision: ReaskedDecision, at: Place) -> Step | None:
     """The best frame without what markup and tags say against it."""
-    at = _place_in(asked, at)
+    at = _place_in(decision, at)
     reason = at.left_out
     if reason not in OF_MARKUP and reason is not LeftOut.TAGS:
         return None
     kind = "tags" if reason is LeftOut.TAGS else "mark"
     what = f"{reason.text} on {at.asset}"
-    return ChangePart(kind, what, "without"), _with_search(asked, _unmarked_search(asked.searches[at.name], at.range))
+    return ChangePart(kind, what, "without"), _with_search(decision, _unmarked_search(decision.searches[at.name], at.range))
 
 
 def _unmarked_search(search: ReaskedSearch, at: int) -> ReaskedSearch:
@@ -180,48 +180,47 @@ def _unmarked_search(search: ReaskedSearch, at: int) -> ReaskedSearch:
     return ReaskedSearch(search.name, other, search.query, chosen._replace(kinds=freed, frames=flags, skips=skips), search._sums)
 
 
-def _in_time(asked: ReaskedDecision, at: Place) -> Step | None:
+def _in_time(decision: ReaskedDecision, at: Place) -> Step | None:
     """The best frame though it was played just now, or plays nearly."""
-    at = _place_in(asked, at)
+    at = _place_in(decision, at)
     setting = OF_TIME.get(at.left_out)
     if setting is None:
         return None
-    chosen = asked.searches[at.name].chosen
+    chosen = decision.searches[at.name].chosen
     skips = tuple(skip for skip in chosen.skips if skip.why is not at.left_out)
-    return ChangePart("setting", setting, 0.0), _with(asked, at, chosen._replace(skips=skips))
+    return ChangePart("setting", setting, 0.0), _with(decision, at, chosen._replace(skips=skips))
 
 
-def _in_turn(asked: ReaskedDecision, at: Place) -> Step | None:
+def _in_turn(decision: ReaskedDecision, at: Place) -> Step | None:
     """The database searched though one before it won outright."""
-    choice = asked.choice
-    if choice is None or at.name in asked.searched or choice.database is None:
+    choice = decision.choice
+    if choice is None or at.name in decision.searched or choice.database is None:
         return None
     lower = _rounded(choice.hit.cost, downwards=True)
-    return ChangePart("threshold", choice.database, lower), asked.with_threshold(choice.database, lower)
+    return ChangePart("threshold", choice.database, lower), decision.with_threshold(choice.database, lower)
 
 
-def _cheaper(asked: ReaskedDecision, at: Place) -> Iterator[Step]:
+def _cheaper(decision: ReaskedDecision, at: Place) -> Iterator[Step]:
     """A bias, a threshold and a weight that bring an asset that may be chosen before the winner."""
-    choice = asked.choice
-    if choice is None or choice.database is None or at.left_out is not LeftOut.NO or at.name not in asked.searched:
+    choice = decision.choice
+    if choice is None or choice.database is None or at.left_out is not LeftOut.NO or at.name not in decision.searched:
         return
     behind = at.cost - choice.hit.cost
     added = -_rounded(behind + MARGIN * (abs(at.cost) + abs(choice.hit.cost)), downwards=False)
-    chosen = asked.searches[at.name].chosen
+    chosen = decision.searches[at.name].chosen
     biases = chosen.range_biases.copy()
     biases[at.range] += added
-    least = float(biases.min(initial=np.inf))
-    yield ChangePart("bias", at.asset, added), _with(asked, at, chosen._replace(range_biases=biases, least_of_ranges=least))
-    if at.name != choice.database and _comes_before(asked, at.name, choice.database):
+    yield ChangePart("bias", at.asset, added), _with(decision, at, chosen._replace(range_biases=biases))
+    if at.name != choice.database and _comes_before(decision, at.name, choice.database):
         to = _rounded(at.cost + MARGIN * abs(at.cost), downwards=False)
-        yield ChangePart("threshold", at.name, to), asked.with_threshold(at.name, to)
-    yield from _weighed(asked, at, choice)
+        yield ChangePart("threshold", at.name, to), decision.with_threshold(at.name, to)
+    yield from _weighed(decision, at, choice)
 
 
-def _weighed(asked: ReaskedDecision, at: Place, choice: Choice) -> Iterator[Step]:
+def _weighed(decision: ReaskedDecision, at: Place, choice: Choice) -> Iterator[Step]:
     """The one weight of least relative change with which the asset wins; without one, the one of least change at all."""
-    winner = asked.searches[str(choice.database)]
-    found: list[tuple[float, Step]] = []
+    winner = decision.searches[str(choice.database)]
+    steps: list[tuple[float, Step]] = []
     for i, channel in enumerate(at.search.database.channel_names):
         now = float(at.search.database.weights[i])
         weight = _weight_of_tie(channel, now, at, winner, choice.hit.frame)
@@ -229,16 +228,16 @@ def _weighed(asked: ReaskedDecision, at: Place, choice: Choice) -> Iterator[Step
             continue
         to = _rounded(weight, downwards=weight < now)
         size = abs(math.log((to + 1e-12) / (now + 1e-12)))
-        found.append((size, (ChangePart("weight", channel, to), asked.with_weights({channel: to}))))
-    found.sort(key=lambda each: each[0])
-    winning = [step for _, step in found if _wins(step[1], at.asset)]
-    yield from (winning or [step for _, step in found])[:1]
+        steps.append((size, (ChangePart("weight", channel, to), decision.with_weights({channel: to}))))
+    steps.sort(key=lambda each: each[0])
+    winning = [step for _, step in steps if _wins(step[1], at.asset)]
+    yield from (winning or [step for _, step in steps])[:1]
 
 
 def _weight_of_tie(channel: str, now: float, at: Place, winner: ReaskedSearch, frame: int) -> float | None:
     """The weight of a channel just beyond that at which a frame costs as much as the winner; None where there is none.
 
-    Costs may depend on all weights, as where these are divided by their sum: the tie is found step by step. Where a cost is a sum
+    Costs may depend on all weights, as where these are divided by their sum: the tie is computed in steps. Where a cost is a sum
     of weights times differences, the first step is exact.
     """
 
@@ -271,23 +270,23 @@ def _weight_of_tie(channel: str, now: float, at: Place, winner: ReaskedSearch, f
 # ---- small things
 
 
-def _with(asked: ReaskedDecision, at: Place, chosen: Filter) -> ReaskedDecision:
-    return _with_search(asked, asked.searches[at.name].with_filter(chosen))
+def _with(decision: ReaskedDecision, at: Place, chosen: Filter) -> ReaskedDecision:
+    return _with_search(decision, decision.searches[at.name].with_filter(chosen))
 
 
-def _with_search(asked: ReaskedDecision, search: ReaskedSearch) -> ReaskedDecision:
-    searches: Mapping[str, ReaskedSearch] = {**asked.searches, search.name: search}
-    return asked.with_searches(searches)
+def _with_search(decision: ReaskedDecision, search: ReaskedSearch) -> ReaskedDecision:
+    searches: Mapping[str, ReaskedSearch] = {**decision.searches, search.name: search}
+    return decision.with_searches(searches)
 
 
-def _place_in(asked: ReaskedDecision, at: Place) -> Place:
+def _place_in(decision: ReaskedDecision, at: Place) -> Place:
     """The best frame of a range in a changed decision."""
-    search = asked.searches[at.name]
+    search = decision.searches[at.name]
     return Place(search, at.range, search.best_of_range(at.range))
 
 
-def _comes_before(asked: ReaskedDecision, one: str, other: str) -> bool:
-    names = [entry.name for entry in asked.entries]
+def _comes_before(decision: ReaskedDecision, one: str, other: str) -> bool:
+    names = [entry.name for entry in decision.entries]
     return names.index(one) < names.index(other)
 
 
@@ -335,22 +334,22 @@ class Place:
         return LeftOut(int(self.search.left_out[self.frame]))
 
 
-def place_of(asked: ReaskedDecision, asset: str) -> Place:
+def place_of(decision: ReaskedDecision, asset: str) -> Place:
     """The best frame of an asset, in whichever database and range."""
-    found = [
+    places = [
         Place(search, i, frame)
-        for search in asked.searches.values()
+        for search in decision.searches.values()
         for i, each in enumerate(search.database.assets)
         if each == asset and (frame := search.best_of_range(i)) >= 0
     ]
-    if not found:
+    if not places:
         raise MotionError(Fault(f"the asset {in_quotes(asset)} has no frames.", "an asset with frames"))
-    return min(found, key=lambda at: (at.left_out is not LeftOut.NO, at.cost))
+    return min(places, key=lambda at: (at.left_out is not LeftOut.NO, at.cost))
 
 
-def rows_of(asked: ReaskedDecision, at: Place) -> list[Row]:
+def rows_of(decision: ReaskedDecision, at: Place) -> list[Row]:
     """The asset's rows in its table that are not valid, the nearest first; none where there is no table, or no facts."""
-    table, context = asked.stock.table(at.name), asked.decision.context
+    table, context = decision.stock.table(at.name), decision.decision.context
     if table is None or context is None:
         return []
     try:

@@ -59,12 +59,12 @@ def baked_cycle(
         raise MotionError(Fault(f"n_moments is {n_moments}.", f"from 2 to {MOST_MOMENTS:,}"))
     phases = np.arange(n_moments) / n_moments
     rotations, translations = (np.array(each) for each in zip(*map(cycle.at, phases.tolist()), strict=True))
-    shown = forward_kinematics(LocalPoses(cycle.skeleton, 1.0, translations, rotations))
+    poses = forward_kinematics(LocalPoses(cycle.skeleton, 1.0, translations, rotations))
     rest = _rest(cycle)
-    turns = np.stack([quaternions.rotate(shown.rotations, axis) for axis in np.eye(3)], axis=-1)
-    moved = shown.positions - np.einsum("fjab,jb->fja", turns, rest)
+    turns = np.stack([quaternions.rotate(poses.rotations, axis) for axis in np.eye(3)], axis=-1)
+    moved = poses.positions - np.einsum("fjab,jb->fja", turns, rest)
     matrices = np.concatenate((turns, moved[..., None]), axis=-1)
-    found: dict[str, NDArray[Any]] = {
+    arrays: dict[str, NDArray[Any]] = {
         "matrices": matrices.astype(np.float32),
         "rest": rest.astype(np.float32),
         "bones": np.array(cycle.skeleton.names),
@@ -75,8 +75,8 @@ def baked_cycle(
     }
     if points is not None or weights is not None:
         held, shares = _mesh(points, weights, len(rest))
-        found["positions"] = np.einsum("vj,fjab,vb->fva", shares, matrices, held, optimize=True).astype(np.float32)
-    return found
+        arrays["positions"] = np.einsum("vj,fjab,vb->fva", shares, matrices, held, optimize=True).astype(np.float32)
+    return arrays
 
 
 def _rest(cycle: Cycle) -> Floats:
@@ -94,8 +94,8 @@ def _mesh(points: ArrayLike | None, weights: ArrayLike | None, n_joints: int) ->
     except (TypeError, ValueError):
         raise MotionError(Fault("points or weights are not numbers.", f"{POINTS}; {WEIGHTS}")) from None
     if own.ndim != 2 or own.shape[1] != 3 or shares.shape != (len(own), n_joints):
-        found = f"points have the shape {own.shape}, weights {shares.shape}, and there are {n_joints} joints."
-        raise MotionError(Fault(found, f"{POINTS}; {WEIGHTS}"))
+        problem = f"points have the shape {own.shape}, weights {shares.shape}, and there are {n_joints} joints."
+        raise MotionError(Fault(problem, f"{POINTS}; {WEIGHTS}"))
     if not (np.isfinite(own).all() and np.abs(shares.sum(axis=1) - 1.0).max(initial=0.0) < 1e-3):
         raise MotionError(Fault("points are not finite, or weights do not sum to one.", f"{POINTS}; {WEIGHTS}"))
     return np.concatenate((own, np.ones((len(own), 1))), axis=1), shares

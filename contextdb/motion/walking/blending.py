@@ -71,8 +71,8 @@ class Gait:
             raise MotionError(Fault(f"the gait {in_quotes(self.name)} has no steady cycle.", "at least one"))
         for slow, fast in pairwise(steady):
             if slow.speed_mps == fast.speed_mps:
-                found = f"{in_quotes(slow.name)} and {in_quotes(fast.name)} are both {slow.speed_mps:g} m/s fast."
-                raise MotionError(Fault(found, "steady cycles of different speeds"))
+                problem = f"{in_quotes(slow.name)} and {in_quotes(fast.name)} are both {slow.speed_mps:g} m/s fast."
+                raise MotionError(Fault(problem, "steady cycles of different speeds"))
         same_rig(self.cycles)
 
     @cached_property
@@ -96,16 +96,16 @@ class Gait:
         speed_mps, acceleration, turn = (
             require_real(value, name) for value, name in ((speed_mps, "speed_mps"), (acceleration, "acceleration"), (turn, "turn"))
         )
-        found = np.zeros(len(self.cycles))
+        weights = np.zeros(len(self.cycles))
         speeds = _between([cycle.speed_mps for cycle in self.steady], speed_mps)
         for i, of_acceleration in enumerate(_column(acceleration)):
             for j, of_turn in enumerate(_column(turn)):
                 place = self._corners[i][j]
                 if place is None:
-                    found[: len(self.steady)] += of_acceleration * of_turn * speeds
+                    weights[: len(self.steady)] += of_acceleration * of_turn * speeds
                 else:
-                    found[place] += of_acceleration * of_turn
-        return found
+                    weights[place] += of_acceleration * of_turn
+        return weights
 
     @cached_property
     def _corners(self) -> list[list[int | None]]:
@@ -122,8 +122,8 @@ def same_rig(cycles: Sequence[Cycle]) -> None:
     for other in cycles[1:]:
         same = other.skeleton.names == first.skeleton.names and np.array_equal(other.skeleton.parents, first.skeleton.parents)
         if not same or other.feet != first.feet:
-            found = f"{in_quotes(first.name)} and {in_quotes(other.name)} are of different rigs."
-            raise MotionError(Fault(found, "cycles of one rig", RIG_MEND))
+            problem = f"{in_quotes(first.name)} and {in_quotes(other.name)} are of different rigs."
+            raise MotionError(Fault(problem, "cycles of one rig", RIG_MEND))
 
 
 def _column(value: float) -> tuple[float, float, float]:
@@ -136,11 +136,11 @@ def _between(speeds: Sequence[float], speed_mps: float) -> Floats:
     """The weights of ascending speeds: those of the nearest two, or of the first or last alone."""
     at = float(np.interp(speed_mps, speeds, np.arange(len(speeds))))
     low = min(int(at), len(speeds) - 1)
-    found = np.zeros(len(speeds))
-    found[low] = 1.0 - (at - low)
+    shares = np.zeros(len(speeds))
+    shares[low] = 1.0 - (at - low)
     if at > low:
-        found[low + 1] = at - low
-    return found
+        shares[low + 1] = at - low
+    return shares
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,8 +153,8 @@ class Mix:
     @classmethod
     def of(cls, cycles: Sequence[Cycle], weights: Floats) -> Mix:
         """Those of the cycles that have weight."""
-        kept = [i for i, weight in enumerate(weights.tolist()) if weight > 0.0]
-        return cls(tuple(cycles[i] for i in kept), tuple(weights[kept].tolist()))
+        indices = [i for i, weight in enumerate(weights.tolist()) if weight > 0.0]
+        return cls(tuple(cycles[i] for i in indices), tuple(weights[indices].tolist()))
 
     @cached_property
     def movement(self) -> Place3:

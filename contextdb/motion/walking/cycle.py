@@ -92,9 +92,9 @@ class Cycle:
         clip : Clip
             Of several cycles, of which the first whole one is taken, or of exactly one that loops.
         feet : (left bone, right bone), optional
-            Default: as `contextdb.motion.footfalls` finds them.
+            Default: as `contextdb.motion.clips.feet.footfalls` detects them.
         footfalls : Footfalls, optional
-            Those of the clip, where they are known better than they are found.
+            Those of the clip, where they are known better than they are detected.
         stances : Stances, optional
             When the feet are down in the cycle, counted from its mid-stance. Default: as the footfalls say.
 
@@ -208,7 +208,7 @@ def _cut(clip: Clip, bones: FootBones, falls: Footfalls | None, stances: Stances
     poses = poses_of(clip)
     if poses.n_frames < LEAST_MOMENTS:
         raise MotionError(Fault(f"the clip has {poses.n_frames} frames.", f"at least {LEAST_MOMENTS}"))
-    pair = bones.found_in(poses.skeleton)
+    pair = bones.feet_in(poses.skeleton)
     feet = pair[0].bone, pair[1].bone
     known = footfalls_of(poses, bones) if falls is None else falls
     middles = _middles(known, 0, poses)
@@ -219,9 +219,9 @@ def _cut(clip: Clip, bones: FootBones, falls: Footfalls | None, stances: Stances
     if math.hypot(*cut.movement[:2]) < LEAST_STRIDE_M:
         raise MotionError(Fault(f"the body comes {math.hypot(*cut.movement[:2]):.2f} m far in a cycle.", "a cycle that moves on"))
     is_known = falls is not None and len(middles) > 1
-    own = _known(known, spans[best]) if is_known else _found(cut, bones)
+    own = _known(known, spans[best]) if is_known else _detected(cut, bones)
     if own is None:
-        raise MotionError(Fault("no whole cycle is found in it.", A_LOOP))
+        raise MotionError(Fault("no whole cycle is detected in it.", A_LOOP))
     shift = own.middle(0)
     n = len(cut.local.rotations) - 1
     round_ = LocalPoses(poses.skeleton, poses.rate, cut.local.positions[:-1], cut.local.rotations[:-1])
@@ -257,7 +257,7 @@ def _inwards(stances: Stances, n: int) -> Stances:
     return replace(stances, down=down, up=(math.floor(c * n + 1e-6) / n % 1.0, math.floor(d * n + 1e-6) / n % 1.0))
 
 
-def _found(cut: _Cut, bones: FootBones) -> Stances | None:
+def _detected(cut: _Cut, bones: FootBones) -> Stances | None:
     """The stances of a cycle, of three rounds of it; None where a foot does not come down once in each."""
     n = len(cut.local.rotations) - 1
     moments = np.arange(3 * n + 1)
@@ -362,9 +362,9 @@ def _closed(cut: _Cut, most: tuple[float, float]) -> _Cut:
     local = cut.local
     if cut.apart(most) > 1.0:
         name = in_quotes(local.skeleton.names[cut.joint])
-        found = f"the cycle's end is not its beginning: {name} and others are up to {100.0 * cut.apart_m:.1f} cm and"
+        problem = f"the cycle's end is not its beginning: {name} and others are up to {100.0 * cut.apart_m:.1f} cm and"
         accepted = f"ends that differ by at most {100.0 * most[0]:g} cm and {most[1]:g}°"
-        raise MotionError(Fault(f"{found} {cut.apart_deg:.1f}° from where it began.", accepted))
+        raise MotionError(Fault(f"{problem} {cut.apart_deg:.1f}° from where it began.", accepted))
     n = len(local.rotations) - 1
     shares = (np.arange(n + 1) / n)[:, None, None]
     nothing = np.array([[[1.0, 0.0, 0.0, 0.0]]])

@@ -120,14 +120,14 @@ def adjusted(step: Footstep, adjust: Adjust | None) -> Footstep:
     """A footstep as the game moves it. Raises ContextError where it gives something else."""
     if adjust is None:
         return step
-    found = adjust(step)
-    if found is None:
+    adjustment = adjust(step)
+    if adjustment is None:
         return step
-    if not isinstance(found, Footstep) or found.foot != step.foot:
-        raise ContextError(Fault(f"adjust gave {found!r}.", AN_ADJUST))
-    if not all(isinstance(each, (int, float)) and math.isfinite(each) for each in (found.x, found.z, found.heading)):
-        raise ContextError(Fault(f"adjust gave {found!r}.", "finite numbers"))
-    return found
+    if not isinstance(adjustment, Footstep) or adjustment.foot != step.foot:
+        raise ContextError(Fault(f"adjust gave {adjustment!r}.", AN_ADJUST))
+    if not all(isinstance(each, (int, float)) and math.isfinite(each) for each in (adjustment.x, adjustment.z, adjustment.heading)):
+        raise ContextError(Fault(f"adjust gave {adjustment!r}.", "finite numbers"))
+    return adjustment
 
 
 def delta(wanted: Footstep, seen: Footstep) -> Place3:

@@ -68,5 +68,5 @@ def advanced(state: GaitState, gaits: Sequence[Gait], wanted: int, each: Sequenc
 
 
 def _limits(gaits: Sequence[Gait], slower: int) -> tuple[float, float]:
-    """The two speeds between which both of two gaits beside each other are kept."""
+    """The two speeds between which both of two neighbouring gaits are retained."""
     return gaits[slower].fastest_mps, gaits[slower + 1].slowest_mps

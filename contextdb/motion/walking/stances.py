@@ -139,9 +139,9 @@ def _edges(curve: np.ndarray, foot: int) -> Pair:
     is_down, after = curve >= bar, np.roll(curve, -1)
     rises, falls = np.flatnonzero(~is_down & (after >= bar)), np.flatnonzero(is_down & (after < bar))
     if len(rises) != 1:
-        found = f"comes down {len(rises)} times" if len(rises) else "never comes down, or never goes up"
+        problem = f"comes down {len(rises)} times" if len(rises) else "never comes down, or never goes up"
         raise MotionError(
-            Fault(f"the {side} foot {found} in the curves.", "a foot that comes down once and goes up once in a cycle")
+            Fault(f"the {side} foot {problem} in the curves.", "a foot that comes down once and goes up once in a cycle")
         )
     down, up = (i + (bar - curve[i]) / (after[i] - curve[i]) for i in (int(rises[0]), int(falls[0])))
     return float(down / n) % 1.0, float(up / n) % 1.0

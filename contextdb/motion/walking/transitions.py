@@ -99,8 +99,8 @@ class Transitions:
 
     def _near(self, name: str) -> str:
         """A clip that is perhaps meant to have a name; "" for none."""
-        found = nearest(name, self.clips) or ""
-        return found if SequenceMatcher(None, name.casefold(), found.casefold()).ratio() >= MISSPELT else ""
+        near = nearest(name, self.clips) or ""
+        return near if SequenceMatcher(None, name.casefold(), near.casefold()).ratio() >= MISSPELT else ""
 
 
 def _is_pattern(text: str) -> bool:

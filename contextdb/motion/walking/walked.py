@@ -58,7 +58,7 @@ def walked_clips(
     Returns
     -------
     list of Clip
-        In centimetres. A name is the gait, the speed as it was asked for, and the turn: "walk_1.30", "walk_1.30_left_45".
+        In centimetres. A name is the gait, the speed as it was requested, and the turn: "walk_1.30", "walk_1.30_left_45".
 
     Raises
     ------
@@ -129,7 +129,7 @@ def _rig(skeleton: Skeleton, pose: Pose) -> Skeleton:
     """A skeleton with its offsets in metres, as a pose has them."""
     offsets = np.array(pose.translations)
     offsets[0] = 0.0
-    own, shown = (float(np.linalg.norm(each[1:])) for each in (skeleton.offsets, offsets))
-    scale = shown / own if own else 1.0
+    own, displayed = (float(np.linalg.norm(each[1:])) for each in (skeleton.offsets, offsets))
+    scale = displayed / own if own else 1.0
     ends = tuple((joint, (x * scale, y * scale, z * scale)) for joint, (x, y, z) in skeleton.end_sites)
     return replace(skeleton, offsets=offsets, end_sites=ends)

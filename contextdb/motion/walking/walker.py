@@ -21,12 +21,12 @@ import numpy as np
 
 from contextdb.cells.arguments import require_kind, require_many_of, require_real
 from contextdb.errors import ContextError, Fault, MotionError
+from contextdb.files.settings import Declared, number
 from contextdb.motion.clips.ground_place import A_BODY, OfBody, place_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.steering import Steered
-from contextdb.motion.output.ground import A_GROUND
+from contextdb.motion.output.ground import A_GROUND, Ground
 from contextdb.motion.output.samples import Place3
-from contextdb.motion.output.stages import Ground, damping, decayed
 from contextdb.motion.output.stream import Pose
 from contextdb.motion.walking.blending import Gait, Mix, same_rig
 from contextdb.motion.walking.footsteps import AN_ADJUST, Adjust, Footstep, Going, Steps, stepped
@@ -40,27 +40,19 @@ LEAST_MPS = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
-class WalkSettings:
+class WalkSettings(Declared, error=ContextError):
     """What counts as the full of an acceleration and of a turn, and how fast the blend follows them.
-
-    Attributes
-    ----------
-    full_acceleration_mps2, full_turn_dps : float
-        Where the cycles of speeding up and slowing down, and those of turning, have all the weight.
-    halflife_s : float
-        How fast speed, acceleration and turn, as the blend sees them, follow those of the body.
 
     Raises ContextError for numbers that are not above 0.
     """
 
-    full_acceleration_mps2: float = 3.0
-    full_turn_dps: float = 180.0
-    halflife_s: float = 0.15
-
-    def __post_init__(self) -> None:
-        require_real(self.full_acceleration_mps2, "full_acceleration_mps2", 1e-3, 1e6)
-        require_real(self.full_turn_dps, "full_turn_dps", 1e-3, 1e6)
-        require_real(self.halflife_s, "halflife_s", 1e-3, 60.0)
+    full_acceleration_mps2: float = number(
+        "Where the cycles of speeding up and slowing down have all the weight.", 3.0, 1e-3, 1e6, "metres a second squared"
+    )
+    full_turn_dps: float = number("Where the cycles of turning have all the weight.", 180.0, 1e-3, 1e6, "degrees a second")
+    halflife_s: float = number(
+        "How fast speed, acceleration and turn, as the blend sees them, follow those of the body.", 0.15, 1e-3, 60.0, "seconds"
+    )
 
 
 USUAL = WalkSettings()
@@ -68,7 +60,7 @@ USUAL = WalkSettings()
 
 @dataclass(frozen=True, eq=False, slots=True)
 class WalkState:
-    """Where a walker is: all that its next pose depends on beside the next body. Never changed, so it may be kept as it is.
+    """Where a walker is: all that its next pose depends on beside the next body. Never changed, so it may be stored as it is.
 
     `seen` is what the blend sees of the body: its speed, and its acceleration and turn as shares of the full of them; `seen_change`
     is how that changes a second.
@@ -144,10 +136,10 @@ class Walker:
     def weights(self) -> Mapping[str, float]:
         """The cycles that have weight now, by the names of their clips."""
         mix = self._mix(self._state)
-        found = dict.fromkeys((cycle.name for cycle in mix.cycles), 0.0)
+        weights = dict.fromkeys((cycle.name for cycle in mix.cycles), 0.0)
         for cycle, weight in zip(mix.cycles, mix.weights, strict=True):
-            found[cycle.name] += weight
-        return found
+            weights[cycle.name] += weight
+        return weights
 
     @property
     def footsteps(self) -> tuple[Footstep, ...]:
@@ -199,7 +191,7 @@ class Walker:
             stepped(own[0], 0, mix, state.phase, going, adjust),
             stepped(own[1], 1, mix, state.phase, going, adjust),
         )
-        return self._shown(state, mix, steps, ground, dt, is_new, step)
+        return self._displayed(state, mix, steps, ground, dt, is_new, step)
 
     def _moved(self, state: WalkState, body: OfBody, place: Place3, dt: float) -> tuple[WalkState, bool]:
         """The state with what the game does with the body; and whether the body is new where it is."""
@@ -216,9 +208,9 @@ class Walker:
             first = next((i for i, each in enumerate(self.gaits) if going.speed_mps <= each.fastest_mps), len(self.gaits) - 1)
             return replace(state, gait=GaitState(first, first), going=going, seen=goal), True
         apart = state.seen[0] - goal[0], state.seen[1] - goal[1], state.seen[2] - goal[2]
-        left, change = decayed(apart, state.seen_change, damping(self.settings.halflife_s), dt)
-        seen = goal[0] + left[0], goal[1] + left[1], goal[2] + left[2]
-        return replace(state, going=going, seen=seen, seen_change=change), is_new
+        remaining, change = _decayed(np.array(apart), np.array(state.seen_change), self.settings.halflife_s, dt)
+        speed, gained, turned = (np.array(goal) + remaining).tolist()
+        return replace(state, going=going, seen=(speed, gained, turned), seen_change=tuple(change.tolist())), is_new
 
     def _movement(self, body: OfBody, place: Place3, before: Going | None, dt: float) -> Place3 | None:
         """How the body moves a second, to its left, ahead and turning; None where that is not to be known."""
@@ -261,16 +253,23 @@ class Walker:
             parts.append(share * own.weights(*seen) if share > 0.0 else np.zeros(len(own.cycles)))
         return Mix.of(self._cycles, np.concatenate(parts))
 
-    def _shown(
+    def _displayed(
         self, state: WalkState, mix: Mix, steps: tuple[Steps, Steps], ground: Ground | None, dt: float, is_new: bool, step: float
     ) -> Pose:
         """The pose on its ground; the walker then is in that state."""
         assert state.going is not None
         place = state.going.place
         below = self._legs.grounded(state.ground or LEVEL, mix, state.phase, steps, ground, dt, is_new or state.ground is None)
-        shown, below = self._legs.shown(below, mix, state.phase, steps, place, dt)
+        pose, below = self._legs.displayed(below, mix, state.phase, steps, place, dt)
         self._state = replace(state, steps=steps, ground=below)
         duration_s = sum(weight * cycle.duration_s for cycle, weight in zip(mix.cycles, mix.weights, strict=True))
         rate = step * duration_s / dt if dt > 0.0 else 1.0
         contacts = np.array([each.is_down for each in steps], np.bool_)
-        return Pose(None, False, False, place, shown.rotations, shown.translations, shown.positions, contacts, rate)
+        return Pose(None, False, False, place, pose.rotations, pose.translations, pose.positions, contacts, rate)
+
+
+def _decayed(offset: Floats, speed: Floats, halflife_s: float, dt_s: float) -> tuple[Floats, Floats]:
+    """Numbers that decay to 0 as critically damped springs, and their change a second, some time later."""
+    y = 2.0 * math.log(2.0) / halflife_s
+    pushed, fade = speed + offset * y, math.exp(-y * dt_s)
+    return fade * (offset + pushed * dt_s), fade * (speed - pushed * y * dt_s)

@@ -54,10 +54,10 @@ def align(before: TableData, after: TableData) -> Alignment:
 
 def inverse(came_from: CameFrom, n_before: int) -> CameFrom:
     """Where each of before is now, -1 where it is gone; each is taken once at most."""
-    found = np.full(n_before, -1, np.int64)
-    kept = np.flatnonzero(came_from >= 0)
-    found[came_from[kept]] = kept
-    return found
+    places = np.full(n_before, -1, np.int64)
+    retained = np.flatnonzero(came_from >= 0)
+    places[came_from[retained]] = retained
+    return places
 
 
 def moved(came_from: CameFrom) -> NDArray[np.bool_]:
@@ -119,10 +119,10 @@ def _pair_renamed(matching: Matching, names: Shared, others: Sequence[Shared]) -
     if matching.is_done:
         return
     if others:
-        said, rest = says_something(others), signatures(others, [len(codes) for codes in names.codes])
-        matching.pair_by(rest, is_unique=True, among=said)
+        specified, rest = says_something(others), signatures(others, [len(codes) for codes in names.codes])
+        matching.pair_by(rest, is_unique=True, among=specified)
         gaps = matching.gaps()
-        matching.pair_by((mixed(rest[0], gaps[0]), mixed(rest[1], gaps[1])), among=said)
+        matching.pair_by((mixed(rest[0], gaps[0]), mixed(rest[1], gaps[1])), among=specified)
     gaps = matching.gaps()
     matching.pair_alike(gaps, others, LEAST_ALIKE)
     matching.pair_alike_names(gaps, names)
@@ -133,9 +133,9 @@ def _pair_renamed(matching: Matching, names: Shared, others: Sequence[Shared]) -
 
 def row_twins(ours: TableData, theirs: TableData, new_ours: Places, new_theirs: Places) -> CameFrom:
     """For each row of theirs the row of ours that both sides inserted: of the same asset, or without one the same in every cell."""
-    found = np.full(theirs.n_rows, -1, np.int64)
+    twins = np.full(theirs.n_rows, -1, np.int64)
     if not len(new_ours) or not len(new_theirs):
-        return found
+        return twins
     matching = Matching(ours.n_rows, theirs.n_rows)
     is_new = [np.isin(np.arange(n), new) for n, new in ((ours.n_rows, new_ours), (theirs.n_rows, new_theirs))]
     places = {c.name: at for at, c in enumerate(ours.columns)}
@@ -153,28 +153,28 @@ def row_twins(ours: TableData, theirs: TableData, new_ours: Places, new_theirs: 
 
 
 def _align_columns(before: TableData, after: TableData, rows: CameFrom, by_name: CameFrom) -> CameFrom:
-    found = by_name.copy()
+    pairs = by_name.copy()
     assets = _asset_place(before), _asset_place(after)
-    if found[assets[1]] < 0 and assets[0] not in found:
-        found[assets[1]] = assets[0]
-    new = np.flatnonzero(found < 0)
-    gone = np.setdiff1d(np.arange(len(before.columns)), found)
+    if pairs[assets[1]] < 0 and assets[0] not in pairs:
+        pairs[assets[1]] = assets[0]
+    new = np.flatnonzero(pairs < 0)
+    gone = np.setdiff1d(np.arange(len(before.columns)), pairs)
     if len(new) and len(gone) and len(new) * len(gone) <= MOST_PAIRS:
-        kept = np.flatnonzero(rows >= 0)
+        retained = np.flatnonzero(rows >= 0)
         likeness = np.array(
-            [[_column_likeness(before, after, b, a, rows[kept], kept) for a in new.tolist()] for b in gone.tolist()]
+            [[_column_likeness(before, after, b, a, rows[retained], retained) for a in new.tolist()] for b in gone.tolist()]
         )
         for i, j in best_pairs(likeness, LEAST_ALIKE):
-            found[new[j]] = gone[i]
-    return found
+            pairs[new[j]] = gone[i]
+    return pairs
 
 
 def _column_likeness(before: TableData, after: TableData, b: int, a: int, rows_before: Places, rows_after: Places) -> float:
     shared = Shared.of((before.columns[b], after.columns[a]))
     old, now = shared.at(0, rows_before), shared.at(1, rows_after)
-    said = ~(shared.is_any[old] & shared.is_any[now])
-    if said.any():
-        return float((old == now)[said].mean())
+    specified = ~(shared.is_any[old] & shared.is_any[now])
+    if specified.any():
+        return float((old == now)[specified].mean())
     likeness = name_likeness(before.columns[b].name, after.columns[a].name)
     return likeness if likeness >= LEAST_NAME_ALIKE else 0.0
 

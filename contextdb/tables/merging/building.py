@@ -1,4 +1,4 @@
-"""The edit that makes one table another: its rows, its columns, what is said of them, and the texts that then still differ."""
+"""The edit that makes one table another: its rows, its columns, the settings of them, and the texts that then still differ."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import numpy as np
 
 from contextdb.columns import TextColumn
 from contextdb.errors import SchemaError
-from contextdb.schema.jobs import JOB_KEYS
 from contextdb.schema.sections import condition_to_dict, differences, settings_to_dict
 from contextdb.schema.settings import Schema, TableSettings
+from contextdb.schema.table_settings import JOB_KEYS
 from contextdb.tables.changes import CameFrom, Cells, Change, Columns, Edit, Rows, Sections
 from contextdb.tables.data import TableData
 from contextdb.tables.merging.shared import Shared
@@ -38,8 +38,8 @@ def edit_to(
     if layout != tuple((c.name, c.name) for c in before.columns):
         changes.append(Columns(layout))
     middle = Edit(name, tuple(c for c in changes if isinstance(c, Columns))).apply(before)
-    said = say(middle)
-    changes += [] if said.is_empty else [said]
+    name_of = say(middle)
+    changes += [] if name_of.is_empty else [name_of]
     texts = {c.name: _differences(before, c, rows, f) for c, f in zip(columns, fields.tolist(), strict=True)}
     texts = {column: cells for column, cells in texts.items() if cells}
     return Edit(name, (*changes, Cells(texts)) if texts else tuple(changes))
@@ -56,21 +56,21 @@ def edit_under(
 ) -> Edit:
     """The same, with the jobs of columns from `settings` and what `schema` declares of these columns, unless the two cannot be said
     together: then `before` keeps what it says."""
-    return edit_to(before, columns, rows, fields, lambda table: _said_of(table, columns, settings, schema), name)
+    return edit_to(before, columns, rows, fields, lambda table: _sections_of(table, columns, settings, schema), name)
 
 
-def _said_of(table: TableData, columns: Sequence[TextColumn], settings: TableSettings, schema: Schema) -> Sections:
+def _sections_of(table: TableData, columns: Sequence[TextColumn], settings: TableSettings, schema: Schema) -> Sections:
     changed = differences(settings_to_dict(table.settings), settings_to_dict(settings))
     jobs = {key: value for key, value in changed.items() if key in JOB_KEYS}
     known = table.schema.conditions
     wanted = (schema.conditions.get(c.name) for c in columns)
     declared = {c.name: condition_to_dict(c) for c in wanted if c is not None and known.get(c.name) != c}
-    said = Sections(jobs, {"conditions": declared} if declared else {})
+    sections = Sections(jobs, {"conditions": declared} if declared else {})
     try:
-        said.apply(table.with_rows_taken([]))
+        sections.apply(table.with_rows_taken([]))
     except SchemaError:
         return Sections()
-    return said
+    return sections
 
 
 def _differences(before: TableData, column: TextColumn, rows: CameFrom, field: int) -> dict[int, str]:

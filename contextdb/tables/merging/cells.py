@@ -29,7 +29,7 @@ def merge_column(
         return as_is, []
     sides = [table.columns[at] if at >= 0 else None for table, at in zip(tables, places, strict=True)]
     shared = Shared.of((*sides, _EMPTY))
-    base, ours, theirs = (shared.at(i, found) for i, found in enumerate((rows.base, rows.ours, rows.theirs)))
+    base, ours, theirs = (shared.at(i, rows_of) for i, rows_of in enumerate((rows.base, rows.ours, rows.theirs)))
     merged, clashes = _merged(base, ours, theirs)
     merged[merged < 0] = int(shared.codes[3][0])
     conflicts = []
@@ -42,7 +42,7 @@ def merge_column(
 def _untouched(tables: Tables, rows: Origins, places: tuple[int, int, int], name: str) -> TextColumn | None:
     """The column of ours where it holds what theirs and base hold, and all rows stay: nothing is worked out then."""
     if min(places) < 0 or not all(
-        np.array_equal(found, np.arange(tables[1].n_rows)) for found in (rows.base, rows.ours, rows.theirs)
+        np.array_equal(taken, np.arange(tables[1].n_rows)) for taken in (rows.base, rows.ours, rows.theirs)
     ):
         return None
     base, ours, theirs = (table.columns[at] for table, at in zip(tables, places, strict=True))
@@ -96,16 +96,20 @@ def _judged(
 
 
 def changed_in(tables: tuple[TableData, TableData], columns: Places, rows: tuple[Places, Places]) -> Flags:
-    """Whether any cell of some rows of a side differs from base's, or says something in a new column: bool [rows].
+    """Whether any cell of some rows of a side differs from base's: bool [rows].
 
     `tables` are base and the side, `columns` says for each column of the side which one of base it was, and `rows` are places in
     both.
     """
-    found = np.zeros(len(rows[0]), np.bool_)
-    if not len(found):
-        return found
-    for at, was in enumerate(columns.tolist()):
-        shared = Shared.of((tables[0].columns[was] if was >= 0 else None, tables[1].columns[at]))
-        now = shared.at(1, rows[1])
-        found |= shared.at(0, rows[0]) != now if was >= 0 else ~shared.is_any[now]
-    return found
+    flags = np.zeros(len(rows[0]), np.bool_)
+    for at in np.flatnonzero(columns >= 0).tolist() if len(flags) else ():
+        shared = Shared.of((tables[0].columns[columns[at]], tables[1].columns[at]))
+        flags |= shared.at(0, rows[0]) != shared.at(1, rows[1])
+    return flags
+
+
+def new_cells(side: TableData, columns: Places, rows: Places) -> Iterator[tuple[int, int]]:
+    """The row and the column of each cell of some rows of a side that says something in a column that base has not."""
+    new = [(at, Shared.of((side.columns[at],))) for at in np.flatnonzero(columns < 0).tolist()]
+    for row in rows.tolist():
+        yield from ((row, at) for at, shared in new if not shared.is_any[shared.codes[0][row]])

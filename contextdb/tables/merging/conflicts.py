@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from contextdb.errors import safe_text
+
 Side = Literal["ours", "theirs"]
 Key = tuple[object, ...]
 """What a conflict is about, whatever else is decided."""
@@ -37,3 +39,20 @@ class Conflict:
     def place(self) -> str:
         """Where it is, in words."""
         return {"cell": f"{self.asset}, {self.column}", "row": self.asset}.get(self.kind, self.column)
+
+
+@dataclass(frozen=True, slots=True)
+class LostCell:
+    """A cell of a new column of one side, left out of the merge with its row, which the other side deleted."""
+
+    asset: str
+    column: str
+    text: str
+    side: Side
+    """Who wrote it."""
+
+    def __str__(self) -> str:
+        other = "theirs" if self.side == "ours" else "ours"
+        asset, column, text = (safe_text(text) for text in (self.asset, self.column, self.text))
+        cell = f'{asset}, {column}: {self.side} has "{text}"'
+        return f"{cell} in this new column; it is left out with the row, which {other} deleted."

@@ -48,10 +48,10 @@ class Matching:
         among: Among | None = None,
     ) -> None:
         """Take free rows of equal keys together, the first with the first; `is_unique`: only keys that stand once on both sides."""
-        free = [np.flatnonzero(found < 0) for found in (self.of_before, self.of_after)]
+        free = [np.flatnonzero(taken < 0) for taken in (self.of_before, self.of_after)]
         if among is not None:
             free = [rows[flags[rows]] for rows, flags in zip(free, among, strict=True)]
-        left, right = _joined(keys[0][free[0]], keys[1][free[1]], is_unique)
+        left, right = _equal_positions(keys[0][free[0]], keys[1][free[1]], is_unique)
         self.pair(free[0][left], free[1][right])
 
     def gaps(self) -> tuple[Places, Places]:
@@ -71,13 +71,13 @@ class Matching:
             if len(left) * len(right) > MOST_PAIRS // 16:
                 continue
             texts = [[names.texts[c] for c in codes[rows].tolist()] for codes, rows in zip(names.codes, (left, right), strict=True)]
-            found = np.array([[name_likeness(a, b) for b in texts[1]] for a in texts[0]])
-            for i, j in best_pairs(found, LEAST_NAME_ALIKE):
+            likeness = np.array([[name_likeness(a, b) for b in texts[1]] for a in texts[0]])
+            for i, j in best_pairs(likeness, LEAST_NAME_ALIKE):
                 self.pair(left[i : i + 1], right[j : j + 1])
 
     def _groups(self, keys: Keys) -> Iterator[tuple[Places, Places]]:
         """Free rows of equal keys, group by group; groups too large to be compared are left out."""
-        free = [np.flatnonzero(found < 0) for found in (self.of_before, self.of_after)]
+        free = [np.flatnonzero(taken < 0) for taken in (self.of_before, self.of_after)]
         lefts, rights = (_by_key(side, rows) for side, rows in zip(keys, free, strict=True))
         for key in sorted(lefts.keys() & rights.keys()):
             n_pairs = len(lefts[key]) * len(rights[key])
@@ -90,16 +90,16 @@ def _by_key(keys: NDArray[np.integer], rows: Places) -> dict[int, Places]:
     if not len(rows):
         return {}
     order = rows[np.argsort(keys[rows], kind="stable")]
-    found, starts = np.unique(keys[order], return_index=True)
-    return dict(zip(found.tolist(), np.split(order, starts[1:]), strict=True))
+    distinct, starts = np.unique(keys[order], return_index=True)
+    return dict(zip(distinct.tolist(), np.split(order, starts[1:]), strict=True))
 
 
-def _joined(before: NDArray[np.integer], after: NDArray[np.integer], is_unique: bool) -> tuple[Places, Places]:
+def _equal_positions(before: NDArray[np.integer], after: NDArray[np.integer], is_unique: bool) -> tuple[Places, Places]:
     """Positions of equal keys: the nth of before with the nth of after."""
-    found, ids = np.unique(np.concatenate([before, after]), return_inverse=True)
+    distinct, ids = np.unique(np.concatenate([before, after]), return_inverse=True)
     left, right = ids[: len(before)], ids[len(before) :]
     if is_unique:
-        counts = [np.bincount(side, minlength=len(found)) for side in (left, right)]
+        counts = [np.bincount(side, minlength=len(distinct)) for side in (left, right)]
         is_once = (counts[0] == 1) & (counts[1] == 1)
         lefts, rights = np.flatnonzero(is_once[left]), np.flatnonzero(is_once[right])
         return lefts[np.argsort(left[lefts])], rights[np.argsort(right[rights])]
@@ -118,9 +118,9 @@ def _nth(ids: Places) -> Places:
     return nth
 
 
-def _last_known(found: Places) -> Places:
-    at = np.maximum.accumulate(np.where(found >= 0, np.arange(1, len(found) + 1), 0))
-    return np.append(-1, found)[at]
+def _last_known(rows: Places) -> Places:
+    at = np.maximum.accumulate(np.where(rows >= 0, np.arange(1, len(rows) + 1), 0))
+    return np.append(-1, rows)[at]
 
 
 # ---- what tells rows apart
@@ -130,17 +130,17 @@ def signatures(cells: Sequence[Shared], sizes: Sequence[int]) -> tuple[Signature
     """A number for each row that is equal where all cells are; `sizes` are the rows of before and of after."""
     sides = []
     for side, n_rows in enumerate(sizes):
-        found = np.zeros(n_rows, np.uint64)
+        hashes = np.zeros(n_rows, np.uint64)
         for shared in cells:
-            found = mixed(found, shared.codes[side])
-        sides.append(found)
+            hashes = mixed(hashes, shared.codes[side])
+        sides.append(hashes)
     return sides[0], sides[1]
 
 
 def mixed(signature: Signatures, more: NDArray[np.integer]) -> Signatures:
     """Numbers that are equal where both are."""
-    found = (signature ^ (more.astype(np.uint64) + np.uint64(1))) * np.uint64(0x9E3779B97F4A7C15)
-    return found ^ (found >> np.uint64(29))
+    mix = (signature ^ (more.astype(np.uint64) + np.uint64(1))) * np.uint64(0x9E3779B97F4A7C15)
+    return mix ^ (mix >> np.uint64(29))
 
 
 def with_neighbours(names: Sequence[Places], whole: tuple[Signatures, Signatures]) -> Iterator[Keys]:
@@ -163,13 +163,13 @@ def says_something(cells: Sequence[Shared]) -> Among:
 
 def _likeness(left: Places, right: Places, cells: Sequence[Shared]) -> Likeness:
     """The share of equal cells among those that say something in either row: float64 [left, right], 0 where none does."""
-    equal, said = np.zeros((len(left), len(right))), np.zeros((len(left), len(right)))
+    equal, specified = np.zeros((len(left), len(right))), np.zeros((len(left), len(right)))
     for shared in cells:
         before, after = shared.codes[0][left][:, None], shared.codes[1][right][None, :]
         counts = ~(shared.is_any[before] & shared.is_any[after])
         equal += counts & (before == after)
-        said += counts
-    return equal / np.maximum(said, 1)
+        specified += counts
+    return equal / np.maximum(specified, 1)
 
 
 def best_pairs(likeness: Likeness, least: float) -> Iterator[tuple[int, int]]:

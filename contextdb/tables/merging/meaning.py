@@ -6,9 +6,8 @@ from collections.abc import Callable
 
 from contextdb.cells.grammar import parse_cell
 from contextdb.cells.outputs import Output
-from contextdb.cells.words import truth_of
+from contextdb.cells.words import says_any, truth_of
 from contextdb.errors import CellError
-from contextdb.expressions.rules import has_no_rule
 from contextdb.tables.condition_column import ConditionColumn
 from contextdb.tables.data import TableData
 
@@ -33,7 +32,7 @@ def meaning_of(table: TableData, column: int) -> Meaning:
     if (output := settings.output(name)) is not None:
         return _output_reader(output)
     if name == settings.when:
-        return lambda text: "" if has_no_rule(text) else text.strip()
+        return lambda text: "" if says_any(text) else text.strip()
     return lambda text: None
 
 

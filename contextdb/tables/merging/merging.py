@@ -19,18 +19,18 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.outputs import Output
 from contextdb.cells.words import says_any
 from contextdb.columns import TextColumn
-from contextdb.errors import shown
-from contextdb.schema.jobs import JOB_KEYS, JOBS
+from contextdb.errors import safe_text
 from contextdb.schema.sections import job_faults
 from contextdb.schema.settings import Schema, TableSettings, settings_renamed, with_outputs
+from contextdb.schema.table_settings import JOB_KEYS, JOBS
 from contextdb.tables.changes import CameFrom, Edit
 from contextdb.tables.data import AnyTable, TableData
 from contextdb.tables.merging.alignment import Alignment, align, inverse, row_twins
 from contextdb.tables.merging.building import edit_under
-from contextdb.tables.merging.cells import changed_in, merge_column
-from contextdb.tables.merging.conflicts import Conflict, Decided, Side
+from contextdb.tables.merging.cells import changed_in, merge_column, new_cells
+from contextdb.tables.merging.conflicts import Conflict, Decided, LostCell, Side
 from contextdb.tables.merging.order import Origins, Sides, merged_order
-from contextdb.tables.merging.shared import Shared
+from contextdb.tables.merging.shared import Places, Shared
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +49,7 @@ class Merge(Generic[AnyTable]):
     conflicts: tuple[Conflict, ...]
     """What is not decided yet, by row; until then `columns` has it as ours."""
     decided: Decided
+    lost: tuple[LostCell, ...] = ()
 
     @cached_property
     def table(self) -> AnyTable:
@@ -76,7 +77,7 @@ def merge(base: AnyTable, ours: AnyTable, theirs: AnyTable, decided: Decided | N
     decided = decided or {}
     of_ours, of_theirs = align(base, ours), align(base, theirs)
     fields, names, about_columns = merge_columns(base, ours, theirs, of_ours, of_theirs, decided)
-    rows, about_rows = merge_rows(base, ours, theirs, of_ours, of_theirs, decided)
+    rows, about_rows, lost = merge_rows(base, ours, theirs, of_ours, of_theirs, decided)
     merged = [
         merge_column((base, ours, theirs), rows, (int(b), int(o), int(t)), name, decided)
         for b, o, t, name in zip(fields.base, fields.ours, fields.theirs, names, strict=True)
@@ -85,12 +86,13 @@ def merge(base: AnyTable, ours: AnyTable, theirs: AnyTable, decided: Decided | N
     schema = _schema(base.schema, ours.schema, theirs.schema)
     settings = _settings(base, ours, theirs, fields, names, schema)
     asset = next((c for c in columns if c.name == settings.asset), columns[0])
-    cells = sorted((one for _, found in merged for one in found), key=lambda one: one.row or 0)
+    cells = sorted((one for _, of_column in merged for one in of_column), key=lambda one: one.row or 0)
     named = tuple(replace(one, asset=asset[one.row] if one.row is not None else "") for one in cells)
-    return Merge(base, ours, theirs, rows, fields, columns, settings, schema, (*about_columns, *about_rows, *named), decided)
+    conflicts = (*about_columns, *about_rows, *named)
+    return Merge(base, ours, theirs, rows, fields, columns, settings, schema, conflicts, decided, lost)
 
 
-# ---- what is said of the columns
+# ---- the settings of the columns
 
 
 def _settings(
@@ -108,24 +110,24 @@ def _settings(
     is_same = yours["outputs"] == was["outputs"]
     wanted: dict[str, Any] = {} if is_same else {"outputs": _merged_names(was["outputs"], mine["outputs"], yours["outputs"])}
     wanted |= {key: yours[key] for key in JOBS if mine[key] == was[key] != yours[key]}
-    said: TableSettings = replace(ours.settings, **{key: mine[key] for key in (*JOB_KEYS, "fallback_outputs")})
-    said = replace(said, typed=_merged_types(was["typed"], mine["typed"], yours["typed"]))
+    settings: TableSettings = replace(ours.settings, **{key: mine[key] for key in (*JOB_KEYS, "fallback_outputs")})
+    settings = replace(settings, typed=_merged_types(was["typed"], mine["typed"], yours["typed"]))
     for tried in (wanted, *({key: value} for key, value in wanted.items())):  # all at once, else what can be
-        if not any(job_faults(now := replace(said, **tried), names, schema)):
-            said = now
-    return with_outputs(said, said.outputs)
+        if not any(job_faults(now := replace(settings, **tried), names, schema)):
+            settings = now
+    return with_outputs(settings, settings.outputs)
 
 
 def _merged_types(was: tuple[Output, ...], ours: tuple[Output, ...], theirs: tuple[Output, ...]) -> tuple[Output, ...]:
     """What is declared of outputs: as ours has it where ours changed it, else as theirs."""
     base, mine, yours = ({output.name: output for output in side} for side in (was, ours, theirs))
-    found = [yours.get(name) if mine.get(name) == base.get(name) else mine.get(name) for name in {**mine, **yours}]
-    return tuple(output for output in found if output is not None)
+    outputs = [yours.get(name) if mine.get(name) == base.get(name) else mine.get(name) for name in {**mine, **yours}]
+    return tuple(output for output in outputs if output is not None)
 
 
 def _merged_names(was: tuple[str, ...], ours: tuple[str, ...], theirs: tuple[str, ...]) -> tuple[str, ...]:
-    kept = [name for name in ours if name in theirs or name not in was]
-    return (*kept, *(name for name in theirs if name not in kept and name not in was))
+    names_left = [name for name in ours if name in theirs or name not in was]
+    return (*names_left, *(name for name in theirs if name not in names_left and name not in was))
 
 
 def _schema(base: Schema, ours: Schema, theirs: Schema) -> Schema:
@@ -136,8 +138,8 @@ def merged_conditions(base: Schema, ours: Schema, theirs: Schema) -> dict[str, C
     """What is declared of conditions: as ours has it where ours changed it, else as theirs."""
     was, mine, yours = base.conditions, ours.conditions, theirs.conditions
     names = [*yours, *(name for name in mine if name not in yours)]
-    found = {name: yours.get(name) if mine.get(name) == was.get(name) else mine.get(name) for name in names}
-    return {name: condition for name, condition in found.items() if condition is not None}
+    merged = {name: yours.get(name) if mine.get(name) == was.get(name) else mine.get(name) for name in names}
+    return {name: condition for name, condition in merged.items() if condition is not None}
 
 
 # ---- rows and columns
@@ -149,32 +151,44 @@ MOST_CHANGES = 3
 
 def merge_rows(
     base: TableData, ours: TableData, theirs: TableData, of_ours: Alignment, of_theirs: Alignment, decided: Decided
-) -> tuple[Origins, list[Conflict]]:
-    """Which rows are in the merge; a conflict for each that one side took away and the other changed."""
+) -> tuple[Origins, list[Conflict], tuple[LostCell, ...]]:
+    """Which rows are in the merge; a conflict for each that one side took away and the other changed; what others that one side
+    took away had in new columns of the other."""
     twins = row_twins(ours, theirs, np.flatnonzero(of_ours.rows < 0), np.flatnonzero(of_theirs.rows < 0))
     sides = Sides(base.n_rows, of_ours.rows, of_theirs.rows, twins)
     gone = np.flatnonzero(sides.gone_from_theirs), np.flatnonzero(sides.gone_from_ours)
     changed = [
-        found[changed_in((base, table), aligned.columns, (aligned.rows[found], found))]
-        for table, aligned, found in ((ours, of_ours, gone[0]), (theirs, of_theirs, gone[1]))
+        conflicts[changed_in((base, table), aligned.columns, (aligned.rows[conflicts], conflicts))]
+        for table, aligned, conflicts in ((ours, of_ours, gone[0]), (theirs, of_theirs, gone[1]))
     ]
     dropped, revived = sides.gone_from_theirs, np.zeros(theirs.n_rows, np.bool_)
     dropped[[r for r in changed[0].tolist() if decided.get(("row", int(of_ours.rows[r]))) != "theirs"]] = False
     revived[[r for r in changed[1].tolist() if decided.get(("row", int(of_theirs.rows[r]))) == "theirs"]] = True
     rows = merged_order(sides, dropped, revived)
-    kept = [_row_conflict(base, ours, of_ours, r, is_ours=True) for r in changed[0].tolist()]
+    unaffected = [_row_conflict(base, ours, of_ours, r, is_ours=True) for r in changed[0].tolist()]
     lost = [_row_conflict(base, theirs, of_theirs, r, is_ours=False) for r in changed[1].tolist()]
     places = inverse(rows.base, base.n_rows)
-    found = sorted((c for c in (*kept, *lost) if c.key not in decided), key=lambda c: c.row or 0)
-    return rows, [_placed(c, int(places[c.row or 0])) for c in found]
+    conflicts = sorted((c for c in (*unaffected, *lost) if c.key not in decided), key=lambda c: c.row or 0)
+    cells = (
+        *_lost(ours, of_ours, np.setdiff1d(gone[0], changed[0]), "ours"),
+        *_lost(theirs, of_theirs, np.setdiff1d(gone[1], changed[1]), "theirs"),
+    )
+    return rows, [_placed(c, int(places[c.row or 0])) for c in conflicts], cells
+
+
+def _lost(table: TableData, aligned: Alignment, rows: Places, side: Side) -> Iterator[LostCell]:
+    for row, at in new_cells(table, aligned.columns, rows):
+        yield LostCell(table.assets[row], table.columns[at].name, table.columns[at][row], side)
 
 
 def _row_conflict(base: TableData, side: TableData, aligned: Alignment, row: int, is_ours: bool) -> Conflict:
     """A row that this side changed and the other took away; its row is that of base."""
     was = int(aligned.rows[row])
-    said = ", ".join(_changes(base, side, aligned.columns, was, row))
+    changes = ", ".join(_changes(base, side, aligned.columns, was, row))
     asset = base.assets[was]
-    return Conflict("row", asset, "", was, shown(asset), said if is_ours else None, None if is_ours else said, ("row", was))
+    return Conflict(
+        "row", asset, "", was, safe_text(asset), changes if is_ours else None, None if is_ours else changes, ("row", was)
+    )
 
 
 def _changes(base: TableData, side: TableData, columns: CameFrom, was: int, row: int) -> Iterator[str]:
@@ -183,7 +197,7 @@ def _changes(base: TableData, side: TableData, columns: CameFrom, was: int, row:
         for at, b in enumerate(columns.tolist())
         if (base.columns[b][was] != side.columns[at][row] if b >= 0 else not says_any(side.columns[at][row]))
     ]
-    yield from (f"{shown(side.columns[at].name)}: {shown(side.columns[at][row])}" for at in changed[:MOST_CHANGES])
+    yield from (f"{safe_text(side.columns[at].name)}: {safe_text(side.columns[at][row])}" for at in changed[:MOST_CHANGES])
     if len(changed) > MOST_CHANGES:
         yield f"{len(changed) - MOST_CHANGES} more"
 
@@ -219,15 +233,15 @@ def merge_columns(
 def _column_twins(ours: TableData, theirs: TableData, of_ours: Alignment, of_theirs: Alignment) -> CameFrom:
     """For each new column of theirs the new one of ours with the same name."""
     new = {c.name: at for at, c in enumerate(ours.columns) if of_ours.columns[at] < 0}
-    found = [new.get(c.name, -1) if of_theirs.columns[at] < 0 else -1 for at, c in enumerate(theirs.columns)]
-    return np.array(found, np.int64)
+    twins = [new.get(c.name, -1) if of_theirs.columns[at] < 0 else -1 for at, c in enumerate(theirs.columns)]
+    return np.array(twins, np.int64)
 
 
 def _is_changed(base: TableData, side: TableData, aligned: Alignment, at: int) -> bool:
-    """Whether a side changed a text of a column in a row that it kept."""
-    kept = np.flatnonzero(aligned.rows >= 0)
+    """Whether a side changed a text of a column in a row that it retained."""
+    retained = np.flatnonzero(aligned.rows >= 0)
     shared = Shared.of((base.columns[int(aligned.columns[at])], side.columns[at]))
-    return not np.array_equal(shared.at(0, aligned.rows[kept]), shared.at(1, kept))
+    return not np.array_equal(shared.at(0, aligned.rows[retained]), shared.at(1, retained))
 
 
 def _column_conflict(side: TableData, was: int, at: int, is_ours: bool) -> Conflict:
@@ -253,8 +267,8 @@ def _names(
 
 
 def _distinct(names: Sequence[str]) -> list[str]:
-    found: list[str] = []
+    texts: list[str] = []
     for name in names:
         others = (name, *(f"{name} {i}" for i in range(2, len(names) + 2)))
-        found.append(next(n for n in others if n not in found and (n == name or n not in names)))
-    return found
+        texts.append(next(n for n in others if n not in texts and (n == name or n not in names)))
+    return texts

@@ -58,8 +58,8 @@ def expand(tables: Mapping[str, TableData]) -> Expansion:
     name, outer = next(iter(tables.items()))
     if (n_rows := _count(name, tables, {})) > MOST_ROWS:
         file = str(outer.path) if outer.path else None
-        found = f"with the rows of its inner tables the table {in_quotes(name)} has {n_rows:,} rows."
-        raise TableError(Fault(found, f"at most {MOST_ROWS:,}", place=Place(file), rule="too-many-rows"))
+        problem = f"with the rows of its inner tables the table {in_quotes(name)} has {n_rows:,} rows."
+        raise TableError(Fault(problem, f"at most {MOST_ROWS:,}", place=Place(file), rule="too-many-rows"))
     numbers, rows = _ways(name, tables, {inner: number for number, inner in enumerate(tables)}, {})
     return Expansion(tuple(tables), tuple(tables.values()), numbers, rows)
 
@@ -78,8 +78,8 @@ def _ways(
     if name not in known:
         below = {row: _ways(other, tables, order, known) for other, rows in inner_rows(tables[name]).items() for row in rows}
         counts = np.ones(tables[name].n_rows, np.int64)
-        counts[list(below)] = [found[0].shape[1] for found in below.values()]
-        depth, stops = 1 + max((len(found[0]) for found in below.values()), default=0), np.cumsum(counts)
+        counts[list(below)] = [ways[0].shape[1] for ways in below.values()]
+        depth, stops = 1 + max((len(ways[0]) for ways in below.values()), default=0), np.cumsum(counts)
         numbers, rows = (np.full((depth, int(counts.sum())), -1, np.int32) for _ in range(2))
         numbers[0], rows[0] = order[name], np.repeat(np.arange(len(counts)), counts)
         for row, (inner_numbers, taken) in below.items():

@@ -106,7 +106,7 @@ def flatten(table: TableData, tables: Mapping[str, TableData]) -> FlatTable:
     expansion = _expansion(require_sound(table, tables), last)
     sources = _sources(expansion)
     conditions = _conditions(expansion, sources)
-    columns = tuple(_column(expansion, conditions[name], found, last) for name, found in sources.items())
+    columns = tuple(_column(expansion, conditions[name], layers, last) for name, layers in sources.items())
     taken = set(sources)
     asset, leaves = _assets(expansion, free_name(table.asset_column, taken), last)
     declared_of(expansion)
@@ -157,11 +157,11 @@ def _expansion(tables: Mapping[str, TableData], last: FlatTable | None) -> Expan
 
 def _sources(expansion: Expansion) -> Sources:
     """For each condition of any of the tables its columns, with the numbers of the tables."""
-    found: dict[str, list[tuple[int, ConditionColumn]]] = {}
+    sources: dict[str, list[tuple[int, ConditionColumn]]] = {}
     for number, table in enumerate(expansion.tables):
         for column in table.conditions:
-            found.setdefault(column.condition.name, []).append((number, column))
-    return found
+            sources.setdefault(column.condition.name, []).append((number, column))
+    return sources
 
 
 def _conditions(expansion: Expansion, sources: Sources) -> dict[str, Condition]:
@@ -187,13 +187,13 @@ def _unlike(expansion: Expansion, first: int, number: int, name: str, one: Condi
         str(t.path) if t.path else f"the table {in_quotes(expansion.names[n])}" for n, t in _two(expansion, number, first)
     )
     is_kind = one.domain.kind != other.domain.kind
-    found = (
+    problem = (
         f"is of type {other.domain.kind} here and of type {one.domain.kind}" if is_kind else "has other values or bounds here than"
     )
     place = Place(here, None, name)
     mend = "" if one.is_declared and other.is_declared else f"to declare it in contextdb.toml: [conditions.{name}]"
     accepted = "one type in all tables that contain each other"
-    return Fault(f"the condition {found} in {there}.", accepted, mend, place, "unlike-conditions")
+    return Fault(f"the condition {problem} in {there}.", accepted, mend, place, "unlike-conditions")
 
 
 def _two(expansion: Expansion, *numbers: int) -> list[tuple[int, TableData]]:

@@ -34,9 +34,10 @@ class FlatColumn(ConditionColumn):
     def made(cls, expansion: Expansion, condition: Condition, sources: Sequence[tuple[int, ConditionColumn]]) -> FlatColumn:
         """Bring the columns of some tables together."""
         layers = expansion.layers([(number, column.texts) for number, column in sources])
-        found, which = layers.combined
+        combined, which = layers.combined
+        ways = combined.T.tolist()
         cells = _Cells(sources)
-        met = [_met([layers.texts[c] for c in codes if c], [cells[c] for c in codes if c], condition) for codes in found.T.tolist()]
+        met = [_met([layers.texts[c] for c in codes if c], [cells[c] for c in codes if c], condition) for codes in ways]
         texts = TextColumn(condition.name, tuple(text for text, _ in met), which)
         return cls(condition, texts, tuple(cell for _, cell in met), {}, tuple(sources), layers)
 
@@ -68,15 +69,15 @@ class _Cells:
 
 def _met(texts: list[str], cells: list[Cell], condition: Condition) -> tuple[str, Cell]:
     """A cell and its text: the text of one table where that says it all."""
-    found = meet(cells)
-    said = [(text, cell) for text, cell in zip(texts, cells, strict=True) if not cell.is_any]
-    if not said:
-        return (texts[-1] if texts else ""), found
-    n_soft = sum(cell.is_soft for _, cell in said)
-    if not n_soft or len(said) == 1:
-        same = next((text for text, cell in said if cell == found), None)
+    met = meet(cells)
+    specified = [(text, cell) for text, cell in zip(texts, cells, strict=True) if not cell.is_any]
+    if not specified:
+        return (texts[-1] if texts else ""), met
+    n_soft = sum(cell.is_soft for _, cell in specified)
+    if not n_soft or len(specified) == 1:
+        same = next((text for text, cell in specified if cell == met), None)
         if same is not None:
-            return same, found
-    if n_soft or isinstance(found.accepts, TagMeet):
-        return BOTH.join(text.strip() for text, _ in said), found
-    return format_cell(found, condition.domain), found
+            return same, met
+    if n_soft or isinstance(met.accepts, TagMeet):
+        return BOTH.join(text.strip() for text, _ in specified), met
+    return format_cell(met, condition.domain), met

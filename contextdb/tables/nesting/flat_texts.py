@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from contextdb.cells.outputs import Output
+from contextdb.cells.words import says_any
 from contextdb.columns import TextColumn
 from contextdb.compiled.outputs import NO_OUTPUTS, Outputs, cells_of, outputs_of_cells
 from contextdb.errors import Fault, Place, TableError, in_quotes
-from contextdb.expressions.rules import has_no_rule
 from contextdb.tables.data import output_columns_of
 from contextdb.tables.nesting.expansion import Expansion
 from contextdb.tables.nesting.names import asset_name
@@ -33,13 +33,13 @@ def paths_and_leaves(expansion: Expansion, name: str) -> tuple[TextColumn, tuple
 def outputs_of(expansion: Expansion, taken: set[str]) -> list[TextColumn]:
     """The columns of outputs: of slots all words of the way, else the innermost text."""
     names = dict.fromkeys(name for table in expansion.tables for name in table.settings.outputs)
-    found = []
+    flat = []
     for name in (name for name in names if name not in taken):
         columns = [(n, t.text_column(name)) for n, t in enumerate(expansion.tables) if name in t.settings.outputs]
         join = all_words if name == MANDATORY else _innermost
-        found.append(optional_slots(expansion, columns) if name == OPTIONAL else expansion.layers(columns).joined(name, join))
+        flat.append(optional_slots(expansion, columns) if name == OPTIONAL else expansion.layers(columns).joined(name, join))
         taken.add(name)
-    return found
+    return flat
 
 
 def _innermost(texts: list[str]) -> str:
@@ -55,7 +55,7 @@ def rules_of(expansion: Expansion, taken: set[str]) -> TextColumn | None:
 
 
 def _all_rules(texts: list[str]) -> str:
-    rules = [text for text in texts if not has_no_rule(text)]
+    rules = [text for text in texts if not says_any(text)]
     return " and ".join(f"({rule})" for rule in rules) if len(rules) > 1 else "".join(rules)
 
 
@@ -73,16 +73,16 @@ def free_name(name: str, taken: set[str]) -> str:
 def declared_of(expansion: Expansion) -> tuple[Output, ...]:
     """The outputs of all tables, as the first that has one declares it. Raises TableError where tables declare an output with
     different types, values or sizes."""
-    found: dict[str, tuple[int, Output]] = {}
+    outputs: dict[str, tuple[int, Output]] = {}
     faults: list[Fault] = []
     for number, table in enumerate(expansion.tables):
         for output in table.settings.declared_outputs:
-            first, known = found.setdefault(output.name, (number, output))
+            first, known = outputs.setdefault(output.name, (number, output))
             if (known.kind, known.values, known.size) != (output.kind, output.values, output.size):
                 faults.append(_unlike(expansion, first, number, known, output))
     if faults:
         raise TableError(*faults)
-    return tuple(output for _, output in found.values())
+    return tuple(output for _, output in outputs.values())
 
 
 def flat_outputs(expansion: Expansion, slots: Mapping[str, TextColumn]) -> Outputs:
@@ -104,11 +104,11 @@ def _unlike(expansion: Expansion, first: int, number: int, known: Output, output
     outer = expansion.tables[first]
     where = str(outer.path) if outer.path else f"the table {in_quotes(expansion.names[first])}"
     is_kind = known.kind != output.kind
-    found = (
+    problem = (
         f"the output is of type {output.kind} here and of type {known.kind} in {where}."
         if is_kind
         else f"the output has other values or another size here than in {where}."
     )
     file = expansion.tables[number].path
     place = Place(str(file) if file else f"the table {in_quotes(expansion.names[number])}", None, output.name)
-    return Fault(found, "one type in all tables that contain each other", "", place, "unlike-outputs")
+    return Fault(problem, "one type in all tables that contain each other", "", place, "unlike-outputs")

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping
 import numpy as np
 
 from contextdb.cells.words import MARK
+from contextdb.columns import TextColumn
 from contextdb.errors import ContextDBError, Fault, TableError, in_quotes, nearest, some
 from contextdb.tables.data import AnyTable, TableData
 from contextdb.tables.nesting.names import inner_name, says_nesting
@@ -45,7 +46,11 @@ class Neighbours(Mapping[str, AnyTable]):
 
 def is_nested(table: TableData) -> bool:
     """Whether an asset cell of the table says more than the name of an asset."""
-    return bool(table.columns) and says_nesting(table.text_column(table.asset_column).texts)
+    return bool(table.columns) and table.text_column(table.asset_column).once(_is_nesting)
+
+
+def _is_nesting(assets: TextColumn) -> bool:
+    return says_nesting(assets.texts)
 
 
 def inner_rows(table: TableData) -> dict[str, list[int]]:
@@ -54,51 +59,52 @@ def inner_rows(table: TableData) -> dict[str, list[int]]:
         return {}
     column = table.text_column(table.asset_column)
     names = {code: name for code, text in enumerate(column.texts) if MARK in text and (name := inner_name(text)) is not None}
-    found: dict[str, list[int]] = {}
+    rows_by_name: dict[str, list[int]] = {}
     for row in np.flatnonzero(np.isin(column.codes, list(names))).tolist() if names else ():
-        found.setdefault(names[int(column.codes[row])], []).append(row)
-    return found
+        rows_by_name.setdefault(names[int(column.codes[row])], []).append(row)
+    return rows_by_name
 
 
 def inner_tables(tables: Iterable[TableData]) -> set[str]:
+    """The names of the tables that rows of some tables refer to."""
     return {name for table in tables for name in inner_rows(table)}
 
 
 def reached(table: TableData, tables: Tables) -> dict[str, TableData]:
     """The table and all that are in it, by name, each once; the table itself first. Those that cannot be read are left out."""
-    found = {table.name: table}
+    tables_by_name = {table.name: table}
     waiting = [table]
     while waiting:
         for name in inner_rows(waiting.pop()):
-            if name not in found and (inner := _read(name, tables)) is not None:
-                found[name] = inner
+            if name not in tables_by_name and (inner := _read(name, tables)) is not None:
+                tables_by_name[name] = inner
                 waiting.append(inner)
-    return found
+    return tables_by_name
 
 
 def nesting_faults(table: TableData, tables: Tables, name: str | None = None) -> list[Fault]:
     """What is wrong with the rows of one table, known as `name`, that refer to others, in the order of its rows."""
-    found: list[tuple[int, Fault]] = []
+    placed: list[tuple[int, Fault]] = []
     for inner, rows in inner_rows(table).items():
         if fault := _missing(name or table.name, inner, tables) or _cycle(name or table.name, inner, tables):
-            found += [(row, fault.at(table.place(row, table.asset_column))) for row in rows]
-    return [fault for _, fault in sorted(found, key=lambda item: item[0])]
+            placed += [(row, fault.at(table.place(row, table.asset_column))) for row in rows]
+    return [fault for _, fault in sorted(placed, key=lambda item: item[0])]
 
 
 def require_sound(table: TableData, tables: Tables) -> dict[str, TableData]:
     """The tables that are in a table, as `reached`. Raises TableError with what is wrong in any of them: files and cells that
     cannot be read, tables that are missing, cycles."""
-    found = reached(table, tables)
-    faults = dict.fromkeys(_unread(found.values(), tables))
-    for name, inner in found.items():
+    reachable = reached(table, tables)
+    faults = dict.fromkeys(_unread(reachable.values(), tables))
+    for name, inner in reachable.items():
         faults |= dict.fromkeys((*inner.faults, *nesting_faults(inner, tables, name)))
     if faults:
         raise TableError(*faults)
-    return found
+    return reachable
 
 
-def _unread(found: Iterable[TableData], tables: Tables) -> Iterator[Fault]:
-    for name in dict.fromkeys(name for table in found for name in inner_rows(table)):
+def _unread(reachable: Iterable[TableData], tables: Tables) -> Iterator[Fault]:
+    for name in dict.fromkeys(name for table in reachable for name in inner_rows(table)):
         if name in tables:
             try:
                 tables[name]
@@ -109,7 +115,7 @@ def _unread(found: Iterable[TableData], tables: Tables) -> Iterator[Fault]:
 def _read(name: str, tables: Tables) -> TableData | None:
     try:
         return tables.get(name)
-    except ContextDBError:  # told by `require_sound`, and in the file itself
+    except ContextDBError:  # reported by `require_sound`, and in the file itself
         return None
 
 
@@ -120,8 +126,8 @@ def _missing(outer: str, name: str, tables: Tables) -> Fault | None:
     near = nearest(name, others)
     known = some(f"{MARK}{other}" for other in others) or "an asset, as there is no other table"
     mend = in_quotes(MARK + near) if near else f'to put an asset of this name in quotes: "{MARK}{name}"' if name else ""
-    found = f"there is no table {in_quotes(name)}." if name else f'after "{MARK}" the name of a table is missing.'
-    return Fault(found, known, mend, rule="no-such-table")
+    problem = f"there is no table {in_quotes(name)}." if name else f'after "{MARK}" the name of a table is missing.'
+    return Fault(problem, known, mend, rule="no-such-table")
 
 
 def _cycle(outer: str, name: str, tables: Tables) -> Fault | None:

@@ -28,6 +28,7 @@ def asset_name(text: str) -> str:
 
 
 def asset_text(asset: str) -> str:
+    """An asset as its cell is written: in quotes where it would else refer to a table."""
     return '"' + asset.replace('"', '""') + '"' if asset.startswith(MARK) else asset
 
 

@@ -16,7 +16,7 @@ from contextdb.tables.nesting.flat import FlatTable
 
 
 def as_plain(flat: FlatTable) -> FlatTable | None:
-    """The table; None where tags are asked for in a way that one cell cannot say."""
+    """The table; None where tags are required in a way that one cell cannot say."""
     columns = [_plain_column(column) for column in flat.conditions]
     conditions = tuple(column for column in columns if column is not None)
     if len(conditions) < len(columns):
@@ -31,6 +31,6 @@ def _plain_column(column: ConditionColumn) -> ConditionColumn | None:
     cells = [ANY if cell.is_soft else Cell(cell.accepts) for cell in column.cells]
     if any(isinstance(cell.accepts, TagMeet) for cell in cells):
         return None
-    told = [format_cell(cell, column.condition.domain) for cell in cells]
-    texts = TextColumn.of(column.condition.name, [told[code] for code in column.texts.codes.tolist()])
+    written = [format_cell(cell, column.condition.domain) for cell in cells]
+    texts = TextColumn.of(column.condition.name, [written[code] for code in column.texts.codes.tolist()])
     return ConditionColumn.read(texts, column.condition)

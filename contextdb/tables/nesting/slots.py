@@ -7,18 +7,21 @@ slots: what a row asks for is not loosened by the table around it, nor by the on
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.cells.words import quoted, slot_words
 from contextdb.columns import TextColumn
-from contextdb.expressions import Expression
-from contextdb.expressions.rules import WhenColumn
 from contextdb.schema.settings import derivation_of
 from contextdb.tables.condition_column import ConditionColumn
 from contextdb.tables.data import TableData
 from contextdb.tables.nesting.expansion import Expansion
+
+if TYPE_CHECKING:
+    from contextdb.expressions import Expression
+    from contextdb.expressions.rules import WhenColumn
 
 MANDATORY, OPTIONAL = "Mandatory_Slots", "Optional_Slots"
 Flags = NDArray[np.bool_]
@@ -46,14 +49,14 @@ def optional_slots(expansion: Expansion, columns: Sequence[tuple[int, TextColumn
 
 def _constrained(expansion: Expansion, role: str) -> Flags:
     """Whether the row at each depth has a cell on the role that excludes somebody, or a rule that names it: bool [D, n]."""
-    found = np.zeros(expansion.rows.shape, np.bool_)
+    flags = np.zeros(expansion.rows.shape, np.bool_)
     for number, table in enumerate(expansion.tables):
         here = expansion.numbers == number
         for column in (c for c in table.conditions if c.condition.role == role):
-            found[here] |= _says(column)[expansion.rows[here]]
+            flags[here] |= _says(column)[expansion.rows[here]]
         if table.when is not None:
-            found[here] |= _rules(table, table.when, role)[expansion.rows[here]]
-    return found
+            flags[here] |= _rules(table, table.when, role)[expansion.rows[here]]
+    return flags
 
 
 def _roles(table: TableData) -> set[str]:

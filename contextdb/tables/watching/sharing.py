@@ -28,6 +28,6 @@ def table_like(
 
 
 def _shared_texts(column: TextColumn, old: Table) -> TextColumn:
-    found = next((c for c in old.columns if c.name == column.name), None)
-    is_same = found is not None and found.texts == column.texts and np.array_equal(found.codes, column.codes)
-    return found if found is not None and is_same else column
+    match = next((c for c in old.columns if c.name == column.name), None)
+    is_same = match is not None and match.texts == column.texts and np.array_equal(match.codes, column.codes)
+    return match if match is not None and is_same else column

@@ -34,7 +34,7 @@ from contextdb.tables.watching.sharing import table_like
 from contextdb.tables.watching.stamps import Digests, digests_of
 
 Contents = Mapping[Path, bytes]
-Found = Sequence[tuple[str, Path]]
+NamedFiles = Sequence[tuple[str, Path]]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -79,18 +79,18 @@ def schema_from(folder: Path, contents: Contents, last: Snapshot | None) -> Sche
     return schema_of(raw, path)
 
 
-def next_snapshot(folder: Path, schema: Schema, found: Found, contents: Contents, last: Snapshot | None = None) -> Snapshot:
-    """The version that the files now are; `found` are the names and files of the tables. Raises ContextDBError with every fault of
+def next_snapshot(folder: Path, schema: Schema, files: NamedFiles, contents: Contents, last: Snapshot | None = None) -> Snapshot:
+    """The version that the files now are; `files` are the names and files of the tables. Raises ContextDBError with every fault of
     every table."""
     digests = digests_of(contents)
     tables: dict[str, Table] = {}
     faults: list[Fault] = []
-    for name, path in found:
+    for name, path in files:
         try:
             tables[name] = _table(path, folder, schema, contents, digests, last)
         except ContextDBError as error:
             faults += error.faults
-    faults += twice_named(found)
+    faults += twice_named(files)
     if faults:
         raise TableError(*faults)
     project = Project(folder, schema, around_each_other(tables, last.project.tables if last else {}))

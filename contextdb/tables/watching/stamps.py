@@ -12,6 +12,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from contextdb.disk import read_bytes
+from contextdb.disk.boundary import inside
 from contextdb.errors import ContextDBError
 
 COARSEST_TICK_S = 2.0
@@ -26,15 +27,15 @@ def look(paths: Iterable[Path]) -> dict[Path, Stamp]:
     return {path: _stamp(path) for path in paths}
 
 
-def read_all(paths: Iterable[Path]) -> dict[Path, bytes]:
-    """The bytes of those files that are there and may be read."""
-    found = {}
+def read_all(paths: Iterable[Path], folder: Path) -> dict[Path, bytes]:
+    """The bytes of those files that are there, in the folder, and may be read."""
+    contents = {}
     for path in paths:
         try:
-            found[path] = read_bytes(path)
+            contents[path] = read_bytes(inside(path, folder))
         except ContextDBError:  # whoever needs it says why it cannot be read
             continue
-    return found
+    return contents
 
 
 def digests_of(contents: Mapping[Path, bytes]) -> Digests:
@@ -44,7 +45,7 @@ def digests_of(contents: Mapping[Path, bytes]) -> Digests:
 
 def _stamp(path: Path) -> Stamp:
     try:
-        found = path.stat()
+        status = path.stat()
     except (OSError, ValueError):
         return None
-    return found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns
+    return status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns

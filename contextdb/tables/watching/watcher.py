@@ -16,7 +16,6 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from pathlib import Path
 
 from contextdb.cells.arguments import require_callable, require_number, require_path
@@ -52,7 +51,8 @@ def watch(
     path : str or Path
         A folder of tables, or its contextdb.toml.
     on_change : callable, optional
-        Called with the new `Snapshot` after each swap.
+        Called with the new `Snapshot` after each swap; and with the present one, the same object, when files that had faults are
+        again as they were when it was read.
     on_error : callable, optional
         Called with a ContextDBError that holds the new faults, each once, when the files on disk cannot be used; the last good
         version stays. Default: they are logged, to the logger "contextdb".
@@ -92,12 +92,13 @@ class Watch(ByName[CompiledTable]):
         self._polling = threading.RLock()
         self._is_closed = threading.Event()
         self._thread: threading.Thread | None = None
-        self._told: tuple[Fault, ...] = ()
+        self._reported: tuple[Fault, ...] = ()
         self._read_s = clock()
-        self._schema = schema_from(folder, read_all([folder / SCHEMA_FILE]), None)
-        self._stamps: Stamps = look(self._paths())
+        self._schema = schema_from(folder, read_all([folder / SCHEMA_FILE], folder), None)
+        self._stamps: Stamps = {}
+        self._stamps = look(self._paths())
         self._rest = Rest(self._stamps, self._read_s, settle_s)
-        contents = read_all(self._stamps)
+        contents = read_all(self._stamps, folder)
         self._digests = self._tried = digests_of(contents)
         self._snapshot = next_snapshot(folder, self._schema, self._tables(self._schema), contents)
 
@@ -121,23 +122,23 @@ class Watch(ByName[CompiledTable]):
         return len(self._snapshot)
 
     def __repr__(self) -> str:
-        told = f"version {self._snapshot.number} of {plural(len(self), 'table')}"
+        description = f"version {self._snapshot.number} of {plural(len(self), 'table')}"
         faults = f", {plural(len(self.faults), 'fault')}" if self.faults else ""
-        return one_line("Watch", self.folder.name, told + faults + (", closed" if self._is_closed.is_set() else ""))
+        return one_line("Watch", self.folder.name, description + faults + (", closed" if self._is_closed.is_set() else ""))
 
     @property
     def faults(self) -> tuple[Fault, ...]:
         """Why what is on the disk is not the version available; empty when nothing is wrong with it."""
-        return self._told
+        return self._reported
 
     def poll(self) -> bool:
         """Look at the files, and swap in what is on the disk when it is new, rested and good. Gives whether a new version was
-        swapped in; `on_change` has then been called, in this thread."""
+        swapped in; `on_change` has then been called, in this thread, as it is where faults have ended without a swap."""
         with self._polling:
             now, stamps = self._clock(), look(self._paths())
             if not self._rest.is_due(stamps, now) or not self._may_be_new(stamps):
                 return False
-            contents = read_all(stamps)
+            contents = read_all(stamps, self.folder)
             if look(self._paths()) != stamps:
                 return False  # written while it was read: the next look sees that it moved
             return self._is_new(stamps, digests_of(contents), now) and self._take(contents)
@@ -171,13 +172,21 @@ class Watch(ByName[CompiledTable]):
 
     def _paths(self) -> list[Path]:
         """The files that the newest contextdb.toml that could be read makes a project of."""
-        return [self.folder / SCHEMA_FILE, *(path for _, path in self._tables(self._schema))]
+        try:
+            tables = [path for _, path in self._tables(self._schema)]
+        except FileError as error:  # links out of the folder: a version without them is never made, and `faults` says why
+            tables = [*self._stamps, *(Path(fault.place.file) for fault in error.faults if fault.place.file)]
+        return list(dict.fromkeys((self.folder / SCHEMA_FILE, *tables)))
 
     def _tables(self, schema: Schema) -> list[tuple[str, Path]]:
-        found: list[tuple[str, Path]] = []
-        with suppress(OSError):  # the folder is gone: what was found until then is what contextdb.toml declares
-            found.extend(table_files(self.folder, schema))
-        return found
+        files: list[tuple[str, Path]] = []
+        try:
+            files.extend(table_files(self.folder, schema))
+        except FileError:
+            raise
+        except OSError:  # the folder is gone: what was found until then is what contextdb.toml declares
+            pass
+        return files
 
     def _may_be_new(self, stamps: Stamps) -> bool:
         return stamps != self._stamps or self._read_s <= self._rest.moved_s + COARSEST_TICK_S
@@ -206,18 +215,17 @@ class Watch(ByName[CompiledTable]):
             self._tried = self._digests
             self._refuse(error)
             return False
-        self._told = ()
-        if new is last:
-            return False
-        self._snapshot = new
-        self._rest.taken(self._read_s)
-        if self._on_change is not None:
+        is_mended, self._reported = bool(self._reported), ()
+        if new is not last:
+            self._snapshot = new
+            self._rest.taken(self._read_s)
+        if self._on_change is not None and (new is not last or is_mended):
             self._on_change(new)
-        return True
+        return new is not last
 
     def _refuse(self, error: ContextDBError) -> None:
-        fresh = [fault for fault in error.faults if fault not in self._told]
-        self._told = error.faults
+        fresh = [fault for fault in error.faults if fault not in self._reported]
+        self._reported = error.faults
         if fresh:
             self._on_error(type(error)(*fresh))
 

@@ -12,6 +12,7 @@ import secrets
 import socket
 import stat
 import struct
+import time
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
@@ -25,6 +26,8 @@ SOCKET, PORT = ".sock", ".port"
 MOST_OF_A_NAME = 99
 """So many games of one name may run at once."""
 MOST_PORT = 65535
+MOST_FILE = 1 << 12
+"""Bytes of a file with a port that are read."""
 WAITING = 16
 """So many connections may wait to be taken."""
 PATIENCE_S = 2.0
@@ -88,9 +91,11 @@ def _door(name: str, path: Path) -> Door:
 
 
 def _is_free(path: Path) -> bool:
-    """Whether nobody listens there; what a game that was killed left there is deleted."""
+    """Whether nobody listens there; what a game that was killed left there is deleted, and nothing else, no link either."""
     if not os.path.lexists(path):
         return True
+    if not _is_door(path):
+        return False
     try:
         connected(path).close()
     except (ConnectionRefusedError, FileNotFoundError):
@@ -102,13 +107,25 @@ def _is_free(path: Path) -> bool:
     return False
 
 
+def _is_door(path: Path) -> bool:
+    """Whether this is what a game listens at: a socket, or the file of a port; of this user."""
+    try:
+        status = os.lstat(path)
+    except OSError:
+        return False
+    is_own = not HAS_OWNERS or status.st_uid == os.getuid()
+    return is_own and (stat.S_ISREG(status.st_mode) if path.suffix == PORT else stat.S_ISSOCK(status.st_mode))
+
+
 def doors() -> Iterator[tuple[str, Path]]:
     """The name of each game that listens, and where; what killed games left is deleted."""
     folder = runtime_folder()
     with turn(folder):
-        paths = [path for path in folder.iterdir() if path.suffix in (SOCKET, PORT) and NAME.fullmatch(path.stem)]
-        left = [path for path in sorted(paths, key=lambda path: path.stem) if not _is_free(path)]
-    for path in left:
+        paths = [
+            path for path in folder.iterdir() if path.suffix in (SOCKET, PORT) and NAME.fullmatch(path.stem) and _is_door(path)
+        ]
+        listening = [path for path in sorted(paths, key=lambda path: path.stem) if not _is_free(path)]
+    for path in listening:
         yield path.stem, path
 
 
@@ -118,8 +135,16 @@ def connected(path: Path) -> socket.socket:
     connection = socket.socket(socket.AF_INET if path.suffix == PORT else socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         connection.settimeout(PATIENCE_S)
-        connection.connect(("127.0.0.1", _port(path)[0]) if path.suffix == PORT else str(path))
-        return connection
+        address = ("127.0.0.1", _port(path)[0]) if path.suffix == PORT else str(path)
+        end_s = time.monotonic() + PATIENCE_S
+        while True:
+            try:
+                connection.connect(address)
+                return connection
+            except BlockingIOError:  # too many wait to be taken
+                if time.monotonic() > end_s:
+                    raise
+                time.sleep(0.01)
     except BaseException:
         connection.close()
         raise
@@ -132,14 +157,17 @@ def token_of(path: Path) -> str:
 
 def _port(path: Path) -> tuple[int, str]:
     """Port and token of a file; OSError for one that is not whole, or not this user's alone."""
-    found = os.lstat(path)
-    if HAS_OWNERS and (found.st_uid != os.getuid() or found.st_mode & 0o077 or not stat.S_ISREG(found.st_mode)):
-        raise PermissionError(f"{path} is not this user's alone")
+    with open(os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)), "rb") as file:
+        status = os.fstat(file.fileno())
+        is_own = not HAS_OWNERS or (status.st_uid == os.getuid() and not status.st_mode & 0o077)
+        if not is_own or not stat.S_ISREG(status.st_mode):
+            raise PermissionError(f"{path} is not this user's alone")
+        raw = file.read(MOST_FILE)
     try:
-        read = json.loads(path.read_bytes())
+        content = json.loads(raw)
     except (ValueError, RecursionError):
-        read = None
-    port, token = (read.get("port"), read.get("token")) if isinstance(read, dict) else (None, None)
+        content = None
+    port, token = (content.get("port"), content.get("token")) if isinstance(content, dict) else (None, None)
     if not isinstance(port, int) or not 0 < port <= MOST_PORT or not isinstance(token, str):
         raise OSError(f"{path} is not the file of a listening game")
     return port, token

@@ -6,10 +6,12 @@ owner, or that others may open, is refused. On Windows it lies in %LOCALAPPDATA%
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import stat
 import tempfile
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -21,6 +23,8 @@ from contextdb.errors import ContextError, Fault, FileError, Place, in_quotes
 HAS_OWNERS = hasattr(os, "getuid")
 """Whether files have an owner and a mode that say who may open them."""
 MOST_NAME = 40
+TURN_S = 5.0
+"""A program that holds the folder longer is stopped."""
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 
 
@@ -43,11 +47,11 @@ def runtime_folder() -> Path:
                 folder.mkdir(mode=0o700)
         else:
             folder.mkdir(parents=True, exist_ok=True)
-        found = os.lstat(folder)
+        status = os.lstat(folder)
     except OSError as error:
         why = f"the folder for running games cannot be made: {error.strerror}."
         raise FileError(Fault(why, "a folder that may be written to", place=Place(str(folder)))) from None
-    _require_own(folder, found)
+    _require_own(folder, status)
     return folder
 
 
@@ -55,37 +59,48 @@ def _place() -> Path:
     if not HAS_OWNERS:
         return Path(os.environ.get("LOCALAPPDATA") or tempfile.gettempdir()) / "contextdb" / "live"
     given = os.environ.get("XDG_RUNTIME_DIR", "")
-    if os.path.isabs(given) and os.path.isdir(given) and os.stat(given).st_uid == os.getuid():
-        return Path(given) / "contextdb"
+    if os.path.isabs(given) and os.path.isdir(given):
+        status = os.stat(given)
+        if status.st_uid == os.getuid() and not status.st_mode & 0o022:  # nobody else can exchange the folder in it
+            return Path(given) / "contextdb"
     return Path(tempfile.gettempdir()) / f"contextdb-{os.getuid()}"
 
 
-def _require_own(folder: Path, found: os.stat_result) -> None:
+def _require_own(folder: Path, status: os.stat_result) -> None:
     """Raise FileError unless a folder is one, of this user, that nobody else may open."""
     place = Place(str(folder))
-    if not stat.S_ISDIR(found.st_mode):
+    if not stat.S_ISDIR(status.st_mode):
         raise FileError(Fault("the folder for running games is not a folder.", "a folder", "to delete what is there", place))
     if not HAS_OWNERS:
         return
-    if found.st_uid != os.getuid():
+    if status.st_uid != os.getuid():
         accepted = "a folder of yours"
         raise FileError(Fault("the folder for running games belongs to another user.", accepted, "to set XDG_RUNTIME_DIR", place))
-    if found.st_mode & 0o077:
+    if status.st_mode & 0o077:
         mend = f"to run: chmod 700 {path_in_quotes(folder)}"
         raise FileError(Fault("others may open the folder for running games.", "a folder with mode 0700", mend, place))
 
 
 @contextmanager
 def turn(folder: Path) -> Iterator[None]:
-    """One process at a time makes or deletes what is in the folder, where the system has such locks."""
+    """One process at a time makes or deletes what is in the folder, where the system has such locks. Raises OSError where the
+    turn does not come."""
     try:
         import fcntl
     except ImportError:
         yield
         return
-    handle = os.open(folder, os.O_RDONLY)
+    handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
     try:
-        fcntl.flock(handle, fcntl.LOCK_EX)
+        end_s = time.monotonic() + TURN_S
+        while True:
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except BlockingIOError:
+                if time.monotonic() > end_s:
+                    raise TimeoutError(errno.ETIMEDOUT, "another program holds the folder") from None
+                time.sleep(0.01)
         yield
     finally:
         os.close(handle)

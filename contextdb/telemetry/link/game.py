@@ -1,21 +1,24 @@
-"""A link: a running game publishes what it asks and picks, to those that listen on the same machine."""
+"""A link: a running game publishes what it asks and picks, to those that listen on the same machine.
+
+Games get one from `contextdb.link`, which hands it what makes plain data of decisions.
+"""
 
 from __future__ import annotations
 
 import os
-import time
 import weakref
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from contextdb.cells.arguments import require_number, require_path
+from contextdb.cells.arguments import require_number, require_path, require_text
 from contextdb.errors import ContextError, Fault, FileError, Place
 from contextdb.telemetry.link import doors
+from contextdb.telemetry.link.feed import Decisions, Feed, Watcher, Who
 from contextdb.telemetry.link.folder import require_name
+from contextdb.telemetry.link.lines import cut_name
 from contextdb.telemetry.link.listeners import FileListener
-from contextdb.telemetry.link.publisher import Publisher
-from contextdb.telemetry.link.ring import Ring
-from contextdb.telemetry.link.taps import Taps, Who
+from contextdb.telemetry.link.watched import Watched, has_decisions
+from contextdb.telemetry.link.writer import Writer
 
 PER_SECOND = 30.0
 RECORDING = ".jsonl"
@@ -25,34 +28,21 @@ _links: weakref.WeakSet[Link] = weakref.WeakSet()
 """The open links: a process that is forked off lets go of them."""
 
 
-def link(name: str = "game", *, record: str | Path | None = None, per_second: float = PER_SECOND) -> Link:
-    """Let programs of the same user on this machine watch what the game asks and picks: see docs/live.md.
-
-    Parameters
-    ----------
-    name : str
-        What the game is called; where one of this name runs already, this one is called "game-2".
-    record : path, optional
-        A new file, *.jsonl, which takes every question from now on, whether or not anybody listens.
-    per_second : float
-        How often a second lines are sent: then of each character and table the newest.
-
-    Raises
-    ------
-    ContextError
-        It cannot be a name.
-    FileError
-        The file is there already or cannot be written; the folder in which games are met is not this user's alone.
-    """
+def open_link(name: str, record: str | Path | None, per_second: float, decisions: Callable[[], Decisions]) -> Link:
+    """What `contextdb.link` gives; `decisions` loads what makes plain data of decisions, when the first is to be published."""
     require_name(name)
     if not 1.0 <= require_number(per_second, "per_second") <= 60.0:
         raise ContextError(Fault(f"per_second is {per_second:g}.", "a number from 1 to 60"))
     file = None if record is None else new_recording(require_path(record, "record"))
+    door = None
     try:
-        return Link(doors.opened(name), file, 1.0 / per_second)
+        door = doors.opened(name)
+        return Link(door, file, 1.0 / per_second, decisions)
     except BaseException:
         if file is not None:
             file.close()
+        if door is not None:
+            door.close()
         raise
 
 
@@ -72,24 +62,24 @@ def new_recording(path: Path) -> FileListener:
 class Link:
     """What a game watches by. Get one from `contextdb.link`; close it, or use it in a `with`.
 
-    While nobody listens, what is watched is as fast as ever: tables are not changed. While somebody does, the game's thread puts a
-    tuple into a ring for each question; all else is done in the link's own thread.
+    While nobody listens, a question tests one flag more. While somebody does, the game's thread puts a tuple into a queue for each
+    question; all else is done in the link's own thread.
     """
 
-    def __init__(self, door: doors.Door, file: FileListener | None, every_s: float) -> None:
+    def __init__(self, door: doors.Door, file: FileListener | None, every_s: float, decisions: Callable[[], Decisions]) -> None:
         self.name = door.name
-        """What the game is called: the name that was asked for, or that with a number."""
-        self._ring = Ring()
-        self._taps = Taps(self._ring)
-        self._publisher = Publisher(door, self._taps, self._ring, file, every_s)
+        """What the game is called: the name that was requested, or that with a number."""
+        self._feed = Feed()
+        self._watched = Watched(self._feed)
+        self._writer = Writer(door, self._watched, file, every_s)
+        self._decisions = decisions
         self._is_closed = False
-        self._knows_decisions = False
         _links.add(self)
 
     @property
     def is_heard(self) -> bool:
         """Whether somebody listens now, or a file takes the lines."""
-        return self._publisher.is_heard
+        return self._feed.is_open
 
     def watch(self, what: object, who: Who = None) -> None:
         """Publish what something is asked, and what is picked or decided, from now on.
@@ -114,29 +104,29 @@ class Link:
             return
         if self._is_closed:
             raise ContextError(Fault("the link is closed.", "an open link"))
-        with self._publisher.lock:
-            if hasattr(getattr(what, "controller", what), "recorder"):
-                self._load_decisions()
-            self._taps.watch(what, who)
+        if who is not None and not callable(who):
+            who = cut_name(require_text(who, "who"))
+        if has_decisions(what):
+            self._load_decisions()
+        with self._writer.lock:
+            self._watched.watch(what, who)
 
     def tell(self, who: str | None, decision: object) -> None:
         """Publish the decision of a controller that is not watched, or the choice of a selector. Raises ContextError where it is
         neither."""
-        if not self._knows_decisions:
-            self._load_decisions()
-        from contextdb.telemetry.link.decisions import require_decision
-
-        require_decision(decision)
-        if self.is_heard:
-            self._ring.put(("tell", who), time.monotonic(), who, None, decision, None)
+        if not self._load_decisions().is_decision(decision):
+            problem = f"a link cannot publish what is of type {type(decision).__name__}."
+            raise ContextError(Fault(problem, "the Decision of a controller, or the Choice of a selector"))
+        if self._feed.is_open:
+            Watcher(self._feed, who).decided(decision)
 
     def close(self) -> None:
         """Publish no more. What was watched is what it was before."""
         if not self._is_closed:
             self._is_closed = True
             _links.discard(self)
-            self._publisher.close()
-            self._taps.forget()
+            self._writer.close()
+            self._watched.forget()
 
     def __enter__(self) -> Link:
         return self
@@ -147,16 +137,16 @@ class Link:
     def __repr__(self) -> str:
         return f"<Link {self.name!r}: {'closed' if self._is_closed else 'heard' if self.is_heard else 'nobody listens'}>"
 
-    def _load_decisions(self) -> None:
-        """Load what makes lines of decisions, now and not in a frame."""
-        import contextdb.telemetry.link.decisions  # noqa: F401
-
-        self._knows_decisions = True
+    def _load_decisions(self) -> Decisions:
+        """What makes plain data of decisions; loaded when the first is to be published, and not in a frame."""
+        if self._writer.decisions is None:
+            self._writer.decisions = self._decisions()
+        return self._writer.decisions
 
     def _forked(self) -> None:
         self._is_closed = True
-        self._publisher.drop()
-        self._taps.forget()
+        self._writer.drop()
+        self._watched.forget()
 
 
 def _let_go() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -29,7 +30,7 @@ class Wanted:
     """Every decision in full, as a row of a recorded session, and nothing else."""
 
     def takes(self, line: Line) -> bool:
-        """Whether a line is asked for: a game written in C sends all of them."""
+        """Whether a line is requested: a game written in C sends all of them."""
         if self.who and "who" in line and line["who"] not in self.who:
             return False
         return not self.tables or "table" not in line or line["table"] in self.tables
@@ -48,7 +49,7 @@ class Hearing:
         self._connection = connection
         self._place = Place(str(path))
         self._wanted = wanted
-        self._rest = b""
+        self._rest = bytearray()
         self._waiting: list[tuple[bytes, Line]] = []
         try:
             connection.settimeout(HEADER_S)
@@ -66,12 +67,12 @@ class Hearing:
             if batch:
                 yield batch
             try:
-                got = self._connection.recv(PIECE)
+                sent = self._connection.recv(PIECE)
             except ConnectionError:
-                got = b""
-            if not got:
+                sent = b""
+            if not sent:
                 return
-            batch = self._lines(got)
+            batch = self._lines(sent)
 
     def close(self) -> None:
         """Hang up; a thread that waits for lines is woken by it, and sees the end."""
@@ -86,17 +87,23 @@ class Hearing:
         self.close()
 
     def _first(self) -> tuple[Line, bytes]:
+        end_s = time.monotonic() + HEADER_S
         while not self._waiting:
-            got = self._connection.recv(PIECE)
-            if not got:
+            self._connection.settimeout(max(end_s - time.monotonic(), 0.001))
+            sent = self._connection.recv(PIECE)
+            if not sent:
                 raise ConnectionResetError("it hung up")
-            self._waiting = self._lines(got)
+            self._waiting = self._lines(sent)
         raw, header = self._waiting.pop(0)
         require_header(header, self._place)
         return header, raw
 
-    def _lines(self, got: bytes) -> list[tuple[bytes, Line]]:
-        *whole, self._rest = (self._rest + got).split(b"\n")
+    def _lines(self, sent: bytes) -> list[tuple[bytes, Line]]:
+        self._rest += sent
+        whole: list[bytes] = []
+        if b"\n" in sent:
+            *whole, rest = bytes(self._rest).split(b"\n")
+            self._rest = bytearray(rest)
         if len(self._rest) > MOST_BYTES:
             raise ContextDBError(Fault("a line of the game does not end.", "lines of JSON", place=self._place))
         try:
@@ -111,17 +118,17 @@ def require_header(line: Line, place: Place) -> None:
     if line["line"] != HEADER:
         raise ContextDBError(Fault("the first line is not the header of a link.", 'a line with "line": "header"', place=place))
     if line["format"] != FORMAT:
-        found = f"the lines are of format {line['format']}; this contextdb reads format {FORMAT}."
-        raise ContextDBError(Fault(found, f"format {FORMAT}", place=place))
+        problem = f"the lines are of format {line['format']}; this contextdb reads format {FORMAT}."
+        raise ContextDBError(Fault(problem, f"format {FORMAT}", place=place))
 
 
 def _request(wanted: Wanted, token: str) -> bytes:
-    asked: Line = {"format": FORMAT, "every": wanted.every}
-    asked |= {"token": token} if token else {}
-    asked |= {"who": list(wanted.who)} if wanted.who else {}
-    asked |= {"tables": list(wanted.tables)} if wanted.tables else {}
-    asked |= {"trace": True} if wanted.trace else {}
-    return dumped(asked)
+    request: Line = {"format": FORMAT, "every": wanted.every}
+    request |= {"token": token} if token else {}
+    request |= {"who": list(wanted.who)} if wanted.who else {}
+    request |= {"tables": list(wanted.tables)} if wanted.tables else {}
+    request |= {"trace": True} if wanted.trace else {}
+    return dumped(request)
 
 
 @dataclass(frozen=True)
@@ -135,14 +142,14 @@ class Game:
 
 def games() -> list[Game]:
     """The games that run now, by name. One that does not answer is left out."""
-    found = []
+    games = []
     for name, path in doors():
         try:
             with hear(path) as hearing:
-                found.append(Game(name, path, hearing.header))
+                games.append(Game(name, path, hearing.header))
         except (OSError, ContextDBError):
             continue
-    return found
+    return games
 
 
 def the_game(name: str | None) -> tuple[str, Path]:
@@ -164,9 +171,9 @@ def the_game(name: str | None) -> tuple[str, Path]:
 
 
 def no_game(name: str | None, running: Sequence[Game]) -> ContextDBError:
-    """The error where a game that is asked for does not run."""
+    """The error where a game that is requested does not run."""
     names = [game.name for game in running]
     if name is None:
         return ContextDBError(Fault("no game is running.", 'a game that calls contextdb.link("game")'))
-    found = f"no game {in_quotes(name)} is running{'' if names else ', nor any other'}."
-    return ContextDBError(Fault(found, some(names) if names else "", mend_for(name, names)))
+    problem = f"no game {in_quotes(name)} is running{'' if names else ', nor any other'}."
+    return ContextDBError(Fault(problem, some(names) if names else "", mend_for(name, names)))

@@ -30,6 +30,10 @@ DATABASES = "databases"
 
 MOST_BYTES = 1 << 20
 """A longer line is not one of a game."""
+MOST_DEPTH = 32
+"""Lists and objects in each other."""
+MOST_NAME = 1000
+"""Characters of the name of a character, a table, an asset or a fact; a game cuts that of a character."""
 
 Line = dict[str, Any]
 _AS_IT_IS = (bool, int, str, type(None))
@@ -43,15 +47,35 @@ def dumped(line: Mapping[str, object]) -> bytes:
 def read_line(raw: bytes) -> Line:
     """A line that was sent. Raises ValueError where it is none; the message says why."""
     try:
-        read = json.loads(raw)
+        line = json.loads(raw, parse_constant=_refuse)
     except (ValueError, RecursionError):
         raise ValueError("this is not JSON.") from None
-    if not isinstance(read, dict):
+    if not isinstance(line, dict):
         raise ValueError("this is not a JSON object.")
-    if not isinstance(read.get("line"), str):
+    if raw.count(b"[") + raw.count(b"{") > MOST_DEPTH and _is_deep(line):
+        raise ValueError(f"it is nested over {MOST_DEPTH} deep.")
+    if not isinstance(line.get("line"), str):
         raise ValueError('the key "line" is missing.')
-    _require(read)
-    return read
+    _require(line)
+    return line
+
+
+def _is_deep(value: object) -> bool:
+    level: list[object] = [value]
+    for _ in range(MOST_DEPTH):
+        nested = [each.values() if isinstance(each, dict) else each for each in level if isinstance(each, (dict, list))]
+        level = [child for children in nested for child in children]
+    return bool(level)
+
+
+def cut_name(name: str) -> str:
+    """The name of a character, not too long for a line."""
+    return name if len(name) <= MOST_NAME else f"{name[: MOST_NAME - 1]}…"
+
+
+def _refuse(constant: str) -> None:
+    """NaN and Infinity are not JSON, though Python reads them."""
+    raise ValueError(constant)
 
 
 _KEYS: Mapping[str, Mapping[str, tuple[type, ...]]] = {
@@ -77,15 +101,21 @@ def _require(line: Line) -> None:
             raise ValueError('the value of "rows" is no number in hexadecimal.') from None
         if line.get("actors") is not None and not _is_actors(line["actors"]):
             raise ValueError('the value of "actors" is no object of lists of objects.')
-    if isinstance(line.get("t"), int) and abs(line["t"]) > sys.float_info.max:
+    if isinstance(line.get("t"), (int, float)) and not abs(line["t"]) <= sys.float_info.max:
         raise ValueError('the value of "t" is too large.')
-    for table in line["tables"].values() if line["line"] in (HEADER, TABLES) else ():
+    names = [line.get(key) for key in ("who", "table", "game")]
+    for name, table in line["tables"].items() if line["line"] in (HEADER, TABLES) else ():
+        names.append(name)
         if not isinstance(table, dict):
             raise ValueError('a table of "tables" is no object of JSON.')
         if not isinstance(table.get("conditions", {}), dict):
             raise ValueError('the value of "conditions" of a table is no object of JSON.')
-    if isinstance(line.get("pick"), dict) and not isinstance(line["pick"].get("asset"), (str, type(None))):
-        raise ValueError('the asset of "pick" is no text.')
+    if isinstance(line.get("pick"), dict):
+        names.append(line["pick"].get("asset"))
+        if not isinstance(names[-1], (str, type(None))):
+            raise ValueError('the asset of "pick" is no text.')
+    if any(isinstance(name, str) and len(name) > MOST_NAME for name in names):
+        raise ValueError(f"a name has over {MOST_NAME:,} characters.")
 
 
 def _is_actors(value: object) -> bool:

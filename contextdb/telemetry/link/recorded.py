@@ -5,6 +5,7 @@ A recording may still be growing: a last line that is not whole is left out. Any
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,7 +36,7 @@ class Piece:
     starts: list[int]
     """Where in `raw` the line of each context begins."""
     facts: list[Texts]
-    asked: Sequence[str]
+    fact_names: Sequence[str]
     """The facts that the game's version of the table asks for."""
     share_done: float
     offset: int = 0
@@ -44,11 +45,12 @@ class Piece:
 
     def frame(self, wanted: Collection[str]) -> tuple[Sequence[str], pl.DataFrame]:
         """The names of all facts, and the wanted ones as texts, null where one is missing."""
-        names = list(dict.fromkeys((*self.asked, *(name for facts in self.facts for name in facts))))
+        names = list(dict.fromkeys((*self.fact_names, *(name for facts in self.facts for name in facts))))
         return names, facts_frame(self.facts, [name for name in names if name in wanted])
 
 
 def facts_frame(facts: Sequence[Texts], names: Sequence[str]) -> pl.DataFrame:
+    """Facts as a frame of texts, a row for each moment; null where one is missing."""
     return pl.DataFrame([pl.Series(name, [each.get(name) for each in facts], dtype=pl.String) for name in names])
 
 
@@ -56,16 +58,21 @@ def pieces_of(path: Path, table: str) -> Iterator[Piece]:
     """A recording, some lines at a time; one empty piece where it holds no line. Raises TableError or FileError where it cannot be
     read, lines of it are damaged (each with its number), or none is about the table."""
     reader = _Reader(path, table)
-    size = max(1, path.stat().st_size) if path.exists() else 1
     n_bytes = n_lines = n_rows = 0
-    for raw, is_last in _blocks(path):
-        starts, facts = reader.read(raw, is_last)
-        n_rows += len(facts)
-        if facts:
-            share_done = min(1.0, (n_bytes + len(raw)) / size)
-            yield Piece(raw, starts, facts, reader.tables.get(table, ()), share_done, n_bytes, n_lines)
-        n_bytes += len(raw)
-        n_lines += raw.count(b"\n")
+    try:
+        with path.open("rb") as file:
+            size = max(1, os.fstat(file.fileno()).st_size)
+            while lines := file.readlines(BYTES):
+                starts, facts = reader.read(lines)
+                raw = b"".join(lines)
+                if facts:
+                    share_done = min(1.0, (n_bytes + len(raw)) / size)
+                    yield Piece(raw, starts, facts, reader.tables.get(table, ()), share_done, n_bytes, n_lines)
+                n_bytes, n_lines, n_rows = n_bytes + len(raw), n_lines + len(lines), n_rows + len(facts)
+                if not raw.endswith(b"\n"):
+                    break
+    except OSError as error:
+        raise FileError(Fault(f"the file cannot be read: {error.strerror}.", place=Place(str(path)))) from None
     reader.end()
     if not n_rows:
         yield Piece(b"", [], [], reader.tables.get(table, ()), 1.0, n_bytes, n_lines)
@@ -96,8 +103,8 @@ class Recorded:
             pairs = zip(self.starts[start:stop], self.stops[start:stop], strict=True)
             return [_plain_texts(_question(raw[i - first : j - first])) for i, j in pairs]
         except ValueError:
-            found = "the file has been changed since it was opened."
-            raise TableError(Fault(found, "a recording that only grows", place=Place(str(self.path)))) from None
+            problem = "the file has been changed since it was opened."
+            raise TableError(Fault(problem, "a recording that only grows", place=Place(str(self.path)))) from None
 
 
 def indexed(path: Path, table: str) -> Recorded:
@@ -116,12 +123,8 @@ def indexed(path: Path, table: str) -> Recorded:
     return Recorded(path, starts, stops, tuple(names))
 
 
-class _NoHeader(ValueError):
-    """A line without a header before it."""
-
-
 class _Reader:
-    """Reads lines and keeps what is wrong with them."""
+    """Reads lines and collects what is wrong with them."""
 
     def __init__(self, path: Path, table: str) -> None:
         self.path, self.table = path, table
@@ -132,46 +135,42 @@ class _Reader:
         self._n_lines = 0
         self._has_header = False
 
-    def read(self, raw: bytes, is_last: bool) -> tuple[list[int], list[Texts]]:
-        """The questions of the table in some lines: where each begins, and its facts."""
+    def read(self, lines: Sequence[bytes]) -> tuple[list[int], list[Texts]]:
+        """The questions of the table in some lines: where each begins, and its facts. The last of a file may be half a line."""
         starts: list[int] = []
-        found: list[Texts] = []
+        questions: list[Texts] = []
         at = 0
-        while at < len(raw):
-            end = raw.find(b"\n", at)
-            is_whole = end >= 0
-            stop = end if is_whole else len(raw)
+        for raw in lines:
             self._n_lines += 1
             try:
-                line = self._line(raw[at:stop])
+                line = self._line(raw)
                 if line is not None and line["line"] == ASK and line["table"] == self.table:
-                    found.append(_texts(line))
+                    questions.append(_texts(line))
                     starts.append(at)
-            except _NoHeader:
-                pass
             except ValueError as error:
-                if self._has_header and (is_whole or not is_last):
+                if self._has_header and raw.endswith(b"\n"):
                     self._fault(str(error))
-            at = stop + 1
-        return starts, found
+            at += len(raw)
+        return starts, questions
 
     def end(self) -> None:
         """Raise TableError where lines were damaged, or none is about the table."""
         if not self._has_header:
-            found = "this is not a recording of a link: its first line is not a header."
+            problem = "this is not a recording of a link: its first line is not a header."
             accepted = "lines that `contextdb live --record` or link(record=...) wrote"
-            raise TableError(Fault(found, accepted, place=self._at(1)), *self._faults)
+            raise TableError(Fault(problem, accepted, place=self._at(1)), *self._faults)
         if self._n_faults > len(self._faults):
             more = self._n_faults - len(self._faults)
             self._faults.append(Fault(f"{plural(more, 'more line')} cannot be read.", place=Place(str(self.path))))
         if not self._faults and self.table not in self.tables:
             known = some(self.tables) if self.tables else "it is of no table"
-            found = f"no line is about the table {in_quotes(self.table)}."
-            self._faults.append(Fault(found, f"a table of the recording: {known}", place=Place(str(self.path))))
+            problem = f"no line is about the table {in_quotes(self.table)}."
+            self._faults.append(Fault(problem, f"a table of the recording: {known}", place=Place(str(self.path))))
         if self._faults:
             raise TableError(*self._faults)
 
     def _line(self, raw: bytes) -> Line | None:
+        """A line; None for an empty one, and before the header."""
         if not raw.strip():
             return None
         line = read_line(raw)
@@ -180,15 +179,15 @@ class _Reader:
             if line["format"] != FORMAT:
                 raise ValueError(f"it says format {line['format']}, and this contextdb reads format {FORMAT}.")
         elif not self._has_header:
-            raise _NoHeader
+            return None
         if line["line"] in (HEADER, TABLES):
             self.tables |= {name: tuple(table.get("conditions", ())) for name, table in line["tables"].items()}
         return line
 
-    def _fault(self, found: str) -> None:
+    def _fault(self, problem: str) -> None:
         self._n_faults += 1
         if len(self._faults) < MOST_FAULTS:
-            self._faults.append(Fault(f"the line cannot be read: {found}", place=self._at(self._n_lines)))
+            self._faults.append(Fault(f"the line cannot be read: {problem}", place=self._at(self._n_lines)))
 
     def _at(self, line: int) -> Place:
         return Place(str(self.path), line)
@@ -221,22 +220,3 @@ def _require_text(text: str) -> None:
         text.encode("utf-8")
     except UnicodeEncodeError:
         raise ValueError("half a surrogate pair in a text.") from None
-
-
-def _blocks(path: Path) -> Iterator[tuple[bytes, bool]]:
-    """The bytes of a file in pieces of whole lines, and whether it is the last."""
-    try:
-        with path.open("rb") as file:
-            rest = b""
-            while True:
-                block = file.read(BYTES)
-                rest += block
-                cut = rest.rfind(b"\n") + 1 if block else len(rest)
-                if not block:
-                    yield rest, True
-                    return
-                if cut:
-                    yield rest[:cut], False
-                    rest = rest[cut:]
-    except OSError as error:
-        raise FileError(Fault(f"the file cannot be read: {error.strerror}.", place=Place(str(path)))) from None

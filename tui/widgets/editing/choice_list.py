@@ -14,9 +14,9 @@ from textual.message import Message
 from textual.strip import Strip
 from textual.widget import Widget
 
-from tui.model.chooser import Row
-from tui.model.completion import Tick
-from tui.model.layout import cut
+from ...model.chooser import Row
+from ...model.completion import Tick
+from ...model.layout import cut
 
 MARKS: dict[Tick, str] = {"on": "[x] ", "off": "[ ] ", "+": "[+] ", "-": "[-] "}
 LABELS_MEASURED = 200

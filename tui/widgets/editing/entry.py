@@ -29,7 +29,7 @@ def one_line(text: str) -> str:
 
 
 class Entry(Input):
-    """One line without a frame. Control characters that the text has from before are shown as signs, and kept."""
+    """One line without a frame. Control characters that the text has from before are displayed as signs, and stay."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("ctrl+a", "select_all", "Select all", show=False),

@@ -16,8 +16,9 @@ from textual.widgets import Static
 from contextdb.cells.domains import Domain
 from contextdb.cells.sets import Cell, NumberSet
 from contextdb.errors import Fault, in_quotes
-from tui.model.interval_picture import DIAL_HEIGHT, DIAL_WIDTH, Run, dial, framed_line
-from tui.widgets.editing.choice_list import ChoiceList
+
+from ...model.interval_picture import DIAL_HEIGHT, DIAL_WIDTH, Run, dial, framed_line
+from .choice_list import ChoiceList
 
 NARROWEST, OF_NUMBERS, WIDEST = 34, 54, 64
 MOST_ROWS = 8
@@ -30,7 +31,7 @@ _DIAL_SIDE = 3, 4
 
 
 @dataclass(frozen=True)
-class Told:
+class Verdict:
     """What the popup says in words."""
 
     words: str = ""
@@ -72,7 +73,7 @@ class Popup(Vertical):
         self._picture = Static()
         self._words = Static()
         self._mend = Mend()
-        self._told = Told()
+        self._verdict = Verdict()
         self._cell: Cell | None = None
         self._domain: Domain | None = None
         self._sizes: tuple[int, ...] = ()
@@ -84,20 +85,20 @@ class Popup(Vertical):
         yield self._words
         yield self._mend
 
-    def tell(self, told: Told, domain: Domain | None, cell: Cell | None) -> None:
+    def tell(self, verdict: Verdict, domain: Domain | None, cell: Cell | None) -> None:
         """Show other words, and the picture of a cell of numbers; `domain` is None where there is no picture."""
-        self._told, self._domain, self._cell = told, domain, cell
+        self._verdict, self._domain, self._cell = verdict, domain, cell
 
     @property
     def is_empty(self) -> bool:
         """Whether there is nothing to show."""
-        return not (self._told.words or self._told.fault or self.choices.rows or self._domain)
+        return not (self._verdict.words or self._verdict.fault or self.choices.rows or self._domain)
 
     @property
     def wanted_width(self) -> int:
         """How wide it would like to be."""
-        told = WIDEST if self._told.is_refused else cell_len(self._told.words)
-        wanted = max(told, cell_len(str(self.border_subtitle or "")) + 2, self.choices.wanted_width) + GUTTER
+        words = WIDEST if self._verdict.is_refused else cell_len(self._verdict.words)
+        wanted = max(words, cell_len(str(self.border_subtitle or "")) + 2, self.choices.wanted_width) + GUTTER
         least = NARROWEST if self._domain is None else WIDEST if self._domain.type.is_circular else OF_NUMBERS
         return max(least, min(wanted, WIDEST))
 
@@ -108,13 +109,13 @@ class Popup(Vertical):
             return
         width = min(max(self.wanted_width, min(entry.width, NARROWEST)), screen.width)
         parts = self._say(max(width - GUTTER, 1))
-        said = sum(parts)
+        n_lines = sum(parts)
         below, above = screen.height - entry.bottom, entry.y
-        wanted = said + min(len(self.choices.rows), MOST_ROWS) + 2
+        wanted = n_lines + min(len(self.choices.rows), MOST_ROWS) + 2
         is_below = wanted <= below or (wanted > above and below >= above)
         height = min(wanted, below if is_below else above)
         self.display = height > 2
-        n_rows = max(0, min(len(self.choices.rows), height - said - 2))
+        n_rows = max(0, min(len(self.choices.rows), height - n_lines - 2))
         self.choices.styles.height = n_rows
         self.choices.display = n_rows > 0
         self.choices.keep_in_view(max(n_rows, 1))
@@ -126,12 +127,16 @@ class Popup(Vertical):
 
     def _say(self, width: int) -> tuple[int, int, int]:
         """Fill in picture, words and mend for a width; gives how many lines each takes."""
-        told, domain = self._told, None if self._told.is_refused else self._domain
+        verdict, domain = self._verdict, None if self._verdict.is_refused else self._domain
         is_dial = domain is not None and domain.type.is_circular
-        self.set_class(told.is_refused, "-refused")
+        self.set_class(verdict.is_refused, "-refused")
         room = width - DIAL_WIDTH - sum(_DIAL_SIDE) - 2 if is_dial else width
-        words = list(_worded(told, max(room, 8)))
-        mend = wrapped(f"Did you mean {in_quotes(told.mend)}? Ctrl+T accepts it.", width) if told.mend and told.is_refused else []
+        words = list(_worded(verdict, max(room, 8)))
+        mend = (
+            wrapped(f"Did you mean {in_quotes(verdict.mend)}? Ctrl+T accepts it.", width)
+            if verdict.mend and verdict.is_refused
+            else []
+        )
         picture = self._draw(width, words, domain) if domain is not None else []
         below = [] if is_dial else words
         for part, lines in ((self._picture, picture), (self._words, below), (self._mend, _styled(mend, "bold $text-accent"))):
@@ -163,18 +168,18 @@ def _coloured(line: Iterable[Run]) -> Content:
     return Content.assemble(*((text, "bold $text-primary" if is_accepted else MUTED) for text, is_accepted in line))
 
 
-def _worded(told: Told, width: int) -> Iterable[Content]:
+def _worded(verdict: Verdict, width: int) -> Iterable[Content]:
     """The words, or the fault: in short while one types, at length when the text was refused."""
-    if told.fault is None:
-        yield from _styled(wrapped(told.words, width), MUTED)
-    elif not told.is_refused:
-        yield from _styled(wrapped(f"! {told.fault.found}", width)[:2], "$text-warning")
+    if verdict.fault is None:
+        yield from _styled(wrapped(verdict.words, width), MUTED)
+    elif not verdict.is_refused:
+        yield from _styled(wrapped(f"! {verdict.fault.found}", width)[:2], "$text-warning")
     else:
-        yield from _styled(wrapped(f"! {told.fault.found}", width), "bold $text-error")
-        if told.fault.accepted:
-            yield from _styled(wrapped(f"Accepted: {told.fault.accepted}.", width), MUTED)
-        if told.fault.mend.startswith("to "):
-            yield from _styled(wrapped(f"Try {told.fault.mend}.", width), MUTED)
+        yield from _styled(wrapped(f"! {verdict.fault.found}", width), "bold $text-error")
+        if verdict.fault.accepted:
+            yield from _styled(wrapped(f"Accepted: {verdict.fault.accepted}.", width), MUTED)
+        if verdict.fault.mend.startswith("to "):
+            yield from _styled(wrapped(f"Try {verdict.fault.mend}.", width), MUTED)
 
 
 def _styled(lines: Iterable[str], style: str) -> list[Content]:

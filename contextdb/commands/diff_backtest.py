@@ -1,0 +1,133 @@
+"""The part of `contextdb diff` that asks both versions in recorded moments."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from contextdb.checks.effects import Box, Effects
+from contextdb.checks.effects_space import shared_space
+from contextdb.commands.progress import bar, has_many_bytes
+from contextdb.compiled.table import data_of
+from contextdb.console import note, printable, terminal_width
+from contextdb.covering.shares import format_percent
+from contextdb.errors import Fault, plural, safe_text
+from contextdb.report.document import Block, Document, Numbered, Section, as_markdown, section_lines
+from contextdb.report.results import Gate
+from contextdb.tables.table import Table
+from contextdb.telemetry.backtest import EMPTIED, FILLED, GAINS, LOSES, Backtest, ChangedBox, Comparison, Example, backtest
+from contextdb.telemetry.contexts import context_files
+
+MOST_BOXES = 64
+"""Boxes in which moments are counted."""
+WORDS = {EMPTIED: "no row any more", FILLED: "a row at last", GAINS: "gains", LOSES: "loses"}
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """What recorded moments say of a change, and the bars of the command."""
+
+    result: Backtest
+    gates: tuple[Gate, ...]
+
+    def to_json(self) -> dict[str, object]:
+        document: dict[str, object] = {"backtest": self.result.to_json()}
+        return document | ({"gates": [gate.to_json() for gate in self.gates]} if self.gates else {})
+
+    def text(self, colour: bool, shows_all: bool) -> str:
+        """For a terminal."""
+        return "\n" + "\n".join(section_lines(self._section, colour, terminal_width(), shows_all)) + "\n"
+
+    @property
+    def markdown(self) -> str:
+        return "\n" + as_markdown(Document("diff", "part", (self._section,))).partition("\n")[2].lstrip("\n")
+
+    @property
+    def _section(self) -> Section:
+        """The same for people."""
+        result = self.result
+        shares = [(f"{_percent(n, result.moments)} {what}", n) for what, n in self._counts]
+        parts = ", ".join(text for text, n in shares if n) or "nothing changes"
+        unread = [f"{printable(file)} was not read: {faults[0].message}" for file, faults in result.unread]
+        return Section(f"{plural(result.moments, 'recorded moment')}", parts, unread, tuple(self._blocks()), self.gates)
+
+    @property
+    def _counts(self) -> list[tuple[str, int]]:
+        result = self.result
+        return [("change", result.changed), ("are left without a row", result.emptied), ("have a row at last", result.filled)]
+
+    def _blocks(self) -> Iterator[Block]:
+        result = self.result
+        assets = sorted({*result.gains, *result.loses}, key=lambda asset: (-result.gains[asset] - result.loses[asset], asset))
+        if assets:
+            lines = [f"{safe_text(a)}: {_both(result.gains[a], result.loses[a], result.moments)}" for a in assets]
+            yield Numbered("assets", lines)
+        if boxes := result.ordered_boxes:
+            yield Numbered("where", [f"{_percent(n, result.moments)}  {_words(box)}: {_cells(box)}" for box, n in boxes])
+        if result.examples:
+            yield Numbered("moments to open", list(map(_example, result.examples)))
+
+
+def replayed_moments(arguments: argparse.Namespace, before: Table, after: Table, effect: Effects | Fault | None) -> Replayed:
+    """Ask both versions in the moments that were recorded."""
+    boxes = _boxes(effect) if isinstance(effect, Effects) else []
+    own = data_of(shared_space(before, after).table([[dict(box.cells) for box in boxes]]).compile()) if boxes else None
+    old, new = (data_of(table.flat().compile()) for table in (before, after))
+    comparison = Comparison(old, new, arguments.count, tuple(boxes), own)
+    files = [file for pattern in arguments.telemetry for file in context_files(pattern)]
+    with bar("asking in recorded moments", has_many_bytes(files)) as tell:
+        result = backtest(comparison, arguments.telemetry, arguments.engine, arguments.scheduler, tell)
+    for file, faults in result.unread:
+        note(f"{printable(file)} was not read: {faults[0].message}")
+    bars = (("max-changed", arguments.max_changed, result.changed), ("max-emptied", arguments.max_emptied, result.emptied))
+    return Replayed(result, tuple(_gate(name, limit, n, result.moments) for name, limit, n in bars if limit is not None))
+
+
+def _gate(name: str, limit: float, n: int, moments: int) -> Gate:
+    """A bar of the share of moments; without a moment it fails."""
+    if not moments:
+        return Gate(name, limit, None, False, "no moment was recorded.")
+    share = n / moments
+    verb = "change" if name == "max-changed" else "are left without a row"
+    return Gate(
+        name, limit, share, share <= limit, f"{_percent(n, moments)} of the moments {verb}; allowed {format_percent(limit)}."
+    )
+
+
+def _boxes(effect: Effects) -> list[ChangedBox]:
+    """The boxes of what a change does, those that lose their last row first."""
+    boxes = [ChangedBox(EMPTIED, _items(box)) for box in effect.opened]
+    boxes += [ChangedBox(FILLED, _items(box)) for box in effect.closed]
+    for reach in effect.assets:
+        for what, parts in ((LOSES, reach.lost), (GAINS, reach.gained)):
+            boxes += [ChangedBox(what, _items(box), reach.asset) for box in parts]
+    return list(dict.fromkeys(boxes))[:MOST_BOXES]
+
+
+def _items(box: Box) -> tuple[tuple[str, str], ...]:
+    return tuple(box.cells.items())
+
+
+def _words(box: ChangedBox) -> str:
+    return WORDS[box.what] if box.asset is None else f"{safe_text(box.asset)} {WORDS[box.what]}"
+
+
+def _cells(box: ChangedBox) -> str:
+    return safe_text(", ".join(f"{name}: {cell}" for name, cell in box.items) or "every context", 400)
+
+
+def _both(gains: int, loses: int, moments: int) -> str:
+    parts = [f"{verb} {_percent(n, moments)}" for verb, n in (("gains", gains), ("loses", loses)) if n]
+    return ", ".join(parts)
+
+
+def _example(example: Example) -> str:
+    place = f"line {example.line}" if example.line is not None else f"row {example.row + 1}"
+    facts = " ".join(f"{name}={value}" for name, value in example.context.items())
+    before, after = (", ".join(assets) or "no row" for assets in (example.before, example.after))
+    return safe_text(f"{example.file}, {place}: {facts}: {before} → {after}", 400)
+
+
+def _percent(n: int, moments: int) -> str:
+    return format_percent(n / moments) if moments else "none"

@@ -1,0 +1,139 @@
+"""The tables of a folder as they are in a commit, read from git's objects into another folder. An edge: it runs git.
+
+A ref is never an option of git: it is looked up once, behind `--end-of-options`, and git is then given the hash of the commit.
+A folder that is made to look like a repository of its own is none. Blobs are read as they are, without filters, hooks or replaced
+objects, and only contextdb.toml, tables and saved contexts are written, as plain files: no link, and no name that leads out of the
+folder.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+from contextdb.disk import TABLE_SUFFIXES, make_folder, real_path, write_atomic
+from contextdb.errors import ContextDBError, ContextError, Fault, FileError, Place, in_quotes, safe_text
+from contextdb.files.file_names import alike
+from contextdb.tables.other_files import cases_path
+from contextdb.tables.project import SCHEMA_FILE, read_folder_schema
+
+_POINTER = b"version https://git-lfs.github.com/spec/"
+_PLAIN_FILES = ("100644", "100755")
+
+
+@dataclass(frozen=True)
+class Commit:
+    """A commit of the repository that a folder is in."""
+
+    folder: Path
+    ref: str
+    hash: str
+
+    @classmethod
+    def of(cls, folder: Path, ref: str) -> Commit:
+        """The commit that a ref names. Raises ContextError where there is none, and FileError where there is no git or no
+        repository."""
+        if not _is_in_a_repository(folder):
+            sentence = "the folder is in no git repository, so that there is nothing to compare with."
+            raise FileError(Fault(sentence, "--baseline FILE, or a folder of a repository", place=Place(str(folder))))
+        code, commit = (1, b"") if _is_no_ref(ref) else _git(folder, *_lookup(ref))
+        if code == 0:
+            return cls(folder, ref, commit.decode("ascii", "replace").strip())
+        is_shallow = _git(folder, "rev-parse", "--is-shallow-repository")[1].strip() == b"true"
+        mend = "git fetch --unshallow, or fetch-depth: 0 of actions/checkout, as this clone is shallow" if is_shallow else ""
+        if not mend and not _is_no_ref(ref) and _git(folder, *_lookup(f"origin/{ref}"))[0] == 0:
+            mend = in_quotes(f"origin/{ref}")
+        raise ContextError(Fault(f"git has no commit {in_quotes(ref)} here.", "a branch, a tag or a commit of this clone", mend))
+
+    @property
+    def name(self) -> str:
+        """The commit in words."""
+        return f"{safe_text(self.ref)} (commit {self.hash[:12]})"
+
+    def tables_into(self, target: Path) -> bool:
+        """Write the folder's tables, as they are in the commit, into an empty folder; whether it has any file there. Raises
+        ContextDBError where its contextdb.toml cannot be read, or git does not have a file."""
+        prefix = _git(self.folder, "rev-parse", "--show-prefix")[1].decode("utf-8", "surrogateescape").strip("\n")
+        code, listed = _git(self.folder, "ls-tree", "-r", "-z", "--full-tree", f"{self.hash}:{prefix.rstrip('/')}")
+        blobs = dict(_plain_files(listed)) if code == 0 else {}
+        if SCHEMA_FILE in blobs:
+            self._write(blobs, [SCHEMA_FILE], target)
+        declared = {alike(file) for settings in read_folder_schema(target).tables.values() for file in settings.files}
+        declared |= {alike(cases_path(Path(file)).as_posix()) for file in declared}
+        wanted = [name for name in blobs if _is_tabular(name) and ("/" not in name or alike(name) in declared)]
+        self._write(blobs, wanted, target)
+        return bool(wanted)
+
+    def _write(self, blobs: dict[str, str], names: list[str], target: Path) -> None:
+        if not names:
+            return
+        request = "".join(f"{blobs[name]}\n" for name in names).encode()
+        code, out = _git(self.folder, "cat-file", "--batch", given=request)
+        at = 0
+        for name in names:
+            head, _, _ = out[at : at + 200].partition(b"\n")
+            parts = head.split()
+            if code != 0 or len(parts) != 3 or parts[1] != b"blob":
+                raise ContextDBError(Fault("git does not have the contents of the file.", place=Place(f"{self.ref}:{name}")))
+            start = at + len(head) + 1
+            raw = out[start : start + int(parts[2])]
+            at = start + len(raw) + 1
+            if raw.startswith(_POINTER):
+                sentence = "the file is a pointer of Git LFS: its contents are not in git."
+                raise ContextDBError(Fault(sentence, "--baseline FILE, a report of that commit", place=Place(f"{self.ref}:{name}")))
+            path = target.joinpath(*PurePosixPath(name).parts)
+            make_folder(path.parent)
+            write_atomic(path, raw, syncs=False)
+
+
+def _is_in_a_repository(folder: Path) -> bool:
+    """Whether a folder is in the work tree of a repository that is not itself made of files of that tree."""
+    code, out = _git(folder, "rev-parse", "--is-inside-work-tree", "--show-toplevel", "--absolute-git-dir")
+    is_inside, *paths = os.fsdecode(out).splitlines() or [""]
+    if code != 0 or is_inside != "true" or len(paths) != 2:
+        return False
+    top, own = (real_path(path) for path in paths)
+    return not own.is_relative_to(top) or own.is_relative_to(top / ".git")
+
+
+def _lookup(ref: str) -> tuple[str, ...]:
+    return "rev-parse", "--verify", "--quiet", "--end-of-options", f"{ref}^{{commit}}"
+
+
+def _is_no_ref(ref: str) -> bool:
+    """Whether no commit can be named so: git would take it for an option, or the system for the end of a text."""
+    return not ref.strip() or ref.startswith("-") or not ref.isprintable()
+
+
+def _plain_files(listed: bytes) -> Iterator[tuple[str, str]]:
+    """Name and object of each plain file of a listed tree; a name that could lead elsewhere is passed over."""
+    for entry in listed.split(b"\0"):
+        about, _, raw_name = entry.partition(b"\t")
+        mode, _, blob = about.decode("ascii", "replace").partition(" blob ")
+        name = raw_name.decode("utf-8", "surrogateescape")
+        parts = name.split("/")
+        is_safe = all(part not in ("", ".", "..") and not set(part) & {"\\", ":", "\0"} for part in parts)
+        if mode in _PLAIN_FILES and is_safe and not any(alike(part) == ".git" for part in parts):
+            yield name, blob
+
+
+def _is_tabular(name: str) -> bool:
+    return name.lower().endswith(TABLE_SUFFIXES)
+
+
+def _git(folder: Path, *arguments: str, given: bytes = b"") -> tuple[int, bytes]:
+    """The exit code of git and its standard output. Raises FileError where it cannot be run."""
+    command = ["git", "-c", "safe.bareRepository=explicit", "--no-replace-objects", "--literal-pathspecs", *arguments]
+    environment = os.environ | {"LC_ALL": "C", "GIT_TERMINAL_PROMPT": "0"}
+    try:
+        done = subprocess.run(command, cwd=folder, input=given, capture_output=True, check=False, env=environment)
+    except OSError as error:
+        fault = Fault(f"git cannot be run: {error.strerror}.", "git on the search path", "to install git, or --baseline FILE")
+        raise FileError(fault, errno=error.errno) from None
+    if done.returncode and b"dubious ownership" in done.stderr:
+        accepted = "a repository of this user, or one that git's safe.directory names"
+        raise FileError(Fault("git refuses the repository: another user owns it.", accepted, place=Place(str(folder))))
+    return done.returncode, done.stdout

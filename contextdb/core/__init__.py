@@ -1,0 +1,104 @@
+"""The core: what a compiled table answers, in C99. The same sources are the header of games and this package's extension.
+
+    boxes.h, count.h    boxes of contexts for coverage: counted, searched, compared
+    python_*.h, abi.h   what Python sees of them: the extension `contextdb.core._core`, by the stable ABI
+    poses.h             all parts of the poses, in order: functions, rotations, paths, frames, a rig, and the stages of a pose
+    core.h              all parts for tables, in order: masks and classes, programs, a table's query, outputs, picks
+    motion.h            all parts for motion: the searches for the best frame, for that of several characters, and controllers
+    batch.h, choose.h   many contexts and many characters at once; fact_columns.h and keys.h are their columns and counters
+
+Only this file imports the extension. Nothing here keeps state but the objects that it gives out, and no array is copied: a `Table`
+holds the arrays and texts that it is made of."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+
+try:
+    from contextdb.core._core import (
+        Answer,
+        Batch,
+        Boxes,
+        Choices,
+        Controllers,
+        Frames,
+        Live,
+        PoseFrames,
+        Poses,
+        Shared,
+        Table,
+        bend_legs,
+        count_holders,
+        feel_ground,
+        fill_ranges,
+        group_keys,
+        hash_keys,
+        list_rows,
+        lower_hips,
+        move_bodies,
+        pack_codes,
+        place_joints,
+        pose_columns,
+        read_column,
+        search_joint,
+        stand_legs,
+        steer_paths,
+        turn_rows,
+        unpack_codes,
+        write_paths,
+    )
+except ImportError as error:
+    found = "contextdb's core is not built for this Python"
+    raise ImportError(f"{found}: run `python build_core.py` in the checkout, or install contextdb again ({error})") from None
+
+__all__ = [
+    "FLAT",
+    "SLOTS",
+    "VALUE",
+    "WIDE",
+    "Answer",
+    "Batch",
+    "Boxes",
+    "Choices",
+    "Controllers",
+    "Frames",
+    "Live",
+    "PoseFrames",
+    "Poses",
+    "Shared",
+    "Table",
+    "bend_legs",
+    "count_holders",
+    "feel_ground",
+    "fill_ranges",
+    "group_keys",
+    "hash_keys",
+    "header_text",
+    "list_rows",
+    "lower_hips",
+    "move_bodies",
+    "pack_codes",
+    "place_joints",
+    "pose_columns",
+    "read_column",
+    "search_joint",
+    "stand_legs",
+    "steer_paths",
+    "turn_rows",
+    "unpack_codes",
+    "write_paths",
+]
+
+VALUE, FLAT, WIDE, SLOTS = 1, 2, 3, 4
+"""How the masks of a column are kept; see `contextdb.compiled.classes`."""
+
+
+@cache
+def header_text() -> str:
+    """The parts of the core in their order, C99 and C++11, as the header for games has them."""
+    from importlib.resources import files
+
+    folder = files("contextdb.core")
+    parts = re.findall(r'^#include "(\w+\.h)"$', folder.joinpath("core.h").read_text(encoding="ascii"), re.M)
+    return "".join(folder.joinpath(part).read_text(encoding="ascii") for part in parts)

@@ -1,0 +1,18 @@
+/* All parts of the core, in the order in which each needs those before it. A game gets the same parts in the header that
+ * `contextdb compile --c-header` writes; Python gets them in the extension, _core.c. */
+#include "types.h"
+#include "arithmetic.h"
+#include "json.h"
+#include "opening.h"
+#include "columns.h"
+#include "facts.h"
+#include "programs.h"
+#include "arrays.h"
+#include "linking.h"
+#include "levels.h"
+#include "outputs.h"
+#include "open.h"
+#include "query.h"
+#include "rows.h"
+#include "pick.h"
+#include "files.h"

@@ -1,0 +1,306 @@
+"""The child process that reads FBX or USD: one file after another, of which it hands back arrays. It imports nothing of ours.
+
+    python parser_child.py fbx       (or usd)
+
+A request on standard input is a line of JSON, `{"size": n, "take": i}`, and n bytes. An answer on standard output is one line of
+JSON: `{"fault": text}`, or `{"names", "parents", "deforms", "rate", "frames"}` and float64 matrices [J, 4, 4] at rest and
+[F, J, 4, 4] in the world, metres, y up. Before it `{"done": n, "of": m}` says that the process is alive.
+What kills this process kills no other.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+MOST_FRAME_JOINTS = 20_000_000
+USUAL_RATE = 30.0
+MOST_MEMORY = 2 << 30
+"""Bytes that a small file may take; a large one so many times its size more."""
+TIMES_MEMORY = 24
+
+
+Floats = NDArray[np.float64]
+Tell = Callable[[int, int], None]
+Joints = tuple[list[str], list[int], Any, Any, float, Floats, Floats | None, Floats]
+"""Names, parents, which are joints, which deform, the rate, and places: at rest, of nodes as they stand (None: all places are in
+the world already), and of frames."""
+
+
+class Refusal(Exception):
+    """What is wrong with a file, in a sentence."""
+
+
+def fbx(content: bytes, take: int, tell: Tell) -> Joints:
+    """The bones of an FBX file, against their parents."""
+    import ufbx
+
+    # Every object is held in a name while others that were taken out of it are used: the binding frees what nobody holds.
+    scene = ufbx.load_memory(
+        content,
+        target_axes=ufbx.axes_right_handed_y_up,
+        target_unit_meters=1.0,
+        ignore_geometry=False,
+        ignore_embedded=True,
+        skip_mesh_parts=True,
+        inherit_mode_handling=ufbx.InheritModeHandling.HELPER_NODES,
+        node_depth_limit=1000,
+    )
+    nodes, stacks, settings = list(scene.nodes), list(scene.anim_stacks), scene.settings
+    if not stacks:
+        raise Refusal("there is no animation.")
+    if take >= len(stacks):
+        raise Refusal(f"there are {len(stacks)} takes, and take {take + 1} is wanted.")
+    stack = stacks[take]
+    rate = settings.frames_per_second
+    rate = rate if 1.0 <= rate <= 1e4 else USUAL_RATE
+    start, stop = stack.time_begin, stack.time_end
+    n_frames = frames_of(stop - start, rate, len(nodes))
+    ids = {node.typed_id: i for i, node in enumerate(nodes)}
+    parents = []
+    for node in nodes:
+        parent = node.parent
+        parents.append(-1 if parent is None else ids[parent.typed_id])
+    tell(0, n_frames)
+    rest = np.array([of_transform(node.local_transform) for node in nodes]).reshape(-1, 4, 4)
+    local = np.repeat(rest[None], n_frames, axis=0)
+    anim = stack.anim
+    baked = ufbx.bake_anim(scene, anim, resample_rate=rate, maximum_sample_rate=rate, max_keyframe_segments=4096)
+    at = start + np.arange(n_frames) / rate
+    for own in list(baked.nodes):
+        node = ids.get(own.typed_id)
+        if node is None:
+            continue
+        usual = nodes[node].local_transform
+        places = sampled(own.translation_keys, at, usual.translation)
+        turns = sampled(own.rotation_keys, at, usual.rotation)
+        sizes = sampled(own.scale_keys, at, usual.scale)
+        local[:, node] = matrices(places, turns, sizes)
+        tell(node, len(nodes))
+    bound = rest.copy()
+    for i, node in enumerate(nodes):
+        pose = node.bind_pose
+        for bone in list(pose.bone_poses) if pose is not None else []:
+            other = bone.bone_node
+            if other is not None and other.typed_id == node.typed_id:
+                bound[i, :3] = np.array(bone.bone_to_parent, np.float64).T
+    is_bone = np.array([node.bone is not None for node in nodes])
+    deforms = np.zeros(len(nodes), bool)
+    for cluster in list(scene.skin_clusters):
+        bone = cluster.bone_node
+        if bone is not None and cluster.num_weights and bone.typed_id in ids:
+            deforms[ids[bone.typed_id]] = True
+    names = [node.name for node in nodes]
+    if not is_bone.any():  # some exporters write joints as empty nodes
+        plain = (node.parent is not None and not (node.mesh or node.camera or node.light) for node in nodes)
+        is_bone = np.fromiter(plain, bool, len(nodes))
+    return names, parents, is_bone | deforms, deforms, rate, bound if usable(bound) else rest, rest, local
+
+
+def of_transform(transform: Any) -> Floats:
+    place, turn, size = transform.translation, transform.rotation, transform.scale
+    return np.asarray(matrices(np.array([list(place)]), np.array([list(turn)]), np.array([list(size)]))[0])
+
+
+def usable(rest: Floats) -> bool:
+    return bool(np.isfinite(rest).all() and (np.abs(np.linalg.det(rest)) > 1e-18).all())
+
+
+def sampled(keys: Any, at: Floats, usual: Any) -> Floats:
+    """Keys of a track at some times: [F, 3], or rotations [F, 4]."""
+    listed = [(key.time, *key.value) for key in keys]
+    if not listed:
+        return np.repeat(np.array([list(usual)]), len(at), axis=0)
+    table = np.array(listed)
+    times, values = table[:, 0], table[:, 1:]
+    before = np.clip(np.searchsorted(times, at + 1e-6, side="right") - 1, 0, len(times) - 1)
+    after = np.minimum(before + 1, len(times) - 1)
+    step = np.where(times[after] > times[before], times[after] - times[before], 1.0)
+    share = np.clip((at - times[before]) / step, 0.0, 1.0)[:, None]
+    first, second = values[before], values[after]
+    if values.shape[1] == 4:
+        second = np.where((first * second).sum(axis=1, keepdims=True) < 0.0, -second, second)
+    return np.asarray(first * (1.0 - share) + second * share)
+
+
+def matrices(places: Floats, turns: Floats, sizes: Floats) -> Floats:
+    """Matrices [F, 4, 4] of places, rotations (x, y, z, w) of any length, and sizes."""
+    x, y, z, w = (turns / np.linalg.norm(turns, axis=1, keepdims=True)).T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    whole = np.zeros((len(places), 4, 4))
+    whole[:, :3, :3] = np.moveaxis(np.array(rows), 2, 0) * sizes[:, None, :]
+    whole[:, :3, 3] = places
+    whole[:, 3, 3] = 1.0
+    return whole
+
+
+def usd(content: bytes, take: int, tell: Tell) -> Joints:
+    """The joints of the largest skeleton that moves in a USD file, in the world."""
+    from pxr import Sdf, Usd, UsdGeom, UsdSkel
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "clip.usdc" if content.startswith(b"PXR-USDC") else "clip.usda")
+        with open(path, "wb") as file:
+            file.write(content)
+        layer = Sdf.Layer.FindOrOpen(path)
+        if layer is None:
+            raise Refusal("the file is damaged, or no USD.")
+        others = [name for name in layer.GetCompositionAssetDependencies() if name]
+        if others:
+            raise Refusal(f"the file refers to other files, such as {others[0]!r}: flatten it, by usdcat --flatten")
+        stage = Usd.Stage.Open(layer)
+        return usd_joints(stage, tell, Usd, UsdGeom, UsdSkel)
+
+
+def usd_joints(stage: Any, tell: Tell, Usd: Any, UsdGeom: Any, UsdSkel: Any) -> Joints:
+    cache, best = UsdSkel.Cache(), None
+    for prim in stage.Traverse():
+        if prim.IsA(UsdSkel.Root):
+            cache.Populate(UsdSkel.Root(prim), Usd.PrimDefaultPredicate)
+    for prim in stage.Traverse():
+        if prim.IsA(UsdSkel.Skeleton):
+            query = cache.GetSkelQuery(UsdSkel.Skeleton(prim))
+            moves = query.GetAnimQuery() if query else None
+            if query and (best is None or (bool(moves), len(query.GetJointOrder())) > best[0]):
+                best = (bool(moves), len(query.GetJointOrder())), prim, query
+    if best is None:
+        raise Refusal("there is no skeleton.")
+    _, prim, query = best
+    paths = [str(path) for path in query.GetJointOrder()]
+    moves = query.GetAnimQuery()
+    if not moves:
+        raise Refusal("nothing moves the skeleton.")
+    rate = stage.GetTimeCodesPerSecond()
+    if not 1.0 <= rate <= 1e4:
+        raise Refusal(f"the file has {rate:g} time codes a second.")
+    times = sorted({*moves.GetJointTransformTimeSamples()}) or [0.0]
+    step = float(np.median(np.diff(times))) if len(times) > 1 else 1.0
+    step = step if step > 1e-6 else 1.0
+    n_frames = frames_of((times[-1] - times[0]) / step, 1.0, len(paths))
+    index = {path: i for i, path in enumerate(paths)}
+    parents = [index.get(path.rpartition("/")[0], -1) for path in paths]
+    unit = UsdGeom.GetStageMetersPerUnit(stage)
+    upright = np.eye(4) * [unit, unit, unit, 1.0]
+    if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z:
+        upright = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]]) @ upright
+    frames = np.empty((n_frames, len(paths), 4, 4))
+    for frame in range(n_frames):
+        at = Usd.TimeCode(min(times[0] + frame * step, times[-1]))
+        above = np.array(UsdGeom.XformCache(at).GetLocalToWorldTransform(prim)).T
+        joints = np.array(query.ComputeJointSkelTransforms(at)).transpose(0, 2, 1)
+        if joints.shape != (len(paths), 4, 4):
+            raise Refusal("the animation does not fit the skeleton.")
+        frames[frame] = upright @ above @ joints
+        if frame % 64 == 0:
+            tell(frame, n_frames)
+    given = np.array(UsdSkel.Skeleton(prim).GetRestTransformsAttr().Get())
+    local = given.transpose(0, 2, 1) if given.shape == (len(paths), 4, 4) else None
+    rest = frames[0].copy()
+    if local is not None and usable(local):
+        first = upright @ np.array(UsdGeom.XformCache(Usd.TimeCode(times[0])).GetLocalToWorldTransform(prim)).T
+        for joint in in_order(parents):
+            rest[joint] = (first if parents[joint] < 0 else rest[parents[joint]]) @ local[joint]
+    names = [path.rpartition("/")[2] for path in paths]
+    return names, parents, np.ones(len(paths), bool), np.ones(len(paths), bool), rate / step, rest, None, frames
+
+
+def frames_of(duration_s: float, rate: float, n_joints: int) -> int:
+    """How many frames there are; a refusal of more than can be meant."""
+    if not 0.0 <= duration_s * rate * n_joints <= MOST_FRAME_JOINTS:
+        raise Refusal(f"{duration_s:g} s of {n_joints} joints at {rate:g} frames a second are too much, or nothing.")
+    return round(duration_s * rate) + 1
+
+
+def in_order(parents: Sequence[int]) -> list[int]:
+    """The joints, a parent before its children."""
+    waiting, order = [joint for joint, parent in enumerate(parents) if parent < 0], []
+    while waiting:
+        order.append(waiting.pop())
+        waiting += [joint for joint, parent in enumerate(parents) if parent == order[-1]]
+    return order
+
+
+def in_world(
+    names: list[str],
+    parents: list[int],
+    is_joint: Any,
+    deforms: Any,
+    rate: float,
+    bound: Floats,
+    rest: Floats | None,
+    local: Floats,
+) -> tuple[dict[str, Any], Floats, Floats]:
+    """The joints that count alone, in the world; what is above and between them is in their places."""
+    if rest is not None:
+        for node in in_order(parents):
+            if parents[node] >= 0:
+                bound[node] = bound[parents[node]] @ bound[node]
+                local[:, node] = local[:, parents[node]] @ local[:, node]
+    joints = [i for i in range(len(names)) if is_joint[i]]
+    rank = {joint: i for i, joint in enumerate(joints)}
+    above: list[int] = []
+    for joint in joints:
+        parent = parents[joint]
+        while parent >= 0 and parent not in rank:
+            parent = parents[parent]
+        above.append(rank.get(parent, -1))
+    about = {"names": [names[i] for i in joints], "parents": above, "deforms": [bool(deforms[i]) for i in joints]}
+    return {**about, "rate": float(rate), "frames": len(local)}, bound[joints], local[:, joints]
+
+
+def limit_memory(size: int) -> None:
+    try:
+        import resource
+    except ImportError:  # Windows
+        return
+    hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+    wanted = MOST_MEMORY + TIMES_MEMORY * size
+    with suppress(ValueError, OSError):
+        resource.setrlimit(resource.RLIMIT_AS, (wanted if hard < 0 else min(wanted, hard), hard))
+
+
+def main() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever started this decides
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # libraries may print
+    read = {"fbx": fbx, "usd": usd}[sys.argv[1]]
+
+    def answer(document: dict[str, Any], *arrays: Floats) -> None:
+        answers.write(json.dumps(document).encode() + b"\n")
+        for array in arrays:
+            answers.write(np.ascontiguousarray(array, "<f8").tobytes())
+        answers.flush()
+
+    for line in iter(sys.stdin.buffer.readline, b""):
+        wanted = json.loads(line)
+        content = sys.stdin.buffer.read(wanted["size"])
+        limit_memory(wanted["size"])
+        try:
+            about, rest, frames = in_world(*read(content, wanted["take"], lambda done, of: answer({"done": done, "of": of})))
+        except ImportError:
+            answer({"missing": True})
+        except MemoryError:
+            answer({"fault": "the file needs more memory than a file of its size may."})
+        except Refusal as refusal:
+            answer({"fault": str(refusal)})
+        except Exception as error:  # whatever the libraries raise
+            answer({"fault": f"the file is damaged ({type(error).__name__}: {str(error)[:200]})."})
+        else:
+            answer(about, rest, frames)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,159 @@
+"""FBX and USD files, read by a child process: their libraries end the process now and then, which is then a fault of one file.
+
+One child of a kind reads many files, and is started again when it dies. It is given up when it says nothing for long.
+"""
+
+from __future__ import annotations
+
+import atexit
+import json
+import os
+import queue
+import subprocess
+import sys
+import threading
+from collections.abc import Mapping
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from contextdb.errors import ClipError, Fault, Place
+from contextdb.motion.clips.joint_arrays import MOST_JOINTS, depth_first
+from contextdb.motion.clips.joint_worlds import JointWorlds
+
+CHILD = Path(__file__).with_name("parser_child.py")
+SILENCE_S = 20.0
+"""So long a child may say nothing of a small file, on a machine that does other things too."""
+BYTES_PER_S = 2e6
+"""Of a large file it may be silent so much longer."""
+MOST_LINE = 1 << 24
+MOST_FRAME_JOINTS = 20_000_000
+Answer = tuple[dict[str, Any], bytes] | None
+
+
+class ParserProcess:
+    """The child of one kind, "fbx" or "usd"; `library` is what it needs, and `extra` installs it."""
+
+    def __init__(self, kind: str, library: str, extra: str) -> None:
+        self.kind, self.library, self.extra = kind, library, extra
+        self.child: subprocess.Popen[bytes] | None = None
+        self.answers: queue.SimpleQueue[Answer] = queue.SimpleQueue()
+        self.turn = threading.Lock()
+
+    def worlds(self, content: bytes, take: int, file: str) -> JointWorlds:
+        """The joints of a take. Raises ClipError where the file cannot be read, the child dies or is silent, or the library is not
+        installed."""
+        with self.turn:
+            try:
+                about, data = self._asked(content, take)
+            except BaseException as error:
+                self.close()
+                if isinstance(error, _Lost):
+                    raise self._refused(str(error), file) from None
+                raise
+        if about.get("missing"):
+            problem = f"{self.kind.upper()} files cannot be read: {self.library} is not installed."
+            mend = f'to install it: pip install "contextdb[{self.extra}]"'
+            raise ClipError(Fault(problem, ".bvh, .glb and .npz, which need nothing more", mend, Place(file)))
+        if "fault" in about:
+            raise self._refused(str(about["fault"]), file)
+        return _worlds(about, data)
+
+    def _refused(self, problem: str, file: str) -> ClipError:
+        return ClipError(Fault(problem, f"a whole {self.kind.upper()} file", "to export it again", Place(file)))
+
+    def close(self) -> None:
+        """End the child; the next file starts another."""
+        child, self.child = self.child, None
+        if child is not None:
+            child.kill()
+            child.wait()
+            for stream in (child.stdin, child.stdout):
+                if stream is not None:
+                    with suppress(OSError):
+                        stream.close()
+
+    def _asked(self, content: bytes, take: int) -> tuple[dict[str, Any], bytes]:
+        child = self._running()
+        sender = threading.Thread(target=_send, args=(child.stdin, content, take), daemon=True)
+        sender.start()
+        while True:
+            try:
+                answer = self.answers.get(timeout=SILENCE_S + len(content) / BYTES_PER_S)
+            except queue.Empty:
+                raise _Lost("the file was read for too long without an answer.") from None
+            if answer is None:
+                raise _Lost(f"the process that read the file ended (exit code {child.wait()}).")
+            if "done" not in answer[0]:
+                return answer
+
+    def _running(self) -> subprocess.Popen[bytes]:
+        if self.child is None or self.child.poll() is not None:
+            self.close()
+            command = [sys.executable, "-P", str(CHILD), self.kind]
+            alone = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+            pipe, nowhere = subprocess.PIPE, subprocess.DEVNULL
+            self.child = subprocess.Popen(command, env=alone, stdin=pipe, stdout=pipe, stderr=nowhere)
+            self.answers = queue.SimpleQueue()
+            threading.Thread(target=_receive, args=(self.child.stdout, self.answers), daemon=True).start()
+        return self.child
+
+
+class _Lost(Exception):
+    """The child gives no answer."""
+
+
+def _send(stream: IO[bytes] | None, content: bytes, take: int) -> None:
+    assert stream is not None
+    with suppress(OSError, ValueError):  # the child died, which the other thread reports
+        stream.write(json.dumps({"size": len(content), "take": take}).encode() + b"\n")
+        stream.write(content)
+        stream.flush()
+
+
+def _receive(stream: IO[bytes] | None, answers: queue.SimpleQueue[Answer]) -> None:
+    """Pass on what a child answers; None at its end, or where it does not answer as agreed."""
+    assert stream is not None
+    with suppress(OSError, ValueError, TypeError, KeyError):
+        while line := stream.readline(MOST_LINE):
+            about = json.loads(line)
+            size = _size(about)
+            data = stream.read(size)
+            if len(data) < size:
+                break
+            answers.put((about, data))
+    answers.put(None)
+
+
+def _size(about: Mapping[str, Any]) -> int:
+    """How many bytes follow an answer."""
+    if "frames" not in about:
+        return 0
+    joints, frames = len(about["names"]), int(about["frames"])
+    if not (0 <= joints <= MOST_JOINTS and frames >= 0 and joints * frames <= MOST_FRAME_JOINTS):
+        raise ValueError("more than a clip")
+    return 8 * 16 * joints * (1 + frames)
+
+
+def _worlds(about: Mapping[str, Any], data: bytes) -> JointWorlds:
+    n, n_frames = len(about["names"]), int(about["frames"])
+    numbers = np.frombuffer(data, "<f8").astype(np.float64).reshape(1 + n_frames, n, 4, 4)
+    parents = np.array(about["parents"], np.int64)
+    assert len(depth_first(parents)) == n, "the child sends trees"
+    names = [str(name) for name in about["names"]]
+    return JointWorlds(names, parents, numbers[0], numbers[1:], np.array(about["deforms"], bool), float(about["rate"]))
+
+
+def parser(kind: str) -> ParserProcess:
+    """The child of a kind, of this process: one that was forked starts its own."""
+    return _parser(kind, os.getpid())
+
+
+@cache
+def _parser(kind: str, _pid: int) -> ParserProcess:
+    started = ParserProcess(kind, *{"fbx": ("ufbx", "fbx"), "usd": ("usd-core", "usd")}[kind])
+    atexit.register(started.close)
+    return started

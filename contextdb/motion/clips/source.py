@@ -1,0 +1,198 @@
+"""Files of clips in any format: what a file holds, the names of its clips, and each of them.
+
+    path ─► ClipSource(bytes, format) ─► names ─► Clip
+
+What a file holds is asked of its bytes, not of its ending. Nothing after this knows formats. A file of one animation is a clip of
+the file's name; of a file with several each is `FILE:TAKE`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from functools import partial
+from os import PathLike
+from pathlib import Path
+
+from contextdb.cells.arguments import require_many, require_path
+from contextdb.disk import read_bytes
+from contextdb.errors import ClipError, Fault, FileError, Place, in_quotes, mend_for, some
+from contextdb.motion.clips import gltf, npz, scenes
+from contextdb.motion.clips.clip import BY_SIZE, CENTIMETRE, Clip, Unit, Up, parse_bvh, text_of
+from contextdb.motion.clips.doubts import unit_by_size
+
+TAKE = ":"
+"""Between the name of a file and that of one of its takes."""
+ONE_TAKE: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Format:
+    """A format of clips.
+
+    Attributes
+    ----------
+    name : str
+    endings : tuple of str
+    is_format : function of bytes
+        Whether the bytes begin as such a file does.
+    takes : function of bytes and the file's name
+        The names of its animations; none where the file is one clip.
+    read : function of ClipSource, the clip's name, the take, a unit and an axis
+        The clip.
+    states_unit : bool
+        Whether a file says its unit and which axis points up, so that settings of both are about other files.
+    whole : function of bytes and the file
+        The bytes with those of other files that it needs.
+    version : int
+        One more whenever the same file would give another clip.
+    """
+
+    name: str
+    endings: tuple[str, ...]
+    is_format: Callable[[bytes], bool]
+    takes: Callable[[bytes, str], tuple[str, ...]]
+    read: Callable[[ClipSource, str, str, float, Up], Clip]
+    states_unit: bool = True
+    whole: Callable[[bytes, Path], bytes] = lambda content, path: content
+    version: int = 1
+
+
+@dataclass(frozen=True)
+class ClipSource:
+    """A file of clips: its bytes, and what they are."""
+
+    path: Path
+    content: bytes
+    format: Format
+
+    @classmethod
+    def of(cls, path: str | PathLike[str]) -> ClipSource:
+        """A file; raises FileError where it cannot be opened, ClipError where it is of no format of clips."""
+        place = require_path(path)
+        try:
+            content = read_bytes(place)
+        except FileError as error:
+            raise FileError(*(replace(fault, rule="file") for fault in error.faults), errno=error.errno) from None
+        form = format_of(content, str(path))
+        return cls(place, form.whole(content, place), form)
+
+    @property
+    def file(self) -> str:
+        """The file's name in messages."""
+        return str(self.path)
+
+    @property
+    def takes(self) -> tuple[str, ...]:
+        """The names of its animations, where it has several."""
+        takes = self.format.takes(self.content, self.file)
+        return takes if len(takes) > 1 else ONE_TAKE
+
+    @property
+    def names(self) -> list[str]:
+        """The names of its clips."""
+        return [clip_name(self.path, take) for take in self.takes or ("",)]
+
+    def clip(self, take: str = "", name: str | None = None, *, metres_per_unit: Unit = CENTIMETRE, up: Up = "y") -> Clip:
+        """The clip of a take; "size" is the unit in which its body is of a usual size, where the format does not say one. Raises
+        ClipError where it cannot be read, or there are several takes and none of this name."""
+        takes = self.takes
+        if takes and take not in takes:
+            problem = f"the file has {len(takes)} takes, and none is named {in_quotes(take)}."
+            raise ClipError(Fault(problem, some(takes), mend_for(take, takes), Place(self.file)))
+        plain = CENTIMETRE if metres_per_unit == BY_SIZE else metres_per_unit
+        clip = self.format.read(self, clip_name(self.path, take) if name is None else name, take, plain, up)
+        if metres_per_unit != BY_SIZE or self.format.states_unit:
+            return clip
+        return replace(clip, metres_per_unit=unit_by_size(clip) or CENTIMETRE)
+
+
+def clip_name(path: Path, take: str) -> str:
+    """The name of a file's clip."""
+    return f"{path.stem}{TAKE}{take}" if take else path.stem
+
+
+def take_at(text: str) -> tuple[str | None, str]:
+    """The file and the take of `FILE` or `FILE:TAKE`; None and "" of a name that is no file's."""
+    parts = _FILE.fullmatch(text)
+    return (None, "") if parts is None else (parts[1], parts[2] or "")
+
+
+def format_of(content: bytes, file: str) -> Format:
+    """The format of a file, by how it begins; by its ending where that says nothing."""
+    if content[:2] in PICKLES and content[-1:] == b".":
+        raise ClipError(Fault("the file is a pickle, which is never loaded.", "arrays in .npz", UNPICKLE, Place(file)))
+    begins = next((each for each in FORMATS if each.is_format(content)), None)
+    ends = next((each for each in FORMATS if Path(file).suffix.casefold() in each.endings), BVH)
+    return begins or ends
+
+
+def takes_of(path: Path) -> tuple[str, ...]:
+    """The takes of a file with several, which may have to be opened; none of one that cannot be read: whoever reads it says why."""
+    if path.suffix.casefold() in (*BVH.endings, *NPZ.endings):
+        return ONE_TAKE
+    try:
+        return ClipSource.of(path).takes
+    except (ClipError, FileError):
+        return ONE_TAKE
+
+
+def load_clips(paths: Iterable[str | PathLike[str]], *, metres_per_unit: float = CENTIMETRE, up: Up = "y") -> list[Clip]:
+    """Read the clips of several files, of any format; of a file with several takes all, in order.
+
+    `metres_per_unit` and `up` are about files whose format does not say either. Raises one ClipError with the faults of all that
+    are broken or cannot be read.
+    """
+    return [clip for _, clip in clips_by_file(paths, metres_per_unit, up)]
+
+
+def clips_by_file(paths: Iterable[str | PathLike[str]], metres_per_unit: float, up: Up) -> list[tuple[str, Clip]]:
+    """The same, each with the name of its file."""
+    clips = []
+    faults: list[Fault] = []
+    for path in require_many(paths, "paths", "a list of paths"):
+        try:
+            source = ClipSource.of(path)
+            for take in source.takes or ("",):
+                clips.append((source.file, source.clip(take, metres_per_unit=metres_per_unit, up=up)))
+        except (ClipError, FileError) as error:
+            faults.extend(error.faults)
+    if faults:
+        raise ClipError(*faults)
+    return clips
+
+
+PICKLES = (b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05")
+UNPICKLE = 'data = pickle.load(open("FILE.pkl", "rb")); np.savez("FILE.npz", **data), where you trust the file'
+
+
+def _one_take(content: bytes, file: str) -> tuple[str, ...]:
+    return ONE_TAKE
+
+
+def _read_bvh(source: ClipSource, name: str, take: str, metres_per_unit: float, up: Up) -> Clip:
+    text = text_of(source.content, source.file)
+    return parse_bvh(text, name, file=source.file, metres_per_unit=metres_per_unit, up=up)
+
+
+def _read_npz(source: ClipSource, name: str, take: str, metres_per_unit: float, up: Up) -> Clip:
+    return npz.read(source.content, name, source.file)
+
+
+def _read_gltf(source: ClipSource, name: str, take: str, metres_per_unit: float, up: Up) -> Clip:
+    return gltf.read(source.content, source.takes.index(take) if take else 0, name, source.file)
+
+
+def _read_scene(kind: str, source: ClipSource, name: str, take: str, metres_per_unit: float, up: Up) -> Clip:
+    return scenes.read(kind, source.content, source.takes.index(take) if take else 0, name, source.file)
+
+
+BVH = Format("BVH", (".bvh",), lambda content: content[:64].lstrip()[:9].upper() == b"HIERARCHY", _one_take, _read_bvh, False)
+NPZ = Format("arrays", (".npz",), lambda content: content.startswith(b"PK\x03\x04"), _one_take, _read_npz)
+GLTF = Format("glTF", (".glb", ".gltf"), gltf.is_gltf, gltf.takes, _read_gltf, whole=gltf.packed)
+FBX = Format("FBX", (".fbx",), scenes.is_fbx, scenes.fbx_takes, partial(_read_scene, "fbx"))
+USD = Format("USD", (".usd", ".usda", ".usdc"), scenes.is_usd, scenes.usd_takes, partial(_read_scene, "usd"))
+FORMATS = (BVH, FBX, GLTF, USD, NPZ)
+ENDINGS = tuple(ending for each in FORMATS for ending in each.endings)
+_FILE = re.compile(f"(.+?(?:{'|'.join(map(re.escape, ENDINGS))}))(?:{TAKE}(.*))?", re.IGNORECASE | re.DOTALL)

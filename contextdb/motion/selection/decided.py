@@ -1,0 +1,150 @@
+"""From the numbers of an update to a `Decision`: its sentences and its records, made for those who want them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from contextdb.motion.clips.ground_place import GroundPlace
+from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.markup.tag_filter import TagFilter
+from contextdb.motion.search.candidates import Candidates
+from contextdb.motion.search.filters import Filter
+from contextdb.motion.selection import trigger
+from contextdb.motion.selection.choice import Choice
+from contextdb.motion.selection.chooser import Updates
+from contextdb.motion.selection.decision import Action, Decision, Playing
+from contextdb.motion.selection.guards import Held
+from contextdb.motion.selection.inputs import Inputs
+from contextdb.motion.selection.root_motion import RootMotion
+from contextdb.motion.selection.search_options import SearchOptions
+from contextdb.motion.selection.trigger import Trigger
+from contextdb.motion.selection.worked_out import WorkedOut
+
+CAUSES, HELD, ACTIONS = (None, *Trigger), tuple(Held), tuple(Action)
+"""What the numbers of the core mean."""
+VALID, WIDENED = 0, 1
+
+
+class Told(NamedTuple):
+    """What a decision is made of beside the numbers of an update."""
+
+    query: Floats
+    context: Mapping[str, object] | None
+    body: GroundPlace | None
+    search_us: float | None
+    n_candidates: int
+    options: SearchOptions | None
+    force: bool
+    interrupt: bool
+
+
+class Numbers(NamedTuple):
+    """A decision as the core gives it, in its order."""
+
+    tick: float
+    time_s: float
+    action: float
+    cause: float
+    held: float
+    standing: float
+    playing: Sequence[float]
+    before: Sequence[float]
+    cost: float | None
+    continuing_cost: float | None
+    winner: int
+    chosen: Sequence[float]
+    motion: Sequence[float]
+    root_weight: float
+    rate: float
+    due_s: float
+    waited_s: float
+
+    @classmethod
+    def of(cls, row: list[float]) -> Numbers:
+        """A row of decisions."""
+        cost, continuing = (None if each != each else each for each in row[14:16])
+        parts = row[6:10], row[10:14], cost, continuing, int(row[16]), row[18:22], row[22:25]
+        return cls._make((*row[:6], *parts, *row[25:29]))
+
+
+def decision_of(updates: Updates, i: int, was: Playing | None, asked: Told) -> Decision:
+    """The decision of one of some updates; `was` is what played before it."""
+    numbers, chooser = Numbers.of(updates.decisions[i].tolist()), updates.chooser
+    cause = CAUSES[int(numbers.cause)]
+    choice = None if cause is None else updates.choice(i)
+    before = chooser.playing(numbers.before) or was
+    is_same = numbers.playing == numbers.before
+    filters: tuple[tuple[str, Filter], ...] = ()
+    candidates: Sequence[tuple[str, Candidates]] = ()
+    if choice is not None and asked.n_candidates > 0:
+        among = updates.given.among[i if len(updates.given.among) > 1 else 0].tolist()
+        each = zip(chooser.names, chooser.databases, among, strict=True)
+        filters = tuple((name, updates.filter_of(i, d)) for d, (name, own, is_in) in enumerate(each) if own is not None and is_in)
+        if filters:
+            candidates = WorkedOut(chooser.selector.databases, asked.query, filters, choice, asked.n_candidates)
+    return Decision(
+        tick=int(numbers.tick),
+        time_s=numbers.time_s,
+        action=ACTIONS[int(numbers.action)],
+        why=_why(updates, numbers, cause, before, choice),
+        searched=cause is not None,
+        playing=before if is_same else chooser.playing(numbers.playing),
+        before=before,
+        cost=numbers.cost,
+        continuing_cost=numbers.continuing_cost,
+        choice=choice,
+        context=asked.context,
+        query=asked.query,
+        candidates=candidates,
+        search_us=None if cause is None else asked.search_us,
+        root_motion=RootMotion(*numbers.motion),
+        root_weight=numbers.root_weight,
+        body=asked.body,
+        held=str(HELD[int(numbers.held)]),
+        play_rate=numbers.rate,
+        filters=filters,
+        inputs=_inputs(updates, asked) if asked.n_candidates > 0 else None,
+    )
+
+
+def _inputs(updates: Updates, asked: Told) -> Inputs:
+    """For a recorder, what else an update was given."""
+    chooser, options = updates.chooser, asked.options
+    assert options is not None, "they are handed over where somebody records"
+    among = None if options.among is None else tuple(sorted(chooser.selector.among(options.among)))
+    tags = options.tags
+    if tags is not None and not isinstance(tags, TagFilter):  # flags of frames are in the filters
+        named = {name: each for name, each in tags.items() if isinstance(each, TagFilter)}
+        return Inputs(updates.given.dt_s, asked.force, asked.interrupt, among, named, chooser.settings)
+    return Inputs(updates.given.dt_s, asked.force, asked.interrupt, among, tags, chooser.settings)
+
+
+def _why(updates: Updates, numbers: Numbers, cause: Trigger | None, before: Playing | None, choice: Choice | None) -> str:
+    """The decision in one sentence."""
+    held, chooser = HELD[int(numbers.held)], updates.chooser
+    if cause is None or choice is None:
+        assert before is not None, "without anything playing there is a cause to search"
+        if held is Held.HYSTERESIS:
+            return trigger.by_hysteresis(trigger.not_due(numbers.due_s), before)
+        return trigger.held(before, held.sentence) if held else trigger.not_due(numbers.due_s)
+    if not choice:
+        return trigger.nothing_else(cause, before, cause is Trigger.ENDED)
+    action = ACTIONS[int(numbers.action)]
+    if action in (Action.START, Action.JUMP) or held is Held.COST_BAR:
+        d, at, frame, cost = numbers.chosen
+        database = chooser.databases[int(d)]
+        assert database is not None, "what is chosen is of a database that is there"
+        entry_s = (frame - float(database.starts[int(at)])) / chooser.rates[int(d)]
+        playing = chooser.playing((d, at, frame, entry_s))
+        assert playing is not None, "something was chosen"
+        bar = chooser.settings.bar_of(database)
+        if held is Held.COST_BAR and before is not None:
+            return trigger.waiting(before, playing, cost, bar, chooser.settings.grace_s - numbers.waited_s)
+        why = trigger.jumped(cause, before, playing, cost, choice, numbers.continuing_cost)
+        is_over = cause is Trigger.NOT_VALID and cost > bar
+        return trigger.last_resort(why, bar, numbers.waited_s) if is_over else why
+    assert before is not None, "only what plays can play on"
+    assert numbers.continuing_cost is not None, "a frame that wins has a cost"
+    why = trigger.continued(cause, before, numbers.continuing_cost, choice.hit.cost)
+    return trigger.by_hysteresis(why, before) if held is Held.HYSTERESIS else why

@@ -1,0 +1,46 @@
+"""Decisions as the live link of a game publishes them: plain JSON, and for who debugs a row of a recorded session.
+
+The link is handed this module; neither imports the other.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from weakref import WeakKeyDictionary
+
+from contextdb.motion.search.database import MotionDatabase
+from contextdb.motion.selection.choice import Choice
+from contextdb.motion.selection.decision import Decision
+from contextdb.motion.selection.worked_out import WorkedOut
+from contextdb.motion.trace.filter_rows import fingerprint, markup_digest
+from contextdb.motion.trace.json_form import as_plain, decision_json
+from contextdb.motion.trace.rows import row_of
+
+_digests: WeakKeyDictionary[MotionDatabase, dict[str, str]] = WeakKeyDictionary()
+
+
+def is_decision(value: object) -> bool:
+    """Whether a value can be published: the Decision of a controller, or the Choice of a selector."""
+    return isinstance(value, (Decision, Choice))
+
+
+def plain(decision: object) -> object:
+    """A decision as `contextdb motion replay --json` writes it; the choice of a selector as a decision with nothing but that."""
+    return decision_json(decision) if isinstance(decision, Decision) else {"choice": as_plain(decision)}
+
+
+def row(decision: object) -> str | None:
+    """A decision as a row of a recorded session, in Python's JSON: what is infinite is `Infinity`. None for a selector's choice."""
+    return json.dumps(row_of(decision, lambda *_: ()), separators=(",", ":")) if isinstance(decision, Decision) else None
+
+
+def digests(decision: object) -> Mapping[str, Mapping[str, str]]:
+    """What tells whether a listener has the databases that a decision was made with, computed once for each; none where the
+    decision does not name them."""
+    candidates = decision.candidates if isinstance(decision, Decision) else None
+    databases = candidates.databases if isinstance(candidates, WorkedOut) else {}
+    for database in databases.values():
+        if database not in _digests:
+            _digests[database] = {"digest": fingerprint(database), "markup": markup_digest(database)}
+    return {name: _digests[database] for name, database in databases.items()}

@@ -1,0 +1,122 @@
+"""Contracts: what must hold of a table in every context, as `[contracts.NAME]` of contextdb.toml declares it.
+
+    some      at least one valid row is of the kind
+    every     all valid rows are, also where there is none
+    none      no valid row is
+    at_most   no more valid rows, or no more of a kind
+    winner    some row is valid, and each row that the policy may pick is of the kind
+
+A kind of rows is an expression over `asset`, `weight`, `priority` and the outputs of the table. Nothing here knows its rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, cast
+
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import BOOL, INT, NUMBER, Domain
+from contextdb.cells.outputs import Output
+from contextdb.errors import SchemaError
+from contextdb.files.settings import Declared, setting
+from contextdb.files.toml_shapes import Shape, meant_text, wrong_name
+from contextdb.files.toml_text import what
+from contextdb.schema.shapes import COLUMN, EXPRESSION, TEXT
+
+Verb = Literal["some", "every", "none", "at_most", "winner"]
+VERBS: tuple[Verb, ...] = ("some", "every", "none", "at_most", "winner")
+MOST = 1000
+"""The greatest number of `at_most`."""
+
+
+def _wrong_limit(value: object) -> str | None:
+    n, of = value, "asset"
+    if isinstance(value, Mapping):
+        if set(value) - {"n", "of"} or "n" not in value:
+            return "this has other keys than n and of, or no n"
+        n, of = value["n"], value.get("of", of)
+    elif isinstance(value, tuple) and len(value) == 2:
+        n, of = value[0], value[1] or of
+    if isinstance(n, bool) or not isinstance(n, int):
+        return f"this is {what(n)}, not a number of rows"
+    if not 0 <= n <= MOST:
+        return f"this is not from 0 to {MOST}"
+    return wrong_name(of)
+
+
+def limit_of(value: Any) -> tuple[int, str | None]:
+    """The number of rows, and their kind; None: all rows."""
+    if isinstance(value, Mapping):
+        return value["n"], value.get("of")
+    return value if isinstance(value, tuple) else (value, None)
+
+
+KIND = Shape("a kind of rows as text, such as \"asset like 'carry*'\"", wrong_name, meant_text)
+LIMIT = Shape("a number of rows from 0 up, or { n = 3, of = \"asset like 'carry*'\" }", _wrong_limit, read=limit_of)
+
+
+@dataclass(frozen=True)
+class Contract(Declared, error=SchemaError):
+    """What `[contracts.NAME]` says must hold of a table; one of `some`, `every`, `none`, `at_most` and `winner` is given."""
+
+    name: str
+    table: str = setting(COLUMN, "The table that it is about.")
+    when: str | None = setting(
+        EXPRESSION, "The contexts in which it must hold.", None,
+        more="An [expression](#expressions) over facts; those that `assume` excludes are left out, too.", without="all contexts",
+    )  # fmt: skip
+    some: str | None = setting(KIND, "At least one valid row is of this kind.", None, without="not demanded")
+    every: str | None = setting(
+        KIND, "All valid rows are of this kind.", None, more="It holds where no row is valid.", without="not demanded"
+    )
+    none: str | None = setting(KIND, "No valid row is of this kind.", None, without="not demanded")
+    at_most: tuple[int, str | None] | None = setting(
+        LIMIT, "No more rows are valid at once, or no more of a kind.", None, without="not demanded"
+    )
+    winner: str | None = setting(
+        KIND, "A row is valid, and every row that the policy may pick is of this kind.", None,
+        more="Whatever was picked before, rests, or costs more in a search. A fallback is no row.", without="not demanded",
+    )  # fmt: skip
+    why: str = setting(TEXT, "Why it must hold: reports say it.", "", without="nothing")
+
+    @property
+    def verb(self) -> Verb:
+        """What is demanded."""
+        return next(verb for verb in VERBS if getattr(self, verb) is not None)
+
+    @property
+    def kind(self) -> str | None:
+        """The kind of rows that it is about; None for all rows."""
+        return self.at_most[1] if self.at_most is not None else cast("str", getattr(self, self.verb))
+
+    @property
+    def most(self) -> int:
+        """The number of `at_most`."""
+        return self.at_most[0] if self.at_most is not None else 0
+
+    @property
+    def demand(self) -> str:
+        """What is demanded, as reports write it."""
+        kind = "" if self.kind is None else f" {self.kind}"
+        return f"at_most {self.most}{' of' if kind else ''}{kind}" if self.at_most is not None else f"{self.verb}{kind}"
+
+
+def row_conditions(outputs: Mapping[str, Output], values: Mapping[str, tuple[str, ...]] | None = None) -> dict[str, Condition]:
+    """What kinds of rows may name, as conditions; `values` are the texts of those of type text that a table has."""
+    known = values or {}
+    conditions = {name: Condition(name, _domain(output, known.get(name, ()))) for name, output in outputs.items()}
+    conditions = {name: condition for name, condition in conditions.items() if not output_is_list(outputs[name])}
+    own = {"asset": Domain("text", known.get("asset", ())), "weight": NUMBER, "priority": INT}
+    return conditions | {name: Condition(name, domain) for name, domain in own.items()}
+
+
+def output_is_list(output: Output) -> bool:
+    """Whether a cell has several numbers, of which no kind can be made."""
+    return output.type.has_size
+
+
+def _domain(output: Output, values: tuple[str, ...]) -> Domain:
+    if output.type.has_values:
+        return Domain("enum", output.values)
+    return {"bool": BOOL, "int": INT, "number": NUMBER}.get(output.kind) or Domain("text", values)

@@ -1,0 +1,388 @@
+"""Clips of any format: what a file holds is asked of its bytes, and the same motion is the same clip."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from clip_files import SMPL_OFFSETS, Moving, amass, fbx, gltf, usda
+
+from contextdb import motion
+from contextdb.errors import ContextDBError
+from contextdb.motion.clips import parser_process
+from contextdb.motion.clips.feet import footfalls_of
+from contextdb.motion.clips.parser_process import ParserProcess
+from contextdb.motion.clips.poses import poses_of
+from contextdb.motion.features.extraction import clip_features
+from contextdb.motion.made.recipes import RECIPES, make_clip
+from contextdb.motion.storage.building import build_all
+from contextdb.motion.storage.written_poses import write_arrays
+
+OTHERS: dict[str, Callable[[Moving, str], bytes]] = {
+    ".glb": lambda body, up: gltf(body, up=up),
+    ".gltf": lambda body, up: gltf(body, up=up, binary=False),
+    ".fbx": lambda body, up: fbx(body, up=up, metres_per_unit=0.01 if up == "z" else 1.0),
+    ".usda": lambda body, up: usda(body, up=up, metres_per_unit=0.01 if up == "z" else 1.0),
+}
+"""Writers of other formats than BVH: with z up in centimetres, or another unit than the one with y up."""
+CHANNELS = [
+    {"type": "position", "bone": "LeftFoot"},
+    {"type": "velocity", "bone": "Hips"},
+    {"type": "orientation", "bone": "Chest"},
+    {"type": "trajectory", "what": "position", "at": [0.3, 0.6]},
+]
+NAMES = ["Hips", "LeftFoot", "RightFoot"]
+STILL = np.array([[0.0, 0.9, 0.0], [0.1, -0.9, 0.0], [-0.1, -0.9, 0.0]])
+
+
+@pytest.fixture(scope="module")
+def walk() -> motion.Clip:
+    """A made walk without the ends of chains, which other formats have not."""
+    body = Moving.of(make_clip("walk").clip)
+    return motion.Clip.from_arrays(body.names, body.parents, body.offsets, body.rotations, body.root, body.rate, name="walk")
+
+
+def same_joints(one: motion.Clip, other: motion.Clip, within_m: float = 1e-4) -> None:
+    first, second = poses_of(one), poses_of(other)
+    joints = [other.skeleton.index(name) for name in one.skeleton.names]
+    assert first.positions.shape == second.positions[:, joints].shape
+    assert np.abs(first.positions - second.positions[:, joints]).max() < within_m
+
+
+def arrays_of(clip: motion.Clip) -> dict[str, object]:
+    body, poses = Moving.of(clip), poses_of(clip)
+    return {"body": body, "positions": poses.positions, "bones": np.array(body.names), "parents": np.array(body.parents)}
+
+
+def test_a_clip_of_arrays_is_the_clip_that_they_were_taken_from(walk: motion.Clip):
+    plain = make_clip("walk").clip
+    same_joints(plain, walk, 1e-9)
+    assert walk.rate == pytest.approx(plain.rate)
+    assert walk.metres_per_unit == 0.01
+
+
+def test_joints_of_arrays_may_come_in_any_order():
+    order = [2, 0, 1]
+    still = np.tile(np.array([1.0, 0.0, 0.0, 0.0]), (2, 3, 1))
+    clip = motion.Clip.from_arrays([NAMES[i] for i in order], [1, -1, 1], STILL[order], still[:, order], np.ones((2, 3)), 30.0)
+    assert clip.skeleton.names == ("Hips", "RightFoot", "LeftFoot")
+    assert poses_of(clip).positions[0, 1].tolist() == pytest.approx([0.9, 0.1, 1.0])
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"names": ["a", "a", "b"]}, 'two joints are named "a"'),
+        ({"parents": [-1, -1, 0]}, "2 joints of 3 have no parent"),
+        ({"parents": [-1, 2, 1]}, "the parents are no tree"),
+        ({"parents": [-1, 0, 9]}, "the parents are no tree"),
+        ({"offsets": np.zeros((2, 3))}, "the offsets are [2, 3]"),
+        ({"rotations": np.full((2, 3, 4), np.nan)}, "the rotations are [2, 3, 4], not all finite"),
+        ({"rotations": np.zeros((2, 3, 4))}, "a rotation is 0 in all four numbers"),
+        ({"positions": np.zeros((3, 3))}, "the positions are [3, 3]"),
+        ({"positions": [[1, 2], [3]]}, "the positions are [0]"),
+    ],
+)
+def test_arrays_that_do_not_fit_together_are_refused(changed: dict[str, object], message: str):
+    turns = np.tile(np.array([1.0, 0.0, 0.0, 0.0]), (2, 3, 1))
+    given = {"names": NAMES, "parents": [-1, 0, 0], "offsets": STILL, "rotations": turns, "positions": np.zeros((2, 3)), **changed}
+    with pytest.raises(motion.ClipError) as error:
+        motion.Clip.from_arrays(**given, rate=30.0, name="walk")
+    assert str(error.value).startswith(f"walk: {message}")
+
+
+def test_poses_that_were_written_as_arrays_are_read_as_a_clip(walk: motion.Clip, tmp_path: Path):
+    arrays = arrays_of(walk)
+    del arrays["body"]
+    write_arrays({**arrays, "rate": np.array(walk.rate)}, tmp_path / "walk.npz")
+    (clip,) = motion.load_clips([tmp_path / "walk.npz"])
+    same_joints(walk, clip, 1e-9)
+    assert (clip.name, clip.rate) == ("walk", pytest.approx(walk.rate))
+    hands = [poses_of(each).rotations[:, each.skeleton.index("Hips")] for each in (walk, clip)]
+    turned = np.abs((hands[0] * hands[1]).sum(axis=-1) / np.abs((hands[0][0] * hands[1][0]).sum()))
+    assert turned.min() > 0.9  # bones turn, and not the joints alone move
+
+
+def test_arrays_say_their_unit_and_axis(walk: motion.Clip, tmp_path: Path):
+    arrays = arrays_of(walk)
+    body = arrays.pop("body")
+    assert isinstance(body, Moving)
+    places = poses_of(walk).positions[..., [0, 2, 1]] * np.array([1.0, -1.0, 1.0]) * 100.0
+    units = {"metres_per_unit": np.array(0.01), "up": np.array("z"), "rate": np.array(walk.rate)}
+    write_arrays({**arrays, "positions": places, **units}, tmp_path / "walk.npz")
+    same_joints(walk, motion.load_clips([tmp_path / "walk.npz"])[0], 1e-9)
+
+
+def test_the_arrays_of_from_arrays_are_a_clip(walk: motion.Clip, tmp_path: Path):
+    body = Moving.of(walk)
+    arrays = {"names": np.array(body.names), "parents": np.array(body.parents), "offsets": body.offsets}
+    arrays |= {"rotations": body.rotations, "positions": body.root, "rate": np.array(body.rate)}
+    write_arrays(arrays, tmp_path / "a.npz")
+    (clip,) = motion.load_clips([tmp_path / "a.npz"])
+    same_joints(clip, walk, 1e-9)
+
+
+def test_joints_of_humanml3d_have_the_names_of_smpl(tmp_path: Path):
+    places = np.cumsum(np.ones((5, 22, 3)), axis=1) + np.arange(5)[:, None, None]
+    write_arrays({"joints": places}, tmp_path / "a.npz")
+    (clip,) = motion.load_clips([tmp_path / "a.npz"])
+    assert clip.rate == pytest.approx(20.0)
+    joints = [clip.skeleton.index(name) for name in ("Pelvis", "Head", "R_Wrist")]
+    assert np.abs(poses_of(clip).positions[:, joints] - places[:, [0, 15, 21]]).max() < 1e-9
+
+
+def test_amass_is_read_with_the_offsets_that_its_user_brings(tmp_path: Path):
+    """A body turned by 90° about the axis that points up, 1 m along x, with a bent left knee."""
+    (tmp_path / "amass.npz").write_bytes(amass(offsets=SMPL_OFFSETS))
+    (clip,) = motion.load_clips([tmp_path / "amass.npz"])
+    poses = poses_of(clip)
+    at = {name: poses.positions[0, clip.skeleton.index(name)] for name in clip.skeleton.names}
+    assert clip.rate == pytest.approx(60.0)
+    assert at["Pelvis"].tolist() == pytest.approx([1.0, 0.9, 0.0])
+    assert at["L_Hip"].tolist() == pytest.approx([1.0, 0.8, -0.1])  # the left of a body that faces +x is at -z
+    assert at["L_Knee"].tolist() == pytest.approx([1.0, 0.4, -0.1])
+    assert at["L_Ankle"].tolist() == pytest.approx([0.6, 0.4, -0.1])  # bent backwards
+
+
+def test_amass_without_offsets_says_how_to_bring_them(tmp_path: Path):
+    (tmp_path / "amass.npz").write_bytes(amass())
+    with pytest.raises(motion.ClipError) as error:
+        motion.load_clips([tmp_path / "amass.npz"])
+    assert "amass.npz: AMASS holds no lengths of bones" in str(error.value)
+    assert "offsets=offsets" in str(error.value)
+
+
+def test_a_pickle_is_never_loaded_and_the_message_converts_it(tmp_path: Path):
+    import pickle
+
+    (tmp_path / "a.npz").write_bytes(pickle.dumps({"poses": 1}))
+    with pytest.raises(motion.ClipError, match="a pickle, which is never loaded") as error:
+        motion.load_clips([tmp_path / "a.npz"])
+    assert 'pickle.load(open("FILE.pkl", "rb")); np.savez("FILE.npz", **data)' in str(error.value)
+    whole = io.BytesIO()
+    np.savez(whole, positions=np.array([{}], object))
+    (tmp_path / "b.npz").write_bytes(whole.getvalue())
+    with pytest.raises(motion.ClipError, match='the array "positions" is a pickle'):
+        motion.load_clips([tmp_path / "b.npz"])
+
+
+def test_what_a_file_holds_is_asked_of_its_bytes_and_not_of_its_ending(walk: motion.Clip, tmp_path: Path):
+    body = arrays_of(walk)
+    del body["body"]
+    write_arrays({**body, "rate": np.array(walk.rate)}, tmp_path / "walk.npz")
+    (tmp_path / "walk.npz").rename(tmp_path / "walk.bvh")
+    same_joints(walk, motion.load_clips([tmp_path / "walk.bvh"])[0])
+
+
+def test_a_pattern_may_name_several_endings(walk: motion.Clip, tmp_path: Path):
+    body = arrays_of(walk)
+    del body["body"]
+    (tmp_path / "clips").mkdir()
+    write_arrays({**body, "rate": np.array(walk.rate)}, tmp_path / "clips/run.npz")
+    motion.write_bvh(walk, tmp_path / "clips/walk.bvh")
+    (tmp_path / "clips/other.txt").write_text("", encoding="utf-8")
+    features = {"jog": {"rate": 30.0, "channels": [{"type": "position", "bone": "LeftFoot"}]}}
+    databases = {"jog": {"clips": "clips/*.{bvh,npz}", "features": "jog"}}
+    config = motion.MotionConfig.from_dict({"features": features, "databases": databases})
+    run, again = config.load_clips("jog", tmp_path)
+    same_joints(run, again)
+    built = build_all(config, tmp_path, {})["jog"]
+    assert (built.computed, tuple(built.database.assets)) == (("run", "walk"), ("run", "walk"))
+    assert build_all(config, tmp_path, {})["jog"].computed == ()
+
+
+def test_every_made_clip_is_the_same_by_its_joints_alone(tmp_path: Path):
+    for name in RECIPES:
+        clip = make_clip(name).clip
+        arrays = arrays_of(clip)
+        del arrays["body"]
+        write_arrays({**arrays, "rate": np.array(clip.rate)}, tmp_path / f"{name}.npz")
+        same_joints(clip, motion.load_clips([tmp_path / f"{name}.npz"])[0], 1e-6)
+
+
+def test_a_damaged_archive_is_one_fault_with_the_name_of_the_file(tmp_path: Path):
+    whole = amass(offsets=SMPL_OFFSETS)
+    for n in (4, 100, len(whole) // 2, len(whole) - 3):
+        (tmp_path / "a.npz").write_bytes(whole[:n])
+        with pytest.raises(ContextDBError) as error:
+            motion.load_clips([tmp_path / "a.npz"])
+        assert str(error.value).startswith(f"{tmp_path / 'a.npz'}: ")
+
+
+# ---- glTF
+
+
+@pytest.mark.parametrize(("up", "how"), [("y", "LINEAR"), ("z", "LINEAR"), ("y", "STEP"), ("y", "CUBICSPLINE")])
+@pytest.mark.parametrize("ending", [".glb", ".gltf"])
+def test_a_walk_as_gltf_has_the_joints_that_it_has_as_bvh(walk: motion.Clip, up: str, how: str, ending: str, tmp_path: Path):
+    (tmp_path / f"walk{ending}").write_bytes(gltf(Moving.of(walk), up=up, how=how, binary=ending == ".glb"))
+    (clip,) = motion.load_clips([tmp_path / f"walk{ending}"])
+    same_joints(walk, clip)
+    assert clip.rate == pytest.approx(walk.rate, rel=1e-5)
+    assert clip.skeleton.names == walk.skeleton.names
+    assert np.abs(clip.skeleton.offsets[1:] - walk.skeleton.offsets[1:]).max() < 1e-2
+
+
+def test_a_gltf_reads_the_buffers_beside_it_and_none_elsewhere(walk: motion.Clip, tmp_path: Path):
+    document = json.loads(gltf(Moving.of(walk), binary=False))
+    data = base64.b64decode(document["buffers"][0]["uri"].partition(",")[2])
+    (tmp_path / "clips").mkdir()
+    for place in ("walk data.bin", "../outside.bin"):
+        (tmp_path / "clips" / place).write_bytes(data)
+        document["buffers"][0]["uri"] = place.replace(" ", "%20")
+        (tmp_path / "clips/walk.gltf").write_text(json.dumps(document), encoding="utf-8")
+        if ".." in place:
+            with pytest.raises(ContextDBError):
+                motion.load_clips([tmp_path / "clips/walk.gltf"])
+        else:
+            same_joints(walk, motion.load_clips([tmp_path / "clips/walk.gltf"])[0])
+
+
+def test_takes_of_one_file_are_clips_of_their_own(walk: motion.Clip, tmp_path: Path):
+    (tmp_path / "clips").mkdir()
+    (tmp_path / "clips/all.glb").write_bytes(gltf(Moving.of(walk), takes=("Walk", "Run", "Run")))
+    names = [clip.name for clip in motion.load_clips([tmp_path / "clips/all.glb"])]
+    assert names == ["all:Walk", "all:Run 2", "all:Run 3"]
+    features = {"jog": {"rate": 30.0, "channels": [{"type": "position", "bone": "LeftFoot"}]}}
+    config = motion.MotionConfig.from_dict(
+        {"features": features, "databases": {"jog": {"clips": "clips/*.{bvh,glb}", "features": "jog"}}}
+    )
+    assert build_all(config, tmp_path, {})["jog"].computed == ("all:Walk", "all:Run 2", "all:Run 3")
+    assert build_all(config, tmp_path, {})["jog"].computed == ()
+
+
+def test_nodes_beside_the_body_are_left_out_and_reported(walk: motion.Clip, tmp_path: Path):
+    document = json.loads(gltf(Moving.of(walk), binary=False))
+    document["nodes"].append({"name": "LeftFootCtrl"})
+    document["animations"][0]["channels"].append({"sampler": 0, "target": {"node": len(document["nodes"]) - 1, "path": "rotation"}})
+    document["skins"][0]["joints"].append(len(document["nodes"]) - 1)
+    (tmp_path / "walk.gltf").write_text(json.dumps(document), encoding="utf-8")
+    (clip,) = motion.load_clips([tmp_path / "walk.gltf"])
+    assert clip.notes == ('1 node beside the body left out: "LeftFootCtrl".',)
+    same_joints(walk, clip)
+
+
+# ---- the oracle
+
+
+RATES = (24.0, 30.0, 60.0, 120.0)
+
+
+@pytest.mark.parametrize("rate", RATES)
+@pytest.mark.parametrize("up", ["y", "z"])
+@pytest.mark.parametrize("ending", sorted(OTHERS))
+def test_one_motion_in_any_format_is_one_clip(walk: motion.Clip, ending: str, up: str, rate: float, tmp_path: Path):
+    """The same joints, contacts, features and description as BVH, in units of metres and centimetres."""
+    body = replace(Moving.of(walk), rate=rate)
+    plain = motion.Clip.from_arrays(body.names, body.parents, body.offsets, body.rotations, body.root, rate, name="walk")
+    motion.write_bvh(plain, tmp_path / "walk.bvh", digits=9)
+    (tmp_path / f"walk{ending}").write_bytes(OTHERS[ending](body, up))
+    bvh, other = (motion.load_clips([tmp_path / f"walk{each}"])[0] for each in (".bvh", ending))
+    same_joints(bvh, other)
+    assert other.rate == pytest.approx(rate, rel=1e-6)
+    schema = motion.FeatureSchema.from_dict("jog", {"rate": 30.0, "channels": CHANNELS})
+    features = [clip_features(clip, schema).features for clip in (bvh, other)]
+    assert np.abs(features[0] - features[1]).max() < 5e-3
+    down = [footfalls_of(poses_of(clip)).down for clip in (bvh, other)]
+    assert {foot: np.round(times, 3).tolist() for foot, times in down[0].items()} == {
+        foot: np.round(times, 3).tolist() for foot, times in down[1].items()
+    }
+    one, another = (motion.describe([clip])[0].cells for clip in (bvh, other))
+    assert one == another
+
+
+# ---- FBX and USD
+
+
+ODD_LIBRARY = """
+import os, time
+axes_right_handed_y_up = None
+class InheritModeHandling: HELPER_NODES = 1
+def load_memory(content, **options):
+    if b"die" in content:
+        os._exit(11)
+    if b"sleep" in content:
+        time.sleep(600)
+    raise ValueError("no scene")
+"""
+
+
+@pytest.fixture
+def child() -> Iterator[ParserProcess]:
+    """A child of its own, for what ends it."""
+    process = ParserProcess("fbx", "ufbx", "fbx")
+    yield process
+    process.close()
+
+
+@pytest.fixture
+def odd_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The file of a library that dies or sleeps where a file says so."""
+    file = tmp_path / "ufbx.py"
+    file.write_text(ODD_LIBRARY, encoding="utf-8")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    return file
+
+
+def test_takes_of_an_fbx_are_clips_and_helpers_are_left_out(walk: motion.Clip, tmp_path: Path):
+    (tmp_path / "all.fbx").write_bytes(fbx(Moving.of(walk), takes=("Walk", "Run &amp; jump"), helper="LeftFootCtrl"))
+    clips = motion.load_clips([tmp_path / "all.fbx"])
+    assert [clip.name for clip in clips] == ["all:Walk", "all:Run & jump"]
+    assert clips[0].notes == ('1 node beside the body left out: "LeftFootCtrl".',)
+    for clip in clips:
+        same_joints(walk, clip)
+
+
+def test_one_child_reads_many_files(walk: motion.Clip, child: ParserProcess):
+    raw = fbx(Moving.of(walk))
+    child.worlds(raw, 0, "walk.fbx")
+    first = child.child
+    for _ in range(20):
+        child.worlds(raw, 0, "walk.fbx")
+    assert first is child.child
+
+
+def test_a_child_that_dies_is_one_fault_of_that_file_and_the_next_is_read(odd_library: Path, child: ParserProcess):
+    for _ in range(2):
+        with pytest.raises(motion.ClipError, match=r"walk\.fbx: the process that read the file ended \(exit code 11\)"):
+            child.worlds(b"die", 0, "walk.fbx")
+        with pytest.raises(motion.ClipError, match=r"run\.fbx: the file is damaged \(ValueError: no scene\)"):
+            child.worlds(b"live", 0, "run.fbx")
+
+
+def test_a_silent_child_is_given_up(odd_library: Path, child: ParserProcess, monkeypatch: pytest.MonkeyPatch):
+    with pytest.raises(motion.ClipError):
+        child.worlds(b"live", 0, "walk.fbx")
+    monkeypatch.setattr(parser_process, "SILENCE_S", 0.5)
+    with pytest.raises(motion.ClipError, match=r"walk\.fbx: the file was read for too long"):
+        child.worlds(b"sleep", 0, "walk.fbx")
+    assert child.child is None
+
+
+def test_without_the_library_a_message_names_the_extra(odd_library: Path, child: ParserProcess):
+    odd_library.write_text("raise ImportError", encoding="utf-8")
+    with pytest.raises(motion.ClipError, match=r"ufbx is not installed.*contextdb\[fbx\]"):
+        child.worlds(b"live", 0, "walk.fbx")
+
+
+def test_a_usd_that_refers_to_other_files_is_refused(walk: motion.Clip, tmp_path: Path):
+    (tmp_path / "walk.usda").write_bytes(usda(Moving.of(walk), reference="other.usda"))
+    with pytest.raises(motion.ClipError, match=r"refers to other files, such as 'other\.usda': flatten it"):
+        motion.load_clips([tmp_path / "walk.usda"])
+
+
+@pytest.mark.parametrize("ending", sorted(OTHERS))
+def test_a_file_that_was_cut_off_is_one_fault_with_its_name(walk: motion.Clip, ending: str, tmp_path: Path):
+    whole = OTHERS[ending](Moving.of(walk), "y")
+    path = tmp_path / f"walk{ending}"
+    for n in (0, 30, len(whole) // 3):
+        path.write_bytes(whole[:n])
+        with pytest.raises(motion.ClipError) as error:
+            motion.load_clips([path])
+        assert str(error.value).startswith(f"{path}")

@@ -63,7 +63,7 @@ SECTIONS = {
     "Unsaved edits": ("LeavingDialog",),
     "The table is open elsewhere": ("HeldDialog",),
     "The file was changed on disk": ("ConflictsDialog",),
-    "Panes of the debugger": ("Bars", "Channels", "Stage"),
+    "Panes of the debugger": ("Bars", "CursorLines", "Stage"),
     "Help of the debugger": ("HelpPage", "DebugHelp"),
     "The debugger before a session is read": ("WaitingScreen",),
 }

@@ -1,4 +1,4 @@
-/* The parts of the core for motion, in the order in which each needs those before it. */
+/* The parts of the core for motion, in the order in which each needs those before it; poses.h comes before them. */
 #include "lanes.h"
 #include "frame_boxes.h"
 #include "search.h"

@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import zip_longest
 from operator import and_
 from typing import Any
 
@@ -552,7 +553,7 @@ class _Prover:
         is_kind, ranks = bitmask.flags_of(self.kind, len(rows)), self._choosing.ranks[0][rows]
         counted = pickable & (~is_kind | self._always[rows])
         order = sorted(np.flatnonzero(counted).tolist(), key=lambda i: (-ranks[i], is_kind[i]))
-        n_runs = 2 + 2 * sum(not is_kind[i] for i, j in zip(order, [*order[1:], None], strict=True) if j is None or is_kind[j])
+        n_runs = 2 + 2 * sum(not is_kind[i] for i, j in zip_longest(order, order[1:]) if j is None or is_kind[j])
         left = self._open(self.impossible | self.rows, n_runs)  # no row is valid
         low, high, before, own = left.lower, left.upper, self.impossible, 0
         for i in [*order, None]:

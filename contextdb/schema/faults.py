@@ -15,6 +15,7 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import NUMBER, Domain
 from contextdb.cells.kinds import KINDS, Kind
 from contextdb.cells.mirroring import partner_of, sided_pairs, swap_faults, swapped_tag
+from contextdb.cells.outputs import Output
 from contextdb.cells.sets import covers
 from contextdb.disk import TABLE_SUFFIXES
 from contextdb.errors import Fault, in_quotes, mend_for, nearest, no_such, safe_text, some
@@ -66,9 +67,14 @@ def expression_faults_in(document: Part) -> Iterator[PathFault]:
     conditions = {name: condition_of(name, part) for name, part in parts_of(document, "conditions").items()}
     assumed = {name: fitting_of("tables", part).get("assume", ()) for name, part in parts_of(document, "tables").items()}
     yield from expression_faults_of(conditions, assumed)
-    outputs = {name: fitting_of("tables", part).get("outputs", ()) for name, part in parts_of(document, "tables").items()}
-    declared = {name: {output.name: output for output in declared_outputs(section)} for name, section in outputs.items()}
-    yield from contract_expression_faults(document, conditions, declared)
+    yield from contract_expression_faults(document, conditions, _outputs_of_tables(document))
+
+
+def _outputs_of_tables(document: Part) -> dict[str, dict[str, Output]]:
+    """The outputs of each table by name; none of a table whose outputs have faults."""
+    tables = {name: fitting_of("tables", part) for name, part in parts_of(document, "tables").items()}
+    sound = {name: () if any(outputs_faults(part)) else part.get("outputs", ()) for name, part in tables.items()}
+    return {name: {output.name: output for output in declared_outputs(section)} for name, section in sound.items()}
 
 
 def expression_faults_of(conditions: Mapping[str, Condition], assumed: Mapping[str, Sequence[str]]) -> Iterator[PathFault]:

@@ -7,6 +7,7 @@ static unsigned long count_clusters, count_groups, count_boxes, count_frames, co
 #define CDBM_COUNT(what) (count_##what++)
 #define CDB_MALLOC(size) malloc(size)
 #define CDB_FREE(block) free(block)
+#include "poses.h"
 #include "motion.h"
 
 static FILE *from;

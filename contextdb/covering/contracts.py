@@ -49,7 +49,6 @@ from contextdb.schema.contracts import Contract, output_is_list, row_conditions
 from contextdb.schema.settings import derivation_of
 from contextdb.tables.condition_column import ConditionColumn
 from contextdb.tables.data import known_conditions
-from contextdb.tables.nesting.flat import FlatTable
 from contextdb.tables.table import EitherTable, Table
 
 WORK = 1_500_000
@@ -175,7 +174,7 @@ class _Prover:
     """One contract of one table."""
 
     contract: Contract
-    table: FlatTable | Table
+    table: EitherTable
     ready: Opened
     """The table without rules, under what is assumed and the premise of the contract."""
     drawer: Drawer | None

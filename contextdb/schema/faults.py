@@ -38,6 +38,7 @@ from contextdb.schema.parts import (
 from contextdb.schema.shapes import CONDITION, KEY_SYNONYMS
 from contextdb.schema.table_settings import columns_checked, table_files
 from contextdb.schema.toml_lines import Path
+from contextdb.schema.variant_faults import bases_of, variant_faults
 
 PathFault = tuple[Path, Fault]
 
@@ -57,6 +58,7 @@ def document_faults(document: Part) -> Iterator[PathFault]:
     for name, part in parts_of(document, "tables").items():
         yield from column_faults(("tables", name), fitting_of("tables", part), conditions)
     yield from _file_faults(parts_of(document, "tables"))
+    yield from variant_faults({name: fitting_of("tables", part) for name, part in parts_of(document, "tables").items()})
     for name, part in parts_of(document, "blueprints").items():
         yield from _blueprint_faults(("blueprints", name), fitting_of("blueprints", part), conditions)
 
@@ -66,8 +68,9 @@ def expression_faults_in(document: Part) -> Iterator[PathFault]:
     conditions = {name: condition_of(name, part) for name, part in parts_of(document, "conditions").items()}
     assumed = {name: fitting_of("tables", part).get("assume", ()) for name, part in parts_of(document, "tables").items()}
     yield from expression_faults_of(conditions, assumed)
-    outputs = {name: fitting_of("tables", part).get("outputs", ()) for name, part in parts_of(document, "tables").items()}
-    declared = {name: {output.name: output for output in declared_outputs(section)} for name, section in outputs.items()}
+    tables = {name: fitting_of("tables", part) for name, part in parts_of(document, "tables").items()}
+    own = {name: {output.name: output for output in declared_outputs(part.get("outputs", ()))} for name, part in tables.items()}
+    declared = {name: {n: o for one in reversed(bases_of(name, tables)) for n, o in own[one].items()} for name in tables}
     yield from contract_expression_faults(document, conditions, declared)
 
 

@@ -28,6 +28,7 @@ from contextdb.schema.faults import (
     part_faults,
     section_faults,
 )
+from contextdb.schema.inheriting import resolved
 from contextdb.schema.outputs import declared_outputs, fallback_of
 from contextdb.schema.parts import Part, condition_of, fitting_of, parts_of
 from contextdb.schema.table_settings import JOBS, TableSettings
@@ -113,11 +114,11 @@ class Schema:
         }
 
     def settings_for(self, file: str) -> TableSettings:
-        """The settings of the table in `file`, a path below the folder; one that is not declared has the file's stem as
-        name. Raises ContextError for no text."""
+        """The settings of the table in `file`, a path below the folder, with what it inherits; one that is not declared has the
+        file's stem as name. Raises ContextError for no text."""
         path = PurePosixPath(composed(require_text(file, "file")))
         declared = (settings for settings in self.tables.values() if str(path) in map(composed, settings.files))
-        return next(declared, TableSettings(path.stem))
+        return resolved(next(declared, TableSettings(path.stem)), self.tables)
 
 
 def derivation_of(schema: Schema, names: Iterable[str]) -> Derivation | None:

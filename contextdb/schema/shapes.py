@@ -132,6 +132,7 @@ def _wrong_transitions(value: object) -> str | None:
 
 TEXT = Shape('text, such as "m/s"', wrong_text, meant_text)
 COLUMN = Shape('a name, such as "Asset Name"', wrong_name, meant_text)
+BASE = Shape('the name of a table, such as "hit_human"', wrong_name, meant_text)
 EXPRESSION = Shape('an expression as text, such as "speed - target_speed"', wrong_name, meant_text)
 EXPRESSIONS = Shape('a list of expressions, such as ["not (IsRunning and IsIdle)"]', _wrong_list, _meant_names(r"\A|\Z"))
 NUMBER = Shape("a number, such as -1.5", _wrong_number, meant_number)
@@ -192,6 +193,7 @@ CONDITION: Settings = {
         HYSTERESIS, "How far beyond the edges of its cells a row stays valid while its animation plays, in its unit.", 0.0,
         types=names_where(lambda kind: kind.is_decimal),
     ),
+    "owner": Setting(TEXT, "Who answers for the condition, such as a team.", "", without="nobody is named", label="Owner"),
 }  # fmt: skip
 BLUEPRINT: Settings = {
     "conditions": Setting(

@@ -34,11 +34,13 @@ from contextdb.errors import (
 )
 from contextdb.files import texts as files
 from contextdb.files.file_names import alike, composed, spelled
+from contextdb.schema.inheriting import resolved
 from contextdb.schema.settings import EMPTY, Schema, TableSettings, read_schema
 from contextdb.tables.data import require_readable
 from contextdb.tables.nesting.links import Neighbours, inner_tables, is_nested, require_sound
 from contextdb.tables.other_files import other_form, stray_sentence
-from contextdb.tables.table import Table
+from contextdb.tables.table import Table, has_others
+from contextdb.tables.variants import whole_of
 
 T = TypeVar("T")
 
@@ -133,13 +135,21 @@ def require_all_sound(project: Project) -> None:
     """Raise TableError with what is wrong with rows that refer to tables."""
     faults: dict[Fault, None] = {}
     for table in project.tables.values():
-        if is_nested(table):
+        if has_others(table):
             try:
-                require_sound(table, project.tables)
+                require_whole(table, project.tables)
             except ContextDBError as error:
                 faults |= dict.fromkeys(error.faults)
     if faults:
         raise TableError(*faults)
+
+
+def require_whole(table: Table, tables: Mapping[str, Table]) -> None:
+    """Raise TableError with what is wrong with the base of a table and with the tables inside it."""
+    whole = whole_of(table, tables)
+    if is_nested(whole):
+        require_sound(whole, tables)
+    require_readable(whole)
 
 
 def load(path: str | Path, strict: bool = True) -> Table:
@@ -173,8 +183,8 @@ def load_table(path: Path, strict: bool = True) -> Table:
     folder, schema = schema_for(path)
     around = Neighbours(_Folder(folder, schema))
     table = _read_table(path, schema, folder, strict, around)
-    if strict and is_nested(table):
-        require_sound(table, around)
+    if strict and has_others(table):
+        require_whole(table, around)
     return table
 
 
@@ -230,7 +240,7 @@ def schema_for(path: Path) -> tuple[Path, Schema]:
     for folder in real_path(path).parent.parents:
         if (folder / SCHEMA_FILE).is_file():
             schema = read_folder_schema(folder)
-            if settings_of(path, folder, schema) in schema.tables.values():
+            if settings_of(path, folder, schema).name in schema.tables:
                 return folder, schema
             break
     return path.parent, EMPTY
@@ -321,7 +331,8 @@ def _names_in(folder: Path) -> list[str]:
 
 
 def settings_of(path: Path, folder: Path, schema: Schema) -> TableSettings:
-    """What contextdb.toml says of a table file: what it declares for this file, whatever the disk makes of its name."""
+    """What contextdb.toml says of a table file: what it declares for this file, whatever the disk makes of its name; of a variant
+    with what it inherits."""
     below = _below(path, folder)
     settings = schema.settings_for(below)
     if settings.name in schema.tables:
@@ -329,7 +340,7 @@ def settings_of(path: Path, folder: Path, schema: Schema) -> TableSettings:
     for declared in schema.tables.values():
         for file in declared.files:
             if alike(file) == alike(below) and _is_same_file(folder / file, path):
-                return declared
+                return resolved(declared, schema.tables)
     return settings
 
 

@@ -118,7 +118,7 @@ def unused_conditions(schema: Schema, tables: Iterable[EitherTable], lines: Mapp
     return [
         Finding("unused-condition", "info", message, None, schema.file, line=lines.get(("conditions", name)), column=name)
         for name in schema.conditions
-        if name not in used
+        if name not in used and ("conditions", name) not in schema.shared
     ]
 
 

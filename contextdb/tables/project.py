@@ -16,7 +16,7 @@ from contextdb.compiled.table import CompiledTable
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.disk import TABLE_SUFFIXES, names_a_table, path_in_quotes, read_bytes, real_path
 from contextdb.disk.boundary import SCHEMA_FILE as SCHEMA_FILE
-from contextdb.disk.boundary import inside, why_outside
+from contextdb.disk.boundary import extended_file, inside, why_outside
 from contextdb.disk.together import finish
 from contextdb.errors import (
     ContextDBError,
@@ -35,7 +35,7 @@ from contextdb.errors import (
 from contextdb.files import texts as files
 from contextdb.files.file_names import alike, composed, spelled
 from contextdb.schema.inheriting import resolved
-from contextdb.schema.settings import EMPTY, Schema, TableSettings, read_schema
+from contextdb.schema.settings import EMPTY, Schema, Studio, TableSettings, extends_of, read_schema
 from contextdb.tables.data import require_readable
 from contextdb.tables.nesting.links import Neighbours, inner_tables, is_nested, require_sound
 from contextdb.tables.other_files import other_form, stray_sentence
@@ -256,13 +256,31 @@ def read_folder_schema(folder: Path) -> Schema:
 
 
 def schema_of(raw: bytes, path: Path) -> Schema:
-    """What the bytes of a contextdb.toml say. Raises SchemaError where they are no UTF-8, or have an invalid setting."""
+    """What the bytes of a contextdb.toml say, with what it extends. Raises SchemaError where they are no UTF-8, or have an invalid
+    setting; FileError where the project that it extends cannot be read."""
+    text = _decoded(raw, path)
+    return read_schema(text, str(path), _studio_of(text, path, ()))
+
+
+def _decoded(raw: bytes, path: Path) -> str:
     try:
-        text = raw.decode("utf-8-sig")
+        return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = raw[: error.start].count(b"\n") + 1
         raise SchemaError(Fault("the file is not UTF-8.", "TOML is UTF-8", "to save it as UTF-8", Place(str(path), line))) from None
-    return read_schema(text, str(path))
+
+
+def _studio_of(text: str, path: Path, way: tuple[Path, ...]) -> Studio | None:
+    """What the text of a contextdb.toml extends; None where it extends nothing, or not in a way that can be read."""
+    extends = extends_of(text, str(path))
+    if extends is None:
+        return None
+    file = extended_file(path.parent, extends)
+    if file in (real_path(path), *way):
+        problem = f"[project] extends = {in_quotes(extends)}: the project extends itself."
+        raise SchemaError(Fault(problem, "another project", "to leave it out", Place(str(path))))
+    known = _decoded(read_bytes(file), file)
+    return Studio(known, str(file), _studio_of(known, file, (*way, real_path(path), file)))
 
 
 def table_files(folder: Path, schema: Schema) -> Iterator[tuple[str, Path]]:

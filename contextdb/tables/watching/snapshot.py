@@ -74,9 +74,17 @@ def schema_from(folder: Path, contents: Contents, last: Snapshot | None) -> Sche
         if path.exists():
             read_bytes(path)
         return EMPTY
-    if last is not None and digests_of({path: raw})[path] == last._digests.get(path):
-        return last.project.schema
+    if last is not None:
+        files = [path, *shared_files(last.project.schema)]
+        now = digests_of({file: contents[file] for file in files if file in contents})
+        if all(now.get(file) == last._digests.get(file) for file in files):
+            return last.project.schema
     return schema_of(raw, path)
+
+
+def shared_files(schema: Schema) -> list[Path]:
+    """The files that the project of a schema extends."""
+    return [Path(file) for file in schema.studio.files] if schema.studio is not None else []
 
 
 def next_snapshot(folder: Path, schema: Schema, files: NamedFiles, contents: Contents, last: Snapshot | None = None) -> Snapshot:

@@ -50,6 +50,7 @@ from contextdb.tables.other_files import cases_path
 from contextdb.tables.places import table_path
 from contextdb.tables.project import SCHEMA_FILE, Project, load_table
 from contextdb.tables.table import EitherTable, Table
+from contextdb.tables.variants import WholeTable
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -230,7 +231,7 @@ def _tell(progress: Bar | None) -> Tell | None:
 
 def _inside(table: EitherTable) -> dict[int, str]:
     """For the rows that are in other files than the table their files, from the table's folder."""
-    if table.path is None or not isinstance(table, FlatTable):
+    if table.path is None or not isinstance(table, (FlatTable, WholeTable)):
         return {}
     files = {row: table.place(row).file for row in range(table.n_rows)}
     own, folder = str(table.path), table.path.parent

@@ -25,14 +25,14 @@ from contextdb.cells.words import says_any
 from contextdb.columns import TextColumn
 from contextdb.disk import ACTORS_SUFFIX, NOTES_SUFFIX, read_bytes, real_path, write_atomic
 from contextdb.disk.together import putting_back
-from contextdb.edits.schema_file import schema_path
+from contextdb.edits.schema_file import require_declared_here, schema_path
 from contextdb.errors import ContextDBError, Fault, FileError, Place, SchemaError, TableError, in_quotes, plural
 from contextdb.expressions.names import names_in, with_names
 from contextdb.files.texts import AnySource, read_texts, written_over
 from contextdb.schema import toml_edit
-from contextdb.schema.settings import TableSettings, plain_names, read_schema
+from contextdb.schema.settings import TableSettings, plain_names
 from contextdb.tables.other_files import CASE_COLUMNS, cases_path
-from contextdb.tables.project import SCHEMA_FILE, read_folder_schema, table_files
+from contextdb.tables.project import SCHEMA_FILE, read_folder_schema, schema_of, table_files
 from contextdb.tables.table import Table
 
 _BOM = b"\xef\xbb\xbf"
@@ -173,6 +173,8 @@ def renaming(table: Table, old: str, new: str, only_here: bool = False) -> Renam
     on_disk = read_folder_schema(folder) if raw else schema
     if not only_here and new in on_disk.conditions:
         raise SchemaError(Fault(f"the condition {in_quotes(new)} is declared already.", "a name that nothing has yet"))
+    if not only_here:
+        require_declared_here([("conditions", old)], on_disk, folder / SCHEMA_FILE)
     files: list[Rewrite] = []
     for name, path in table_files(folder, on_disk):
         is_own = real_path(path) == real_path(table.path)
@@ -347,7 +349,7 @@ def rewritten_toml(path: Path, raw: bytes, change: Callable[[dict[str, Any]], No
     if tomllib.loads(text) != wanted:
         problem = "this cannot be renamed without changing more of the file."
         raise SchemaError(Fault(problem, "sections such as [conditions.NAME]", "to rename it in a text editor", Place(str(path))))
-    read_schema(text, str(path))  # refuses what no project can be
+    schema_of(text.encode(), path)  # refuses what no project can be
     yield Rewrite(path, raw, bom + text.encode())
 
 

@@ -39,6 +39,7 @@ from contextdb.schema.parts import (
 from contextdb.schema.shapes import CONDITION, KEY_SYNONYMS
 from contextdb.schema.table_settings import columns_checked, table_files
 from contextdb.schema.toml_lines import Path
+from contextdb.schema.variant_faults import bases_of, variant_faults
 
 PathFault = tuple[Path, Fault]
 
@@ -58,6 +59,7 @@ def document_faults(document: Part) -> Iterator[PathFault]:
     for name, part in parts_of(document, "tables").items():
         yield from column_faults(("tables", name), fitting_of("tables", part), conditions)
     yield from _file_faults(parts_of(document, "tables"))
+    yield from variant_faults({name: fitting_of("tables", part) for name, part in parts_of(document, "tables").items()})
     for name, part in parts_of(document, "blueprints").items():
         yield from _blueprint_faults(("blueprints", name), fitting_of("blueprints", part), conditions)
 
@@ -71,10 +73,11 @@ def expression_faults_in(document: Part) -> Iterator[PathFault]:
 
 
 def _outputs_of_tables(document: Part) -> dict[str, dict[str, Output]]:
-    """The outputs of each table by name; none of a table whose outputs have faults."""
+    """The outputs of each table by name, those of the tables that it varies too; none where its own have faults."""
     tables = {name: fitting_of("tables", part) for name, part in parts_of(document, "tables").items()}
     sound = {name: () if any(outputs_faults(part)) else part.get("outputs", ()) for name, part in tables.items()}
-    return {name: {output.name: output for output in declared_outputs(section)} for name, section in sound.items()}
+    own = {name: {output.name: output for output in declared_outputs(section)} for name, section in sound.items()}
+    return {name: {n: o for one in reversed(bases_of(name, tables)) for n, o in own[one].items()} for name in tables}
 
 
 def expression_faults_of(conditions: Mapping[str, Condition], assumed: Mapping[str, Sequence[str]]) -> Iterator[PathFault]:

@@ -86,6 +86,26 @@ def test_a_listener_learns_who_asked_what_and_what_was_picked(link: cdb.Link, me
     assert jog.assets[line["pick"]["row"]] == line["pick"]["asset"] == asset
 
 
+def test_a_row_that_the_game_plays_of_itself_belongs_to_the_last_question(meeting: Path, file: Path):
+    with cdb.link("game", record=file) as link:
+        jog = table()
+        link.watch(jog, "player")
+        valid = jog.query(FACTS)
+        link.picked(jog, "player", int(valid.rows[0]))
+        link.picked(jog, "npc", -1)
+    [played], [other] = recorded(file), recorded(file, "pick")
+    assert (played["who"], played["pick"]) == ("player", {"row": 1, "asset": jog.assets[1]})
+    assert (other["who"], other["pick"]["row"]) == ("npc", None)
+
+
+@pytest.mark.parametrize("row", [3, -2, 1.5, "run"])
+def test_a_row_that_the_table_does_not_have_is_not_published(link: cdb.Link, row: object):
+    with pytest.raises(cdb.ContextDBError):
+        link.picked(table(), "player", row)  # type: ignore[arg-type]
+    with pytest.raises(cdb.ContextDBError, match="a compiled table"):
+        link.picked({}, "player", 0)  # type: ignore[arg-type]
+
+
 def test_every_way_to_ask_a_table_is_told_once(meeting: Path, file: Path):
     with cdb.link("game", record=file) as link:
         jog = table()

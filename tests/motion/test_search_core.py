@@ -103,7 +103,16 @@ def cases(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, bytes]:
 
 def program(folder: Path, name: str, *command: str) -> Path:
     target = folder / name
-    line = [*command, "-std=c99", "-ffp-contract=off", *STRICT, "-Wno-unused-function", f"-I{CORE}", str(PROGRAMS / "search.c")]
+    line = [
+        *command,
+        "-std=c99",
+        "-ffp-contract=off",
+        *STRICT,
+        "-Wno-unused-function",
+        f"-I{CORE}",
+        str(PROGRAMS / "search.c"),
+        "-lm",
+    ]
     done = subprocess.run([*line, "-o", str(target)], capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
     return target

@@ -5,3 +5,4 @@
 #include "search.h"
 #include "joint.h"
 #include "controller.h"
+#include "walk.h"

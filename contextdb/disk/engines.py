@@ -14,7 +14,7 @@ import os
 import pickle
 import signal
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar
 
@@ -35,10 +35,16 @@ Result = TypeVar("Result")
 
 
 class Engines(Protocol):
-    """How items are worked out: each result with the number of its item."""
+    """How items are worked out: each result with the number of its item. `is_much` says whether it is worth to start workers."""
 
     def __call__(
-        self, work: Callable[[What, Item], Result], what: What, items: Sequence[Item], named: Callable[[Item], str] = ...
+        self,
+        work: Callable[[What, Item], Result],
+        what: What,
+        items: Sequence[Item],
+        named: Callable[[Item], str] = ...,
+        *,
+        is_much: bool = ...,
     ) -> Iterator[tuple[int, Result]]: ...
 
 
@@ -47,11 +53,56 @@ class EngineError(ContextDBError):
 
 
 def here(
-    work: Callable[[What, Item], Result], what: What, items: Sequence[Item], named: Callable[[Item], str] = str
+    work: Callable[[What, Item], Result],
+    what: What,
+    items: Sequence[Item],
+    named: Callable[[Item], str] = str,
+    *,
+    is_much: bool = False,
 ) -> Iterator[tuple[int, Result]]:
     """Do the work for each item in this process, in order."""
     for i, item in enumerate(items):
         yield i, work(what, item)
+
+
+def local(
+    work: Callable[[What, Item], Result],
+    what: What,
+    items: Sequence[Item],
+    named: Callable[[Item], str] = str,
+    *,
+    is_much: bool = False,
+) -> Iterator[tuple[int, Result]]:
+    """Do the work for each item on this machine: much of it on all cores. Only for a program whose main module may be loaded again,
+    as workers do, such as a command."""
+    yield from on_cores(work, what, items, named) if is_much and n_cores() > 1 else here(work, what, items, named)
+
+
+def dask(scheduler: str | None, mend: str) -> Engines:
+    """The workers of a scheduler, or of a cluster of this machine's own."""
+
+    def on_workers(
+        work: Callable[[What, Item], Result],
+        what: What,
+        items: Sequence[Item],
+        named: Callable[[Item], str] = str,
+        *,
+        is_much: bool = False,
+    ) -> Iterator[tuple[int, Result]]:
+        return with_dask(work, what, items, scheduler, mend, named)
+
+    return on_workers
+
+
+def in_order(worked: Iterable[tuple[int, Result]]) -> Iterator[Result]:
+    """Results in the order of their items; those that came too early wait."""
+    early: dict[int, Result] = {}
+    n = 0
+    for i, result in worked:
+        early[i] = result
+        while n in early:
+            yield early.pop(n)
+            n += 1
 
 
 def n_cores() -> int:
@@ -77,25 +128,27 @@ def on_cores(
     """
     from concurrent.futures.process import BrokenProcessPool
 
-    job, waiting, tries = pickle.dumps((work, what)), list(range(len(items)))[::-1], [0] * len(items)
-    lost: dict[int, str] = {}
-    while waiting:
+    job, n = pickle.dumps((work, what)), n_processes or n_cores()
+    waiting, suspects, lost = list(range(len(items)))[::-1], list[int](), dict[int, str]()
+    tries = [0] * len(items)
+    while waiting or suspects:
         tasks: dict[Future[Any], int] = {}
+        alone = not waiting  # so that who ends its worker does so with nobody beside it
         try:
-            yield from _pooled(job, items, waiting, tasks, n_processes or n_cores())
+            yield from _pooled(job, items, suspects if alone else waiting, tasks, 1 if alone else n, 1 if alone else AHEAD)
         except BrokenProcessPool as error:
-            for i in sorted({*tasks.values()}, reverse=True):
-                tries[i] += 1
-                if tries[i] > RETRIES:
-                    lost[i] = str(error)
+            for i in tasks.values():
+                tries[i] += alone
+                if tries[i] < RETRIES:
+                    suspects.append(i)
                 else:
-                    waiting.append(i)
+                    lost[i] = str(error)
     if lost:
         raise _unfinished({named(items[i]): why for i, why in lost.items()}, "to run again, with fewer of them")
 
 
 def _pooled(
-    job: bytes, items: Sequence[Any], waiting: list[int], tasks: dict[Future[Any], int], n_processes: int
+    job: bytes, items: Sequence[Any], waiting: list[int], tasks: dict[Future[Any], int], n_processes: int, ahead: int
 ) -> Iterator[tuple[int, Any]]:
     """Results of what waits, until nothing does; `tasks` are those that are being worked out when a worker dies."""
     import multiprocessing
@@ -106,9 +159,9 @@ def _pooled(
     pool = ProcessPoolExecutor(min(n_processes, len(waiting)), mp_context=context, initializer=_begin)
     try:
         while waiting or tasks:
-            while waiting and len(tasks) < AHEAD * n_processes:
-                i = waiting.pop()
-                tasks[pool.submit(_run, job, items[i])] = i
+            while waiting and len(tasks) < ahead * n_processes:
+                tasks[pool.submit(_run, job, items[waiting[-1]])] = waiting[-1]
+                waiting.pop()
             for done in wait(tasks, return_when=FIRST_COMPLETED).done:
                 result = done.result()
                 yield tasks.pop(done), result

@@ -21,9 +21,10 @@ from contextdb.motion.clips.doubts import ClipFinding, doubts
 from contextdb.motion.clips.source import load_clips
 from contextdb.motion.storage import building
 from contextdb.motion.storage.build_inputs import Assets, Faults, Inputs, distinct_faults
-from contextdb.motion.storage.building import Built, Progress
+from contextdb.motion.storage.building import Built
 from contextdb.motion.storage.clip_files import ClipFile, read_clip, unmatched
 from contextdb.motion.storage.config import MotionConfig
+from contextdb.motion.storage.extracting import Progress
 
 
 @dataclass(frozen=True, slots=True)

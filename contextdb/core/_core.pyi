@@ -194,6 +194,16 @@ class Poses:
     def width(self) -> int: ...
     def begin(self, row: NDArray[np.float64], /) -> None:
         """Write the row of a character that has not displayed anything yet."""
+    def receive(
+        self,
+        rows: NDArray[np.float64],
+        plays: NDArray[np.float64],
+        dt_s: float,
+        given: NDArray[np.float64],
+        seams: NDArray[np.float64],
+        /,
+    ) -> int:
+        """Write what happens to characters by what was decided; gives how many moments at seams there are, two for each."""
     def update(
         self,
         before: NDArray[np.float64],

@@ -41,7 +41,7 @@ from contextdb.motion.nodes.warping import Target
 from contextdb.motion.output.bank import PoseBank
 from contextdb.motion.output.ground import Ground as HeightOf
 from contextdb.motion.output.samples import Place3
-from contextdb.motion.output.stream import Pose, PoseStream
+from contextdb.motion.output.stream import Pose, PoseStream, root_of
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.controller import Clock, Controller
 from contextdb.motion.selection.controller import Place as ControllerPlace
@@ -370,7 +370,7 @@ class Character:
         """What an update gave, once the pose of a number among some is displayed, with its root."""
         body, apart = step.body, NO_MOTION
         if root is not None and self.stream is not None:
-            if self.stream.settings.root == "animation":
+            if root_of(decision, self.stream.settings) == "animation":
                 body = replace(body, position=root[:2], heading=root[2])
             else:
                 apart = apart_of(root, (*body.position, body.heading))

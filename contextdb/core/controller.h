@@ -580,6 +580,7 @@ static inline int cdbm_take_choosing(const cdbm_controller *controller, cdbm_cho
 {
     size_t n_ranges, n_skips, n_bytes;
     cdbm_measure_choosing(controller, n, &n_ranges, &n_skips, &n_bytes);
+    memset(own, 0, sizeof *own);
     own->numbers = (size_t *)cdbm_part(room, n * sizeof(size_t));
     own->queries = (double *)cdbm_part(room, n * (controller->n_features + n_ranges + 1) * sizeof(double));
     own->ranges = (uint8_t *)cdbm_part(room, n * (n_ranges + 1));

@@ -1,4 +1,6 @@
 
+#ifndef CDB_ROW_PLAY
+#define CDB_ROW_PLAY
 /* ---- How the animation of a row plays: what the outputs with a reserved name say. NaN: as the settings of the game say. */
 
 typedef enum cdb_mirror { CDB_AS_ASKED, CDB_ALWAYS_MIRRORED, CDB_NEVER_MIRRORED } cdb_mirror;
@@ -10,3 +12,4 @@ typedef struct cdb_row_play {   /* doubles alone, as in the file; of a word its 
     double min_rate, max_rate;  /* how fast it plays, or the limits within which it may */
     double mirror, loop, root, until;
 } cdb_row_play;
+#endif

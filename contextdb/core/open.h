@@ -61,6 +61,7 @@ static inline void cdbi_read(cdbi_opening *opening, const cdbi_json *header)
     if (opening->status == CDB_OK) cdbi_link(opening);
     if (opening->status == CDB_OK) cdbi_levels(opening);
     if (opening->status == CDB_OK) cdbi_outputs(opening, header);
+    if (opening->status == CDB_OK) cdbi_plays(opening, header);
 }
 
 static inline cdb_status cdbi_open(cdb_table *table, cdb_column *columns, const cdb_schema *schema, const void *bytes, size_t size,

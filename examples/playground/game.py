@@ -10,10 +10,11 @@ from pathlib import Path
 
 import contextdb as cdb
 from contextdb import motion
-from examples.playground import world
-from examples.playground.actor import LAST_MINUTE, Actor
-from examples.playground.ball import Ball
-from examples.playground.stick import PACES_MPS, Stick
+
+from . import world
+from .actor import LAST_MINUTE, Actor
+from .ball import Ball
+from .stick import PACES_MPS, Stick
 
 LOOK_EVERY_S, GATE, GATE_CLOSES = 0.2, 1.0, 1.5
 """How often the files of the tables are looked at, below which cost a vault begins, and above which one may no more."""
@@ -37,6 +38,7 @@ class Game(AbstractContextManager["Game"]):
         if "once" in stock.databases:  # the game's own clips; a folder of others has none of these
             self.rival = Actor("rival", stock, moves, (2.5, -4.0))
             self.actors.append(self.rival)
+            self.player.others, self.rival.others = [self.rival], [self.player]
             self.node = motion.MatchNode(stock.databases["once"], position_weight=0.5, rotation_weight=0.5)
             self.gate = motion.MatchGate(self.node, GATE, GATE_CLOSES)
             self.ball = Ball(self)

@@ -19,4 +19,5 @@
 #include "pick.h"
 #include "pickers.h"
 #include "live.h"
+#include "foreign.h"
 #include "files.h"

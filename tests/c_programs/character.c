@@ -1,5 +1,5 @@
 /* character BUNDLE IN OUT   characters of the first controller, by what a file gives in each update: their states and poses.
- * character BUNDLE          whether it is opened; why it is not is printed. Then some updates with whatever is in it. */
+ * character BUNDLE N        N times opened with something damaged; what is not refused is played. Prints how often it was refused. */
 #include <stdio.h>
 #include <stdlib.h>
 #include "contextdb_motion.h"
@@ -81,60 +81,132 @@ static void try_out(const cdbm_player *player, double *state, cdbm_pose *pose, c
     free(matrices);
 }
 
-int main(int n_words, char **words)
-{
-    size_t size, n = 1, i;
-    char *bytes = read_all(words[1], &size);
-    cdbm_player *player = (cdbm_player *)malloc(sizeof *player);
-    cdbm_bundle bundle;
-    cdbm_room room;
-    const char *why = cdbm_open_bundle(&bundle, bytes, size);
-    char *room_at, *input = NULL;
+typedef struct memory {
     double *states;
     cdbm_pose *poses;
     cdbm_input *inputs;
-    char *memory;
-    if (!player) return 1;
-    if (!why) why = cdbm_open_player(player, &bundle, NULL);
-    if (why) {
-        puts(why);
-        free(player);
-        free(bytes);
-        return 0;
-    }
-    if (n_words == 4) {
-        input = read_all(words[2], &size);
-        at = input;
-        n = (size_t)*(const int64_t *)take(8, 1);
-        if (!cdbm_has_digest(&bundle)) return 6;
-    }
-    room.left = cdbm_room_size(player, n);
-    room.at = room_at = (char *)malloc(room.left);
-    states = (double *)malloc(n * cdbm_state_size(player));
-    poses = (cdbm_pose *)malloc(n * sizeof *poses);
-    inputs = (cdbm_input *)malloc(n * sizeof *inputs);
-    memory = (char *)malloc(n * cdbm_pose_size(player));
-    if (!room.at || !states || !poses || !inputs || !memory) return 1;
+    char *of_poses;
+    cdbm_room room;
+} memory;
+
+static memory taken(const cdbm_player *player, size_t n)
+{
+    memory own;
+    size_t i;
+    own.room.left = cdbm_room_size(player, n);
+    own.room.at = (char *)malloc(own.room.left);
+    own.states = (double *)malloc(n * cdbm_state_size(player));
+    own.poses = (cdbm_pose *)malloc(n * sizeof *own.poses);
+    own.inputs = (cdbm_input *)malloc(n * sizeof *own.inputs);
+    own.of_poses = (char *)malloc(n * cdbm_pose_size(player));
+    if (!own.room.at || !own.states || !own.poses || !own.inputs || !own.of_poses) exit(1);
     for (i = 0; i < n; i++) {
-        cdbm_lay_out(player, &poses[i], memory + i * cdbm_pose_size(player));
-        cdbm_begin(player, states + i * cdbm_state_width(player), 0.0, 0.0, 0.0);
-        if (!cdbm_is_state(player, states + i * cdbm_state_width(player))) return 7;
+        cdbm_lay_out(player, &own.poses[i], own.of_poses + i * cdbm_pose_size(player));
+        cdbm_begin(player, own.states + i * cdbm_state_width(player), 0.0, 0.0, 0.0);
+        if (!cdbm_is_state(player, own.states + i * cdbm_state_width(player))) exit(7);
     }
-    if (n_words == 4) {
-        FILE *out = fopen(words[3], "wb");
-        int64_t n_ticks = *(const int64_t *)take(8, 1), tick;
-        if (!out) return 1;
-        for (tick = 0; tick < n_ticks; tick++) update(player, n, states, poses, inputs, room, out);
-        fclose(out);
-    } else try_out(player, states, poses, room);
-    free(memory);
-    free(inputs);
-    free(poses);
-    free(states);
-    free(room_at);
-    cdbm_close_player(player);
-    free(player);
+    return own;
+}
+
+static void give_back(memory *own)
+{
+    free(own->of_poses);
+    free(own->inputs);
+    free(own->poses);
+    free(own->states);
+    free(own->room.at);
+}
+
+static void play(const cdbm_player *player, const char *from, const char *to)
+{
+    size_t size, n;
+    char *input = read_all(from, &size);
+    FILE *out = fopen(to, "wb");
+    int64_t n_ticks, tick;
+    memory own;
+    at = input;
+    n = (size_t)*(const int64_t *)take(8, 1), n_ticks = *(const int64_t *)take(8, 1);
+    own = taken(player, n);
+    if (!out || !cdbm_has_digest(&player->bundle)) exit(6);
+    for (tick = 0; tick < n_ticks; tick++) update(player, n, own.states, own.poses, own.inputs, own.room, out);
+    fclose(out);
+    give_back(&own);
     free(input);
+}
+
+static uint64_t drawn(uint64_t *seed)
+{
+    uint64_t z = *seed += 0x9E3779B97F4A7C15;
+    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9;
+    z = (z ^ (z >> 27)) * 0x94D049BB133111EB;
+    return z ^ (z >> 31);
+}
+
+/* Write other numbers into some places, as often into the directory and into small parts as into the large ones. */
+static void damage(unsigned char *bytes, size_t size, uint64_t *seed)
+{
+    static const int64_t odd[] = {-1, 0, 1, 255, INT64_MAX, INT64_MIN, 1 << 20};
+    cdbm_bundle bundle;
+    size_t n = 1 + (size_t)(drawn(seed) % 3), at_byte;
+    cdbm_open_bundle(&bundle, bytes, size);
+    for (; n > 0; n--) {
+        if (drawn(seed) % 4 == 0 || bundle.n_parts == 0) at_byte = (size_t)(drawn(seed) % (64 + 24 * (bundle.n_parts + 1)));
+        else {
+            const cdbm_part_entry *part = &bundle.parts[drawn(seed) % bundle.n_parts];
+            if (part->n_bytes == 0) continue;
+            at_byte = (size_t)(part->at + drawn(seed) % part->n_bytes);
+        }
+        if (at_byte + 8 > size || drawn(seed) % 2) bytes[at_byte % size] = (unsigned char)drawn(seed);
+        else memcpy(bytes + at_byte / 8 * 8, &odd[drawn(seed) % 7], 8);
+    }
+}
+
+static void try_damaged(const char *bytes, size_t size, long n_times)
+{
+    unsigned char *copy;
+    cdbm_player *player = (cdbm_player *)malloc(sizeof *player);
+    cdbm_bundle bundle;
+    uint64_t seed = (uint64_t)n_times;
+    long n_refused = 0, i;
+    for (i = 0; player && i < n_times; i++) {
+        size_t own_size = drawn(&seed) % 10 ? size : (size_t)(drawn(&seed) % size);
+        const char *why;
+        copy = (unsigned char *)malloc(own_size + 1);
+        if (!copy) exit(1);
+        memcpy(copy, bytes, own_size);
+        if (own_size == size) damage(copy, size, &seed);
+        why = cdbm_open_bundle(&bundle, copy, own_size);
+        if (!why) why = cdbm_open_player(player, &bundle, NULL);
+        if (!why) {
+            memory own = taken(player, 1);
+            try_out(player, own.states, own.poses, own.room);
+            give_back(&own);
+            cdbm_close_player(player);
+        } else n_refused++;
+        free(copy);
+    }
+    printf("%ld\n", n_refused);
+    free(player);
+}
+
+int main(int n_words, char **words)
+{
+    size_t size;
+    char *bytes = read_all(words[1], &size);
+    cdbm_player *player = (cdbm_player *)malloc(sizeof *player);
+    cdbm_bundle bundle;
+    if (!player) return 1;
+    if (n_words == 3) try_damaged(bytes, size, atol(words[2]));
+    else {
+        const char *why = cdbm_open_bundle(&bundle, bytes, size);
+        if (!why) why = cdbm_open_player(player, &bundle, NULL);
+        if (why) puts(why);
+        else {
+            play(player, words[2], words[3]);
+            cdbm_close_player(player);
+        }
+    }
+    free(player);
     free(bytes);
     return 0;
 }

@@ -10,9 +10,11 @@
  * back, it goes on from there. Equal blocks have equal futures, on every machine. Only opening takes memory (CDB_MALLOC); a call
  * works in room that it is given, which only one call uses at a time.
  *
- * What may play is given as the valid rows of each table, such as cdb_query gives them. */
+ * A game gives the facts of each table, or its valid rows. A fact that is missing and that the character knows itself (its speed, the
+ * direction of its stick, its turn) it adds. */
 
 #define CDBM_MOST_DATABASES 64
+#define CDBM_MOST_TABLES 16
 #define CDBM_MOST_BELOW 16          /* so many feet may feel a ground */
 
 typedef struct cdbm_player {
@@ -22,7 +24,6 @@ typedef struct cdbm_player {
     cdbm_table_ranges tables[CDBM_MOST_DATABASES]; /* the rows that name the ranges of each database, where it has a table */
     int64_t table_of[CDBM_MOST_DATABASES], bank_of[CDBM_MOST_DATABASES], database_of[CDBM_MOST_DATABASES]; /* in the bundle; -1: none */
     const int64_t *pose_ranges[CDBM_MOST_DATABASES]; /* [R] the range of poses of each range */
-    size_t n_words[CDBM_MOST_DATABASES];             /* of the rows of each table */
     cdbm_ways ways;
     cdbo_poses poses;
     cdbo_frames banks[CDBM_MOST_DATABASES];
@@ -31,7 +32,11 @@ typedef struct cdbm_player {
     const uint8_t *allowed, *playable;
     size_t n_ranges, n_kinds;
     double velocity_halflife_s, heading_halflife_s;
-    int moves_body, has_poses;
+    int has_poses, has_costs;
+    cdb_any *opened[CDBM_MOST_TABLES];
+    cdb_row_play *plays;            /* of the rows of all tables, one after the other; NULL where none says */
+    int64_t plays_at[CDBM_MOST_TABLES]; /* where those of each table begin; -1 where it says nothing */
+    size_t n_tables, n_most_rows;
     cdbm_bundle bundle;
     size_t number;                  /* of the controller */
 } cdbm_player;
@@ -45,7 +50,10 @@ typedef struct cdbm_input {
     const double *positions, *headings; /* the path that a game plans, from now on, [n_path, 2] and [n_path]; or NULL */
     size_t n_path;
     double path_rate;
-    const uint64_t *const *rows;    /* the valid rows of each table of the bundle, NULL: of which all are valid; or NULL */
+    const cdb_fact *const *facts;   /* of each table of the bundle the facts in the order of its schema, NULL: none is known; or NULL */
+    cdb_unknown unknown;            /* what a missing fact does */
+    cdb_fault *fault;               /* which fact was refused; or NULL */
+    const uint64_t *const *rows;    /* in place of facts the valid rows of each table, NULL: all are valid; or NULL */
     const uint64_t *const *mirrored; /* and those with the facts as a mirror shows them; NULL: the same */
     cdbm_ground ground;             /* or NULL, where all is flat */
     void *user;                     /* what the ground is asked with */
@@ -66,27 +74,49 @@ static inline void cdbm_close_player(cdbm_player *player)
 {
     size_t i;
     for (i = 0; i < player->controller.n_databases; i++) cdbm_free_levels(&player->frames[i]);
-    player->controller.n_databases = 0;
+    for (i = 0; i < player->n_tables; i++) cdb_close_any(player->opened[i]);
+    CDB_FREE(player->plays);
+    player->controller.n_databases = player->n_tables = 0, player->plays = NULL;
+}
+
+/* Open the tables, and put together how their rows play. */
+static inline void cdbm_read_tables(cdbm_bundle *bundle, cdbm_player *player)
+{
+    size_t n_tables = cdbm_count(bundle, CDBM_P_TABLE), size, n = 0, i;
+    if (n_tables > CDBM_MOST_TABLES) cdbm_refuse(bundle, "it has more tables than can be read");
+    for (i = 0; !bundle->why && i < n_tables; i++) {
+        const void *bytes = cdbm_find(bundle, CDBM_P_TABLE, i, 1, &size);
+        cdb_any *any = player->opened[i] = cdb_open_any(bytes, size, NULL);
+        if (!any || any->schema.n_conditions > CDB_MOST_FACTS) cdbm_refuse(bundle, "a table of the bundle cannot be opened");
+        player->n_tables = i + 1, player->plays_at[i] = -1;
+        if (!any) return;
+        if (any->table.n_rows + 64 > player->n_most_rows) player->n_most_rows = any->table.n_rows + 64;
+        player->has_costs |= any->table.soft != NULL;
+        if (any->table.plays) player->plays_at[i] = (int64_t)n, n += any->table.n_rows + 1;
+    }
+    if (bundle->why || n == 0) return;
+    player->plays = (cdb_row_play *)CDB_MALLOC(n * sizeof(cdb_row_play));
+    if (!player->plays) cdbm_refuse(bundle, "there is not enough memory");
+    for (i = 0; player->plays && i < n_tables; i++)
+        if (player->plays_at[i] >= 0)
+            memcpy(player->plays + player->plays_at[i], player->opened[i]->table.plays, (player->opened[i]->table.n_rows + 1) * sizeof(cdb_row_play));
 }
 
 /* Which rows name the ranges of a database. */
-static inline void cdbm_read_rows(cdbm_bundle *bundle, size_t number, size_t n_ranges, cdbm_table_ranges *of, size_t *n_words)
+static inline void cdbm_read_rows(cdbm_bundle *bundle, size_t number, size_t n_ranges, size_t n_table_rows, cdbm_table_ranges *of)
 {
     size_t n_rows = 0, i;
     memset(of, 0, sizeof *of);
     of->n_ranges = n_ranges;
     of->starts = CDBM_TAKE(int64_t, CDBM_P_ROW_STARTS, n_ranges + 1), of->rows = CDBM_TAKE_ALL(int64_t, CDBM_P_ROWS, &n_rows);
     of->mirrored = CDBM_TAKE(uint8_t, CDBM_P_MIRRORED, n_ranges);
-    *n_words = 0;
     if (bundle->why) return;
     if (of->starts[0] != 0 || (uint64_t)of->starts[n_ranges] != n_rows) cdbm_refuse(bundle, "the rows of a table do not go together");
     for (i = 0; i < n_ranges; i++)
         if (of->starts[i] > of->starts[i + 1] || of->starts[i] < 0 || of->mirrored[i] > 1)
             cdbm_refuse(bundle, "the rows of a table do not go together");
-    for (i = 0; i < n_rows; i++) {
-        if (of->rows[i] < 0 || of->rows[i] > 1 << 30) cdbm_refuse(bundle, "a row of a table is not there");
-        else if ((size_t)of->rows[i] / 64 >= *n_words) *n_words = (size_t)of->rows[i] / 64 + 1;
-    }
+    for (i = 0; i < n_rows; i++)
+        if (of->rows[i] < 0 || (uint64_t)of->rows[i] >= n_table_rows) cdbm_refuse(bundle, "a row of a table is not there");
 }
 
 static inline void cdbm_read_entry(cdbm_bundle *bundle, cdbm_player *player, size_t i, const int64_t *entry, double threshold, double bar)
@@ -102,7 +132,11 @@ static inline void cdbm_read_entry(cdbm_bundle *bundle, cdbm_player *player, siz
     if (i == 0) player->controller.n_features = clips->frames->n_features;
     if (clips->frames->n_features != player->controller.n_features) cdbm_refuse(bundle, "two databases have other features");
     player->n_ranges += clips->n_ranges, player->n_kinds += clips->n_kinds;
-    if (entry[2] >= 0) cdbm_read_rows(bundle, number, clips->n_ranges, &player->tables[i], &player->n_words[i]);
+    if (entry[2] >= (int64_t)player->n_tables) cdbm_refuse(bundle, "a database has a table that is not there");
+    else if (entry[2] >= 0) {
+        cdbm_read_rows(bundle, number, clips->n_ranges, player->opened[entry[2]]->table.n_rows, &player->tables[i]);
+        player->tables[i].plays = player->opened[entry[2]]->table.plays;
+    }
     player->tables[i].at = clips->range_at;
     if (!player->has_poses || entry[1] < 0) {
         if (player->has_poses && clips->n_ranges > 0) cdbm_refuse(bundle, "a database has no poses");
@@ -122,7 +156,6 @@ static inline void cdbm_read_output(cdbm_bundle *bundle, size_t number, cdbm_pla
     const double *settings = CDBM_TAKE(double, CDBM_P_OUTPUT, CDBO_N_SETTINGS), *joints = CDBM_TAKE(double, CDBM_P_JOINTS, 2);
     if (bundle->why) return;
     memcpy(player->poses.settings, settings, sizeof player->poses.settings);
-    player->moves_body = settings[CDBO_ROOT] == CDBO_BY_ANIMATION;
     player->poses.banks = player->bank_list;
     cdbm_read_rig(bundle, number, &player->poses.rig, joints);
     if (player->poses.rig.n_feet > CDBM_MOST_BELOW) cdbm_refuse(bundle, "a rig has more feet than can feel a ground");
@@ -153,12 +186,16 @@ static inline const char *cdbm_open_player(cdbm_player *player, const cdbm_bundl
     to->history_s = settings[3], to->min_rate = settings[4], to->max_rate = settings[5], to->grace_s = settings[6];
     to->until_natural = settings[7] != 0.0, player->has_poses = settings[8] != 0.0;
     player->velocity_halflife_s = player->heading_halflife_s = settings[9], player->ways.rate = settings[10];
+    for (i = 0; i < n_settings; i++)
+        if (!(settings[i] >= 0.0 && settings[i] <= 1e6)) cdbm_refuse(bundle, "a setting of a controller is none");
     if (to->n_played > 1024) cdbm_refuse(bundle, "a controller is damaged");
+    cdbm_read_tables(bundle, player);
     if (player->has_poses && !bundle->why) cdbm_read_output(bundle, number, player);
     to->databases = player->clips;
     for (i = 0; !bundle->why && i < n_entries; i++) {
         to->n_databases = i + 1;
         cdbm_read_entry(bundle, player, i, entries + 3 * i, thresholds[i], bars[i]);
+        if (!bundle->why && !(player->clips[i].rate <= 1e6)) cdbm_refuse(bundle, "the rate of a database is none");
     }
     player->range_biases = CDBM_TAKE(double, CDBM_P_RANGE_BIASES, player->n_ranges);
     player->allowed = CDBM_TAKE(uint8_t, CDBM_P_ALLOWED, player->n_kinds), player->playable = CDBM_TAKE(uint8_t, CDBM_P_PLAYABLE, player->n_kinds);
@@ -221,10 +258,10 @@ static inline size_t cdbm_room_size(const cdbm_player *player, size_t n)
 {
     size_t n_features = player->controller.n_features, n_frames = cdbm_most_frames(&player->ways);
     size_t each = cdbm_rounded(cdbm_state_size(player)) + cdbm_rounded(n_features * sizeof(double)) + cdbm_rounded(sizeof(cdbm_moved))
-        + cdbm_rounded(player->n_ranges) + 2 * cdbm_rounded(cdbm_width(&player->controller) * sizeof(double)) + 64
+        + cdbm_rounded(player->n_ranges) + 2 * cdbm_rounded(player->n_ranges * sizeof(double)) + 2 * cdbm_rounded(cdbm_width(&player->controller) * sizeof(double)) + 64
         + cdbm_rounded(player->controller.n_databases * sizeof(cdbm_found)) + cdbm_rounded(sizeof(cdbm_decision));
     return n * each + cdbm_rounded((4 * n_frames + 3 * n_features) * sizeof(double)) + cdbm_choice_room(&player->controller, n)
-        + cdbm_rounded((player->has_poses ? cdbo_pose_room(&player->poses) : 0) * sizeof(double)) + cdbm_rounded(CDBM_MOST_DATABASES) + 256;
+        + cdbm_rounded((player->has_poses ? cdbo_pose_room(&player->poses) : 0) * sizeof(double)) + cdbm_rounded(CDBM_MOST_DATABASES) + cdbm_answer_room(player) + 256;
 }
 
 /* A character that stands at a place and has not done anything yet. */
@@ -238,7 +275,7 @@ static inline void cdbm_begin(const cdbm_player *player, double *state, double x
     body.velocity_halflife_s = player->velocity_halflife_s, body.heading_halflife_s = player->heading_halflife_s;
     cdbm_begin_walk(&player->ways, &body, state);
     played = (cdbm_state *)(void *)cdbm_played_part(player, state);
-    played->rate = 1.0, played->waiting_since_s = NAN, played->playing.database = CDBM_NO_DATABASE;
+    played->play = cdbm_plain_play(), played->rate = 1.0, played->waiting_since_s = NAN, played->playing.database = CDBM_NO_DATABASE;
     cdbm_displayed(player, state)->bank = -1.0;
     if (player->has_poses) cdbo_poses_begin(&player->poses, cdbm_pose_part(player, state));
 }
@@ -260,6 +297,7 @@ static inline int cdbm_is_state(const cdbm_player *player, const double *state)
 
 typedef struct cdbm_many {          /* a crowd in an update, in room */
     double *states, *queries, *biases;
+    int64_t *play_of;
     cdbm_moved *moved;
     cdbm_found *found;
     cdbm_decision *decisions;
@@ -274,23 +312,141 @@ static inline int cdbm_take_many(const cdbm_player *player, size_t n, cdbm_many 
     many->found = (cdbm_found *)cdbm_part(room, n * player->controller.n_databases * sizeof *many->found);
     many->decisions = (cdbm_decision *)cdbm_part(room, n * sizeof *many->decisions);
     many->ranges = (uint8_t *)cdbm_part(room, n * player->n_ranges), many->urgent = (uint8_t *)cdbm_part(room, n);
+    many->biases = (double *)cdbm_part(room, n * player->n_ranges * sizeof(double));
+    many->play_of = (int64_t *)cdbm_part(room, n * player->n_ranges * sizeof(int64_t));
+    if (!many->biases || !many->play_of) return 0;
     many->among = (uint8_t *)cdbm_part(room, player->controller.n_databases);
     return many->states && many->queries && many->moved && many->found && many->decisions && many->ranges && many->urgent && many->among;
 }
 
-/* Write which ranges the rows of the tables let play. */
-static inline void cdbm_let_play(const cdbm_player *player, const cdbm_input *input, uint8_t *ranges)
+/* ---- what the tables say */
+
+/* What follows a letter in the texts of a part, where one of them begins with it and goes on with a name; NULL where none does. A text
+ * of two parts has its second behind a '='. */
+static inline const char *cdbm_said_of(const cdbm_player *player, uint32_t kind, size_t table, const char *name, char *letter)
 {
-    size_t i;
-    memset(ranges, 1, player->n_ranges);
-    for (i = 0; i < player->controller.n_databases; i++) {
-        int64_t table = player->table_of[i];
-        const uint64_t *masks[2];
-        if (table < 0 || !input->rows || !input->rows[table]) continue;
-        masks[0] = input->rows[table];
-        masks[1] = input->mirrored && input->mirrored[table] ? input->mirrored[table] : masks[0];
-        cdbm_fill_ranges(&player->tables[i], masks, NULL, NULL, ranges, NULL);
+    size_t n, at, length = strlen(name);
+    const char *texts = (const char *)cdbm_find(&player->bundle, kind, table, 1, &n);
+    if (!texts || n == 0 || texts[n - 1] != 0) return NULL;
+    for (at = 0; at < n; at += strlen(texts + at) + 1) {
+        const char *own = texts + at;
+        if (own[0] == 0 || strncmp(own + 1, name, length) != 0 || (own[length + 1] != 0 && own[length + 1] != '=')) continue;
+        *letter = own[0];
+        return own + length + 1 + (own[length + 1] == '=');
     }
+    return NULL;
+}
+
+/* A fact that a game does not give and that the character knows itself. */
+static inline void cdbm_add_own(const cdbm_player *player, size_t table, size_t at, const cdbm_walk *walk, const cdbo_goal *goal, cdb_fact *fact)
+{
+    const cdb_condition *condition = &player->opened[table]->schema.conditions[at];
+    char letter = 0;
+    if (condition->expr || !cdbi_is_missing(condition, fact)) return;
+    if (condition->type != CDB_NUMBER && condition->type != CDB_ANGLE) return;
+    if (!cdbm_said_of(player, CDBM_P_OWN_FACTS, table, condition->name, &letter)) return;
+    if (letter == 's') fact->number = cdbo_flat_length(walk->body.velocity[0], walk->body.velocity[1]);
+    if (letter == 'd') fact->number = cdbm_direction(goal->velocity, walk->body.heading);
+    if (letter == 't') fact->number = walk->body.turn_rate * (180.0 / CDBO_PI);
+}
+
+/* The facts as a mirror shows them; whether any is another. */
+static inline int cdbm_mirror_facts(const cdbm_player *player, size_t table, const cdb_fact *facts, cdb_fact *to)
+{
+    const cdb_schema *schema = &player->opened[table]->schema;
+    size_t i;
+    int is_other = 0;
+    memcpy(to, facts, schema->n_conditions * sizeof *to);
+    for (i = 0; i < schema->n_conditions; i++) {
+        const cdb_condition *condition = &schema->conditions[i];
+        char letter = 0;
+        const char *more = cdbm_said_of(player, CDBM_P_MIRROR, table, condition->name, &letter);
+        int64_t left = facts[i].whole;
+        if (!more || cdbi_is_missing(condition, &facts[i])) continue;
+        is_other = 1;
+        if (letter == 'p') {
+            int other = cdb_condition_number(schema, more);
+            if (other >= 0 && schema->conditions[other].type == condition->type) to[other] = facts[i];
+        } else if (letter == 'v') { /* numbers of values, one after another */
+            for (; left > 0 && *more; left--) while (*more && *more++ != ' ') {}
+            for (to[i].whole = 0; *more >= '0' && *more <= '9' && to[i].whole < 1 << 20; more++) to[i].whole = 10 * to[i].whole + (*more - '0');
+        } else if (condition->type == CDB_BOOL) to[i].whole = !facts[i].whole;
+        else if (condition->type == CDB_INT) to[i].whole = -facts[i].whole;
+        else to[i].number = 0.0 - facts[i].number;
+    }
+    return is_other;
+}
+
+typedef struct cdbm_answer {        /* of a table, as it is and with mirrored facts */
+    const uint64_t *masks[2];
+    const double *costs[2];
+} cdbm_answer;
+
+/* How many bytes the answer of a table takes. */
+static inline size_t cdbm_answer_room(const cdbm_player *player)
+{
+    return 2 * (cdbm_rounded(player->n_most_rows / 8 + 8) + cdbm_rounded(player->n_most_rows * sizeof(double))) + 64;
+}
+
+/* Ask a table. 1; -2 for a fact that is refused. */
+static inline int cdbm_ask_table(const cdbm_player *player, size_t table, const cdbm_input *input, const cdbm_walk *walk,
+    cdbm_answer *answer, cdbm_room *room)
+{
+    const cdb_any *any = player->opened[table];
+    const cdb_schema *schema = &any->schema;
+    cdb_fact own[CDB_MOST_FACTS], mirrored[CDB_MOST_FACTS], *facts = own;
+    size_t n_words = any->table.n_words, n_rows = any->table.n_rows, i, side;
+    memset(own, 0, sizeof own);
+    for (i = 0; i < schema->n_conditions; i++) {
+        own[i] = input->facts && input->facts[table] ? input->facts[table][i] : cdb_missing_fact(&schema->conditions[i]);
+        cdbm_add_own(player, table, i, walk, &input->goal, &own[i]);
+    }
+    for (side = 0; side < 2; side++) {
+        uint64_t *mask = (uint64_t *)cdbm_part(room, n_words * sizeof(uint64_t));
+        double *costs = any->table.soft ? (double *)cdbm_part(room, n_rows * sizeof(double)) : NULL;
+        if (side == 1 && !cdbm_mirror_facts(player, table, own, mirrored)) {
+            answer->masks[1] = answer->masks[0], answer->costs[1] = answer->costs[0];
+            return 1;
+        }
+        if (side == 1) facts = mirrored;
+        if (!mask || (any->table.soft && !costs)) return 0;
+        if (cdb_query(&any->table, any->columns, schema, facts, input->unknown, mask, n_words, input->fault) != CDB_OK) return -2;
+        if (costs && cdb_penalties(&any->table, any->columns, schema, facts, input->unknown, costs, n_rows, input->fault) != CDB_OK) return -2;
+        answer->masks[side] = mask, answer->costs[side] = costs;
+    }
+    return 1;
+}
+
+/* Write which ranges the tables let play, what they add to their costs, and by which rows they play. 1; 0 with too little room; -2 for a
+ * fact that is refused. */
+static inline int cdbm_let_play(const cdbm_player *player, const cdbm_input *input, const double *state, uint8_t *ranges, double *biases,
+    int64_t *play_of, cdbm_room room)
+{
+    size_t table, i, r;
+    memset(ranges, 1, player->n_ranges);
+    memcpy(biases, player->range_biases, player->n_ranges * sizeof(double));
+    for (r = 0; r < player->n_ranges; r++) play_of[r] = -1;
+    for (table = 0; table < player->n_tables; table++) {
+        cdbm_answer answer = {{NULL, NULL}, {NULL, NULL}};
+        cdbm_room left = room;
+        for (i = 0; i < player->controller.n_databases; i++) {
+            if (player->table_of[i] != (int64_t)table) continue;
+            if (!answer.masks[0] && input->rows) {
+                answer.masks[0] = input->rows[table];
+                answer.masks[1] = input->mirrored && input->mirrored[table] ? input->mirrored[table] : answer.masks[0];
+                if (!answer.masks[0]) continue;
+            } else if (!answer.masks[0]) {
+                int is_done = cdbm_ask_table(player, table, input, (const cdbm_walk *)(const void *)state, &answer, &left);
+                if (is_done != 1) return is_done;
+            }
+            cdbm_fill_ranges(&player->tables[i], answer.masks, answer.costs[0] ? answer.costs : NULL, player->range_biases, ranges, biases,
+                player->plays_at[table] >= 0 ? play_of : NULL);
+            if (player->plays_at[table] > 0)
+                for (r = player->tables[i].at; r < player->tables[i].at + player->tables[i].n_ranges; r++)
+                    if (play_of[r] >= 0) play_of[r] += player->plays_at[table];
+        }
+    }
+    return 1;
 }
 
 /* Write the query of one: it is some time later, and wishes to take a path. 0 for a path without a frame. */
@@ -353,6 +509,7 @@ static inline void cdbm_pose_of(const cdbm_player *player, const cdbm_input *inp
     play.displayed = *displayed, play.action = decision->action, play.rate = decision->rate, play.weight = decision->root_weight;
     play.gives_ground = input->ground ? 1.0 : 0.0;
     memcpy(play.motion, decision->motion, sizeof play.motion);
+    play.blend_s = decision->play.blend_s, play.root = decision->play.root;
     one.poses = &player->poses, one.before = cdbm_pose_part(player, (double *)(uintptr_t)before), one.row = cdbm_pose_part(player, state);
     cdbo_receive(&player->poses, one.before, &play, dt_s, &given, seams, &n_seams);
     place[0] = walk->body.position[0], place[1] = walk->body.position[1], place[2] = walk->body.heading;
@@ -372,8 +529,15 @@ static inline void cdbm_pose_of(const cdbm_player *player, const cdbm_input *inp
     pose->is_jump = given.seam >= 0.0 && (decision->action == CDBM_JUMPS || (decision->action != CDBM_STARTS && given.is_ahead != 0.0));
 }
 
+/* Whether the clip alone moves the body, as the row of what plays or the settings say. */
+static inline int cdbm_moves_body(const cdbm_player *player, const cdbm_decision *decision)
+{
+    double root = decision->play.root;
+    return (root == root ? root : player->poses.settings[CDBO_ROOT]) == CDBO_BY_ANIMATION;
+}
+
 /* Update characters: `states` are their blocks, one after another. 1; 0 with too little room, or a path that is none; -1 where what is
- * asked for is no finite number. Where it is not 1 all stand where they stood. */
+ * asked for is no finite number; -2 for a fact that a table refuses. Where it is not 1 all stand where they stood. */
 static inline int cdbm_update_all(const cdbm_player *player, size_t n, double *states, double dt_s, const cdbm_input *inputs,
     cdbm_pose *poses, cdbm_room room)
 {
@@ -388,13 +552,16 @@ static inline int cdbm_update_all(const cdbm_player *player, size_t n, double *s
     memset(&given, 0, sizeof given);
     memset(many.among, 1, controller->n_databases);
     given.n = n, given.dt_s = dt_s, given.queries = many.queries, given.ranges = many.ranges, given.ranges_step = player->n_ranges;
-    given.range_biases = player->range_biases, given.allowed = player->allowed, given.playable = player->playable;
+    given.range_biases = many.biases, given.biases_step = given.plays_step = player->n_ranges;
+    given.plays = player->plays, given.play_of = many.play_of, given.allowed = player->allowed, given.playable = player->playable;
     given.kind_biases = player->kind_biases, given.among = many.among, given.urgent = many.urgent;
     for (i = 0; i < n; i++) {
         many.urgent[i] = (uint8_t)((inputs[i].force ? CDBM_FORCE : 0) | (inputs[i].interrupt ? CDBM_INTERRUPT : 0));
-        cdbm_let_play(player, &inputs[i], many.ranges + i * player->n_ranges);
         if (!cdbm_query_of(player, &inputs[i], dt_s, states + i * width, many.states + i * width, &many.moved[i],
                 many.queries + i * n_features, room)) return 0;
+        is_done = cdbm_let_play(player, &inputs[i], many.states + i * width, many.ranges + i * player->n_ranges,
+            many.biases + i * player->n_ranges, many.play_of + i * player->n_ranges, room);
+        if (is_done != 1) return is_done;
     }
     left = room;
     before = (double *)cdbm_part(&left, n * played * sizeof(double)), after = (double *)cdbm_part(&left, n * played * sizeof(double));
@@ -420,7 +587,7 @@ static inline int cdbm_update_all(const cdbm_player *player, size_t n, double *s
         numbers = (double *)cdbm_part(&left, (player->has_poses ? cdbo_pose_room(&player->poses) : 0) * sizeof(double));
         if (!numbers) return 0;
         if (player->has_poses) cdbm_pose_of(player, &inputs[i], dt_s, own, state, &poses[i], numbers);
-        cdbm_settle(state, poses[i].root, player->has_poses && player->moves_body);
+        cdbm_settle(state, poses[i].root, player->has_poses && cdbm_moves_body(player, &poses[i].decision));
     }
     memcpy(states, many.states, n * width * sizeof(double));
     return 1;

@@ -38,7 +38,7 @@ from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.nodes.warping import Target
 from contextdb.motion.output.bank import PoseBank
 from contextdb.motion.output.ground import Ground as HeightOf
-from contextdb.motion.output.stream import PoseStream
+from contextdb.motion.output.stream import PoseStream, root_of
 from contextdb.motion.selection.controller import Clock, Controller
 from contextdb.motion.selection.controller import Place as ControllerPlace
 from contextdb.motion.selection.decision import Decision, Playing, plays
@@ -373,7 +373,7 @@ class Character:
         except Exception:
             self.controller.put_back(before)
             raise
-        moves_body = self.stream.settings.root == "animation"
+        moves_body = root_of(decision, self.stream.settings) == "animation"
         self._stand(
             walks.settled(self.schema.ways, step.walk, np.array([pose.root]), moves_body), None if moves_body else step.body
         )

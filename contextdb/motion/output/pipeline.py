@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,12 +11,14 @@ from typing import Any
 import numpy as np
 
 from contextdb.cells.arguments import require_kind, require_mapping
+from contextdb.cells.row_play import ROOTS, RowPlay
 from contextdb.core import Poses, pose_columns
 from contextdb.errors import Fault, MotionError, in_quotes, no_such
 from contextdb.files.settings import settings_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints, Skeleton
-from contextdb.motion.output.bank import RIG_MEND, PoseBank, tops_of
+from contextdb.motion.output.bank import RIG_MEND, PoseBank
+from contextdb.motion.output.clip_parts import tops_of
 from contextdb.motion.output.ground import Grounds, below_all
 from contextdb.motion.output.legs import hinges_of, legs_of
 from contextdb.motion.output.pose import CrowdPoses
@@ -30,7 +33,7 @@ NUMBERS = {action: float(number) for number, action in enumerate(Action)}
 COLUMNS = pose_columns()
 """Where each single number of a row is."""
 PLAY_RATE, CLIP_RATE = COLUMNS["play_rate"], COLUMNS["clip_rate"]
-N_GIVEN, IS_AHEAD, LOST = 14, 10, 12
+N_GIVEN, IS_AHEAD, LOST = 16, 10, 12
 """So many numbers the core is given of a character, and two of their places; see `cdbo_given` in pose.h."""
 Moment = tuple[int, int, float]
 NO_MOMENT: Moment = (-1, 0, 0.0)
@@ -133,6 +136,7 @@ class Pipeline:
                 *self.moment_of(decision.playing), *self.moment_of(decision.before), *self.moment_of(displayed),
                 NUMBERS[decision.action], decision.play_rate,
                 motion.left_m, motion.ahead_m, motion.turn_rad, decision.root_weight, ground,
+                *_said(decision.play),
             )  # fmt: skip
         n = len(rows)
         given, moments = np.empty((n, N_GIVEN)), np.empty((2 * n, 4))
@@ -147,6 +151,13 @@ class Pipeline:
     def moment_of(self, playing: Playing | None) -> Moment:
         """What plays as the core has it: its bank, range and second."""
         return NO_MOMENT if playing is None else (*self.find(playing), playing.time_s)
+
+
+def _said(play: RowPlay | None) -> tuple[float, float]:
+    """How long the row of what plays is blended, and what moves the root, as the core has it; NaN where it does not say."""
+    if play is None:
+        return math.nan, math.nan
+    return math.nan if play.blend_s is None else play.blend_s, math.nan if play.root is None else float(ROOTS.index(play.root))
 
 
 def _gives(grounds: Grounds | None, n: int) -> Sequence[bool]:

@@ -213,7 +213,7 @@ static inline void cdbm_loop(const cdbm_clips *clips, size_t range, double wante
     move->n_loops = n_loops;
     if (n_loops > 1.0) {
         cdbm_leg(clips, range, 0.0, last_s, start, move);
-        if (move->is_ended) {
+        if (move->is_ended != 0.0) {
             move->n_loops = 1.0;
             cdbm_then(motion, move->motion, move->motion);
             return;
@@ -239,7 +239,7 @@ static inline void cdbm_play(const cdbm_controller *controller, const cdbm_playi
     last_s = cdbm_last_s(clips, range), at_s = cdbo_least(playing->at_s, last_s), wanted_s = at_s + passed_s;
     cdbm_leg(clips, range, at_s, cdbo_least(wanted_s, last_s), cdbm_frame_at(clips, range, at_s) + 1, move);
     if (wanted_s <= last_s + CDBM_TOLERANCE_S) return;
-    if (!move->is_ended && cdbm_is_looping(clips, range, play) && !(cdbm_mark_of(clips, clips->starts[range]) & CDBM_EXCLUDED))
+    if (move->is_ended == 0.0 && cdbm_is_looping(clips, range, play) && !(cdbm_mark_of(clips, clips->starts[range]) & CDBM_EXCLUDED))
         cdbm_loop(clips, range, wanted_s, move);
     else move->is_ended = 1.0;
 }

@@ -6,3 +6,4 @@
 #include "search.h"
 #include "joint.h"
 #include "controller.h"
+#include "walk.h"

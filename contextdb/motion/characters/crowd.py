@@ -136,10 +136,7 @@ class Crowd(ListSequence[Character]):
             for controller, place in zip(group, before, strict=True):
                 controller.put_back(place)
             raise
-        moves = [
-            character.stream is not None and root_of(decision, character.stream.settings) == "animation"
-            for character, decision in zip(self, decisions, strict=True)
-        ]
+        moves = [_moves_body(character, decision) for character, decision in zip(self, decisions, strict=True)]
         for moves_body in set(moves):
             numbers = [i for i, own in enumerate(moves) if own is moves_body]
             rows[numbers] = walks.settled(schema.ways, rows[numbers], roots[numbers], moves_body)
@@ -220,6 +217,11 @@ def _answers(table: Table, facts: Sequence[Facts], unknown: Any) -> Iterable[Ans
         columns = {name: [each.get(name) for each in facts] for name in table.asked}
         return table.query_many(columns, unknown=unknown)
     return [asking.answer(table, each, unknown) for each in facts]
+
+
+def _moves_body(character: Character, decision: Decision) -> bool:
+    """Whether the animation moves the body of a character."""
+    return character.stream is not None and root_of(decision, character.stream.settings) == "animation"
 
 
 def _facts_of_each(facts: object, n: int) -> list[Facts]:

@@ -38,7 +38,7 @@ CustomFunction = Callable[[Poses, Trajectory], Floats]
 MOST_RATE = 1000.0
 ABOUT_S = 0.5
 """How fast a path goes is the mean of about so many seconds."""
-SEE_FEET = "See [feet](clips.md#feet-on-the-ground)."
+SEE_FEET = "See [feet](choosing.md#feet-on-the-ground)."
 CHANNELS = listed('a list of channels, such as [{ type = "position", bone = "LeftFoot", weight = 1.0 }]', nothing)
 
 
@@ -71,7 +71,7 @@ class FeatureSchema(Declared, error=MotionError):
         "To how many frames a second clips are resampled.", least=1.0, most=MOST_RATE, unit="frames a second", such_as=30.0
     )
     channels: tuple[Channel, ...] = setting(
-        CHANNELS, "The channels, each a table.", more="See [features](clips.md#features-what-is-compared) for their keys."
+        CHANNELS, "The channels, each a table.", more="See [features](choosing.md#features-what-is-compared) for their keys."
     )
     root: str | None = setting(
         filled('a bone, such as "Hips"'),

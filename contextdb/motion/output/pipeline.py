@@ -17,7 +17,8 @@ from contextdb.errors import Fault, MotionError, in_quotes, no_such
 from contextdb.files.settings import settings_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints, Skeleton
-from contextdb.motion.output.bank import RIG_MEND, PoseBank, tops_of
+from contextdb.motion.output.bank import RIG_MEND, PoseBank
+from contextdb.motion.output.clip_parts import tops_of
 from contextdb.motion.output.ground import Grounds, below_all
 from contextdb.motion.output.legs import hinges_of, legs_of
 from contextdb.motion.output.pose import CrowdPoses

@@ -53,7 +53,7 @@ RULES: dict[str, Rule] = {
     "unreadable-penalty": Rule(
         "error",
         "The text after the ~ of a soft cell is not a penalty.",
-        "Write a number from 0 up after the ~, such as 3..5 ~2.5, or put a text that contains a ~ in double quotes.",
+        "Write a number from 0 up after the ~, such as 3..5 ~2.5 or 3..5 ~2.5/10, or put a text with a ~ in double quotes.",
         ("cells.grammar",),
     ),
     "unknown-value": Rule(

@@ -41,6 +41,7 @@ COMMANDS = {
     "verify": "whether files are as contextdb wrote them",
     "motion": "motion databases: bones, check, build, search, select, run, replay, describe, prepare",
     "demo": "a tour of the sample tables",
+    "play": "a small game whose characters obey tables, with the editor beside it",
 }
 
 

@@ -1,4 +1,4 @@
-"""`[project] extends`: the conditions and blueprints of another project, without leaving the repository or following links."""
+"""`[project] extends`: the conditions and blueprints of another project, found inside the repository, through no link."""
 
 from __future__ import annotations
 

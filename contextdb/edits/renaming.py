@@ -47,6 +47,7 @@ class Uses:
     derived: tuple[str, ...] = ()
     """Derived facts that are computed from it."""
     n_assumptions: int = 0
+    n_contracts: int = 0
     blueprints: tuple[str, ...] = ()
     n_rules: int = 0
     """Rows, of any table, whose own rule names it."""
@@ -62,6 +63,7 @@ class Uses:
             (len(self.tables), "table"),
             (len(self.derived), "derived fact"),
             (self.n_assumptions, "assumption"),
+            (self.n_contracts, "contract"),
             (len(self.blueprints), "blueprint"),
             (self.n_rules, "rule"),
             (self.n_cases, "saved context"),
@@ -153,11 +155,12 @@ def uses_of(table: Table, condition: str) -> Uses:
     derived = tuple(c.name for c in schema.conditions.values() if c.expr is not None and condition in names_in(c.expr))
     blueprints = tuple(name for name, names in schema.blueprints.items() if condition in names)
     premises = {t: [c.when for c in schema.contracts.values() if c.when and (c.table == own.name) == t] for t in (True, False)}
-    n_own_assumed = _n_naming((*own.assume, *premises[True]), condition)
+    n_own_premises, n_premises = (_n_naming(premises[is_own], condition) for is_own in (True, False))
     elsewhere = [text for s in schema.tables.values() if s.name != own.name for text in s.assume]
-    assumed = n_own_assumed + _n_naming((*elsewhere, *premises[False]), condition)
-    is_elsewhere = bool(others or derived or blueprints or n_rules or n_cases > n_own_cases or assumed > n_own_assumed)
-    return Uses(tuple(others), derived, assumed, blueprints, n_rules + n_own_rules, n_cases, is_elsewhere)
+    n_own_assumed, n_assumed = _n_naming(own.assume, condition), _n_naming(elsewhere, condition)
+    is_elsewhere = bool(others or derived or blueprints or n_rules or n_cases > n_own_cases or n_assumed or n_premises)
+    counts = n_own_assumed + n_assumed, n_own_premises + n_premises
+    return Uses(tuple(others), derived, *counts, blueprints, n_rules + n_own_rules, n_cases, is_elsewhere)
 
 
 def renaming(table: Table, old: str, new: str, only_here: bool = False) -> Renaming:

@@ -40,6 +40,7 @@ def role_uses(table: Table, role: str) -> tuple[str, tuple[str, ...]]:
         (len(tables), "other table"),
         (len(derived), "derived fact"),
         (max((one.n_assumptions for one in uses), default=0), "assumption"),
+        (max((one.n_contracts for one in uses), default=0), "contract"),
         (max((one.n_rules for one in uses), default=0), "rule"),
         (max((one.n_cases for one in uses), default=0), "saved context"),
     )

@@ -15,6 +15,7 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import NUMBER, Domain
 from contextdb.cells.kinds import KINDS, Kind
 from contextdb.cells.mirroring import partner_of, sided_pairs, swap_faults, swapped_tag
+from contextdb.cells.outputs import Output
 from contextdb.cells.sets import covers
 from contextdb.disk import TABLE_SUFFIXES
 from contextdb.errors import Fault, in_quotes, mend_for, nearest, no_such, safe_text, some
@@ -68,10 +69,15 @@ def expression_faults_in(document: Part) -> Iterator[PathFault]:
     conditions = {name: condition_of(name, part) for name, part in parts_of(document, "conditions").items()}
     assumed = {name: fitting_of("tables", part).get("assume", ()) for name, part in parts_of(document, "tables").items()}
     yield from expression_faults_of(conditions, assumed)
+    yield from contract_expression_faults(document, conditions, _outputs_of_tables(document))
+
+
+def _outputs_of_tables(document: Part) -> dict[str, dict[str, Output]]:
+    """The outputs of each table by name, those of the tables that it varies too; none where its own have faults."""
     tables = {name: fitting_of("tables", part) for name, part in parts_of(document, "tables").items()}
-    own = {name: {output.name: output for output in declared_outputs(part.get("outputs", ()))} for name, part in tables.items()}
-    declared = {name: {n: o for one in reversed(bases_of(name, tables)) for n, o in own[one].items()} for name in tables}
-    yield from contract_expression_faults(document, conditions, declared)
+    sound = {name: () if any(outputs_faults(part)) else part.get("outputs", ()) for name, part in tables.items()}
+    own = {name: {output.name: output for output in declared_outputs(section)} for name, section in sound.items()}
+    return {name: {n: o for one in reversed(bases_of(name, tables)) for n, o in own[one].items()} for name in tables}
 
 
 def expression_faults_of(conditions: Mapping[str, Condition], assumed: Mapping[str, Sequence[str]]) -> Iterator[PathFault]:

@@ -37,6 +37,7 @@ RULES: dict[str, Rule] = {
             "commands.motion_replay_command",
             "commands.motion_run_command",
             "disk",
+            "disk.boundary",
             "tables.places",
             "tables.project",
             "tables.watching.snapshot",
@@ -48,7 +49,7 @@ RULES: dict[str, Rule] = {
         "error",
         "The text of a cell does not follow the grammar of its type.",
         "Write the cell in an accepted form, or correct the type of the condition in contextdb.toml.",
-        ("cells.grammar", "expressions.rules.column", "tables.plain_columns"),
+        ("cells.grammar", "expressions.rules.column", "tables.expected_file", "tables.plain_columns"),
     ),
     "unreadable-penalty": Rule(
         "error",
@@ -106,15 +107,15 @@ RULES: dict[str, Rule] = {
     ),
     "no-such-table": Rule(
         "error",
-        "A row refers to a missing table.",
-        "Correct the name after the @, restore the table, or put the asset in quotes if its name begins with @.",
-        ("tables.nesting.links", "tables.table"),
+        "A row refers to a missing table, or the base of a variant is missing.",
+        "Correct the name after the @ or of the base, restore the table, or put the asset in quotes if its name begins with @.",
+        ("tables.nesting.links", "tables.table", "tables.variants"),
     ),
     "cyclic-tables": Rule(
         "error",
-        "A table contains itself, directly or through an inner table.",
-        "Remove one of the rows on the path, or let it refer to another table.",
-        ("tables.nesting.links",),
+        "A table contains itself, directly or through an inner table, or is a variant of itself.",
+        "Remove one of the rows on the path, or let it refer to another table; of a variant name another base.",
+        ("tables.nesting.links", "tables.variants"),
     ),
     "unusable-table": Rule(
         "error",

@@ -30,6 +30,7 @@ COMMANDS = {
     "evaluate": "every context of a file: how many assets are valid in each",
     "check": "what is wrong with the tables",
     "coverage": "which contexts have a valid asset, and which have none",
+    "cases": "what saved contexts reach of a table, and the fewest that reach the rest",
     "ci": "check and coverage as a build runs them, against a commit, with report files",
     "diff": "what changed between two versions of a table",
     "merge": "merge two versions of a table",

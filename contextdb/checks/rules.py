@@ -371,6 +371,12 @@ RULES: dict[str, Rule] = {
         "Look at what the message names; if the change is intended, name the table with `--redefined`, or make a new baseline.",
         ("report.coverage_results",),
     ),
+    "few-cases": Rule(
+        "error",
+        "A table has fewer saved contexts than `--min-cases`, or they reach fewer rows than `--min-rows-reached`.",
+        "Restore a file of cases that was deleted, or let `contextdb cases --write` add the fewest contexts.",
+        ("checks.cases",),
+    ),
     "cases-fewer": Rule(
         "error",
         "The saved contexts of a table expect less than in the baseline, or reach fewer rows.",
@@ -405,6 +411,9 @@ OF_COVERAGE = (
 )
 """The rules that only `contextdb coverage` reports."""
 
+OF_OPTIONS = ("few-cases",)
+"""The rules of bars that an option of check sets."""
+
 OF_CONTRACTS = ("broken-contract", "unreadable-contract", "open-contract", "empty-contract")
 """The rules of contracts, which are of contextdb.toml."""
 
@@ -420,6 +429,7 @@ TABLE_RULES: tuple[str, ...] = tuple(
         "unportable-name",
         "not-a-table",
         *OF_CONTRACTS,
+        *OF_OPTIONS,
         *OF_COVERAGE,
     )
 )

@@ -77,8 +77,30 @@ class KnownProposals:
         return self.clips[clip.name]
 
 
+@dataclass(frozen=True, eq=False)
+class ClipHead(Clip):
+    """A clip whose motion is forgotten: its first frame stands for all. `key` is what `key_of` gave of the clip itself."""
+
+    key: str = ""
+
+    @classmethod
+    def of(cls, clip: Clip, key: str) -> ClipHead:
+        """The head of a clip of one frame or more."""
+        values = np.broadcast_to(clip.values[:1].copy(), clip.values.shape)
+        return cls(clip.name, clip.skeleton, clip.frame_time_s, values, clip.metres_per_unit, clip.up, clip.notes, key)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "values": self.values[:1].copy(), "n_frames": self.n_frames}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        shape = state.pop("n_frames"), state["values"].shape[1]
+        self.__dict__.update(state | {"values": np.broadcast_to(state["values"], shape)})
+
+
 def key_of(clip: Clip) -> str:
     """A digest of all that proposals for a clip depend on."""
+    if isinstance(clip, ClipHead):
+        return clip.key
     rig = clip.skeleton
     about = [PREPARING, clip.frame_time_s, clip.metres_per_unit, clip.up, rig.names, rig.parents.tolist(), rig.offsets.tolist()]
     digest = hashlib.blake2b(json.dumps([*about, rig.channels]).encode(), digest_size=16)

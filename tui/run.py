@@ -17,8 +17,9 @@ FEW_COLOURS = ("ansi", "linux", "vt100", "vt220", "xterm", "xterm-color", "scree
 """Terminals of 16 colours or fewer, by TERM, unless COLORTERM says that they can do more."""
 
 
-def edit(path: str | None, theme: str | None = None) -> int:
-    """Open a table or a folder of tables, and stay until the editor is left; gives the exit code.
+def edit(path: str | None, theme: str | None = None, follow: str = "") -> int:
+    """Open a table or a folder of tables, and stay until the editor is left; gives the exit code. A game of the name `follow` is
+    followed as soon as it asks the first table.
 
     Raises
     ------
@@ -37,7 +38,7 @@ def edit(path: str | None, theme: str | None = None) -> int:
     forget_exported_size()
     read_whole_keys()
     pass_over_what_stays()
-    return EditorApp(workspace, settings, theme or theme_for(settings)).stay()
+    return EditorApp(workspace, settings, theme or theme_for(settings), follow=follow).stay()
 
 
 def pass_over_what_stays() -> None:

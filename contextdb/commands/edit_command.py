@@ -4,6 +4,7 @@ Exits with 2 without a terminal.
 
   contextdb edit tables/
   contextdb edit tables/hit_mid_air.csv --theme contextdb-light
+  contextdb edit tables/ --follow my_game
 """
 
 from __future__ import annotations
@@ -26,12 +27,13 @@ class TerminalError(ContextDBError):
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("path", metavar="PATH", nargs="?", help="a table, or a folder of tables (default: tables/, or here)")
     parser.add_argument("--theme", metavar="NAME", help="the colours (default: from the settings)")
+    parser.add_argument("--follow", metavar="GAME", default="", help="the running game that the test row follows, once it is there")
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Open the editor, and stay in it until it is left."""
     require_terminal()
-    return ExitCode(screens("run").edit(arguments.path, arguments.theme))
+    return ExitCode(screens("run").edit(arguments.path, arguments.theme, arguments.follow))
 
 
 def screens(module: str) -> Any:

@@ -511,34 +511,44 @@ typedef struct cdbm_choosing { /* some characters, while a database is searched 
     int64_t *skips, *skip_stops, *currents, *frames, *found;
 } cdbm_choosing;
 
-static inline void cdbm_free_choosing(cdbm_choosing *room)
+/* The most ranges of a database, and the most spans that a search of one leaves out, and how much room that takes. */
+static inline void cdbm_measure_choosing(const cdbm_controller *controller, size_t n, size_t *n_ranges, size_t *n_skips, size_t *n_bytes)
 {
-    CDB_FREE(room->numbers);
-    CDB_FREE(room->queries);
-    CDB_FREE(room->ranges);
-    CDB_FREE(room->skips);
-}
-
-static inline int cdbm_take_choosing(const cdbm_controller *controller, cdbm_choosing *room, size_t n)
-{
-    size_t d, n_ranges = 1, n_skips = 1;
+    size_t d;
+    *n_ranges = *n_skips = 1, *n_bytes = 0;
     for (d = 0; d < controller->n_databases; d++) {
         const cdbm_clips *clips = &controller->databases[d];
         if (!clips->frames) continue;
-        if (clips->n_ranges > n_ranges) n_ranges = clips->n_ranges;
-        if (cdbm_most_skips(controller, clips) > n_skips) n_skips = cdbm_most_skips(controller, clips);
+        if (clips->n_ranges > *n_ranges) *n_ranges = clips->n_ranges;
+        if (cdbm_most_skips(controller, clips) > *n_skips) *n_skips = cdbm_most_skips(controller, clips);
+        if (cdbm_search_room(clips->frames, n) > *n_bytes) *n_bytes = cdbm_search_room(clips->frames, n);
     }
-    memset(room, 0, sizeof *room);
-    room->numbers = (size_t *)CDB_MALLOC(n * sizeof(size_t) + 1);
-    room->queries = (double *)CDB_MALLOC(n * (controller->n_features + n_ranges + 1) * sizeof(double) + 1);
-    room->ranges = (uint8_t *)CDB_MALLOC(n * (n_ranges + 1) + 1);
-    room->skips = (int64_t *)CDB_MALLOC((n * (2 * n_skips + 4) + 1) * sizeof(int64_t));
-    if (!room->numbers || !room->queries || !room->ranges || !room->skips) return 0;
-    room->biases = room->queries + n * controller->n_features, room->totals = room->biases + n * n_ranges;
-    room->stopped = room->ranges + n * n_ranges;
-    room->skip_stops = room->skips + n * 2 * n_skips, room->currents = room->skip_stops + n + 1;
-    room->frames = room->currents + n, room->found = room->frames + n;
-    memset(room->stopped, 0, n);
+}
+
+/* How many bytes of room a choice for so many characters takes. */
+static inline size_t cdbm_choice_room(const cdbm_controller *controller, size_t n)
+{
+    size_t n_ranges, n_skips, n_bytes;
+    if (n > CDBM_TILE) n = CDBM_TILE;
+    cdbm_measure_choosing(controller, n, &n_ranges, &n_skips, &n_bytes);
+    return n_bytes + cdbm_rounded(n * sizeof(size_t)) + cdbm_rounded(n * (controller->n_features + n_ranges + 1) * sizeof(double))
+        + cdbm_rounded(n * (n_ranges + 1)) + cdbm_rounded((n * (2 * n_skips + 4) + 1) * sizeof(int64_t));
+}
+
+static inline int cdbm_take_choosing(const cdbm_controller *controller, cdbm_choosing *own, size_t n, cdbm_room *room)
+{
+    size_t n_ranges, n_skips, n_bytes;
+    cdbm_measure_choosing(controller, n, &n_ranges, &n_skips, &n_bytes);
+    own->numbers = (size_t *)cdbm_part(room, n * sizeof(size_t));
+    own->queries = (double *)cdbm_part(room, n * (controller->n_features + n_ranges + 1) * sizeof(double));
+    own->ranges = (uint8_t *)cdbm_part(room, n * (n_ranges + 1));
+    own->skips = (int64_t *)cdbm_part(room, (n * (2 * n_skips + 4) + 1) * sizeof(int64_t));
+    if (!own->numbers || !own->queries || !own->ranges || !own->skips) return 0;
+    own->biases = own->queries + n * controller->n_features, own->totals = own->biases + n * n_ranges;
+    own->stopped = own->ranges + n * n_ranges;
+    own->skip_stops = own->skips + n * 2 * n_skips, own->currents = own->skip_stops + n + 1;
+    own->frames = own->currents + n, own->found = own->frames + n;
+    memset(own->stopped, 0, n);
     return 1;
 }
 
@@ -562,10 +572,10 @@ static inline void cdbm_put_question(const cdbm_controller *controller, const cd
         room->ranges[at * n_ranges + (size_t)move->to.range] = 1, room->biases[at * n_ranges + (size_t)move->to.range] = given->wide[i];
 }
 
-/* Search a database for all of some characters whom none before it has satisfied. 0 where memory is missing, -1 for a query that
+/* Search a database for all of some characters whom none before it has satisfied. 0 where there is too little room, -1 for a query that
  * cannot be compared. */
 static inline int cdbm_search_database(const cdbm_controller *controller, const cdbm_given *given, size_t start, size_t stop,
-    const double *after, const cdbm_moved *moves, cdbm_decision *decisions, cdbm_found *found, size_t database, cdbm_choosing *room)
+    const double *after, const cdbm_moved *moves, cdbm_decision *decisions, cdbm_found *found, size_t database, cdbm_choosing *room, cdbm_room left)
 {
     const cdbm_clips *clips = &controller->databases[database];
     size_t n = 0, i, k, width = cdbm_width(controller), n_databases = controller->n_databases;
@@ -591,7 +601,7 @@ static inline int cdbm_search_database(const cdbm_controller *controller, const 
     asked.frame_biases = given->frame_biases ? given->frame_biases + clips->frame_at : NULL;
     asked.skips = room->skips, asked.skip_stops = room->skip_stops, asked.currents = room->currents;
     hits.totals = room->totals, hits.frames = room->frames, hits.ranges = room->found;
-    if (!cdbm_search_frames(clips->frames, &asked, 0, n, &hits)) return 0;
+    if (!cdbm_search_frames(clips->frames, &asked, 0, n, &hits, left)) return 0;
     for (k = 0; k < n; k++) {
         cdbm_found *own = &found[room->numbers[k] * n_databases + database];
         if (hits.ranges[k] == CDBM_REFUSED) return -1;
@@ -601,24 +611,24 @@ static inline int cdbm_search_database(const cdbm_controller *controller, const 
     return 1;
 }
 
-/* Search for those of characters `start` to `stop` - 1 who want to. 0 where memory is missing, -1 for a query that cannot be
- * compared. Several threads may do so for different ones. */
+/* Search for those of characters `start` to `stop` - 1 who want to. 0 where there is too little room (see cdbm_choice_room), -1
+ * for a query that cannot be compared. Several threads may do so for different ones, each with room of its own. */
 static inline int cdbm_choose(const cdbm_controller *controller, const cdbm_given *given, size_t start, size_t stop, const double *after,
-    const cdbm_moved *moves, cdbm_decision *decisions, cdbm_found *found)
+    const cdbm_moved *moves, cdbm_decision *decisions, cdbm_found *found, cdbm_room room)
 {
-    cdbm_choosing room;
+    cdbm_choosing own;
     size_t d, end, n = stop - start < CDBM_TILE ? stop - start : CDBM_TILE;
     int is_done = 1;
     for (; is_done == 1 && start < stop; start = end) {
+        cdbm_room left = room;
         int any = 0;
         size_t i;
         end = stop - start < n ? stop : start + n;
         for (i = start; i < end; i++) any |= decisions[i].cause != CDBM_NOT_DUE;
         if (!any) continue;
-        is_done = cdbm_take_choosing(controller, &room, end - start);
+        is_done = cdbm_take_choosing(controller, &own, end - start, &left);
         for (d = 0; is_done == 1 && d < controller->n_databases; d++)
-            is_done = cdbm_search_database(controller, given, start, end, after, moves, decisions, found, d, &room);
-        cdbm_free_choosing(&room);
+            is_done = cdbm_search_database(controller, given, start, end, after, moves, decisions, found, d, &own, left);
     }
     return is_done;
 }

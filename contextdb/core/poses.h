@@ -3,6 +3,7 @@
  *
  *   cdbo_poses_open    a rig, its banks and settings, all checked: the stages, and where their columns are
  *   cdbo_poses_begin   the row of a character that has not displayed anything yet
+ *   cdbo_receive       from what was decided to what happens to a pose
  *   cdbo_pose_one      one character through all stages; or, where a game has a ground, up to it, and then from there */
 
 #include <float.h>
@@ -164,3 +165,4 @@ static inline void cdbo_pose_one(cdbo_posed *one, const cdbo_seam *seams, double
     for (; i < stop; i++) poses->stages[i]->run(one);
     if (part == CDBO_UP_TO_GROUND) cdbo_stand_free(one);
 }
+#include "receive.h"

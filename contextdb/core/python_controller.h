@@ -226,13 +226,16 @@ static int cdbp_are_chosen(const cdbm_controller *controller, const cdbp_update 
 
 /* The steps of an update that `parts` says, for characters `start` to `stop` - 1: 1, 0 without memory, -1 for a query that cannot be
  * compared. */
-static int cdbp_run_controller(const cdbm_controller *controller, const cdbp_update *to, int parts, size_t start, size_t stop, double *room)
+static int cdbp_run_controller(const cdbm_controller *controller, const cdbp_update *to, int parts, size_t start, size_t stop,
+    cdbm_room left)
 {
     size_t width = cdbm_width(controller), i;
+    double *room = (double *)cdbm_part(&left, controller->n_features * sizeof(double));
+    if (!room) return 0;
     for (i = start; parts & CDBP_ASK && i < stop; i++)
         cdbm_ask(controller, &to->given, i, to->before + i * width, &to->moved[i], to->after + i * width, &to->decisions[i], room);
     if (parts & CDBP_CHOOSE) {
-        int is_done = cdbm_choose(controller, &to->given, start, stop, to->after, to->moved, to->decisions, to->found);
+        int is_done = cdbm_choose(controller, &to->given, start, stop, to->after, to->moved, to->decisions, to->found, left);
         if (is_done != 1) return is_done;
         for (i = start; i < stop; i++) cdbm_compare(controller, &to->given, i, &to->moved[i], &to->decisions[i], room);
     }
@@ -253,11 +256,13 @@ static PyObject *cdbp_controller_update(PyObject *self, PyObject *const *in, Py_
     if (own->is_made && n == 20 && cdbp_int_of(in[0], &parts) && cdbp_int_of(in[1], &start) && cdbp_int_of(in[2], &stop)
         && cdbp_take_given(own, &a, in + 3, &to) == 0 && start >= 0 && start <= stop && (uint64_t)stop <= to.given.n
         && cdbp_are_moved(&own->controller, &to) && (parts & CDBP_ASK || cdbp_are_chosen(&own->controller, &to))) {
-        double *room = (double *)PyMem_Malloc(own->controller.n_features * sizeof(double) + 1);
-        PyThreadState *state = room ? PyEval_SaveThread() : NULL;
-        is_done = room ? cdbp_run_controller(&own->controller, &to, (int)parts, (size_t)start, (size_t)stop, room) : 0;
+        size_t n_bytes = cdbm_choice_room(&own->controller, (size_t)(stop - start))
+            + cdbm_rounded(own->controller.n_features * sizeof(double));
+        cdbm_room room = {(char *)PyMem_Malloc(n_bytes + 1), n_bytes};
+        PyThreadState *state = room.at ? PyEval_SaveThread() : NULL;
+        is_done = room.at ? cdbp_run_controller(&own->controller, &to, (int)parts, (size_t)start, (size_t)stop, room) : 0;
         if (state) PyEval_RestoreThread(state);
-        PyMem_Free(room);
+        PyMem_Free(room.at);
     }
     cdbp_release(&a);
     if (is_done == 0) return PyErr_NoMemory();

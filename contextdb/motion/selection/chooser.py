@@ -363,7 +363,7 @@ class Chooser:
 
     def penalised(self, biases: Floats, penalties: Sequence[OfPenalties | None]) -> Floats:
         """Biases of ranges with the penalties of each update: float64 [n, R]."""
-        biases = np.array(np.broadcast_to(biases, (len(penalties), self.n_ranges)))
+        biases = np.array(np.broadcast_to(biases, (len(penalties), self.n_ranges)), order="C")
         for row, own in zip(biases, penalties, strict=True):
             for name, part in zip(self.names, self.ranges_at, strict=True):
                 if own is not None and name in self.selector.databases:

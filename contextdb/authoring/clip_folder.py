@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from contextdb.authoring.clip_looks import ClipAt, LeftOut, Looks, Seen, look_at_all
+from contextdb.authoring.clip_looks import ClipAt, LeftOut, Looks, Seen
+from contextdb.authoring.saved_looks import SavedLooks, look_at_all
 from contextdb.disk import path_in_quotes
 from contextdb.disk.boundary import inside
 from contextdb.disk.engines import Engines, here
@@ -114,7 +115,8 @@ def clips_of(
         for (file, take), (unit, axis, rig, is_by_feet) in files.items()
     ]
     results: list[Seen | LeftOut] = [()] * len(wanted)
-    for n_done, (i, seen) in enumerate(look_at_all(wanted, looks, engines), start=1):
+    saved = SavedLooks.of(folder)
+    for n_done, (i, seen) in enumerate(look_at_all(wanted, looks, engines, saved), start=1):
         results[i] = seen
         tell(n_done, len(wanted), wanted[i].name)
     rigs: dict[object, Skeleton] = {}
@@ -125,7 +127,8 @@ def clips_of(
         else:
             folder_clips.left_out += seen
     if not folder_clips.config.databases:
-        _guess(folder_clips, up is None, metres_per_unit is None, looks, engines)
+        _guess(folder_clips, up is None, metres_per_unit is None, looks, engines, saved)
+    saved.remove()
     folder_clips.notes[:0] = [note for seen in folder_clips.seen for note in seen.notes]
     return folder_clips
 
@@ -137,7 +140,7 @@ def _of_one_rig(seen: Seen, rigs: dict[object, Skeleton]) -> Seen:
     return seen if skeleton is own else replace(seen, head=replace(seen.head, skeleton=skeleton))
 
 
-def _guess(clips: FolderClips, guesses_axes: bool, guesses_units: bool, looks: Looks, engines: Engines) -> None:
+def _guess(clips: FolderClips, guesses_axes: bool, guesses_units: bool, looks: Looks, engines: Engines, saved: SavedLooks) -> None:
     """Choose what files leave open, and look again at clips that are read in another way then."""
     rigs = _rigs(clips.clips, [i for i, seen in enumerate(clips.seen) if not seen.states_unit])
     before = list(clips.places)
@@ -146,7 +149,7 @@ def _guess(clips: FolderClips, guesses_axes: bool, guesses_units: bool, looks: L
     if guesses_units:
         _guess_units(clips, rigs)
     changed = [i for i, (old, new) in enumerate(zip(before, clips.places, strict=True)) if old != new]
-    for k, seen in look_at_all([clips.places[i] for i in changed], looks, engines):
+    for k, seen in look_at_all([clips.places[i] for i in changed], looks, engines, saved):
         if isinstance(seen, Seen):
             clips.seen[changed[k]] = seen
 

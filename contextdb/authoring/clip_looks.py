@@ -7,11 +7,10 @@ A clip itself is forgotten once it was looked at; its head stays. An edge: this 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from contextdb.disk.engines import Engines
 from contextdb.errors import ContextDBError, Fault, Place
 from contextdb.motion.clips.clip import MOST_RATE, Clip, Unit, Up
 from contextdb.motion.clips.clip_measures import Measures, measure
@@ -79,13 +78,10 @@ LeftOut = tuple[str, ...]
 """Why a file is no clip."""
 
 
-def look_at_all(clips: Sequence[ClipAt], looks: Looks, engines: Engines) -> Iterator[tuple[int, Seen | LeftOut]]:
-    """What each clip shows, with its number, in any order."""
-    is_much = len(clips) > MANY
-    size = CHUNK if is_much else 1
-    chunks = [tuple(clips[i : i + size]) for i in range(0, len(clips), size)]
-    for i, seen in engines(look_at_chunk, looks, chunks, lambda chunk: str(chunk[0].file), is_much=is_much):
-        yield from enumerate(seen, size * i)
+def chunks_of(clips: Sequence[ClipAt]) -> list[tuple[ClipAt, ...]]:
+    """The clips in chunks: of few clips each by itself."""
+    size = CHUNK if len(clips) > MANY else 1
+    return [tuple(clips[i : i + size]) for i in range(0, len(clips), size)]
 
 
 def look_at_chunk(looks: Looks, chunk: tuple[ClipAt, ...]) -> list[Seen | LeftOut]:

@@ -12,7 +12,7 @@ import pytest
 from running import run
 
 from contextdb import motion
-from contextdb.authoring import clip_looks
+from contextdb.authoring import clip_looks, saved_looks
 from contextdb.disk import engines
 from contextdb.errors import MotionError
 from contextdb.files import scratch, tensors
@@ -118,6 +118,31 @@ def test_all_cores_describe_and_prepare_as_one_process_does(folder: Path, comman
         results.append(run("motion", command, folder / "clips"))
     assert (results[0].code, results[0].out, results[0].err) == (results[1].code, results[1].out, results[1].err)
     assert results[0].out.count("\n") >= N
+
+
+@pytest.mark.parametrize("command", ["describe", "prepare"])
+def test_a_run_that_was_stopped_does_not_look_again_at_what_it_saw(folder: Path, command: str, monkeypatch: pytest.MonkeyPatch):
+    for module in (clip_looks, saved_looks):
+        monkeypatch.setattr(module, "MANY", 3)
+    monkeypatch.setattr(clip_looks, "CHUNK", 4)
+    monkeypatch.setattr(engines, "n_cores", lambda: 1)
+    whole = run("motion", command, folder / "clips")
+    assert not list(folder.rglob("seen"))
+    names: list[str] = []
+    real = clip_looks.look_at
+
+    def look(looks: clip_looks.Looks, at: clip_looks.ClipAt) -> clip_looks.Seen | clip_looks.LeftOut:
+        names.append(at.name)
+        if len(names) == 7:
+            raise KeyboardInterrupt
+        return real(looks, at)
+
+    monkeypatch.setattr(clip_looks, "look_at", look)
+    assert run("motion", command, folder / "clips").code == 130
+    again = run("motion", command, folder / "clips")
+    assert names[7:] == [f"{i:02}" for i in range(4, N)]
+    assert (again.code, again.out, again.err) == (whole.code, whole.out, whole.err)
+    assert not list(folder.rglob("seen"))
 
 
 def test_a_head_of_a_clip_has_its_first_frame_and_its_length(folder: Path):

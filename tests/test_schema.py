@@ -263,13 +263,13 @@ def test_a_type_of_another_language_is_mended(found: str, mend: str):
             "tpye = 'bool'",
             'line 2: [conditions.x] has no key "tpye". '
             'Accepted: "type", "min", "max", "values", "unit", "description", "expr", '
-            '"mirror", "weight", "hysteresis". Did you mean "type"?',
+            '"mirror", "weight", "hysteresis", "owner". Did you mean "type"?',
         ),
         (
             "type = 'enum'\noptions = ['A']",
             'line 3: [conditions.x] has no key "options". '
             'Accepted: "type", "min", "max", "values", "unit", "description", "expr", '
-            '"mirror", "weight", "hysteresis". Did you mean "values"?',
+            '"mirror", "weight", "hysteresis", "owner". Did you mean "values"?',
         ),
     ],
 )
@@ -508,7 +508,7 @@ def test_conditions_given_in_python_are_checked_as_those_of_a_file():
         (
             {"speed": {"type": "number", 7: 1}},
             '[conditions.speed] has no key "7". '
-            'Accepted: "type", "min", "max", "values", "unit", "description", "expr", "mirror", "weight", "hysteresis".',
+            'Accepted: "type", "min", "max", "values", "unit", "description", "expr", "mirror", "weight", "hysteresis", "owner".',
         ),
     ],
 )

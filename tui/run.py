@@ -6,6 +6,7 @@ import gc
 import os
 import sys
 import webbrowser
+from collections.abc import Sequence
 
 from contextdb.disk import refuse_writing
 from contextdb.errors import ContextDBError, Fault, in_quotes, mend_for
@@ -24,8 +25,9 @@ class BrowserError(ContextDBError):
     """What shows the editor in a browser is not installed."""
 
 
-def edit(path: str | None, theme: str | None = None, reads_only: bool = False) -> int:
-    """Open a table or a folder of tables, and stay until the editor is left; gives the exit code.
+def edit(path: str | None, theme: str | None = None, reads_only: bool = False, follow: str = "") -> int:
+    """Open a table or a folder of tables, and stay until the editor is left; gives the exit code. A game of the name `follow` is
+    followed as soon as it asks the first table.
 
     Raises
     ------
@@ -41,11 +43,12 @@ def edit(path: str | None, theme: str | None = None, reads_only: bool = False) -
         forget_exported_size()
     read_whole_keys()
     pass_over_what_stays()
-    return EditorApp(workspace, settings, theme or theme_for(settings)).stay()
+    return EditorApp(workspace, settings, theme or theme_for(settings), follow=follow).stay()
 
 
-def edit_in_browser(path: str | None, theme: str | None, reads_only: bool, host: str, port: int) -> int:
-    """Show the editor in a browser until it is left; gives the exit code. Errors as of `edit`, and of the server."""
+def edit_in_browser(path: str | None, theme: str | None, options: Sequence[str], host: str, port: int) -> int:
+    """Show the editor, started with options, in a browser until it is left; gives the exit code. Errors as of `edit`, and of the
+    server."""
     try:
         from .browser.server import serve
     except ImportError:
@@ -54,14 +57,14 @@ def edit_in_browser(path: str | None, theme: str | None, reads_only: bool, host:
     workspace, _ = _opened(path, theme, True)
     title = workspace.first or workspace.folder.resolve().name
     workspace.close(keep_journals=True)
-    words = [*(["--theme", theme] if theme else []), *(["--read-only"] if reads_only else []), *(["--", path] if path else [])]
+    command = [sys.executable, "-m", "contextdb", "edit", *options, *(["--", path] if path else [])]
 
     def ready(address: str) -> None:
         print(f"The editor is at {address}", flush=True)
         print("Ctrl+C ends it; edits that are not saved are there the next time.", file=sys.stderr, flush=True)
         webbrowser.open(address)
 
-    return serve([sys.executable, "-m", "contextdb", "edit", *words], f"{title} - contextdb", host, port, ready)
+    return serve(command, f"{title} - contextdb", host, port, ready)
 
 
 def is_in_browser() -> bool:

@@ -7,6 +7,7 @@ has the address can edit; a second window follows the first and cannot. Needs: p
   contextdb edit tables/hit_mid_air.csv --theme contextdb-light
   contextdb edit tables/ --browser
   contextdb edit tables/ --browser --read-only
+  contextdb edit tables/ --follow my_game
 """
 
 from __future__ import annotations
@@ -42,20 +43,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=LOOPBACK,
         help="with --browser: an address of this machine to listen at (default: 127.0.0.1)",
     )
+    parser.add_argument("--follow", metavar="GAME", default="", help="the running game that the test row follows, once it is there")
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Open the editor, and stay in it until it is left."""
     run_in = screens("run")
     if arguments.browser:
-        return ExitCode(
-            run_in.edit_in_browser(arguments.path, arguments.theme, arguments.read_only, arguments.host, arguments.port)
-        )
+        given = {"--theme": arguments.theme, "--follow": arguments.follow}
+        words = [word for name, text in given.items() if text for word in (name, text)]
+        words += ["--read-only"] if arguments.read_only else []
+        return ExitCode(run_in.edit_in_browser(arguments.path, arguments.theme, words, arguments.host, arguments.port))
     if (arguments.host, arguments.port) != (LOOPBACK, 0):
         raise TerminalError(Fault("--port and --host are of the editor in a browser.", "--browser with them"))
     if not run_in.is_in_browser():
         require_terminal()
-    return ExitCode(run_in.edit(arguments.path, arguments.theme, arguments.read_only))
+    return ExitCode(run_in.edit(arguments.path, arguments.theme, arguments.read_only, arguments.follow))
 
 
 def screens(module: str) -> Any:

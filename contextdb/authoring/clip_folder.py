@@ -14,7 +14,8 @@ from contextdb.disk import path_in_quotes
 from contextdb.disk.boundary import inside
 from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, plural, some
 from contextdb.motion.clips.clip import CENTIMETRE, MOST_RATE, Clip, Unit, Up
-from contextdb.motion.clips.doubts import LEAST_BODY_M, LYING_SHARE, UNITS, measure, unit_by_size
+from contextdb.motion.clips.clip_measures import UNITS, measure, unit_by_size
+from contextdb.motion.clips.doubts import LEAST_BODY_M, LYING_SHARE
 from contextdb.motion.clips.on_the_spot import ground_motion, with_ground_motion
 from contextdb.motion.clips.source import ENDINGS, ClipSource, clip_name, takes_of
 from contextdb.motion.storage.clip_files import named_takes

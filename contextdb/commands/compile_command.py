@@ -55,7 +55,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     header = None if arguments.c_header is None else _written_as(arguments.c_header, HEADERS, "a C header")
     link = _link_path(arguments)
     tables = _tables(arguments.path)
-    targets = [_target(table, arguments.out, len(tables)) for table in tables]
+    targets = [_target(table, arguments.out, len(tables), _is_folder(arguments.path)) for table in tables]
     _require_different(targets)
     header_text = None if header is None else c_header_of({t.name: t.compile() for t in tables}, f"CDB_{header.stem}_H")
     for table, target in progress(list(zip(tables, targets, strict=True)), "compiling"):
@@ -112,7 +112,7 @@ def _written_as(text: str, suffixes: tuple[str, ...], what: str) -> Path:
 
 
 def _tables(text: str) -> list[Table]:
-    if os.path.isdir(text) or Path(text).name == SCHEMA_FILE:
+    if _is_folder(text):
         tables = list(Project.load(text).tables.values())
         if not tables:
             raise ContextDBError(Fault("the folder holds no table.", "a folder with .csv or .parquet files", place=Place(text)))
@@ -120,7 +120,12 @@ def _tables(text: str) -> list[Table]:
     return [load_table(table_path(text))]
 
 
-def _target(table: Table, out: str | None, n_tables: int) -> Path:
+def _is_folder(text: str) -> bool:
+    return os.path.isdir(text) or Path(text).name == SCHEMA_FILE
+
+
+def _target(table: Table, out: str | None, n_tables: int, is_folder: bool) -> Path:
+    """Where a table is written: what is compiled out of a folder goes into a folder, however many tables there are."""
     assert table.path is not None
     if out is None:
         return inside(table.path.with_suffix(SUFFIX), _home(table))
@@ -129,7 +134,7 @@ def _target(table: Table, out: str | None, n_tables: int) -> Path:
         raise FileError(Fault(f"{n_tables} tables do not go into one artefact.", "a folder", place=Place(out)))
     if is_artefact:
         return Path(out)
-    if n_tables > 1 or out.endswith(SEPARATORS) or os.path.isdir(out):
+    if is_folder or out.endswith(SEPARATORS) or os.path.isdir(out):
         is_file_name = PurePath(table.name).name == table.name and not any(c in table.name for c in SEPARATORS)
         return inside(Path(out) / f"{table.name if is_file_name else table.path.stem}{SUFFIX}", Path(out))
     mend = path_in_quotes(Path(out).with_suffix(SUFFIX))

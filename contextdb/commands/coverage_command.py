@@ -33,7 +33,7 @@ from contextdb.commands.gating import (
     require_baseline,
     with_gates,
 )
-from contextdb.commands.numbers import number_of
+from contextdb.commands.numbers import percent
 from contextdb.commands.progress import Bar, bar, has_many_cells
 from contextdb.console import ExitCode, output, printable, terminal_width, wants_colour
 from contextdb.covering.baseline import ACCEPTED, Baseline, CaseCounts, read_baseline
@@ -50,6 +50,7 @@ from contextdb.tables.other_files import cases_path
 from contextdb.tables.places import table_path
 from contextdb.tables.project import SCHEMA_FILE, Project, load_table
 from contextdb.tables.table import EitherTable, Table
+from contextdb.tables.variants import WholeTable
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -230,7 +231,7 @@ def _tell(progress: Bar | None) -> Tell | None:
 
 def _inside(table: EitherTable) -> dict[int, str]:
     """For the rows that are in other files than the table their files, from the table's folder."""
-    if table.path is None or not isinstance(table, FlatTable):
+    if table.path is None or not isinstance(table, (FlatTable, WholeTable)):
         return {}
     files = {row: table.place(row).file for row in range(table.n_rows)}
     own, folder = str(table.path), table.path.parent
@@ -283,14 +284,6 @@ def _only(tables: Sequence[EitherTable]) -> EitherTable:
         names = ", ".join(in_quotes(table.name) for table in tables[:6])
         raise TableError(Fault(f"--gap and --explain are about one table, and there are {len(tables)}.", f"one of {names}"))
     return tables[0]
-
-
-def percent(text: str) -> float:
-    """A percentage as a share."""
-    percent = number_of(text.removesuffix("%"))
-    if percent is None or not 0.0 <= percent <= 100.0:
-        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a percentage. Accepted: a number from 0 to 100.")
-    return percent / 100.0
 
 
 def _count(text: str) -> int:

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING
 
 from contextdb.checks.effects import Effects
 from contextdb.commands import add_format_arguments
-from contextdb.commands.coverage_command import percent
 from contextdb.commands.diff_views import as_markdown, as_text, effects_json, effects_markdown, effects_text
+from contextdb.commands.numbers import percent
 from contextdb.console import ExitCode, output, wants_colour
 from contextdb.edits.diffing import Diff, diff
 from contextdb.errors import ContextDBError, ContextError, Fault

@@ -21,7 +21,6 @@ from pathlib import Path
 
 from contextdb.authoring.motion_coverage import TableMotion, motion_coverage
 from contextdb.commands import add_format_arguments
-from contextdb.commands.coverage_command import percent
 from contextdb.commands.gating import (
     Accepted,
     add_accepting_arguments,
@@ -31,7 +30,7 @@ from contextdb.commands.gating import (
     space_gates,
 )
 from contextdb.commands.motion_build_command import MotionProject
-from contextdb.commands.numbers import number_type
+from contextdb.commands.numbers import number_type, percent
 from contextdb.commands.progress import building_bar
 from contextdb.console import ExitCode, note, output, terminal_width, wants_colour
 from contextdb.covering.declared import NOTHING, declared, differences

@@ -18,6 +18,14 @@ def number_of(text: str) -> float | None:
         return None
 
 
+def percent(text: str) -> float:
+    """A percentage as a share."""
+    number = number_of(text.removesuffix("%"))
+    if number is None or not 0.0 <= number <= 100.0:
+        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a percentage. Accepted: a number from 0 to 100.")
+    return number / 100.0
+
+
 def number_type(is_not: str, least: float = 0.0, most: float = math.inf) -> Callable[[str], float]:
     """The type of an option that is a number between two bounds; `is_not` says what another text is not, and what is accepted."""
 

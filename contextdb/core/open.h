@@ -60,6 +60,7 @@ static inline void cdbi_read(cdbi_opening *opening, const cdbi_json *header)
     if (opening->status == CDB_OK) cdbi_link(opening);
     if (opening->status == CDB_OK) cdbi_levels(opening);
     if (opening->status == CDB_OK) cdbi_outputs(opening, header);
+    if (opening->status == CDB_OK) cdbi_plays(opening, header);
 }
 
 /* Open an artefact from memory that stays where it is, unchanged, until cdb_close. It begins on an address that 8 divides, as the

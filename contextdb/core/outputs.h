@@ -67,6 +67,18 @@ static inline const char *cdbi_take_output(cdbi_opening *opening, const cdbi_jso
     return fits ? NULL : "the values of an output have another type, shape or place than they must have";
 }
 
+/* Take how the rows play, where the file says. */
+static inline void cdbi_plays(cdbi_opening *opening, const cdbi_json *header)
+{
+    cdbi_json entry = cdbi_member(header, "outputs.plays");
+    cdbi_array array;
+    if (entry.why) return;
+    array = cdbi_read_array(opening->table, &entry);
+    if (entry.why || !cdbi_fits(&array, "F64", 2, sizeof(cdb_row_play) / sizeof(double)) || array.shape[0] != opening->table->n_rows + 1)
+        cdbi_refuse(opening, CDB_BAD_FILE, "how rows play has another type, shape or place than it must have", -1, "outputs.plays");
+    else opening->table->plays = (const cdb_row_play *)(const void *)array.at;
+}
+
 /* Find the outputs that the header reads among those that the file declares. */
 static inline void cdbi_outputs(cdbi_opening *opening, const cdbi_json *header)
 {
@@ -103,6 +115,12 @@ static inline void cdbi_outputs(cdbi_opening *opening, const cdbi_json *header)
 static inline size_t cdbi_output_row(const cdb_table *table, int64_t row)
 {
     return row >= 0 && (uint64_t)row < table->n_rows ? (size_t)row : table->n_rows;
+}
+
+/* How a row plays, by its reserved outputs; NULL where the table has none. -1 reads what plays where no row is picked. */
+static inline const cdb_row_play *cdb_play_of(const cdb_table *table, int64_t row)
+{
+    return table->plays ? &table->plays[cdbi_output_row(table, row)] : NULL;
 }
 
 /* The value of an output in a row; -1, as of a pick without a row, reads what there is then: the fallback's, else the default. */

@@ -232,6 +232,7 @@ typedef struct cdb_table {
     const char **assets;
     const char *fallback;           /* the asset where no row can be picked, or NULL */
     cdb_output *outputs;            /* those of the schema, in its order */
+    const cdb_row_play *plays;      /* how each row plays, and behind them what plays without one; NULL where no output says */
     size_t n_limited;               /* rows that rest after they were picked, of all tables */
     cdbi_soft *soft;                /* one for each condition, or NULL where no cell is soft */
     size_t n_depths;                /* 1, or how many tables are in each other */

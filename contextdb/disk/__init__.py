@@ -39,7 +39,7 @@ _BINARY = getattr(os, "O_BINARY", 0)
 _AT_ONCE = getattr(os, "O_NONBLOCK", 0)
 """To open a pipe does not wait for its other end."""
 
-Data = bytes | Iterable[bytes]
+Data = bytes | Iterable[bytes | memoryview]
 
 Was = bytes | Literal["any"] | None
 """What a file must still hold when it is replaced; None: it must not be there."""

@@ -59,7 +59,8 @@ class Game(AbstractContextManager["Game"]):
             self.asking = actor.name
             actor.update(dt, stick if actor is self.player or self.ball is None else self.ball.stick_of(actor, self.player))
             if self.link is not None and self.link.is_heard and actor.playing in actor.readout.valid.assets:
-                actor.moves.pick(actor.readout.valid.only([actor.playing]))  # the editor marks the row that the search picked
+                row = actor.readout.valid.only([actor.playing]).rows[0]  # the search picked it: the editor marks it
+                self.link.picked(actor.moves, actor.name, row)
         try:
             self._vault(self.player)
             if self.ball is not None:

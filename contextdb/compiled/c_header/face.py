@@ -22,7 +22,7 @@ from contextdb.compiled.data import CompiledData
 from contextdb.compiled.table import CompiledTable, data_of
 from contextdb.core import header_text
 
-READER = 5
+READER = 6
 """Raised when the core changes: headers with different readers do not go into one file."""
 
 _HEAD = """/* Written by `contextdb compile --c-header`: do not edit. */

@@ -7,7 +7,7 @@ channel holds.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from contextdb.cells.arguments import require_mapping, require_text
 from contextdb.cells.notebook import one_line
+from contextdb.core import Ways
 from contextdb.errors import Fault, MotionError, SchemaError, in_quotes, mend_for, plural, some
 from contextdb.files.settings import Declared, Section, number, setting, settings_of
 from contextdb.files.toml_shapes import Mapped, Shape, filled, listed, nothing
@@ -151,6 +152,21 @@ class FeatureSchema(Declared, error=MotionError):
         return np.array(steps, np.float64), np.array(features, np.int64).reshape(-1, 3)
 
     @cached_property
+    def ways(self) -> Ways:
+        """How far the paths of characters are looked at, for the core."""
+        columns = [
+            self.slices[channel.name].start + 3 * i
+            for channel in self.channels
+            if channel.type == "velocity" and channel.relative_to is None
+            for i in range(channel.n_features // 3)
+        ]
+        return Ways(*self.path_features, np.array(columns, np.int64), self.n_features, float(self.rate))
+
+    def __getstate__(self) -> dict[str, object]:
+        """The fields alone: what is prepared for the core is prepared again where the schema is unpickled or copied."""
+        return {each.name: getattr(self, each.name) for each in fields(self)}
+
+    @cached_property
     def speed_features(self) -> tuple[slice, float] | None:
         """Which features say how fast a path goes, and what their length is divided by for metres a second; None where none do."""
         for kind in ("position", "velocity", "speed"):
@@ -166,20 +182,6 @@ class FeatureSchema(Declared, error=MotionError):
                 seconds, start = min(points, key=lambda point: abs(point[0] - ABOUT_S))
                 return slice(start, start + size), seconds if kind == "position" else 1.0
         return None
-
-    @cached_property
-    def looks_back(self) -> bool:
-        """Whether a trajectory channel looks at where the path was."""
-        return any(reach < 0.0 for reaches in self.path_reaches for reach in reaches)
-
-    @cached_property
-    def path_reaches(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """The seconds and the metres at which the trajectory channels look at the path."""
-        channels = [channel for channel in self.channels if channel.type == "trajectory"]
-        return (
-            tuple(second for channel in channels for second in channel.at),
-            tuple(metre for channel in channels for metre in channel.along),
-        )
 
     @property
     def permutation_s(self) -> tuple[float, ...]:

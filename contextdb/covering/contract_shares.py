@@ -1,0 +1,162 @@
+"""The share of the contexts in which a contract holds: counted by the core, or bounded by random contexts.
+
+Counting adds up boxes, so it is exact where it is finished. Where only draws tell what can happen, contexts are drawn, and the
+bounds hold with a chance of 99 %.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import zip_longest
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb import bitmask
+from contextdb.covering.contract_demand import Demand
+from contextdb.covering.count import Bounds, uncovered_share
+from contextdb.covering.moments import Moment, Moments
+from contextdb.covering.sample import CHUNK, Sampler
+from contextdb.covering.shares import wilson
+from contextdb.covering.space import Box, Space
+from contextdb.covering.witness import OutOfSteps, Point
+
+MOST_SHARED = 2_000
+"""So many boxes that too many rows share are counted."""
+
+Drawn = tuple[Point, Moment]
+"""A context that was drawn: its classes, and its facts."""
+
+
+@dataclass(eq=False)
+class Shares:
+    """Measures a contract."""
+
+    demand: Demand
+    moments: Moments
+
+    @property
+    def space(self) -> Space:
+        return self.demand.space
+
+    def share(self, samples: int, rng: np.random.Generator) -> tuple[float, float]:
+        """Bounds of the share of contexts in which the contract holds, where boxes tell what can happen."""
+        bounds = self._counted()
+        if bounds is not None and bounds.is_exact:
+            return bounds.lower, bounds.upper
+        lower, upper = self._sampled(samples, rng)
+        return (lower, upper) if bounds is None else (max(lower, bounds.lower), max(lower, min(upper, bounds.upper)))
+
+    def _counted(self) -> Bounds | None:
+        """The share by counting boxes; None where it is of another form."""
+        possible = self._open(self._impossible)
+        if possible.upper == 0.0:
+            return Bounds(0.0, 0.0)
+        verb = self.demand.contract.verb
+        if verb == "some":
+            return _less(_over(self._open(self._impossible | self.demand.kind), possible))
+        if verb in ("every", "none"):
+            return _over(
+                self._open(
+                    self._impossible | (self.demand.kind if verb == "none" else self.demand.finder.rows & ~self.demand.kind)
+                ),
+                possible,
+            )
+        if verb == "at_most":
+            return self._not_shared(possible)
+        return self._won(possible)
+
+    def _open(self, avoided: int, parts: int = 1) -> Bounds:
+        """The share that some boxes leave open, by one of so many equal parts of the work."""
+        return uncovered_share(
+            self.space, self.demand.finder.chosen(avoided), self.demand.finder.work // parts, self.demand.finder.progress
+        )
+
+    def _not_shared(self, possible: Bounds) -> Bounds | None:
+        shared: dict[Box, None] = {}
+        try:
+            for box in self.demand.shared(self.space.full, 0, self.demand.kind):
+                shared[box] = None
+                if len(shared) > MOST_SHARED:
+                    return None
+        except OutOfSteps:
+            return None
+        left = uncovered_share(self.space, [*shared, *self.space.impossible], self.demand.finder.work, self.demand.finder.progress)
+        return _over(left, possible)
+
+    def _won(self, possible: Bounds) -> Bounds | None:
+        """The share in which the first of the valid rows, those of the kind behind others of their rank, is of the kind."""
+        if len(self.demand.picks.choosing.ranks) > 1:
+            return None
+        pickable = bitmask.flags_of(self.demand.picks.pickable, len(self.space.boxes))
+        rows = np.array(self.space.rows, np.int64)
+        is_kind, ranks = bitmask.flags_of(self.demand.kind, len(rows)), self.demand.picks.choosing.ranks[0][rows]
+        counted = pickable & (~is_kind | self.demand.picks.always[rows])
+        order = sorted(np.flatnonzero(counted).tolist(), key=lambda i: (-ranks[i], is_kind[i]))
+        n_runs = 2 + 2 * sum(not is_kind[i] for i, j in zip_longest(order, order[1:]) if j is None or is_kind[j])
+        left = self._open(self._impossible | self.demand.finder.rows, n_runs)  # no row is valid
+        low, high, before, own = left.lower, left.upper, self._impossible, 0
+        for i in [*order, None]:
+            if i is not None and not is_kind[i]:
+                own |= 1 << i
+                continue
+            if own:
+                here, there = self._open(before, n_runs), self._open(before | own, n_runs)
+                low, high = low + max(0.0, here.lower - there.upper), high + here.upper - there.lower
+                before, own = before | own, 0
+            if i is not None:
+                before |= 1 << i
+        broken = Bounds(low, high)
+        return _less(_over(broken, possible))
+
+    def _sampled(self, samples: int, rng: np.random.Generator) -> tuple[float, float]:
+        """The share by random contexts, with a chance of 99 %."""
+        n_contexts = n_broken = 0
+        for codes, _ in self._sampler.random_contexts(samples, rng):
+            broken = self._broken_at(codes[self._sampler.is_possible(codes)])
+            n_contexts += len(broken)
+            n_broken += int(broken.sum())
+        return wilson(n_contexts - n_broken, n_contexts)
+
+    def drawn(self, samples: int, rng: np.random.Generator, most: int) -> tuple[tuple[float, float], list[Drawn]]:
+        """The same by draws of what can happen, and at most so many of those that break the contract."""
+        assert self.moments.drawer is not None
+        n_contexts, drawn, n_broken = 0, list[Drawn](), 0
+        for at in range(0, samples, CHUNK):
+            codes, columns = self.moments.drawer.moments(min(CHUNK, samples - at), rng)
+            broken = self._broken_at(codes) & self._sampler.is_possible(codes)
+            n_contexts += int(self._sampler.is_possible(codes).sum())
+            n_broken += int(broken.sum())
+            for i in np.flatnonzero(broken)[: max(0, most - len(drawn))].tolist():
+                drawn.append((tuple(codes[i].tolist()), self.moments.drawn(codes[i], columns, i)))
+        return wilson(n_contexts - n_broken, n_contexts), drawn
+
+    def _broken_at(self, codes: NDArray[np.int32]) -> NDArray[np.bool_]:
+        """Whether contexts, as classes of the factors, break the contract."""
+        self.demand.finder.progress.check()
+        words, starts = self._sampler.masks
+        held = np.full((len(codes), words.shape[1]), ~np.uint64(0))
+        for f in range(codes.shape[1]):
+            held &= words[starts[f] + codes[:, f]]
+        bits = np.unpackbits(held.view(np.uint8), axis=1, bitorder="little", count=len(self.space.boxes))
+        return self.demand.broken(bits.astype(np.bool_))
+
+    @cached_property
+    def _sampler(self) -> Sampler:
+        return Sampler(self.space, self.demand.finder.progress, self.moments.drawer)
+
+    @property
+    def _impossible(self) -> int:
+        return self.demand.finder.impossible
+
+
+def _over(part: Bounds, whole: Bounds) -> Bounds:
+    if part.is_exact and whole.is_exact:
+        share = min(1.0, part.lower / whole.lower)
+        return Bounds(share, share)
+    return Bounds(min(1.0, part.lower / whole.upper), min(1.0, part.upper / whole.lower) if whole.lower > 0.0 else 1.0)
+
+
+def _less(share: Bounds) -> Bounds:
+    return Bounds(1.0 - share.upper, 1.0 - share.lower)

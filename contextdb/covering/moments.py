@@ -1,0 +1,94 @@
+"""Classes of a space as moments that a query takes: the facts of a point, what is derived from them, whether they can happen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb.covering.assumed import assumptions_of
+from contextdb.covering.draw import Drawer
+from contextdb.covering.facts import fact_of, written_fact
+from contextdb.covering.space import Box, Space
+from contextdb.covering.witness import Point
+from contextdb.expressions import Derivation, Expression, read_expression
+from contextdb.expressions.assume import WANTS
+from contextdb.schema.settings import derivation_of
+from contextdb.tables.data import known_conditions
+from contextdb.tables.table import EitherTable
+
+TRIES = 4_096
+"""So many draws look for a moment in a box."""
+MOST_DRAWN = 12
+"""So many moments of a box are given."""
+
+Moment = dict[str, object]
+"""The facts of a context that are given, as a query takes them."""
+
+
+@dataclass(eq=False)
+class Moments:
+    """The moments of a space without rules."""
+
+    space: Space
+    table: EitherTable
+    """The table that the space is of."""
+    drawer: Drawer | None
+    """What draws moments, where boxes do not tell all that can happen."""
+    premises: Sequence[str] = ()
+    """Expressions that must be known to hold."""
+
+    def of_box(self, box: Box, point: Point, rng: np.random.Generator) -> Iterator[Moment]:
+        """The given point of a box, or where only draws tell what can happen, some that are drawn."""
+        if self.drawer is None:
+            yield self.of_point(point)
+            return
+        codes, columns = self.drawer.moments(TRIES, rng, box)
+        for i in range(min(len(codes), MOST_DRAWN)):
+            yield self.drawn(codes[i], columns, i)
+
+    def drawn(self, codes: NDArray[np.int32], columns: Mapping[str, list[Any]], i: int) -> Moment:
+        """Number `i` of some draws."""
+        assert self.drawer is not None
+        domains = {name: condition.domain for name, condition in self.drawer.given.items()}
+        given = {name: written_fact(_plain_value(column[i]), domains[name]) for name, column in columns.items()}
+        return self.of_point(tuple(codes.tolist())) | given
+
+    def of_point(self, point: Point) -> Moment:
+        given = ((at, c) for at, c in enumerate(self.space.conditions) if not c.expr)
+        return {c.name: fact_of(self.space, at, point) for at, c in given}
+
+    def can_happen(self, moment: Mapping[str, object]) -> bool:
+        """Whether what is assumed holds in a moment, and the premises."""
+        facts = {**moment, **self._derived(moment)}
+        is_possible = all(expression.evaluate(facts) is not False for expression in self._assumptions)
+        return is_possible and all(premise.evaluate(facts) is True for premise in self._premises)
+
+    def _derived(self, moment: Mapping[str, object]) -> Mapping[str, object]:
+        if self._derivation is None:
+            return {}
+        needed = {c.name for c in self._derivation.inputs}
+        columns = self._derivation.complete_frame({name: [value] for name, value in moment.items() if name in needed}, 1)
+        return {name: _plain_value(column[0]) for name, column in columns.items()}
+
+    @cached_property
+    def _derivation(self) -> Derivation | None:
+        names = [*(c.name for c in self.space.conditions), *(n for e in self._assumptions for n in e.names)]
+        return derivation_of(self.table.schema, names)
+
+    @cached_property
+    def _premises(self) -> list[Expression]:
+        known = known_conditions(self.table)
+        return [read_expression(text, known, WANTS) for text in self.premises]
+
+    @cached_property
+    def _assumptions(self) -> tuple[Expression, ...]:
+        return assumptions_of(self.table).expressions
+
+
+def _plain_value(value: Any) -> Any:
+    return value.item() if isinstance(value, np.generic) else value

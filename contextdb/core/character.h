@@ -408,7 +408,6 @@ static inline int cdbm_ask_table(const cdbm_player *player, size_t table, const 
     const cdb_schema *schema = &any->schema;
     cdb_fact own[CDB_MOST_FACTS], mirrored[CDB_MOST_FACTS], *facts = own;
     size_t n_words = any->table.n_words, n_rows = any->table.n_rows, i, side;
-    memset(own, 0, sizeof own);
     for (i = 0; i < schema->n_conditions; i++) {
         own[i] = input->facts && input->facts[table] ? input->facts[table][i] : cdbm_missing_fact(&schema->conditions[i]);
         cdbm_add_own(player, table, i, walk, &input->goal, &own[i]);

@@ -41,6 +41,31 @@ static inline cdb_status cdbi_ready(const cdb_table *table, const cdb_column *co
     return status;
 }
 
+/* How far a number is from a span. */
+static inline double cdbi_gap(double number, const double *span)
+{
+    return span[0] > number ? span[0] - number : number > span[1] ? number - span[1] : 0.0;
+}
+
+/* What a soft cell that does not accept its fact costs: its penalty, or so many as the fact is away from it. */
+static inline double cdbi_grown(const cdbi_soft *soft, const cdb_condition *condition, const cdb_fact *fact, size_t row)
+{
+    double penalty = soft->penalties[row], least, number, gap;
+    int64_t k;
+    int turn, is_circular = condition->type == CDB_ANGLE;
+    size_t cell = soft->per ? (size_t)soft->which[row] : 0;
+    if (!soft->per || !(soft->per[cell] == soft->per[cell]) || cdbi_is_missing(condition, fact)) return penalty;
+    if (!(penalty > 0.0)) return 0.0;
+    number = cdbi_number(condition, fact);
+    least = cdbi_gap(number, soft->ends + 2 * soft->starts[cell]);
+    for (k = soft->starts[cell]; k < soft->starts[cell + 1]; k++)
+        for (turn = is_circular ? -1 : 0; turn <= is_circular; turn++) {
+            gap = cdbi_gap(number + 360.0 * (double)turn, soft->ends + 2 * k);
+            if (gap < least) least = gap;
+        }
+    return penalty * (least / soft->per[cell]);
+}
+
 /* What the soft cells of one row cost at one depth of tables inside tables. */
 static inline double cdbi_cost(const cdb_table *table, const cdb_schema *schema, const cdb_fact *facts, cdb_unknown unknown,
     size_t depth, size_t row)
@@ -50,7 +75,7 @@ static inline double cdbi_cost(const cdb_table *table, const cdb_schema *schema,
     for (i = 0; table->soft && i < schema->n_conditions; i++)
         if (table->soft[i].column.kind != 0
             && !cdbi_accepts(&table->soft[i].column, &schema->conditions[i], &facts[i], unknown, at, n_words))
-            cost = cdbi_sum(cost, table->soft[i].penalties[at]);
+            cost = cdbi_sum(cost, cdbi_grown(&table->soft[i], &schema->conditions[i], &facts[i], at));
     return cost;
 }
 

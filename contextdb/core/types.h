@@ -234,6 +234,10 @@ typedef struct cdb_output {         /* n_rows + 1 values: the last is what there
 typedef struct cdbi_soft {          /* the soft cells of a condition, a row for each row of each depth */
     cdb_column column;
     const double *penalties;
+    const double *per, *ends;       /* how penalties grow, NULL where none does: of each distinct cell the distance that one is for, */
+    const int64_t *starts;          /* NaN for any; its spans, two ends each, from which to which; */
+    const int32_t *which;           /* and the cell of each row */
+    size_t n_cells, n_spans, n_starts;
 } cdbi_soft;
 
 typedef struct cdb_table {

@@ -643,7 +643,7 @@ static PyObject *cdbp_ask(const cdbp_table *own, PyObject *context, cdb_unknown 
     cdbp_lay_out(own, memory, &frame);
     if (cdbp_read_all(own, context, unknown, &frame) == CDBP_READ) answer = cdbp_new_answer(own->answers, own->shared, own->table.n_words);
     if (answer
-        && cdb_query(&own->table, own->columns, &own->schema, frame.facts, unknown, answer->words, own->table.n_words, &fault)) {
+        && cdbi_query(&own->table, own->columns, &own->schema, frame.facts, frame.facts, unknown, answer->words, own->table.n_words, &fault)) {
         Py_DecRef((PyObject *)answer);
         answer = NULL;
     }
@@ -718,6 +718,7 @@ static int cdbp_put_each(const cdbp_table *own, PyObject *context, cdb_unknown u
     void (*put)(const cdbp_table *, size_t, const cdb_fact *, cdb_unknown, void *))
 {
     void *memory = PyMem_Malloc(own->frame_bytes);
+    const cdb_fact *facts;
     cdbp_frame frame;
     cdb_fault fault;
     size_t i;
@@ -726,7 +727,8 @@ static int cdbp_put_each(const cdbp_table *own, PyObject *context, cdb_unknown u
     if (!memory) return -1;
     cdbp_lay_out(own, memory, &frame);
     how = cdbp_read_all(own, context, unknown, &frame);
-    if (how == CDBP_READ && cdbi_ready(&own->table, own->columns, &own->schema, frame.facts, unknown, &fault) != CDB_OK)
+    facts = frame.facts;
+    if (how == CDBP_READ && cdbi_ready(&own->table, own->columns, &own->schema, &facts, frame.facts, unknown, &fault) != CDB_OK)
         how = CDBP_CAREFUL;
     for (i = 0; how == CDBP_READ && i < n; i++) put(own, i, &frame.facts[i], unknown, items);
     cdbp_let_go(&frame);

@@ -26,17 +26,17 @@ static inline int cdbi_accepts(const cdb_column *column, const cdb_condition *co
 }
 
 /* Refuse facts that are wrong or missing, and compute those that are derived. */
-static inline cdb_status cdbi_ready(const cdb_table *table, const cdb_column *columns, const cdb_schema *schema, cdb_fact *facts,
-    cdb_unknown unknown, cdb_fault *fault)
+static inline cdb_status cdbi_ready(const cdb_table *table, const cdb_column *columns, const cdb_schema *schema,
+    const cdb_fact **facts, cdb_fact *own, cdb_unknown unknown, cdb_fault *fault)
 {
     size_t i;
-    cdb_status status = CDB_OK;
-    if (table->has_programs) status = cdbi_derive(table, schema, facts, unknown, fault);
+    cdb_status status = cdbi_derived(table, schema, facts, own, unknown, fault);
     for (i = 0; i < schema->n_conditions && status == CDB_OK; i++) {
+        const cdb_fact *fact = &(*facts)[i];
         if (columns[i].kind == 0) continue;
-        if (!cdbi_is_missing(&schema->conditions[i], &facts[i])) {
-            if (cdbi_is_wrong(&schema->conditions[i], &facts[i])) status = cdbi_fact_fault(fault, CDB_WRONG_FACT, schema, i);
-        } else if (unknown == CDB_UNKNOWN_ERROR) status = cdbi_missing_fault(fault, table, schema, facts, i);
+        if (!cdbi_is_missing(&schema->conditions[i], fact)) {
+            if (cdbi_is_wrong(&schema->conditions[i], fact)) status = cdbi_fact_fault(fault, CDB_WRONG_FACT, schema, i);
+        } else if (unknown == CDB_UNKNOWN_ERROR) status = cdbi_missing_fault(fault, table, schema, *facts, i);
     }
     return status;
 }
@@ -80,15 +80,16 @@ static inline double cdbi_cost(const cdb_table *table, const cdb_schema *schema,
 }
 
 /* What the soft cells of every row that do not accept their facts cost: `penalties` has room for so many numbers. */
-static inline cdb_status cdb_penalties(const cdb_table *table, const cdb_column *columns, const cdb_schema *schema, cdb_fact *facts,
-    cdb_unknown unknown, double *penalties, size_t room, cdb_fault *fault)
+CDB_API cdb_status cdb_penalties(const cdb_table *table, const cdb_column *columns, const cdb_schema *schema,
+    const cdb_fact *facts, cdb_unknown unknown, double *penalties, size_t room, cdb_fault *fault)
 {
+    cdb_fact own[CDB_MOST_FACTS];
     size_t row, depth;
     cdb_status status;
     for (row = 0; row < room; row++) penalties[row] = 0.0;
     if (room < table->n_rows)
         return cdbi_fault(fault, CDB_TOO_SHORT, "the array for the penalties is shorter than the table", -1, "");
-    status = table->soft ? cdbi_ready(table, columns, schema, facts, unknown, fault) : CDB_OK;
+    status = table->soft ? cdbi_ready(table, columns, schema, &facts, own, unknown, fault) : CDB_OK;
     if (status != CDB_OK) return status;
     for (row = 0; table->soft && row < table->n_rows; row++)
         for (depth = 0; depth < table->n_depths; depth++)
@@ -102,15 +103,16 @@ static inline cdb_status cdb_penalties(const cdb_table *table, const cdb_column 
 /* Why a row is not valid: the numbers of the conditions whose cells fail, CDB_RULE and CDB_DISABLED, as many as have room in
  * `reasons`; *n is their whole number, 0 for a valid row. With CDB_UNKNOWN_ERROR a row that an open rule alone keeps from being
  * valid is a fault, as in a query. */
-static inline cdb_status cdb_why_not(const cdb_table *table, const cdb_column *columns, const cdb_schema *schema, cdb_fact *facts,
-    cdb_unknown unknown, int64_t row, int *reasons, size_t room, size_t *n, cdb_fault *fault)
+CDB_API cdb_status cdb_why_not(const cdb_table *table, const cdb_column *columns, const cdb_schema *schema,
+    const cdb_fact *facts, cdb_unknown unknown, int64_t row, int *reasons, size_t room, size_t *n, cdb_fault *fault)
 {
+    cdb_fact own[CDB_MOST_FACTS];
     size_t i;
     int truth, is_open;
     cdb_status status;
     *n = 0;
     if (row < 0 || (uint64_t)row >= table->n_rows) return cdbi_fault(fault, CDB_TOO_SHORT, "the table has no such row", -1, "");
-    status = cdbi_ready(table, columns, schema, facts, unknown, fault);
+    status = cdbi_ready(table, columns, schema, &facts, own, unknown, fault);
     if (status != CDB_OK) return status;
     truth = cdbi_rule(table, schema, facts, (size_t)row);
     is_open = truth < 0 && unknown == CDB_UNKNOWN_ERROR;

@@ -28,8 +28,8 @@ PACKAGE := pyproject.toml build_core.py $(wildcard contextdb/core/*.[ch])
 
 help:
 	@$(info make demo     the whole way on the sample tables: read, ask, explain, search)
-	@$(info make play     open the playground: a game whose characters obey tables that you edit beside it)
-	@$(info make edit     the editor on the tables of that game)
+	@$(info make play     a game whose characters obey tables, and their editor beside it)
+	@$(info make edit     the editor alone on the tables of that game)
 	@$(info make test     run the tests; EXAMPLES=full draws all examples from a new seed, SEED=1 draws the same ones again)
 	@$(info make cover    run the tests and list the lines and branches of the code that none of them reaches)
 	@$(info make check    formatting, lint, types and import contracts)
@@ -46,10 +46,10 @@ demo: $(VENV)/.runtime
 	@$(PY) -m contextdb demo
 
 play: $(VENV)/.playground
-	@$(PY) -m examples.playground $(if $(CLIPS),--clips "$(CLIPS)")
+	@$(PY) -m contextdb play $(if $(CLIPS),--clips "$(CLIPS)")
 
 edit: $(VENV)/.runtime
-	@$(PY) -m contextdb edit examples/playground/tables
+	@$(PY) -m contextdb edit examples/playground/tables --follow playground
 
 test: export EXAMPLES := $(EXAMPLES)
 test: export PYTHONDONTWRITEBYTECODE :=

@@ -20,11 +20,12 @@ from typing import IO, Any, NoReturn
 
 from contextdb.console import ExitCode, drop_output, note, printable
 from contextdb.disk import unnameable
+from contextdb.disk.boundary import TYPED_ROOT
 from contextdb.disk.together import UnfinishedWarning
 from contextdb.errors import ContextDBError, Fault, Place, in_quotes, joined, mend_for, nearest, some
 
 COMMANDS = {
-    "edit": "the terminal editor",
+    "edit": "the editor, in the terminal or in a browser",
     "query": "which assets are valid for one context",
     "evaluate": "every context of a file: how many assets are valid in each",
     "check": "what is wrong with the tables",
@@ -40,7 +41,9 @@ COMMANDS = {
     "live": "what a running game asks its tables, and what it picks",
     "verify": "whether files are as contextdb wrote them",
     "motion": "motion databases: bones, check, build, search, select, run, replay, describe, prepare",
+    "desktop": "open tables with a double click",
     "demo": "a tour of the sample tables",
+    "play": "a small game whose characters obey tables, with the editor beside it",
 }
 
 
@@ -134,6 +137,9 @@ class Group:
         limits = parser.add_argument_group("limits")
         limits.add_argument("--max-memory", type=_limit, metavar="MB", help="exit with 2 if it needs more memory (on Linux)")
         limits.add_argument("--max-time", type=_limit, metavar="S", help="exit with 2 after so many seconds")
+        project = parser.add_argument_group("project")
+        about = "the folder up to which [project] extends may climb (default: the nearest with a .git)"
+        project.add_argument("--root", metavar="FOLDER", help=about)
         return parser
 
     def _help(self) -> str:
@@ -228,6 +234,7 @@ def _run(group: Group, given: Sequence[str]) -> int:
         takes_screen = group.words == () and given[0] == "edit"
         with nullcontext() if takes_screen else announced():
             arguments = group.parser(given[0], command).parse(given[1:])
+            TYPED_ROOT.set(None if arguments.root is None else Path(arguments.root))
             if arguments.max_memory is None and arguments.max_time is None:
                 return int(command.run(arguments))
             from contextdb.commands.limits import limited

@@ -63,7 +63,7 @@ SECTIONS = {
     "Unsaved edits": ("LeavingDialog",),
     "The table is open elsewhere": ("HeldDialog",),
     "The file was changed on disk": ("ConflictsDialog",),
-    "Panes of the debugger": ("Bars", "Channels", "Stage"),
+    "Panes of the debugger": ("Bars", "CursorLines", "Stage"),
     "Help of the debugger": ("HelpPage", "DebugHelp"),
     "The debugger before a session is read": ("WaitingScreen",),
 }
@@ -144,7 +144,8 @@ def _section(group: str) -> str:
 def _debugger() -> str:
     """The keys of the debugger, which have no names."""
     lines = [f"| {_shown(key.keys)} | {key.about} |" for key in KEYS]
-    about = "Those of [the debugger](debugging.md). The arrows up and down move the cursor of the pane that has the focus."
+    about = "Those of [the debugger](sessions.md#see-why-the-debugger)."
+    about += " The arrows up and down move the cursor of the pane that has the focus."
     return "\n".join(["## In the debugger", "", about, "", "| keys | does |", "| --- | --- |", *lines, ""])
 
 

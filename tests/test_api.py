@@ -79,7 +79,7 @@ def signature_of(call: object) -> str:
     parameters = list(inspect.signature(call).parameters.values())  # type: ignore[arg-type]
     parts, is_keyword = [], False
     for parameter in parameters:
-        if parameter.name == "self":
+        if parameter.name == "self" or parameter.annotation == "Never":  # what is there to be refused with what to write
             continue
         if parameter.kind is parameter.KEYWORD_ONLY and not is_keyword:
             parts.append("*")

@@ -82,6 +82,15 @@ CALLS: dict[str, Call] = {
     "link(per_second)": lambda x: cdb.link("arguments", per_second=x).close(),
     "link.watch(what)": lambda x: linked(lambda link: link.watch(x)),
     "link.watch(who)": lambda x: linked(lambda link: link.watch(COMPILED, x)),
+    "live_many(facts)": lambda x: COMPILED.live_many(x),  # type: ignore[arg-type]
+    "live_many(unknown)": lambda x: COMPILED.live_many(MANY, unknown=x),  # type: ignore[arg-type]
+    "crowd.set(name)": lambda x: COMPILED.live_many(MANY).set(x, 0, 1.0),  # type: ignore[arg-type]
+    "crowd.set(who)": lambda x: COMPILED.live_many(MANY).set("speed", x, 1.0),  # type: ignore[arg-type]
+    "crowd.set(values)": lambda x: COMPILED.live_many(MANY).set("speed", [0], x),
+    "crowd.update(facts)": lambda x: COMPILED.live_many(MANY).update(x),  # type: ignore[arg-type]
+    "link.picked(table)": lambda x: linked(lambda link: link.picked(x, "a", 0)),
+    "link.picked(who)": lambda x: linked(lambda link: link.picked(COMPILED, x, 0)),
+    "link.picked(row)": lambda x: linked(lambda link: link.picked(COMPILED, "a", x)),
     "link.tell(decision)": lambda x: linked(lambda link: link.tell("a", x)),
     "watch(poll_s)": lambda x: cdb.watch(SAMPLES, poll_s=x).close(),  # type: ignore[arg-type]
     "watch(settle_s)": lambda x: cdb.watch(SAMPLES, poll_s=None, settle_s=x).close(),  # type: ignore[arg-type]
@@ -265,6 +274,12 @@ def test_a_seed_or_generator_that_is_none_is_refused_by_name():
         COMPILED.pick(FACTS, rng="x")  # type: ignore[arg-type]
     with pytest.raises(cdb.ContextError, match="rng is of type type"):
         COMPILED.pick(FACTS, rng=random.Random)  # type: ignore[arg-type]
+
+
+def test_facts_that_are_given_by_name_are_refused_with_what_to_write():
+    for ask in (COMPILED.query, COMPILED.live, TABLE.compile().query):
+        with pytest.raises(TypeError, match=r'Accepted: the facts as one mapping. Did you mean \w+\({"gait": ...}\)'):
+            ask(gait="Run")  # type: ignore[arg-type]
 
 
 def test_an_asset_that_is_misspelt_is_refused_with_the_nearest():

@@ -144,7 +144,7 @@ def test_the_codes_of_a_batch_are_those_of_each_context(flat_bytes, table, data)
         compiled = table.compile()
         codes = compiled.query_many(columns, unknown="never").codes
     assert codes.dtype == np.int32
-    alone = [{name: [fact] for name, fact in context.items()} for context in contexts]
+    alone = [{name: [facts[i]] for name, facts in columns.items()} for i in range(3)]
     assert codes.tolist() == [compiled.query_many(one, unknown="never").codes[0].tolist() for one in alone]
 
 
@@ -504,9 +504,9 @@ def test_what_soft_cells_cost_in_many_contexts_is_what_they_cost_in_each(unknown
 
 def test_what_only_a_single_answer_has_is_refused_with_what_to_use():
     many = Table.from_columns({"Asset": ["a"], "x": ["True"]}, {"x": {"type": "bool"}}).compile().query_many({"x": [True]})
-    with pytest.raises(AttributeError, match=r"ManyMatches has no attribute 'indices': use lists\(\) .* or many\[i\]\.indices"):
+    with pytest.raises(AttributeError, match=r"ManyMatches has no attribute 'indices': use rows and starts, or many\[i\]\.indices"):
         many.indices  # noqa: B018
-    with pytest.raises(AttributeError, match=r"'assets': each of its answers has it, many\[i\]\.assets"):
-        many.assets  # noqa: B018
+    with pytest.raises(AttributeError, match=r"'widened': each of its answers has it, many\[i\].widened"):
+        many.widened  # noqa: B018
     with pytest.raises(AttributeError, match=r"ManyMatches has no attribute 'nope'$"):
         many.nope  # noqa: B018

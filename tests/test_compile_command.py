@@ -53,6 +53,14 @@ def test_the_name_of_a_table_never_leads_out_of_the_folder(here: Path, name: str
     assert artefacts(here) == ["build/jog.safetensors", "build/run.safetensors"]
 
 
+def test_a_folder_is_compiled_into_a_folder_even_where_it_has_one_table(here: Path):
+    (here / "game" / "run.csv").unlink()
+    (here / "game" / "contextdb.toml").write_text(TOML.split("[tables")[0], encoding="utf-8")
+    assert run("compile", "game", "-o", "build").lines == ["build/jog.safetensors"]
+    assert run("compile", "game", "-o", "one.safetensors").lines == ["one.safetensors"]
+    assert 'Did you mean "build_2.safetensors"?' in refused("game/jog.csv", "-o", "build_2")
+
+
 def test_the_same_tables_give_the_same_bytes(here: Path):
     run("compile", "game", "-o", "one")
     run("compile", "game", "-o", "two")

@@ -13,11 +13,11 @@ import contextdb as cdb
 from contextdb import errors, motion
 from contextdb.commands.edit_command import TerminalError
 from contextdb.disk import read_bytes, refused_writing
+from contextdb.disk.engines import EngineError
 from contextdb.errors import ContextDBError, Fault, FileError, Place
 from contextdb.files.tensors import FileKind
 from contextdb.files.texts import scanned_parquet
 from contextdb.tables.table import Table
-from contextdb.telemetry.engines import EngineError
 from contextdb.telemetry.evaluate_file import answers_written
 
 BUILT_IN: dict[type[ContextDBError], tuple[type[Exception], ...]] = {

@@ -45,3 +45,12 @@ def test_gaps_are_a_frame_of_cells():
     frame = report.to_polars()
     assert frame.rows() == [(g.id, g.share, g.cells.get("speed"), g.cells.get("hurt")) for g in report.gaps]
     assert cdb.coverage(TABLE).to_polars().is_empty()
+
+
+def test_in_a_notebook_a_table_says_its_conditions_and_answers_their_assets():
+    many, live = COMPILED.query_many({"speed": [5.0] * 30}), COMPILED.live({"speed": 5.0})
+    assert "<td>speed</td><td>number</td>" in COMPILED._repr_html_()
+    assert "<td>29</td>" not in many._repr_html_()
+    assert "<td>0</td><td>2</td><td>run, walk</td>" in many._repr_html_()
+    assert "<p>and 10 more</p>" in many._repr_html_()
+    assert "<td>speed</td><td>5.0</td>" in live._repr_html_()

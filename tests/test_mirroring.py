@@ -282,8 +282,8 @@ def test_actors_in_a_mirror_match_as_actors_with_mirrored_facts_do(seed):
     found = compiled.query(facts, actors=actors).mirrored
     seen = compiled.query(turned(facts), actors={role: [turned(a) for a in each] for role, each in actors.items()})
     assert found.indices.tolist() == seen.indices.tolist()
-    assert [{r: a["id"] for r, a in found.casting(i).items()} for i in found] == [
-        {r: a["id"] for r, a in seen.casting(i).items()} for i in seen
+    assert [{r: a["id"] for r, a in found.casting(i).items()} for i in found.rows] == [
+        {r: a["id"] for r, a in seen.casting(i).items()} for i in seen.rows
     ]
 
 

@@ -22,7 +22,7 @@ from contextdb.commands.motion_check_command import check_path
 from contextdb.files.tensors import read_tensors
 from contextdb.motion import write_bvh
 from contextdb.motion.made.recipes import make_clip
-from contextdb.motion.storage import building
+from contextdb.motion.storage import building, extracting
 from contextdb.motion.storage.pose_files import STORED_POSES, open_poses
 from contextdb.motion.storage.stored import inputs_of, open_database
 
@@ -142,14 +142,14 @@ def test_a_search_that_must_build_first_shows_the_same_bar(here: Path, monkeypat
 
 
 def test_an_interrupted_build_says_so_and_keeps_what_was_done(here: Path):
-    real = building.extract
+    real = extracting.extract
 
     def stop(file, cache):
         if file.asset == "walk":
             raise KeyboardInterrupt
         return real(file, cache)
 
-    with mock.patch.object(building, "extract", stop):
+    with mock.patch.object(extracting, "extract", stop):
         result = run("motion", "build", "game")
     assert (result.code, result.out) == (130, "")
     assert result.err.endswith("contextdb: interrupted\n")

@@ -11,7 +11,7 @@ import pytest
 from running import run
 
 from contextdb.motion import Clip, write_bvh
-from contextdb.motion.clips.doubts import measure
+from contextdb.motion.clips.clip_measures import measure
 from contextdb.motion.made.recipes import make_clip
 
 TOML = """

@@ -76,7 +76,7 @@ def texts(folder: Path) -> dict[str, str]:
 
 def test_who_else_uses_a_condition_is_counted(folder: Path):
     uses = uses_of(load(folder / "a.csv"), "speed")
-    assert uses.text == "1 table, 1 derived fact, 3 assumptions, 1 blueprint, 1 rule, 2 saved contexts"
+    assert uses.text == "1 table, 1 derived fact, 2 assumptions, 1 contract, 1 blueprint, 1 rule, 2 saved contexts"
     assert uses.is_elsewhere
     assert uses_of(load(folder / "a.csv"), "closing").text == ""
     assert uses_of(load(folder / "b.csv"), "Note").text == ""

@@ -263,13 +263,13 @@ def test_a_type_of_another_language_is_mended(found: str, mend: str):
             "tpye = 'bool'",
             'line 2: [conditions.x] has no key "tpye". '
             'Accepted: "type", "min", "max", "values", "unit", "description", "expr", '
-            '"mirror", "weight", "hysteresis". Did you mean "type"?',
+            '"mirror", "weight", "hysteresis", "owner". Did you mean "type"?',
         ),
         (
             "type = 'enum'\noptions = ['A']",
             'line 3: [conditions.x] has no key "options". '
             'Accepted: "type", "min", "max", "values", "unit", "description", "expr", '
-            '"mirror", "weight", "hysteresis". Did you mean "values"?',
+            '"mirror", "weight", "hysteresis", "owner". Did you mean "values"?',
         ),
     ],
 )
@@ -336,7 +336,10 @@ SECTIONS_SAID = (
         ("[Project]\nname = ''", f'line 1: "Project" is not a section. Accepted: {SECTIONS_SAID}. Did you mean [project]?'),
         ("[qqq]", f'line 1: "qqq" is not a section. Accepted: {SECTIONS_SAID}.'),
         ("\nname = 'x'", f'line 2: "name" is not a section. Accepted: {SECTIONS_SAID}.'),
-        ("[project]\nnmae = 'x'", 'line 2: [project] has no key "nmae". Accepted: "name", "transitions". Did you mean "name"?'),
+        (
+            "[project]\nnmae = 'x'",
+            'line 2: [project] has no key "nmae". Accepted: "name", "extends", "transitions". Did you mean "name"?',
+        ),
         (
             "[project]\ntransitions = 'to_{to}'",
             'line 2: [project] transitions = "to_{to}": this is not a pattern for names of transitions. Accepted: {from} and '
@@ -508,7 +511,7 @@ def test_conditions_given_in_python_are_checked_as_those_of_a_file():
         (
             {"speed": {"type": "number", 7: 1}},
             '[conditions.speed] has no key "7". '
-            'Accepted: "type", "min", "max", "values", "unit", "description", "expr", "mirror", "weight", "hysteresis".',
+            'Accepted: "type", "min", "max", "values", "unit", "description", "expr", "mirror", "weight", "hysteresis", "owner".',
         ),
     ],
 )

@@ -218,7 +218,7 @@ def test_the_arrays_of_many_answers_and_of_explanations_cannot_be_written_to(act
     many = compiled.query_many(columns) if actors is None else compiled.query_many(columns, actors=actors)
     explanation = compiled.explain(given_facts, actors=actors)
     for array in (many.counts, many.hits, many.mask, *many.lists(), *(m.indices for m in many), explanation._n_failures,
-                  explanation._order, explanation._breaks_rule, MOVES.priorities, MOVES.row_weights):  # fmt: skip
+                  explanation._order, explanation.breaks_rule, MOVES.priorities, MOVES.row_weights):  # fmt: skip
         assert not array.flags.writeable
 
 

@@ -105,7 +105,7 @@ MODULES: dict[str, tuple[dict[str, CompiledTable], str]] = {
         PLAIN,
         LIVE
         + 'live = table.live()\n    live["speed"] = 1\n    live["state"] = None\n    del live["n"]\n'
-        + "    live.copy().matches().assets\n",
+        + "    live.copy().query().assets\n",
     ),
     "reading live": (
         PLAIN,

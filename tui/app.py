@@ -80,11 +80,18 @@ class EditorApp(Editor):
     VERTICAL_BREAKPOINTS = [(0, "-low"), (LOW, "-high"), (TALL, "-tall")]  # noqa: RUF012 - Textual declares it so
 
     def __init__(
-        self, workspace: Workspace, settings: EditorSettings | None = None, theme: str = "", at: GoToCell | None = None
+        self,
+        workspace: Workspace,
+        settings: EditorSettings | None = None,
+        theme: str = "",
+        at: GoToCell | None = None,
+        follow: str = "",
     ) -> None:
         super().__init__()
         self._at = at
         """The cell that is gone to first."""
+        self._follow = follow
+        """The game that is followed as soon as it asks the first table."""
         self._debugger: Any = None
         """The debugger, once it was requested: a `tui.debug.inside.Inside`."""
         self.workspace = workspace
@@ -125,6 +132,8 @@ class EditorApp(Editor):
             self.open_table(self.workspace.first)
             if self._at is not None:
                 self.main.call_after_refresh(self.main.go_to_cell, self._at)
+            if self._follow:
+                self.main.call_after_refresh(self.main.expect_game, self._follow)
 
     # ---- the debugger
 

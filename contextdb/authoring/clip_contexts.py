@@ -34,8 +34,9 @@ from contextdb.errors import some
 from contextdb.motion.measuring.moves import DIRECTION, SPEED, TURN
 from contextdb.motion.measuring.wanted import ClipContexts
 from contextdb.schema.settings import derivation_of
+from contextdb.tables.data import TableData
 from contextdb.tables.nesting.flat import FlatTable
-from contextdb.tables.table import EitherTable, Table
+from contextdb.tables.table import EitherTable
 
 MOST_ANSWERS = 3_000
 """From more different answers on contexts are drawn."""
@@ -83,7 +84,7 @@ def clip_contexts(
     gives for "speed", "turn" and "direction" the condition that says what is requested; see `queried_axes`. `seed` is that of the
     contexts that are drawn. Raises ContextDBError as coverage of a table does.
     """
-    require_kind(table, (Table, FlatTable), "table", "a Table")
+    require_kind(table, TableData, "table", "a Table")
     ready, flat = opened(table, progress=progress), table.flat()
     assets = list(flat.leaves) if isinstance(flat, FlatTable) else flat.assets
     boxes = _Boxes.of(ready, assets, set(assets if clips is None else clips), set(mirrored))

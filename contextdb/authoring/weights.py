@@ -18,7 +18,7 @@ from contextdb.errors import Fault, Place, SchemaError, in_quotes, mend_for, som
 from contextdb.files.toml_text import Path as KeyPath
 from contextdb.motion.storage.config import MotionConfig
 from contextdb.schema import toml_edit
-from contextdb.schema.settings import read_schema
+from contextdb.tables.project import schema_of
 
 _BOM = b"\xef\xbb\xbf"
 
@@ -34,7 +34,7 @@ def weights_change(
     """
     raw = read_bytes(path)
     bom = _BOM if raw.startswith(_BOM) else b""
-    schema = read_schema(raw.removeprefix(_BOM).decode("utf-8", "replace"), str(path))
+    schema = schema_of(raw, path)
     config = MotionConfig.from_dict(schema.motion, file=str(path))
     text = raw.removeprefix(_BOM).decode()
     document: dict[str, Any] = tomllib.loads(text)
@@ -54,7 +54,7 @@ def weights_change(
     if tomllib.loads(text) != expected:
         problem = "the weights cannot be changed without changing more of the file."
         raise SchemaError(Fault(problem, "channels in a list, or as [[features.NAME.channels]]", place=Place(str(path))))
-    MotionConfig.from_dict(read_schema(text, str(path)).motion, file=str(path))
+    MotionConfig.from_dict(schema_of(text.encode(), path).motion, file=str(path))
     return SchemaChange(path, bom + text.encode(), raw)
 
 

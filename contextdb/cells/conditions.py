@@ -30,6 +30,8 @@ class Condition:
 
     weight: float = 1.0
     """What a cell of this condition counts under the policy "specific"."""
+    owner: str = ""
+    """Who answers for it."""
     hysteresis: float = 0.0
     """How far beyond the edges of its cells a row that plays stays valid. See `contextdb.cells.hysteresis`."""
 

@@ -26,9 +26,8 @@ from contextdb.edits.diffing import Diff, diff
 from contextdb.errors import Fault, Place, TableError, in_quotes
 from contextdb.findings import Finding
 from contextdb.tables.nesting.flat import FlatTable
-from contextdb.tables.nesting.links import is_nested
 from contextdb.tables.nesting.plain import as_plain
-from contextdb.tables.table import EitherTable
+from contextdb.tables.table import EitherTable, has_others
 
 WORK = 1_000_000
 """Steps for each question about a whole table."""
@@ -154,7 +153,7 @@ def effects(
     Raises TableError where cells cannot be read, or a column is of another type before than after; ExpressionError where an
     assumption of the table cannot be read.
     """
-    if is_nested(before) or is_nested(after):
+    if has_others(before) or has_others(after):
         before, after, changes = _flat(before), _flat(after), None
     changes = changes if changes is not None else diff(before, after)
     before, after = without_rules(before).table, without_rules(after).table
@@ -215,7 +214,7 @@ def _flat(table: EitherTable) -> EitherTable:
     """A table with the rows of its inner tables, by what they say together."""
     flat = table.flat()
     if not isinstance(flat, FlatTable):
-        return table
+        return flat
     plain = as_plain(flat)
     if plain is None:
         problem = f"tags of {in_quotes(table.name)} and of a table inside it have requirements that no single cell can describe."

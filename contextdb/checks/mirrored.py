@@ -20,12 +20,11 @@ from contextdb.files.toml_text import as_toml
 from contextdb.findings import Finding
 from contextdb.schema.settings import derivation_of
 from contextdb.tables.condition_column import ConditionColumn
-from contextdb.tables.data import known_conditions
+from contextdb.tables.data import TableData, known_conditions
 from contextdb.tables.nesting.links import reached
-from contextdb.tables.table import Table
 
 
-def check_mirroring(table: Table) -> Iterator[Finding]:
+def check_mirroring(table: TableData) -> Iterator[Finding]:
     """What is to be said of one table."""
     conditions = _queried(table)
     for condition in conditions.values():
@@ -52,7 +51,7 @@ def check_mirroring(table: Table) -> Iterator[Finding]:
             yield Finding("undeclared-mirror", "info", message, table.name, _file(table), column=condition.name)
 
 
-def _queried(table: Table) -> dict[str, Condition]:
+def _queried(table: TableData) -> dict[str, Condition]:
     """The conditions whose facts the table is queried with: its columns, those of rules, and the inputs of derived ones."""
     conditions = {c.condition.name: c.condition for c in table.conditions}
     if table.when is not None:
@@ -62,7 +61,7 @@ def _queried(table: Table) -> dict[str, Condition]:
     return conditions | {c.name: c for c in (derivation.inputs if derivation is not None else ())}
 
 
-def _mirroring_databases(table: Table) -> list[str]:
+def _mirroring_databases(table: TableData) -> list[str]:
     """The databases that play assets of the table mirrored: its own, and those of tables that it is in."""
     around = table.around or {}
     names = []
@@ -115,5 +114,5 @@ def _uneven(condition: Condition) -> str:
     return f'mirror = "negate", with {low} and {high}: the mirrored facts are outside the bounds.'
 
 
-def _file(table: Table) -> str | None:
+def _file(table: TableData) -> str | None:
     return str(table.path) if table.path else None

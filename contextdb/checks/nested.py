@@ -13,13 +13,26 @@ import numpy as np
 from contextdb.errors import ContextDBError, in_quotes, plural
 from contextdb.findings import Finding
 from contextdb.tables.alike import finding_at
+from contextdb.tables.data import TableData
 from contextdb.tables.nesting.flat import FlatTable
 from contextdb.tables.nesting.flat_columns import FlatColumn
 from contextdb.tables.nesting.links import inner_rows, is_nested, require_sound
-from contextdb.tables.table import Table
+from contextdb.tables.table import flat_of
+from contextdb.tables.variants import WholeTable
 
 
-def check_nesting(table: Table) -> Iterator[Finding]:
+def new_findings(whole: TableData, findings: Iterable[Finding]) -> Iterator[Finding]:
+    """The findings of all rows of a table; of a variant those that its base does not have."""
+    if not isinstance(whole, WholeTable):
+        yield from findings
+        return
+    for finding in findings:
+        rows = () if finding.row is None else (finding.row, *finding.by)
+        if not rows or not all(whole.is_inherited(row, finding.column) for row in rows):
+            yield finding
+
+
+def check_nesting(table: TableData) -> Iterator[Finding]:
     """What is wrong with the rows of a readable table that refer to others; nothing where no others are known."""
     if not is_nested(table) or table.around is None or table.faults:
         return
@@ -28,7 +41,7 @@ def check_nesting(table: Table) -> Iterator[Finding]:
     if unusable:
         return
     try:
-        flat = table.flat()
+        flat = flat_of(table, table.around)
     except ContextDBError as error:
         yield from (Finding.of(fault, "error", table.name) for fault in error.faults)
         return
@@ -36,7 +49,7 @@ def check_nesting(table: Table) -> Iterator[Finding]:
         yield from own_findings(flat, _shut_out(flat))
 
 
-def _unusable(table: Table) -> Iterator[Finding]:
+def _unusable(table: TableData) -> Iterator[Finding]:
     """A finding for each inner table that has faults, which are reported there."""
     for name, rows in inner_rows(table).items():
         try:

@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
-from contextdb.checks.nested import outer_findings, own_findings
+from contextdb.checks.nested import new_findings, outer_findings, own_findings
 from contextdb.checks.run import capped
 from contextdb.covering.assumed import assumptions_of, opened
 from contextdb.covering.engine import finding_steps
@@ -26,8 +26,10 @@ from contextdb.expressions import ExpressionError, names_in
 from contextdb.findings import Finding
 from contextdb.schema.settings import Schema
 from contextdb.schema.toml_lines import Path
+from contextdb.tables.data import TableData
 from contextdb.tables.nesting.flat import FlatTable
 from contextdb.tables.table import EitherTable
+from contextdb.tables.variants import whole_of
 
 WORK = 4_000_000
 """A tenth of what coverage may spend."""
@@ -45,18 +47,21 @@ def check_rows(
     if table.faults:
         return []
     try:
-        contradictions = assumptions_of(table).contradictions
+        whole = whole_of(table, table.around)
+    except ContextDBError:  # of the base: reported there
+        return []
+    try:
+        contradictions = assumptions_of(whole).contradictions
     except ExpressionError as error:
         return [_of_schema(table, "bad-assumption", fault.message) for fault in error.faults]
     if contradictions:
         return [_of_schema(table, "no-context", f"no context is possible: {fault.message}") for fault in contradictions]
-    findings = capped([*_always_any(table), *_judged(table, work, Progress(progress, should_stop))])
+    judged = _judged(table, work, Progress(progress, should_stop)) if whole.n_rows else []
+    findings = capped([*_always_any(whole), *new_findings(whole, judged)])
     return sorted(findings, key=lambda f: (f.row is not None, f.row or 0))
 
 
 def _judged(table: EitherTable, work: int, progress: Progress) -> list[Finding]:
-    if table.n_rows == 0:
-        return []
     try:
         ready = opened(table, is_cut=True)
     except ContextDBError:  # such as a domain without a value: reported for the cells already
@@ -82,7 +87,7 @@ def _undecided(table: EitherTable, n_undecided: int, n_rows: int) -> Finding:
     return Finding("undecided-rows", "info", message, table.name, file)
 
 
-def _always_any(table: EitherTable) -> Iterator[Finding]:
+def _always_any(table: TableData) -> Iterator[Finding]:
     if not table.enabled.any():
         return
     file = str(table.path) if table.path else None
@@ -113,7 +118,7 @@ def unused_conditions(schema: Schema, tables: Iterable[EitherTable], lines: Mapp
     return [
         Finding("unused-condition", "info", message, None, schema.file, line=lines.get(("conditions", name)), column=name)
         for name in schema.conditions
-        if name not in used
+        if name not in used and ("conditions", name) not in schema.shared
     ]
 
 

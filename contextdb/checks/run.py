@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from typing import cast
@@ -14,8 +15,8 @@ from contextdb import bitmask
 from contextdb.cells.domains import Domain
 from contextdb.cells.sets import Cell, NumberSet
 from contextdb.checks.mirrored import check_mirroring
-from contextdb.checks.nested import check_nesting
-from contextdb.errors import in_quotes, nearest
+from contextdb.checks.nested import check_nesting, new_findings
+from contextdb.errors import ContextDBError, in_quotes, nearest
 from contextdb.expressions import constant_truth
 from contextdb.expressions.rules import WhenRules
 from contextdb.files.csv_source import Source
@@ -24,8 +25,10 @@ from contextdb.schema.policies import lets_choose
 from contextdb.schema.table_settings import missing_job
 from contextdb.tables.alike import finding_at, identical_rows, named, where
 from contextdb.tables.condition_column import ConditionColumn
+from contextdb.tables.data import TableData
 from contextdb.tables.nesting.names import inner_name
 from contextdb.tables.table import Table
+from contextdb.tables.variants import whole_of
 from contextdb.tables.variety import gathered
 
 LINE_ENDS = {"\n": "LF", "\r\n": "CRLF", "\r": "CR"}
@@ -35,8 +38,12 @@ MOST_ROWS = 1000
 
 def check(table: Table) -> list[Finding]:
     """Every finding of a table, in the order of its rows, those of the whole table first."""
-    rules = (_whole_table, _unreadable, _cells, _constant_rules, _assets, _identical, check_nesting, check_mirroring)
-    findings = capped(finding for rule in rules for finding in rule(table))
+    findings = [*_whole_table(table), *_unreadable(table)]
+    with suppress(ContextDBError):  # of a base that cannot be used, which is among what cannot be read
+        whole = whole_of(table, table.around)
+        rules = (_undeclared_conditions, _cells, _constant_rules, _assets, _identical, check_nesting, check_mirroring)
+        findings += new_findings(whole, (finding for rule in rules for finding in rule(whole)))
+    findings = list(capped(findings))
     return sorted(findings, key=lambda f: (f.row is not None, f.row or 0))
 
 
@@ -55,7 +62,7 @@ def capped(findings: Iterable[Finding]) -> Iterator[Finding]:
         yield replace(finding, message=f"{finding.message} ({counts[kind] - MOST_ROWS:,} rows like this one are not listed.)")
 
 
-def _whole_table(table: Table) -> Iterator[Finding]:
+def _whole_table(table: TableData) -> Iterator[Finding]:
     file = str(table.path) if table.path else None
     if table.n_rows == 0:
         yield Finding("no-rows", "warning", "the table has no rows, so no context has an asset.", table.name, file)
@@ -63,6 +70,10 @@ def _whole_table(table: Table) -> Iterator[Finding]:
         ends = ", ".join(f"{n:,} in {LINE_ENDS[end]}" for end, n in table.source.line_ends.items())
         message = f"the lines end in different ways: {ends}; they are kept as they are."
         yield Finding("mixed-line-ends", "info", message, table.name, file)
+
+
+def _undeclared_conditions(table: TableData) -> Iterator[Finding]:
+    file = str(table.path) if table.path else None
     present = {c.name for c in table.columns}
     absent = [name for name in table.schema.conditions if name not in present]
     for column in table.conditions:
@@ -70,7 +81,7 @@ def _whole_table(table: Table) -> Iterator[Finding]:
             yield _undeclared(table, column, file, absent)
 
 
-def _undeclared(table: Table, column: ConditionColumn, file: str | None, absent: Sequence[str]) -> Finding:
+def _undeclared(table: TableData, column: ConditionColumn, file: str | None, absent: Sequence[str]) -> Finding:
     name, kind = column.condition.name, column.condition.domain.kind
     near = nearest(name, absent)
     meant = missing_job(name, vars(table.settings)) or (in_quotes(near) if near else "")
@@ -80,13 +91,13 @@ def _undeclared(table: Table, column: ConditionColumn, file: str | None, absent:
     return Finding("undeclared-condition", level, message, table.name, file, column=name)
 
 
-def _unreadable(table: Table) -> Iterator[Finding]:
+def _unreadable(table: TableData) -> Iterator[Finding]:
     for fault in table.faults:
         row = fault.place.row
         yield Finding.of(fault, "error", table.name, None if row is None else table.assets[row])
 
 
-def _cells(table: Table) -> Iterator[Finding]:
+def _cells(table: TableData) -> Iterator[Finding]:
     for column in table.conditions:
         texts: dict[int, tuple[str, Level, str]] = {}
         for i, cell in enumerate(column.cells):
@@ -124,7 +135,7 @@ def _declared(domain: Domain) -> str:
     return f"the declared max {high}" if np.isinf(domain.minimum) else f"the declared {low} to {high}"
 
 
-def _constant_rules(table: Table) -> Iterator[Finding]:
+def _constant_rules(table: TableData) -> Iterator[Finding]:
     """Rules that say the same of every context of the declared values and bounds."""
     when = WhenRules.of(table.when)
     for rule in when.rules if when is not None else ():
@@ -138,7 +149,7 @@ def _constant_rules(table: Table) -> Iterator[Finding]:
             yield finding_at(table, row, kind, cast(Level, level), message, table.settings.when)
 
 
-def _assets(table: Table) -> Iterator[Finding]:
+def _assets(table: TableData) -> Iterator[Finding]:
     rows_of: dict[str, list[int]] = defaultdict(list)
     for row, asset in enumerate(table.assets):
         rows_of[asset].append(row)
@@ -152,7 +163,7 @@ def _assets(table: Table) -> Iterator[Finding]:
                 yield finding_at(table, row, "duplicate-asset", "warning", message, table.asset_column, (rows[0],))
 
 
-def _identical(table: Table) -> Iterator[Finding]:
+def _identical(table: TableData) -> Iterator[Finding]:
     findings = list(identical_rows(table))
     if lets_choose([table.settings.policy]):
         findings = gathered(

@@ -37,6 +37,7 @@ from contextdb.report.results import CheckReport, TableSummary
 from contextdb.schema.settings import Schema
 from contextdb.schema.toml_lines import key_lines
 from contextdb.tables import project
+from contextdb.tables.expected_file import expected_path, read_situations
 from contextdb.tables.other_files import cases_path, notes_path
 from contextdb.tables.places import table_path
 from contextdb.tables.table import Table
@@ -167,7 +168,7 @@ def _check_files(files: Sequence[tuple[str | None, Path]], schema: Schema | None
         findings += check_rows(table, progress=tell)
         proofs += proofs_of(table, tell)
         findings += _check_cases(table, cases_path(path), bar or CaseBar())
-        findings += _check_notes(table, notes_path(path))
+        findings += [*_check_notes(table, notes_path(path)), *_check_expected(table)]
     if schema is not None:
         names = [name for name, _ in files if name is not None]
         proofs += strayed(schema, names, [name for name in names if name not in {table.name for table in read}])
@@ -189,6 +190,19 @@ def _check_cases(table: Table, path: Path, bar: CaseBar) -> list[Finding]:
         return [*check_cases(table, cases, str(path)), *bar.findings(table, cases, str(table.path) if table.path else None)]
     except ContextDBError as error:
         return _as_findings(error, table.name)
+
+
+def _check_expected(table: Table) -> list[Finding]:
+    """What is wrong in the file of the contexts that are expected of a table."""
+    if table.settings.expected is None or table.faults:
+        return []
+    try:
+        path = expected_path(table)
+        if path is not None:
+            read_situations(path, [column.condition for column in table.flat().conditions])
+    except ContextDBError as error:
+        return _as_findings(error, table.name)
+    return []
 
 
 def _check_notes(table: Table, path: Path) -> list[Finding]:

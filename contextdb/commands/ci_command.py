@@ -27,7 +27,7 @@ from contextdb.commands.git_tree import Commit
 from contextdb.commands.numbers import percent
 from contextdb.console import ExitCode, output, printable, terminal_width, wants_colour
 from contextdb.covering.baseline import ACCEPTED, Baseline, read_baseline
-from contextdb.disk import make_folder, remove, write_atomic
+from contextdb.disk import make_folder, real_path, remove, write_atomic
 from contextdb.disk.boundary import inside
 from contextdb.errors import ContextDBError, ContextError, Fault, in_quotes, plural, safe_text
 from contextdb.findings import LEVELS, Level
@@ -140,16 +140,17 @@ def _before(arguments: argparse.Namespace, folder: Path) -> Before:
 def _of_commit(arguments: argparse.Namespace, commit: Commit) -> Before:
     """The tables of a commit, measured as those of the folder are."""
     with TemporaryDirectory(prefix="contextdb-ci-") as temporary:
-        target = Path(temporary)
+        target, folder = real_path(temporary), None
         try:
-            if not commit.tables_into(target):
+            if (folder := commit.tables_into(target)) is None:
                 return Before(commit.name, missing=f"{commit.name} has no tables in this folder")
             plain = argparse.Namespace(**vars(arguments) | {"telemetry": None, "fail_under": None})
-            results = measured_results(plain, Tables.at(temporary), None, Accepted({}))
+            results = measured_results(plain, Tables.at(str(folder)), None, Accepted({}))
         except ContextDBError as error:
             first = error.faults[0]
             file = Path(first.place.file or "")
-            what = f"{file.relative_to(target).as_posix()}: " if file.is_relative_to(target) else ""
+            inner = next((one for one in (folder, target) if one is not None and file.is_relative_to(one)), None)
+            what = f"{file.relative_to(inner).as_posix()}: " if inner is not None else ""
             return Before(commit.name, missing=f"the tables of {commit.name} cannot be measured: {what}{first.found.rstrip('.')}")
         return Before(commit.name, read_baseline(render("json", results), commit.name))
 

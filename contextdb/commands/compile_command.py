@@ -2,7 +2,8 @@
 
 Prints the path of each written file. --stubs also writes the facts of these tables as Python types, for completion in editors and
 for type checkers. --c-header also writes one header for games in C or C++, which opens and queries the compiled files, and
---c-link a second one, by which such a game shows live what it asks.
+--c-link a second one, by which such a game shows live what it asks. --c-motion writes the header by which it plays the
+characters of a bundle, see `contextdb motion build --bundle`.
 
   contextdb compile tables/                  one compiled file next to each table
   contextdb compile tables/ -o build/        all of them into a folder
@@ -10,6 +11,7 @@ for type checkers. --c-header also writes one header for games in C or C++, whic
   contextdb compile tables/ -o build/ --stubs game/facts.py
   contextdb compile tables/ -o build/ --c-header game/tables.h
   contextdb compile tables/ -o build/ --c-header game/tables.h --c-link game/cdb_link.h
+  contextdb compile tables/ -o build/ --c-motion game/contextdb_motion.h
 """
 
 from __future__ import annotations
@@ -26,6 +28,7 @@ from contextdb.disk import make_folder, path_in_quotes, write_atomic
 from contextdb.disk.boundary import inside
 from contextdb.errors import ContextDBError, Fault, FileError, Place, plural
 from contextdb.files.tensors import SUFFIX
+from contextdb.motion.storage.c_header import c_motion_header
 from contextdb.tables.places import table_path
 from contextdb.tables.project import SCHEMA_FILE, Project, load_table
 from contextdb.tables.table import Table
@@ -45,6 +48,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--c-header", metavar="FILE", help="also write one C99 header that opens and queries the compiled files: a .h file"
     )
     parser.add_argument(
+        "--c-motion", metavar="FILE", help="also write a C99 header that plays characters of a motion bundle: a .h file"
+    )
+    parser.add_argument(
         "--c-link", metavar="FILE", help="with --c-header: also write a header that publishes what the game asks: a .h file"
     )
 
@@ -53,9 +59,10 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     """Compile one table or a folder of them; prints the path of each file."""
     stubs = None if arguments.stubs is None else _written_as(arguments.stubs, STUBS, "a Python file")
     header = None if arguments.c_header is None else _written_as(arguments.c_header, HEADERS, "a C header")
+    motion = None if arguments.c_motion is None else _written_as(arguments.c_motion, HEADERS, "a C header")
     link = _link_path(arguments)
     tables = _tables(arguments.path)
-    targets = [_target(table, arguments.out, len(tables)) for table in tables]
+    targets = [_target(table, arguments.out, len(tables), _is_folder(arguments.path)) for table in tables]
     _require_different(targets)
     header_text = None if header is None else c_header_of({t.name: t.compile() for t in tables}, f"CDB_{header.stem}_H")
     for table, target in progress(list(zip(tables, targets, strict=True)), "compiling"):
@@ -72,6 +79,8 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         _write(header, header_text)
         if link is not None:
             _write(link, _link_text(tables, header, link))
+    if motion is not None:
+        _write(motion, c_motion_header(c_header_of({}, "CDB_MOTION_READER_H")))
     return ExitCode.OK
 
 
@@ -112,7 +121,7 @@ def _written_as(text: str, suffixes: tuple[str, ...], what: str) -> Path:
 
 
 def _tables(text: str) -> list[Table]:
-    if os.path.isdir(text) or Path(text).name == SCHEMA_FILE:
+    if _is_folder(text):
         tables = list(Project.load(text).tables.values())
         if not tables:
             raise ContextDBError(Fault("the folder holds no table.", "a folder with .csv or .parquet files", place=Place(text)))
@@ -120,7 +129,12 @@ def _tables(text: str) -> list[Table]:
     return [load_table(table_path(text))]
 
 
-def _target(table: Table, out: str | None, n_tables: int) -> Path:
+def _is_folder(text: str) -> bool:
+    return os.path.isdir(text) or Path(text).name == SCHEMA_FILE
+
+
+def _target(table: Table, out: str | None, n_tables: int, is_folder: bool) -> Path:
+    """Where a table is written: what is compiled out of a folder goes into a folder, however many tables there are."""
     assert table.path is not None
     if out is None:
         return inside(table.path.with_suffix(SUFFIX), _home(table))
@@ -129,7 +143,7 @@ def _target(table: Table, out: str | None, n_tables: int) -> Path:
         raise FileError(Fault(f"{n_tables} tables do not go into one artefact.", "a folder", place=Place(out)))
     if is_artefact:
         return Path(out)
-    if n_tables > 1 or out.endswith(SEPARATORS) or os.path.isdir(out):
+    if is_folder or out.endswith(SEPARATORS) or os.path.isdir(out):
         is_file_name = PurePath(table.name).name == table.name and not any(c in table.name for c in SEPARATORS)
         return inside(Path(out) / f"{table.name if is_file_name else table.path.stem}{SUFFIX}", Path(out))
     mend = path_in_quotes(Path(out).with_suffix(SUFFIX))

@@ -84,7 +84,7 @@ def _answered(
 ) -> dict[Path, Answered]:
     """The answers to the contexts of each file, in the order of the files. Raises ContextDBError where a file cannot be read, holds
     facts that the table cannot use, or was not finished; then nothing is reported."""
-    from contextdb.telemetry.engines import with_dask
+    from contextdb.disk.engines import with_dask
     from contextdb.telemetry.evaluate_file import Question, evaluate_file
 
     question = Question(compiled, arguments.unknown, folder)
@@ -96,8 +96,8 @@ def _answered(
                 tell(len(answers) + share, len(files))
 
         here = ((path, evaluate_file(question, path, tell_share)) for path in files)
-        there = with_dask(evaluate_file, question, files, arguments.scheduler) if arguments.engine == "dask" else here
-        for path, answered in there:
+        there = ((files[i], each) for i, each in with_dask(evaluate_file, question, files, arguments.scheduler))
+        for path, answered in there if arguments.engine == "dask" else here:
             if answered.faults and arguments.engine == "local":
                 raise _by_option(answered.faults)
             answers[path] = answered

@@ -14,12 +14,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from contextdb.disk import TABLE_SUFFIXES, make_folder, real_path, write_atomic
+from contextdb.disk import TABLE_SUFFIXES, make_folder, read_bytes, real_path, write_atomic
 from contextdb.errors import ContextDBError, ContextError, Fault, FileError, Place, in_quotes, safe_text
 from contextdb.files.file_names import alike
+from contextdb.schema.settings import extends_of
 from contextdb.tables.other_files import cases_path
 from contextdb.tables.project import SCHEMA_FILE, read_folder_schema
 
+MOST_EXTENDED = 16
+"""So many projects extend each other in a row."""
 _POINTER = b"version https://git-lfs.github.com/spec/"
 _PLAIN_FILES = ("100644", "100755")
 
@@ -53,19 +56,39 @@ class Commit:
         """The commit in words."""
         return f"{safe_text(self.ref)} (commit {self.hash[:12]})"
 
-    def tables_into(self, target: Path) -> bool:
-        """Write the folder's tables, as they are in the commit, into an empty folder; whether it has any file there. Raises
-        ContextDBError where its contextdb.toml cannot be read, or git does not have a file."""
+    def tables_into(self, root: Path) -> Path | None:
+        """Write the folder's tables, as they are in the commit, into an empty folder, at their path in the repository, with what
+        their project extends; gives their folder, None where it has no file there. Raises ContextDBError where its contextdb.toml
+        cannot be read, or git does not have a file."""
         prefix = _git(self.folder, "rev-parse", "--show-prefix")[1].decode("utf-8", "surrogateescape").strip("\n")
+        target = root.joinpath(*PurePosixPath(prefix).parts)
         code, listed = _git(self.folder, "ls-tree", "-r", "-z", "--full-tree", f"{self.hash}:{prefix.rstrip('/')}")
         blobs = dict(_plain_files(listed)) if code == 0 else {}
+        make_folder(root / ".git")  # what is extended may climb to here
         if SCHEMA_FILE in blobs:
             self._write(blobs, [SCHEMA_FILE], target)
-        declared = {alike(file) for settings in read_folder_schema(target).tables.values() for file in settings.files}
-        declared |= {alike(cases_path(Path(file)).as_posix()) for file in declared}
+            self._write_extended(target / SCHEMA_FILE, root)
+        schema = read_folder_schema(target)
+        declared = {alike(file) for settings in schema.tables.values() for file in settings.files}
+        expected = {alike(settings.expected) for settings in schema.tables.values() if settings.expected is not None}
+        declared |= expected | {alike(cases_path(Path(file)).as_posix()) for file in declared}
         wanted = [name for name in blobs if _is_tabular(name) and ("/" not in name or alike(name) in declared)]
         self._write(blobs, wanted, target)
-        return bool(wanted)
+        return target if wanted else None
+
+    def _write_extended(self, schema: Path, root: Path) -> None:
+        """Write what a contextdb.toml extends, as it is in the commit; what the commit does not have is missed by whoever reads."""
+        for _ in range(MOST_EXTENDED):
+            extends = extends_of(read_bytes(schema).decode("utf-8", "replace"), str(schema))
+            schema = Path(os.path.normpath(schema.parent / (extends or ".")))
+            if extends is None or not schema.is_relative_to(root) or schema.exists():
+                return
+            name = schema.relative_to(root).as_posix()
+            code, listed = _git(self.folder, "ls-tree", "-z", "--full-tree", self.hash, name)
+            blobs = dict(_plain_files(listed)) if code == 0 else {}
+            if name not in blobs:
+                return
+            self._write(blobs, [name], root)
 
     def _write(self, blobs: dict[str, str], names: list[str], target: Path) -> None:
         if not names:

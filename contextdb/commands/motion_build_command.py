@@ -8,6 +8,11 @@ The features of each clip are cached in .contextdb-cache, so the next build comp
   contextdb motion build tables/ --keep-going            without faulty clips and databases
   contextdb motion build tables/ --poses                 and their poses, for what plays them
   contextdb motion build tables/ --watch                 and again whenever a clip is saved
+  contextdb motion build tables/ --bundle game.motion    and one file with all that a game in C needs
+  contextdb motion build tables/ --engine dask --scheduler tcp://10.0.0.5:8786
+
+More than 64 clips are computed on all cores; with --engine dask on workers, which see the files under the same paths. The databases
+are the same, byte for byte. After a build that was killed, the next one computes only clips that are not in the cache yet.
 
 If a clip cannot be read, nothing is saved, all faults are reported, and the exit code is 2. With --keep-going such clips are left
 out and reported, and the exit code is 1. Clips that only look wrong, such as a body of 170 m, give warnings.
@@ -22,10 +27,13 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
+from contextdb.commands.engine_options import add_engine_arguments, engines_of
+from contextdb.commands.motion_bundle import bundle_path, write_bundle
 from contextdb.commands.progress import building_bar
 from contextdb.commands.watched_work import watched
 from contextdb.console import ExitCode, aligned, note, output
 from contextdb.disk import make_folder
+from contextdb.disk.engines import Engines
 from contextdb.errors import ContextDBError, Fault, FileError, Place, plural, some
 from contextdb.files.tensors import other_layout
 from contextdb.motion.clips.doubts import grouped
@@ -37,7 +45,7 @@ from contextdb.motion.storage.config import MotionConfig
 from contextdb.motion.storage.pose_files import poses_alone, poses_path, save_poses
 from contextdb.motion.storage.stored import STORED, save_database
 from contextdb.tables.project import SCHEMA_FILE, Project
-from contextdb.tables.table import leaf_assets
+from contextdb.tables.table import Table, leaf_assets
 
 HEADER = ("database", "assets", "clips", "frames", "features", "MB", "computed", "cached", "file")
 
@@ -50,10 +58,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--keep-going", action="store_true", help="leave out faulty clips and databases, build the rest, and exit with 1"
     )
     parser.add_argument("--poses", action="store_true", help="save the poses of the clips too; not with --keep-going")
+    parser.add_argument(
+        "--bundle",
+        metavar="FILE",
+        help="also write all databases, poses, controllers and tables as one file for games: a .motion file; not with --keep-going",
+    )
     parser.add_argument("--no-cache", action="store_true", help="compute every clip, and cache nothing")
     parser.add_argument(
         "--watch", action="store_true", help="build again whenever a clip, a table, markup or contextdb.toml is saved"
     )
+    add_engine_arguments(parser)
     parser.add_argument("--json", action="store_true", help="print a JSON document instead of a table")
 
 
@@ -67,7 +81,8 @@ def _build(arguments: argparse.Namespace) -> ExitCode:
     targets = project.targets(arguments.out, arguments.database)
     if arguments.poses and arguments.keep_going:
         raise ContextDBError(Fault("--poses takes the poses of all clips, --keep-going leaves faulty ones out.", "one of the two"))
-    left_out = LeftOut()
+    bundle = None if arguments.bundle is None else bundle_path(arguments.bundle, arguments.keep_going or arguments.database)
+    left_out, engines = LeftOut(), engines_of(arguments)
     with building_bar() as progress:
         built = building.build_all(
             project.config,
@@ -77,6 +92,7 @@ def _build(arguments: argparse.Namespace) -> ExitCode:
             names=arguments.database,
             cache=None if arguments.no_cache else building.CACHE_FOLDER,
             tolerates=left_out.take if arguments.keep_going else None,
+            engines=engines,
         )
     targets = {name: target for name, target in targets.items() if name in built}
     replaced = [sentence for target in targets.values() for sentence in _replaced(target)]
@@ -84,7 +100,9 @@ def _build(arguments: argparse.Namespace) -> ExitCode:
         make_folder(target.parent)
         save_database(built[name].database, target, inputs=built[name].digest)
     if arguments.poses:
-        _save_poses(project, built, targets)
+        _save_poses(project, built, targets, engines)
+    if bundle is not None:
+        write_bundle(bundle, project.tables, project.config, {name: each.database for name, each in built.items()}, project.folder)
     warn([*replaced, *project.warnings(built)])
     with output():
         if arguments.json:
@@ -104,9 +122,9 @@ def _replaced(target: Path) -> Iterator[str]:
         yield f"{target} was of layout {layout} and is replaced by one of layout {STORED.layout}."
 
 
-def _save_poses(project: MotionProject, built: Mapping[str, Built], targets: Mapping[str, Path]) -> None:
+def _save_poses(project: MotionProject, built: Mapping[str, Built], targets: Mapping[str, Path], engines: Engines) -> None:
     """Save the poses of some databases next to them."""
-    banks = poses_alone(project.config, project.folder, project.assets, names=list(targets))
+    banks = poses_alone(project.config, project.folder, project.assets, names=list(targets), engines=engines)
     for name, bank in banks.items():
         save_poses(bank, poses_path(targets[name].parent, name), inputs=built[name].digest)
 
@@ -148,6 +166,7 @@ class MotionProject:
     folder: Path
     config: MotionConfig
     assets: Mapping[str, list[str]]
+    tables: Mapping[str, Table]
 
     @classmethod
     def load(cls, path: str) -> MotionProject:
@@ -158,7 +177,7 @@ class MotionProject:
             place = Place(str(project.folder / SCHEMA_FILE))
             accepted = 'a section such as [databases.jog] with features and clips = "clips/*.bvh"'
             raise ContextDBError(Fault("no motion database is declared.", accepted, place=place))
-        return cls(project.folder, config, {name: leaf_assets(table) for name, table in project.tables.items()})
+        return cls(project.folder, config, {name: leaf_assets(table) for name, table in project.tables.items()}, project.tables)
 
     def targets(self, out: str | None, names: list[str] | None) -> dict[str, Path]:
         """Where the databases of some names, or all, are saved."""

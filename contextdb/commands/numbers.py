@@ -20,10 +20,10 @@ def number_of(text: str) -> float | None:
 
 def percent(text: str) -> float:
     """A percentage as a share."""
-    percent = number_of(text.removesuffix("%"))
-    if percent is None or not 0.0 <= percent <= 100.0:
+    number = number_of(text.removesuffix("%"))
+    if number is None or not 0.0 <= number <= 100.0:
         raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a percentage. Accepted: a number from 0 to 100.")
-    return percent / 100.0
+    return number / 100.0
 
 
 def number_type(is_not: str, least: float = 0.0, most: float = math.inf) -> Callable[[str], float]:

@@ -167,7 +167,7 @@ class Explanation:
         return self.matches.bits & ~self.decided(always)
 
     def decided(self, always: int) -> int:
-        """Of rows whose cells match for every value, as bits, those whose rule does too, and is not open."""
+        """Of rows whose cells match for every value, as bits, those whose rule does too, and is not open. Never fails."""
         when = self.compiled.when
         return always if when is None else when.left_with_care(always, always, self.facts, "never")[1]
 
@@ -206,7 +206,7 @@ class Explanation:
         return bitmask.unpack(self.compiled.enabled, self.compiled.n_rows)
 
     def failing(self, rows: Rows) -> NDArray[np.bool_]:
-        """Which cells of some rows fail: bool [rows, conditions], the conditions in the order of the table."""
+        """Which cells of some rows fail: bool [rows, conditions], the conditions in the order of the table. Never fails."""
         words, shifts = self.accepted[:, rows >> 6], (rows & 63).astype(np.uint64)
         fails: NDArray[np.bool_] = ((words >> shifts) & np.uint64(1) == 0).T
         return fails

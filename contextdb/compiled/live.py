@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import NAMES, Unknown, alike, as_context, no_condition, read_fact, require_names
-from contextdb.cells.notebook import one_line
+from contextdb.cells.notebook import as_html, one_line
 from contextdb.compiled.casting.explaining import explain_with_actors
 from contextdb.compiled.casting.facts import Actors, Ask, Prefer
 from contextdb.compiled.casting.live import LiveActors
@@ -28,7 +28,7 @@ from contextdb.errors import Fault, NoSuchFact, in_quotes, plural, some
 
 
 class LiveContext(Live, MutableMapping[Any, Any]):
-    """Facts kept between queries. `live["speed"] = 3.2` sets one, `del live["speed"]` makes it missing, `live.matches()` answers.
+    """Facts kept between queries. `live["speed"] = 3.2` sets one, `del live["speed"]` makes it missing, `live.query()` answers.
 
     A mapping of the facts that are set; a name that is not among them raises NoSuchFact, which is also a KeyError. `copy()` gives a
     context of its own. A live context is equal only to itself.
@@ -173,7 +173,7 @@ class LiveContext(Live, MutableMapping[Any, Any]):
         """Offer actors for roles from now on, as `query` accepts them; None withdraws them. They are read at the next query.
 
         The mappings are kept, not copied: what the game changes in them counts in the next query. While they do not change, they
-        are not read again. What is wrong with them is raised by `matches()`.
+        are not read again. What is wrong with them is raised by `query()`.
         """
         self._cast = None if actors is None else LiveActors(self._compiled, Ask(actors, prefer, self._unknown))
         self._lead()
@@ -190,8 +190,14 @@ class LiveContext(Live, MutableMapping[Any, Any]):
 
     if TYPE_CHECKING:  # the core has it
 
-        def matches(self) -> Matches:
+        def query(self) -> Matches:
             """The valid rows now."""
+
+        def matches(self) -> Matches:
+            """The same, by its older name."""
+
+    else:
+        query = Live.matches
 
     def _matches(self) -> Matches:
         """The same where the core alone cannot answer."""
@@ -217,6 +223,11 @@ class LiveContext(Live, MutableMapping[Any, Any]):
         if self._cast is not None:
             return explain_with_actors(self._compiled, self.facts, self._cast.ask)
         return explain(self._compiled, self.facts, self._unknown)
+
+    def _repr_html_(self) -> str:
+        """A notebook's table of the facts."""
+        rows = [(name, "" if value is None else value) for name, value in self.facts.items()]
+        return as_html(repr(self), ("fact", "value"), rows, len(rows))
 
     def __repr__(self) -> str:
         return one_line("LiveContext", self._compiled.name, f"{len(self)} of {plural(len(self._known), 'fact')} set")

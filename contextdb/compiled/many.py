@@ -9,7 +9,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
+from itertools import islice, pairwise
 from operator import and_, or_, xor
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from contextdb import bitmask
 from contextdb.bitmask import Rows, Words, read_only
 from contextdb.cells.arguments import require_place
-from contextdb.cells.notebook import one_line
+from contextdb.cells.notebook import MOST_COLUMNS, MOST_ROWS, as_html, one_line
 from contextdb.cells.sequences import Made
 from contextdb.columns import Framed
 from contextdb.compiled.answered_table import SaidRows
@@ -221,6 +221,12 @@ class ManyMatches(Framed, Unchanging, Made[Matches]):
 
     def __iter__(self) -> Iterator[Matches]:
         return (self._answer(context) for context in range(len(self)))
+
+    def _repr_html_(self) -> str:
+        """A notebook's table of the first contexts, each with its valid rows."""
+        assets = (", ".join(self._answer(context)[:MOST_COLUMNS]) for context in range(len(self)))
+        rows = ((context, count, named) for context, (count, named) in enumerate(zip(self.counts.tolist(), assets, strict=True)))
+        return as_html(repr(self), ("context", "rows", "assets"), islice(rows, MOST_ROWS), len(self))
 
     def __repr__(self) -> str:
         return one_line("ManyMatches", self.compiled.name, f"{plural(len(self), 'context')} x {plural(self.n_rows, 'row')}")

@@ -82,7 +82,7 @@ def _live(table: str, facts: Mapping[str, str], name_of: NameOf, some: str, acto
     lines.append(f"    def update(self, facts: {some}, /) -> None: ...")
     if actors:
         lines.append(f"    def actors(self, actors: {actors} | None, *, prefer: cdb.Prefer = None) -> None: ...")
-    lines.append("    def matches(self) -> cdb.Matches: ...")
+    lines += [f"    def {name_of_query}(self) -> cdb.Matches: ..." for name_of_query in ("query", "matches")]
     lines.append("    def explain(self) -> cdb.Explanation: ...")
     lines.append("    def pick(self, rng: cdb.Rng | int | None = None, last: str | None = None) -> str | None: ...")
     lines.append(f"    def copy(self) -> {name}: ...")

@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Never, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from contextdb.cells.arguments import require_path
 from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import Context, Unknown, check_mode, require_context
+from contextdb.cells.notebook import as_html
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.matches import Matches
 from contextdb.compiled.memory import Rng
@@ -24,7 +26,7 @@ from contextdb.compiled.outputs import Outputs
 from contextdb.compiled.pick import pick
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.compiled.ways import Step
-from contextdb.errors import ContextError, Fault, WrongType
+from contextdb.errors import ContextError, Fault, WrongType, in_quotes
 from contextdb.schema.policies import Policy
 
 if TYPE_CHECKING:
@@ -33,10 +35,13 @@ if TYPE_CHECKING:
     from contextdb.compiled.casting.facts import Actors, Prefer
     from contextdb.compiled.explain import Explanation
     from contextdb.compiled.live import LiveContext
+    from contextdb.compiled.live_many import LiveMany
     from contextdb.compiled.many import ManyMatches
     from contextdb.compiled.picker import Picker
 
     ManyContexts = Mapping[str, Sequence[object] | NDArray[Any]] | pl.DataFrame
+
+NO_FACTS: Context = MappingProxyType({})
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -50,6 +55,11 @@ class CompiledTable(Unchanging):
 
     def __repr__(self) -> str:
         return self._data.described(type(self).__name__)
+
+    def _repr_html_(self) -> str:
+        """A notebook's table of the conditions."""
+        rows = [(c.name, c.domain.kind, c.unit, c.description) for c in self.asked.values()]
+        return as_html(repr(self), ("condition", "type", "unit", "description"), rows)
 
     @property
     def name(self) -> str:
@@ -123,7 +133,13 @@ class CompiledTable(Unchanging):
         return self._data.way(row)
 
     def query(
-        self, context: Context, *, unknown: Unknown = "error", actors: Actors | None = None, prefer: Prefer = None
+        self,
+        context: Context = NO_FACTS,
+        *,
+        unknown: Unknown = "error",
+        actors: Actors | None = None,
+        prefer: Prefer = None,
+        **slips: Never,
     ) -> Matches:
         """Find the rows whose cells all accept their facts, and whose roles can be filled.
 
@@ -153,6 +169,8 @@ class CompiledTable(Unchanging):
         With set-valued facts the answer holds the rows that may match; `Matches.always` those that match for every value.
         """
         data = self._data
+        if slips:
+            raise _facts_by_name("query", slips)
         if actors is not None:
             from contextdb.compiled.casting.facts import Ask
             from contextdb.compiled.casting.stage import query_with_actors
@@ -211,17 +229,28 @@ class CompiledTable(Unchanging):
         unknown: Unknown = "error",
         actors: Actors | None = None,
         prefer: Prefer = None,
+        **slips: Never,
     ) -> LiveContext:
-        """Keep a context between frames: `live["speed"] = 3.2`, then `live.matches()`. Actors are offered from then on, as with
+        """Keep a context between frames: `live["speed"] = 3.2`, then `live.query()`. Actors are offered from then on, as with
         `LiveContext.actors`. Raises ContextError where a fact cannot be used, or its name looks misspelt. Facts may be missing
-        until `matches()` is called."""
+        until `query()` is called."""
         from contextdb.compiled.live import LiveContext
 
+        if slips:
+            raise _facts_by_name("live", slips)
         check_mode(unknown)
         live = LiveContext(self._data, unknown)
         live.update({} if facts is None else facts)
         live.actors(actors, prefer=prefer)
         return live
+
+    def live_many(self, facts: ManyContexts, *, unknown: Unknown = "error") -> LiveMany:
+        """Keep the facts of many characters: `crowd["speed"] = speeds`, then `crowd.query()`. The columns are as in `query_many`,
+        one fact for each character; those that change are set whole or by character. Raises ContextError where a fact cannot be
+        used, or a name looks misspelt."""
+        from contextdb.compiled.live_many import LiveMany
+
+        return LiveMany(self._data, facts, unknown)
 
     def prepare(self, casting: bool = False, batches: bool = False) -> None:
         """Do the work of the first queries now, while the game loads; answers stay the same, and nothing is raised: it asks without
@@ -326,6 +355,14 @@ class CompiledTable(Unchanging):
         from contextdb.compiled.artefact import open_artefact
 
         return cls(open_artefact(require_path(path)))
+
+
+def _facts_by_name(method: str, slips: Mapping[str, object]) -> WrongType:
+    """The error for facts that are given as arguments by name."""
+    first = next(iter(slips))
+    problem = f"{method} is given {in_quotes(first)} as an argument."
+    accepted = "the facts as one mapping"
+    return WrongType(Fault(problem, accepted, f"{method}({{{in_quotes(first)}: ...}})"))
 
 
 def data_of(table: CompiledTable) -> CompiledData:

@@ -28,8 +28,10 @@ try:
         Poses,
         Shared,
         Table,
+        Ways,
         bend_legs,
         count_holders,
+        direction_of,
         feel_ground,
         fill_ranges,
         group_keys,
@@ -41,6 +43,7 @@ try:
         place_joints,
         pose_columns,
         read_column,
+        return_path,
         search_joint,
         stand_legs,
         steer_paths,
@@ -68,8 +71,10 @@ __all__ = [
     "Poses",
     "Shared",
     "Table",
+    "Ways",
     "bend_legs",
     "count_holders",
+    "direction_of",
     "feel_ground",
     "fill_ranges",
     "group_keys",
@@ -77,11 +82,13 @@ __all__ = [
     "header_text",
     "list_rows",
     "lower_hips",
+    "motion_text",
     "move_bodies",
     "pack_codes",
     "place_joints",
     "pose_columns",
     "read_column",
+    "return_path",
     "search_joint",
     "stand_legs",
     "steer_paths",
@@ -97,8 +104,26 @@ VALUE, FLAT, WIDE, SLOTS = 1, 2, 3, 4
 @cache
 def header_text() -> str:
     """The parts of the core in their order, C99 and C++11, as the header for games has them."""
+    return _parts_of("core.h")
+
+
+@cache
+def motion_text() -> str:
+    """The parts for motion, behind those of `header_text`."""
+    return "".join(_parts_of(name) for name in ("poses.h", "motion.h", "motion_game.h"))
+
+
+def _parts_of(name: str) -> str:
+    """The text of the parts that a file includes, with what else of it is no comment before the first part."""
     from importlib.resources import files
 
     folder = files("contextdb.core")
-    parts = re.findall(r'^#include "(\w+\.h)"$', folder.joinpath("core.h").read_text(encoding="ascii"), re.M)
-    return "".join(folder.joinpath(part).read_text(encoding="ascii") for part in parts)
+    lines = folder.joinpath(name).read_text(encoding="ascii")
+    text, is_begun = "", name == "core.h"
+    for line in lines[lines.index("*/") + 3 :].splitlines(keepends=True):
+        part = re.match(r'#include "(\w+\.h)"$', line.rstrip())
+        if part:
+            text += folder.joinpath(part[1]).read_text(encoding="ascii")
+        elif not (is_begun and line.isspace()):
+            text += line
+    return text

@@ -118,6 +118,14 @@ class Boxes:
         """Write to `holders` for each chosen box the place of the first that holds it whole and is not like it, else -1; `alike`
         names the first box like each. `look` gets the number of boxes that are done."""
 
+def direction_of(x: float, z: float, heading: float, /) -> float:
+    """Where a stick points against the way a body faces, degrees."""
+
+def return_path(
+    place: NDArray[np.float64], rate: float, halflife_s: float, positions: NDArray[np.float64], headings: NDArray[np.float64], /
+) -> bool:
+    """Let a path, which is written, begin at a place and come back to itself; gives whether that changes it."""
+
 def count_holders(
     codes: NDArray[np.int32],
     starts: NDArray[np.int64],
@@ -172,6 +180,46 @@ class PoseFrames:
     ) -> None:
         """Write how much the joint that accelerates most does so in each frame of a range, over steps of some frames."""
 
+class Ways:
+    """How far the paths of characters are looked at; see walk.h. Raises ValueError where a feature is not there."""
+
+    def __init__(
+        self, steps: NDArray[np.float64], features: NDArray[np.int64], velocities: NDArray[np.int64], n_features: int, rate: float
+    ) -> None: ...
+    @property
+    def width(self) -> int: ...
+    def move(
+        self,
+        before: NDArray[np.float64],
+        goals: NDArray[np.float64],
+        bodies: NDArray[np.float64] | None,
+        dt_s: float,
+        after: NDArray[np.float64],
+        places: NDArray[np.float64],
+        /,
+    ) -> None:
+        """Write walks as they are some time later, and where their animations are; a body that is NaN follows its goal."""
+    def n_frames(self, walks: NDArray[np.float64], goals: NDArray[np.float64], /) -> int:
+        """How many frames the longest of their paths has."""
+    def n_behind(self, rate: float, /) -> int:
+        """How many frames of a path lie behind now."""
+    def ask(
+        self,
+        walks: NDArray[np.float64],
+        goals: NDArray[np.float64] | None,
+        rate: float,
+        poses: NDArray[np.float64],
+        positions: NDArray[np.float64],
+        headings: NDArray[np.float64],
+        queries: NDArray[np.float64],
+        /,
+    ) -> None:
+        """Write the paths that are wished for, and queries; without goals the frames from now on are there."""
+    def rest(self, walks: NDArray[np.float64], mean: NDArray[np.float64], poses: NDArray[np.float64], /) -> None:
+        """Write the poses of characters that play nothing."""
+    def settle(self, walks: NDArray[np.float64], roots: NDArray[np.float64], moves_body: int, /) -> None:
+        """Put walks where poses are displayed."""
+
 class Poses:
     """The stages of the poses of a rig; see pose.h. Raises ValueError where the rig and its banks do not go together."""
 
@@ -194,6 +242,16 @@ class Poses:
     def width(self) -> int: ...
     def begin(self, row: NDArray[np.float64], /) -> None:
         """Write the row of a character that has not displayed anything yet."""
+    def receive(
+        self,
+        rows: NDArray[np.float64],
+        plays: NDArray[np.float64],
+        dt_s: float,
+        given: NDArray[np.float64],
+        seams: NDArray[np.float64],
+        /,
+    ) -> int:
+        """Write what happens to characters by what was decided; gives how many moments at seams there are, two for each."""
     def update(
         self,
         before: NDArray[np.float64],
@@ -351,8 +409,8 @@ class Controllers:
         """Write what plays some time later, [Q, 16], and the features of its frames, [Q, F]."""
     def update(self, parts: int, start: int, stop: int, *arrays: NDArray[Any] | float | None) -> bool:
         """update(parts, start, stop, before, moved, queries, dt_s, ranges, range_biases, allowed, playable, kind_biases, flags,
-        frame_biases, among, urgent, wide, after, decisions, found): 1 asks, 2 chooses, 4 decides, for characters `start` to
-        `stop` - 1, into the last three. Whether all queries can be compared. Several threads may run it at once."""
+        frame_biases, among, urgent, plays, play_of, wide, after, decisions, found): 1 asks, 2 chooses, 4 decides, for characters
+        `start` to `stop` - 1, into the last three. Whether all queries can be compared. Several threads may run it at once."""
     def skips(
         self,
         row: NDArray[np.float64],
@@ -361,13 +419,16 @@ class Controllers:
         database: int,
         spans: NDArray[np.int64],
         whys: NDArray[np.uint8],
+        plays: NDArray[np.float64] | None,
+        play_of: NDArray[np.int64] | None,
         /,
     ) -> int:
         """Write the spans of frames that a search leaves out, and why; gives how many."""
 
 def fill_ranges(*arguments: NDArray[Any] | int | None) -> None:
-    """fill_ranges(starts, rows, mirrored, at, masks, in_mirror, costs, costs_in_mirror, own_biases, ranges, biases): which ranges
-    each of some answers lets play, into columns from `at` on; `rows` from `starts[r]` on are those of range r."""
+    """fill_ranges(starts, rows, mirrored, at, masks, in_mirror, costs, costs_in_mirror, own_biases, ranges, biases, plays, chosen):
+    which ranges each of some answers lets play, into columns from `at` on, and by which row; `rows` from `starts[r]` on are those
+    of range r."""
 
 def search_joint(*arguments: NDArray[Any]) -> None:
     """search_joint(blocks, rank, boxes, lows, highs, channels, weights, ranges, firsts, relative, relative_lows, relative_highs,

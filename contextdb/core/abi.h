@@ -173,6 +173,7 @@ int PyDict_SetItemString(PyObject *, const char *, PyObject *);
 Py_ssize_t PyObject_Length(PyObject *);
 Py_ssize_t PyDict_Size(PyObject *);
 double PyFloat_AsDouble(PyObject *);
+PyObject *PyFloat_FromDouble(double);
 double PyLong_AsDouble(PyObject *);
 long PyLong_AsLong(PyObject *);
 long long PyLong_AsLongLong(PyObject *);

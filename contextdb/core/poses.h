@@ -3,6 +3,7 @@
  *
  *   cdbo_poses_open    a rig, its banks and settings, all checked: the stages, and where their columns are
  *   cdbo_poses_begin   the row of a character that has not displayed anything yet
+ *   cdbo_receive       from what was decided to what happens to a pose
  *   cdbo_pose_one      one character through all stages; or, where a game has a ground, up to it, and then from there */
 
 #include <float.h>
@@ -145,6 +146,7 @@ static inline void cdbo_pose_one(cdbo_posed *one, const cdbo_seam *seams, double
     size_t i = part == CDBO_FROM_GROUND ? poses->n_before_ground : 0;
     size_t stop = part == CDBO_UP_TO_GROUND ? poses->n_before_ground : poses->n_stages;
     one->dt_s = is_on ? dt_s : 0.0;
+    one->mode = one->given->root == one->given->root ? one->given->root : poses->settings[CDBO_ROOT];
     one->seams = is_on && one->given->seam >= 0.0 ? seams + 2 * (size_t)one->given->seam : NULL;
     one->frames = one->given->bank >= 0.0 ? poses->banks[(size_t)one->given->bank] : NULL;
     one->frame = 0;
@@ -164,3 +166,4 @@ static inline void cdbo_pose_one(cdbo_posed *one, const cdbo_seam *seams, double
     for (; i < stop; i++) poses->stages[i]->run(one);
     if (part == CDBO_UP_TO_GROUND) cdbo_stand_free(one);
 }
+#include "receive.h"

@@ -388,6 +388,40 @@ static PyObject *cdbp_poses_update(PyObject *self, PyObject *const *in, Py_ssize
     return cdbp_given_back(&a, is_done, "update takes 13 arguments");
 }
 
+/* Whether a moment is one of the banks, or nothing. */
+static int cdbp_is_moment(const cdbo_poses *poses, const cdbo_instant *moment)
+{
+    return moment->bank < 0.0 || cdbo_is_moment(poses, moment->bank, moment->range);
+}
+
+/* poses.receive(rows, plays, seconds, given, seams): what happens to each in an update, and how many moments at seams, of 2 N at
+ * most. */
+static PyObject *cdbp_poses_receive(PyObject *self, PyObject *const *in, Py_ssize_t n)
+{
+    const cdbo_poses *poses = cdbp_made_poses(self);
+    cdbp_arrays a;
+    const double *rows;
+    const cdbo_play *plays;
+    cdbo_given *given;
+    cdbo_seam *seams;
+    double dt_s = poses && n == 5 ? PyFloat_AsDouble(in[2]) : 0.0;
+    size_t s[3], n_rows = 0, n_seams = 0, i;
+    int is_done = 0;
+    a.n = 0;
+    if (poses && n == 5 && !PyErr_Occurred() && (rows = cdbp_numbers(&a, in[0], s, 2, CDBP_ANY, poses->width, 0)) && ((n_rows = s[0]), 1)
+        && (plays = (const cdbo_play *)cdbp_numbers(&a, in[1], s, 2, n_rows, sizeof(cdbo_play) / sizeof(double), 0))
+        && (given = (cdbo_given *)cdbp_to_numbers(&a, in[3], s, 2, n_rows, sizeof(cdbo_given) / sizeof(double), 0))
+        && (seams = (cdbo_seam *)cdbp_to_numbers(&a, in[4], s, 2, 2 * n_rows, 4, 0))) {
+        for (i = 0, is_done = 1; i < n_rows; i++)
+            is_done = is_done && cdbp_is_moment(poses, &plays[i].playing) && cdbp_is_moment(poses, &plays[i].before)
+                && cdbp_is_moment(poses, &plays[i].displayed);
+        for (i = 0; is_done && i < n_rows; i++) cdbo_receive(poses, rows + i * poses->width, &plays[i], dt_s, &given[i], seams, &n_seams);
+    }
+    if (!is_done) return cdbp_given_back(&a, 0, "receive takes rows, moments that are there, seconds and two arrays");
+    cdbp_release(&a);
+    return PyLong_FromLongLong((long long)n_seams);
+}
+
 static PyObject *cdbp_poses_width(PyObject *self, void *unused)
 {
     (void)unused;
@@ -396,6 +430,7 @@ static PyObject *cdbp_poses_width(PyObject *self, void *unused)
 
 static PyMethodDef cdbp_poses_methods[] = {
     {"begin", cdbp_poses_begun, METH_O, "Write the row of a character that has not displayed anything yet."},
+    {"receive", CDBP_CALL(cdbp_poses_receive), METH_FASTCALL, "Write what happens to characters by what was decided."},
     {"update", CDBP_CALL(cdbp_poses_update), METH_FASTCALL, "Put characters through the stages."},
     {NULL, NULL, 0, NULL},
 };

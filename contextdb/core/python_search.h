@@ -122,9 +122,16 @@ wrong:
 /* Search without the lock of Python; 0 with an error where memory is missing. */
 static int cdbp_search_now(const cdbm_frames *frames, const cdbm_question *asked, size_t start, size_t stop, cdbm_hits *hits)
 {
-    PyThreadState *state = PyEval_SaveThread();
-    int is_done = cdbm_search_frames(frames, asked, start, stop, hits);
-    PyEval_RestoreThread(state);
+    size_t n_bytes = cdbm_search_room(frames, stop - start);
+    cdbm_room room = {(char *)PyMem_Malloc(n_bytes + 1), n_bytes};
+    PyThreadState *state;
+    int is_done = 0;
+    if (room.at) {
+        state = PyEval_SaveThread();
+        is_done = cdbm_search_frames(frames, asked, start, stop, hits, room);
+        PyEval_RestoreThread(state);
+    }
+    PyMem_Free(room.at);
     if (!is_done) PyErr_NoMemory();
     return is_done;
 }

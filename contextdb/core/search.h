@@ -313,24 +313,29 @@ static void cdbm_search_tile(const cdbm_search *search, cdbm_query *queries, siz
         for (i = 0; i < n; i++) cdbm_search_cluster(search, &queries[i], at);
 }
 
-typedef struct cdbm_memory {        /* what a tile of n queries is searched with; all is in one block */
+typedef struct cdbm_memory {        /* what a tile of n queries is searched with */
     cdbm_query *queries;
     double *normalised;
     float *narrow;
     int16_t *levels;
 } cdbm_memory;
 
-/* Memory for tiles of n queries; 0 where there is too little. `queries` is given back. */
-static int cdbm_take(cdbm_memory *memory, const cdbm_frames *frames, size_t n)
+/* How many bytes of room a search for so many queries takes. */
+static inline size_t cdbm_search_room(const cdbm_frames *frames, size_t n)
 {
-    size_t n_features = n * frames->n_features, n_levels = n * 2 * frames->n_pairs;
-    size_t n_bytes = n * sizeof(cdbm_query) + n_features * (sizeof(double) + sizeof(float)) + n_levels * sizeof(int16_t);
-    memory->queries = (cdbm_query *)CDB_MALLOC(n_bytes + 1);
-    if (!memory->queries) return 0;
-    memory->normalised = (double *)(void *)(memory->queries + n);
-    memory->narrow = (float *)(void *)(memory->normalised + n_features);
-    memory->levels = (int16_t *)(void *)(memory->narrow + n_features);
-    return 1;
+    size_t n_queries = n < CDBM_TILE ? n : CDBM_TILE, n_features = n_queries * frames->n_features;
+    return cdbm_rounded(n_queries * sizeof(cdbm_query)) + cdbm_rounded(n_features * sizeof(double))
+        + cdbm_rounded(n_features * sizeof(float)) + cdbm_rounded(n_queries * 2 * frames->n_pairs * sizeof(int16_t));
+}
+
+/* Memory for tiles of n queries; 0 where there is too little. */
+static int cdbm_take(cdbm_memory *memory, const cdbm_frames *frames, size_t n, cdbm_room room)
+{
+    memory->queries = (cdbm_query *)cdbm_part(&room, n * sizeof(cdbm_query));
+    memory->normalised = (double *)cdbm_part(&room, n * frames->n_features * sizeof(double));
+    memory->narrow = (float *)cdbm_part(&room, n * frames->n_features * sizeof(float));
+    memory->levels = (int16_t *)cdbm_part(&room, n * 2 * frames->n_pairs * sizeof(int16_t));
+    return memory->queries && memory->normalised && memory->narrow && memory->levels;
 }
 
 /* Prepare query `number` of a question as the i-th of a tile; its hits are those of nothing. Whether it can be compared. */
@@ -370,13 +375,14 @@ static int cdbm_prepare(const cdbm_search *search, cdbm_memory *memory, const cd
 }
 
 /* Search for queries `start` to `stop` - 1 of a question. Each hit has the lowest total that is not above `within`, its frame and its
- * range; `within` and -1 where there is none. 0 where memory is missing. */
-static inline int cdbm_search_frames(const cdbm_frames *frames, const cdbm_question *asked, size_t start, size_t stop, cdbm_hits *hits)
+ * range; `within` and -1 where there is none. 0 where there is too little room, see cdbm_search_room. */
+static inline int cdbm_search_frames(const cdbm_frames *frames, const cdbm_question *asked, size_t start, size_t stop, cdbm_hits *hits,
+    cdbm_room room)
 {
     cdbm_search search = {frames, asked, (double)INFINITY, 0.0, 0.0};
     cdbm_memory memory;
     size_t n = stop - start < CDBM_TILE ? stop - start : CDBM_TILE, i;
-    if (!cdbm_take(&memory, frames, n)) return 0;
+    if (!cdbm_take(&memory, frames, n, room)) return 0;
     for (i = 0; i < frames->n_kinds; i++)
         if (asked->allowed[i] && asked->kind_biases[i] < search.least_kind) search.least_kind = asked->kind_biases[i];
     if (asked->frame_biases) search.least_frame = cdbm_least_of(asked->frame_biases, frames->n_frames);
@@ -386,6 +392,5 @@ static inline int cdbm_search_frames(const cdbm_frames *frames, const cdbm_quest
         for (i = 0; i < n && start < stop; start++) i += (size_t)cdbm_prepare(&search, &memory, hits, start, i);
         cdbm_search_tile(&search, memory.queries, i);
     }
-    CDB_FREE(memory.queries);
     return 1;
 }

@@ -23,8 +23,8 @@ from contextdb.expressions.expression import read_expression
 from contextdb.expressions.faults import ExpressionError
 from contextdb.expressions.tokens import written_name
 from contextdb.schema.settings import derivation_of
-from contextdb.tables.nesting.flat import FlatTable
-from contextdb.tables.table import EitherTable, Table
+from contextdb.tables.data import TableData
+from contextdb.tables.table import EitherTable
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ def opened(
 
     A table that is too large is refused, or where `is_cut` cut to so many rows as can be compared.
     """
-    require_kind(table, (Table, FlatTable, CompiledTable), "table", "a Table, or a CompiledTable")
+    require_kind(table, (TableData, CompiledTable), "table", "a Table, or a CompiledTable")
     if isinstance(table, CompiledTable):
         data = data_of(table)
         data.refuse_rules("what they leave is worked out from the table itself")
@@ -124,7 +124,7 @@ def not_boxed(table: EitherTable, assumed: Assumptions) -> Iterator[Condition]:
             yield condition
 
 
-def assumptions_of(table: EitherTable) -> Assumptions:
+def assumptions_of(table: TableData) -> Assumptions:
     """The assumptions of a table, as its settings in contextdb.toml say, and what its derived bools imply. Raises ExpressionError
     where an assumption names what is neither a condition of the table nor declared."""
     conditions = [column.condition for column in table.conditions]

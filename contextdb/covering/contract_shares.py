@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import zip_longest
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,7 +94,7 @@ class Shares:
         is_kind, ranks = bitmask.flags_of(self.demand.kind, len(rows)), self.demand.picks.choosing.ranks[0][rows]
         counted = pickable & (~is_kind | self.demand.picks.always[rows])
         order = sorted(np.flatnonzero(counted).tolist(), key=lambda i: (-ranks[i], is_kind[i]))
-        n_runs = 2 + 2 * sum(not is_kind[i] for i, j in zip(order, [*order, None][1:], strict=True) if j is None or is_kind[j])
+        n_runs = 2 + 2 * sum(not is_kind[i] for i, j in zip_longest(order, order[1:]) if j is None or is_kind[j])
         left = self._open(self._impossible | self.demand.finder.rows, n_runs)  # no row is valid
         low, high, before, own = left.lower, left.upper, self._impossible, 0
         for i in [*order, None]:

@@ -39,7 +39,6 @@ from contextdb.schema.contracts import Contract, output_is_list, row_conditions
 from contextdb.schema.settings import derivation_of
 from contextdb.tables.condition_column import ConditionColumn
 from contextdb.tables.data import known_conditions
-from contextdb.tables.nesting.flat import FlatTable
 from contextdb.tables.table import EitherTable, Table
 
 WORK = 1_500_000
@@ -147,7 +146,7 @@ def rows_of_kind(table: EitherTable, kind: str | None) -> NDArray[np.bool_]:
 class _Prover:
     """One contract of one table."""
 
-    table: FlatTable | Table
+    table: EitherTable
     demand: Demand
     moments: Moments
     rng: np.random.Generator

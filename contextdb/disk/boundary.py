@@ -3,6 +3,9 @@
 A project may come from a stranger. A path that a person typed is followed wherever it leads. A path that is put together here, of a
 folder and a name that the project gives, is `inside` that folder or refused: a link in a clone must not choose what is read or
 written elsewhere. Links that stay in the folder are followed.
+
+One path may leave the folder: that of the contextdb.toml which a project extends. It may climb to the nearest folder with a .git,
+or to a folder that a person typed, and no link is on its way.
 """
 
 from __future__ import annotations
@@ -10,6 +13,7 @@ from __future__ import annotations
 import errno
 import os
 import stat
+from contextvars import ContextVar
 from pathlib import Path
 
 from contextdb.errors import Fault, FileError, Place, in_quotes
@@ -23,6 +27,28 @@ ACTORS_SUFFIX = ".actors.json"
 """What the file of the actors for a table's roles ends in."""
 COMPANIONS = (SCHEMA_FILE, CASES_SUFFIX, NOTES_SUFFIX, ACTORS_SUFFIX)
 """The ends of the names of files that are found next to a table. Nobody types them, so they are always `inside`."""
+
+
+TYPED_ROOT: ContextVar[Path | None] = ContextVar("TYPED_ROOT", default=None)
+"""The folder that a person typed, up to which projects may extend another one."""
+
+
+def extended_file(folder: Path, path: str) -> Path:
+    """The file that the project of a folder extends, given as contextdb.toml has it: from its folder. It has no links on its way.
+    Raises FileError where it is not below the root, a link is on its way, or there is no such file."""
+    start = real_path(folder)
+    file = Path(os.path.normpath(start / path))
+    root = real_path(typed) if (typed := TYPED_ROOT.get()) is not None and is_below(start, real_path(typed)) else work_tree(start)
+    place, accepted = Place(str(folder / SCHEMA_FILE)), "a contextdb.toml below it"
+    prefix = f"[project] extends = {in_quotes(path)}"
+    if not file.is_relative_to(root):
+        mend = "--root FOLDER, a folder that has both, or a git repository of both"
+        raise FileError(Fault(f"{prefix}: the file is not in {_quoted(root)}.", accepted, mend, place, "link-outside"))
+    if real_path(file) != file:
+        raise FileError(Fault(f"{prefix}: a link is on its way.", accepted, "to name the file itself", place, "link-outside"))
+    if not file.is_file():
+        raise FileError(Fault(f"{prefix}: there is no such file.", accepted, "", place, "no-such-path"))
+    return file
 
 
 def inside(path: Path, folder: Path) -> Path:

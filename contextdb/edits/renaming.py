@@ -25,14 +25,14 @@ from contextdb.cells.words import says_any
 from contextdb.columns import TextColumn
 from contextdb.disk import ACTORS_SUFFIX, NOTES_SUFFIX, read_bytes, real_path, write_atomic
 from contextdb.disk.together import putting_back
-from contextdb.edits.schema_file import schema_path
+from contextdb.edits.schema_file import require_declared_here, schema_path
 from contextdb.errors import ContextDBError, Fault, FileError, Place, SchemaError, TableError, in_quotes, plural
 from contextdb.expressions.names import names_in, with_names
 from contextdb.files.texts import AnySource, read_texts, written_over
 from contextdb.schema import toml_edit
-from contextdb.schema.settings import TableSettings, plain_names, read_schema
+from contextdb.schema.settings import TableSettings, plain_names
 from contextdb.tables.other_files import CASE_COLUMNS, cases_path
-from contextdb.tables.project import SCHEMA_FILE, read_folder_schema, table_files
+from contextdb.tables.project import SCHEMA_FILE, read_folder_schema, schema_of, table_files
 from contextdb.tables.table import Table
 
 _BOM = b"\xef\xbb\xbf"
@@ -47,6 +47,7 @@ class Uses:
     derived: tuple[str, ...] = ()
     """Derived facts that are computed from it."""
     n_assumptions: int = 0
+    n_contracts: int = 0
     blueprints: tuple[str, ...] = ()
     n_rules: int = 0
     """Rows, of any table, whose own rule names it."""
@@ -62,6 +63,7 @@ class Uses:
             (len(self.tables), "table"),
             (len(self.derived), "derived fact"),
             (self.n_assumptions, "assumption"),
+            (self.n_contracts, "contract"),
             (len(self.blueprints), "blueprint"),
             (self.n_rules, "rule"),
             (self.n_cases, "saved context"),
@@ -153,11 +155,12 @@ def uses_of(table: Table, condition: str) -> Uses:
     derived = tuple(c.name for c in schema.conditions.values() if c.expr is not None and condition in names_in(c.expr))
     blueprints = tuple(name for name, names in schema.blueprints.items() if condition in names)
     premises = {t: [c.when for c in schema.contracts.values() if c.when and (c.table == own.name) == t] for t in (True, False)}
-    n_own_assumed = _n_naming((*own.assume, *premises[True]), condition)
+    n_own_premises, n_premises = (_n_naming(premises[is_own], condition) for is_own in (True, False))
     elsewhere = [text for s in schema.tables.values() if s.name != own.name for text in s.assume]
-    assumed = n_own_assumed + _n_naming((*elsewhere, *premises[False]), condition)
-    is_elsewhere = bool(others or derived or blueprints or n_rules or n_cases > n_own_cases or assumed > n_own_assumed)
-    return Uses(tuple(others), derived, assumed, blueprints, n_rules + n_own_rules, n_cases, is_elsewhere)
+    n_own_assumed, n_assumed = _n_naming(own.assume, condition), _n_naming(elsewhere, condition)
+    is_elsewhere = bool(others or derived or blueprints or n_rules or n_cases > n_own_cases or n_assumed or n_premises)
+    counts = n_own_assumed + n_assumed, n_own_premises + n_premises
+    return Uses(tuple(others), derived, *counts, blueprints, n_rules + n_own_rules, n_cases, is_elsewhere)
 
 
 def renaming(table: Table, old: str, new: str, only_here: bool = False) -> Renaming:
@@ -170,6 +173,8 @@ def renaming(table: Table, old: str, new: str, only_here: bool = False) -> Renam
     on_disk = read_folder_schema(folder) if raw else schema
     if not only_here and new in on_disk.conditions:
         raise SchemaError(Fault(f"the condition {in_quotes(new)} is declared already.", "a name that nothing has yet"))
+    if not only_here:
+        require_declared_here([("conditions", old)], on_disk, folder / SCHEMA_FILE)
     files: list[Rewrite] = []
     for name, path in table_files(folder, on_disk):
         is_own = real_path(path) == real_path(table.path)
@@ -344,7 +349,7 @@ def rewritten_toml(path: Path, raw: bytes, change: Callable[[dict[str, Any]], No
     if tomllib.loads(text) != wanted:
         problem = "this cannot be renamed without changing more of the file."
         raise SchemaError(Fault(problem, "sections such as [conditions.NAME]", "to rename it in a text editor", Place(str(path))))
-    read_schema(text, str(path))  # refuses what no project can be
+    schema_of(text.encode(), path)  # refuses what no project can be
     yield Rewrite(path, raw, bom + text.encode())
 
 

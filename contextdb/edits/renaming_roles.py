@@ -16,6 +16,7 @@ from contextdb.columns import TextColumn
 from contextdb.disk import read_bytes, real_path
 from contextdb.edits import renaming
 from contextdb.edits.renaming_values import with_value
+from contextdb.edits.schema_file import require_declared_here
 from contextdb.errors import Fault, SchemaError, in_quotes, plural
 from contextdb.files.toml_shapes import wrong_name
 from contextdb.schema.settings import Schema, TableSettings
@@ -39,6 +40,7 @@ def role_uses(table: Table, role: str) -> tuple[str, tuple[str, ...]]:
         (len(tables), "other table"),
         (len(derived), "derived fact"),
         (max((one.n_assumptions for one in uses), default=0), "assumption"),
+        (max((one.n_contracts for one in uses), default=0), "contract"),
         (max((one.n_rules for one in uses), default=0), "rule"),
         (max((one.n_cases for one in uses), default=0), "saved context"),
     )
@@ -60,6 +62,8 @@ def role_renaming(table: Table, old: str, new: str, only_here: bool = False) -> 
     own = read[real_path(table.path)]
     files = [own] if only_here else list(read.values())
     names = _names(schema, files, old, new)
+    if not only_here:
+        require_declared_here((("conditions", name) for name in names), schema, folder / SCHEMA_FILE)
     _require_role(new, {*schema.conditions, *(c.name for file in files for c in file.columns)})
     rewrites = [rewrite for file in files for rewrite in _rewritten(file, names, old, new)]
     if raw:

@@ -16,6 +16,7 @@ from contextdb.cells.words import quoted, says_any
 from contextdb.columns import TextColumn
 from contextdb.disk import read_bytes, real_path
 from contextdb.edits.renaming import Renaming, Rewrite, TableFile, folder_of, rewritten, rewritten_toml, with_texts
+from contextdb.edits.schema_file import require_declared_here
 from contextdb.errors import ContextDBError, Fault, SchemaError, in_quotes, plural
 from contextdb.expressions.faults import Refusal
 from contextdb.expressions.names import names_in
@@ -91,6 +92,7 @@ def value_renaming(table: Table, condition: str, old: str, new: str) -> Renaming
     if new in declared:
         raise SchemaError(Fault(f"{in_quotes(new)} is a value of {condition} already.", "a name that there is not yet"))
     _require_plain(schema, condition, old)
+    require_declared_here([("conditions", condition)], schema, folder / SCHEMA_FILE)
     files: list[Rewrite] = []
     for name, path in table_files(folder, schema):
         file = TableFile.read(name, path, schema.tables.get(name, TableSettings(name)))

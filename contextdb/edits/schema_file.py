@@ -8,7 +8,7 @@ the table says.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,9 +19,10 @@ from contextdb.files.file_names import alike
 from contextdb.files.toml_text import Path as KeyPath
 from contextdb.files.toml_text import as_toml, dotted, plain_numbers
 from contextdb.schema import toml_edit
+from contextdb.schema.parts import header
 from contextdb.schema.sections import schema_to_dict, settings_to_dict
-from contextdb.schema.settings import EMPTY, Schema, TableSettings, read_schema
-from contextdb.tables.project import SCHEMA_FILE, read_folder_schema
+from contextdb.schema.settings import EMPTY, Schema, TableSettings
+from contextdb.tables.project import SCHEMA_FILE, read_folder_schema, schema_of
 from contextdb.tables.table import Table
 
 Keys = dict[KeyPath, object]
@@ -74,6 +75,7 @@ def schema_change(before: Table | None, after: Table) -> SchemaChange | None:
         return None
     raw = read_bytes(path) if path.is_file() else b""
     theirs = read_folder_schema(path.parent) if raw else EMPTY
+    require_declared_here(((key[0], key[1]) for key in wanted), theirs, path)
     wanted = _not_there_yet(wanted, theirs, path)
     if not wanted:
         return None
@@ -84,6 +86,15 @@ def schema_change(before: Table | None, after: Table) -> SchemaChange | None:
     now = _edited(text, wanted, after, _settings_name(after, path))
     _require_changed(now, wanted, theirs, path)
     return SchemaChange(path, bom + now.encode(), raw if path.is_file() else None)
+
+
+def require_declared_here(parts: Iterable[tuple[str, str]], schema: Schema, path: Path) -> None:
+    """Raise SchemaError where a part is to change, such as ("conditions", "speed"), that the project has from what it extends."""
+    for part in parts:
+        if part in schema.shared and schema.studio is not None:
+            problem = f"{header(part)} is not declared in this file, but in one that it extends: {schema.studio.file}."
+            mend = f"to change it there, or to declare {header(part)} here too"
+            raise SchemaError(Fault(problem, "what this project declares itself", mend, Place(str(path))))
 
 
 def schema_path(table: Table) -> Path:
@@ -259,7 +270,7 @@ def _behind(part: KeyPath, table: Table, name: str) -> list[KeyPath]:
 
 def _require_changed(text: str, wanted: Changes, theirs: Schema, path: Path) -> None:
     """Raise SchemaError unless the text says what is wanted, and all else as before."""
-    now = read_schema(text, str(path))
+    now = schema_of(text.encode(), path)
     before, after = _keys_of(theirs), _keys_of(now)
     expected = {key: value for key, value in before.items() if key not in wanted}
     expected |= {key: value for key, (_, value) in wanted.items() if value is not None}

@@ -23,7 +23,7 @@ from contextdb.schema.settings import Schema, TableSettings, conditions_from_dic
 from contextdb.schema.table_settings import PLAIN_JOBS
 from contextdb.tables.table import Table
 
-COLUMN_JOBS = (*PLAIN_JOBS, "when")
+COLUMN_JOBS = (*(job for job in PLAIN_JOBS if job != "remove"), "when")
 JOBS = ("asset", "condition", "output", *COLUMN_JOBS, "left out")
 _NEVER_GUESSED = ("when",)
 """Jobs whose word is too common a name to go by."""

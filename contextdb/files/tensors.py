@@ -23,8 +23,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.disk import TENSORS_SUFFIX, read_bytes, write_atomic
+from contextdb.disk import TENSORS_SUFFIX, needing, read_bytes, write_atomic
 from contextdb.errors import ArtefactError, ContextDBError, Fault, Place
+from contextdb.files.scratch import LARGE_BYTES
 
 SUFFIX = TENSORS_SUFFIX
 
@@ -69,10 +70,21 @@ class FileKind:
 def write_tensors(path: Path, kind: FileKind, tensors: Mapping[str, NDArray[Any]], metadata: Mapping[str, str]) -> None:
     """Write arrays and metadata; the same ones give the same bytes. The old file is whole until the new one is. Raises FileError
     where the disk refuses."""
-    write_atomic(path, to_bytes(tensors, kind.metadata(metadata)))
+    pieces = _pieces(tensors, kind.metadata(metadata))
+    size = sum(map(len, pieces))
+    if size < LARGE_BYTES:
+        write_atomic(path, b"".join(pieces))
+        return
+    with needing(size):
+        write_atomic(path, pieces)
 
 
 def to_bytes(tensors: Mapping[str, NDArray[Any]], metadata: Mapping[str, str]) -> bytes:
+    """The bytes of a file."""
+    return b"".join(_pieces(tensors, metadata))
+
+
+def _pieces(tensors: Mapping[str, NDArray[Any]], metadata: Mapping[str, str]) -> list[bytes | memoryview]:
     """The bytes of a file. Arrays of larger numbers stand first, so that each is aligned; then they go by name."""
     arrays = {name: _little(array) for name, array in tensors.items()}
     header: dict[str, object] = {_METADATA: dict(metadata)}
@@ -84,7 +96,7 @@ def to_bytes(tensors: Mapping[str, NDArray[Any]], metadata: Mapping[str, str]) -
         header[name] = {"dtype": _NAMES[array.dtype], "shape": list(array.shape), "data_offsets": [start, stop]}
     text = json.dumps(header, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 8)
-    return b"".join([len(text).to_bytes(8, "little"), text, *(_octets(arrays[name]) for name in ordered)])
+    return [len(text).to_bytes(8, "little"), text, *(_octets(arrays[name]) for name in ordered)]
 
 
 def read_tensors(path: Path, kind: FileKind, *, writeable: bool = False) -> tuple[Tensors, dict[str, str]]:

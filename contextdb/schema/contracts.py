@@ -16,7 +16,8 @@ from dataclasses import dataclass
 from typing import Any, Literal, cast
 
 from contextdb.cells.conditions import Condition
-from contextdb.cells.domains import BOOL, INT, NUMBER, Domain
+from contextdb.cells.domains import INT, NUMBER, Domain
+from contextdb.cells.kinds import KINDS
 from contextdb.cells.outputs import Output
 from contextdb.errors import SchemaError
 from contextdb.files.settings import Declared, setting
@@ -119,4 +120,5 @@ def output_is_list(output: Output) -> bool:
 def _domain(output: Output, values: tuple[str, ...]) -> Domain:
     if output.type.has_values:
         return Domain("enum", output.values)
-    return {"bool": BOOL, "int": INT, "number": NUMBER}.get(output.kind) or Domain("text", values)
+    kind = KINDS.get(output.kind)
+    return Domain("text", values) if kind is None or kind.has_values else Domain(kind.name)

@@ -15,6 +15,7 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import NUMBER, Domain
 from contextdb.cells.kinds import KINDS, Kind
 from contextdb.cells.mirroring import partner_of, sided_pairs, swap_faults, swapped_tag
+from contextdb.cells.outputs import Output
 from contextdb.cells.sets import covers
 from contextdb.disk import TABLE_SUFFIXES
 from contextdb.errors import Fault, in_quotes, mend_for, nearest, no_such, safe_text, some
@@ -38,6 +39,7 @@ from contextdb.schema.parts import (
 from contextdb.schema.shapes import CONDITION, KEY_SYNONYMS
 from contextdb.schema.table_settings import columns_checked, table_files
 from contextdb.schema.toml_lines import Path
+from contextdb.schema.variant_faults import bases_of, variant_faults
 
 PathFault = tuple[Path, Fault]
 
@@ -57,6 +59,7 @@ def document_faults(document: Part) -> Iterator[PathFault]:
     for name, part in parts_of(document, "tables").items():
         yield from column_faults(("tables", name), fitting_of("tables", part), conditions)
     yield from _file_faults(parts_of(document, "tables"))
+    yield from variant_faults({name: fitting_of("tables", part) for name, part in parts_of(document, "tables").items()})
     for name, part in parts_of(document, "blueprints").items():
         yield from _blueprint_faults(("blueprints", name), fitting_of("blueprints", part), conditions)
 
@@ -66,9 +69,15 @@ def expression_faults_in(document: Part) -> Iterator[PathFault]:
     conditions = {name: condition_of(name, part) for name, part in parts_of(document, "conditions").items()}
     assumed = {name: fitting_of("tables", part).get("assume", ()) for name, part in parts_of(document, "tables").items()}
     yield from expression_faults_of(conditions, assumed)
-    outputs = {name: fitting_of("tables", part).get("outputs", ()) for name, part in parts_of(document, "tables").items()}
-    declared = {name: {output.name: output for output in declared_outputs(section)} for name, section in outputs.items()}
-    yield from contract_expression_faults(document, conditions, declared)
+    yield from contract_expression_faults(document, conditions, _outputs_of_tables(document))
+
+
+def _outputs_of_tables(document: Part) -> dict[str, dict[str, Output]]:
+    """The outputs of each table by name, those of the tables that it varies too; none where its own have faults."""
+    tables = {name: fitting_of("tables", part) for name, part in parts_of(document, "tables").items()}
+    sound = {name: () if any(outputs_faults(part)) else part.get("outputs", ()) for name, part in tables.items()}
+    own = {name: {output.name: output for output in declared_outputs(section)} for name, section in sound.items()}
+    return {name: {n: o for one in reversed(bases_of(name, tables)) for n, o in own[one].items()} for name in tables}
 
 
 def expression_faults_of(conditions: Mapping[str, Condition], assumed: Mapping[str, Sequence[str]]) -> Iterator[PathFault]:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from pathlib import PurePosixPath
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from contextdb.cells.arguments import require_text
 from contextdb.cells.conditions import Condition
@@ -28,6 +28,7 @@ from contextdb.schema.faults import (
     part_faults,
     section_faults,
 )
+from contextdb.schema.inheriting import resolved
 from contextdb.schema.outputs import declared_outputs, fallback_of
 from contextdb.schema.parts import Part, condition_of, fitting_of, parts_of
 from contextdb.schema.table_settings import JOBS, TableSettings
@@ -66,6 +67,24 @@ def with_outputs(settings: TableSettings, names: Iterable[str]) -> TableSettings
     return replace(settings, outputs=outputs, typed=typed, fallback_outputs=given)
 
 
+SHARED_SECTIONS = ("conditions", "blueprints")
+"""The sections that a project has of the one that it extends."""
+
+
+class Studio(NamedTuple):
+    """A contextdb.toml that a project extends, as it was read."""
+
+    text: str
+    file: str
+    studio: Studio | None = None
+    """What that one extends."""
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Its file, and those of what it extends."""
+        return (self.file, *(self.studio.files if self.studio else ()))
+
+
 @dataclass(frozen=True, repr=False)
 class Schema:
     """All that a contextdb.toml says."""
@@ -84,6 +103,10 @@ class Schema:
     """How clips that lead from one state to another are named, such as "{from}_to_{to}"; "" where that is not declared."""
     contracts: Mapping[str, Contract] = field(default_factory=dict)
     """What must hold of the tables."""
+    studio: Studio | None = None
+    """What the project extends."""
+    shared: frozenset[tuple[str, str]] = frozenset()
+    """The conditions and blueprints that it has from there: ("conditions", "speed")."""
 
     def __repr__(self) -> str:
         return one_line("Schema", self.name, f"{plural(len(self.conditions), 'condition')}, {plural(len(self.tables), 'table')}")
@@ -113,11 +136,11 @@ class Schema:
         }
 
     def settings_for(self, file: str) -> TableSettings:
-        """The settings of the table in `file`, a path below the folder; one that is not declared has the file's stem as
-        name. Raises ContextError for no text."""
+        """The settings of the table in `file`, a path below the folder, with what it inherits; one that is not declared has the
+        file's stem as name. Raises ContextError for no text."""
         path = PurePosixPath(composed(require_text(file, "file")))
         declared = (settings for settings in self.tables.values() if str(path) in map(composed, settings.files))
-        return next(declared, TableSettings(path.stem))
+        return resolved(next(declared, TableSettings(path.stem)), self.tables)
 
 
 def derivation_of(schema: Schema, names: Iterable[str]) -> Derivation | None:
@@ -132,11 +155,16 @@ EMPTY = Schema()
 
 
 @lru_cache(maxsize=8)
-def read_schema(text: str, file: str) -> Schema:
-    """What the text of a contextdb.toml says; `file` is its name in messages. The last few are cached. Raises
-    SchemaError with every fault: its line, what was found, what is accepted and the nearest mend."""
+def read_schema(text: str, file: str, studio: Studio | None = None) -> Schema:
+    """What the text of a contextdb.toml says, with the conditions and blueprints of the one that it extends; `file` is its name in
+    messages. The last few are cached. Raises SchemaError with every fault: its line, what was found, what is accepted and the
+    nearest mend."""
     text = text.removeprefix("\ufeff")
     document = read_toml(text, file)
+    shared: frozenset[tuple[str, str]] = frozenset()
+    if studio is not None:
+        read_schema(*studio)  # raises what is wrong there
+        document, shared = _extended(document, studio)
     faults = list(document_faults(document))
     if not any(path[0] == "conditions" for path, _ in faults):
         faults += expression_faults_in(document)
@@ -144,7 +172,35 @@ def read_schema(text: str, file: str) -> Schema:
         lines = key_lines(text)
         placed = (fault.at(Place(file, line_of(path, lines))) for path, fault in faults)
         raise SchemaError(*sorted(placed, key=lambda fault: fault.place.line or 0))
-    return _schema(document, file)
+    return replace(_schema(document, file), studio=studio, shared=shared)
+
+
+def _extended(document: Part, studio: Studio) -> tuple[dict[str, Any], frozenset[tuple[str, str]]]:
+    """A document with the conditions and blueprints of a sound one that it lacks, and which these are."""
+    known: Part = read_toml(studio.text.removeprefix("\ufeff"), studio.file)
+    if studio.studio is not None:
+        known, _ = _extended(known, studio.studio)
+    whole, shared = dict(document), set()
+    for section in SHARED_SECTIONS:
+        own = document.get(section, {})
+        if isinstance(own, Mapping):
+            more = {name: part for name, part in known.get(section, {}).items() if name not in own}
+            whole |= {section: {**more, **own}} if more else {}
+            shared |= {(section, name) for name in more}
+    return whole, frozenset(shared)
+
+
+def extends_of(text: str, file: str) -> str | None:
+    """The path that a text of contextdb.toml extends; None where it says none that can be used."""
+    if "extends" not in text:
+        return None
+    try:
+        document = read_toml(text.removeprefix("\ufeff"), file)
+    except SchemaError:  # reported when it is read
+        return None
+    project = document.get("project")
+    extends = fitting_of("project", project).get("extends") if isinstance(project, Mapping) else None
+    return None if extends is None else str(extends)
 
 
 def conditions_from_dict(mapping: Mapping[str, Mapping[str, object]]) -> dict[str, Condition]:

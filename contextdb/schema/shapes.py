@@ -10,6 +10,7 @@ import math
 import numbers
 import re
 from collections.abc import Callable, Mapping
+from pathlib import PureWindowsPath
 
 from contextdb.cells.kinds import KINDS, names_where
 from contextdb.disk import TABLE_SUFFIXES
@@ -130,8 +131,28 @@ def _wrong_transitions(value: object) -> str | None:
     return None if is_pattern else "this is not a pattern for names of transitions"
 
 
+def _wrong_extends(value: object) -> str | None:
+    if not isinstance(value, str) or wrong_name(value):
+        return wrong_name(value)
+    path = PureWindowsPath(value)
+    if path.drive or path.root:
+        return "it names a place on one machine"
+    if "\\" in value:
+        return 'folders are separated by "/" on every system'
+    return None if path.suffix == ".toml" else "its ending is not .toml"
+
+
+def _meant_extends(value: object) -> object:
+    if not isinstance(value, str) or PureWindowsPath(value).drive or PureWindowsPath(value).root:
+        return None
+    path = value.strip().replace("\\", "/").rstrip("/")
+    return path if path.endswith(".toml") else f"{path}/contextdb.toml"
+
+
 TEXT = Shape('text, such as "m/s"', wrong_text, meant_text)
 COLUMN = Shape('a name, such as "Asset Name"', wrong_name, meant_text)
+EXTENDS = Shape('the path of a contextdb.toml, such as "../studio/contextdb.toml"', _wrong_extends, _meant_extends)
+BASE = Shape('the name of a table, such as "hit_human"', wrong_name, meant_text)
 EXPRESSION = Shape('an expression as text, such as "speed - target_speed"', wrong_name, meant_text)
 EXPRESSIONS = Shape('a list of expressions, such as ["not (IsRunning and IsIdle)"]', _wrong_list, _meant_names(r"\A|\Z"))
 NUMBER = Shape("a number, such as -1.5", _wrong_number, meant_number)
@@ -161,8 +182,12 @@ TRANSITIONS = Shape(
 
 PROJECT: Settings = {
     "name": Setting(TEXT, "The name of the project.", "", without="none"),
+    "extends": Setting(
+        EXTENDS, "A contextdb.toml whose conditions and blueprints this project has, too.", None,
+        "From the folder of this one. See [shared conditions](#shared-conditions).", "none",
+    ),
     "transitions": Setting(TRANSITIONS, "How clips that lead from one state to another are named.", None, without="not declared"),
-}
+}  # fmt: skip
 _BOUNDED = names_where(lambda kind: kind.is_bounded)
 _BEYOND = 'A date is written `"2026-01-01"`. Facts beyond are still compared; `check` reports cells beyond.'
 CONDITION: Settings = {
@@ -192,6 +217,7 @@ CONDITION: Settings = {
         HYSTERESIS, "How far beyond the edges of its cells a row stays valid while its animation plays, in its unit.", 0.0,
         types=names_where(lambda kind: kind.is_decimal),
     ),
+    "owner": Setting(TEXT, "Who answers for the condition, such as a team.", "", without="nobody is named", label="Owner"),
 }  # fmt: skip
 BLUEPRINT: Settings = {
     "conditions": Setting(

@@ -14,7 +14,7 @@ from contextdb.errors import Fault, SchemaError, in_quotes
 from contextdb.files.settings import Declared, setting, settings_of, word
 from contextdb.files.toml_shapes import filled, listed
 from contextdb.schema.policies import POLICIES, POLICY_SYNONYMS, Policy
-from contextdb.schema.shapes import COLUMN, EXPRESSIONS, FALLBACK, FILE, OUTPUTS
+from contextdb.schema.shapes import BASE, COLUMN, EXPRESSIONS, FALLBACK, FILE, OUTPUTS, TEXT
 
 AN_OUTPUT = "Columns that are data for the game. They are not conditions: they exclude no row."
 ASSUMED = "What is always so, such as: not (IsRunning and IsIdle). Coverage leaves out all other contexts."
@@ -81,6 +81,20 @@ class TableSettings(Declared, error=SchemaError):
         "An expression that must hold in each row.",
         "The row's [own rule](#a-rows-own-rule); one with `Any`, `-` or an empty cell has none.", "no rules",
     )  # fmt: skip
+    base: str | None = setting(
+        BASE, "The table that this one is a variant of: its file holds only what differs.", None,
+        more="See [variants](designers.md#variants). Settings that it leaves out are those of the base.",
+        without="a table of its own",
+    )  # fmt: skip
+    remove: str | None = _job(
+        "Of a variant: a row that says True here is taken out of the base.", "True and False; empty is False.", "none is taken out"
+    )
+    expected: str | None = setting(
+        FILE, "A file of the contexts that are expected, which coverage is first about.", None,
+        more="Cells as in any table, and a column `weight` for how often. See [expected contexts](designers.md#expected-contexts).",
+        without="nothing is expected",
+    )  # fmt: skip
+    owner: str = setting(TEXT, "Who answers for the table, such as a team.", "", without="nobody is named", label="Owner")
     typed: tuple[Output, ...] = ()
     fallback_outputs: tuple[tuple[str, OutputValue], ...] = ()
 

@@ -35,7 +35,7 @@ from contextdb.compiled.ways import Ways
 from contextdb.errors import ContextError, Fault, NoSuchRow, Place, TableError, in_quotes, no_such, plural, some
 from contextdb.files.texts import AnySource
 from contextdb.schema.policies import POLICIES
-from contextdb.schema.settings import EMPTY, Schema, TableSettings, plain_names
+from contextdb.schema.settings import EMPTY, Schema, TableSettings, plain_names, settings_renamed
 from contextdb.schema.table_settings import PLAIN_JOBS, missing_job
 from contextdb.tables.condition_column import ConditionColumn
 from contextdb.tables.nesting.names import inner_name
@@ -85,6 +85,8 @@ class TableData(Framed, Unchanging):
         TableError where a column that the settings name is missing, or two columns have one name.
         """
         settings = settings or TableSettings(name=name)
+        if settings.base is not None:
+            settings = _of_variant(settings, columns)
         _require_columns(columns, settings, path)
         conditions = conditions_of(columns, schema, settings, before or {})
         n_rows = columns[0].n_rows if columns else 0
@@ -260,11 +262,13 @@ class TableData(Framed, Unchanging):
 
     @property
     def _output_faults(self) -> Iterator[tuple[int, Fault]]:
-        """The cells of outputs that cannot be read; a row that refers to a table may leave them empty."""
+        """The cells of outputs that cannot be read; a row that refers to a table may leave them empty,
+        and one of a variant, which inherits them."""
         if any(column.faults for column in self._output_columns):
             texts = self.text_column(self.asset_column)
             refers = np.array([inner_name(text) is not None for text in texts.texts], np.bool_)
-            may_be_empty = frozenset(np.flatnonzero(refers[texts.codes]).tolist())
+            is_left = refers[texts.codes] | (self.settings.base is not None)
+            may_be_empty = frozenset(np.flatnonzero(is_left).tolist())
             for column in self._output_columns:
                 yield from column.faulty_rows(may_be_empty)
 
@@ -307,6 +311,12 @@ def picking_of(table: TableData) -> PickColumns:
     return table._picking
 
 
+def removed_rows(table: TableData) -> NDArray[np.bool_]:
+    """Whether each row takes that of the base out, where the table is a variant: bool [n_rows]."""
+    removed = table._plain.removed
+    return np.zeros(table.n_rows, np.bool_) if removed is None else removed
+
+
 def output_columns_of(table: TableData) -> tuple[OutputColumn, ...]:
     """The columns of a table's outputs, in the order of the settings."""
     return table._output_columns
@@ -340,6 +350,12 @@ def with_columns(table: AnyTable, columns: Sequence[TextColumn], origin: NDArray
 
 def _no_such(what: str, name: str, known: list[str]) -> Fault:
     return no_such(what, name, known, some(known) or f"no {what}: there is none")
+
+
+def _of_variant(settings: TableSettings, columns: Sequence[TextColumn]) -> TableSettings:
+    """The settings of a variant without jobs of columns that its file leaves to the base."""
+    present = settings_renamed(settings, {c.name: c.name for c in columns}.get)
+    return replace(present, asset=settings.asset, remove=settings.remove)
 
 
 def _require_columns(columns: Sequence[TextColumn], settings: TableSettings, path: Path | None) -> None:

@@ -28,6 +28,8 @@ class PlainColumns:
     """The rows that cannot be read, and why; the place of a fault names the column alone."""
     resting: PickColumns = NOTHING
     """How long rows rest after they were picked."""
+    removed: NDArray[np.bool_] | None = None
+    """Whether each row of a variant takes that of its base out; None where no column says so."""
 
     @classmethod
     def read(cls, columns: Sequence[TextColumn], settings: TableSettings) -> PlainColumns:
@@ -48,7 +50,8 @@ class PlainColumns:
             None if turns is None else turns.astype(np.int64),
         )
         enabled, priorities = filled("enabled").astype(np.bool_), filled("priority").astype(np.int64)
-        return cls(enabled, priorities, filled("weight"), tuple(faults), resting)
+        removed = None if of["remove"] is None else of["remove"].astype(np.bool_)
+        return cls(enabled, priorities, filled("weight"), tuple(faults), resting, removed)
 
 
 @dataclass(frozen=True)
@@ -114,6 +117,7 @@ READERS: dict[str, Reader] = {
     "enabled": Reader(truth_of, True, '"True" or "False"'),
     "priority": Reader(_priority, 0, "a whole number"),
     "weight": Reader(_weight, 1.0, "a number from 0 up"),
+    "remove": Reader(truth_of, False, '"True" or "False"'),
     "once": Reader(truth_of, False, '"True" or "False"'),
     "cooldown_s": Reader(_weight, 0.0, "a number of seconds from 0 up"),
     "cooldown_turns": Reader(_turns, 0, "a whole number of picks from 0 up"),

@@ -16,7 +16,7 @@ from contextdb.compiled.table import CompiledTable
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.disk import TABLE_SUFFIXES, names_a_table, path_in_quotes, read_bytes, real_path
 from contextdb.disk.boundary import SCHEMA_FILE as SCHEMA_FILE
-from contextdb.disk.boundary import inside, why_outside
+from contextdb.disk.boundary import extended_file, inside, why_outside
 from contextdb.disk.together import finish
 from contextdb.errors import (
     ContextDBError,
@@ -34,11 +34,13 @@ from contextdb.errors import (
 )
 from contextdb.files import texts as files
 from contextdb.files.file_names import alike, composed, spelled
-from contextdb.schema.settings import EMPTY, Schema, TableSettings, read_schema
+from contextdb.schema.inheriting import resolved
+from contextdb.schema.settings import EMPTY, Schema, Studio, TableSettings, extends_of, read_schema
 from contextdb.tables.data import require_readable
 from contextdb.tables.nesting.links import Neighbours, inner_tables, is_nested, require_sound
 from contextdb.tables.other_files import other_form, stray_sentence
-from contextdb.tables.table import Table
+from contextdb.tables.table import Table, has_others
+from contextdb.tables.variants import whole_of
 
 T = TypeVar("T")
 
@@ -133,13 +135,21 @@ def require_all_sound(project: Project) -> None:
     """Raise TableError with what is wrong with rows that refer to tables."""
     faults: dict[Fault, None] = {}
     for table in project.tables.values():
-        if is_nested(table):
+        if has_others(table):
             try:
-                require_sound(table, project.tables)
+                require_whole(table, project.tables)
             except ContextDBError as error:
                 faults |= dict.fromkeys(error.faults)
     if faults:
         raise TableError(*faults)
+
+
+def require_whole(table: Table, tables: Mapping[str, Table]) -> None:
+    """Raise TableError with what is wrong with the base of a table and with the tables inside it."""
+    whole = whole_of(table, tables)
+    if is_nested(whole):
+        require_sound(whole, tables)
+    require_readable(whole)
 
 
 def load(path: str | Path, strict: bool = True) -> Table:
@@ -173,8 +183,8 @@ def load_table(path: Path, strict: bool = True) -> Table:
     folder, schema = schema_for(path)
     around = Neighbours(_Folder(folder, schema))
     table = _read_table(path, schema, folder, strict, around)
-    if strict and is_nested(table):
-        require_sound(table, around)
+    if strict and has_others(table):
+        require_whole(table, around)
     return table
 
 
@@ -230,7 +240,7 @@ def schema_for(path: Path) -> tuple[Path, Schema]:
     for folder in real_path(path).parent.parents:
         if (folder / SCHEMA_FILE).is_file():
             schema = read_folder_schema(folder)
-            if settings_of(path, folder, schema) in schema.tables.values():
+            if settings_of(path, folder, schema).name in schema.tables:
                 return folder, schema
             break
     return path.parent, EMPTY
@@ -246,13 +256,31 @@ def read_folder_schema(folder: Path) -> Schema:
 
 
 def schema_of(raw: bytes, path: Path) -> Schema:
-    """What the bytes of a contextdb.toml say. Raises SchemaError where they are no UTF-8, or have an invalid setting."""
+    """What the bytes of a contextdb.toml say, with what it extends. Raises SchemaError where they are no UTF-8, or have an invalid
+    setting; FileError where the project that it extends cannot be read."""
+    text = _decoded(raw, path)
+    return read_schema(text, str(path), _studio_of(text, path, ()))
+
+
+def _decoded(raw: bytes, path: Path) -> str:
     try:
-        text = raw.decode("utf-8-sig")
+        return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = raw[: error.start].count(b"\n") + 1
         raise SchemaError(Fault("the file is not UTF-8.", "TOML is UTF-8", "to save it as UTF-8", Place(str(path), line))) from None
-    return read_schema(text, str(path))
+
+
+def _studio_of(text: str, path: Path, way: tuple[Path, ...]) -> Studio | None:
+    """What the text of a contextdb.toml extends; None where it extends nothing, or not in a way that can be read."""
+    extends = extends_of(text, str(path))
+    if extends is None:
+        return None
+    file = extended_file(path.parent, extends)
+    if file in (real_path(path), *way):
+        problem = f"[project] extends = {in_quotes(extends)}: the project extends itself."
+        raise SchemaError(Fault(problem, "another project", "to leave it out", Place(str(path))))
+    known = _decoded(read_bytes(file), file)
+    return Studio(known, str(file), _studio_of(known, file, (*way, real_path(path), file)))
 
 
 def table_files(folder: Path, schema: Schema) -> Iterator[tuple[str, Path]]:
@@ -279,7 +307,8 @@ def stray_files(folder: Path, schema: Schema) -> Iterator[tuple[Path, str]]:
 def _files_in(folder: Path, schema: Schema) -> tuple[list[tuple[str, Path]], list[Path]]:
     """The declared tables of a folder, and the other files that may be tables."""
     declared = list(_declared_files(folder, schema))
-    others = list(_undeclared_files(folder, declared))
+    expected = {folder / settings.expected for settings in schema.tables.values() if settings.expected is not None}
+    others = [path for path in _undeclared_files(folder, declared) if path not in expected]
     paths = [*(path for _, path in declared), *others]
     if faults := [fault for path in paths if (fault := why_outside(path, folder)) is not None]:
         raise FileError(*faults)
@@ -321,7 +350,8 @@ def _names_in(folder: Path) -> list[str]:
 
 
 def settings_of(path: Path, folder: Path, schema: Schema) -> TableSettings:
-    """What contextdb.toml says of a table file: what it declares for this file, whatever the disk makes of its name."""
+    """What contextdb.toml says of a table file: what it declares for this file, whatever the disk makes of its name; of a variant
+    with what it inherits."""
     below = _below(path, folder)
     settings = schema.settings_for(below)
     if settings.name in schema.tables:
@@ -329,7 +359,7 @@ def settings_of(path: Path, folder: Path, schema: Schema) -> TableSettings:
     for declared in schema.tables.values():
         for file in declared.files:
             if alike(file) == alike(below) and _is_same_file(folder / file, path):
-                return declared
+                return resolved(declared, schema.tables)
     return settings
 
 

@@ -18,6 +18,7 @@ from contextdb.tables.compiling import compile_table
 from contextdb.tables.data import TableData, require_readable
 from contextdb.tables.nesting.flat import FlatTable, flatten
 from contextdb.tables.nesting.links import inner_rows, is_nested, nesting_faults
+from contextdb.tables.variants import WholeTable, is_variant, variant_faults, whole_of
 
 if TYPE_CHECKING:
     import polars as pl
@@ -89,8 +90,11 @@ class Table(TableData):
 
     @cached_property
     def faults(self) -> list[Fault]:
-        """Every cell that cannot be read, and every row that refers to a table that cannot be used there, in the order of rows."""
-        return self._in_order(() if self.around is None else nesting_faults(self, self.around))
+        """Every cell that cannot be read, every row that refers to a table that cannot be used there, in the order of rows, and a
+        base that cannot be used."""
+        if self.around is None:
+            return self._in_order(())
+        return self._in_order((*variant_faults(self, self.around), *nesting_faults(self, self.around)))
 
     def save(self, path: str | Path | None = None, overwrite: bool = False) -> Table:
         """Write the table atomically; only edited lines change. Returns the table as it is on disk.
@@ -126,26 +130,42 @@ class Table(TableData):
         require_readable(self)
         return CompiledTable(compile_table(self.flat(tables)))
 
-    def flat(self, tables: Mapping[str, Table] | None = None) -> Table | FlatTable:
-        """The table with the rows of its inner tables in place of those that refer to them: the rows that a query answers with.
-        The table itself where no row refers to a table. `tables` and what is raised as in `compile`."""
+    def flat(self, tables: Mapping[str, Table] | None = None) -> EitherTable:
+        """The table with the rows of its inner tables in place of those that refer to them, and those of its base where it is a
+        variant: the rows that a query answers with. The table itself where no other table has a part in it. `tables` and what is
+        raised as in `compile`."""
         if tables is not None:
             for table in require_mapping(tables, "tables", "a mapping of names to tables").values():
                 require_kind(table, Table, "a table of tables", "a Table")
-        if not is_nested(self):
+        if not has_others(self):
             return self
-        return self._flat if tables is None else flat_table(self, tables)
+        return self._flat if tables is None else flat_of(self, tables)
 
     @cached_property
-    def _flat(self) -> Table | FlatTable:
-        return flat_table(self, self.around)
+    def _flat(self) -> EitherTable:
+        return flat_of(self, self.around)
 
 
-EitherTable = Table | FlatTable
-"""A table as it was read, or one with the rows of the tables inside it."""
+EitherTable = Table | FlatTable | WholeTable
+"""A table as it was read, or one with the rows of the tables inside it, or of its base."""
 
 
-def flat_table(table: Table, tables: Mapping[str, Table] | None) -> FlatTable:
+def has_others(table: TableData) -> bool:
+    """Whether other tables have a part in it: inside its rows, or as its base."""
+    return is_variant(table) or is_nested(table)
+
+
+def flat_of(table: TableData, tables: Mapping[str, TableData] | None) -> FlatTable | WholeTable:
+    """A table with the rows of its base and of its inner tables; raises TableError where they are not known, or cannot be read."""
+    whole = whole_of(table, tables)
+    if is_nested(whole):
+        return flat_table(whole, tables)
+    assert isinstance(whole, WholeTable)
+    require_readable(whole)
+    return whole
+
+
+def flat_table(table: TableData, tables: Mapping[str, TableData] | None) -> FlatTable:
     """A table with its inner tables' rows; raises TableError where no others are known."""
     inner = inner_rows(table)
     if tables is None and inner:

@@ -23,10 +23,10 @@ from contextdb.cells.conditions import Condition
 from contextdb.compiled.batch import query_encoded
 from contextdb.compiled.choosing import Choosing
 from contextdb.compiled.data import CompiledData
+from contextdb.disk.engines import Engine, with_dask
 from contextdb.errors import ContextDBError, Fault, FileError
 from contextdb.telemetry.chunks import Chunk, chunks_of
 from contextdb.telemetry.contexts import context_files
-from contextdb.telemetry.engines import Engine, with_dask
 from contextdb.telemetry.facts_read import FactColumn, read_facts
 from contextdb.telemetry.keys import Counts, grouped
 from contextdb.telemetry.observe_file import moments_of
@@ -188,8 +188,9 @@ def backtest(
         if progress is not None:
             progress(n_done + share, len(paths))
 
-    here = ((path, backtest_file(comparison, path, tell)) for path in paths)
-    for _, part in with_dask(backtest_file, comparison, paths, scheduler) if engine == "dask" else here:
+    here = (backtest_file(comparison, path, tell) for path in paths)
+    there = (part for _, part in with_dask(backtest_file, comparison, paths, scheduler))
+    for part in there if engine == "dask" else here:
         total.add(part)
         n_done += 1
         tell(0.0)

@@ -16,10 +16,10 @@ from contextdb.covering.factors import TagFactor
 from contextdb.covering.report import Gap
 from contextdb.covering.ruled import RuledTable
 from contextdb.covering.space import Space, require_counts
+from contextdb.disk.engines import ENGINES, Engine, with_dask
 from contextdb.errors import ContextError, Fault, FileError, no_such
 from contextdb.tables.table import EitherTable
 from contextdb.telemetry.contexts import context_files
-from contextdb.telemetry.engines import ENGINES, Engine, with_dask
 from contextdb.telemetry.gap_list import box_of
 from contextdb.telemetry.keys import estimated
 from contextdb.telemetry.observe_file import observe_file
@@ -144,7 +144,8 @@ def _parts(
     n_threads = min(os.cpu_count() or 1, MOST_THREADS)
     here = ((path, observe_file(plan, path, n_threads, tell_share)) for path in left)
     mend = "to run again; with a resume folder, finished files are not read again"
-    for path, part in with_dask(observe_file, plan, left, scheduler, mend) if engine == "dask" else here:
+    there = ((left[i], part) for i, part in with_dask(observe_file, plan, left, scheduler, mend))
+    for path, part in there if engine == "dask" else here:
         if saved is not None:
             saved.put(path, part, keys[path])
         n_done += 1

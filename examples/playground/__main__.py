@@ -1,4 +1,4 @@
-"""Play: a character who obeys the tables beside this file. Edit them meanwhile: `contextdb edit examples/playground/tables`.
+"""Play: a character who obeys the tables beside this file. `contextdb play` opens it with the editor beside it.
 
 python -m examples.playground --clips FOLDER                       with any folder of BVH clips
 python -m examples.playground --headless 10 --stick stick.csv --poses out.npz --record out.parquet --picture out.png
@@ -17,9 +17,10 @@ from typing import Any
 
 from contextdb import motion
 from contextdb.errors import ContextDBError, Fault, FileError, Place
-from examples.playground.actor import LONGEST
-from examples.playground.game import Game
-from examples.playground.stick import Sticks, read_sticks, stick_at
+
+from .actor import LONGEST
+from .game import Game
+from .stick import Sticks, read_sticks, stick_at
 
 RATE, TABLES = 60.0, Path(__file__).parent / "tables"
 
@@ -27,6 +28,9 @@ RATE, TABLES = 60.0, Path(__file__).parent / "tables"
 def main(words: list[str] | None = None) -> int:
     """Read the arguments, and play."""
     parser = argparse.ArgumentParser(prog="python -m examples.playground", description=__doc__.splitlines()[0])
+    parser.add_argument(
+        "--tables", type=Path, default=TABLES, metavar="FOLDER", help="its tables (default: those beside this file)"
+    )
     parser.add_argument("--clips", type=Path, metavar="FOLDER", help="BVH clips to play with; their table is made")
     parser.add_argument("--link", metavar="NAME", default="playground", help="what the editor knows the game by")
     parser.add_argument("--headless", type=float, metavar="SECONDS", help="play so long without a window")
@@ -36,7 +40,7 @@ def main(words: list[str] | None = None) -> int:
     parser.add_argument("--picture", type=Path, metavar="FILE", help="with --headless: write the last moment, .png")
     given = parser.parse_args(words)
     try:
-        folder = own_tables() if given.clips is None else project_of_clips(given.clips)
+        folder = own_tables(given.tables) if given.clips is None else project_of_clips(given.clips)
         with Game(folder, None if given.headless else given.link) as game:
             if given.headless is None:
                 opened(game).begin().run()
@@ -72,14 +76,14 @@ def opened(game: Game, is_offscreen: bool = False) -> Any:
     """The game's window; Panda3D is imported where it is needed."""
     if find_spec("direct") is None:
         raise FileError(Fault("Panda3D draws the playground and is not installed.", mend="pip install 'contextdb[playground]'"))
-    return import_module("examples.playground.window").Window(game, is_offscreen)
+    return import_module(".window", __package__).Window(game, is_offscreen)
 
 
-def own_tables() -> Path:
+def own_tables(folder: Path = TABLES) -> Path:
     """The folder of the tables, with their clips, which are made where they are not there yet."""
-    if not (TABLES / "clips" / "walk_about_left.bvh").exists():
-        motion.write_game_clips(TABLES / "clips")
-    return TABLES
+    if not (folder / "clips" / "walk_about_left.bvh").exists():
+        motion.write_game_clips(folder / "clips")
+    return folder
 
 
 def project_of_clips(clips: Path) -> Path:

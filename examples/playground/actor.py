@@ -2,8 +2,9 @@
 
 import contextdb as cdb
 from contextdb import motion
-from examples.playground import world
-from examples.playground.stick import REST, Stick
+
+from . import world
+from .stick import REST, Stick
 
 LAST_MINUTE, LONGEST = 3600, 216_000
 """Decisions that are always kept, a minute at 60 a second; and of an hour, more are not recorded."""
@@ -16,6 +17,7 @@ class Actor:
         self.name, self.stock, self.moves = name, stock, moves
         self.character = stock.character(name, moves, motion.Steered(position=place), unknown="any", ground=world.ground)
         self.stamina, self.is_tired = 1.0, False
+        self.others: list[Actor] = []
         self.once: motion.OneOff | None = None
         self.readout = motion.Readout()
         self.trace = self.character.record(5, most=LAST_MINUTE)
@@ -31,7 +33,8 @@ class Actor:
         wanted, facing, once = stick.velocity(self.is_tired), stick.camera if stick.strafe else None, self.once
         if once is None:
             before = self.character.body
-            body = world.moved(before, before.moved(dt, wanted, facing))
+            after = world.apart(before.moved(dt, wanted, facing), (each.character.body.position for each in self.others))
+            body = world.moved(before, after)
             self.moved = self.character.update(dt, wanted, facts, facing, body=body)
         else:
             self.moved = once.update(dt, wanted, facts)

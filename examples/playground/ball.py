@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import motion
-from examples.playground.actor import Actor
-from examples.playground.stick import REST, Stick
+
+from .actor import Actor
+from .stick import REST, Stick
 
 if TYPE_CHECKING:
-    from examples.playground.game import Game
+    from .game import Game
 
 SPOTS = ((-1.5, 2.5), (1.5, -3.0), (-4.0, -1.0), (4.0, -2.0), (-2.0, -5.0))
 HELD_S, REACH_M, HIGH_M, FALL_S = 4.0, 1.6, 2.05, 1.2

@@ -10,10 +10,11 @@ from pathlib import Path
 
 import contextdb as cdb
 from contextdb import motion
-from examples.playground import world
-from examples.playground.actor import LAST_MINUTE, Actor
-from examples.playground.ball import Ball
-from examples.playground.stick import PACES_MPS, Stick
+
+from . import world
+from .actor import LAST_MINUTE, Actor
+from .ball import Ball
+from .stick import PACES_MPS, Stick
 
 LOOK_EVERY_S, GATE, GATE_CLOSES = 0.2, 1.0, 1.5
 """How often the files of the tables are looked at, below which cost a vault begins, and above which one may no more."""
@@ -37,6 +38,7 @@ class Game(AbstractContextManager["Game"]):
         if "once" in stock.databases:  # the game's own clips; a folder of others has none of these
             self.rival = Actor("rival", stock, moves, (2.5, -4.0))
             self.actors.append(self.rival)
+            self.player.others, self.rival.others = [self.rival], [self.player]
             self.node = motion.MatchNode(stock.databases["once"], position_weight=0.5, rotation_weight=0.5)
             self.gate = motion.MatchGate(self.node, GATE, GATE_CLOSES)
             self.ball = Ball(self)
@@ -57,7 +59,8 @@ class Game(AbstractContextManager["Game"]):
             self.asking = actor.name
             actor.update(dt, stick if actor is self.player or self.ball is None else self.ball.stick_of(actor, self.player))
             if self.link is not None and self.link.is_heard and actor.playing in actor.readout.valid.assets:
-                actor.moves.pick(actor.readout.valid.only([actor.playing]))  # the editor marks the row that the search picked
+                row = actor.readout.valid.only([actor.playing]).rows[0]  # the search picked it: the editor marks it
+                self.link.picked(actor.moves, actor.name, row)
         try:
             self._vault(self.player)
             if self.ball is not None:
@@ -106,8 +109,8 @@ class Game(AbstractContextManager["Game"]):
         lines = [
             f"{'tired' if player.is_tired else 'stamina'}  {100 * player.stamina:.0f} %",
             f"gate  {seen}" if seen else "",
-            "" if ball is None else "the ball is free" if ball.holder is None else ball.said,
-            "" if link is None else f"link  {link.name}, {'followed' if link.is_heard else 'nobody follows'}",
+            "" if ball is None or ball.holder is None else ball.said,
+            "" if link is None else "the editor follows" if link.is_heard else "no editor follows yet",
             f"recording  {len(player.trace)} moments" if player.trace.most > LAST_MINUTE else "",
             f"not loaded: {self.trouble}" if self.trouble else "",
         ]

@@ -15,10 +15,12 @@ from direct.showbase.ShowBase import ShowBase
 from panda3d import core
 
 from contextdb.errors import Fault, FileError
-from examples.playground.actor import LAST_MINUTE, LONGEST
-from examples.playground.drawing import CLIP, Scene
-from examples.playground.game import Game
-from examples.playground.stick import Stick
+
+from .actor import LAST_MINUTE, LONGEST
+from .drawing import CLIP, Scene
+from .game import Game
+from .guide import Guide
+from .stick import DEAD, Stick
 
 STEP_S, LONGEST_FRAME_S, SLOW, TURN_PER_PIXEL, TURN_DPS, SIZE, MOST_ROWS = 0.05, 0.25, 0.2, 0.2, 140.0, 0.048, 6
 KEYS = {"w": "ahead", "s": "back", "a": "left", "d": "right", "q": "strafe", "mouse3": "strafe", "shift": "run", "lshift": "run"}
@@ -34,6 +36,7 @@ F1\tthis help
 F2\tslow motion
 F3\tthe page of the last minute
 F4\trecord, and write what was recorded
+F5\twhy this clip, and what the table was asked
 Esc\tquit
 
 Any key begins. The tables, beside it: """
@@ -64,7 +67,9 @@ class Window:
     def __init__(self, game: Game, is_offscreen: bool = False, size: tuple[int, int] = (1280, 720), words: float = SIZE) -> None:
         self.game, self.base, self.is_offscreen = game, opened(is_offscreen, size), is_offscreen
         self.scene = Scene(self.base, game)
-        self.notice, self.is_slow, self.held, self.is_centred = "", False, set[str](), False
+        self.guide = Guide(game)
+        self.notice, self.held = "", set[str]()
+        self.is_slow = self.is_centred = self.has_details = False
         self.gamepads: Any = lambda: self.base.devices.getDevices(core.InputDevice.DeviceClass.gamepad)
         for name, shade in SHADES.items():
             properties = core.TextProperties()
@@ -74,6 +79,7 @@ class Window:
         core.TextNode.getDefaultFont().setLineHeight(1.15)
         left, top = 0.09 - self.base.getAspectRatio(), 0.92 - words
         self.top, self.state, self.middle = (self._text(x, y, words) for x, y in ((left, top), (left, -0.68), (-0.1, top)))
+        self.lesson = self._text(0.45, -0.8, 1.1 * words, is_centred=True)
 
     def begin(self) -> ShowBase:
         """Listen to the keys, and update the game in each frame that is run."""
@@ -83,7 +89,8 @@ class Window:
             base.accept(key, self._hold, [name])
             base.accept(f"shift-{key}", self._hold, [name])
             base.accept(f"{key}-up", self.held.discard, [name])
-        for key, act in (("f1", self._help), ("f2", self._slow), ("f3", self._page), ("f4", self._record), ("escape", sys.exit)):
+        acts = {"f1": self._help, "f2": self._slow, "f3": self._page, "f4": self._record, "f5": self._details, "escape": sys.exit}
+        for key, act in acts.items():
             base.accept(key, act)
         base.taskMgr.add(self._frame, "game")
         self._help()
@@ -100,6 +107,9 @@ class Window:
         steps = math.ceil(dt / STEP_S) or 1  # few pictures a second do not make the play slow
         for _ in range(steps):
             self.game.update(dt / steps * (SLOW if self.is_slow else 1.0), self._stick())
+        self.scene.swing(dt)
+        self.guide.update(dt)
+        self.lesson.setText("" if self.middle.getText() else self.guide.text)
         self.show()
         return task.cont
 
@@ -109,9 +119,9 @@ class Window:
         said = self.game.player.readout
         rows = [_in("plays", text) if plays else text for text, plays in said.rows[:MOST_ROWS]]
         rows += [f"and {len(said.rows) - MOST_ROWS} more"] * (len(said.rows) > MOST_ROWS)
-        rows = rows or [_in("alarm", "No row is valid now."), said.gap]
-        heads = [_in("big", said.title), said.why, "", _in("dim", "valid rows of moves")]
-        self.top.setText("\n".join([*heads, *rows, "", _in("dim", said.facts)]))
+        rows = [_in("dim", "Valid rows of moves"), *rows] if rows else [_in("alarm", "No row is valid for these facts."), said.gap]
+        details = ["", said.why, _in("dim", said.facts)] if self.has_details else []
+        self.top.setText("\n".join([_in("big", self.game.player.playing), *rows, *details]))
         self.state.setText("\n".join([*self.game.state, *([_in("plays", self.notice)] if self.notice else [])]))
 
     def write_picture(self, path: Path) -> None:
@@ -120,11 +130,16 @@ class Window:
         self.base.graphicsEngine.renderFrame()
         self.base.win.saveScreenshot(core.Filename.fromOsSpecific(str(path)))
 
-    def _text(self, x: float, y: float, size: float) -> core.TextNode:
+    def _text(self, x: float, y: float, size: float, is_centred: bool = False) -> core.TextNode:
         """Words on a dark card."""
         colours: dict[str, Any] = {"fg": (1.0, 1.0, 1.0, 1.0), "bg": (0.08, 0.09, 0.12, 0.72)}
         node = OnscreenText(
-            pos=(x, y), scale=size, wordwrap=1.4 / size, align=core.TextNode.ALeft, mayChange=True, **colours
+            pos=(x, y),
+            scale=size,
+            wordwrap=(2.2 if is_centred else 1.4) / size,
+            align=core.TextNode.ACenter if is_centred else core.TextNode.ALeft,
+            mayChange=True,
+            **colours,
         ).textNode
         node.setTabWidth(15.0)
         node.setCardAsMargin(0.7, 0.7, 0.5, 0.4)
@@ -151,16 +166,21 @@ class Window:
             pointer, x, y = window.getPointer(0), window.getXSize() // 2, window.getYSize() // 2
             is_centred = window.movePointer(0, x, y)
             if is_centred and self.is_centred:  # where the pointer comes from is no look
-                scene.turn -= TURN_PER_PIXEL * (pointer.getX() - x)
-                scene.tilt = min(60.0, max(4.0, scene.tilt + TURN_PER_PIXEL * (pointer.getY() - y)))
+                left, down = TURN_PER_PIXEL * (x - pointer.getX()), TURN_PER_PIXEL * (pointer.getY() - y)
+                if left or down:
+                    scene.look(left, down)
             self.is_centred = is_centred
         else:
             self.is_centred = False
         for pad in self.gamepads():
-            scene.turn -= dt * TURN_DPS * pad.findAxis(core.InputDevice.Axis.right_x).value
+            if abs(pushed := pad.findAxis(core.InputDevice.Axis.right_x).value) > DEAD:
+                scene.look(-dt * TURN_DPS * pushed)
 
     def _help(self) -> None:
         self.middle.setText("" if self.middle.getText() else HELP + edit_command(self.game.watch.folder))
+
+    def _details(self) -> None:
+        self.has_details = not self.has_details
 
     def _slow(self) -> None:
         self.is_slow, self.notice = not self.is_slow, "" if self.is_slow else "slow motion"

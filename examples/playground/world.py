@@ -1,12 +1,13 @@
 """The ground, what stands on it, and where a body may go. Metres; x is to the left of who faces along z."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from contextdb.motion import Steered
 
-RADIUS_M, HIGHEST_STEP_M, EDGE_M = 0.35, 0.35, 18.0
-"""How near a body comes to a wall, onto what it steps, and how far the world goes."""
+RADIUS_M, APART_M, HIGHEST_STEP_M, EDGE_M = 0.35, 0.6, 0.35, 18.0
+"""How near a body comes to a wall and to another body, onto what it steps, and how far the world goes."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,16 @@ def moved(before: Steered, after: Steered) -> Steered:
     ways = [((new_x, z), (vx, 0.0)), ((x, new_z), (0.0, vz))]
     place, velocity = next((way for way in ways if is_free(before.position, way[0])), ((x, z), (0.0, 0.0)))
     return replace(after, position=place, velocity=velocity, acceleration=(0.0, 0.0))
+
+
+def apart(body: Steered, others: Iterable[tuple[float, float]]) -> Steered:
+    """A body that keeps its distance from others: it is pushed back to where it touches them, and slides round."""
+    x, z = body.position
+    for other_x, other_z in others:
+        away = math.hypot(x - other_x, z - other_z)
+        if 1e-6 < away < APART_M:
+            x, z = other_x + (x - other_x) * APART_M / away, other_z + (z - other_z) * APART_M / away
+    return body if (x, z) == body.position else replace(body, position=(x, z))
 
 
 def is_free(here: tuple[float, float], there: tuple[float, float]) -> bool:

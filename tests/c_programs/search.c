@@ -7,6 +7,7 @@ static unsigned long count_clusters, count_groups, count_boxes, count_frames, co
 #define CDBM_COUNT(what) (count_##what++)
 #define CDB_MALLOC(size) malloc(size)
 #define CDB_FREE(block) free(block)
+#include "poses.h"
 #include "motion.h"
 
 static FILE *from;
@@ -30,6 +31,8 @@ static void answer_case(FILE *to)
     cdbm_frames frames;
     cdbm_question asked;
     cdbm_hits hits;
+    cdbm_room room;
+    char *own;
     size_t n, n_slots, n_skips, i;
     void *all[40];
     size_t n_all = 0;
@@ -77,7 +80,10 @@ static void answer_case(FILE *to)
     hits.totals = (double *)malloc(n_slots * sizeof(double) + 1);
     hits.frames = (int64_t *)malloc(n_slots * sizeof(int64_t) + 1);
     hits.ranges = (int64_t *)malloc(n * sizeof(int64_t) + 1);
-    if (!cdbm_make_levels(&frames) || !cdbm_search_frames(&frames, &asked, 0, n, &hits)) exit(5);
+    if (!cdbm_make_levels(&frames)) exit(5);
+    room.left = cdbm_search_room(&frames, n), room.at = own = (char *)malloc(room.left + 1);
+    if (!cdbm_search_frames(&frames, &asked, 0, n, &hits, room)) exit(5);
+    free(own);
     fwrite(hits.totals, sizeof(double), n_slots, to);
     fwrite(hits.frames, sizeof(int64_t), n_slots, to);
     fwrite(hits.ranges, sizeof(int64_t), n, to);

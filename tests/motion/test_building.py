@@ -17,7 +17,7 @@ from contextdb.motion.features.extraction import clip_features
 from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.search.database import build_databases
 from contextdb.motion.search.filters import Biases
-from contextdb.motion.storage import building
+from contextdb.motion.storage import extracting
 from contextdb.motion.storage.building import build, build_all, open_or_build, saved_path
 from contextdb.motion.storage.clip_files import unmatched
 from contextdb.motion.storage.feature_cache import EXTRACTION, FeatureCache, file_name, key_of
@@ -351,7 +351,7 @@ def test_builds_at_once_give_the_same_and_leave_a_whole_cache(folder):
 
 def test_a_clip_that_changes_while_it_is_read_never_stands_under_a_wrong_key(folder, monkeypatch):
     path = folder / "clips" / "walk.bvh"
-    real = building.extract
+    real = extracting.extract
 
     def extract_and_alter(file, cache):
         found = real(file, cache)
@@ -359,7 +359,7 @@ def test_a_clip_that_changes_while_it_is_read_never_stands_under_a_wrong_key(fol
             alter(path)
         return found
 
-    monkeypatch.setattr(building, "extract", extract_and_alter)
+    monkeypatch.setattr(extracting, "extract", extract_and_alter)
     build(CONFIG, folder)
     monkeypatch.undo()
     after = build_all(CONFIG, folder)

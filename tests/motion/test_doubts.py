@@ -11,7 +11,8 @@ import pytest
 
 from contextdb.errors import MotionError
 from contextdb.motion import Clip, MotionConfig, load_bvh, write_bvh
-from contextdb.motion.clips.doubts import Measures, doubts_of, grouped, measure
+from contextdb.motion.clips.clip_measures import Measures, measure
+from contextdb.motion.clips.doubts import doubts_of, grouped
 from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.storage.building import build_all
 

@@ -285,7 +285,7 @@ def test_the_memory_of_a_search_is_a_fifth_more_than_the_features_at_most():
     stops = np.cumsum(lengths)
     features = rng.normal(size=(int(stops[-1]), 27)).astype(np.float32)
     database = MotionDatabase.from_features(features, stops - lengths, stops, [f"a{i}" for i in range(60)])
-    assert database.layout.n_bytes + database._searcher._frames.n_bytes <= 1.2 * features.nbytes
+    assert database.layout.n_bytes + database.frames.n_bytes <= 1.2 * features.nbytes
 
 
 def test_a_database_that_has_searched_can_be_sent_to_another_process():

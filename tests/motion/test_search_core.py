@@ -103,7 +103,16 @@ def cases(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, bytes]:
 
 def program(folder: Path, name: str, *command: str) -> Path:
     target = folder / name
-    line = [*command, "-std=c99", "-ffp-contract=off", *STRICT, "-Wno-unused-function", f"-I{CORE}", str(PROGRAMS / "search.c")]
+    line = [
+        *command,
+        "-std=c99",
+        "-ffp-contract=off",
+        *STRICT,
+        "-Wno-unused-function",
+        f"-I{CORE}",
+        str(PROGRAMS / "search.c"),
+        "-lm",
+    ]
     done = subprocess.run([*line, "-o", str(target)], capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
     return target
@@ -178,7 +187,7 @@ def test_arrays_that_do_not_go_together_are_refused_when_they_are_handed_over():
 
 def test_a_search_with_arrays_of_another_shape_is_refused():
     database, queries, many = walks(500, 3, 1)
-    frames = database._searcher._frames
+    frames = database.frames
     one = many.shared
     good = [queries[0], one.ranges, one.range_biases, one.kinds.allowed, one.kinds.biases, one.kinds.playable, None, None, None]
     good += [-1, 0.0, np.inf, np.empty(1), np.empty(1, np.int64)]

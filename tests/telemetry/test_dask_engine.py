@@ -12,9 +12,9 @@ import pytest
 from running import run
 from strategies import IS_FULL
 
+from contextdb.disk.engines import EngineError
 from contextdb.tables.table import Table
 from contextdb.telemetry import observe
-from contextdb.telemetry.engines import EngineError
 
 SCHEMA = {"speed": {"type": "number", "min": 0.0, "max": 10.0}}
 TABLE = Table.from_columns({"Asset": ["a", "b"], "speed": ["0..2", "4..5"]}, SCHEMA)
@@ -61,7 +61,7 @@ def test_a_worker_killed_half_way_changes_no_sum(recorded, cluster):
 
 
 def test_files_that_kill_every_worker_are_named(recorded, cluster, monkeypatch):
-    monkeypatch.setattr("contextdb.telemetry.engines._run", die)
+    monkeypatch.setattr("contextdb.disk.engines._run", die)
     with pytest.raises(EngineError, match=r"could not be finished: .*00\.parquet"):
         observe(TABLE, str(recorded / "00.parquet"), engine="dask", scheduler=cluster.scheduler_address)
 
@@ -136,7 +136,7 @@ def test_evaluate_names_the_faults_of_every_file_and_writes_nothing(recorded, cl
 
 @pytest.mark.skipif(not IS_FULL, reason="with EXAMPLES=full: two workers are started for it")
 def test_evaluate_that_kills_every_worker_names_the_files(recorded, cluster, table_file, monkeypatch):
-    monkeypatch.setattr("contextdb.telemetry.engines._run", die)
+    monkeypatch.setattr("contextdb.disk.engines._run", die)
     told = ("evaluate", table_file, str(recorded / "00.parquet"), "--out", str(recorded / "answers.csv"))
     found = run(*told, "--engine", "dask", "--scheduler", cluster.scheduler_address)
     assert (found.code, found.out) == (2, "")

@@ -86,6 +86,26 @@ def test_a_listener_learns_who_asked_what_and_what_was_picked(link: cdb.Link, me
     assert jog.assets[line["pick"]["row"]] == line["pick"]["asset"] == asset
 
 
+def test_a_row_that_the_game_plays_of_itself_belongs_to_the_last_question(meeting: Path, file: Path):
+    with cdb.link("game", record=file) as link:
+        jog = table()
+        link.watch(jog, "player")
+        valid = jog.query(FACTS)
+        link.picked(jog, "player", int(valid.rows[0]))
+        link.picked(jog, "npc", -1)
+    [played], [other] = recorded(file), recorded(file, "pick")
+    assert (played["who"], played["pick"]) == ("player", {"row": 1, "asset": jog.assets[1]})
+    assert (other["who"], other["pick"]["row"]) == ("npc", None)
+
+
+@pytest.mark.parametrize("row", [3, -2, 1.5, "run"])
+def test_a_row_that_the_table_does_not_have_is_not_published(link: cdb.Link, row: object):
+    with pytest.raises(cdb.ContextDBError):
+        link.picked(table(), "player", row)  # type: ignore[arg-type]
+    with pytest.raises(cdb.ContextDBError, match="a compiled table"):
+        link.picked({}, "player", 0)  # type: ignore[arg-type]
+
+
 def test_every_way_to_ask_a_table_is_told_once(meeting: Path, file: Path):
     with cdb.link("game", record=file) as link:
         jog = table()
@@ -150,7 +170,7 @@ def test_a_live_context_tells_what_it_is_asked_and_its_picks_are_its_own(meeting
     lines = recorded(file)
     assert [line["who"] for line in lines] == ["npc0", "npc1", "npc0"]
     assert [line["facts"]["speed"] for line in lines] == [0.7, 2.5, 2**60]
-    assert [line["pick"]["row"] in answer for line, answer in zip(lines, answers, strict=False)] == [True, True]
+    assert [line["pick"]["row"] in answer.rows for line, answer in zip(lines, answers, strict=False)] == [True, True]
     assert recorded(file, "pick") == []
 
 

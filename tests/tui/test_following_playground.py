@@ -35,6 +35,17 @@ def tables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     shutil.rmtree(base, ignore_errors=True)
 
 
+def test_an_editor_that_expects_a_game_follows_its_player_once_it_is_there(tables: Path):
+    async def script(app, pilot):
+        app.main.expect_game("playground")
+        with play.opened(tables, "playground") as game:
+            following = app.main.following
+            await until(pilot, lambda: game.update(1.0 / RATE, BACKWARDS) or following.followed is not None)
+            return following.followed.name
+
+    assert with_editor(tables / "moves.csv", script, (130, 45)) == "playground · player"
+
+
 def test_the_editor_sees_the_gap_live_makes_its_row_and_the_game_plays_it(tables: Path):
     watch, look, fill = ([*keys_of(text)] for _, text in BLOCK.findall(section(9)))
 

@@ -31,7 +31,7 @@ def test_a_rename_that_would_fork_a_condition_asks_and_escape_changes_nothing(fo
         return question, app.main.session.sheet.is_modified
 
     question, is_modified = with_editor(folder / "a.csv", script, (100, 24))
-    assert "speed is used by 1 table, 1 derived fact, 2 assumptions, 1 blueprint" in question
+    assert "speed is used by 1 table, 1 derived fact, 2 assumptions, 1 contract," in question
     assert "Rename everywhere" in question
     assert "Only here" in question
     assert not is_modified

@@ -129,7 +129,7 @@ SCREENS = (
     Screen(named("motion"), "1 session", "MotionPane SessionList", leaves=alt("1")),
     Screen("\r", "─Bars · ", "DebugScreen Bars", leaves="q", before=MOTION),
     Screen("\t\t]", JUMPED, "Stage", leaves="q", before=(*MOTION, BARS)),
-    Screen("\t\t\t]", JUMPED, "Channels", leaves="q", before=(*MOTION, BARS)),
+    Screen("\t\t\t]", JUMPED, "CursorLines", leaves="q", before=(*MOTION, BARS)),
     Screen("?", "Esc close", "DebugHelp HelpPage Dialog", leaves="qq", before=(*MOTION, BARS)),
     Screen(xterm("ctrl+g"), "Go to", "AskDialog Dialog", is_typed_in=True, also=TYPED),
     Screen(xterm("f9") + xterm("f2"), "Rename the context", "AskDialog Dialog", is_typed_in=True, leaves=ESC + ESC, also=TYPED),

@@ -296,6 +296,13 @@ class MainScreen(TableScreen):
         else:
             self.try_to(lambda: self.test_row.step(by))
 
+    def expect_game(self, game: str) -> None:
+        """Follow a game as soon as it asks this table."""
+        from .expected_game import LOOK_EVERY_S, ExpectedGame
+
+        expected = ExpectedGame(game, self.table_name, self.following.start)
+        expected.timer = self.set_interval(LOOK_EVERY_S, expected.look)
+
     def action_live(self) -> None:
         """Let the test row follow a game, or a recording."""
         from .live import LiveDialog

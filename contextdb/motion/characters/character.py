@@ -12,11 +12,9 @@ A character reads no clock: the same calls give the same poses.
 
 from __future__ import annotations
 
-import math
 import random
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from copy import copy
-from dataclasses import replace
 from typing import Unpack
 
 import numpy as np
@@ -25,28 +23,26 @@ from numpy.typing import ArrayLike
 from contextdb.cells.arguments import require_callable, require_kind, require_mapping, require_point, require_real, require_text
 from contextdb.errors import ContextError, Fault, in_quotes, some
 from contextdb.motion.answers import Answer
+from contextdb.motion.arguments import query_of
 from contextdb.motion.characters import tables as asking
+from contextdb.motion.characters import walks
 from contextdb.motion.characters.facts import FACTS, FactOf, Ground, Moment
-from contextdb.motion.characters.paths import ahead_s, apart_of, back_s, path_from_place, place_beside
 from contextdb.motion.characters.played import Played
 from contextdb.motion.characters.project import HasTables, Parts
 from contextdb.motion.characters.tables import Facts, Tables, Unknown
 from contextdb.motion.characters.updates import UNKNOWN, CharacterState, Options, Paths, Step, Updated
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.clips.steering import Steered, steered_path
-from contextdb.motion.clips.trajectory import Trajectory, to_own_frame
-from contextdb.motion.features.extraction import Features, with_path
+from contextdb.motion.clips.steering import Steered
+from contextdb.motion.clips.trajectory import Trajectory
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.nodes.warping import Target
 from contextdb.motion.output.bank import PoseBank
 from contextdb.motion.output.ground import Ground as HeightOf
-from contextdb.motion.output.samples import Place3
-from contextdb.motion.output.stream import Pose, PoseStream
-from contextdb.motion.search.database import MotionDatabase
+from contextdb.motion.output.stream import PoseStream, root_of
 from contextdb.motion.selection.controller import Clock, Controller
 from contextdb.motion.selection.controller import Place as ControllerPlace
 from contextdb.motion.selection.decision import Decision, Playing, plays
-from contextdb.motion.selection.root_motion import NO_MOTION, RootMotion
+from contextdb.motion.selection.root_motion import RootMotion
 from contextdb.motion.selection.search_options import OfValid
 from contextdb.motion.selection.variation import Rng
 from contextdb.motion.trace.session import MOST, Trace
@@ -122,8 +118,8 @@ class Character:
         self.own_facts, self.unknown, self.ground = dict(own_facts), unknown, ground
         self.tables = tables
         self._own: tuple[object, object, Mapping[str, FactOf]] = (None, None, {})
-        self._body, self._apart = body, NO_MOTION
-        self._trail: tuple[tuple[float, Place3], ...] = ()
+        self._body: Steered | None = None
+        self._stand(walks.begun(schema.ways, body), body)
 
     @classmethod
     def of(
@@ -169,7 +165,7 @@ class Character:
         """Another character that stands where this one does, with the same tables, databases and poses, and no recorder."""
         stream = None if self.stream is None else copy(self.stream)
         options = {"own_facts": self.own_facts, "pose": self.pose, "unknown": self.unknown, "ground": self.ground}
-        copied = Character(self.controller.copy(), self.schema, self.tables, stream, self._body, **options)  # type: ignore[arg-type]
+        copied = Character(self.controller.copy(), self.schema, self.tables, stream, self.body, **options)  # type: ignore[arg-type]
         copied.restore(self.state)
         return copied
 
@@ -208,17 +204,28 @@ class Character:
     @property
     def body(self) -> Steered:
         """Where the game has the body. Set it to put the character elsewhere: the animation comes after it."""
+        if self._body is None:
+            self._body = walks.body_of(self._row)
         return self._body
 
     @body.setter
     def body(self, body: Steered) -> None:
         require_kind(body, Steered, "body", "a Steered")
-        self._body = body
+        self._stand(walks.with_body(self._row, body), body)
+
+    def _stand(self, rows: Floats, body: Steered | None, at: int = 0) -> None:
+        """Stand where one of some rows says; `body` is its body where that is known."""
+        self._rows, self._at, self._body = rows, at, body
+
+    @property
+    def _row(self) -> Floats:
+        """The character's walk: [1, W]."""
+        return walks.fitted(self.schema.ways, self._rows[self._at : self._at + 1])
 
     @property
     def root(self) -> RootMotion:
         """Where the animation is: x to the left, z ahead and the heading of the last pose's root, which may lag behind the body."""
-        return RootMotion(*place_beside((*self._body.position, self._body.heading), self._apart))
+        return RootMotion(*walks.place_of(self._row))
 
     def sees(self, x_m: float, z_m: float, heading_rad: float | None = None) -> Target:
         """A place in the world as seen from where the animation is: a target of one-offs, its distance and direction for facts.
@@ -235,8 +242,10 @@ class Character:
     @property
     def state(self) -> CharacterState:
         """Where the character is, to come back to with `restore`. The facts of live contexts are the game's and not in it."""
-        stream = None if self.stream is None else self.stream.state
-        return CharacterState(self._body, self._apart, self._trail, self.controller.state, stream)
+        stream, walk, controller = None if self.stream is None else self.stream.state, self._row.tobytes(), self.controller
+        displayed = np.array((-1.0, 0.0, 0.0) if self.stream is None else self.stream.displayed, np.float64)
+        row = b"" if stream is None else stream.row.tobytes()
+        return CharacterState(walk, controller.state, stream, walk + controller.row.tobytes() + displayed.tobytes() + row)
 
     def restore(self, state: CharacterState) -> None:
         """Go on from a state of this character, or of another one with the same parts; raises ContextError for anything else."""
@@ -246,7 +255,7 @@ class Character:
         if self.stream is not None and state.stream is not None:
             self.stream.restore(state.stream)
         self.controller.restore(state.controller)
-        self._body, self._apart, self._trail = state.body, state.apart, state.trail
+        self._stand(state.row, None)
 
     def update(
         self,
@@ -288,13 +297,16 @@ class Character:
         if path is not None:
             require_kind(path, Trajectory, "path", "a Trajectory over the ground")
         step = self._step(dt, stick, facts, facing, body)
-        wished = self._wished(step, self._steered(step, stick, facing) if path is None else path)
-        query = with_path(self.schema, self._features(step.dt_s, step.body), wished)
+        pose = self._features(step)[None]
+        if path is None:
+            paths, queries = walks.wished(self.schema, step.walk, step.goal, pose)
+        else:
+            paths, queries = walks.wished_along(self.schema, step.walk, path, pose)
         if "valid" not in options:
             options["valid"] = self._valid(step.facts)
         before = self.controller.place
-        decision = self.controller.update(step.dt_s, query, context=step.facts or None, body=step.body, **options)
-        return self._answer(step, wished, decision, before)
+        decision = self.controller.update(step.dt_s, queries[0], context=step.facts or None, body=step.body, **options)
+        return self._answer(step, paths, decision, before)
 
     # ---- the parts of an update, for a crowd
 
@@ -305,17 +317,19 @@ class Character:
         require_kind(body, (Steered, type(None)), "body", "a Steered")
         if facing is not None:
             require_real(facing, "facing")
-        moved = self._body.moved_unchecked(dt, stick, facing) if body is None else body
-        return self._step_of(dt, stick, given, facing, moved)
+        goals = walks.goals_of([stick], [facing])
+        rows, _ = walks.moved(self.schema.ways, self._row, goals, dt, [body])
+        return self._step_of(dt, stick, given, facing, rows, goals, body or walks.body_of(rows))
 
-    def _step_of(self, dt: float, stick: Ground, given: Facts, facing: float | None, moved: Steered) -> Step:
-        """The same with the body that has moved."""
-        place = place_beside((*moved.position, moved.heading), self._apart)
+    def _step_of(
+        self, dt: float, stick: Ground, given: Facts, facing: float | None, row: Floats, goal: Floats, body: Steered
+    ) -> Step:
+        """The same where the body has moved."""
         own, facts = self.asked_facts, given
         if any(name not in given for name in own):
-            moment = Moment(dt, stick, facing, moved, self.playing, self._played())
+            moment = Moment(dt, stick, facing, body, self.playing, self._played())
             facts = {**{name: of(moment) for name, of in own.items() if name not in given}, **given}
-        return Step(dt, moved, place, self._trail_after(dt, place), facts)
+        return Step(dt, row, goal, body, facts)
 
     def _played(self) -> Played | None:
         """What plays, with what it is of."""
@@ -326,25 +340,20 @@ class Character:
         bank = banks if isinstance(banks, PoseBank) else banks.get(playing.database)
         return Played(playing, self.controller.selector.databases.get(playing.database), bank)
 
-    def _steered(self, step: Step, stick: Ground, facing: float | None) -> Trajectory:
-        """The path of the body if the stick stays as it is, as far as a search must know it."""
-        reach = ahead_s(self.schema, math.hypot(*stick), step.body.velocity_halflife_s)
-        return steered_path([step.body], stick, facing, reach_s=reach, rate=self.schema.rate)
-
-    def _wished(self, step: Step, path: Trajectory) -> Trajectory:
-        """The path from where the animation is: what lies behind it is where it was."""
-        return _after_trail(path_from_place(step.place, path), step.trail)
-
-    def features(self) -> Features | Floats:
+    def features(self) -> Floats:
         """The features of the pose as it is now, which a query begins with, such as for `MatchNode.enter`. Never fails."""
-        return self._features(0.0, self._body)
+        return self._features_after(0.0, self._row)
 
-    def _features(self, dt_s: float, body: Steered) -> Features | Floats:
-        """The features of the pose that a query begins with: of the frame that plays next, or of rest where nothing plays."""
+    def _features(self, step: Step) -> Floats:
+        """The features of the pose that a query begins with."""
+        return self._features_after(step.dt_s, step.walk)
+
+    def _features_after(self, dt_s: float, row: Floats) -> Floats:
+        """Those of the frame that plays next, or of rest where nothing plays."""
         if self.pose is not None:
-            return np.asarray(self.pose(self, dt_s))
+            return query_of(self.pose(self, dt_s), self.schema.feature_names)
         features = self.controller.upcoming_features(dt_s)
-        return resting_pose(self.controller.selector.databases, self.schema, body) if features is None else features
+        return walks.resting(self.schema, row, self.controller.selector.databases)[0] if features is None else features
 
     def _valid(self, facts: Facts) -> OfValid | None:
         """What the tables allow with some facts."""
@@ -353,63 +362,19 @@ class Character:
         }
         return asking.valid_of(self._tables, answers)
 
-    def _answer(self, step: Step, wished: Trajectory, decision: Decision, before: ControllerPlace) -> Updated:
+    def _answer(self, step: Step, paths: Paths, decision: Decision, before: ControllerPlace) -> Updated:
         """The pose after a decision; `before` is where the controller stood."""
         if self.stream is None:
-            return self._updated(step, (wished,), decision, (), 0, None)
+            roots = np.array([(*step.body.position, step.body.heading)])
+            self._stand(walks.settled(self.schema.ways, step.walk, roots, False), step.body)
+            return Updated(step.body, step.facts, paths, decision)
         try:
             pose = self.stream.update(decision, step.dt_s, step.body, self.ground)
         except Exception:
             self.controller.put_back(before)
             raise
-        return self._updated(step, (wished,), decision, (pose,), 0, pose.root)
-
-    def _updated(
-        self, step: Step, paths: Paths, decision: Decision, poses: Sequence[Pose | None], at: int, root: Place3 | None
-    ) -> Updated:
-        """What an update gave, once the pose of a number among some is displayed, with its root."""
-        body, apart = step.body, NO_MOTION
-        if root is not None and self.stream is not None:
-            if self.stream.settings.root == "animation":
-                body = replace(body, position=root[:2], heading=root[2])
-            else:
-                apart = apart_of(root, (*body.position, body.heading))
-        self._body, self._apart, self._trail = body, apart, step.trail
-        return Updated(body, step.facts, paths, decision, poses, at)
-
-    def _trail_after(self, dt_s: float, place: Place3) -> tuple[tuple[float, Place3], ...]:
-        """Where the animation was, and how many seconds ago, from the oldest that a search must know to now."""
-        if not self.schema.looks_back:
-            return ()
-        back = back_s(self.schema)
-        older = [(ago + dt_s, each) for ago, each in self._trail]
-        needed = sum(ago > back for ago, _ in older)  # one behind the farthest
-        return (*older[max(0, needed - 1) :], (0.0, place))
-
-
-def resting_pose(databases: Mapping[str, MotionDatabase], schema: FeatureSchema, body: Steered) -> Floats:
-    """The pose of a character that plays nothing: the mean of all frames, moving as the body does; zeros without databases."""
-    pose = np.zeros(schema.n_features)
-    for database in databases.values():
-        pose = database.normalisation.undo(pose)
-        break
-    left, ahead = to_own_frame(np.array(body.velocity), np.array(body.heading))
-    for channel in schema.channels:
-        if channel.type == "velocity" and channel.relative_to is None:
-            own = pose[schema.slices[channel.name]].reshape(-1, 3)
-            own[:] = left, 0.0, ahead
-    return pose
-
-
-def _after_trail(path: Trajectory, trail: tuple[tuple[float, Place3], ...]) -> Trajectory:
-    """A path whose past is a trail, at the path's own rate."""
-    if len(trail) < 2:
-        return path
-    ago = np.array([seconds for seconds, _ in trail])
-    places = np.array([place for _, place in trail])
-    places[:, 2] = np.unwrap(places[:, 2])
-    n_past = math.ceil(float(ago[0]) * path.rate - 1e-9)
-    times = -np.arange(n_past, 0, -1) / path.rate
-    past = np.stack([np.interp(times, -ago, places[:, axis]) for axis in range(3)], axis=1)
-    headings = np.unwrap(np.concatenate((past[:, 2], path.headings[path.now :])))
-    return Trajectory(path.rate, np.concatenate((past[:, :2], path.positions[path.now :])), headings, n_past)
+        moves_body = root_of(decision, self.stream.settings) == "animation"
+        self._stand(
+            walks.settled(self.schema.ways, step.walk, np.array([pose.root]), moves_body), None if moves_body else step.body
+        )
+        return Updated(self.body, step.facts, paths, decision, (pose,))

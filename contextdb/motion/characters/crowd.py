@@ -17,18 +17,14 @@ from contextdb.cells.sequences import ListSequence
 from contextdb.errors import ContextError, Fault, MotionError, in_quotes, plural
 from contextdb.motion.answers import Answer
 from contextdb.motion.characters import tables as asking
+from contextdb.motion.characters import walks
 from contextdb.motion.characters.character import Character
-from contextdb.motion.characters.paths import MOST_TURN_RAD, ahead_s, back_s, shares_left
 from contextdb.motion.characters.tables import Facts, Table
-from contextdb.motion.characters.updates import CharacterState, Paths, Step, Updated
-from contextdb.motion.clips.many_paths import ManyTrajectories
-from contextdb.motion.clips.many_steered import ManySteered, steered_paths
+from contextdb.motion.characters.updates import CharacterState, Step, Updated
+from contextdb.motion.clips.many_steered import ManySteered
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.features.extraction import with_path
-from contextdb.motion.features.path_features import with_paths
 from contextdb.motion.output.pose import Pose
-from contextdb.motion.output.samples import Place3
-from contextdb.motion.output.stream import PoseStream
+from contextdb.motion.output.stream import PoseStream, root_of
 from contextdb.motion.output.streams import PoseStreams
 from contextdb.motion.records import collector_at_rest
 from contextdb.motion.selection.controller_group import ControllerGroup
@@ -115,32 +111,52 @@ class Crowd(ListSequence[Character]):
         dt = require_real(dt, "dt", 0.0)
         if not len(self):
             return []
-        bodies = ManySteered.of([character.body for character in self]).moved(dt, sticks, facing)
-        wanted = np.asarray(sticks, np.float64)
-        headings = None if facing is None else np.asarray(facing, np.float64)
-        given = _facts_of_each(facts, len(self))
-        steps = []
-        for i, (character, (x, z), body) in enumerate(zip(self, wanted.tolist(), bodies, strict=True)):
-            heading = None if headings is None else float(headings[i])
-            steps.append(character._step_of(dt, (x, z), given[i], heading, body))
+        schema = self[0].schema
+        if any(character.schema is not schema and character.schema != schema for character in self):
+            raise MotionError(Fault("the characters have different features.", "characters of one feature schema"))
+        bodies = ManySteered.of([character.body for character in self])
+        goals, given = bodies.goals(sticks, facing), _facts_of_each(facts, len(self))
+        rows = np.concatenate([character._row for character in self])
+        rows, _ = walks.moved(schema.ways, rows, goals, dt, [None] * len(self))
+        steps, each = [], zip(self, given, walks.bodies_of(rows), goals.tolist(), strict=True)
+        for i, (character, own, body, (x, z, heading)) in enumerate(each):
+            wanted = None if math.isnan(heading) else heading
+            steps.append(character._step_of(dt, (x, z), own, wanted, rows[i : i + 1], goals[i : i + 1], body))
         group = ControllerGroup(character.controller for character in self)
-        queries, paths = self._queries(dt, group, steps, bodies, wanted, headings)
+        paths, queries = walks.wished(schema, rows, goals, self._features(dt, group, steps))
+        places = np.array([(*step.body.position, step.body.heading) for step in steps])
         valid = self._valid(steps)
         before = [controller.place for controller in group]
-        decisions = group.update(dt, queries, valid, contexts=[step.facts or None for step in steps], body=bodies)
+        decisions = group.update(
+            dt, queries, valid, contexts=[step.facts or None for step in steps], body=[step.body for step in steps]
+        )
         try:
-            poses, roots = self._poses_and_roots(dt, decisions, np.column_stack((bodies.positions, bodies.headings)))
+            poses, roots = self._poses_and_roots(dt, decisions, places)
         except Exception:
             for controller, place in zip(group, before, strict=True):
                 controller.put_back(place)
             raise
-        together = enumerate(zip(self, steps, decisions, roots, strict=True))
-        return [each._updated(step, paths, decision, poses, i, root) for i, (each, step, decision, root) in together]
+        moves = [_moves_body(character, decision) for character, decision in zip(self, decisions, strict=True)]
+        for moves_body in set(moves):
+            numbers = [i for i, own in enumerate(moves) if own is moves_body]
+            rows[numbers] = walks.settled(schema.ways, rows[numbers], roots[numbers], moves_body)
+        updated = []
+        for i, (character, step, decision) in enumerate(zip(self, steps, decisions, strict=True)):
+            character._stand(rows, None if moves[i] else step.body, i)
+            updated.append(Updated(character.body, step.facts, paths, decision, poses, i))
+        return updated
 
-    def _poses_and_roots(
-        self, dt: float, decisions: list[Decision], places: Floats
-    ) -> tuple[Sequence[Pose | None], list[Place3] | list[Place3 | None]]:
-        """The poses of all and their roots, None without a stream; those of equal streams are worked out together."""
+    def _features(self, dt: float, group: ControllerGroup, steps: list[Step]) -> Floats:
+        """The features of the pose that each query begins with."""
+        features = np.asarray(group.poses(dt))
+        for i, character in enumerate(self):
+            if character.pose is not None or character.playing is None:
+                features[i] = character._features(steps[i])
+        return features
+
+    def _poses_and_roots(self, dt: float, decisions: list[Decision], places: Floats) -> tuple[Sequence[Pose | None], Floats]:
+        """The poses of all, None without a stream, and their roots, the body's without one; those of equal streams are worked out
+        together."""
         groups = []
         for numbers in self._equal_streams():
             streams = PoseStreams(stream for i in numbers if (stream := self[i].stream) is not None)
@@ -150,12 +166,14 @@ class Crowd(ListSequence[Character]):
         for _, streams, _, rows in groups:
             streams.go_on(rows)
         if groups and len(groups[0][0]) == len(self):
-            return groups[0][2], [(x, z, heading) for x, z, heading in groups[0][2].roots.tolist()]
+            return groups[0][2], groups[0][2].roots
         displayed: list[Pose | None] = [None] * len(self)
+        roots = places.copy()
         for numbers, _, poses, _ in groups:
+            roots[numbers] = poses.roots
             for i, pose in zip(numbers, poses, strict=True):
                 displayed[i] = pose
-        return displayed, [None if pose is None else pose.root for pose in displayed]
+        return displayed if groups else (), roots
 
     def _equal_streams(self) -> list[list[int]]:
         """The numbers of the characters with a stream, those together that have the same banks and settings."""
@@ -171,26 +189,6 @@ class Crowd(ListSequence[Character]):
             else:
                 groups.append((stream, [i]))
         return [numbers for _, numbers in groups]
-
-    def _queries(
-        self, dt: float, group: ControllerGroup, steps: list[Step], bodies: ManySteered, sticks: Floats, facing: Floats | None
-    ) -> tuple[Floats, Paths]:
-        """The query of each, and its wished path."""
-        schema = self[0].schema
-        if any(character.schema is not schema and character.schema != schema for character in self):
-            raise MotionError(Fault("the characters have different features.", "characters of one feature schema"))
-        features = np.asarray(group.poses(dt))
-        for i, character in enumerate(self):
-            if character.pose is not None or character.playing is None:
-                features[i] = character._features(dt, steps[i].body)
-        halflife_s = float(bodies.velocity_halflives_s.max())
-        reach = ahead_s(schema, min(map(math.hypot, *sticks.T.tolist())), halflife_s)
-        steered = steered_paths([bodies], sticks, facing, reach_s=reach, rate=schema.rate)
-        if back_s(schema):
-            paths = [each._wished(step, steered[i]) for i, (each, step) in enumerate(zip(self, steps, strict=True))]
-            return np.array([with_path(schema, own, path) for own, path in zip(features, paths, strict=True)]), paths
-        wished = _paths_from(np.array([step.place for step in steps]), steered)
-        return with_paths(schema, features, wished).astype(np.float64), wished
 
     def _valid(self, steps: list[Step]) -> Any:
         """What may play of each, every table asked once with the facts of all who have it."""
@@ -221,6 +219,11 @@ def _answers(table: Table, facts: Sequence[Facts], unknown: Any) -> Iterable[Ans
     return [asking.answer(table, each, unknown) for each in facts]
 
 
+def _moves_body(character: Character, decision: Decision) -> bool:
+    """Whether the animation moves the body of a character."""
+    return character.stream is not None and root_of(decision, character.stream.settings) == "animation"
+
+
 def _facts_of_each(facts: object, n: int) -> list[Facts]:
     if facts is None:
         return [{}] * n
@@ -236,13 +239,3 @@ def _facts_of_each(facts: object, n: int) -> list[Facts]:
             problem = f"{in_quotes(str(name))} has {plural(len(columns[name]), 'fact')} for {plural(n, 'character')}."
             raise ContextError(Fault(problem, "one for all, or a list of one for each"))
     return [{name: values[i] for name, values in columns.items()} for i in range(n)]
-
-
-def _paths_from(places: Floats, paths: ManyTrajectories) -> ManyTrajectories:
-    """Each path from where its character is; see `path_from`."""
-    apart = places[:, :2] - paths.positions[:, paths.now]
-    turned = places[:, 2] - paths.headings[:, paths.now]
-    turned = np.clip(turned - math.tau * np.rint(turned / math.tau), -MOST_TURN_RAD, MOST_TURN_RAD)
-    left = shares_left(paths.headings.shape[1], paths.now, paths.rate)
-    positions = paths.positions + left[None, :, None] * apart[:, None]
-    return ManyTrajectories(paths.rate, positions, paths.headings + left * turned[:, None], paths.now)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from contextdb.cells.conditions import Condition
+from contextdb.core import direction_of
 from contextdb.motion.characters.played import Played, of_played
 from contextdb.motion.clips.steering import Steered
 from contextdb.motion.selection.decision import Playing
@@ -53,14 +54,13 @@ FactOf = Callable[[Moment], object]
 
 def speed(moment: Moment) -> float:
     """How fast the body goes, m/s."""
-    return math.hypot(*moment.body.velocity)
+    x, z = moment.body.velocity
+    return math.sqrt(x * x + z * z)  # as the core does, to the bit
 
 
 def direction(moment: Moment) -> float:
     """Where the stick points against the way the body faces: degrees, positive to the left; 0 at rest."""
-    if not any(moment.stick):
-        return 0.0
-    return math.degrees(math.remainder(math.atan2(*moment.stick) - moment.body.heading, math.tau))
+    return direction_of(*moment.stick, moment.body.heading)
 
 
 def turn(moment: Moment) -> float:

@@ -69,7 +69,7 @@ class ManySteered:
         go. Raises MotionError for shapes that do not fit, ContextError for what is no number of seconds."""
         require_real(dt_s, "dt_s", 0.0)
         moved = np.empty((len(self), N_NUMBERS))
-        move_bodies(self._numbers, self._goals(wanted, facing), float(dt_s), moved)
+        move_bodies(self._numbers, self.goals(wanted, facing), float(dt_s), moved)
         return ManySteered(moved[:, 0:2], moved[:, 2:4], moved[:, 4:6], *moved[:, 6:].T)
 
     @property
@@ -78,7 +78,7 @@ class ManySteered:
         others = self.headings, self.turn_rates, self.velocity_halflives_s, self.heading_halflives_s
         return np.column_stack((self.positions, self.velocities, self.accelerations, *others))
 
-    def _goals(self, wanted: ArrayLike, facing: ArrayLike | None) -> Floats:
+    def goals(self, wanted: ArrayLike, facing: ArrayLike | None) -> Floats:
         """The velocities and headings that the sticks ask for, checked: [Q, 3], NaN where none is asked for."""
         velocities = require_numbers(wanted, "wanted")
         if velocities.shape != self.positions.shape:
@@ -132,5 +132,5 @@ def steered_paths(
     positions, headings = np.empty((len(present), n_frames, 2)), np.empty((len(present), n_frames))
     for i, bodies in enumerate(past):
         positions[:, i], headings[:, i] = bodies.positions, bodies.headings
-    steer_paths(present._numbers, present._goals(wanted, facing), rate, n_past, positions, headings)
+    steer_paths(present._numbers, present.goals(wanted, facing), rate, n_past, positions, headings)
     return ManyTrajectories(rate, positions, headings, n_past - 1)

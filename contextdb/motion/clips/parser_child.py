@@ -15,7 +15,7 @@ import os
 import signal
 import sys
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -27,7 +27,6 @@ USUAL_RATE = 30.0
 MOST_MEMORY = 2 << 30
 """Bytes that a small file may take; a large one so many times its size more."""
 TIMES_MEMORY = 24
-
 
 Floats = NDArray[np.float64]
 Tell = Callable[[int, int], None]
@@ -60,22 +59,34 @@ def fbx(content: bytes, take: int, tell: Tell) -> Joints:
         raise Refusal("there is no animation.")
     if take >= len(stacks):
         raise Refusal(f"there are {len(stacks)} takes, and take {take + 1} is wanted.")
-    stack = stacks[take]
-    rate = settings.frames_per_second
+    stack, rate = stacks[take], settings.frames_per_second
     rate = rate if 1.0 <= rate <= 1e4 else USUAL_RATE
-    start, stop = stack.time_begin, stack.time_end
-    n_frames = frames_of(stop - start, rate, len(nodes))
+    n_frames = frames_of(stack.time_end - stack.time_begin, rate, len(nodes))
     ids = {node.typed_id: i for i, node in enumerate(nodes)}
+    tell(0, n_frames)
+    rest = np.array([of_transform(node.local_transform) for node in nodes]).reshape(-1, 4, 4)
+    anim = stack.anim
+    baked = ufbx.bake_anim(scene, anim, resample_rate=rate, maximum_sample_rate=rate, max_keyframe_segments=4096)
+    local = fbx_frames(baked, nodes, rest, stack.time_begin + np.arange(n_frames) / rate, tell)
+    bound = fbx_bound(nodes, rest)
+    is_joint, deforms = fbx_joints(scene, nodes, ids)
+    names = [node.name for node in nodes]
+    return names, fbx_parents(nodes, ids), is_joint, deforms, rate, bound if usable(bound) else rest, rest, local
+
+
+def fbx_parents(nodes: Sequence[Any], ids: Mapping[int, int]) -> list[int]:
+    """The place of each node's parent, -1 for none."""
     parents = []
     for node in nodes:
         parent = node.parent
         parents.append(-1 if parent is None else ids[parent.typed_id])
-    tell(0, n_frames)
-    rest = np.array([of_transform(node.local_transform) for node in nodes]).reshape(-1, 4, 4)
-    local = np.repeat(rest[None], n_frames, axis=0)
-    anim = stack.anim
-    baked = ufbx.bake_anim(scene, anim, resample_rate=rate, maximum_sample_rate=rate, max_keyframe_segments=4096)
-    at = start + np.arange(n_frames) / rate
+    return parents
+
+
+def fbx_frames(baked: Any, nodes: Sequence[Any], rest: Floats, at: Floats, tell: Tell) -> Floats:
+    """Each node against its parent at some times: [F, N, 4, 4]."""
+    ids = {node.typed_id: i for i, node in enumerate(nodes)}
+    local = np.repeat(rest[None], len(at), axis=0)
     for own in list(baked.nodes):
         node = ids.get(own.typed_id)
         if node is None:
@@ -83,9 +94,13 @@ def fbx(content: bytes, take: int, tell: Tell) -> Joints:
         usual = nodes[node].local_transform
         places = sampled(own.translation_keys, at, usual.translation)
         turns = sampled(own.rotation_keys, at, usual.rotation)
-        sizes = sampled(own.scale_keys, at, usual.scale)
-        local[:, node] = matrices(places, turns, sizes)
+        local[:, node] = matrices(places, turns, sampled(own.scale_keys, at, usual.scale))
         tell(node, len(nodes))
+    return local
+
+
+def fbx_bound(nodes: Sequence[Any], rest: Floats) -> Floats:
+    """Each node against its parent as skins were bound to it; as it rests where no pose says it."""
     bound = rest.copy()
     for i, node in enumerate(nodes):
         pose = node.bind_pose
@@ -93,25 +108,31 @@ def fbx(content: bytes, take: int, tell: Tell) -> Joints:
             other = bone.bone_node
             if other is not None and other.typed_id == node.typed_id:
                 bound[i, :3] = np.array(bone.bone_to_parent, np.float64).T
+    return bound
+
+
+def fbx_joints(scene: Any, nodes: Sequence[Any], ids: Mapping[int, int]) -> tuple[Any, Any]:
+    """Which nodes are joints, and on which of them a skin hangs."""
     is_bone = np.array([node.bone is not None for node in nodes])
     deforms = np.zeros(len(nodes), bool)
     for cluster in list(scene.skin_clusters):
         bone = cluster.bone_node
         if bone is not None and cluster.num_weights and bone.typed_id in ids:
             deforms[ids[bone.typed_id]] = True
-    names = [node.name for node in nodes]
     if not is_bone.any():  # some exporters write joints as empty nodes
         plain = (node.parent is not None and not (node.mesh or node.camera or node.light) for node in nodes)
         is_bone = np.fromiter(plain, bool, len(nodes))
-    return names, parents, is_bone | deforms, deforms, rate, bound if usable(bound) else rest, rest, local
+    return is_bone | deforms, deforms
 
 
 def of_transform(transform: Any) -> Floats:
+    """A place, a turn and a size as a matrix [4, 4]."""
     place, turn, size = transform.translation, transform.rotation, transform.scale
     return np.asarray(matrices(np.array([list(place)]), np.array([list(turn)]), np.array([list(size)]))[0])
 
 
 def usable(rest: Floats) -> bool:
+    """Whether matrices are finite, and none scales to nothing."""
     return bool(np.isfinite(rest).all() and (np.abs(np.linalg.det(rest)) > 1e-18).all())
 
 
@@ -166,6 +187,48 @@ def usd(content: bytes, take: int, tell: Tell) -> Joints:
 
 
 def usd_joints(stage: Any, tell: Tell, Usd: Any, UsdGeom: Any, UsdSkel: Any) -> Joints:
+    """The joints of the skeleton of a stage, in the world."""
+    prim, query = usd_skeleton(stage, Usd, UsdSkel)
+    moves, rate = query.GetAnimQuery(), stage.GetTimeCodesPerSecond()
+    if not moves:
+        raise Refusal("nothing moves the skeleton.")
+    if not 1.0 <= rate <= 1e4:
+        raise Refusal(f"the file has {rate:g} time codes a second.")
+    paths = [str(path) for path in query.GetJointOrder()]
+    times = sorted({*moves.GetJointTransformTimeSamples()}) or [0.0]
+    step = float(np.median(np.diff(times))) if len(times) > 1 else 1.0
+    step = step if step > 1e-6 else 1.0
+    codes = np.minimum(times[0] + step * np.arange(frames_of((times[-1] - times[0]) / step, 1.0, len(paths))), times[-1])
+    index = {path: i for i, path in enumerate(paths)}
+    parents = [index.get(path.rpartition("/")[0], -1) for path in paths]
+    unit = UsdGeom.GetStageMetersPerUnit(stage)
+    upright = np.eye(4) * [unit, unit, unit, 1.0]
+    if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z:
+        upright = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]]) @ upright
+
+    def above(code: float) -> Floats:
+        return np.asarray(upright @ np.array(UsdGeom.XformCache(Usd.TimeCode(code)).GetLocalToWorldTransform(prim)).T)
+
+    frames = np.empty((len(codes), len(paths), 4, 4))
+    for frame, code in enumerate(codes.tolist()):
+        joints = np.array(query.ComputeJointSkelTransforms(Usd.TimeCode(code))).transpose(0, 2, 1)
+        if joints.shape != (len(paths), 4, 4):
+            raise Refusal("the animation does not fit the skeleton.")
+        frames[frame] = above(code) @ joints
+        if frame % 64 == 0:
+            tell(frame, len(codes))
+    given = np.array(UsdSkel.Skeleton(prim).GetRestTransformsAttr().Get())
+    local = given.transpose(0, 2, 1) if given.shape == (len(paths), 4, 4) else None
+    rest = frames[0].copy()
+    if local is not None and usable(local):
+        for joint in in_order(parents):
+            rest[joint] = (above(times[0]) if parents[joint] < 0 else rest[parents[joint]]) @ local[joint]
+    names, every = [path.rpartition("/")[2] for path in paths], np.ones(len(paths), bool)
+    return names, parents, every, every, rate / step, rest, None, frames
+
+
+def usd_skeleton(stage: Any, Usd: Any, UsdSkel: Any) -> tuple[Any, Any]:
+    """The skeleton with most joints of those that move, else of all; and what answers about it."""
     cache, best = UsdSkel.Cache(), None
     for prim in stage.Traverse():
         if prim.IsA(UsdSkel.Root):
@@ -178,43 +241,7 @@ def usd_joints(stage: Any, tell: Tell, Usd: Any, UsdGeom: Any, UsdSkel: Any) -> 
                 best = (bool(moves), len(query.GetJointOrder())), prim, query
     if best is None:
         raise Refusal("there is no skeleton.")
-    _, prim, query = best
-    paths = [str(path) for path in query.GetJointOrder()]
-    moves = query.GetAnimQuery()
-    if not moves:
-        raise Refusal("nothing moves the skeleton.")
-    rate = stage.GetTimeCodesPerSecond()
-    if not 1.0 <= rate <= 1e4:
-        raise Refusal(f"the file has {rate:g} time codes a second.")
-    times = sorted({*moves.GetJointTransformTimeSamples()}) or [0.0]
-    step = float(np.median(np.diff(times))) if len(times) > 1 else 1.0
-    step = step if step > 1e-6 else 1.0
-    n_frames = frames_of((times[-1] - times[0]) / step, 1.0, len(paths))
-    index = {path: i for i, path in enumerate(paths)}
-    parents = [index.get(path.rpartition("/")[0], -1) for path in paths]
-    unit = UsdGeom.GetStageMetersPerUnit(stage)
-    upright = np.eye(4) * [unit, unit, unit, 1.0]
-    if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z:
-        upright = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]]) @ upright
-    frames = np.empty((n_frames, len(paths), 4, 4))
-    for frame in range(n_frames):
-        at = Usd.TimeCode(min(times[0] + frame * step, times[-1]))
-        above = np.array(UsdGeom.XformCache(at).GetLocalToWorldTransform(prim)).T
-        joints = np.array(query.ComputeJointSkelTransforms(at)).transpose(0, 2, 1)
-        if joints.shape != (len(paths), 4, 4):
-            raise Refusal("the animation does not fit the skeleton.")
-        frames[frame] = upright @ above @ joints
-        if frame % 64 == 0:
-            tell(frame, n_frames)
-    given = np.array(UsdSkel.Skeleton(prim).GetRestTransformsAttr().Get())
-    local = given.transpose(0, 2, 1) if given.shape == (len(paths), 4, 4) else None
-    rest = frames[0].copy()
-    if local is not None and usable(local):
-        first = upright @ np.array(UsdGeom.XformCache(Usd.TimeCode(times[0])).GetLocalToWorldTransform(prim)).T
-        for joint in in_order(parents):
-            rest[joint] = (first if parents[joint] < 0 else rest[parents[joint]]) @ local[joint]
-    names = [path.rpartition("/")[2] for path in paths]
-    return names, parents, np.ones(len(paths), bool), np.ones(len(paths), bool), rate / step, rest, None, frames
+    return best[1:]
 
 
 def frames_of(duration_s: float, rate: float, n_joints: int) -> int:
@@ -262,6 +289,7 @@ def in_world(
 
 
 def limit_memory(size: int) -> None:
+    """Let this process take no more memory than a file of a size may need."""
     try:
         import resource
     except ImportError:  # Windows
@@ -273,12 +301,14 @@ def limit_memory(size: int) -> None:
 
 
 def main() -> None:
+    """Answer requests until standard input ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever started this decides
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # libraries may print
     read = {"fbx": fbx, "usd": usd}[sys.argv[1]]
 
     def answer(document: dict[str, Any], *arrays: Floats) -> None:
+        """Write a line, and arrays behind it."""
         answers.write(json.dumps(document).encode() + b"\n")
         for array in arrays:
             answers.write(np.ascontiguousarray(array, "<f8").tobytes())

@@ -20,7 +20,7 @@ from contextdb.disk import read_bytes
 from contextdb.errors import ClipError, Fault, FileError, Place, in_quotes, mend_for, some
 from contextdb.motion.clips import gltf, npz, scenes
 from contextdb.motion.clips.clip import BY_SIZE, CENTIMETRE, Clip, Unit, Up, parse_bvh, text_of
-from contextdb.motion.clips.doubts import unit_by_size
+from contextdb.motion.clips.clip_measures import unit_by_size
 
 TAKE = ":"
 """Between the name of a file and that of one of its takes."""

@@ -12,6 +12,7 @@ Source: D. Holden, "Spring-It-On", 2021; orangeduck/Motion-Matching, `controller
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,12 +76,17 @@ class Steered:
     def moved_unchecked(self, dt_s: float, wanted: Ground, facing: float | None) -> Steered:
         """The same of arguments that are known to be right."""
         moved = np.empty((1, N_NUMBERS))
-        move_bodies(np.array([self._numbers]), _goal(wanted, facing), float(dt_s), moved)
-        x, z, to_x, to_z, more_x, more_z, heading, turn_rate, *halflives_s = moved[0].tolist()
-        return Steered((x, z), (to_x, to_z), (more_x, more_z), heading, turn_rate, *halflives_s)
+        move_bodies(np.array([self.numbers]), _goal(wanted, facing), float(dt_s), moved)
+        return Steered.of_numbers(moved[0].tolist())
+
+    @classmethod
+    def of_numbers(cls, numbers: Sequence[float]) -> Steered:
+        """A body as the core has it."""
+        x, z, to_x, to_z, more_x, more_z, heading, turn_rate, *halflives_s = numbers
+        return cls((x, z), (to_x, to_z), (more_x, more_z), heading, turn_rate, *halflives_s)
 
     @property
-    def _numbers(self) -> tuple[float, ...]:
+    def numbers(self) -> tuple[float, ...]:
         """Itself as the core takes it."""
         others = self.heading, self.turn_rate, self.velocity_halflife_s, self.heading_halflife_s
         return (*self.position, *self.velocity, *self.acceleration, *others)
@@ -127,5 +133,5 @@ def steered_path(
     n_frames = n_past + math.ceil(reach_s * rate)
     positions, headings = np.empty((1, n_frames, 2)), np.empty((1, n_frames))
     positions[0, :n_past], headings[0, :n_past] = [body.position for body in past], [body.heading for body in past]
-    steer_paths(np.array([past[-1]._numbers]), _goal(wanted, facing), rate, n_past, positions, headings)
+    steer_paths(np.array([past[-1].numbers]), _goal(wanted, facing), rate, n_past, positions, headings)
     return Trajectory(rate, positions[0], headings[0], n_past - 1)

@@ -15,7 +15,7 @@ ours.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -80,11 +80,12 @@ class Normalisation:
 
     @classmethod
     def of(cls, blocks: Sequence[Features], schema: FeatureSchema) -> Normalisation:
-        """The normalisation that fits all frames of some blocks [F, N] of features."""
-        features = np.concatenate([np.zeros((0, schema.n_features), np.float32), *blocks]).astype(np.float64)
-        if not len(features):
+        """The normalisation that fits all frames of some blocks [F, N] of features, which are looked at one by one."""
+        n_frames = sum(map(len, blocks))
+        if not n_frames:
             return cls.none(schema.n_features)
-        deviations = features.std(axis=0)
+        mean = _sum(block.astype(np.float64) for block in blocks) / n_frames
+        deviations = np.sqrt(_sum((block.astype(np.float64) - mean) ** 2 for block in blocks) / n_frames)
         scale, raised = np.ones(schema.n_features), []
         for channels in _groups(schema):
             columns = np.concatenate([np.arange(schema.n_features)[schema.slices[channel.name]] for channel in channels])
@@ -93,7 +94,16 @@ class Normalisation:
             if spread < floor:
                 raised.append(RaisedScale(tuple(channel.name for channel in channels), spread, floor, unit))
             scale[columns] = max(spread, floor) if max(spread, floor) > SMALLEST_SCALE else 1.0
-        return cls(features.mean(axis=0), scale, tuple(raised))
+        return cls(mean, scale, tuple(raised))
+
+
+def _sum(blocks: Iterable[Floats]) -> Floats:
+    """The sum of all rows of some blocks, one row after another: to the last bit that of the blocks in one."""
+    total: Floats | None = None
+    for block in blocks:
+        rows = block if total is None else np.concatenate((total[None], block))
+        total = np.add.reduce(rows, axis=0)
+    return np.zeros(0) if total is None else total
 
 
 def floor_of(channel: Channel) -> tuple[float, str]:

@@ -7,7 +7,7 @@ channel holds.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from contextdb.cells.arguments import require_mapping, require_text
 from contextdb.cells.notebook import one_line
+from contextdb.core import Ways
 from contextdb.errors import Fault, MotionError, SchemaError, in_quotes, mend_for, plural, some
 from contextdb.files.settings import Declared, Section, number, setting, settings_of
 from contextdb.files.toml_shapes import Mapped, Shape, filled, listed, nothing
@@ -37,7 +38,7 @@ CustomFunction = Callable[[Poses, Trajectory], Floats]
 MOST_RATE = 1000.0
 ABOUT_S = 0.5
 """How fast a path goes is the mean of about so many seconds."""
-SEE_FEET = "See [feet](clips.md#feet-on-the-ground)."
+SEE_FEET = "See [feet](choosing.md#feet-on-the-ground)."
 CHANNELS = listed('a list of channels, such as [{ type = "position", bone = "LeftFoot", weight = 1.0 }]', nothing)
 
 
@@ -70,7 +71,7 @@ class FeatureSchema(Declared, error=MotionError):
         "To how many frames a second clips are resampled.", least=1.0, most=MOST_RATE, unit="frames a second", such_as=30.0
     )
     channels: tuple[Channel, ...] = setting(
-        CHANNELS, "The channels, each a table.", more="See [features](clips.md#features-what-is-compared) for their keys."
+        CHANNELS, "The channels, each a table.", more="See [features](choosing.md#features-what-is-compared) for their keys."
     )
     root: str | None = setting(
         filled('a bone, such as "Hips"'),
@@ -150,6 +151,26 @@ class FeatureSchema(Declared, error=MotionError):
                 features += [(is_along, WHATS.index(channel.what), part.start + i * size) for i, (is_along, _) in enumerate(points)]
         return np.array(steps, np.float64), np.array(features, np.int64).reshape(-1, 3)
 
+    @property
+    def velocity_features(self) -> Ints:
+        """The features at which the velocities of joints begin that move as the body does: int64."""
+        columns = [
+            self.slices[channel.name].start + 3 * i
+            for channel in self.channels
+            if channel.type == "velocity" and channel.relative_to is None
+            for i in range(channel.n_features // 3)
+        ]
+        return np.array(columns, np.int64)
+
+    @cached_property
+    def ways(self) -> Ways:
+        """How far the paths of characters are looked at, for the core."""
+        return Ways(*self.path_features, self.velocity_features, self.n_features, float(self.rate))
+
+    def __getstate__(self) -> dict[str, object]:
+        """The fields alone: what is prepared for the core is prepared again where the schema is unpickled or copied."""
+        return {each.name: getattr(self, each.name) for each in fields(self)}
+
     @cached_property
     def speed_features(self) -> tuple[slice, float] | None:
         """Which features say how fast a path goes, and what their length is divided by for metres a second; None where none do."""
@@ -166,20 +187,6 @@ class FeatureSchema(Declared, error=MotionError):
                 seconds, start = min(points, key=lambda point: abs(point[0] - ABOUT_S))
                 return slice(start, start + size), seconds if kind == "position" else 1.0
         return None
-
-    @cached_property
-    def looks_back(self) -> bool:
-        """Whether a trajectory channel looks at where the path was."""
-        return any(reach < 0.0 for reaches in self.path_reaches for reach in reaches)
-
-    @cached_property
-    def path_reaches(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """The seconds and the metres at which the trajectory channels look at the path."""
-        channels = [channel for channel in self.channels if channel.type == "trajectory"]
-        return (
-            tuple(second for channel in channels for second in channel.at),
-            tuple(metre for channel in channels for metre in channel.along),
-        )
 
     @property
     def permutation_s(self) -> tuple[float, ...]:

@@ -15,27 +15,28 @@ import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contextdb.cells.arguments import require_kind, require_many, require_real, require_text
 from contextdb.core import PoseFrames, place_joints
 from contextdb.errors import Fault, MotionError, Place, in_quotes, mend_for, plural, some
-from contextdb.motion.clips import mirror as mirrors
+from contextdb.files import scratch
+from contextdb.files.scratch import Pile
 from contextdb.motion.clips import quaternions
 from contextdb.motion.clips.clip import Clip
-from contextdb.motion.clips.feet import NO_MARKS, ContactMarks, held_feet_of
-from contextdb.motion.clips.poses import Poses, forward_kinematics, local_poses, resampled
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints, Skeleton
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.markup.markup import Markup
+from contextdb.motion.output.clip_parts import ARRAYS, ClipParts, Part, parts_of, tops_of
 from contextdb.motion.output.legs import leg_of, steps_of, travels
 from contextdb.motion.output.samples import Flags, Moment, Place3, Sample, Singles
 
 SAME_M = 1e-6
 """A joint that is never farther from its offset keeps it."""
-FARTHEST_M = 1e6
 RIG_MEND = 'to put the clips on one rig: rig = "clips/idle.bvh" in [databases.NAME], or motion.retargeted'
 STEP_S, USUAL = 1.0 / 30.0, 0.999
 """Accelerations are those over steps of this length, and usual are those of so many frames."""
@@ -114,30 +115,27 @@ class PoseBank:
         require_kind(markup, (Markup, type(None)), "markup", "a Markup, or None")
         for name in () if isinstance(mirror, bool) else require_many(mirror, "mirror", "True, False, or the names of clips"):
             require_text(name, "one of mirror")
-        parts: list[_Part] = []
-        faults: list[Fault] = []
-        seen: set[str] = set()
-        first: Clip | None = None
-        for clip in require_many(clips, "clips", "a list of Clip"):
-            require_kind(clip, Clip, "one of clips", "a Clip")
-            first = clip if first is None else first
-            wrong = list(_faults(clip, first, seen))
-            seen.add(clip.name)
-            if wrong:
-                faults += [fault.at(Place(clip.name)) for fault in wrong]
-                continue
-            both = mirror if isinstance(mirror, bool) else clip.name in mirror
-            try:
-                loops = markup is not None and markup.is_looping(clip.name)
-                marks = NO_MARKS if markup is None else markup.contacts_of(clip.name)
-                parts += [_Part.of(clip, schema, side, loops, marks) for side in ((False, True) if both else (False,))]
-            except MotionError as error:
-                faults += [fault.at(Place(clip.name)) for fault in error.faults]
+        taken = (parts_of(clip, schema, mirror, markup) for clip in require_many(clips, "clips", "a list of Clip"))
+        return cls.of_parts(taken, schema.rate)
+
+    @classmethod
+    def of_parts(cls, taken: Iterable[ClipParts], rate: float) -> PoseBank:
+        """The bank of the parts of some clips, taken one after another. Raises what `build` raises."""
+        parts: list[Part] = []
+        pile, faults, seen = Pile(), list[Fault](), set[str]()
+        first: ClipParts | None = None
+        for each in taken:
+            first = each if first is None else first
+            wrong = [*_faults(each, first, seen), *each.faults]
+            seen.add(each.name)
+            faults += [fault.at(Place(each.name)) for fault in wrong]
+            if not wrong:
+                parts += [part.on(pile) for part in each.parts]
         if not parts and not faults:
             faults.append(Fault("there is no clip to take poses of.", "at least one clip"))
         if faults:
             raise MotionError(*faults)
-        return _bank_of(parts, schema.rate)
+        return _bank_of(parts, pile.arrays(), rate)
 
     def __repr__(self) -> str:
         sizes = plural(len(self.assets), "range"), plural(self.n_frames, "frame"), plural(self.n_joints, "joint")
@@ -263,12 +261,21 @@ class PoseBank:
         return self._frames(self._steps)
 
     def _frames(self, steps: Floats | None) -> PoseFrames:
+        return PoseFrames(*self.frame_parts(steps))
+
+    def frame_parts(self, steps: Floats | None) -> tuple[Any, ...]:
+        """The arrays of which the core makes frames; without steps for those who feel no ground."""
         rotations, positions, root = (
             np.require(each, np.float32, ("C", "A")) for each in (self.rotations, self.positions, self.root)
         )
         starts, looping, contacts = np.array(self.starts, np.int64), np.array(self.looping), np.ascontiguousarray(self.contacts)
         n_steps, ways = np.array(self.stops, np.int64) - starts - 1, np.ascontiguousarray(self._ways, np.float64)
-        return PoseFrames(rotations, positions, root, ways, contacts, steps, starts, n_steps, looping, float(self.rate))
+        return rotations, positions, root, ways, contacts, steps, starts, n_steps, looping, float(self.rate)
+
+    @property
+    def steps(self) -> Floats:
+        """Of each foot in each frame how far it is through its swing, and where that puts it down: [N, feet, 3]."""
+        return self._steps
 
     def __getstate__(self) -> dict[str, object]:
         """The fields alone: what is prepared for the core is prepared again where the bank is unpickled or copied."""
@@ -299,89 +306,20 @@ def placed(rig: Skeleton, translations: Floats, rotations: Floats, root: Place3)
     return positions, world
 
 
-@dataclass(frozen=True, eq=False)
-class _Part:
-    """One clip, as recorded or mirrored: positions of all joints [F, J, 3]."""
-
-    asset: str
-    is_mirrored: bool
-    is_looping: bool
-    rig: Skeleton
-    rotations: Floats
-    positions: Floats
-    root: Floats
-    feet: tuple[str, ...]
-    contacts: Flags
-
-    @classmethod
-    def of(cls, clip: Clip, schema: FeatureSchema, is_mirrored: bool, is_looping: bool, marks: ContactMarks) -> _Part:
-        with np.errstate(all="ignore"):  # numbers too large become infinite or NaN, and are refused below
-            local = resampled(local_poses(clip), schema.rate)
-            if is_mirrored:
-                if not schema.mirror:
-                    raise MotionError(mirrors.undeclared(clip.skeleton, schema.name))
-                local = mirrors.mirrored(local, schema.mirror)
-            poses = forward_kinematics(local)
-        if not np.isfinite(poses.positions).all() or np.abs(poses.positions).max() > FARTHEST_M:
-            raise MotionError(Fault("its numbers are too large to be a body.", f"joints within {FARTHEST_M:g} m of the origin"))
-        path = schema.path_of(poses)
-        root = np.column_stack((path.positions, path.headings)).astype(np.float32).astype(np.float64)
-        rotations, positions = local.rotations, local.positions.copy()
-        above = poses.skeleton.ancestors(poses.skeleton.hips)
-        rotations[:, above], positions[:, above] = [1.0, 0.0, 0.0, 0.0], 0.0
-        tops = tops_of(poses.skeleton)
-        back = quaternions.about_axis("y", -root[:, 2])[:, None]
-        ground = np.stack((root[:, 0], np.zeros(len(root)), root[:, 1]), axis=-1)[:, None]
-        positions[:, tops] = quaternions.rotate(back, poses.positions[:, tops] - ground)
-        rotations[:, tops] = quaternions.multiply(back, poses.rotations[:, tops])
-        feet, contacts = _contacts(poses, schema, (marks[1], marks[0]) if is_mirrored else marks)
-        return cls(clip.name, is_mirrored, is_looping, _rig(clip), rotations, positions, root, feet, contacts)
-
-
-def tops_of(skeleton: Skeleton) -> list[int]:
-    """The joints that hang on the root: the first, or those below the joints above the hips."""
-    above = {-1, *skeleton.ancestors(skeleton.hips)}
-    return [joint for joint, parent in enumerate(skeleton.parents.tolist()) if parent in above and joint not in above]
-
-
-def _rig(clip: Clip) -> Skeleton:
-    """The clip's skeleton in metres, the joints above its hips at the root."""
-    offsets = clip.skeleton.offsets * clip.metres_per_unit
-    offsets[[0, *clip.skeleton.ancestors(clip.skeleton.hips)]] = 0.0
-    ends = tuple(
-        (joint, (x * clip.metres_per_unit, y * clip.metres_per_unit, z * clip.metres_per_unit))
-        for joint, (x, y, z) in clip.skeleton.end_sites
-    )
-    return replace(clip.skeleton, offsets=offsets, end_sites=ends)
-
-
-def _contacts(poses: Poses, schema: FeatureSchema, marks: ContactMarks) -> tuple[tuple[str, ...], Flags]:
-    """The feet, and in which frames each is down."""
-    try:
-        falls = held_feet_of(poses, schema.foot_bones(), marks)
-    except MotionError:
-        return (), np.zeros((poses.n_frames, 0), np.bool_)
-    feet = falls.feet
-    frames = np.arange(poses.n_frames) / poses.rate
-    down = [[(a - 1e-9 <= frames) & (frames <= b + 1e-9) for a, b in falls.down[foot].tolist()] for foot in feet]
-    none = np.zeros(poses.n_frames, np.bool_)
-    return feet, np.column_stack([np.logical_or.reduce([none, *each]) for each in down])
-
-
-def _faults(clip: Clip, first: Clip, seen: set[str]) -> Iterator[Fault]:
+def _faults(clip: ClipParts, first: ClipParts, seen: set[str]) -> Iterator[Fault]:
     """What keeps a clip out of a bank."""
     if clip.name in seen:
         yield Fault(f"two clips are named {in_quotes(clip.name)}.", "a different name for each asset", rule="duplicate")
     if clip.n_frames == 0:
         yield Fault("the clip has no frame.", "a clip with at least one frame")
-    names, rig = clip.skeleton.names, first.skeleton
+    names, rig = clip.rig.names, first.rig
     if names != rig.names:
-        other = [name for name in names if name not in rig] or [name for name in rig.names if name not in clip.skeleton]
+        other = [name for name in names if name not in rig] or [name for name in rig.names if name not in clip.rig]
         differ = (
             f"its bones are not those of {in_quotes(first.name)}: {some(other)}" if other else "its bones come in another order"
         )
         yield Fault(f"{differ}.", f"the same {plural(rig.n_joints, 'bone')} in every clip of a bank", RIG_MEND)
-    elif not np.array_equal(clip.skeleton.parents, rig.parents):
+    elif not np.array_equal(clip.rig.parents, rig.parents):
         problem = f"its bones hang on other parents than those of {in_quotes(first.name)}."
         yield Fault(problem, "one rig for every clip of a bank", RIG_MEND)
 
@@ -399,23 +337,33 @@ def moving_alike(banks: Mapping[str, PoseBank]) -> dict[str, PoseBank]:
     return alike
 
 
-def _bank_of(parts: list[_Part], rate: float) -> PoseBank:
+def _bank_of(parts: list[Part], arrays: list[NDArray[Any]], rate: float) -> PoseBank:
+    """The bank of parts, of arrays on a pile."""
     rig = parts[0].rig
-    away = [np.abs(part.positions - rig.offsets).max(axis=(0, 2)) for part in parts if not part.is_mirrored]
+    away = [
+        np.maximum(np.abs(part.least - rig.offsets), np.abs(part.most - rig.offsets)).max(axis=1)
+        for part in parts
+        if not part.is_mirrored
+    ]
     moving = sorted({*tops_of(rig), *np.flatnonzero(np.max(away, axis=0) > SAME_M).tolist()})
-    stops = np.cumsum([len(part.root) for part in parts])
+    rotations, positions, root, contacts = ([arrays[part.numbers[i]] for part in parts] for i in range(len(ARRAYS)))
+    lengths = list(map(len, root))
+    stops = np.cumsum(lengths, dtype=np.int64)
+    places = scratch.zeros((int(stops[-1]), len(moving), 3), np.float32)
+    for start, stop, own in zip((stops - lengths).tolist(), stops.tolist(), positions, strict=True):
+        places[start:stop] = own[:, moving]
     return PoseBank(
         rig,
         rate,
-        stops - [len(part.root) for part in parts],
+        stops - np.array(lengths, np.int64),
         stops,
         tuple(part.asset for part in parts),
         np.array([part.is_mirrored for part in parts], np.bool_),
         np.array([part.is_looping for part in parts], np.bool_),
         np.array(moving, np.int64),
-        np.concatenate([part.rotations for part in parts]).astype(np.float32),
-        np.concatenate([part.positions[:, moving] for part in parts]).astype(np.float32),
-        np.concatenate([part.root for part in parts]).astype(np.float32),
+        scratch.joined(rotations, rotations[0][:0]),
+        places,
+        scratch.joined(root, root[0][:0]),
         parts[0].feet,
-        np.concatenate([part.contacts for part in parts]),
+        scratch.joined(contacts, contacts[0][:0]),
     )

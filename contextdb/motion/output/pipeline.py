@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from contextdb.cells.arguments import require_kind, require_mapping
+from contextdb.cells.row_play import ROOTS, RowPlay
 from contextdb.core import Poses, pose_columns
 from contextdb.errors import Fault, MotionError, in_quotes, no_such
 from contextdb.files.settings import settings_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints, Skeleton
-from contextdb.motion.output.bank import RIG_MEND, PoseBank, tops_of
+from contextdb.motion.output.bank import RIG_MEND, PoseBank
+from contextdb.motion.output.clip_parts import tops_of
 from contextdb.motion.output.ground import Grounds, below_all
 from contextdb.motion.output.legs import hinges_of, legs_of
 from contextdb.motion.output.pose import CrowdPoses
@@ -25,17 +28,16 @@ from contextdb.motion.selection.decision import Action, Decision, Playing
 
 ADDED_SHARE = 0.75
 """What is added to the clips may accelerate joints by this share of what the clips do; the rest is left for the clips."""
-NEAR_S = 0.1
-"""What is displayed goes on where it is not farther from where it should be than this."""
-CONTINUES, HOLDS, DOES_ELSE = 0.0, 1.0, 2.0
+NUMBERS = {action: float(number) for number, action in enumerate(Action)}
 """What an update did, as the core has it."""
 COLUMNS = pose_columns()
 """Where each single number of a row is."""
 PLAY_RATE, CLIP_RATE = COLUMNS["play_rate"], COLUMNS["clip_rate"]
-N_GIVEN = 14
-"""So many numbers the core is given of a character, see `cdbo_given` in pose.h."""
-Seam = tuple[int, int, float, float]
-"""A moment at a seam: the number of its bank, its range and second, and how fast it plays."""
+N_GIVEN, IS_AHEAD, LOST = 16, 10, 12
+"""So many numbers the core is given of a character, and two of their places; see `cdbo_given` in pose.h."""
+Moment = tuple[int, int, float]
+NO_MOMENT: Moment = (-1, 0, 0.0)
+"""A moment of a bank: its number, a range and a second; nothing."""
 
 
 @quickly_made
@@ -102,7 +104,7 @@ class Pipeline:
         n, n_joints, n_feet = len(rows), self.rig.n_joints, len(self.rig.feet)
         after, roots, contacts = np.empty((n, self.width)), np.empty((n, 3)), np.empty((n, n_feet), np.bool_)
         rotations, translations, positions = np.empty((n, n_joints, 4)), np.empty((n, n_joints, 3)), np.empty((n, n_joints, 3))
-        moments = np.array(seams, np.float64) if seams else None
+        moments = seams if len(seams) else None
         bodies = None if places is None else np.ascontiguousarray(places)
         arrays = rows.numbers, given, bodies, moments, dt, after, roots, rotations, translations, positions, contacts
         if grounds is None:
@@ -124,64 +126,38 @@ class Pipeline:
 
     def _given(
         self, rows: Rows, decisions: Sequence[Decision], dt: float, grounds: Grounds | None
-    ) -> tuple[Floats, list[Seam], list[Playing | None], list[bool], list[bool]]:
+    ) -> tuple[Floats, Floats, list[Playing | None], list[bool], list[bool]]:
         """What happens in this update, a row each, and the moments at seams, two for each; what plays; which jump, and had to."""
-        given: list[float] = []
-        seams: list[Seam] = []
-        all_playing, jumps, forced = [], [], []
-        gives = _gives(grounds, len(rows))
-        rates, shown_rates = rows.numbers[:, CLIP_RATE].tolist(), rows.numbers[:, PLAY_RATE].tolist()
-        for decision, displayed, rate, shown_rate, ground in zip(decisions, rows.playing, rates, shown_rates, gives, strict=True):
-            playing, action, before, is_ahead = decision.playing, decision.action, decision.before, False
-            number, at, time_s, seam, lost_s = -1, 0, 0.0, -1, 0.0
-            if playing is not None:
-                (number, at), time_s = self.find(playing), playing.time_s
-            if displayed is not None and playing is not None:
-                if not _goes_on(decision, displayed, dt * rate):
-                    is_seam = action is Action.JUMP or action is Action.START
-                    is_ahead = not is_seam or before is None
-                    before, action = replace(displayed, time_s=displayed.time_s + dt * rate), action if is_seam else Action.JUMP
-                if action is Action.LOOP:
-                    seam, end_s = len(seams) // 2, self.all[number].last_s(at)
-                    seams += [(number, at, end_s, rate), (number, at, 0.0, decision.play_rate)]
-                elif action is Action.JUMP or action is Action.START:
-                    left = self._seam(before or displayed, displayed.time_s + dt * rate, rate, shown_rate == 0.0)
-                    seam = len(seams) // 2
-                    lost_s = 0.0 if before is None or is_ahead or rate == 0.0 else (left[2] - before.time_s) / rate
-                    seams += [
-                        left,
-                        (number, at, time_s, decision.play_rate),
-                    ]
-            code = CONTINUES if action is Action.CONTINUE else HOLDS if action is Action.HOLD else DOES_ELSE
+        plays: list[float] = []
+        all_playing = [decision.playing for decision in decisions]
+        for decision, displayed, ground in zip(decisions, rows.playing, _gives(grounds, len(rows)), strict=True):
             motion = decision.root_motion
-            given += (
-                number, at, time_s, displayed is not None, code, decision.play_rate,
-                motion.left_m, motion.ahead_m, motion.turn_rad, decision.root_weight, is_ahead, seam, lost_s, ground,
+            plays += (
+                *self.moment_of(decision.playing), *self.moment_of(decision.before), *self.moment_of(displayed),
+                NUMBERS[decision.action], decision.play_rate,
+                motion.left_m, motion.ahead_m, motion.turn_rad, decision.root_weight, ground,
+                *_said(decision.play),
             )  # fmt: skip
-            all_playing.append(playing)
-            jumps.append(action is Action.JUMP)
-            forced.append(action is Action.JUMP and decision.continuing_cost is None)
-        return np.array(given, np.float64).reshape(-1, N_GIVEN), seams, all_playing, jumps, forced
+        n = len(rows)
+        given, moments = np.empty((n, N_GIVEN)), np.empty((2 * n, 4))
+        n_seams = self._flat.receive(rows.numbers, np.array(plays, np.float64).reshape(n, -1), dt, given, moments)
+        jumps = [
+            seam >= 0.0 and (decision.action is Action.JUMP or (decision.action is not Action.START and is_ahead != 0.0))
+            for decision, (is_ahead, seam) in zip(decisions, given[:, IS_AHEAD:LOST].tolist(), strict=True)
+        ]
+        forced = [jump and decision.continuing_cost is None for jump, decision in zip(jumps, decisions, strict=True)]
+        return given, moments[:n_seams], all_playing, jumps, forced
 
-    def _seam(self, was: Playing, until_s: float, rate: float, is_still: bool) -> Seam:
-        """The moment that is left at a seam: behind its end where a clip has run out within the update, and did not stand there."""
-        number, at = self.find(was)
-        if was.time_s < self.all[number].last_s(at):
-            return number, at, was.time_s, rate
-        return number, at, was.time_s if is_still else max(was.time_s, until_s), 0.0 if is_still else rate
+    def moment_of(self, playing: Playing | None) -> Moment:
+        """What plays as the core has it: its bank, range and second."""
+        return NO_MOMENT if playing is None else (*self.find(playing), playing.time_s)
 
 
-def _goes_on(decision: Decision, displayed: Playing, passed_s: float) -> bool:
-    """Whether a decision goes on from what was displayed; else another one has decided meanwhile."""
-    playing = decision.before if decision.action is Action.JUMP or decision.action is Action.START else decision.playing
-    if (
-        playing is None
-        or playing.asset != displayed.asset
-        or playing.mirrored != displayed.mirrored
-        or playing.database != displayed.database
-    ):
-        return False
-    return decision.action is Action.LOOP or -NEAR_S <= playing.time_s - displayed.time_s <= passed_s + NEAR_S
+def _said(play: RowPlay | None) -> tuple[float, float]:
+    """How long the row of what plays is blended, and what moves the root, as the core has it; NaN where it does not say."""
+    if play is None:
+        return math.nan, math.nan
+    return math.nan if play.blend_s is None else play.blend_s, math.nan if play.root is None else float(ROOTS.index(play.root))
 
 
 def _gives(grounds: Grounds | None, n: int) -> Sequence[bool]:
@@ -192,17 +168,26 @@ def _gives(grounds: Grounds | None, n: int) -> Sequence[bool]:
 
 def _poses(banks: Sequence[PoseBank], settings: PoseSettings, *, feels_ground: bool) -> Poses:
     """The stages in the core: a rig, its banks and settings."""
+    frames = tuple(each.frames_on_ground if feels_ground else each.frames for each in banks)
+    return Poses(*rig_parts(banks), numbers_of(settings), frames)
+
+
+Rig = tuple[Ints, Floats, Ints, Ints, Floats, Ints, Ints, Floats, float, int]
+
+
+def rig_parts(banks: Sequence[PoseBank]) -> Rig:
+    """The rig of banks as the core takes it: parents, offsets, places, legs, hinges, tops, the spine and what is left of its turn,
+    what joints may be accelerated by, and how many have positions of their own."""
     bank, spine = banks[0], spine_of(banks[0])
     rig = bank.skeleton
     joints, left = (np.zeros(0, np.int64), np.zeros(0)) if spine is None else (spine.joints, spine.left)
     legs = legs_of(rig, bank.feet)
     most = ADDED_SHARE * max(each.most_accel for each in banks)
-    frames = tuple(each.frames_on_ground if feels_ground else each.frames for each in banks)
     hinges, tops = hinges_of(rig, legs, bank.rotations), np.array(tops_of(rig), np.int64)
-    return Poses(*bank.joints, legs, hinges, tops, joints, left, most, len(bank.moving), _numbers(settings), frames)
+    return *bank.joints, legs, hinges, tops, joints, left, most, len(bank.moving)
 
 
-def _numbers(settings: PoseSettings) -> dict[str, float]:
+def numbers_of(settings: PoseSettings) -> dict[str, float]:
     """Settings as numbers: of a word its place among those that are accepted."""
     values: dict[str, Any] = {key: getattr(settings, key) for key in settings_of(PoseSettings)}
     words = {key: each.shape.words for key, each in settings_of(PoseSettings).items()}

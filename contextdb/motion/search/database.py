@@ -34,6 +34,7 @@ from contextdb.cells.arguments import (
 )
 from contextdb.core import Frames
 from contextdb.errors import Fault, MotionError, QueryError, in_quotes, no_such, plural
+from contextdb.files import scratch
 from contextdb.motion import arguments
 from contextdb.motion.arguments import Currents, Flags, Valid, ValidForMany, ValidRanges
 from contextdb.motion.clips.clip import Clip
@@ -147,7 +148,7 @@ class MotionDatabase(Searched):
         lengths = np.array([len(part.features) for part in parts], np.int64)
         stops = np.cumsum(lengths)
         starts, assets = stops - lengths, tuple(part.asset for part in parts)
-        features = np.zeros((int(lengths.sum()), schema.n_features), np.float32)
+        features = scratch.zeros((int(lengths.sum()), schema.n_features), np.float32)
         for part, start, stop in zip(parts, starts, stops, strict=True):
             features[start:stop] = shared.apply(part.features)
         marks = marks_of(Markup() if markup is None else markup, assets, starts, stops, schema.rate, end_s)
@@ -164,7 +165,7 @@ class MotionDatabase(Searched):
             shared,
             marks,
             biases,
-            np.concatenate([np.zeros((0, 3), np.float32), *(part.root for part in parts)]),
+            scratch.joined([part.root for part in parts], np.zeros((0, 3), np.float32)),
             schema,
         )
 
@@ -414,6 +415,11 @@ class MotionDatabase(Searched):
     def frames(self) -> Frames:
         """What the core searches."""
         return self._searcher.frames
+
+    @property
+    def frame_parts(self) -> tuple[Any, ...]:
+        """The arrays and numbers of which the core makes that."""
+        return self._searcher.frame_parts
 
     def valid_of_each(self, valid: ValidForMany | None, n: int) -> list[ValidRanges]:
         """What the masks of n characters mean to this database, see `search_many`: each serves as `valid` of `search`."""

@@ -18,6 +18,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from contextdb.files import scratch
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.ranges import frames_between
@@ -138,7 +139,7 @@ class Layout:
 
 def _blocks(features: Features, order: Ints, box_starts: Ints, box_sizes: Ints) -> Features:
     """The features of each box's frames, [B, F, L]; filled part by part, so that no copy of all is made."""
-    blocks = np.empty((len(box_starts), features.shape[1], LANES), np.float32)
+    blocks = scratch.zeros((len(box_starts), features.shape[1], LANES), np.float32)
     for box in range(0, len(box_starts), BOXES_AT_ONCE):
         part = slice(box, box + BOXES_AT_ONCE)
         blocks[part] = features[_frames_of(box_starts[part], box_sizes[part])].transpose(0, 2, 1)[:, order]

@@ -8,7 +8,7 @@ An edge: this touches the disk.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
@@ -16,6 +16,7 @@ from pathlib import Path
 from contextdb.cells.arguments import require_kind, require_many, require_mapping, require_path, require_text
 from contextdb.disk import matching, real_path
 from contextdb.disk.boundary import inside
+from contextdb.disk.engines import Engines, here
 from contextdb.errors import ArtefactError, Fault, FileError, MotionError, Place, in_quotes, plural, some
 from contextdb.motion.clips.doubts import ClipFinding, doubts
 from contextdb.motion.features.normalisation import Normalisation
@@ -25,18 +26,16 @@ from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.filters import Biases
 from contextdb.motion.storage import stored
 from contextdb.motion.storage.build_inputs import Assets, Faults, Inputs, Tolerates
-from contextdb.motion.storage.clip_files import ClipFile, Extracted, extract
+from contextdb.motion.storage.clip_files import Extracted
 from contextdb.motion.storage.config import MotionConfig
 from contextdb.motion.storage.database_settings import DatabaseSettings
+from contextdb.motion.storage.extracting import Progress, extract_all
 from contextdb.motion.storage.feature_cache import FeatureCache, file_name
 
 CACHE_FOLDER = ".contextdb-cache"
 SAVED_SUFFIX = ".motion.safetensors"
 MOST_BONES = 4
 """So many bones are named in a warning."""
-
-Progress = Callable[[int, int, str], None]
-"""Called with how many clips are done, how many there are, and the name of the one done last."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,8 +114,11 @@ def build_all(
     names: Collection[str] | None = None,
     cache: str | PathLike[str] | None = CACHE_FOLDER,
     tolerates: Tolerates | None = None,
+    engines: Engines = here,
 ) -> dict[str, Built]:
     """Build as `build` does, and tell of each database what it was made of.
+
+    `engines` says where features are worked out; the databases are the same wherever it is.
 
     `tolerates` is called with the name of a database and what is wrong with it or with one of its clips. Where it says True the
     build goes on without. Of the databases of one schema, which share a normalisation, those that are not among `names` take part.
@@ -126,7 +128,7 @@ def build_all(
     feature_cache = None if cache is None else FeatureCache(_cache_folder(root, require_path(cache, "cache")))
     faults, built = Faults(tolerates), {}
     inputs = Inputs.of(config, root, assets or {}, names, faults)
-    extracted = _extract_all(inputs.files, feature_cache, progress, faults)
+    extracted = extract_all(inputs.files, feature_cache, progress, faults, engines)
     faults.tell()
     had_clips = {name: bool(files) for name, files in inputs.files.items()}
     inputs = replace(inputs, files={name: [each.file for each in parts] for name, parts in extracted.items()})
@@ -222,22 +224,6 @@ def _open(path: Path, digest: str) -> MotionDatabase | None:
 
 
 # ---- steps of a build
-
-
-def _extract_all(
-    files: Mapping[str, list[ClipFile]], cache: FeatureCache | None, progress: Progress | None, faults: Faults
-) -> dict[str, list[Extracted]]:
-    """The features of all clips that can be read."""
-    total, done = sum(map(len, files.values())), 0
-    extracted: dict[str, list[Extracted]] = {name: [] for name in files}
-    for name, listed in files.items():
-        for file in listed:
-            with faults.of(name):
-                extracted[name].append(extract(file, cache))
-            done += 1
-            if progress is not None:
-                progress(done, total, file.asset)
-    return extracted
 
 
 def _shared_normalisation(config: MotionConfig, schema: str, extracted: Mapping[str, list[Extracted]]) -> Normalisation:

@@ -16,13 +16,15 @@ from contextdb.disk import matching
 from contextdb.errors import ContextDBError, Fault, MotionError, Place, nearest, plural, some
 from contextdb.findings import Finding
 from contextdb.motion.clips.clip import CENTIMETRE
-from contextdb.motion.clips.doubts import ClipFinding, Measures, doubts, measure
+from contextdb.motion.clips.clip_measures import Measures, measure
+from contextdb.motion.clips.doubts import ClipFinding, doubts
 from contextdb.motion.clips.source import load_clips
 from contextdb.motion.storage import building
 from contextdb.motion.storage.build_inputs import Assets, Faults, Inputs, distinct_faults
-from contextdb.motion.storage.building import Built, Progress
+from contextdb.motion.storage.building import Built
 from contextdb.motion.storage.clip_files import ClipFile, read_clip, unmatched
 from contextdb.motion.storage.config import MotionConfig
+from contextdb.motion.storage.extracting import Progress
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ from contextdb.errors import Fault, MotionError, Place, in_quotes
 from contextdb.files.toml_text import as_toml
 from contextdb.motion.clips import mirror
 from contextdb.motion.clips.clip import Clip
-from contextdb.motion.clips.doubts import Measures, measure
+from contextdb.motion.clips.clip_measures import Measures, measure
 from contextdb.motion.clips.feet import NO_MARKS, ContactMarks
 from contextdb.motion.clips.on_the_spot import by_feet
 from contextdb.motion.clips.skeleton import Skeleton

@@ -65,7 +65,7 @@ class DatabaseSettings(Declared, error=MotionError):
     clips: str = setting(
         file_below("a pattern of files", "file of clips", ENDINGS, '"clips/*.bvh"'),
         "A pattern of files of clips below the folder of contextdb.toml.",
-        more='In several formats: `"clips/**/*.{bvh,fbx,glb}"`; see [formats of clips](clips.md#formats-of-clips).',
+        more='In several formats: `"clips/**/*.{bvh,fbx,glb}"`; see [formats of clips](choosing.md#formats-of-clips).',
     )
     features: str = setting(filled("the name of a [features.NAME]"), "The name of a feature schema.")
     table: str | None = setting(
@@ -90,7 +90,7 @@ class DatabaseSettings(Declared, error=MotionError):
         file_below("a file", "CSV file", (".csv",), '"clips/marks.csv"'),
         "A CSV file of marks on frames, below the folder of contextdb.toml.",
         None,
-        more="See [markup](clips.md#markup-which-frames-may-be-used-and-how).",
+        more="See [markup](choosing.md#markup-which-frames-may-be-used-and-how).",
         without="none",
     )
     base_bias: float = number("Added to the cost of every frame.", 0.0, unit="a cost", such_as=0.5)
@@ -104,7 +104,7 @@ class DatabaseSettings(Declared, error=MotionError):
         Shape('two names or more, each once and without a dot, such as ["Tackler", "Carrier"]', _wrong_roles, read=tuple),
         "Clips are named `ASSET.ROLE.bvh`, and those of one asset play together.",
         (),
-        more='See [joint clips](joint.md): `["Tackler", "Carrier"]`.',
+        more='See [joint clips](motion.md#several-characters-at-once): `["Tackler", "Carrier"]`.',
         without="none",
     )
     place_weight: float = number("The weight of where roles see each other.", 1.0, 0.0, MOST_WEIGHT, "a weight")

@@ -33,7 +33,7 @@ from contextdb.disk.own_files import (
 from contextdb.errors import ArtefactError, FileError
 from contextdb.files.tensors import SUFFIX, FileKind, Tensors, digest_of, read_tensors, to_bytes
 from contextdb.motion.clips.clip import BY_SIZE, Unit, Up
-from contextdb.motion.clips.doubts import Measures
+from contextdb.motion.clips.clip_measures import Measures
 from contextdb.motion.clips.feet import NO_MARKS, ContactMarks
 from contextdb.motion.features.extraction import ClipFeatures
 from contextdb.motion.features.schema import FeatureSchema

@@ -27,6 +27,7 @@ from typing import Any
 
 from contextdb.cells.arguments import require_kind, require_path, require_text
 from contextdb.disk.boundary import inside
+from contextdb.disk.engines import Engines, here, in_order
 from contextdb.errors import ArtefactError, ContextDBError, FileError
 from contextdb.files.tensors import (
     FileKind,
@@ -39,12 +40,16 @@ from contextdb.files.tensors import (
     write_tensors,
 )
 from contextdb.motion.clips.skeleton import Skeleton
+from contextdb.motion.markup.markup import Markup
 from contextdb.motion.output.bank import PoseBank, moving_alike
+from contextdb.motion.output.clip_parts import ClipParts, parts_of
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.storage.build_inputs import Assets, Inputs
 from contextdb.motion.storage.building import checked
 from contextdb.motion.storage.clip_files import read_clip
 from contextdb.motion.storage.config import MotionConfig
+from contextdb.motion.storage.database_settings import DatabaseSettings
+from contextdb.motion.storage.extracting import CHUNK, MANY, Chunk, named_chunk
 from contextdb.motion.storage.feature_cache import file_name
 
 STORED_POSES = FileKind(
@@ -148,19 +153,30 @@ def poses_alone(
     *,
     names: Collection[str] | None = None,
     saved: str | PathLike[str] | None = None,
+    engines: Engines = here,
 ) -> dict[str, PoseBank]:
-    """The same, each as it is without the others: as it is saved."""
+    """The same, each as it is without the others: as it is saved. `engines` says where clips are read."""
     root = checked(config, folder, assets, names)
     place = root / (require_path(saved, "saved") if saved else "")
     inputs = Inputs.of(config, root, assets or {}, names)
     digests = inputs.digests(inputs.keys())
-    return {name: _open(poses_path(place, name), digests[name]) or _built(inputs, name) for name in inputs.wanted}
+    return {name: _open(poses_path(place, name), digests[name]) or _built(inputs, name, engines) for name in inputs.wanted}
 
 
-def _built(inputs: Inputs, name: str) -> PoseBank:
-    settings = inputs.config.databases[name]
-    clips = [read_clip(file) for file in inputs.files[name]]
-    return PoseBank.build(clips, inputs.config.features[settings.features], mirror=settings.mirror, markup=inputs.markups.get(name))
+def _built(inputs: Inputs, name: str, engines: Engines) -> PoseBank:
+    settings, files = inputs.config.databases[name], inputs.files[name]
+    size = CHUNK if len(files) > MANY else 1
+    chunks = [tuple(files[i : i + size]) for i in range(0, len(files), size)]
+    schema = inputs.config.features[settings.features]
+    run = here if schema.functions else engines
+    worked = run(_parts, (settings, inputs.markups.get(name)), chunks, named_chunk, is_much=len(files) > MANY)
+    return PoseBank.of_parts((each for parts in in_order(worked) for each in parts), schema.rate)
+
+
+def _parts(about: tuple[DatabaseSettings, Markup | None], chunk: Chunk) -> list[ClipParts]:
+    """What the clips of a chunk give to a bank."""
+    settings, markup = about
+    return [parts_of(read_clip(file), file.schema, settings.mirror, markup) for file in chunk]
 
 
 def _open(path: Path, digest: str) -> PoseBank | None:

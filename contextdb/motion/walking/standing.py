@@ -16,7 +16,8 @@ from contextdb.core import feel_ground, lower_hips, stand_legs
 from contextdb.motion.clips import quaternions
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints, Skeleton
-from contextdb.motion.output.bank import placed, tops_of
+from contextdb.motion.output.bank import placed
+from contextdb.motion.output.clip_parts import tops_of
 from contextdb.motion.output.ground import Ground, below
 from contextdb.motion.output.legs import hinges_of, legs_of
 from contextdb.motion.output.samples import Place3

@@ -12,6 +12,7 @@ from contextdb.columns import TextColumn
 from contextdb.errors import ContextDBError, Fault, TableError, in_quotes, nearest, some
 from contextdb.tables.data import AnyTable, TableData
 from contextdb.tables.nesting.names import inner_name, says_nesting
+from contextdb.tables.variants import whole_of
 
 Tables = Mapping[str, TableData]
 
@@ -70,8 +71,22 @@ def inner_tables(tables: Iterable[TableData]) -> set[str]:
     return {name for table in tables for name in inner_rows(table)}
 
 
+def sources(table: TableData, tables: Tables) -> dict[str, TableData]:
+    """The tables whose files say what is in a table, by name: itself, those inside it, and the bases of variants."""
+    tables_by_name = {table.name: table}
+    waiting = [table]
+    while waiting:
+        at = waiting.pop()
+        for name in (*inner_rows(at), *([at.settings.base] if at.settings.base else [])):
+            if name in tables and name not in tables_by_name:
+                tables_by_name[name] = tables[name]
+                waiting.append(tables[name])
+    return tables_by_name
+
+
 def reached(table: TableData, tables: Tables) -> dict[str, TableData]:
-    """The table and all that are in it, by name, each once; the table itself first. Those that cannot be read are left out."""
+    """The table and all that are in it, by name, each once; the table itself first. Those that cannot be read are left out, and
+    variants are whole."""
     tables_by_name = {table.name: table}
     waiting = [table]
     while waiting:
@@ -107,14 +122,14 @@ def _unread(reachable: Iterable[TableData], tables: Tables) -> Iterator[Fault]:
     for name in dict.fromkeys(name for table in reachable for name in inner_rows(table)):
         if name in tables:
             try:
-                tables[name]
+                whole_of(tables[name], tables)
             except ContextDBError as error:
                 yield from error.faults
 
 
 def _read(name: str, tables: Tables) -> TableData | None:
     try:
-        return tables.get(name)
+        return whole_of(tables[name], tables) if name in tables else None
     except ContextDBError:  # reported by `require_sound`, and in the file itself
         return None
 

@@ -18,7 +18,7 @@ from contextdb.errors import ContextDBError, Fault, FileError, Place, TableError
 from contextdb.files.texts import texts_of
 from contextdb.schema.settings import EMPTY, Schema
 from contextdb.tables.data import require_readable
-from contextdb.tables.nesting.links import reached
+from contextdb.tables.nesting.links import sources
 from contextdb.tables.project import (
     SCHEMA_FILE,
     ByName,
@@ -74,9 +74,17 @@ def schema_from(folder: Path, contents: Contents, last: Snapshot | None) -> Sche
         if path.exists():
             read_bytes(path)
         return EMPTY
-    if last is not None and digests_of({path: raw})[path] == last._digests.get(path):
-        return last.project.schema
+    if last is not None:
+        files = [path, *shared_files(last.project.schema)]
+        now = digests_of({file: contents[file] for file in files if file in contents})
+        if all(now.get(file) == last._digests.get(file) for file in files):
+            return last.project.schema
     return schema_of(raw, path)
+
+
+def shared_files(schema: Schema) -> list[Path]:
+    """The files that the project of a schema extends."""
+    return [Path(file) for file in schema.studio.files] if schema.studio is not None else []
 
 
 def next_snapshot(folder: Path, schema: Schema, files: NamedFiles, contents: Contents, last: Snapshot | None = None) -> Snapshot:
@@ -96,7 +104,7 @@ def next_snapshot(folder: Path, schema: Schema, files: NamedFiles, contents: Con
     project = Project(folder, schema, around_each_other(tables, last.project.tables if last else {}))
     require_all_sound(project)
     before = last._alone if last else {}
-    changed = tuple(n for n, t in tables.items() if any(before.get(m) is not inner for m, inner in reached(t, tables).items()))
+    changed = tuple(n for n, t in tables.items() if any(before.get(m) is not inner for m, inner in sources(t, tables).items()))
     older = last.tables if last else {}
     compiled = {n: older[n] if last and n not in changed else _compiled(t, older.get(n)) for n, t in project.tables.items()}
     return Snapshot(last.number + 1 if last else 1, project, compiled, changed, digests, tables)

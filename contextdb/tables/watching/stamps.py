@@ -8,7 +8,7 @@ only when the last write lies longer ago than that.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 
 from contextdb.disk import read_bytes
@@ -27,12 +27,12 @@ def look(paths: Iterable[Path]) -> dict[Path, Stamp]:
     return {path: _stamp(path) for path in paths}
 
 
-def read_all(paths: Iterable[Path], folder: Path) -> dict[Path, bytes]:
-    """The bytes of those files that are there, in the folder, and may be read."""
+def read_all(paths: Iterable[Path], folder: Path, shared: Collection[Path] = ()) -> dict[Path, bytes]:
+    """The bytes of those files that are there, in the folder or among those that its project extends, and may be read."""
     contents = {}
     for path in paths:
         try:
-            contents[path] = read_bytes(inside(path, folder))
+            contents[path] = read_bytes(path if path in shared else inside(path, folder))
         except ContextDBError:  # whoever needs it says why it cannot be read
             continue
     return contents

@@ -25,7 +25,7 @@ from contextdb.errors import ContextDBError, Fault, FileError, Place, plural
 from contextdb.schema.settings import Schema
 from contextdb.tables.project import SCHEMA_FILE, ByName, Project, folder_of, table_files
 from contextdb.tables.watching.rest import Rest
-from contextdb.tables.watching.snapshot import Contents, Snapshot, next_snapshot, schema_from
+from contextdb.tables.watching.snapshot import Contents, Snapshot, next_snapshot, schema_from, shared_files
 from contextdb.tables.watching.stamps import COARSEST_TICK_S, Digests, Stamps, digests_of, look, read_all
 
 POLL_S = 0.25
@@ -98,7 +98,7 @@ class Watch(ByName[CompiledTable]):
         self._stamps: Stamps = {}
         self._stamps = look(self._paths())
         self._rest = Rest(self._stamps, self._read_s, settle_s)
-        contents = read_all(self._stamps, folder)
+        contents = read_all(self._stamps, folder, shared_files(self._schema))
         self._digests = self._tried = digests_of(contents)
         self._snapshot = next_snapshot(folder, self._schema, self._tables(self._schema), contents)
 
@@ -138,7 +138,7 @@ class Watch(ByName[CompiledTable]):
             now, stamps = self._clock(), look(self._paths())
             if not self._rest.is_due(stamps, now) or not self._may_be_new(stamps):
                 return False
-            contents = read_all(stamps, self.folder)
+            contents = read_all(stamps, self.folder, shared_files(self._schema))
             if look(self._paths()) != stamps:
                 return False  # written while it was read: the next look sees that it moved
             return self._is_new(stamps, digests_of(contents), now) and self._take(contents)
@@ -176,7 +176,7 @@ class Watch(ByName[CompiledTable]):
             tables = [path for _, path in self._tables(self._schema)]
         except FileError as error:  # links out of the folder: a version without them is never made, and `faults` says why
             tables = [*self._stamps, *(Path(fault.place.file) for fault in error.faults if fault.place.file)]
-        return list(dict.fromkeys((self.folder / SCHEMA_FILE, *tables)))
+        return list(dict.fromkeys((self.folder / SCHEMA_FILE, *shared_files(self._schema), *tables)))
 
     def _tables(self, schema: Schema) -> list[tuple[str, Path]]:
         files: list[tuple[str, Path]] = []
@@ -206,7 +206,7 @@ class Watch(ByName[CompiledTable]):
             _require_folder(self.folder)
             schema = schema_from(self.folder, contents, last)
             tables = self._tables(schema)
-            if not {path for _, path in tables} <= self._stamps.keys():
+            if not {path for _, path in tables}.union(shared_files(schema)) <= self._stamps.keys():
                 self._schema = schema  # these files have to rest too
                 return False
             self._tried, self._schema = self._digests, schema

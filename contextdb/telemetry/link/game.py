@@ -10,10 +10,11 @@ import weakref
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from contextdb.cells.arguments import require_number, require_path, require_text
+from contextdb.cells.arguments import require_number, require_path, require_row, require_text, require_whole
+from contextdb.compiled.table import CompiledTable
 from contextdb.errors import ContextError, Fault, FileError, Place
 from contextdb.telemetry.link import doors
-from contextdb.telemetry.link.feed import Decisions, Feed, Watcher, Who
+from contextdb.telemetry.link.feed import Decisions, Feed, Picked, Watcher, Who
 from contextdb.telemetry.link.folder import require_name
 from contextdb.telemetry.link.lines import cut_name
 from contextdb.telemetry.link.listeners import FileListener
@@ -119,6 +120,17 @@ class Link:
             raise ContextError(Fault(problem, "the Decision of a controller, or the Choice of a selector"))
         if self._feed.is_open:
             Watcher(self._feed, who).decided(decision)
+
+    def picked(self, table: CompiledTable, who: str | None, row: int | None) -> None:
+        """Publish the row that a character plays though no picker picked it, such as that of the frame that a search chose; None or
+        -1 for none. It belongs to the character's last question. Raises ContextError where the table has no such row."""
+        if not isinstance(table, CompiledTable):
+            raise ContextError(Fault(f"a row of {type(table).__name__} is published.", "a compiled table"))
+        at = None if row is None or require_whole(row, "row") == -1 else require_row(row, table.n_rows)
+        if self._feed.is_open:
+            with self._writer.lock:
+                source = self._watched.source_of(table)
+            self._feed.put(who, source, Picked(at, table.fallback if at is None else table.assets[at]))
 
     def close(self) -> None:
         """Publish no more. What was watched is what it was before."""

@@ -63,6 +63,10 @@ class Watched:
             mend = "to compile it first" if hasattr(what, "compile") else ""
             raise ContextError(Fault(problem, accepted, mend))
 
+    def source_of(self, table: CompiledTable) -> Source:
+        """What the lines say of a table, whose picks are published from now on."""
+        return self._watch_table(data_of(table), None, has_questions=False)
+
     def follow(self) -> None:
         """Watch the tables that folders have now."""
         for folder in self._folders:

@@ -33,6 +33,7 @@ COMMANDS = {
     "cases": "what saved contexts reach of a table, and the fewest that reach the rest",
     "ci": "check and coverage as a build runs them, against a commit, with report files",
     "diff": "what changed between two versions of a table",
+    "tidy": "fewer cells with the same answers",
     "merge": "merge two versions of a table",
     "git": "let git merge and show tables cell by cell",
     "import": "import a table from another program: CSV, Excel, JSON, DMN, Unreal",

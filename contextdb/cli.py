@@ -40,6 +40,7 @@ COMMANDS = {
     "export": "write a table for another program",
     "compile": "write the compiled file for the game",
     "live": "what a running game asks its tables, and what it picks",
+    "index": "the rows of all projects below a folder as one Parquet file",
     "verify": "whether files are as contextdb wrote them",
     "motion": "motion databases: bones, check, build, search, select, run, replay, describe, prepare",
     "desktop": "open tables with a double click",

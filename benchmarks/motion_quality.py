@@ -213,13 +213,13 @@ COLUMNS = (
     ("forced", "forced_jumps", 0),
     ("jump cm", "jump_cm", 1),
     ("skate cm/s", "skate_cm_s", 1),
-    ("toe down", "toe_skate_cm_s", 1),
-    ("worst s", "toe_skate_worst_cm_s", 1),
+    ("toe down", "skate_toe_cm_s", 1),
+    ("worst s", "skate_toe_worst_cm_s", 1),
     ("MANN", "skate_weighted_cm_s", 1),
-    ("dip cm", "dip_cm", 1),
+    ("dip cm", "hip_dip_cm", 1),
     ("below cm", "penetration_cm", 1),
     ("knees %", "knee_limit_share", -1),
-    ("off feet cm", "balance_cm", 1),
+    ("off feet cm", "hips_off_feet_cm", 1),
     ("lean deg", "lean_deg", 1),
     ("acc p99", "accel_p99", 1),
     ("snaps %", "snap_share", -1),
@@ -233,7 +233,7 @@ COLUMNS = (
 )
 RAW = {
     "skate_cm_s": "skate_raw_cm_s",
-    "toe_skate_cm_s": "toe_skate_raw_cm_s",
+    "skate_toe_cm_s": "skate_toe_raw_cm_s",
     "skate_weighted_cm_s": "skate_weighted_raw_cm_s",
     "penetration_cm": "penetration_raw_cm",
     "knee_limit_share": "knee_limit_raw_share",
@@ -241,7 +241,7 @@ RAW = {
 }
 TOGETHER: dict[str, Callable[..., Any]] = {
     **{"forced_jumps": sum, "n_missed": sum, "forced_cost": max},
-    **dict.fromkeys(("dip_cm", "penetration_cm", "balance_cm", "lean_deg", "toe_skate_worst_cm_s"), max),
+    **dict.fromkeys(("hip_dip_cm", "penetration_cm", "hips_off_feet_cm", "lean_deg", "skate_toe_worst_cm_s"), max),
 }
 
 

@@ -1,4 +1,4 @@
-"""`[project] extends`: the conditions and blueprints of another project, found without leaving the repository or following links."""
+"""`[project] extends`: the conditions and blueprints of another project, found inside the repository, through no link."""
 
 from __future__ import annotations
 
@@ -140,7 +140,9 @@ def test_an_edit_changes_nothing_of_the_studio(game):
     table = load(game / "moves.csv")
     own = Sections(parts={"conditions": {"Air": {"type": "bool", "description": "off the ground"}}}).apply(table)
     change = schema_change(table, own)
-    assert change is not None and b"off the ground" in change.raw and b"[conditions.speed]" not in change.raw
+    assert change is not None
+    assert b"off the ground" in change.raw
+    assert b"[conditions.speed]" not in change.raw
     shared = Sections(parts={"conditions": {"speed": {"type": "number", "min": 0, "max": 99}}}).apply(table)
     with pytest.raises(SchemaError, match=r"\[conditions\.speed\] is not declared in this file"):
         schema_change(table, shared)

@@ -336,7 +336,10 @@ SECTIONS_SAID = (
         ("[Project]\nname = ''", f'line 1: "Project" is not a section. Accepted: {SECTIONS_SAID}. Did you mean [project]?'),
         ("[qqq]", f'line 1: "qqq" is not a section. Accepted: {SECTIONS_SAID}.'),
         ("\nname = 'x'", f'line 2: "name" is not a section. Accepted: {SECTIONS_SAID}.'),
-        ("[project]\nnmae = 'x'", 'line 2: [project] has no key "nmae". Accepted: "name", "transitions". Did you mean "name"?'),
+        (
+            "[project]\nnmae = 'x'",
+            'line 2: [project] has no key "nmae". Accepted: "name", "extends", "transitions". Did you mean "name"?',
+        ),
         (
             "[project]\ntransitions = 'to_{to}'",
             'line 2: [project] transitions = "to_{to}": this is not a pattern for names of transitions. Accepted: {from} and '

@@ -8,7 +8,8 @@
     numbers  0 1.5 0                 so many numbers as `size` says, with spaces or commas between
 
 An empty cell means the default; without one it is a fault, but for text, which is then "". What there is where no row gives a value
-is `Output.nothing`. Nothing here knows a file or a table.
+is `Output.nothing`. Outputs with a reserved name say how a row plays, see `contextdb.cells.row_play`. Nothing here knows a file or
+a table.
 """
 
 from __future__ import annotations
@@ -20,8 +21,10 @@ from typing import Any
 import numpy as np
 
 from contextdb.cells.output_types import OUTPUT_TYPES, OutputType, OutputValue
+from contextdb.cells.row_play import ACCEPTED as PLAY_ACCEPTED
+from contextdb.cells.row_play import play_choices, read_play
 from contextdb.cells.words import format_number, says_any
-from contextdb.errors import CellError, Fault, in_quotes, plural, some
+from contextdb.errors import CellError, Fault, in_quotes, nearest, plural, some
 
 SLOT_COLUMNS = ("Mandatory_Slots", "Optional_Slots")
 """The outputs that say which roles a row fills."""
@@ -60,6 +63,16 @@ class Output:
         return self == Output(self.name)
 
     @property
+    def is_reserved(self) -> bool:
+        """Whether it says how the row's animation plays."""
+        return self.name in PLAY_ACCEPTED
+
+    @property
+    def is_free(self) -> bool:
+        """Whether any text is a value."""
+        return self.type.is_free and not self.is_reserved
+
+    @property
     def needs_cell(self) -> bool:
         """Whether an empty cell is a fault."""
         return self.default is None and not self.type.is_free
@@ -67,12 +80,14 @@ class Output:
     @property
     def accepted(self) -> str:
         """What a cell may say, for messages."""
+        if self.is_reserved:
+            return PLAY_ACCEPTED[self.name]
         return some(self.values) if self.type.has_values else self.type.accepted.format(size=self.size) + self._bounds
 
     @property
     def choices(self) -> tuple[str, ...]:
         """The texts of all values, where they are a list."""
-        return self.type.choices or self.values
+        return self.type.choices or self.values or play_choices(self.name)
 
     def array(self, values: list[OutputValue]) -> np.ndarray[Any, np.dtype[Any]]:
         """Some values as numpy has them: bool, int64, float64, float64 [n, size] or, for texts, objects."""
@@ -94,7 +109,7 @@ class Output:
                 )
             return self.nothing
         try:
-            value = self.type.read(text, self)
+            value = self._value(text)
         except ValueError as error:
             why = f": {error}." if str(error) else "."
             wrong = f"cannot read {in_quotes(text)} as {self._noun}{why}"
@@ -117,7 +132,7 @@ class Output:
     def reads(self, text: str) -> bool:
         """Whether a text, not an empty one, is a value."""
         try:
-            return bool(text.strip()) and self._is_inside(self.type.read(text, self))
+            return bool(text.strip()) and self._is_inside(self._value(text))
         except ValueError:
             return False
 
@@ -125,6 +140,8 @@ class Output:
         """The value that Python or TOML gives, such as a default. Raises ValueError where it is no value of the output;
         with why."""
         taken = self.type.take(value, self)
+        if self.is_reserved:
+            read_play(self.name, self.written(taken))
         if not self._is_inside(taken):
             raise ValueError("this is outside the declared bounds")
         return taken
@@ -135,12 +152,21 @@ class Output:
             return " ".join(map(format_number, value))
         return format_number(value) if isinstance(value, float) else str(value)
 
+    def _value(self, text: str) -> OutputValue:
+        """The value of a text; ValueError, with why or without a word, where it is none."""
+        value = self.type.read(text, self)
+        if self.is_reserved:
+            read_play(self.name, self.written(value))
+        return value
+
     @property
     def _absent(self) -> OutputValue:
         return _numbers(self.type.absent) * self.size if self.type.has_size else self.type.absent
 
     @property
     def _noun(self) -> str:
+        if self.is_reserved:
+            return self.name
         return plural(self.size, "number") if self.type.has_size else self.type.noun
 
     @property
@@ -171,6 +197,8 @@ class Output:
         if says_any(text) and not self.needs_cell:
             return _LEAVE_EMPTY
         short = text[:1000].strip()
+        if self.is_reserved and (near_word := nearest(short.casefold(), play_choices(self.name))):
+            return in_quotes(near_word)
         return next((in_quotes(near) for near in self.type.near(short, self) if near != short and self.reads(near)), "")
 
 

@@ -38,9 +38,9 @@ from contextdb.report.results import Gate, as_path
 
 BARS = {
     "skate": ("skate_cm_s", "CM_S", "the most that planted feet may slide, cm/s"),
-    "toe-skate": ("toe_skate_cm_s", "CM_S", "the most that toes may slide that are low and slow in their clips, cm/s"),
-    "dip": ("dip_cm", "CM", "the most that hips may be lower than in their clips, cm"),
-    "balance": ("balance_cm", "CM", "the most that hips may be off their place over the feet at rest, cm"),
+    "toe-skate": ("skate_toe_cm_s", "CM_S", "the most that toes may slide that are low and slow in their clips, cm/s"),
+    "dip": ("hip_dip_cm", "CM", "the most that hips may be lower than in their clips, cm"),
+    "balance": ("hips_off_feet_cm", "CM", "the most that hips may be off their place over the feet at rest, cm"),
     "jumps": ("jumps_per_s", "PER_S", "the most jumps a second"),
     "accel": ("accel_p99", "M_S2", "the most that 99 %% of joint accelerations may be, m/s²"),
     "path": ("path_rms_m", "M", "the most that the path error may be, RMS, m"),

@@ -125,6 +125,12 @@ class Matches(Framed, Answer):
         leaves = self._table.leaves
         return [leaves[r] for r in self.indices.tolist()]
 
+    @property
+    def plays(self) -> NDArray[np.float64] | None:
+        """How each row of the table plays, by its reserved outputs, and last what plays without a row: float64 [n_rows + 1, 8], see
+        `contextdb.cells.row_play`; None where the table has no such output."""
+        return self._table.outputs.plays
+
     def outputs(self, name: str) -> NDArray[Any]:
         """An output of the valid rows, in the order of `indices`, read-only: bool, int64 or float64 [count], for `numbers` float64
         [count, size], for enum and text an array of str.

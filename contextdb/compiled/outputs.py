@@ -18,6 +18,7 @@ from contextdb.bitmask import Rows, read_only
 from contextdb.cells.arguments import require_row, require_text
 from contextdb.cells.output_types import OutputValue
 from contextdb.cells.outputs import Output
+from contextdb.cells.row_play import N_PLAY, read_play
 from contextdb.columns import TextColumn
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.errors import ContextError, Fault, NoSuchOutput, NoSuchPlace, no_such, safe_text, some
@@ -111,6 +112,21 @@ class Outputs(Unchanging, Mapping[str, Column]):
             name: tuple(value) if isinstance(value, list) else cast("OutputValue", value)
             for name, value in zip(self.names, plain, strict=True)
         }
+
+    @cached_property
+    def plays(self) -> NDArray[np.float64] | None:
+        """How each row plays, and last what plays without a row: float64 [R + 1, 8], see `contextdb.cells.row_play`; None where no
+        reserved output is declared."""
+        reserved = [output for output in self.declared if output.is_reserved]
+        if not reserved:
+            return None
+        plays = np.full((len(self._values(reserved[0].name)), N_PLAY), np.nan)
+        for output in reserved:
+            values, codes = np.unique(self._values(output.name), return_inverse=True)
+            for code, value in enumerate(values.tolist()):
+                for column, number in read_play(output.name, output.written(value)).items():
+                    plays[codes == code, column] = number
+        return read_only(plays)
 
     @property
     def said(self) -> tuple[object, ...]:

@@ -21,7 +21,8 @@ from contextdb.compiled.ways import Ways, WayTable
 from contextdb.files.tensors import Tensors, texts_from_array, texts_to_array
 from contextdb.schema.policies import POLICIES, Policy
 
-DECLARED = "outputs.declared"
+DECLARED, PLAYS = "outputs.declared", "outputs.plays"
+"""What is declared of outputs; and how rows play, for the header of games: float64 [R + 1, 8]."""
 
 
 def outputs_to_tensors(outputs: Outputs) -> Tensors:
@@ -36,7 +37,7 @@ def outputs_to_tensors(outputs: Outputs) -> Tensors:
             tensors[f"outputs.{at:03d}.texts"] = texts_to_array(list(cells.texts))
         else:
             tensors[f"outputs.{at:03d}.values"] = cells.view(np.uint8) if cells.dtype == np.bool_ else cells
-    return tensors
+    return tensors if outputs.plays is None else {**tensors, PLAYS: np.array(outputs.plays)}
 
 
 def outputs_from(tensors: Tensors, n_rows: int) -> Outputs:
@@ -44,7 +45,10 @@ def outputs_from(tensors: Tensors, n_rows: int) -> Outputs:
     if DECLARED not in tensors:
         return NO_OUTPUTS
     declared = tuple(map(_output, json.loads(tensors[DECLARED].tobytes().decode("utf-8", "surrogatepass"))))
-    return Outputs(declared, tuple(_cells(output, f"outputs.{at:03d}", tensors, n_rows) for at, output in enumerate(declared)))
+    cells = (_cells(output, f"outputs.{at:03d}", tensors, n_rows) for at, output in enumerate(declared))
+    outputs = Outputs(declared, tuple(cells))
+    _ = outputs.plays  # what cannot be read is refused here
+    return outputs
 
 
 def _output_to_json(output: Output) -> dict[str, object]:

@@ -409,8 +409,8 @@ class Controllers:
         """Write what plays some time later, [Q, 16], and the features of its frames, [Q, F]."""
     def update(self, parts: int, start: int, stop: int, *arrays: NDArray[Any] | float | None) -> bool:
         """update(parts, start, stop, before, moved, queries, dt_s, ranges, range_biases, allowed, playable, kind_biases, flags,
-        frame_biases, among, urgent, wide, after, decisions, found): 1 asks, 2 chooses, 4 decides, for characters `start` to
-        `stop` - 1, into the last three. Whether all queries can be compared. Several threads may run it at once."""
+        frame_biases, among, urgent, plays, play_of, wide, after, decisions, found): 1 asks, 2 chooses, 4 decides, for characters
+        `start` to `stop` - 1, into the last three. Whether all queries can be compared. Several threads may run it at once."""
     def skips(
         self,
         row: NDArray[np.float64],
@@ -419,13 +419,16 @@ class Controllers:
         database: int,
         spans: NDArray[np.int64],
         whys: NDArray[np.uint8],
+        plays: NDArray[np.float64] | None,
+        play_of: NDArray[np.int64] | None,
         /,
     ) -> int:
         """Write the spans of frames that a search leaves out, and why; gives how many."""
 
 def fill_ranges(*arguments: NDArray[Any] | int | None) -> None:
-    """fill_ranges(starts, rows, mirrored, at, masks, in_mirror, costs, costs_in_mirror, own_biases, ranges, biases): which ranges
-    each of some answers lets play, into columns from `at` on; `rows` from `starts[r]` on are those of range r."""
+    """fill_ranges(starts, rows, mirrored, at, masks, in_mirror, costs, costs_in_mirror, own_biases, ranges, biases, plays, chosen):
+    which ranges each of some answers lets play, into columns from `at` on, and by which row; `rows` from `starts[r]` on are those
+    of range r."""
 
 def search_joint(*arguments: NDArray[Any]) -> None:
     """search_joint(blocks, rank, boxes, lows, highs, channels, weights, ranges, firsts, relative, relative_lows, relative_highs,

@@ -33,6 +33,7 @@ static inline void cdbo_warp_goal(const cdbo_posed *one, double *turn, double *s
     double left = one->given->rate * one->travel[0], ahead = one->given->rate * one->travel[1], own, game, x, z, limit, angle;
     double sway = one->travel[2] * cdbo_rotation_share(one);
     *turn = 0.0, *stride = 1.0;
+    if (one->mode == CDBO_BY_ANIMATION) return;
     cdbo_velocity(one, &x, &z);
     own = cdbo_flat_length(left, ahead), game = cdbo_flat_length(x, z);
     if (own < CDBO_LEAST_MPS || game < CDBO_LEAST_MPS) return;
@@ -40,7 +41,7 @@ static inline void cdbo_warp_goal(const cdbo_posed *one, double *turn, double *s
     if (cdbo_size(angle) > 0.5 * CDBO_PI) return;
     limit = cdbo_set(one, CDBO_PATH_ALIGNMENT) != 0.0 ? cdbo_set(one, CDBO_ALIGNMENT_LIMIT) : 0.0;
     *turn = cdbo_within(angle, -limit, limit);
-    if (cdbo_set(one, CDBO_ROOT) != CDBO_BY_PATH)
+    if (one->mode != CDBO_BY_PATH)
         *stride = cdbo_within(game / own, cdbo_set(one, CDBO_MIN_STRIDE), cdbo_set(one, CDBO_MAX_STRIDE));
 }
 
@@ -74,7 +75,8 @@ static inline void cdbo_run_alignment(cdbo_posed *one)
     int warps = cdbo_set(one, CDBO_MIN_STRIDE) < 1.0 || cdbo_set(one, CDBO_MAX_STRIDE) > 1.0;
     int bends = warps || cdbo_set(one, CDBO_PATH_ALIGNMENT) != 0.0;
     turn[0] = turn[1] = stride[1] = 0.0, stride[0] = 1.0;
-    if (!bends || cdbo_set(one, CDBO_ROOT) == CDBO_BY_ANIMATION || one->poses->rig.n_spine == 0) return;
+    if (!bends || one->poses->rig.n_spine == 0) return;
+    if (one->mode == CDBO_BY_ANIMATION && cdbo_was(one, CDBO_TURN)[0] == 0.0 && cdbo_was(one, CDBO_STRIDE)[0] == 1.0) return;
     cdbo_warp_goal(one, &to_turn, &to_stride);
     cdbo_keep(one, CDBO_TURN, 2);
     cdbo_keep(one, CDBO_STRIDE, 2);

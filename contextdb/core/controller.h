@@ -22,7 +22,7 @@ typedef enum cdbm_cause { CDBM_NOT_DUE, CDBM_NOTHING_PLAYS, CDBM_LOST, CDBM_ENDE
 typedef enum cdbm_held { CDBM_NOT_HELD, CDBM_BY_NATURE, CDBM_TO_ITS_END, CDBM_BY_BAR, CDBM_BY_HYSTERESIS } cdbm_held;
 typedef enum cdbm_action { CDBM_STARTS, CDBM_PLAYS_ON, CDBM_JUMPS, CDBM_LOOPS, CDBM_HOLDS, CDBM_PLAYS_NOTHING } cdbm_action;
 typedef enum cdbm_standing { CDBM_IS_VALID, CDBM_IS_WIDENED, CDBM_IS_NOT_VALID } cdbm_standing;
-typedef enum cdbm_why { CDBM_WHY_NOT_VALID = 1, CDBM_WHY_NATURE = 4, CDBM_WHY_JUMP = 8, CDBM_WHY_HISTORY = 9 } cdbm_why;
+typedef enum cdbm_why { CDBM_WHY_NOT_VALID = 1, CDBM_WHY_NATURE = 4, CDBM_WHY_JUMP = 8, CDBM_WHY_HISTORY = 9, CDBM_WHY_START = 12 } cdbm_why;
 enum { CDBM_EXCLUDED = 1, CDBM_NEXT_NATURAL = 8 }; /* flags of a kind of frames */
 enum { CDBM_FORCE = 1, CDBM_INTERRUPT = 2 };
 enum { CDBM_NO_DATABASE = -1, CDBM_GONE = -2, CDBM_GO_ON = -2 };
@@ -55,6 +55,7 @@ typedef struct cdbm_state {
     double tick, time_s, since_search_s, rate, waiting_since_s; /* NaN: no jump waits */
     cdbm_playing playing;
     double n_played;             /* behind the state */
+    cdb_row_play play;           /* how the row of what plays says that it does */
 } cdbm_state;
 
 typedef struct cdbm_moved {
@@ -72,6 +73,7 @@ typedef struct cdbm_decision {
     double chosen[4];              /* database, range, frame and cost of what is to be played; CDBM_GO_ON: what plays */
     double motion[3], root_weight, rate;
     double due_s, waited_s, current, dt_s;
+    cdb_row_play play;             /* of what plays */
 } cdbm_decision;
 
 typedef struct cdbm_found { double range, frame, cost; } cdbm_found; /* of a database; frame -1: nothing; -2: not searched */
@@ -89,8 +91,38 @@ typedef struct cdbm_given {      /* what some characters may choose from; of all
     const double *frame_biases;  /* [N] or NULL */
     const uint8_t *among;        /* [n or 1, D]: the databases of the moment */
     const uint8_t *urgent;       /* [n] CDBM_FORCE, CDBM_INTERRUPT */
+    const cdb_row_play *plays;   /* how rows play; NULL: no row says */
+    const int64_t *play_of;      /* [n or 1, R] which of them is that of each range, -1 for none */
+    size_t plays_step;
     const double *wide;          /* [n] the bias of what plays by hysteresis, NaN where that does not hold; or NULL */
 } cdbm_given;
+
+/* ---- what can be played */
+
+/* Whether all ranges, and all that is said of them, are there. */
+static inline int cdbm_are_clips(const cdbm_clips *clips, size_t n_features)
+{
+    size_t i;
+    if (clips->n_kinds < clips->frames->n_kinds || clips->frames->n_features != n_features || !(clips->rate > 0.0)) return 0;
+    if (clips->n_permutations < 1 || clips->n_ranges % clips->n_permutations || clips->n_pace > 2) return 0;
+    if (clips->n_pace && (clips->pace > n_features || clips->n_pace > n_features - clips->pace)) return 0;
+    for (i = 0; i < clips->n_ranges; i++) {
+        if (clips->starts[i] < 0 || clips->stops[i] < clips->starts[i] || (uint64_t)clips->stops[i] > clips->frames->n_frames) return 0;
+        if (i % clips->n_permutations && clips->stops[i] - clips->starts[i] != clips->stops[i - 1] - clips->starts[i - 1]) return 0;
+    }
+    return 1;
+}
+
+/* Whether what plays is of a database that is there, or none plays. */
+static inline int cdbm_is_playing(const cdbm_controller *controller, const cdbm_playing *playing)
+{
+    const cdbm_clips *clips;
+    if (playing->database < 0.0) return 1;
+    if (!(playing->database < (double)controller->n_databases)) return 0;
+    clips = &controller->databases[(size_t)playing->database];
+    if (!clips->frames || !(playing->range >= 0.0 && playing->range < (double)clips->n_ranges) || playing->at_s != playing->at_s) return 0;
+    return (double)clips->starts[(size_t)playing->range] <= playing->frame && playing->frame < (double)clips->stops[(size_t)playing->range];
+}
 
 /* ---- movements over the ground */
 
@@ -144,9 +176,25 @@ static inline double cdbm_last_s(const cdbm_clips *clips, size_t range)
     return (double)(clips->stops[range] - clips->starts[range] - 1) / clips->rate;
 }
 
-static inline int cdbm_is_looping(const cdbm_clips *clips, size_t range)
+/* Whether a range loops: as its row says, or else its marks. */
+static inline int cdbm_is_looping(const cdbm_clips *clips, size_t range, const cdb_row_play *play)
 {
-    return clips->looping[range] && clips->stops[range] - clips->starts[range] > 1;
+    int loops = play->loop == play->loop ? play->loop != 0.0 : clips->looping[range];
+    return loops && clips->stops[range] - clips->starts[range] > 1;
+}
+
+static inline cdb_row_play cdbm_plain_play(void)
+{
+    cdb_row_play made;
+    made.blend_s = made.start_s = made.min_rate = made.max_rate = made.mirror = made.loop = made.root = made.until = NAN;
+    return made;
+}
+
+/* How a range of a database is to play for character i. */
+static inline cdb_row_play cdbm_play_of(const cdbm_given *given, size_t i, const cdbm_clips *clips, size_t range)
+{
+    int64_t own = given->plays ? given->play_of[i * given->plays_step + clips->range_at + range] : -1;
+    return own < 0 ? cdbm_plain_play() : given->plays[own];
 }
 
 /* The frame of a range that is nearest to a moment, the later of two that are equally near. */
@@ -192,7 +240,7 @@ static inline void cdbm_loop(const cdbm_clips *clips, size_t range, double wante
     move->n_loops = n_loops;
     if (n_loops > 1.0) {
         cdbm_leg(clips, range, 0.0, last_s, start, move);
-        if (move->is_ended) {
+        if (move->is_ended != 0.0) {
             move->n_loops = 1.0;
             cdbm_then(motion, move->motion, move->motion);
             return;
@@ -205,7 +253,8 @@ static inline void cdbm_loop(const cdbm_clips *clips, size_t range, double wante
 }
 
 /* What plays, some seconds of its clip later. */
-static inline void cdbm_play(const cdbm_controller *controller, const cdbm_playing *playing, double passed_s, cdbm_moved *move)
+static inline void cdbm_play(const cdbm_controller *controller, const cdbm_playing *playing, const cdb_row_play *play, double passed_s,
+    cdbm_moved *move)
 {
     const cdbm_clips *clips;
     size_t range = (size_t)playing->range;
@@ -217,7 +266,7 @@ static inline void cdbm_play(const cdbm_controller *controller, const cdbm_playi
     last_s = cdbm_last_s(clips, range), at_s = cdbo_least(playing->at_s, last_s), wanted_s = at_s + passed_s;
     cdbm_leg(clips, range, at_s, cdbo_least(wanted_s, last_s), cdbm_frame_at(clips, range, at_s) + 1, move);
     if (wanted_s <= last_s + CDBM_TOLERANCE_S) return;
-    if (!move->is_ended && cdbm_is_looping(clips, range) && !(cdbm_mark_of(clips, clips->starts[range]) & CDBM_EXCLUDED))
+    if (move->is_ended == 0.0 && cdbm_is_looping(clips, range, play) && !(cdbm_mark_of(clips, clips->starts[range]) & CDBM_EXCLUDED))
         cdbm_loop(clips, range, wanted_s, move);
     else move->is_ended = 1.0;
 }
@@ -225,7 +274,7 @@ static inline void cdbm_play(const cdbm_controller *controller, const cdbm_playi
 static inline void cdbm_move(const cdbm_controller *controller, const double *row, double dt_s, cdbm_moved *move)
 {
     const cdbm_state *state = (const cdbm_state *)row;
-    cdbm_play(controller, &state->playing, dt_s * state->rate, move);
+    cdbm_play(controller, &state->playing, &state->play, dt_s * state->rate, move);
 }
 
 /* The features of a frame that is in a range, in the schema's units. */
@@ -290,7 +339,7 @@ typedef struct cdbm_skips { /* frames that a search leaves out: [n, 2], and why 
 /* So many spans a search leaves out at most. */
 static inline size_t cdbm_most_skips(const cdbm_controller *controller, const cdbm_clips *clips)
 {
-    return (controller->n_played + 4) * clips->n_permutations + 1;
+    return (controller->n_played + 4) * clips->n_permutations + 2 * clips->n_ranges + 1;
 }
 
 static inline void cdbm_skip(cdbm_skips *skips, int64_t start, int64_t stop, cdbm_why why)
@@ -348,7 +397,7 @@ static inline void cdbm_skip_played(const cdbm_controller *controller, const dou
 }
 
 /* What is left out because of the frame that would play on. */
-static inline void cdbm_skip_near(const cdbm_controller *controller, const cdbm_moved *move, cdbm_skips *skips)
+static inline void cdbm_skip_near(const cdbm_controller *controller, const cdb_row_play *play, const cdbm_moved *move, cdbm_skips *skips)
 {
     const cdbm_clips *clips = &controller->databases[(size_t)move->to.database];
     size_t range = (size_t)move->to.range;
@@ -363,14 +412,27 @@ static inline void cdbm_skip_near(const cdbm_controller *controller, const cdbm_
     }
     if (cdbm_mark_of(clips, frame) & CDBM_NEXT_NATURAL) cdbm_skip_all(skips, clips, range, start, stop, CDBM_WHY_NATURE);
     cdbm_skip_all(skips, clips, range, first > start ? first : start, last < stop ? last : stop, CDBM_WHY_JUMP);
-    if (!cdbm_is_looping(clips, range)) return;
+    if (!cdbm_is_looping(clips, range, play)) return;
     n_loop = stop - start - 1;
     if (first <= start) cdbm_skip_all(skips, clips, range, first + n_loop > start ? first + n_loop : start, stop, CDBM_WHY_JUMP);
     if (last > start + n_loop) cdbm_skip_all(skips, clips, range, start, last - n_loop < stop ? last - n_loop : stop, CDBM_WHY_JUMP);
 }
 
-/* All that a search leaves out of a database. */
-static inline void cdbm_list_skips(const cdbm_controller *controller, const double *row, const cdbm_moved *move,
+/* Of ranges whose row says at which second they are entered: all other frames. */
+static inline void cdbm_skip_starts(const cdbm_given *given, size_t i, const cdbm_clips *clips, cdbm_skips *skips)
+{
+    size_t range;
+    for (range = 0; given->plays && range < clips->n_ranges; range++) {
+        int64_t own = given->play_of[i * given->plays_step + clips->range_at + range], entry;
+        if (own < 0 || !(given->plays[own].start_s == given->plays[own].start_s)) continue;
+        entry = cdbm_frame_at(clips, range, given->plays[own].start_s);
+        if (entry > clips->starts[range]) cdbm_skip(skips, clips->starts[range], entry, CDBM_WHY_START);
+        if (entry + 1 < clips->stops[range]) cdbm_skip(skips, entry + 1, clips->stops[range], CDBM_WHY_START);
+    }
+}
+
+/* All that a search of character i leaves out of a database. */
+static inline void cdbm_list_skips(const cdbm_controller *controller, const cdbm_given *given, size_t i, const double *row, const cdbm_moved *move,
     const cdbm_decision *decision, size_t database, cdbm_skips *skips)
 {
     const cdbm_clips *clips = &controller->databases[database];
@@ -379,9 +441,10 @@ static inline void cdbm_list_skips(const cdbm_controller *controller, const doub
         size_t range = (size_t)move->to.range;
         if (decision->current >= 0.0 && decision->standing == CDBM_IS_WIDENED)
             cdbm_skip(skips, clips->starts[range], clips->stops[range], CDBM_WHY_NOT_VALID);
-        cdbm_skip_near(controller, move, skips);
+        cdbm_skip_near(controller, &((const cdbm_state *)row)->play, move, skips);
     }
     cdbm_skip_played(controller, row, database, skips);
+    cdbm_skip_starts(given, i, clips, skips);
 }
 
 /* ---- why to search */
@@ -445,14 +508,18 @@ static inline cdbm_cause cdbm_cause_of(const cdbm_controller *controller, const 
 }
 
 /* What lets play on what is not valid, or valid by hysteresis alone, without a search. */
-static inline cdbm_held cdbm_held_by(const cdbm_controller *controller, const cdbm_moved *move, cdbm_cause cause, cdbm_standing standing)
+static inline cdbm_held cdbm_held_by(const cdbm_controller *controller, const cdb_row_play *play, const cdbm_moved *move, cdbm_cause cause,
+    cdbm_standing standing)
 {
     const cdbm_clips *clips;
+    int is_looping;
     if (cause == CDBM_NOT_DUE && standing == CDBM_IS_WIDENED) return CDBM_BY_HYSTERESIS;
     if (cause != CDBM_NOT_VALID) return CDBM_NOT_HELD;
     clips = &controller->databases[(size_t)move->to.database];
     if ((cdbm_mark_of(clips, (int64_t)move->to.frame) & CDBM_NEXT_NATURAL) && move->n_loops == 0.0) return CDBM_BY_NATURE;
-    return controller->until_natural && !cdbm_is_looping(clips, (size_t)move->to.range) ? CDBM_TO_ITS_END : CDBM_NOT_HELD;
+    is_looping = cdbm_is_looping(clips, (size_t)move->to.range, play);
+    if (play->until == CDB_UNTIL_NATURAL) return !is_looping || move->n_loops == 0.0 ? CDBM_TO_ITS_END : CDBM_NOT_HELD;
+    return controller->until_natural && play->until != CDB_UNTIL_ANY && !is_looping ? CDBM_TO_ITS_END : CDBM_NOT_HELD;
 }
 
 /* The first half of an update: why character i of some searches, and its next row as far as it is known. `room` has a number for
@@ -476,7 +543,7 @@ static inline void cdbm_ask(const cdbm_controller *controller, const cdbm_given 
         else if (given->wide && given->wide[i] == given->wide[i]) standing = CDBM_IS_WIDENED;
     }
     cause = cdbm_cause_of(controller, given, i, state, move, standing);
-    decision->held = cdbm_held_by(controller, move, cause, standing);
+    decision->held = cdbm_held_by(controller, &state->play, move, cause, standing);
     if (decision->held != CDBM_NOT_HELD) cause = CDBM_NOT_DUE;
     if (cause != CDBM_NOT_DUE && move->to.database >= 0.0 && controller->databases[(size_t)move->to.database].n_permutations > 1)
         cdbm_permute(controller, given, i, move, room);
@@ -488,6 +555,7 @@ static inline void cdbm_ask(const cdbm_controller *controller, const cdbm_given 
     decision->waited_s = state->waiting_since_s == state->waiting_since_s ? next->time_s - state->waiting_since_s : 0.0;
     decision->winner = decision->chosen[0] = CDBM_NO_DATABASE;
     decision->cost = decision->continuing_cost = NAN;
+    decision->play = state->play;
 }
 
 /* ---- the choice */
@@ -539,6 +607,7 @@ static inline int cdbm_take_choosing(const cdbm_controller *controller, cdbm_cho
 {
     size_t n_ranges, n_skips, n_bytes;
     cdbm_measure_choosing(controller, n, &n_ranges, &n_skips, &n_bytes);
+    memset(own, 0, sizeof *own);
     own->numbers = (size_t *)cdbm_part(room, n * sizeof(size_t));
     own->queries = (double *)cdbm_part(room, n * (controller->n_features + n_ranges + 1) * sizeof(double));
     own->ranges = (uint8_t *)cdbm_part(room, n * (n_ranges + 1));
@@ -561,7 +630,7 @@ static inline void cdbm_put_question(const cdbm_controller *controller, const cd
     int is_own = decision->current >= 0.0 && move->to.database == (double)database;
     cdbm_skips skips = {NULL, NULL, 0};
     skips.spans = room->skips + 2 * room->skip_stops[at];
-    cdbm_list_skips(controller, after, move, decision, database, &skips);
+    cdbm_list_skips(controller, given, i, after, move, decision, database, &skips);
     room->skip_stops[at + 1] = room->skip_stops[at] + (int64_t)skips.n;
     room->currents[at] = is_own ? (int64_t)decision->current : -1;
     memcpy(room->queries + at * n_features, given->queries + i * n_features, n_features * sizeof(double));
@@ -657,24 +726,28 @@ static inline double cdbm_pace(const cdbm_clips *clips, const double *features)
     return (clips->n_pace == 1 ? cdbo_size(features[0]) : cdbo_flat_length(features[0], features[1])) / clips->pace_s;
 }
 
-/* At what rate a frame is to play for a query, so that it goes about as fast as that asks. */
-static inline double cdbm_play_rate(const cdbm_controller *controller, const cdbm_playing *playing, const double *query)
+/* At what rate a frame is to play for a query, so that it goes about as fast as that asks, within the limits of its row or of the
+ * settings. */
+static inline double cdbm_play_rate(const cdbm_controller *controller, const cdbm_playing *playing, const cdb_row_play *play,
+    const double *query)
 {
     const cdbm_clips *clips = &controller->databases[(size_t)playing->database];
-    double wanted, own, features[2];
+    int is_said = play->min_rate == play->min_rate;
+    double least = is_said ? play->min_rate : controller->min_rate, most = is_said ? play->max_rate : controller->max_rate;
+    double wanted, own, features[2], one = cdbo_within(1.0, least, most);
     int64_t box;
     size_t f;
-    if (clips->n_pace == 0 || (controller->min_rate == 1.0 && controller->max_rate == 1.0)) return 1.0;
+    if (clips->n_pace == 0 || least == most) return one;
     box = cdbm_box_of(clips->frames, (int64_t)playing->frame);
-    if (box < 0) return 1.0;
+    if (box < 0) return one;
     for (f = 0; f < clips->n_pace; f++) features[f] = cdbm_feature(clips->frames, box, (int64_t)playing->frame, clips->pace + f);
     wanted = cdbm_pace(clips, query + clips->pace), own = cdbm_pace(clips, features);
-    if (!(wanted >= CDBM_LEAST_MPS && own >= CDBM_LEAST_MPS)) return 1.0;
-    return cdbo_within(cdbo_exp(CDBM_RATE_SHARE * cdbo_log(wanted / own)), controller->min_rate, controller->max_rate);
+    if (!(wanted >= CDBM_LEAST_MPS && own >= CDBM_LEAST_MPS)) return one;
+    return cdbo_within(cdbo_exp(CDBM_RATE_SHARE * cdbo_log(wanted / own)), least, most);
 }
 
 /* Play what was chosen, unless its cost is over the bar and may wait. */
-static inline void cdbm_jump(const cdbm_controller *controller, cdbm_decision *decision, int is_start)
+static inline void cdbm_jump(const cdbm_controller *controller, const cdbm_given *given, size_t i, cdbm_decision *decision, int is_start)
 {
     const cdbm_clips *clips = &controller->databases[(size_t)decision->chosen[0]];
     double cost = decision->chosen[3];
@@ -688,6 +761,7 @@ static inline void cdbm_jump(const cdbm_controller *controller, cdbm_decision *d
     decision->playing.frame = decision->chosen[2];
     decision->playing.at_s = (decision->chosen[2] - (double)clips->starts[(size_t)decision->chosen[1]]) / clips->rate;
     decision->cost = cost;
+    decision->play = cdbm_play_of(given, i, clips, (size_t)decision->chosen[1]);
 }
 
 /* What it costs to play on, where that takes part in the search. */
@@ -714,7 +788,7 @@ static inline void cdbm_go_on(const cdbm_controller *controller, const cdbm_stat
     }
     if (decision->held == CDBM_NOT_HELD || decision->held == CDBM_BY_HYSTERESIS) next->waiting_since_s = NAN;
     else if (decision->held == CDBM_BY_BAR && !(next->waiting_since_s == next->waiting_since_s)) next->waiting_since_s = next->time_s;
-    next->rate = decision->rate;
+    next->rate = decision->rate, next->play = decision->play;
 }
 
 /* The second half of an update: what plays now. `chosen` may have been changed for another frame that is about as good. */
@@ -735,13 +809,13 @@ static inline void cdbm_decide(const cdbm_controller *controller, const cdbm_giv
     } else if (is_searched && goes_on) {
         decision->cost = decision->continuing_cost;
         if (decision->standing == CDBM_IS_WIDENED) decision->held = CDBM_BY_HYSTERESIS;
-    } else if (is_searched) cdbm_jump(controller, decision, state->playing.database == CDBM_NO_DATABASE);
+    } else if (is_searched) cdbm_jump(controller, given, i, decision, state->playing.database == CDBM_NO_DATABASE);
     memcpy(decision->motion, move->motion, sizeof decision->motion);
     decision->root_weight = decision->rate = 1.0;
     if (decision->playing.database >= 0.0) {
         const cdbm_clips *clips = &controller->databases[(size_t)decision->playing.database];
         decision->root_weight = clips->root_weights[clips->frames->kinds ? clips->frames->kinds[(int64_t)decision->playing.frame] : 0];
-        wanted = decision->action == CDBM_HOLDS ? 1.0 : cdbm_play_rate(controller, &decision->playing, query);
+        wanted = decision->action == CDBM_HOLDS ? 1.0 : cdbm_play_rate(controller, &decision->playing, &decision->play, query);
         decision->rate = wanted;
         if (decision->action == CDBM_PLAYS_ON || decision->action == CDBM_LOOPS)
             decision->rate += (state->rate - wanted) * cdbo_exp(-CDBO_LN2 * given->dt_s / CDBM_RATE_HALFLIFE_S);
@@ -755,13 +829,20 @@ typedef struct cdbm_table_ranges { /* which rows of a table name the asset of ea
     const int64_t *starts;         /* [R + 1] */
     const int64_t *rows;
     const uint8_t *mirrored;       /* [R]: those that go by the answer with mirrored facts */
+    const cdb_row_play *plays;     /* how each row plays, NULL where none says */
     size_t n_ranges, at;           /* at: where the first is among all */
 } cdbm_table_ranges;
 
-/* Write which ranges the rows of an answer, and of that in a mirror, let play; and their biases, with what the cheapest row of each
- * costs where `costs` are given. */
+/* Whether a row lets its clip play as it is, or mirrored. */
+static inline int cdbm_may_mirror(const cdbm_table_ranges *of, int64_t row, int is_mirrored)
+{
+    return !of->plays || !(of->plays[row].mirror == (is_mirrored ? CDB_NEVER_MIRRORED : CDB_ALWAYS_MIRRORED));
+}
+
+/* Write which ranges the rows of an answer, and of that in a mirror, let play; their biases, with what the cheapest row of each
+ * costs where `costs` are given; and by which row each plays, the first or the cheapest, where `chosen` is given. */
 static inline void cdbm_fill_ranges(const cdbm_table_ranges *of, const uint64_t *const *masks, const double *const *costs,
-    const double *own, uint8_t *ranges, double *biases)
+    const double *own, uint8_t *ranges, double *biases, int64_t *chosen)
 {
     size_t r;
     for (r = 0; r < of->n_ranges; r++) {
@@ -769,13 +850,15 @@ static inline void cdbm_fill_ranges(const cdbm_table_ranges *of, const uint64_t 
         const double *cost = costs ? costs[of->mirrored[r]] : NULL;
         double least = (double)INFINITY;
         uint8_t is_valid = 0;
-        int64_t k;
+        int64_t k, first = -1;
         for (k = of->starts[r]; k < of->starts[r + 1] && (cost || !is_valid); k++) {
             int64_t row = of->rows[k];
-            if (!(mask[row / 64] >> (row % 64) & 1)) continue;
+            if (!(mask[row / 64] >> (row % 64) & 1) || !cdbm_may_mirror(of, row, of->mirrored[r])) continue;
+            if (!is_valid || (cost && cost[row] < least)) first = row;
             is_valid = 1;
             if (cost && cost[row] < least) least = cost[row];
         }
+        if (chosen) chosen[of->at + r] = first;
         ranges[of->at + r] = is_valid;
         if (cost) biases[of->at + r] = own[of->at + r] + (is_valid ? least : 0.0);
     }

@@ -1,5 +1,6 @@
 /* All parts of the core, in the order in which each needs those before it. A game gets the same parts in the header that
  * `contextdb compile --c-header` writes; Python gets them in the extension, _core.c. */
+#include "row_play.h"
 #include "types.h"
 #include "arithmetic.h"
 #include "json.h"
@@ -11,8 +12,11 @@
 #include "linking.h"
 #include "levels.h"
 #include "outputs.h"
+#include "schema.h"
 #include "open.h"
 #include "query.h"
 #include "rows.h"
 #include "pick.h"
+#include "pickers.h"
+#include "live.h"
 #include "files.h"

@@ -67,6 +67,18 @@ static inline const char *cdbi_take_output(cdbi_opening *opening, const cdbi_jso
     return fits ? NULL : "the values of an output have another type, shape or place than they must have";
 }
 
+/* Take how the rows play, where the file says. */
+static inline void cdbi_plays(cdbi_opening *opening, const cdbi_json *header)
+{
+    cdbi_json entry = cdbi_member(header, "outputs.plays");
+    cdbi_array array;
+    if (entry.why) return;
+    array = cdbi_read_array(opening->table, &entry);
+    if (entry.why || !cdbi_fits(&array, "F64", 2, sizeof(cdb_row_play) / sizeof(double)) || array.shape[0] != opening->table->n_rows + 1)
+        cdbi_refuse(opening, CDB_BAD_FILE, "how rows play has another type, shape or place than it must have", -1, "outputs.plays");
+    else opening->table->plays = (const cdb_row_play *)(const void *)array.at;
+}
+
 /* Find the outputs that the header reads among those that the file declares. */
 static inline void cdbi_outputs(cdbi_opening *opening, const cdbi_json *header)
 {
@@ -105,36 +117,42 @@ static inline size_t cdbi_output_row(const cdb_table *table, int64_t row)
     return row >= 0 && (uint64_t)row < table->n_rows ? (size_t)row : table->n_rows;
 }
 
+/* How a row plays, by its reserved outputs; NULL where the table has none. -1 reads what plays where no row is picked. */
+static inline const cdb_row_play *cdb_play_of(const cdb_table *table, int64_t row)
+{
+    return table->plays ? &table->plays[cdbi_output_row(table, row)] : NULL;
+}
+
 /* The value of an output in a row; -1, as of a pick without a row, reads what there is then: the fallback's, else the default. */
-static inline int cdb_output_bool(const cdb_table *table, size_t output, int64_t row)
+CDB_API int cdb_output_bool(const cdb_table *table, size_t output, int64_t row)
 {
     return table->outputs[output].bools[cdbi_output_row(table, row)] != 0;
 }
 
-static inline int64_t cdb_output_int(const cdb_table *table, size_t output, int64_t row)
+CDB_API int64_t cdb_output_int(const cdb_table *table, size_t output, int64_t row)
 {
     return table->outputs[output].ints[cdbi_output_row(table, row)];
 }
 
-static inline double cdb_output_number(const cdb_table *table, size_t output, int64_t row)
+CDB_API double cdb_output_number(const cdb_table *table, size_t output, int64_t row)
 {
     return table->outputs[output].numbers[cdbi_output_row(table, row)];
 }
 
 /* The text of a text or an enum. */
-static inline const char *cdb_output_text(const cdb_table *table, size_t output, int64_t row)
+CDB_API const char *cdb_output_text(const cdb_table *table, size_t output, int64_t row)
 {
     return table->outputs[output].texts.texts[table->outputs[output].codes[cdbi_output_row(table, row)]];
 }
 
 /* The number of an enum's value; CDB_MISSING where it has none. */
-static inline int cdb_output_enum(const cdb_table *table, size_t output, int64_t row)
+CDB_API int cdb_output_enum(const cdb_table *table, size_t output, int64_t row)
 {
     return *cdb_output_text(table, output, row) ? (int)table->outputs[output].codes[cdbi_output_row(table, row)] : CDB_MISSING;
 }
 
 /* The first of the numbers of an output of several. */
-static inline const double *cdb_output_numbers(const cdb_table *table, size_t output, int64_t row)
+CDB_API const double *cdb_output_numbers(const cdb_table *table, size_t output, int64_t row)
 {
     return table->outputs[output].numbers + cdbi_output_row(table, row) * table->outputs[output].size;
 }

@@ -13,11 +13,13 @@ typedef enum cdbo_pose_column { /* in the order of the stages; three after a nam
     CDBO_CLIP_ROOT,    /* where the clip has the body */
     CDBO_ROTATIONS,    /* the clip's pose: of each joint */
     CDBO_POSITIONS,    /* and of each joint with a position of its own */
-    CDBO_TURNS,        /* spring: what is left of the last seams, turns of joints, and their change a second */
+    CDBO_FADE,         /* spring: the damping since the last seam, 0 for that of the settings */
+    CDBO_TURNS,        /* what is left of the last seams, turns of joints, and their change a second */
     CDBO_SPINS,
     CDBO_SHIFTS,       /* shifts of joints with positions of their own, and their change a second */
     CDBO_SPEEDS,
-    CDBO_HAS_BODY,     /* root: where the game has the body, and how fast it moves that */
+    CDBO_MODE,         /* root: by what it was moved, one more than a cdbo_root; 0: by nothing yet */
+    CDBO_HAS_BODY,     /* where the game has the body, and how fast it moves that */
     CDBO_BODY,
     CDBO_HAS_VELOCITY,
     CDBO_VELOCITY,
@@ -95,6 +97,7 @@ typedef struct cdbo_given {
     double is_ahead, seam;         /* whether the motion is already that of what is entered; number of the seam, below 0 for none */
     double lost_s;                 /* the seconds that were left when what played had run out: the motion is without them */
     double gives_ground;
+    double blend_s, root;          /* as the row of what plays says, NaN for as the settings do: how long a seam is blended; a cdbo_root */
 } cdbo_given;
 
 typedef struct cdbo_seam { /* a moment at a seam: two for each, what is left and what is entered */
@@ -109,7 +112,7 @@ struct cdbo_posed {
     const cdbo_seam *seams;     /* NULL without a seam */
     const double *below;       /* [F, 3]: the ground at the points that were asked for; NULL where it is level */
     const double *before;
-    double dt_s;
+    double dt_s, mode;         /* mode: the cdbo_root of this update */
     double *row, *root, *rotations, *translations, *positions; /* [width], [3], [J, 4], [J, 3], [J, 3] */
     unsigned char *contacts;   /* [F] */
     const cdbo_frames *frames;  /* of what plays, NULL for nothing */

@@ -146,6 +146,7 @@ static inline void cdbo_pose_one(cdbo_posed *one, const cdbo_seam *seams, double
     size_t i = part == CDBO_FROM_GROUND ? poses->n_before_ground : 0;
     size_t stop = part == CDBO_UP_TO_GROUND ? poses->n_before_ground : poses->n_stages;
     one->dt_s = is_on ? dt_s : 0.0;
+    one->mode = one->given->root == one->given->root ? one->given->root : poses->settings[CDBO_ROOT];
     one->seams = is_on && one->given->seam >= 0.0 ? seams + 2 * (size_t)one->given->seam : NULL;
     one->frames = one->given->bank >= 0.0 ? poses->banks[(size_t)one->given->bank] : NULL;
     one->frame = 0;

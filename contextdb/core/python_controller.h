@@ -39,21 +39,6 @@ static int cdbp_take_clips(cdbp_controller *own, PyObject *part, cdbm_clips *to,
     return 0;
 }
 
-/* Whether the parts of a database go together. */
-static int cdbp_are_clips(const cdbm_controller *controller, const cdbm_clips *clips)
-{
-    size_t i;
-    if (!clips->frames) return 1;
-    if (clips->n_kinds < clips->frames->n_kinds || clips->frames->n_features != controller->n_features || !(clips->rate > 0.0)) return 0;
-    if (clips->n_permutations < 1 || clips->n_ranges % clips->n_permutations || clips->n_pace > 2) return 0;
-    if (clips->n_pace && (clips->pace > clips->frames->n_features || clips->n_pace > clips->frames->n_features - clips->pace)) return 0;
-    for (i = 0; i < clips->n_ranges; i++) {
-        if (clips->starts[i] < 0 || clips->stops[i] < clips->starts[i] || (uint64_t)clips->stops[i] > clips->frames->n_frames) return 0;
-        if (i % clips->n_permutations && clips->stops[i] - clips->starts[i] != clips->stops[i - 1] - clips->starts[i - 1]) return 0;
-    }
-    return 1;
-}
-
 /* Controllers(databases, n_played, search_every_s, jump_threshold_s, history_s, min_rate, max_rate, grace_s, until_natural) */
 static int cdbp_controller_init(PyObject *self, PyObject *arguments, PyObject *named)
 {
@@ -81,7 +66,7 @@ static int cdbp_controller_init(PyObject *self, PyObject *arguments, PyObject *n
     to->databases = own->databases, to->n_databases = own->n_arrays = (size_t)n, to->n_played = (size_t)n_played;
     for (i = 0; i < n; i++)
         if (cdbp_take_clips(own, PyTuple_GetItem(parts, i), &own->databases[i], &own->arrays[i]) != 0) return -1;
-    for (i = 0; i < n; i++) is_right = is_right && cdbp_are_clips(to, &own->databases[i]);
+    for (i = 0; i < n; i++) is_right = is_right && (!to->databases[i].frames || cdbm_are_clips(&to->databases[i], to->n_features));
     own->is_made = is_right && n_played >= 0;
     if (!own->is_made) PyErr_SetString(PyExc_ValueError, "the parts of the databases do not go together");
     return own->is_made ? 0 : -1;
@@ -98,24 +83,13 @@ static void cdbp_controller_free(PyObject *self)
     cdbp_free(self);
 }
 
-/* Whether what plays is of a database that is there, or none plays. */
-static int cdbp_is_playing(const cdbm_controller *controller, const cdbm_playing *playing)
-{
-    const cdbm_clips *clips;
-    if (playing->database < 0.0) return 1;
-    if (!(playing->database < (double)controller->n_databases)) return 0;
-    clips = &controller->databases[(size_t)playing->database];
-    if (!clips->frames || !(playing->range >= 0.0 && playing->range < (double)clips->n_ranges) || playing->at_s != playing->at_s) return 0;
-    return (double)clips->starts[(size_t)playing->range] <= playing->frame && playing->frame < (double)clips->stops[(size_t)playing->range];
-}
-
 /* Whether rows are those of characters of these databases. */
 static int cdbp_are_rows(const cdbm_controller *controller, const double *rows, size_t n)
 {
     size_t i, width = cdbm_width(controller);
     for (i = 0; i < n; i++) {
         const cdbm_state *state = (const cdbm_state *)(rows + i * width);
-        if (!cdbp_is_playing(controller, &state->playing)) return 0;
+        if (!cdbm_is_playing(controller, &state->playing)) return 0;
         if (!(state->n_played >= 0.0 && state->n_played <= (double)controller->n_played)) return 0;
     }
     return 1;
@@ -170,7 +144,23 @@ static const void *cdbp_for_each(cdbp_arrays *a, PyObject *array, char kind, siz
     return items;
 }
 
-/* before, moved, queries, seconds, ranges, range_biases, allowed, playable, kind_biases, flags, frame_biases, among, urgent, wide,
+/* How rows play and which of them each range has: both or none. */
+static int cdbp_take_plays(const cdbp_controller *own, cdbp_arrays *a, PyObject *const *in, cdbm_given *given)
+{
+    size_t s[3], n_plays, i;
+    if (in[0] == Py_None) return 0;
+    if (!(given->plays = (const cdb_row_play *)cdbp_numbers(a, in[0], s, 2, CDBP_ANY, sizeof(cdb_row_play) / sizeof(double), 0))) return -1;
+    n_plays = s[0];
+    if (!(given->play_of = (const int64_t *)cdbp_for_each(a, in[1], 'i', 8, given->n, own->n_ranges, &given->plays_step))) return -1;
+    for (i = 0; i < (given->plays_step ? given->n : 1) * own->n_ranges; i++)
+        if (given->play_of[i] >= (int64_t)n_plays) {
+            PyErr_SetString(PyExc_ValueError, "a range has no such row");
+            return -1;
+        }
+    return 0;
+}
+
+/* before, moved, queries, seconds, ranges, range_biases, allowed, playable, kind_biases, flags, frame_biases, among, urgent, plays, play_of, wide,
  * after, decisions, found */
 static int cdbp_take_given(const cdbp_controller *own, cdbp_arrays *a, PyObject *const *in, cdbp_update *to)
 {
@@ -192,10 +182,11 @@ static int cdbp_take_given(const cdbp_controller *own, cdbp_arrays *a, PyObject 
     if (in[10] != Py_None && !(given->frame_biases = cdbp_numbers(a, in[10], s, 1, own->n_frames, 0, 0))) return -1;
     if (!(given->among = (const uint8_t *)cdbp_for_each(a, in[11], 'b', 1, n, n_databases, &given->among_step))) return -1;
     if (!(given->urgent = (const uint8_t *)cdbp_shaped(a, in[12], 'u', 1, 0, s, 1, n, 0, 0))) return -1;
-    if (in[13] != Py_None && !(given->wide = cdbp_numbers(a, in[13], s, 1, n, 0, 0))) return -1;
-    if (!(to->after = cdbp_to_numbers(a, in[14], s, 2, n, width, 0))) return -1;
-    if (!(to->decisions = (cdbm_decision *)cdbp_to_numbers(a, in[15], s, 2, n, sizeof(cdbm_decision) / sizeof(double), 0))) return -1;
-    if (!(to->found = (cdbm_found *)cdbp_to_numbers(a, in[16], s, 3, n, n_databases, 3))) return -1;
+    if (cdbp_take_plays(own, a, in + 13, given) != 0) return -1;
+    if (in[15] != Py_None && !(given->wide = cdbp_numbers(a, in[15], s, 1, n, 0, 0))) return -1;
+    if (!(to->after = cdbp_to_numbers(a, in[16], s, 2, n, width, 0))) return -1;
+    if (!(to->decisions = (cdbm_decision *)cdbp_to_numbers(a, in[17], s, 2, n, sizeof(cdbm_decision) / sizeof(double), 0))) return -1;
+    if (!(to->found = (cdbm_found *)cdbp_to_numbers(a, in[18], s, 3, n, n_databases, 3))) return -1;
     return 0;
 }
 
@@ -204,7 +195,7 @@ static int cdbp_are_moved(const cdbm_controller *controller, const cdbp_update *
     size_t i;
     for (i = 0; i < to->given.n; i++) {
         const cdbm_moved *moved = &to->moved[i];
-        if (!cdbp_is_playing(controller, &moved->to) || !(moved->n_spans >= 0.0 && moved->n_spans <= 3.0)) return 0;
+        if (!cdbm_is_playing(controller, &moved->to) || !(moved->n_spans >= 0.0 && moved->n_spans <= 3.0)) return 0;
     }
     return cdbp_are_rows(controller, to->before, to->given.n);
 }
@@ -218,7 +209,7 @@ static int cdbp_are_chosen(const cdbm_controller *controller, const cdbp_update 
     for (i = 0; i < to->given.n; i++) {
         cdbm_playing chosen = {0.0, 0.0, 0.0, 0.0};
         chosen.database = to->decisions[i].chosen[0], chosen.range = to->decisions[i].chosen[1], chosen.frame = to->decisions[i].chosen[2];
-        if (!cdbp_is_playing(controller, &chosen)) return 0;
+        if (!cdbm_is_playing(controller, &chosen)) return 0;
         if (chosen.database == CDBM_GO_ON && to->moved[i].to.database < 0.0) return 0;
     }
     return cdbp_are_rows(controller, to->after, to->given.n);
@@ -253,7 +244,7 @@ static PyObject *cdbp_controller_update(PyObject *self, PyObject *const *in, Py_
     int64_t parts, start, stop;
     int is_done = -2;
     a.n = 0;
-    if (own->is_made && n == 20 && cdbp_int_of(in[0], &parts) && cdbp_int_of(in[1], &start) && cdbp_int_of(in[2], &stop)
+    if (own->is_made && n == 22 && cdbp_int_of(in[0], &parts) && cdbp_int_of(in[1], &start) && cdbp_int_of(in[2], &stop)
         && cdbp_take_given(own, &a, in + 3, &to) == 0 && start >= 0 && start <= stop && (uint64_t)stop <= to.given.n
         && cdbp_are_moved(&own->controller, &to) && (parts & CDBP_ASK || cdbp_are_chosen(&own->controller, &to))) {
         size_t n_bytes = cdbm_choice_room(&own->controller, (size_t)(stop - start))
@@ -271,25 +262,29 @@ static PyObject *cdbp_controller_update(PyObject *self, PyObject *const *in, Py_
     return NULL;
 }
 
-/* controllers.skips(row, moved, decision, database, spans, whys): how many spans of frames its search leaves out, and which. */
+/* controllers.skips(row, moved, decision, database, spans, whys, plays, play_of): how many spans of frames its search leaves out, and which. */
 static PyObject *cdbp_controller_skips(PyObject *self, PyObject *const *in, Py_ssize_t n)
 {
     const cdbp_controller *own = (const cdbp_controller *)self;
     const cdbm_controller *controller = &own->controller;
     cdbp_arrays a;
     cdbm_skips skips = {NULL, NULL, 0};
+    cdbm_given given;
     const double *row, *moved, *decision;
     int64_t database = -1;
     size_t s[3];
     a.n = 0;
-    if (own->is_made && n == 6 && cdbp_int_of(in[3], &database) && database >= 0 && (uint64_t)database < controller->n_databases
+    memset(&given, 0, sizeof given);
+    given.n = 1;
+    if (own->is_made && n == 8 && cdbp_int_of(in[3], &database) && database >= 0 && (uint64_t)database < controller->n_databases
         && controller->databases[database].frames && (row = cdbp_numbers(&a, in[0], s, 2, 1, cdbm_width(controller), 0))
         && (moved = cdbp_numbers(&a, in[1], s, 2, 1, sizeof(cdbm_moved) / sizeof(double), 0))
         && (decision = cdbp_numbers(&a, in[2], s, 2, 1, sizeof(cdbm_decision) / sizeof(double), 0))
         && (skips.spans = (int64_t *)cdbp_shaped(&a, in[4], 'i', 8, 1, s, 2, cdbm_most_skips(controller, &controller->databases[database]), 2, 0))
         && (skips.whys = (uint8_t *)cdbp_shaped(&a, in[5], 'u', 1, 1, s, 1, s[0], 0, 0))
-        && cdbp_are_rows(controller, row, 1) && cdbp_is_playing(controller, &((const cdbm_moved *)moved)->to)) {
-        cdbm_list_skips(controller, row, (const cdbm_moved *)moved, (const cdbm_decision *)decision, (size_t)database, &skips);
+        && cdbp_take_plays(own, &a, in + 6, &given) == 0
+        && cdbp_are_rows(controller, row, 1) && cdbm_is_playing(controller, &((const cdbm_moved *)moved)->to)) {
+        cdbm_list_skips(controller, &given, 0, row, (const cdbm_moved *)moved, (const cdbm_decision *)decision, (size_t)database, &skips);
         cdbp_release(&a);
         return PyLong_FromLongLong((long long)skips.n);
     }
@@ -324,8 +319,8 @@ static PyType_Slot cdbp_controller_slots[] = {
 static PyType_Spec cdbp_controller_spec = {"contextdb.core._core.Controllers", (int)sizeof(cdbp_controller), 0, Py_TPFLAGS_DEFAULT,
     cdbp_controller_slots};
 
-/* fill_ranges(starts, rows, mirrored, at, masks, in_mirror, costs or None, costs_in_mirror or None, own, ranges, biases or None): which
- * ranges each of some answers lets play, into columns from `at` on. */
+/* fill_ranges(starts, rows, mirrored, at, masks, in_mirror, costs or None, costs_in_mirror or None, own, ranges, biases or None, plays or
+ * None, chosen or None): which ranges each of some answers lets play, into columns from `at` on; and by which row. */
 static PyObject *cdbp_fill_ranges(PyObject *module, PyObject *const *in, Py_ssize_t n)
 {
     cdbp_arrays a;
@@ -334,12 +329,13 @@ static PyObject *cdbp_fill_ranges(PyObject *module, PyObject *const *in, Py_ssiz
     const double *costs[2] = {NULL, NULL}, *own;
     uint8_t *ranges;
     double *biases = NULL;
-    int64_t at = -1;
-    size_t s[3], n_answers = 0, n_words = 0, n_all = 0, n_rows = 0, n_costs = 0, i, k;
+    int64_t at = -1, *chosen = NULL;
+    size_t s[3], n_answers = 0, n_words = 0, n_all = 0, n_rows = 0, n_costs = 0, n_plays = 0, i, k;
     int is_done = 0;
     (void)module;
     a.n = 0;
-    if (n == 11 && cdbp_int_of(in[3], &at) && at >= 0 && (of.starts = cdbp_int64s(&a, in[0], s, 1, CDBP_ANY, 0)) && s[0] > 0
+    of.plays = NULL;
+    if (n == 13 && cdbp_int_of(in[3], &at) && at >= 0 && (of.starts = cdbp_int64s(&a, in[0], s, 1, CDBP_ANY, 0)) && s[0] > 0
         && ((of.n_ranges = s[0] - 1), 1) && (of.rows = cdbp_int64s(&a, in[1], s, 1, CDBP_ANY, 0)) && ((n_rows = s[0]), 1)
         && (of.mirrored = (const uint8_t *)cdbp_shaped(&a, in[2], 'b', 1, 0, s, 1, of.n_ranges, 0, 0))
         && (masks[0] = (const uint64_t *)cdbp_shaped(&a, in[4], 'u', 8, 0, s, 2, CDBP_ANY, CDBP_ANY, 0))
@@ -349,17 +345,21 @@ static PyObject *cdbp_fill_ranges(PyObject *module, PyObject *const *in, Py_ssiz
         && (uint64_t)at <= n_all && of.n_ranges <= n_all - (size_t)at && (own = cdbp_numbers(&a, in[8], s, 1, n_all, 0, 0))
         && (in[6] == Py_None || ((costs[0] = cdbp_numbers(&a, in[6], s, 2, n_answers, CDBP_ANY, 0)) && ((n_costs = s[1]), 1)
             && (costs[1] = cdbp_numbers(&a, in[7], s, 2, n_answers, n_costs, 0))
-            && (biases = cdbp_to_numbers(&a, in[10], s, 2, n_answers, n_all, 0))))) {
+            && (biases = cdbp_to_numbers(&a, in[10], s, 2, n_answers, n_all, 0))))
+        && (in[11] == Py_None || ((of.plays = (const cdb_row_play *)cdbp_numbers(&a, in[11], s, 2, CDBP_ANY, sizeof(cdb_row_play) / sizeof(double), 0))
+            && ((n_plays = s[0]), 1) && (chosen = (int64_t *)cdbp_shaped(&a, in[12], 'i', 8, 1, s, 2, n_answers, n_all, 0))))) {
         of.at = (size_t)at;
         is_done = of.starts[0] == 0 && (uint64_t)of.starts[of.n_ranges] == n_rows;
         for (i = 0; i < of.n_ranges; i++) is_done = is_done && of.starts[i] <= of.starts[i + 1];
         for (k = 0; k < n_rows; k++)
-            is_done = is_done && of.rows[k] >= 0 && (uint64_t)of.rows[k] < 64 * n_words && (!biases || (uint64_t)of.rows[k] < n_costs);
+            is_done = is_done && of.rows[k] >= 0 && (uint64_t)of.rows[k] < 64 * n_words && (!biases || (uint64_t)of.rows[k] < n_costs)
+                && (!of.plays || (uint64_t)of.rows[k] < n_plays);
         for (i = 0; is_done && i < n_answers; i++) {
             const uint64_t *own_masks[2];
             const double *own_costs[2];
             for (k = 0; k < 2; k++) own_masks[k] = masks[k] + i * n_words, own_costs[k] = biases ? costs[k] + i * n_costs : NULL;
-            cdbm_fill_ranges(&of, own_masks, biases ? own_costs : NULL, own, ranges + i * n_all, biases ? biases + i * n_all : NULL);
+            cdbm_fill_ranges(&of, own_masks, biases ? own_costs : NULL, own, ranges + i * n_all, biases ? biases + i * n_all : NULL,
+                chosen ? chosen + i * n_all : NULL);
         }
     }
     return cdbp_given_back(&a, is_done, "fill_ranges takes rows of a table, and masks and arrays that go together");

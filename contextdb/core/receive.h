@@ -7,7 +7,7 @@ typedef struct cdbo_instant { double bank, range, at_s; } cdbo_instant; /* the n
 typedef struct cdbo_play {   /* all are numbers, as they come in arrays */
     cdbo_instant playing, before, displayed; /* what plays; what would without a search; what was displayed last */
     double action, rate;                    /* number of a word of Action; seconds of the clip in a second */
-    double motion[3], weight, gives_ground; /* as in cdbo_given */
+    double motion[3], weight, gives_ground, blend_s, root; /* as in cdbo_given */
 } cdbo_play;
 
 enum { CDBO_ACTION_STARTS, CDBO_ACTION_PLAYS_ON, CDBO_ACTION_JUMPS, CDBO_ACTION_LOOPS, CDBO_ACTION_HOLDS };
@@ -46,7 +46,7 @@ static inline void cdbo_receive(const cdbo_poses *poses, const double *row, cons
     memset(given, 0, sizeof *given);
     given->bank = play->playing.bank, given->range = play->playing.range, given->at_s = play->playing.at_s;
     given->is_on = play->displayed.bank >= 0.0, given->rate = play->rate, given->weight = play->weight, given->seam = -1.0;
-    given->gives_ground = play->gives_ground;
+    given->gives_ground = play->gives_ground, given->blend_s = play->blend_s, given->root = play->root;
     memcpy(given->motion, play->motion, sizeof given->motion);
     if (given->is_on != 0.0 && given->bank >= 0.0) {
         double passed_s = dt_s * rate, until_s = play->displayed.at_s + passed_s;

@@ -12,7 +12,8 @@
  * what lies along it is not. The game then goes on from the pose's root.
  *
  * A jump moves nobody, but it changes the velocity of what plays. The difference decays as the offsets of joints do: the body runs
- * on or falls back a little, and comes to the path of what plays.
+ * on or falls back a little, and comes to the path of what plays. Where the row of what plays says by what the root is moved, and that
+ * is not what moved it before, the root goes on from where it would have been, and comes to its new place in the same way.
  *
  * Source: Root Motion Weight in EA's talk; speed from the animation along a path from code in Remedy's; the adjustment and the
  * clamp of orangeduck/Motion-Matching, controller.cpp. */
@@ -22,6 +23,7 @@
 #define CDBO_STANDING_MPS 0.1  /* what goes slower stands */
 
 static const cdbo_column_record cdbo_root_columns[] = {
+    {CDBO_MODE, "mode", CDBO_ONE, 1, 0.0},
     {CDBO_HAS_BODY, "has_body", CDBO_ONE, 1, 0.0},
     {CDBO_BODY, "body", CDBO_ONE, 3, 0.0},
     {CDBO_HAS_VELOCITY, "has_velocity", CDBO_ONE, 1, 0.0},
@@ -70,14 +72,14 @@ static inline cdbo_place3 cdbo_place_sum(cdbo_place3 a, cdbo_place3 b)
 /* How much of the turning is the animation's, and of the movement. */
 static inline double cdbo_rotation_share(const cdbo_posed *one)
 {
-    double root = cdbo_set(one, CDBO_ROOT);
+    double root = one->mode;
     if (root == CDBO_BY_BOTH) return one->given->weight * cdbo_set(one, CDBO_ROTATION_WEIGHT);
     return root == CDBO_BY_ANIMATION ? 1.0 : 0.0;
 }
 
 static inline double cdbo_position_share(const cdbo_posed *one)
 {
-    double root = cdbo_set(one, CDBO_ROOT);
+    double root = one->mode;
     if (root == CDBO_BY_BOTH) return one->given->weight * cdbo_set(one, CDBO_POSITION_WEIGHT);
     return root == CDBO_BY_CODE ? 0.0 : 1.0;
 }
@@ -128,7 +130,7 @@ static inline int cdbo_way(const cdbo_posed *one, double *x, double *z)
 {
     double size;
     cdbo_velocity(one, x, z);
-    if (cdbo_set(one, CDBO_ROOT) != CDBO_BY_PATH) return 0;
+    if (one->mode != CDBO_BY_PATH) return 0;
     size = cdbo_flat_length(*x, *z);
     if (!(size > CDBO_STANDING_MPS)) return 0;
     *x /= size, *z /= size;
@@ -167,7 +169,7 @@ static inline cdbo_place3 cdbo_pulled(const cdbo_posed *one, cdbo_place3 base, d
 static inline cdbo_place3 cdbo_moved(const cdbo_posed *one, cdbo_place3 motion, double moved, double turned)
 {
     cdbo_place3 body = cdbo_place_at(cdbo_column(one, CDBO_BODY)), base = body, last = body, after;
-    double root = cdbo_set(one, CDBO_ROOT), x, z, far_m, own_m;
+    double root = one->mode, x, z, far_m, own_m;
     if (*cdbo_was(one, CDBO_BEGUN) != 0.0) base = cdbo_place_at(cdbo_was(one, CDBO_BASE));
     else if (!one->place) base = cdbo_place_at(cdbo_column(one, CDBO_CLIP_ROOT));
     after = cdbo_after(base, cdbo_bent(one, motion), moved, turned);
@@ -213,20 +215,29 @@ static inline void cdbo_change(const cdbo_posed *one, cdbo_place3 base, cdbo_pla
 
 static inline void cdbo_run_root(cdbo_posed *one)
 {
-    double moved = cdbo_position_share(one), turned = cdbo_rotation_share(one), root = cdbo_set(one, CDBO_ROOT);
+    double moved = cdbo_position_share(one), turned = cdbo_rotation_share(one), root = one->mode;
     double lost_s = one->seams ? one->given->lost_s : 0.0;
     int is_on = *cdbo_was(one, CDBO_BEGUN) != 0.0;
+    double mode = *cdbo_was(one, CDBO_MODE) - 1.0;
+    cdbo_place3 kept;
     cdbo_place3 motion = cdbo_xzh(0.0, 0.0, 0.0), base, offset;
     if (is_on) motion = cdbo_place_at(one->given->motion);
     if (lost_s > 0.0) motion = cdbo_place_sum(motion, cdbo_xzh(lost_s * one->left.x, lost_s * one->left.y, lost_s * one->left.z));
     cdbo_move_body(one);
+    *cdbo_column(one, CDBO_MODE) = one->mode + 1.0;
     base = cdbo_moved(one, motion, moved, turned);
     cdbo_keep(one, CDBO_OFFSET, 3);
     cdbo_keep(one, CDBO_OFFSET_SPEED, 3);
     if (cdbo_set(one, CDBO_BLEND) == CDBO_BY_SPRING) {
-        cdbo_decay(3, cdbo_was(one, CDBO_OFFSET), cdbo_was(one, CDBO_OFFSET_SPEED), cdbo_set(one, CDBO_HALFLIFE), one->dt_s,
+        cdbo_decay(3, cdbo_was(one, CDBO_OFFSET), cdbo_was(one, CDBO_OFFSET_SPEED), cdbo_fade(one), one->dt_s,
             cdbo_column(one, CDBO_OFFSET), cdbo_column(one, CDBO_OFFSET_SPEED));
-        if (one->seams) cdbo_change(one, base, motion, moved, turned);
+        if (one->seams && !cdbo_is_cut(one)) cdbo_change(one, base, motion, moved, turned);
+        if (is_on && mode >= 0.0 && mode != root && !cdbo_is_cut(one)) {
+            one->mode = mode, kept = cdbo_moved(one, motion, cdbo_position_share(one), cdbo_rotation_share(one)), one->mode = root;
+            offset = cdbo_place_sum(cdbo_place_at(cdbo_column(one, CDBO_OFFSET)), kept);
+            cdbo_set_place(cdbo_column(one, CDBO_OFFSET),
+                cdbo_xzh(offset.x - base.x, offset.z - base.z, cdbo_remainder(offset.heading - base.heading)));
+        }
     }
     offset = cdbo_place_at(cdbo_column(one, CDBO_OFFSET));
     if ((root == CDBO_BY_BOTH || root == CDBO_BY_PATH) && one->place) base = cdbo_clamped(one, base, offset);

@@ -6,7 +6,10 @@
  *
  * Source: D. Bollo, "Inertialization", GDC 2018; D. Holden, "Spring-It-On", 2021; orangeduck/Motion-Matching, controller.cpp. */
 
+#define CDBO_FADED 6.638352 /* a critically damped spring has a hundredth left when damping x time is so much */
+
 static const cdbo_column_record cdbo_spring_columns[] = {
+    {CDBO_FADE, "fade", CDBO_ONE, 1, 0.0},
     {CDBO_TURNS, "turns", CDBO_EACH_JOINT, 3, 0.0},
     {CDBO_SPINS, "spins", CDBO_EACH_JOINT, 3, 0.0},
     {CDBO_SHIFTS, "shifts", CDBO_EACH_MOVING, 3, 0.0},
@@ -69,15 +72,39 @@ static inline void cdbo_leave(cdbo_moment left, cdbo_moment entered, size_t j, d
     cdbo_set3(spins, j, cdbo_speed_of(remaining, cdbo_from(under, cdbo_add(own, carried))));
 }
 
+/* The damping until now; and from now on, which a seam may change: that of the row that is entered, or else of the settings. */
+static inline double cdbo_fade(const cdbo_posed *one)
+{
+    double fade = *cdbo_was(one, CDBO_FADE);
+    return fade > 0.0 ? fade : cdbo_set(one, CDBO_HALFLIFE);
+}
+
+static inline void cdbo_set_fade(cdbo_posed *one)
+{
+    double blend_s = one->given->blend_s;
+    cdbo_keep(one, CDBO_FADE, 1);
+    if (one->seams) *cdbo_column(one, CDBO_FADE) = blend_s > 0.0 ? CDBO_FADED / blend_s : 0.0;
+}
+
+/* Whether what plays is entered by a cut. */
+static inline int cdbo_is_cut(const cdbo_posed *one)
+{
+    return one->seams && one->given->blend_s == 0.0;
+}
+
 static inline void cdbo_run_spring(cdbo_posed *one)
 {
     const cdbo_rig *rig = &one->poses->rig;
     double *turns = cdbo_column(one, CDBO_TURNS), *spins = cdbo_column(one, CDBO_SPINS);
-    double *shifts = cdbo_column(one, CDBO_SHIFTS), *speeds = cdbo_column(one, CDBO_SPEEDS), y = cdbo_set(one, CDBO_HALFLIFE);
+    double *shifts = cdbo_column(one, CDBO_SHIFTS), *speeds = cdbo_column(one, CDBO_SPEEDS), y = cdbo_fade(one);
     size_t j, i;
+    cdbo_set_fade(one);
     cdbo_decay(3 * rig->n_joints, cdbo_was(one, CDBO_TURNS), cdbo_was(one, CDBO_SPINS), y, one->dt_s, turns, spins);
     cdbo_decay(3 * rig->n_moving, cdbo_was(one, CDBO_SHIFTS), cdbo_was(one, CDBO_SPEEDS), y, one->dt_s, shifts, speeds);
-    if (one->seams) {
+    if (cdbo_is_cut(one)) {
+        memset(turns, 0, 3 * rig->n_joints * sizeof(double)), memset(spins, 0, 3 * rig->n_joints * sizeof(double));
+        memset(shifts, 0, 3 * rig->n_moving * sizeof(double)), memset(speeds, 0, 3 * rig->n_moving * sizeof(double));
+    } else if (one->seams) {
         cdbo_moment left = cdbo_moment_at(one, 0), entered = cdbo_moment_at(one, 1);
         for (j = 0; j < rig->n_joints; j++) cdbo_leave(left, entered, j, turns, spins);
         for (i = 0; i < 3 * rig->n_moving; i++) {

@@ -35,6 +35,11 @@ class Answer(Protocol):
         """The same as bits: uint64 [W]."""
 
     @property
+    def plays(self) -> NDArray[np.float64] | None:
+        """How each row plays, then what plays without one: float64 [R + 1, 8], see `contextdb.cells.row_play`; None where no row
+        says. One object for all answers of a table."""
+
+    @property
     def has_penalties(self) -> bool:
         """Whether soft cells cost something."""
 
@@ -83,6 +88,7 @@ class NamedAssets:
     """An answer without a table: the animations of these assets may play."""
 
     has_penalties = is_widening = False
+    plays = None
 
     def __init__(self, assets: Sequence[str], mirrored: Answer | None = None) -> None:
         self.assets = self.table_assets = assets

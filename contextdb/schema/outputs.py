@@ -18,6 +18,7 @@ from typing import Any
 
 from contextdb.cells.output_types import MOST_NUMBERS, OUTPUT_TYPES, OutputValue, names_where
 from contextdb.cells.outputs import SLOT_COLUMNS, Output
+from contextdb.cells.row_play import KINDS as PLAY_KINDS
 from contextdb.errors import Fault, in_quotes, mend_for, nearest, some
 from contextdb.files.settings import Setting, Settings
 from contextdb.files.toml_shapes import Shape, between, key_value, near_key, no_key, nothing, one_of, wrong_name
@@ -141,6 +142,9 @@ def _joint_faults(path: tuple[str, ...], part: Part) -> Iterator[PathFault]:
     if path[-1] in SLOT_COLUMNS and (not kind.is_free or "default" in part):
         wrong = f"{about} says which roles a row fills, so it is a text without a default."
         faults.append((path, Fault(wrong, _typed("type", "text"))))
+    if kind.name not in PLAY_KINDS.get(path[-1], (kind.name,)):
+        wrong = f"{about} says how a row plays, and is of type {in_quotes(kind.name)}."
+        faults.append((path, Fault(wrong, some(PLAY_KINDS[path[-1]]), _typed("type", PLAY_KINDS[path[-1]][0]))))
     ends = {key: (part[key], float(part[key])) for key in ("min", "max") if key in part}
     faults += [((*path, key), fault) for key, fault in bound_faults(about, ends, "an int", kind.is_whole)]
     yield from faults

@@ -49,7 +49,7 @@ class OutputColumn:
     def _read_on(self, texts: Iterable[str], known: Sequence[OutputValue], wrong: Mapping[int, Fault]) -> Read:
         """What texts give, behind others that are known."""
         output, values, faults = self.output, list(known), dict(wrong)
-        if output.type.is_free:
+        if output.is_free:
             return values + [text if text.strip() else output.nothing for text in texts], faults
         for text in texts:
             try:

@@ -99,7 +99,7 @@ def turned(place, motion):
 
 def posed(banks, settings, state, given, seams, dt, place, ground):
     """(rotations, translations, positions, root, contacts) and the next state."""
-    number, at, at_s, _, _, _, left, ahead, turn, _, is_ahead, seam, lost_s, _ = given
+    number, at, at_s, _, _, _, left, ahead, turn, _, is_ahead, seam, lost_s, *_ = given
     rig, bank = banks[0].skeleton, banks[int(number)] if number >= 0 else None
     dt, motion = (dt, np.array([left, ahead, turn])) if state.is_begun else (0.0, np.zeros(3))
     pair = [seams[2 * int(seam) + i] for i in (0, 1)] if state.is_begun and seam >= 0 else []

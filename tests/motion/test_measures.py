@@ -120,26 +120,26 @@ def test_feet_that_the_clip_has_up_do_not_skate():
 
 def test_a_toe_is_down_where_its_source_is_low_and_slow_whatever_the_contacts_say():
     found = measure(sliding(0.3), a_bank(slide=(61, 0.0, 0.0, False)), rate=RATE)
-    assert (found.skate_cm_s, found.toe_skate_cm_s) == (None, pytest.approx(30.0))
+    assert (found.skate_cm_s, found.skate_toe_cm_s) == (None, pytest.approx(30.0))
     fast = measure(sliding(0.3), a_bank(slide=(61, 0.6, 0.0, True)), rate=RATE)
-    assert (fast.toe_skate_cm_s, fast.missing["toe_skate_cm_s"]) == (None, "no foot is ever down")
+    assert (fast.skate_toe_cm_s, fast.missing["skate_toe_cm_s"]) == (None, "no foot is ever down")
     hopping = a_bank(slide=(61, 0.0, 0.0, True))
     hopping.positions[31:, 0, 1] += 0.04
     poses = [replace(pose, playing=playing(time_s=i / RATE)) for i, pose in enumerate(sliding(0.0)[:31] + sliding(0.3)[31:])]
-    assert measure(poses, hopping, rate=RATE).toe_skate_cm_s == 0.0
+    assert measure(poses, hopping, rate=RATE).skate_toe_cm_s == 0.0
 
 
 def test_the_worst_second_of_sliding_is_beside_the_mean():
     z = np.concatenate((np.zeros(60), 0.3 * np.arange(31) / RATE, np.full(60, 0.3)))
     poses = [a_pose(playing(time_s=min(i / RATE, 2.0)), (0.0, at, 0.0)) for i, at in enumerate(z.tolist())]
     found = measure(poses, BANK, rate=RATE)
-    assert found.skate_cm_s == found.toe_skate_cm_s == pytest.approx(30.0 * 30 / 150)
-    assert found.skate_worst_cm_s == found.toe_skate_worst_cm_s == pytest.approx(30.0)
+    assert found.skate_cm_s == found.skate_toe_cm_s == pytest.approx(30.0 * 30 / 150)
+    assert found.skate_worst_cm_s == found.skate_toe_worst_cm_s == pytest.approx(30.0)
 
 
 def test_hips_and_feet_that_are_lower_than_in_the_clip_show_as_dip_and_below_the_floor():
     found = measure(sliding(0.0, lift=lambda t: -0.07 if t > 1.0 else 0.0), BANK, rate=RATE)
-    assert (found.dip_cm, found.penetration_cm, found.penetration_raw_cm) == (pytest.approx(7.0), pytest.approx(7.0), 0.0)
+    assert (found.hip_dip_cm, found.penetration_cm, found.penetration_raw_cm) == (pytest.approx(7.0), pytest.approx(7.0), 0.0)
 
 
 def test_hips_over_the_feet_and_lean_are_those_two_seconds_after_a_stop():
@@ -147,7 +147,7 @@ def test_hips_over_the_feet_and_lean_are_those_two_seconds_after_a_stop():
     poses = [stream.update(decision, 1.0 / RATE) for decision in decisions([("idle", 0.0, 151)], 1.0 / RATE)]
     wanted = [(0.0, 1.3 if i < 30 else 0.0) for i in range(151)]
     own = measure(poses, bank(), rate=RATE, wanted=wanted)
-    assert own.balance_cm == pytest.approx(0.0, abs=0.2)
+    assert own.hips_off_feet_cm == pytest.approx(0.0, abs=0.2)
     assert own.lean_deg == pytest.approx(own.lean_raw_deg, abs=0.2)
     ahead = np.array([0.0, 0.0, 0.15])
     for pose in poses:
@@ -155,10 +155,10 @@ def test_hips_over_the_feet_and_lean_are_those_two_seconds_after_a_stop():
             [i for i, name in enumerate(rig.names) if "Leg" not in name and "Foot" not in name and "Toe" not in name]
         ] += ahead
     off = measure(poses, bank(), rate=RATE, wanted=wanted)
-    assert off.balance_cm == pytest.approx(15.0, abs=0.2)
+    assert off.hips_off_feet_cm == pytest.approx(15.0, abs=0.2)
     assert off.lean_deg == pytest.approx(own.lean_deg)
     none = measure(poses[:80], bank(), rate=RATE, wanted=wanted[:80])
-    assert none.missing["balance_cm"] == "nothing comes to rest for two seconds"
+    assert none.missing["hips_off_feet_cm"] == "nothing comes to rest for two seconds"
 
 
 def test_a_leg_that_is_straight_is_at_its_limit():

@@ -240,10 +240,10 @@ def test_a_body_at_rest_steps_with_one_foot_at_a_time_and_lifts_it():
 def test_toes_that_stand_in_the_clip_slide_no_more_than_half_as_much_as_there():
     for name in ("walk", "jog"):
         found = measure(streamed([(name, 0.0, 150)]), bank(), rate=RATE)
-        assert found.toe_skate_cm_s <= found.toe_skate_raw_cm_s / 2.0
+        assert found.skate_toe_cm_s <= found.skate_toe_raw_cm_s / 2.0
         assert found.skate_cm_s < 0.5
 
 
 def test_legs_pull_the_hips_down_no_more_than_they_may():
     found = measure(streamed([("walk", 0.0, 120)], lambda t: (0.0, 0.4 * t, 0.0), root="code"), bank(), rate=RATE)
-    assert found.dip_cm < 12.0
+    assert found.hip_dip_cm < 12.0

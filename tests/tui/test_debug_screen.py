@@ -327,6 +327,7 @@ def test_measures_come_as_strips(recording: Recording):
     assert strips == ["cost", "valid", "accel", "skate", "error"]
     assert "path err" in text
     assert "no poses" not in text
+    assert "Esc ends it" not in text, "what has ended is at work no more"
 
 
 def test_the_order_and_the_filter_are_said(recording: Recording):

@@ -87,6 +87,8 @@ class MomentScreen(Screen[None]):
         self.turned = Turned()
         self.order = ORDERS[0]
         self.text = ""
+        self.message = ""
+        """What is said over the foot."""
         self.banks: dict[str, PoseBank] = recording.saved_banks()
         self.moment: Moment | None = None
         self._pane = "bars"
@@ -369,5 +371,6 @@ class MomentScreen(Screen[None]):
 
     def say(self, text: str, is_error: bool = False) -> None:
         """Say something over the foot."""
+        self.message = text
         line = self.query_one("#message", Static)
         line.update(Text(printable(text), style="bold" if is_error else ""))

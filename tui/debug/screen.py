@@ -65,6 +65,10 @@ class RowWanted(Message):
     """Where to come back to."""
 
 
+ESC_ENDS = "Esc ends it"
+"""How a message ends while something is at work."""
+
+
 class DebugScreen(MomentScreen):
     """A session."""
 
@@ -356,6 +360,8 @@ class DebugScreen(MomentScreen):
 
     def _take_strips(self, strips: Mapping[str, Floats]) -> None:
         self.timeline.add_strips(strips)
+        if self.message.endswith(ESC_ENDS):
+            self.say("")
         self._show()
 
     def _progress(self, what: str) -> Callable[[float], None]:
@@ -366,7 +372,7 @@ class DebugScreen(MomentScreen):
             if worker.is_cancelled:
                 raise Cancelled
             full = round(20 * share)
-            self.app.call_from_thread(self.say, f"{'█' * full}{'░' * (20 - full)} {share:.0%} {what} · Esc ends it")
+            self.app.call_from_thread(self.say, f"{'█' * full}{'░' * (20 - full)} {share:.0%} {what} · {ESC_ENDS}")
 
         return progress
 

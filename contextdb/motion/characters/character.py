@@ -38,7 +38,7 @@ from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.nodes.warping import Target
 from contextdb.motion.output.bank import PoseBank
 from contextdb.motion.output.ground import Ground as HeightOf
-from contextdb.motion.output.stream import PoseStream
+from contextdb.motion.output.stream import PoseStream, root_of
 from contextdb.motion.selection.controller import Clock, Controller
 from contextdb.motion.selection.controller import Place as ControllerPlace
 from contextdb.motion.selection.decision import Decision, Playing, plays
@@ -242,8 +242,10 @@ class Character:
     @property
     def state(self) -> CharacterState:
         """Where the character is, to come back to with `restore`. The facts of live contexts are the game's and not in it."""
-        stream = None if self.stream is None else self.stream.state
-        return CharacterState(self._row.tobytes(), self.controller.state, stream)
+        stream, walk, controller = None if self.stream is None else self.stream.state, self._row.tobytes(), self.controller
+        displayed = np.array((-1.0, 0.0, 0.0) if self.stream is None else self.stream.displayed, np.float64)
+        row = b"" if stream is None else stream.row.tobytes()
+        return CharacterState(walk, controller.state, stream, walk + controller.row.tobytes() + displayed.tobytes() + row)
 
     def restore(self, state: CharacterState) -> None:
         """Go on from a state of this character, or of another one with the same parts; raises ContextError for anything else."""
@@ -371,7 +373,7 @@ class Character:
         except Exception:
             self.controller.put_back(before)
             raise
-        moves_body = self.stream.settings.root == "animation"
+        moves_body = root_of(decision, self.stream.settings) == "animation"
         self._stand(
             walks.settled(self.schema.ways, step.walk, np.array([pose.root]), moves_body), None if moves_body else step.body
         )

@@ -24,7 +24,7 @@ from contextdb.motion.characters.updates import CharacterState, Step, Updated
 from contextdb.motion.clips.many_steered import ManySteered
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.output.pose import Pose
-from contextdb.motion.output.stream import PoseStream
+from contextdb.motion.output.stream import PoseStream, root_of
 from contextdb.motion.output.streams import PoseStreams
 from contextdb.motion.records import collector_at_rest
 from contextdb.motion.selection.controller_group import ControllerGroup
@@ -136,7 +136,7 @@ class Crowd(ListSequence[Character]):
             for controller, place in zip(group, before, strict=True):
                 controller.put_back(place)
             raise
-        moves = [character.stream is not None and character.stream.settings.root == "animation" for character in self]
+        moves = [_moves_body(character, decision) for character, decision in zip(self, decisions, strict=True)]
         for moves_body in set(moves):
             numbers = [i for i, own in enumerate(moves) if own is moves_body]
             rows[numbers] = walks.settled(schema.ways, rows[numbers], roots[numbers], moves_body)
@@ -217,6 +217,11 @@ def _answers(table: Table, facts: Sequence[Facts], unknown: Any) -> Iterable[Ans
         columns = {name: [each.get(name) for each in facts] for name in table.asked}
         return table.query_many(columns, unknown=unknown)
     return [asking.answer(table, each, unknown) for each in facts]
+
+
+def _moves_body(character: Character, decision: Decision) -> bool:
+    """Whether the animation moves the body of a character."""
+    return character.stream is not None and root_of(decision, character.stream.settings) == "animation"
 
 
 def _facts_of_each(facts: object, n: int) -> list[Facts]:

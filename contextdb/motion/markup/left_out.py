@@ -23,6 +23,7 @@ class LeftOut(IntEnum):
     HISTORY = 9
     PHASE = 10
     FORBIDDEN = 11
+    START = 12
 
     @property
     def text(self) -> str:
@@ -43,6 +44,7 @@ _TEXTS = {
     LeftOut.HISTORY: "played just now",
     LeftOut.PHASE: "phase",
     LeftOut.FORBIDDEN: "forbidden by bias",
+    LeftOut.START: "not the start_s of its row",
 }
 
 

@@ -33,16 +33,16 @@ class Measures:
         The share of time in which a foot below 5 cm is faster than 0.5 m/s, at once and in the mean over 1/6 s.
     skate_worst_cm_s : float
         The same of planted feet in the worst second.
-    toe_skate_cm_s, toe_skate_raw_cm_s, toe_skate_worst_cm_s : float
+    skate_toe_cm_s, skate_toe_raw_cm_s, skate_toe_worst_cm_s : float
         The mean speed over the ground of what stands of a foot, where it is lower than 3 cm over its floor and slower than 0.5 m/s
         in the source frame: independent of contacts; that of all clips, and in the worst second.
     penetration_cm, penetration_raw_cm : float
         How deep what stands of a foot is at most below the floor of its clip.
     knee_limit_share, knee_limit_raw_share : float
         The share of moments with a knee straighter than 178 degrees.
-    dip_cm : float
+    hip_dip_cm : float
         How much lower than in the source frame hips are at most.
-    balance_cm, lean_deg, lean_raw_deg : float
+    hips_off_feet_cm, lean_deg, lean_raw_deg : float
         From two seconds after each stop on: how far hips are at most, over the ground, from where the source frame has them over
         its feet; how far the spine leans; and in the source frames.
     accel_p99, accel_raw_p99, accel_worst : float
@@ -84,15 +84,15 @@ class Measures:
     skate_ratio: float | None = None
     skate_ratio_raw: float | None = None
     skate_worst_cm_s: float | None = None
-    toe_skate_cm_s: float | None = None
-    toe_skate_raw_cm_s: float | None = None
-    toe_skate_worst_cm_s: float | None = None
+    skate_toe_cm_s: float | None = None
+    skate_toe_raw_cm_s: float | None = None
+    skate_toe_worst_cm_s: float | None = None
     penetration_cm: float | None = None
     penetration_raw_cm: float | None = None
     knee_limit_share: float | None = None
     knee_limit_raw_share: float | None = None
-    dip_cm: float | None = None
-    balance_cm: float | None = None
+    hip_dip_cm: float | None = None
+    hips_off_feet_cm: float | None = None
     lean_deg: float | None = None
     lean_raw_deg: float | None = None
     accel_worst: float | None = None

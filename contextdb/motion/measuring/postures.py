@@ -36,9 +36,9 @@ AFTER_S = 2.0
 SECOND_S = 1.0
 STRAIGHT_DEG = 178.0
 """A knee that is straighter is at its limit."""
-FEET = ("toe_skate_cm_s", "toe_skate_worst_cm_s", "skate_worst_cm_s", "penetration_cm", "knee_limit_share", "dip_cm")
-RAW = ("toe_skate_raw_cm_s", "penetration_raw_cm", "knee_limit_raw_share")
-REST = ("balance_cm", "lean_deg", "lean_raw_deg")
+FEET = ("skate_toe_cm_s", "skate_toe_worst_cm_s", "skate_worst_cm_s", "penetration_cm", "knee_limit_share", "hip_dip_cm")
+RAW = ("skate_toe_raw_cm_s", "penetration_raw_cm", "knee_limit_raw_share")
+REST = ("hips_off_feet_cm", "lean_deg", "lean_raw_deg")
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +99,7 @@ def _raw(clips: Clips) -> dict[str, object]:
     bodies = [(raw, body) for raw in clips.distinct if (body := Body.of(raw)) is not None]
     straight = [body.knees_deg(raw.positions).max(axis=1) > STRAIGHT_DEG for raw, body in bodies]
     return {
-        "toe_skate_raw_cm_s": NEVER_PLANTED if skate is None else 100.0 * skate,
+        "skate_toe_raw_cm_s": NEVER_PLANTED if skate is None else 100.0 * skate,
         "penetration_raw_cm": 100.0 * max(deepest, 0.0),
         "knee_limit_raw_share": float(np.concatenate(straight).mean()) if straight else NO_FEET,
     }
@@ -117,8 +117,8 @@ def _worst_seconds(it: Displayed, at: Ints) -> dict[str, object]:
     toes = formulas.Slides.of(places, times_s, down, floor)
     skate = toes.skate_mps()
     values: dict[str, object] = {
-        "toe_skate_cm_s": NEVER_PLANTED if skate is None else 100.0 * skate,
-        "toe_skate_worst_cm_s": NEVER_PLANTED if skate is None else 100.0 * _worst_slide(toes),
+        "skate_toe_cm_s": NEVER_PLANTED if skate is None else 100.0 * skate,
+        "skate_toe_worst_cm_s": NEVER_PLANTED if skate is None else 100.0 * _worst_slide(toes),
         "skate_worst_cm_s": NEVER_PLANTED,
     }
     if it.contacts is not None:
@@ -156,7 +156,7 @@ def _shapes(it: Displayed, sources: list[int]) -> dict[str, object]:
     first = it.sources[sources[0]]
     body = None if first is None else Body.of(first[0])
     straight: object = NO_FEET if body is None else float((body.knees_deg(it.positions).max(axis=1) > STRAIGHT_DEG).mean())
-    return {"penetration_cm": 100.0 * deepest, "dip_cm": 100.0 * dip, "knee_limit_share": straight}
+    return {"penetration_cm": 100.0 * deepest, "hip_dip_cm": 100.0 * dip, "knee_limit_share": straight}
 
 
 def _rest(it: Displayed, at: Ints, wanted: Floats | None) -> dict[str, object]:

@@ -21,7 +21,7 @@ from contextdb.motion.output.bank import PoseBank
 from contextdb.motion.output.ground import A_GROUND, Ground
 from contextdb.motion.output.pipeline import COLUMNS, Pipeline, Rows
 from contextdb.motion.output.pose import Pose
-from contextdb.motion.output.settings import PoseSettings
+from contextdb.motion.output.settings import PoseSettings, RootMode
 from contextdb.motion.selection.decision import Decision, Playing, plays
 
 __all__ = ["Pose", "PoseState", "PoseStream"]
@@ -125,6 +125,11 @@ class PoseStream:
         self._rows, self._at, self._state = Rows(state.row[None], [state.playing]), 0, state
 
     @property
+    def displayed(self) -> tuple[int, int, float]:
+        """What was displayed last, as the core has it: the number of a bank, -1 for none, its range and second."""
+        return self._pipeline.moment_of(self._rows.playing[self._at])
+
+    @property
     def _place(self) -> tuple[Rows, int]:
         """The rows that the stream is among, and its own."""
         return self._rows, self._at
@@ -164,7 +169,7 @@ class PoseStream:
         dt = require_real(dt, "dt", 0.0)
         if ground is not None and not callable(ground):
             raise ContextError(Fault(f"ground is {ground!r}.", A_GROUND))
-        place = checked_place(body, self.settings)
+        place = checked_place(body, root_of(decision, self.settings))
         places = None if place is None else np.array([place])
         grounds = None if ground is None else [ground]
         rows, poses = self._pipeline.update(self._rows.row(self._at), [decision], dt, places, grounds)
@@ -172,8 +177,14 @@ class PoseStream:
         return poses[0]
 
 
-def checked_place(body: OfBody | None, settings: PoseSettings) -> tuple[float, float, float] | None:
-    """Where the game's body is. Raises MotionError where some settings need one and none is given."""
-    if body is None and settings.root != "animation":
-        raise MotionError(Fault(f'root = "{settings.root}" needs a body, and none was given.', A_BODY, 'root = "animation"'))
+def root_of(decision: Decision, settings: PoseSettings) -> RootMode:
+    """What moves the body: as the row of what plays says, or else the settings."""
+    said = None if decision.play is None else decision.play.root
+    return settings.root if said is None else said
+
+
+def checked_place(body: OfBody | None, root: RootMode) -> tuple[float, float, float] | None:
+    """Where the game's body is. Raises MotionError where a root mode needs one and none is given."""
+    if body is None and root != "animation":
+        raise MotionError(Fault(f'root = "{root}" needs a body, and none was given.', A_BODY, 'root = "animation"'))
     return place_of(body)

@@ -20,7 +20,7 @@ from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.output.ground import MANY_GROUND, Ground, Grounds, ManyGround
 from contextdb.motion.output.pipeline import Rows
 from contextdb.motion.output.pose import CrowdPoses
-from contextdb.motion.output.stream import PoseState, PoseStream, checked_place
+from contextdb.motion.output.stream import PoseState, PoseStream, checked_place, root_of
 from contextdb.motion.selection.decision import Decision
 
 UNKNOWN = (math.nan, math.nan, math.nan)
@@ -100,7 +100,7 @@ class PoseStreams(ListSequence[PoseStream]):
         dt = require_real(dt, "dt", 0.0)
         if len(decided) != len(self):
             raise ContextError(Fault(f"{plural(len(decided), 'decision')} for {plural(len(self), 'character')}.", "one for each"))
-        poses, rows = self.updated(decided, dt, self._places(bodies), self._grounds(ground))
+        poses, rows = self.updated(decided, dt, self._places(bodies, decided), self._grounds(ground))
         self.go_on(rows)
         return poses
 
@@ -124,13 +124,14 @@ class PoseStreams(ListSequence[PoseStream]):
             return first
         return Rows(np.array([rows.numbers[at] for rows, at in each]), [rows.playing[at] for rows, at in each])
 
-    def _places(self, bodies: OfBodies | None) -> Floats | None:
+    def _places(self, bodies: OfBodies | None, decisions: Sequence[Decision]) -> Floats | None:
         """Where all bodies are, [N, 3]; None where none is given."""
-        settings = self._pipeline.settings
+        roots = [root_of(decision, self._pipeline.settings) for decision in decisions]
         if isinstance(bodies, ManySteered):
             bodies = np.column_stack((bodies.positions, bodies.headings))
         if bodies is None:
-            checked_place(None, settings)
+            for root in roots:
+                checked_place(None, root)
             return None
         if not isinstance(bodies, (list, tuple, np.ndarray)) or len(bodies) != len(self):
             raise ContextError(Fault(f"the bodies are {bodies!r}.", f"one for each of {plural(len(self), 'character')}"))
@@ -144,7 +145,7 @@ class PoseStreams(ListSequence[PoseStream]):
         places = []
         for i, body in enumerate(bodies):
             try:
-                places.append(checked_place(body, settings))
+                places.append(checked_place(body, roots[i]))
             except (ContextError, MotionError) as error:
                 raise type(error)(*(fault.at(Place(f"character {i}")) for fault in error.faults)) from None
         return np.array([UNKNOWN if place is None else place for place in places], np.float64)

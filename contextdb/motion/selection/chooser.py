@@ -16,6 +16,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from contextdb.cells.row_play import RowPlay
 from contextdb.core import Controllers, fill_ranges
 from contextdb.errors import Fault, QueryError, plural
 from contextdb.motion import arguments
@@ -36,8 +37,8 @@ from contextdb.motion.selection.search_options import Among, OfPenalties, OfTags
 from contextdb.motion.selection.selector import Selector, choice_of
 
 ASK, CHOOSE, DECIDE = 1, 2, 4
-N_STATE, N_PLAYED, N_MOVED, N_DECISION = 10, 4, 16, 31
-PLAYING, N_REMEMBERED = slice(5, 9), 9
+N_STATE, N_PLAYED, N_MOVED, N_DECISION = 18, 4, 16, 39
+PLAYING, N_REMEMBERED, PLAY = slice(5, 9), 9, slice(10, 18)
 ACTION, CAUSE, HELD, STANDING, WINNER, IS_UNDER, CHOSEN, CURRENT = 2, 3, 4, 5, 16, 17, slice(18, 22), 29
 """Columns of a row, and of a decision."""
 NEW, WIDENED = (0.0, 2.0), 1.0
@@ -79,6 +80,38 @@ class Shared(NamedTuple):
         )
 
 
+class Plays(NamedTuple):
+    """How rows play, float64 [P, 8], and which of them each range has in each of n updates, -1 for none: int64 [n or 1, R]."""
+
+    rows: Floats
+    of: NDArray[np.int64]
+
+
+class Ranges(NamedTuple):
+    """Which ranges may play in each of n updates, bool [n or 1, R], their biases, float64 [n or 1, R], and how they play; None
+    where no row says."""
+
+    flags: Flags
+    biases: Floats
+    plays: Plays | None = None
+
+    @classmethod
+    def joined(cls, each: Sequence[Ranges]) -> Ranges:
+        """Those of several updates of one each."""
+        plays = [own.plays for own in each if own.plays is not None]
+        joined = None
+        if plays:
+            starts = iter(np.cumsum([0, *(len(own.rows) for own in plays)]).tolist())
+            none = np.full(each[0].flags.shape, -1, np.int64)
+            of = [none if own.plays is None else _shifted(own.plays.of, next(starts)) for own in each]
+            joined = Plays(np.concatenate([own.rows for own in plays]), np.concatenate(of))
+        return cls(np.concatenate([own.flags for own in each]), np.concatenate([own.biases for own in each]), joined)
+
+
+def _shifted(of: NDArray[np.int64], by: int) -> NDArray[np.int64]:
+    return np.where(of < 0, of, of + by)
+
+
 class Given(NamedTuple):
     """What Q characters are asked with."""
 
@@ -90,6 +123,7 @@ class Given(NamedTuple):
     among: Flags
     urgent: NDArray[np.uint8]
     wide: Floats | None = None
+    plays: Plays | None = None
 
 
 class Updates(NamedTuple):
@@ -106,7 +140,15 @@ class Updates(NamedTuple):
     def run(self, parts: int) -> None:
         """Do some steps of the updates, on as many cores as this process may use."""
         given, n, done = self.given, len(self.before), list[bool]()
-        what = (given.ranges, given.range_biases, *given.shared[:5], given.among, given.urgent, given.wide)
+        what = (
+            given.ranges,
+            given.range_biases,
+            *given.shared[:5],
+            given.among,
+            given.urgent,
+            *(given.plays or (None, None)),
+            given.wide,
+        )
         arrays = (self.before, self.moved, given.queries, given.dt_s, *what, self.after, self.decisions, self.found)
         if n < 2 * THREAD_QUERIES:
             done.append(self.chooser.core.update(parts, 0, n, *arrays))
@@ -133,13 +175,16 @@ class Updates(NamedTuple):
     def _skips(self, i: int, d: int) -> Iterable[Skip]:
         database = self.chooser.databases[d]
         assert database is not None, "of a database that is not loaded nothing is left out"
-        most = (self.chooser.n_played + 4) * database.n_permutations + 1
+        most = (self.chooser.n_played + 4) * database.n_permutations + 2 * len(database.assets) + 1
         spans, whys = np.empty((most, 2), np.int64), np.empty(most, np.uint8)
         each = slice(i, i + 1)
         row = self.after[each].copy()
         if self.decisions[i, ACTION] in NEW and row[0, N_REMEMBERED]:
             row[0, N_REMEMBERED] -= 1  # what was entered only now was left out of no search
-        n = self.chooser.core.skips(row, self.moved[each], self.decisions[each], d, spans, whys)
+        row[0, PLAY] = self.before[i, PLAY]
+        plays = self.given.plays
+        own = (None, None) if plays is None else (plays.rows, plays.of[each] if len(plays.of) > 1 else plays.of)
+        n = self.chooser.core.skips(row, self.moved[each], self.decisions[each], d, spans, whys, *own)
         return (Skip(start, stop, LeftOut(why)) for (start, stop), why in zip(spans[:n].tolist(), whys[:n].tolist(), strict=True))
 
     def choice(self, i: int) -> Choice:
@@ -171,7 +216,7 @@ class Chooser:
         is_remembering = settings.history_s > 0.0
         self.n_played = min(16 + math.ceil(min(settings.history_s, 1e3) * a_second), MOST_PLAYED) if is_remembering else 0
         self.core = Controllers(
-            tuple(self._part(*each) for each in zip(selector.entries, self.databases, self.rates, strict=True)),
+            tuple(self.part(*each) for each in zip(selector.entries, self.databases, self.rates, strict=True)),
             self.n_played,
             settings.search_every_s,
             settings.jump_threshold_s,
@@ -199,7 +244,7 @@ class Chooser:
             known = selector.choosers[settings] = cls(selector, settings)
         return cast("Chooser", known)
 
-    def _part(self, entry: Any, database: MotionDatabase | None, rate: float) -> tuple[Any, ...]:
+    def part(self, entry: Any, database: MotionDatabase | None, rate: float) -> tuple[Any, ...]:
         """One database as the core takes it."""
         threshold = math.nan if entry.threshold is None else float(entry.threshold)
         if database is None:
@@ -234,6 +279,7 @@ class Chooser:
         waiting_s = math.nan if state.waiting_since_s is None else state.waiting_since_s
         row[0, :5] = state.tick, state.time_s, state.since_search_s, state.play_rate, waiting_s
         row[0, PLAYING] = NO_DATABASE, 0.0, 0.0, 0.0
+        row[0, PLAY] = np.nan if state.play is None else state.play.numbers
         if (playing := state.playing) is not None:
             at = self._range_of(playing)
             row[0, PLAYING] = (GONE, 0.0, 0.0, 0.0) if at is None else (*at, self._frame_at(at, playing.time_s), playing.time_s)
@@ -269,7 +315,7 @@ class Chooser:
         each = [row[N_STATE + N_PLAYED * i : N_STATE + N_PLAYED * (i + 1)] for i in range(int(row[N_REMEMBERED]))]
         history = tuple(Played(self.names[int(d)], int(start), int(stop), played_s) for d, start, stop, played_s in each)
         waiting_since_s = None if math.isnan(waiting_s) else waiting_s
-        return ControllerState(int(tick), time_s, playing, since_s, history, recent, rate, waiting_since_s)
+        return ControllerState(int(tick), time_s, playing, since_s, history, recent, rate, waiting_since_s, RowPlay.of(row[PLAY]))
 
     def playing(self, numbers: Sequence[float]) -> Playing | None:
         """What plays, of its database, range, frame and second; None for nothing."""
@@ -321,45 +367,57 @@ class Chooser:
         self.selector.check_names(name for each in given if isinstance(each, Mapping) for name in each)
         self.selector.check_names(inputs.databases())
 
-    def ranges(self, valid: OfValidForMany | None, n: int) -> tuple[Flags, Floats]:
-        """Which ranges may play in each of n updates, bool [n or 1, R], and their biases, float64 [n or 1, R]."""
+    def ranges(self, valid: OfValidForMany | None, n: int) -> Ranges:
+        """Which ranges may play in each of n updates."""
         if valid is None:
             return self._all_ranges
         if are_mappings(valid):
-            each = [self.ranges(own, 1) for own in cast("Sequence[Any]", valid)]
-            return np.concatenate([flags for flags, _ in each]), np.concatenate([biases for _, biases in each])
+            return Ranges.joined([self.ranges(own, 1) for own in cast("Sequence[Any]", valid)])
         if not isinstance(valid, Mapping) and (answers := AnswersOfMany.of(valid, n)) is not None:
             return self._answered({None: answers}, n)
         of_databases = valid if isinstance(valid, Mapping) else dict.fromkeys(self.selector.databases, valid)
         answers_of = {name: AnswersOfMany.of(each, n) for name, each in of_databases.items() if name in self.selector.databases}
-        if all(each is not None for each in answers_of.values()):
-            return self._answered({name: each for name, each in answers_of.items() if each is not None}, n)
-        return self._by_flags(of_databases, n)
+        answered = self._answered({name: each for name, each in answers_of.items() if each is not None}, n)
+        others = [name for name, each in answers_of.items() if each is None]
+        return self._with_flags(answered, of_databases, others, n) if others else answered
 
-    def _answered(self, answers: Mapping[str | None, AnswersOfMany], n: int) -> tuple[Flags, Floats]:
+    def _answered(self, answers: Mapping[str | None, AnswersOfMany], n: int) -> Ranges:
         """By the answers of tables, of databases or, without a name, of all."""
         n_masks = max(len(each.masks[0]) for each in answers.values()) if answers else 1
-        (all_ranges, all_biases), has_costs = self._all_ranges, any(each.costs is not None for each in answers.values())
+        (all_ranges, all_biases, _), has_costs = self._all_ranges, any(each.costs is not None for each in answers.values())
         is_every = None in answers
         ranges = np.empty((n_masks, self.n_ranges), np.bool_) if is_every else np.repeat(all_ranges, n_masks, axis=0)
         biases = np.repeat(all_biases, n_masks, axis=0) if has_costs else all_biases
+        saying = {name: each.plays for name, each in answers.items() if each.plays is not None}
+        chosen = np.full((n_masks, self.n_ranges), -1, np.int64) if saying else None
+        n_before = 0
         for name, each in answers.items():
             masks, costs = each.of_length(n_masks)
-            written = None if costs is None else biases
-            fill_ranges(*self._table(name, each.assets), *masks, *(costs or (None, None)), all_biases[0], ranges, written)
-        return ranges, biases
+            table, written = self.rows_of(name, each.assets), None if costs is None else biases
+            plays = each.plays, None if each.plays is None else chosen
+            fill_ranges(*table, *masks, *(costs or (None, None)), all_biases[0], ranges, written, *plays)
+            if each.plays is not None and chosen is not None and n_before:
+                own = slice(table[3], table[3] + len(table[2]))
+                chosen[:, own] = _shifted(chosen[:, own], n_before)
+            n_before += 0 if each.plays is None else len(each.plays)
+        rows = list(saying.values())
+        return Ranges(
+            ranges, biases, None if chosen is None else Plays(rows[0] if len(rows) == 1 else np.concatenate(rows), chosen)
+        )
 
-    def _by_flags(self, of_databases: Mapping[str, Any], n: int) -> tuple[Flags, Floats]:
-        """By the flags of ranges, or what else each database is given."""
-        ranges, biases = np.repeat(self._all_ranges[0], n, axis=0), np.repeat(self._all_ranges[1], n, axis=0)
-        for name, part in zip(self.names, self.ranges_at, strict=True):
-            database = self.selector.databases.get(name)
-            if database is not None and name in of_databases:
-                flags, own = database.ranges_of_many(of_databases[name], n)
-                ranges[:, part] = flags
-                if own is not None:
-                    biases[:, part] = own
-        return ranges, biases
+    def _with_flags(self, answered: Ranges, of_databases: Mapping[str, Any], names: Sequence[str], n: int) -> Ranges:
+        """The same where some databases are given flags of ranges, or something else that is no answer."""
+        ranges, biases = (
+            np.repeat(answered.flags, n // len(answered.flags), 0),
+            np.repeat(answered.biases, n // len(answered.biases), 0),
+        )
+        for name in names:
+            part = self.ranges_at[self.names.index(name)]
+            flags, own = self.selector.databases[name].ranges_of_many(of_databases[name], n)
+            ranges[:, part] = flags
+            if own is not None:
+                biases[:, part] = own
+        return Ranges(ranges, biases, answered.plays)
 
     def penalised(self, biases: Floats, penalties: Sequence[OfPenalties | None]) -> Floats:
         """Biases of ranges with the penalties of each update: float64 [n, R]."""
@@ -372,15 +430,15 @@ class Chooser:
         return biases
 
     @cached_property
-    def _all_ranges(self) -> tuple[Flags, Floats]:
+    def _all_ranges(self) -> Ranges:
         """All ranges, and their biases where nothing else is given: [1, R] each."""
         biases = [database.filter().range_biases for _, database in self._loaded()]
-        return np.ones((1, self.n_ranges), np.bool_), np.concatenate([np.zeros(0), *biases])[None]
+        return Ranges(np.ones((1, self.n_ranges), np.bool_), np.concatenate([np.zeros(0), *biases])[None])
 
     def _loaded(self) -> list[tuple[str, MotionDatabase]]:
         return list(self.selector.databases.items())
 
-    def _table(self, name: str | None, assets: Sequence[str]) -> tuple[Any, ...]:
+    def rows_of(self, name: str | None, assets: Sequence[str]) -> tuple[Any, ...]:
         """The rows of a table for each range of a database, or of all: as `fill_ranges` takes them."""
         known = self._tables.get((name, id(assets)))
         if known is None or known[0] is not assets:
@@ -401,11 +459,12 @@ class Chooser:
 
 class AnswersOfMany(NamedTuple):
     """The answers of one table in n contexts, or one for all: the assets of its rows, and the masks of valid rows and what rows
-    cost, [n or 1, ...], each as it is and with mirrored facts; no costs where rows have none."""
+    cost, [n or 1, ...], each as it is and with mirrored facts; no costs where rows have none. And how its rows play."""
 
     assets: Sequence[str]
     masks: tuple[Any, Any]
     costs: tuple[Floats, Floats] | None
+    plays: Floats | None
 
     @classmethod
     def of(cls, valid: object, n: int) -> AnswersOfMany | None:
@@ -414,13 +473,13 @@ class AnswersOfMany(NamedTuple):
             if valid.has_penalties:
                 return cls._of([valid])
             mask, mirrored = valid.mask[None], valid.mirrored
-            return cls(valid.table_assets, (mask, mask if mirrored is valid else mirrored.mask[None]), None)
+            return cls(valid.table_assets, (mask, mask if mirrored is valid else mirrored.mask[None]), None, valid.plays)
         if are_answers(valid):
             if len(valid) != n:
                 raise QueryError(Fault(f"{plural(len(valid), 'mask')} for {n} queries.", "one for all, or one for each query"))
             if not n or valid[0].has_penalties:
                 return cls._of([valid[i] for i in range(n)]) if n else None
-            return cls(valid.table_assets, (valid.mask, valid.mirrored.mask), None)
+            return cls(valid.table_assets, (valid.mask, valid.mirrored.mask), None, valid[0].plays)
         if isinstance(valid, (list, tuple)) and len(valid) == n and n and all(map(is_answer, valid)):
             assets = valid[0].table_assets
             return cls._of(valid) if all(each.table_assets is assets for each in valid) else None
@@ -433,7 +492,7 @@ class AnswersOfMany(NamedTuple):
         masks = [np.ascontiguousarray([each.mask for each in side]) for side in sides]
         has_costs = any(each.has_penalties for each in answers)
         costs = [np.array([each.penalties for each in side], np.float64) for side in sides] if has_costs else None
-        return cls(answers[0].table_assets, (masks[0], masks[1]), None if costs is None else (costs[0], costs[1]))
+        return cls(answers[0].table_assets, (masks[0], masks[1]), None if costs is None else (costs[0], costs[1]), answers[0].plays)
 
     def of_length(self, n: int) -> tuple[tuple[Any, ...], tuple[Floats, ...] | None]:
         """Its arrays for n updates."""

@@ -170,6 +170,12 @@ class Controller:
         return self._rows[self._at : self._at + 1]
 
     @property
+    def row(self) -> Floats:
+        """Where the controller is, as the core has it: [1, W], not to be changed."""
+        self.chooser  # noqa: B018  (the selector may have been exchanged)
+        return self._row
+
+    @property
     def _state(self) -> ControllerState:
         return self._chooser.state(self._rows[self._at].tolist(), self.playing, self._recent)
 
@@ -344,7 +350,7 @@ def _updates(
     is_all = len(numbers) == len(asked.tags)
     valid: Any = asked.valid if is_all or asked.valid is None else [own_valid(asked.valid, i) for i in numbers]
     chooser.check_names(first, valid)
-    ranges, biases = chooser.ranges(valid, n)
+    ranges, biases, plays = chooser.ranges(valid, n)
     penalties = [asked.penalties[i] for i in numbers]
     if any(each is not None for each in penalties):
         biases = chooser.penalised(biases, [asked.options(i).penalties for i in numbers])
@@ -354,7 +360,7 @@ def _updates(
     urgent = np.array([FORCE * bool(asked.force[i]) + INTERRUPT * bool(asked.interrupt[i]) for i in numbers], np.uint8)
     wide = _wide(chooser, moved, ranges, valid, penalties) if widens(valid) else None
     wanted = np.ascontiguousarray(queries[:, : chooser.n_features])
-    given = Given(wanted, dt_s, ranges, biases, chooser.shared(first.tags, first.bias), flags, urgent, wide)
+    given = Given(wanted, dt_s, ranges, biases, chooser.shared(first.tags, first.bias), flags, urgent, wide, plays)
     found = np.empty((n, len(chooser.names), 3))
     updates = Updates(chooser, rows, moved, given, np.empty_like(rows), np.empty((n, N_DECISION)), found)
     return updates, _run(updates, own)

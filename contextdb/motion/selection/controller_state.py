@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from contextdb.cells.row_play import RowPlay
 from contextdb.motion.records import quickly_made
 from contextdb.motion.selection.decision import Playing
 
@@ -42,6 +43,8 @@ class ControllerState:
         Seconds of the clip that pass in a second.
     waiting_since_s : float, optional
         Since when a forced jump over the cost bar waits, in seconds of play; None when none does.
+    play : RowPlay or None
+        How the row of what plays says that it does; None where it says nothing.
     rng : object
         Where the random generator is; None without one.
     """
@@ -54,4 +57,5 @@ class ControllerState:
     recent: tuple[str, ...] = ()
     play_rate: float = 1.0
     waiting_since_s: float | None = None
+    play: RowPlay | None = None
     rng: object = None

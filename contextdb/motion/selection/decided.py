@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+from contextdb.cells.row_play import RowPlay
 from contextdb.motion.clips.ground_place import GroundPlace
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.markup.tag_filter import TagFilter
@@ -59,13 +60,14 @@ class Numbers(NamedTuple):
     rate: float
     due_s: float
     waited_s: float
+    play: Sequence[float]
 
     @classmethod
     def of(cls, row: list[float]) -> Numbers:
         """A row of decisions."""
         cost, continuing = (None if each != each else each for each in row[14:16])
         parts = row[6:10], row[10:14], cost, continuing, int(row[16]), row[18:22], row[22:25]
-        return cls._make((*row[:6], *parts, *row[25:29]))
+        return cls._make((*row[:6], *parts, *row[25:29], row[31:39]))
 
 
 def decision_of(updates: Updates, i: int, was: Playing | None, asked: Told) -> Decision:
@@ -103,6 +105,7 @@ def decision_of(updates: Updates, i: int, was: Playing | None, asked: Told) -> D
         body=asked.body,
         held=str(HELD[int(numbers.held)]),
         play_rate=numbers.rate,
+        play=RowPlay.of(numbers.play),
         filters=filters,
         inputs=_inputs(updates, asked) if asked.n_candidates > 0 else None,
     )

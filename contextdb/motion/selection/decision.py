@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Protocol
 
+from contextdb.cells.row_play import RowPlay
 from contextdb.errors import in_quotes
 from contextdb.motion.clips.ground_place import GroundPlace
 from contextdb.motion.clips.quaternions import Floats
@@ -140,6 +141,8 @@ class Decision:
         candidates are requested.
     inputs : Inputs or None
         What else the update was given; None where no candidates are requested.
+    play : RowPlay or None
+        How the row of what plays says that it does; None where it says nothing.
     together : Together or None
         Where a clip of several characters is entered: who plays it, and what each role costs.
     """
@@ -163,6 +166,7 @@ class Decision:
     body: GroundPlace | None = None
     held: str = ""
     play_rate: float = 1.0
+    play: RowPlay | None = None
     filters: tuple[tuple[str, Filter], ...] = field(default=(), compare=False, repr=False)
     inputs: Inputs | None = field(default=None, compare=False, repr=False)
     together: Together | None = None

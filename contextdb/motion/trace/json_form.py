@@ -26,8 +26,9 @@ Events = Mapping[tuple[str, int], Sequence[str]]
 def decision_json(decision: Decision, events: Events | None = None) -> Json:
     """A decision; its candidates are a list of databases, each with its `rows` and how many frames were `left_out`."""
     document = {field.name: as_plain(getattr(decision, field.name)) for field in fields(decision) if field.name not in LEFT}
-    if decision.together is None:
-        del document["together"]
+    for name in ("together", "play"):
+        if document[name] is None:
+            del document[name]
     document["candidates"] = [candidates_json(name, candidates, events) for name, candidates in decision.candidates]
     return document
 

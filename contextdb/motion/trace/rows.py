@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from contextdb.cells.row_play import RowPlay
 from contextdb.motion.clips.ground_place import GroundPlace
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.markup.tag_filter import TagFilter
@@ -44,7 +45,9 @@ EventsOf = Callable[[str, int], tuple[str, ...]]
 Events = dict[tuple[str, int], tuple[str, ...]]
 
 TIMINGS, FILTERS, INPUTS, HELD, PLAY_RATE = "search_us", "filters", "inputs", "held", "play_rate"
-TOGETHER = "together"
+TOGETHER, PLAY = "together", "play"
+LATER = (TIMINGS, PLAY)
+"""Columns that a session may lack."""
 PERMUTATION_S = "permutation_s"
 """Of a database with permutations: how far ahead each looks."""
 PLAYING = ("database", "asset", "range", "frame", "time_s", "mirrored")
@@ -104,6 +107,7 @@ def columns() -> dict[str, PolarsType]:
         FILTERS: filter_type(),
         INPUTS: text,
         TOGETHER: text,
+        PLAY: text,
         TIMINGS: number,
     }
 
@@ -136,6 +140,7 @@ def row_of(decision: Decision, events_of: EventsOf) -> Row:
         FILTERS: [filter_row(_text(name), chosen) for name, chosen in decision.filters],
         INPUTS: None if decision.inputs is None else inputs_json(decision.inputs),
         TOGETHER: None if decision.together is None else json.dumps(asdict(decision.together)),
+        PLAY: None if decision.play is None else json.dumps(asdict(decision.play)),
         TIMINGS: _number(decision.search_us),
     }
 
@@ -261,6 +266,7 @@ def decision_of(row: Row) -> Decision:
         play_rate=float(row[PLAY_RATE]),
         filters=tuple((_known(each["database"]), filter_of(each)) for each in row[FILTERS]),
         inputs=None if row[INPUTS] is None else inputs_of(row[INPUTS]),
+        play=None if row.get(PLAY) is None else RowPlay(**json.loads(row[PLAY])),
         together=None if row[TOGETHER] is None else Together(**json.loads(row[TOGETHER])),
     )
 

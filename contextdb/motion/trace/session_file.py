@@ -15,7 +15,7 @@ from contextdb.errors import (
     plural,
 )
 from contextdb.files.parquet_frame import MAGIC, DamagedFrame, require_whole
-from contextdb.motion.trace.rows import TIMINGS, Row, columns
+from contextdb.motion.trace.rows import LATER, Row, columns
 
 if TYPE_CHECKING:
     import polars as pl
@@ -60,8 +60,8 @@ def read_rows(raw: bytes, file: str) -> tuple[pl.DataFrame, dict[str, dict[str, 
     except (Exception, pl.exceptions.PanicException) as error:  # some damage makes polars panic instead of raise
         raise refused(f"the file is damaged ({type(error).__name__}).", file) from None
     _check_columns(frame, file)
-    if TIMINGS not in frame.columns:
-        frame = frame.with_columns(pl.lit(None, columns()[TIMINGS]).alias(TIMINGS))
+    missing = [name for name in LATER if name not in frame.columns]
+    frame = frame.with_columns(pl.lit(None, columns()[name]).alias(name) for name in missing)
     return frame.select(list(columns())), about, n_candidates
 
 
@@ -84,7 +84,7 @@ def _check_format(metadata: Mapping[str, str], file: str) -> None:
 
 def _check_columns(frame: pl.DataFrame, file: str) -> None:
     wanted = columns()
-    present = [name for name in wanted if name in frame.columns or name != TIMINGS]
+    present = [name for name in wanted if name in frame.columns or name not in LATER]
     wrong = [name for name in present if frame.schema.get(name) != wanted[name]]
     if wrong:
         problem = f"{plural(len(wrong), 'column')} of the session missing, or of another type: {', '.join(map(in_quotes, wrong))}."

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict
 
 from contextdb.console import printable
 from contextdb.errors import in_quotes
@@ -175,6 +176,9 @@ def _status(decision: Decision, events: EventTexts) -> Iterator[tuple[str, str]]
     if move != NO_MOTION or decision.root_weight != 1.0:
         turn = math.degrees(move.turn_rad)
         yield "moved", f"{move.ahead_m:.3f} m ahead, {move.left_m:.3f} m left, turned {turn:.1f}°; weight {decision.root_weight:g}"
+    if decision.play is not None:
+        said = {key: value for key, value in asdict(decision.play).items() if value is not None}
+        yield "its row says", ", ".join(f"{key} {value}" for key, value in said.items())
     if decision.play_rate != 1.0:
         yield "play rate", f"{decision.play_rate:.2f}"
     if decision.search_us is not None:

@@ -269,6 +269,15 @@ class Sheet(DisplayedTable):
         self._select(self.selection.at(row, self.selection.column, self.shape))
         return done
 
+    def remove_duplicates(self) -> Done:
+        """Delete each row that is in all columns as one above it."""
+        codes = np.column_stack([self.table.enabled, *(column.codes for column in self.table.columns)])
+        first = np.unique(codes, axis=0, return_index=True)[1]
+        gone = np.setdiff1d(np.arange(self.table.n_rows), first).tolist()
+        if not gone:
+            return Done(notes=("No row is in all columns like another.",))
+        return self._do(edits.delete_rows(self.table, gone))
+
     def duplicate_rows(self) -> Done:
         """Copy the selected rows to below them; the copies are then selected."""
         rows = self.selected_rows

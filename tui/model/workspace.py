@@ -176,6 +176,12 @@ class Workspace:
         open_files = {name: self.files[name] for name in self.sessions if name in self.files}
         self.files = open_files | {n: p for n, p in _tables(self.folder).items() if p not in open_files.values()}
 
+    def forget(self) -> None:
+        """Let go of every table: their files have changed. Each is read again when it is next wanted; what was edited before
+        cannot be taken back."""
+        self.close()
+        self.sessions, self._renames, self._n_renamed = {}, [], 0
+
     def close(self, keep_journals: bool = False) -> None:
         """Let go of every table."""
         for session in self.sessions.values():

@@ -15,6 +15,7 @@ from contextdb.console import aligned, printable, styled
 from contextdb.edits.diffing import CellChange, Diff
 from contextdb.errors import Fault, plural, row_name, safe_text
 from contextdb.findings import Finding
+from contextdb.report.document import Block, Document, Picture, Row, Rows, Section, Table
 from contextdb.report.render_markdown import MOST_BYTES, escaped
 from contextdb.tables.table import EitherTable
 
@@ -56,6 +57,19 @@ def as_markdown(changes: Diff, shows_all: bool = False, more: str = "") -> str:
         lines += ["", *head, *fitting] if fitting else []
         lines += ["", f"… and {left:,} more; `contextdb diff --all` shows every one."] if left else []
     return "\n".join(lines) + "\n" + more
+
+
+def as_document(changes: Diff, effect: Effects | Fault | None, replayed: str = "") -> Document:
+    """Differences, what they do and what recorded moments say, as a document with all of them."""
+    headings = [] if effect is None else list(_headings(effect, shows_all=True))
+    rows = [_markdown_texts(change) for change in changes.cells]
+    parts = [f"{what} {verb}: {text}" for what, of in (("column", _columns), ("row", _rows)) for verb, text in of(changes)]
+    blocks: list[Block] = [Rows("Columns and rows", [Row((part,)) for part in parts])] if parts else []
+    blocks += [Table(("asset", "column", "before", "after"), rows, "Cells")] if rows else []
+    blocks += [Rows(heading, [Row((line,)) for line in lines]) for heading, lines in headings if lines]
+    blocks += [Picture("Recorded moments", lambda colour: replayed.splitlines())] if replayed else []
+    sentences = [heading for heading, lines in headings if not lines]
+    return Document("diff", "table", [Section(str(changes.after.path or changes.after.name), changes.summary, sentences, blocks)])
 
 
 def _size(line: str) -> int:
@@ -170,10 +184,22 @@ def effects_markdown(effect: Effects | Fault | None, shows_all: bool = False) ->
     return "".join(f"{line}\n" for line in lines)
 
 
+def _to_look_at(effect: Effects) -> str:
+    """What a reviewer looks at first."""
+    if effect.opened:
+        return f"Look first at {plural(len(effect.opened), 'gap')} that it opens, the largest {_line(effect.opened[0])}."
+    if effect.dead:
+        return f"Look first at {plural(len(effect.dead), 'row')} that can no longer be chosen."
+    if not effect:
+        return "Nothing to look at: every context keeps its assets."
+    return "No context loses its last asset." if effect.is_complete else "No gap is known that it opens."
+
+
 def _headings(effect: Effects | Fault, shows_all: bool) -> Iterator[Heading]:
     if isinstance(effect, Fault):
         yield f"That cannot be determined: {effect}", []
         return
+    yield _to_look_at(effect), []
     most = sys.maxsize if shows_all else MOST_EFFECTS
     if effect.before is not None and effect.after is not None:
         yield _covered(effect), []

@@ -50,7 +50,7 @@ def section(
     page, where there is room for each finding and row."""
     report, is_page = measured.report, page_number is not None
     share = Bar(report.lower, report.upper, report.headline)
-    sentences: list[str | Bar] = [report.headline, share, *words.assumed_sentences(report)]
+    sentences: list[str | Bar] = [words.to_do_sentence(measured), report.headline, share, *words.assumed_sentences(report)]
     blocks: list[Block] = [_gaps(measured, most_gaps, is_page)]
     if is_brief:
         counts = ", ".join(f"{len(group)} {rule}" for rule, group in by_rule(report.findings).items())

@@ -54,7 +54,7 @@ RULES: dict[str, Rule] = {
     "unreadable-penalty": Rule(
         "error",
         "The text after the ~ of a soft cell is not a penalty.",
-        "Write a number from 0 up after the ~, such as 3..5 ~2.5, or put a text that contains a ~ in double quotes.",
+        "Write a number from 0 up after the ~, such as 3..5 ~2.5 or 3..5 ~2.5/10, or put a text with a ~ in double quotes.",
         ("cells.grammar",),
     ),
     "unknown-value": Rule(
@@ -98,6 +98,12 @@ RULES: dict[str, Rule] = {
         "A cell of an output is empty, and the output has no default.",
         "Fill in the cell, or declare `default` for the output in contextdb.toml.",
         ("cells.outputs",),
+    ),
+    "row-against-markup": Rule(
+        "error",
+        "A row says that its clip plays otherwise than the markup of its database says.",
+        "Correct the cell, or the markup of the clip.",
+        ("authoring.rows_against_markup",),
     ),
     "no-asset": Rule(
         "error",
@@ -371,6 +377,12 @@ RULES: dict[str, Rule] = {
         "Look at what the message names; if the change is intended, name the table with `--redefined`, or make a new baseline.",
         ("report.coverage_results",),
     ),
+    "few-cases": Rule(
+        "error",
+        "A table has fewer saved contexts than `--min-cases`, or they reach fewer rows than `--min-rows-reached`.",
+        "Restore a file of cases that was deleted, or let `contextdb cases --write` add the fewest contexts.",
+        ("checks.cases",),
+    ),
     "cases-fewer": Rule(
         "error",
         "The saved contexts of a table expect less than in the baseline, or reach fewer rows.",
@@ -405,6 +417,9 @@ OF_COVERAGE = (
 )
 """The rules that only `contextdb coverage` reports."""
 
+OF_OPTIONS = ("few-cases",)
+"""The rules of bars that an option of check sets."""
+
 OF_CONTRACTS = ("broken-contract", "unreadable-contract", "open-contract", "empty-contract")
 """The rules of contracts, which are of contextdb.toml."""
 
@@ -420,6 +435,7 @@ TABLE_RULES: tuple[str, ...] = tuple(
         "unportable-name",
         "not-a-table",
         *OF_CONTRACTS,
+        *OF_OPTIONS,
         *OF_COVERAGE,
     )
 )

@@ -56,8 +56,8 @@ class ConditionForm:
 
     def declared(self) -> tuple[dict[str, object], dict[str, str]]:
         """What `[conditions.NAME]` would say, and for each field that cannot be read why; fields without a place are left out."""
-        keys: dict[str, object] = {"type": self.kind, "unit": self.unit.strip(), "description": self.description.strip()}
-        keys["owner"] = self.owner.strip()
+        texts = {"unit": self.unit, "description": self.description, "owner": self.owner}
+        keys: dict[str, object] = {"type": self.kind, **{key: text.strip() for key, text in texts.items()}}
         wrong: dict[str, str] = {}
         for key, text in (("min", self.min), ("max", self.max)):
             if has_place(key, self.kind) and text.strip():

@@ -31,6 +31,8 @@ from .series import continued, tells_step
 from .variant_edits import asset_fault, deletion, require_own_order
 from .views import Sort, sorted_rows
 
+READS_ONLY = "Nothing is edited: the editor was started with --read-only."
+
 
 class Recorder(Protocol):
     """What hears of every step, before the verb returns: the journal."""
@@ -58,6 +60,8 @@ class Sheet(DisplayedTable):
     def __init__(self, table: Table, recorder: Recorder | None = None, history: History | None = None) -> None:
         super().__init__(table, history)
         self.recorder = recorder
+        self.reads_only = False
+        """Whether no edit is taken."""
 
     # ---- edits of cells
 
@@ -265,6 +269,15 @@ class Sheet(DisplayedTable):
         self._select(self.selection.at(row, self.selection.column, self.shape))
         return done
 
+    def remove_duplicates(self) -> Done:
+        """Delete each row that is in all columns as one above it."""
+        codes = np.column_stack([self.table.enabled, *(column.codes for column in self.table.columns)])
+        first = np.unique(codes, axis=0, return_index=True)[1]
+        gone = np.setdiff1d(np.arange(self.table.n_rows), first).tolist()
+        if not gone:
+            return Done(notes=("No row is in all columns like another.",))
+        return self._do(edits.delete_rows(self.table, gone))
+
     def duplicate_rows(self) -> Done:
         """Copy the selected rows to below them; the copies are then selected."""
         rows = self.selected_rows
@@ -423,6 +436,8 @@ class Sheet(DisplayedTable):
         return in_turn(lambda: self._made(edit))
 
     def _made(self, edit: Edit) -> Done:
+        if self.reads_only:
+            return Done(warnings=(READS_ONLY,))
         before, position = self.table, self.history.position
         step = self.history.do(edit)
         if self.history.position == position:

@@ -301,6 +301,14 @@ class TableScreen(Screen[None]):
             self.say(f"This table is read-only: {why}.", "warning")
         self._show_bars()
 
+    @property
+    def likely_group(self) -> str:
+        """The group of the commands that somebody likely wants here."""
+        grid = self.assets.grid
+        if self.tab != "assets" or grid.is_in_test_row:
+            return "Test row" if grid.is_in_test_row else "Tabs"
+        return "Columns" if self.session.sheet.block.shape[0] > 1 == self.session.sheet.block.shape[1] else "Edit"
+
     def try_to(self, verb: Callable[[], None]) -> None:
         """Do something; what cannot be done is reported."""
         try:

@@ -20,6 +20,7 @@ from functools import partial
 from pathlib import Path
 
 from contextdb import report
+from contextdb.authoring.rows_against_markup import check_against_markup
 from contextdb.checks.cases import CaseBar, check_cases, read_cases
 from contextdb.checks.contracts import contract_findings, proofs_of, strayed
 from contextdb.checks.rows import check_rows, unused_conditions
@@ -202,6 +203,7 @@ def _check_files(files: Sequence[tuple[str | None, Path]], schema: Schema | None
         lines = key_lines(read_bytes(Path(known.file)).decode("utf-8-sig"))
         findings += contract_findings(proofs, [table.name for table in read if table.faults], known, lines)
         findings += unused_conditions(known, read, lines) if schema is not None and len(read) == len(files) else []
+        findings += check_against_markup(read, Path(known.file).parent)
     return CheckReport(tuple(tables), tuple(findings), tuple(proofs))
 
 

@@ -137,6 +137,14 @@ GRID: tuple[Command, ...] = (
     Command(
         "delete-rows", "ctrl+k,ctrl+delete", "Delete rows", "Delete the selected rows.", "Rows", verb=lambda s: s.delete_rows()
     ),
+    Command(
+        "remove-duplicates",
+        "",
+        "Drop duplicates",
+        "Delete each row that is in all columns as one above it.",
+        "Rows",
+        verb=lambda s: s.remove_duplicates(),
+    ),
     Command("row-up", "alt+i,alt+shift+up", "Move up", "Move the selected rows up.", "Rows", verb=_move_up),
     Command("row-down", "alt+m,alt+shift+down", "Move down", "Move the selected rows down.", "Rows", verb=_move_down),
     Command(
@@ -212,6 +220,9 @@ _OF_SCREEN = (
         "back", "alt+q,alt+up,alt+b", "Back", "Leave an inner table, and go back to the row that refers to it.", "File", "back"
     ),
     Command("new-table", "", "New table", "Make a table, with the columns of a blueprint.", "File", "new_table"),
+    Command("rename-table", "", "Rename table", "Give the table another name, everywhere.", "File", "rename_table"),
+    Command("duplicate-table", "", "Duplicate table", "Copy the table and its saved contexts.", "File", "duplicate_table"),
+    Command("delete-table", "", "Delete table", "Delete the table's file, after a question.", "File", "delete_table"),
     Command("refresh", "f5", "Refresh", "Read changes from disk; sort and filter again.", "File", "refresh"),
     Command("import", "", "Import", "Read rows from Excel, CSV, Parquet or JSON.", "File", "import"),
     Command("export", "", "Export", "Write the table for Excel or other tools.", "File", "export"),
@@ -250,6 +261,7 @@ _OF_SCREEN = (
     Command("priorities", "alt+3", "Priorities", "Which database comes first.", "Tabs", "tab('priorities')"),
     Command("coverage", "alt+4", "Coverage", "Which contexts have no asset.", "Tabs", "tab('coverage')"),
     Command("problems", "alt+5", "Problems", "What is wrong with the table.", "Tabs", "tab('problems')"),
+    Command("contracts", "", "Contracts", "What must hold of the table, proved as you type.", "Tabs", "tab('contracts')"),
     Command("motion", "", "Motion", "The recorded sessions of the project, to debug.", "Tabs", "tab('motion')"),
     Command("quit", "ctrl+q", "Quit", "Quit; asks about unsaved edits.", "File", "quit"),
 )

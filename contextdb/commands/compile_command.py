@@ -3,7 +3,7 @@
 Prints the path of each written file. --stubs also writes the facts of these tables as Python types, for completion in editors and
 for type checkers. --c-header also writes one header for games in C or C++, which opens and queries the compiled files, and
 --c-link a second one, by which such a game shows live what it asks. --c-motion writes the header by which it plays the
-characters of a bundle, see `contextdb motion build --bundle`.
+characters of the bundle that "motion build --bundle" writes.
 
   contextdb compile tables/                  one compiled file next to each table
   contextdb compile tables/ -o build/        all of them into a folder

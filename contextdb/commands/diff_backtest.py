@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from contextdb.checks.effects import Box, Effects
 from contextdb.checks.effects_space import shared_space
@@ -47,10 +47,27 @@ class Replayed:
     def _section(self) -> Section:
         """The same for people."""
         result = self.result
-        shares = [(f"{_percent(n, result.moments)} {what}", n) for what, n in self._counts]
-        parts = ", ".join(text for text, n in shares if n) or "nothing changes"
-        unread = [f"{printable(file)} was not read: {faults[0].message}" for file, faults in result.unread]
-        return Section(f"{plural(result.moments, 'recorded moment')}", parts, unread, tuple(self._blocks()), self.gates)
+        moments, parts = plural(result.moments, "recorded moment"), self._parts
+        return Section(moments, parts, self._unread, tuple(self._blocks()), self.gates)
+
+    @property
+    def sentences(self) -> list[str]:
+        """What becomes of the moments, and which files were not read."""
+        return [f"Of {plural(self.result.moments, 'recorded moment')}: {self._parts}.", *self._unread]
+
+    @property
+    def blocks(self) -> list[Block]:
+        """By assets, by boxes, and moments to open."""
+        return [replace(b, title=f"Recorded moments: {b.title}") if isinstance(b, Numbered) else b for b in self._blocks()]
+
+    @property
+    def _parts(self) -> str:
+        shares = [(f"{_percent(n, self.result.moments)} {what}", n) for what, n in self._counts]
+        return ", ".join(text for text, n in shares if n) or "nothing changes"
+
+    @property
+    def _unread(self) -> list[str]:
+        return [f"{printable(file)} was not read: {faults[0].message}" for file, faults in self.result.unread]
 
     @property
     def _counts(self) -> list[tuple[str, int]]:

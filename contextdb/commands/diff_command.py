@@ -5,6 +5,7 @@ in every recorded moment; with --max-changed or --max-emptied only these decide 
 
   contextdb diff old/hit_mid_air.csv tables/hit_mid_air.csv
   contextdb diff a.csv b.csv --format markdown
+  contextdb diff a.csv b.csv --format html -o review.html
   contextdb diff a.csv b.csv --telemetry "play/*.parquet" --max-emptied 0.1
 """
 
@@ -12,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from contextdb.checks.effects import Effects
@@ -19,6 +21,7 @@ from contextdb.commands import add_format_arguments
 from contextdb.commands.diff_views import as_markdown, as_text, effects_json, effects_markdown, effects_text
 from contextdb.commands.numbers import percent
 from contextdb.console import ExitCode, output, wants_colour
+from contextdb.disk import write_atomic
 from contextdb.edits.diffing import Diff, diff
 from contextdb.errors import ContextDBError, ContextError, Fault
 from contextdb.report.render_json import as_json
@@ -30,13 +33,14 @@ if TYPE_CHECKING:
     from contextdb.commands.diff_backtest import Replayed
 
 ENGINES = ("local", "dask")
-FORMATS = ("text", "markdown", "json")
+FORMATS = ("text", "markdown", "json", "html")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("before", metavar="A", help="the table as it was: a .csv or .parquet file, or the name of a table")
     parser.add_argument("after", metavar="B", help="the table as it is")
     add_format_arguments(parser, FORMATS)
+    parser.add_argument("-o", "--output", metavar="FILE", help="write the differences to a file")
     parser.add_argument("--no-effects", action="store_false", dest="effects", help="leave out the effects of the change")
     group = parser.add_argument_group("recorded moments")
     group.add_argument("--telemetry", action="append", metavar="GLOB", help="files of recorded contexts; may be repeated")
@@ -60,8 +64,11 @@ def run(arguments: argparse.Namespace) -> ExitCode:
 
         replayed = replayed_moments(arguments, before, after, effect)
     text = _rendered(changes, effect, replayed, arguments)
-    with output():
-        print(text, end="")
+    if arguments.output:
+        write_atomic(Path(arguments.output), text.encode("utf-8", "backslashreplace"))
+    else:
+        with output():
+            print(text, end="")
     if replayed is not None and replayed.gates:
         return ExitCode.OK if all(gate.passed for gate in replayed.gates) else ExitCode.FOUND
     return ExitCode.FOUND if changes else ExitCode.OK
@@ -100,9 +107,13 @@ def _rendered(changes: Diff, effect: Effects | Fault | None, replayed: Replayed 
     if arguments.format == "json":
         more = {} if replayed is None else replayed.to_json()
         return as_json(changes.to_json() | {"effects": effects_json(effect)} | more)
+    if arguments.format == "html":
+        from contextdb.commands.diff_page import as_page
+
+        return as_page(changes, effect, replayed)
     if arguments.format == "markdown":
         below = "" if replayed is None else replayed.markdown
         return as_markdown(changes, arguments.all, effects_markdown(effect, arguments.all) + below)
-    colour = wants_colour(sys.stdout)
+    colour = wants_colour(sys.stdout) and not arguments.output
     below = "" if replayed is None else replayed.text(colour, arguments.all)
     return as_text(changes, colour, arguments.all) + effects_text(effect, colour, arguments.all) + below

@@ -25,6 +25,7 @@ from .ask import AskDialog, ChooseDialog
 from .disk_care import LOOK_EVERY_S
 from .export_table import Export
 from .following import Followed
+from .table_files import TableFiles
 from .table_screen import TableScreen
 
 
@@ -119,6 +120,18 @@ class MainScreen(TableScreen):
         make_table(self.workspace.folder, name, conditions)
         self.workspace.look_again()
         self.app.open_table(name)
+
+    def action_rename_table(self) -> None:
+        """Give the table another name, everywhere."""
+        TableFiles(self).rename()
+
+    def action_duplicate_table(self) -> None:
+        """Copy the table, and go to the copy."""
+        TableFiles(self).duplicate()
+
+    def action_delete_table(self) -> None:
+        """Delete the table after a question."""
+        TableFiles(self).delete()
 
     def action_save(self) -> None:
         """Write the table to its file, and what changes to contextdb.toml."""

@@ -25,11 +25,12 @@ from contextdb.disk.together import UnfinishedWarning
 from contextdb.errors import ContextDBError, Fault, Place, in_quotes, joined, mend_for, nearest, some
 
 COMMANDS = {
-    "edit": "the terminal editor",
+    "edit": "the editor, in the terminal or in a browser",
     "query": "which assets are valid for one context",
     "evaluate": "every context of a file: how many assets are valid in each",
     "check": "what is wrong with the tables",
     "coverage": "which contexts have a valid asset, and which have none",
+    "cases": "what saved contexts reach of a table, and the fewest that reach the rest",
     "ci": "check and coverage as a build runs them, against a commit, with report files",
     "diff": "what changed between two versions of a table",
     "merge": "merge two versions of a table",
@@ -40,6 +41,7 @@ COMMANDS = {
     "live": "what a running game asks its tables, and what it picks",
     "verify": "whether files are as contextdb wrote them",
     "motion": "motion databases: bones, check, build, search, select, run, replay, describe, prepare",
+    "desktop": "open tables with a double click",
     "demo": "a tour of the sample tables",
     "play": "a small game whose characters obey tables, with the editor beside it",
 }

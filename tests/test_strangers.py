@@ -406,7 +406,8 @@ def commands(group: Group) -> Iterator[str]:
 
 
 def test_every_command_is_in_the_table():
-    assert set(commands(Group((), COMMANDS))) - set(WORKS) == set()
+    of_the_user = {"desktop install", "desktop uninstall"}  # they know no project
+    assert set(commands(Group((), COMMANDS))) - set(WORKS) == of_the_user
 
 
 @pytest.mark.parametrize("name", WORKS)

@@ -202,7 +202,8 @@ def _with_modifiers(match: re.Match[str]) -> str:
 
 
 def read_whole_keys() -> None:
-    """Have Textual's driver of this system read the terminal with `KeyParser`."""
+    """Have Textual's drivers, of this system's terminals and of browsers, read keys with `KeyParser`."""
     is_windows = sys.platform == "win32"
-    driver = importlib.import_module("textual.drivers.win32" if is_windows else "textual.drivers.linux_driver")
-    vars(driver)["XTermParser"] = WindowsKeyParser if is_windows else KeyParser
+    drivers = {"win32": WindowsKeyParser} if is_windows else {"linux_driver": KeyParser}
+    for name, parser in {**drivers, "web_driver": KeyParser}.items():
+        vars(importlib.import_module(f"textual.drivers.{name}"))["XTermParser"] = parser

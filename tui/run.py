@@ -1,10 +1,14 @@
-"""Run the editor or the debugger in this terminal: what `contextdb edit` and `contextdb motion debug` call. An edge."""
+"""Run the editor in this terminal or in a browser: what `contextdb edit` calls. An edge."""
 
 from __future__ import annotations
 
 import gc
 import os
+import sys
+import webbrowser
+from collections.abc import Sequence
 
+from contextdb.disk import refuse_writing
 from contextdb.errors import ContextDBError, Fault, in_quotes, mend_for
 
 from .app import EditorApp
@@ -17,7 +21,11 @@ FEW_COLOURS = ("ansi", "linux", "vt100", "vt220", "xterm", "xterm-color", "scree
 """Terminals of 16 colours or fewer, by TERM, unless COLORTERM says that they can do more."""
 
 
-def edit(path: str | None, theme: str | None = None, follow: str = "") -> int:
+class BrowserError(ContextDBError):
+    """What shows the editor in a browser is not installed."""
+
+
+def edit(path: str | None, theme: str | None = None, reads_only: bool = False, follow: str = "") -> int:
     """Open a table or a folder of tables, and stay until the editor is left; gives the exit code. A game of the name `follow` is
     followed as soon as it asks the first table.
 
@@ -28,17 +36,52 @@ def edit(path: str | None, theme: str | None = None, follow: str = "") -> int:
     ScreenCrash
         The editor ended by an error of its own.
     """
-    workspace = Workspace(path)
+    if reads_only:
+        refuse_writing("the editor was started with --read-only.")
+    workspace, settings = _opened(path, theme, reads_only)
+    if not is_in_browser():  # there the window says how large it is
+        forget_exported_size()
+    read_whole_keys()
+    pass_over_what_stays()
+    return EditorApp(workspace, settings, theme or theme_for(settings), follow=follow).stay()
+
+
+def edit_in_browser(path: str | None, theme: str | None, options: Sequence[str], host: str, port: int) -> int:
+    """Show the editor, started with options, in a browser until it is left; gives the exit code. Errors as of `edit`, and of the
+    server."""
+    try:
+        from .browser.server import serve
+    except ImportError:
+        mend = 'to install it: pip install "contextdb[browser]"'
+        raise BrowserError(Fault("textual-serve is not installed, which shows the editor in a browser.", "", mend)) from None
+    workspace, _ = _opened(path, theme, True)
+    title = workspace.first or workspace.folder.resolve().name
+    workspace.close(keep_journals=True)
+    command = [sys.executable, "-m", "contextdb", "edit", *options, *(["--", path] if path else [])]
+
+    def ready(address: str) -> None:
+        print(f"The editor is at {address}", flush=True)
+        print("Ctrl+C ends it; edits that are not saved are there the next time.", file=sys.stderr, flush=True)
+        webbrowser.open(address)
+
+    return serve(command, f"{title} - contextdb", host, port, ready)
+
+
+def is_in_browser() -> bool:
+    """Whether this process was started to be shown in a browser."""
+    return os.environ.get("TEXTUAL_DRIVER", "").endswith(":WebDriver")
+
+
+def _opened(path: str | None, theme: str | None, reads_only: bool) -> tuple[Workspace, EditorSettings]:
+    """The tables and the settings, when all can be read."""
+    workspace = Workspace(path, reads_only)
     themes = EditorApp.theme_names()
     settings = read_settings(settings_path(), themes)
     if theme is not None and theme not in themes:
         problem = f"there is no theme {in_quotes(theme)}."
         raise SettingsError(Fault(problem, ", ".join(themes), mend_for(theme, themes)))
     _require_readable(workspace)
-    forget_exported_size()
-    read_whole_keys()
-    pass_over_what_stays()
-    return EditorApp(workspace, settings, theme or theme_for(settings), follow=follow).stay()
+    return workspace, settings
 
 
 def pass_over_what_stays() -> None:

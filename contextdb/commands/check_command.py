@@ -19,11 +19,12 @@ from functools import partial
 from pathlib import Path
 
 from contextdb import report
-from contextdb.checks.cases import check_cases, read_cases
+from contextdb.checks.cases import CaseBar, check_cases, read_cases
 from contextdb.checks.contracts import contract_findings, proofs_of, strayed
 from contextdb.checks.rows import check_rows, unused_conditions
 from contextdb.checks.run import check
 from contextdb.commands import add_format_arguments
+from contextdb.commands.numbers import percent, whole_type
 from contextdb.commands.progress import Bar, has_many_cells, log_of
 from contextdb.console import ExitCode, output, printable, progress, terminal_width, wants_colour
 from contextdb.covering.contracts import Proof
@@ -36,6 +37,7 @@ from contextdb.report.results import CheckReport, TableSummary
 from contextdb.schema.settings import Schema
 from contextdb.schema.toml_lines import key_lines
 from contextdb.tables import project
+from contextdb.tables.expected_file import expected_path, read_situations
 from contextdb.tables.other_files import cases_path, notes_path
 from contextdb.tables.places import table_path
 from contextdb.tables.table import Table
@@ -48,6 +50,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--fail-on", choices=("error", "warning", "none"), default="error", help="the lowest level that fails (default: error)"
     )
     parser.add_argument("--all", action="store_true", help="print every finding, not the first few of each kind")
+    number = whole_type("a number of saved contexts, such as 10.")
+    parser.add_argument(
+        "--min-cases", type=number, default=0, metavar="N", help="fail if a table has fewer saved contexts that expect something"
+    )
+    share = "fail if they reach a smaller part of the rows of a table"
+    parser.add_argument("--min-rows-reached", type=percent, default=0.0, metavar="PCT", help=share)
     parser.add_argument(
         "--propose",
         action="store_true",
@@ -59,7 +67,8 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     """Check one table or a folder of them."""
     if arguments.propose:
         return _propose(arguments)
-    return printed(check_path(arguments.path), arguments)
+    bar = CaseBar(arguments.min_cases, arguments.min_rows_reached)
+    return printed(check_path(arguments.path, bar), arguments)
 
 
 def _propose(arguments: argparse.Namespace) -> ExitCode:
@@ -96,13 +105,13 @@ def printed(checked: CheckReport, arguments: argparse.Namespace) -> ExitCode:
     return ExitCode.FOUND if any(f.level in failing for f in checked.findings) else ExitCode.OK
 
 
-def check_path(text: str) -> CheckReport:
-    """Check everything under a path, saved contexts too; what cannot be read at all is a finding."""
+def check_path(text: str, bar: CaseBar | None = None) -> CheckReport:
+    """Check everything under a path, saved contexts too; what cannot be read at all is a finding. `bar`: of saved contexts."""
     path = Path(text)
     if not os.path.isdir(text) and path.name != project.SCHEMA_FILE:
         file = table_path(text)
         table = _table_of(file) if _is_cases(file) else file
-        return CheckReport((), (_stray(file),)) if table is None else _check_files([(None, table)])
+        return CheckReport((), (_stray(file),)) if table is None else _check_files([(None, table)], None, bar)
     folder = project.folder_of(path)
     try:
         schema = project.read_folder_schema(folder)
@@ -114,7 +123,7 @@ def check_path(text: str) -> CheckReport:
         return CheckReport(
             (), (Finding("no-tables", "error", f"the folder holds no table. Accepted: {accepted}.", file=str(folder)),)
         )
-    report = _check_files(files, schema)
+    report = _check_files(files, schema, bar)
     others = (Finding("not-a-table", "info", sentence, file=str(path)) for path, sentence in project.stray_files(folder, schema))
     strays = _strays(folder, [file for _, file in files])
     return replace(report, findings=(*report.findings, *_unportable(files, schema), *others, *strays))
@@ -137,7 +146,7 @@ def _unportable(files: Sequence[tuple[str, Path]], schema: Schema) -> Iterator[F
         yield from (Finding("unportable-name", "warning", message, name, str(path)) for message in messages)
 
 
-def _check_files(files: Sequence[tuple[str | None, Path]], schema: Schema | None = None) -> CheckReport:
+def _check_files(files: Sequence[tuple[str | None, Path]], schema: Schema | None = None, bar: CaseBar | None = None) -> CheckReport:
     """Check some tables; `schema` is given when they are all of its folder."""
     tables: list[TableSummary] = []
     read: list[Table] = []
@@ -158,8 +167,8 @@ def _check_files(files: Sequence[tuple[str | None, Path]], schema: Schema | None
         tell = None if log is None else partial(_tell, log)
         findings += check_rows(table, progress=tell)
         proofs += proofs_of(table, tell)
-        findings += _check_cases(table, cases_path(path))
-        findings += _check_notes(table, notes_path(path))
+        findings += _check_cases(table, cases_path(path), bar or CaseBar())
+        findings += [*_check_notes(table, notes_path(path)), *_check_expected(table)]
     if schema is not None:
         names = [name for name, _ in files if name is not None]
         proofs += strayed(schema, names, [name for name in names if name not in {table.name for table in read}])
@@ -175,11 +184,25 @@ def _tell(progress: Bar, part: str, share: float) -> None:
     progress(int(1000 * share), 1000, part)
 
 
-def _check_cases(table: Table, path: Path) -> list[Finding]:
+def _check_cases(table: Table, path: Path, bar: CaseBar) -> list[Finding]:
     try:
-        return check_cases(table, read_cases(path), str(path))
+        cases = read_cases(path)
+        return [*check_cases(table, cases, str(path)), *bar.findings(table, cases, str(table.path) if table.path else None)]
     except ContextDBError as error:
         return _as_findings(error, table.name)
+
+
+def _check_expected(table: Table) -> list[Finding]:
+    """What is wrong in the file of the contexts that are expected of a table."""
+    if table.settings.expected is None or table.faults:
+        return []
+    try:
+        path = expected_path(table)
+        if path is not None:
+            read_situations(path, [column.condition for column in table.flat().conditions])
+    except ContextDBError as error:
+        return _as_findings(error, table.name)
+    return []
 
 
 def _check_notes(table: Table, path: Path) -> list[Finding]:

@@ -2,7 +2,8 @@
 
 Prints the path of each written file. --stubs also writes the facts of these tables as Python types, for completion in editors and
 for type checkers. --c-header also writes one header for games in C or C++, which opens and queries the compiled files, and
---c-link a second one, by which such a game shows live what it asks.
+--c-link a second one, by which such a game shows live what it asks. --c-motion writes the header by which it plays the
+characters of a bundle, see `contextdb motion build --bundle`.
 
   contextdb compile tables/                  one compiled file next to each table
   contextdb compile tables/ -o build/        all of them into a folder
@@ -10,6 +11,7 @@ for type checkers. --c-header also writes one header for games in C or C++, whic
   contextdb compile tables/ -o build/ --stubs game/facts.py
   contextdb compile tables/ -o build/ --c-header game/tables.h
   contextdb compile tables/ -o build/ --c-header game/tables.h --c-link game/cdb_link.h
+  contextdb compile tables/ -o build/ --c-motion game/contextdb_motion.h
 """
 
 from __future__ import annotations
@@ -26,6 +28,7 @@ from contextdb.disk import make_folder, path_in_quotes, write_atomic
 from contextdb.disk.boundary import inside
 from contextdb.errors import ContextDBError, Fault, FileError, Place, plural
 from contextdb.files.tensors import SUFFIX
+from contextdb.motion.storage.c_header import c_motion_header
 from contextdb.tables.places import table_path
 from contextdb.tables.project import SCHEMA_FILE, Project, load_table
 from contextdb.tables.table import Table
@@ -45,6 +48,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--c-header", metavar="FILE", help="also write one C99 header that opens and queries the compiled files: a .h file"
     )
     parser.add_argument(
+        "--c-motion", metavar="FILE", help="also write a C99 header that plays characters of a motion bundle: a .h file"
+    )
+    parser.add_argument(
         "--c-link", metavar="FILE", help="with --c-header: also write a header that publishes what the game asks: a .h file"
     )
 
@@ -53,6 +59,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     """Compile one table or a folder of them; prints the path of each file."""
     stubs = None if arguments.stubs is None else _written_as(arguments.stubs, STUBS, "a Python file")
     header = None if arguments.c_header is None else _written_as(arguments.c_header, HEADERS, "a C header")
+    motion = None if arguments.c_motion is None else _written_as(arguments.c_motion, HEADERS, "a C header")
     link = _link_path(arguments)
     tables = _tables(arguments.path)
     targets = [_target(table, arguments.out, len(tables), _is_folder(arguments.path)) for table in tables]
@@ -72,6 +79,8 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         _write(header, header_text)
         if link is not None:
             _write(link, _link_text(tables, header, link))
+    if motion is not None:
+        _write(motion, c_motion_header(c_header_of({}, "CDB_MOTION_READER_H")))
     return ExitCode.OK
 
 

@@ -68,8 +68,10 @@ class Commit:
         if SCHEMA_FILE in blobs:
             self._write(blobs, [SCHEMA_FILE], target)
             self._write_extended(target / SCHEMA_FILE, root)
-        declared = {alike(file) for settings in read_folder_schema(target).tables.values() for file in settings.files}
-        declared |= {alike(cases_path(Path(file)).as_posix()) for file in declared}
+        schema = read_folder_schema(target)
+        declared = {alike(file) for settings in schema.tables.values() for file in settings.files}
+        expected = {alike(settings.expected) for settings in schema.tables.values() if settings.expected is not None}
+        declared |= expected | {alike(cases_path(Path(file)).as_posix()) for file in declared}
         wanted = [name for name in blobs if _is_tabular(name) and ("/" not in name or alike(name) in declared)]
         self._write(blobs, wanted, target)
         return target if wanted else None

@@ -31,6 +31,7 @@ typedef struct cdbi_opening {
     cdb_strange strange;
     int has_ways;                   /* the table has tables inside */
     int has_programs;               /* the table has rules or derived facts */
+    struct cdb_any *any;            /* what gets the schema out of the file; NULL where the caller has one */
 } cdbi_opening;
 
 /* Keep the first fault of an opening. */
@@ -58,7 +59,7 @@ static inline void *cdbi_memory(cdbi_opening *opening, size_t n, size_t size)
     return memset((char *)block + 16, 0, n * size);
 }
 
-static inline void cdb_close(cdb_table *table)
+CDB_API void cdb_close(cdb_table *table)
 {
     void **block = (void **)table->blocks;
     while (block) {

@@ -36,6 +36,8 @@ MOST_PATTERNS = 64
 _CHOICE = re.compile(r"\{([^{}/]*,[^{}/]*)\}")
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _BINARY = getattr(os, "O_BINARY", 0)
+_refusals: list[str] = []
+"""Why this process writes nothing, where it was told so."""
 _AT_ONCE = getattr(os, "O_NONBLOCK", 0)
 """To open a pipe does not wait for its other end."""
 
@@ -55,6 +57,11 @@ def read_bytes(path: str | Path) -> bytes:
         with os.fdopen(os.open(file, os.O_RDONLY | _AT_ONCE | _BINARY), "rb") as opened:
             _require_regular(file, os.fstat(opened.fileno()))
             return opened.read()
+
+
+def refuse_writing(why: str) -> None:
+    """Have this process write no file from now on: whoever wants to gets a FileError that says why."""
+    _refusals[:] = [why]
 
 
 def names_a_table(name: str) -> bool:
@@ -94,6 +101,12 @@ def is_stream(path: Path) -> bool:
     return stat.S_ISCHR(mode) or stat.S_ISFIFO(mode)
 
 
+def require_allowed(file: Path) -> None:
+    """Raise FileError where this process writes nothing."""
+    if _refusals:
+        raise FileError(Fault(f"nothing is written: {_refusals[0]}", "another way to start it", place=Place(str(file))))
+
+
 def is_still(file: Path, was: Was) -> bool:
     """Whether a file holds what it is said to hold. Whoever asks has the turn of its folder."""
     if was == "any":
@@ -128,6 +141,7 @@ class Staged:
 def staged(file: Path, data: Data, syncs: bool = True, folder: Path | None = None) -> Iterator[Staged]:
     """New bytes next to a file, or in another folder, not yet under its name; gone at the end where they did not take it. Raises
     OSError or FileError where the file may not be replaced, or the disk refuses."""
+    require_allowed(file)
     target = real_path(file)
     old = target.stat() if target.exists() else None
     if old is not None:
@@ -151,6 +165,7 @@ def staged(file: Path, data: Data, syncs: bool = True, folder: Path | None = Non
 
 def make_folder(folder: Path) -> None:
     """Make a folder and those above it, where they are missing yet. Raises FileError where it is a file, or may not be made."""
+    require_allowed(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -161,6 +176,7 @@ def make_folder(folder: Path) -> None:
 
 def remove(path: Path) -> None:
     """Remove a file, or a link and not what it leads to; nothing where there is none. Raises FileError where the system refuses."""
+    require_allowed(path)
     with refused_writing(path, b""):
         path.unlink(missing_ok=True)
 

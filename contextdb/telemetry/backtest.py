@@ -123,22 +123,6 @@ class _Side:
         numbers = [assets.setdefault(asset, len(assets)) for asset in compiled.assets]
         return cls(compiled, np.array(own, np.int64), np.array(numbers, np.int64))
 
-    def candidates(self, valid: Flags) -> Flags:
-        """The rows that the policy may pick, whatever was picked before and whatever soft cells cost: bool [M, n_rows]."""
-        choosing = self.compiled.once(Choosing.of)
-        left = valid & choosing.pickable
-        for groups, ranks in zip(choosing.groups, choosing.ranks, strict=True):
-            if not len(groups):
-                break
-            order = np.argsort(groups, kind="stable")
-            starts = np.flatnonzero(np.diff(groups[order], prepend=groups[order][0] - 1))
-            standing = np.where(left, ranks, -np.inf)
-            best = np.maximum.reduceat(standing[:, order], starts, axis=1)
-            of_row = np.empty(len(groups), np.int64)
-            of_row[order] = np.repeat(np.arange(len(starts)), np.diff([*starts, len(groups)]))
-            left &= standing == best[:, of_row]
-        return left
-
 
 @dataclass(eq=False)
 class Backtest:
@@ -276,7 +260,7 @@ def _sums(comparison: Comparison, pairs: Sequence[Flags], sums: Counts) -> tuple
     old, new = comparison.sides
     was, now = (np.asarray(valid.any(axis=1)) for valid in pairs[:2])
     is_other = _differs(pairs[0], old.keys, pairs[1], new.keys)
-    candidates = old.candidates(pairs[0]), new.candidates(pairs[1])
+    candidates = tuple(s.compiled.once(Choosing.of).pickable_of(p) for s, p in zip((old, new), pairs, strict=False))
     is_other |= _differs(candidates[0], old.keys, candidates[1], new.keys)
     if old.compiled.fallback != new.compiled.fallback:
         is_other |= ~was & ~now

@@ -64,10 +64,11 @@ class OnDisk:
 class Session:
     """A table from when it is opened until it is closed."""
 
-    def __init__(self, path: str | Path, takes_over: bool = False) -> None:
+    def __init__(self, path: str | Path, takes_over: bool = False, reads_only: bool = False) -> None:
         """Open a table, with the unsaved edits of an editor that was killed.
 
-        `takes_over`: take the table from an editor on another machine, which a person says has ended.
+        `takes_over`: take the table from an editor on another machine, which a person says has ended. `reads_only`: the table is
+        shown as it is in the file, whoever has it open, and no edit is taken.
 
         Raises
         ------
@@ -78,12 +79,14 @@ class Session:
         assert table.path is not None
         self.path: Path = table.path
         self.lock = Lock(self.path)
-        self.holder: Holder | None = self.lock.acquire(takes_over)
+        self.reads_only = reads_only
+        self.holder: Holder | None = None if reads_only else self.lock.acquire(takes_over)
         """The other editor that has the table open. Until it has closed it nothing is saved here, and no journal is stored."""
         self._clear_leftovers()
-        if self.holder is None and finish_save(table):
+        is_own = self.holder is None and not reads_only
+        if is_own and finish_save(table):
             table = load_table(self.path, strict=False)
-        recovery = recover(table) if self.holder is None else None
+        recovery = recover(table) if is_own else None
         self.n_recovered = recovery.n_edits if recovery else 0
         """How many unsaved edits were brought back."""
         self.problem: Fault | None = (recovery.problem if recovery else None) or self.lock.problem
@@ -95,9 +98,10 @@ class Session:
         self._history = recovery.history if recovery and recovery.n_edits else History(self.saved_table)
         self._watch_files()
         self.journal = Journal(self.path, self._digest, self._history if self.n_recovered else None)
-        if self.holder is None:
+        if is_own:
             self._begin_journal()
-        self.sheet = Sheet(self._history.table, self.journal if self.holder is None else None, self._history)
+        self.sheet = Sheet(self._history.table, self.journal if is_own else None, self._history)
+        self.sheet.reads_only = reads_only
         self._stored_columns = read_columns(self.path)
         self.sheet.show_columns(self._stored_columns)
         self.sheet.marks = Notes.beside(self.path)
@@ -123,6 +127,8 @@ class Session:
     @property
     def why_read_only(self) -> str:
         """Why nothing can be saved to the file, for a person; empty when it can."""
+        if self.reads_only:
+            return "the editor was started with --read-only"
         holder = self.holder or self.lock.taken_by()
         return f"{holder} has it open for editing" if holder is not None else _why_not_writable(self.path)
 
@@ -208,6 +214,8 @@ class Session:
         SchemaError
             What shall change in contextdb.toml disagrees with what others wrote into it: then nothing is written.
         """
+        if self.reads_only:
+            raise FileError(Fault(f"nothing is written: {self.why_read_only}.", "another way to start it"))
         target = self.path if path is None else Path(path)
         is_own = target == self.path
         if is_own:
@@ -243,7 +251,7 @@ class Session:
 
     def close(self, keep_journal: bool = False) -> None:
         """Let go of the table. Unsaved edits are gone then, unless the journal is stored for the next time."""
-        if self.holder is None and self.lock.taken_by() is None:
+        if self.holder is None and not self.reads_only and self.lock.taken_by() is None:
             if self.sheet.visible_columns != self._stored_columns:
                 write_columns(self.path, self.sheet.visible_columns)
             if not keep_journal:

@@ -30,6 +30,8 @@ from .selection import Block
 from .series import continued, tells_step
 from .views import Sort, sorted_rows
 
+READS_ONLY = "Nothing is edited: the editor was started with --read-only."
+
 
 class Recorder(Protocol):
     """What hears of every step, before the verb returns: the journal."""
@@ -57,6 +59,8 @@ class Sheet(DisplayedTable):
     def __init__(self, table: Table, recorder: Recorder | None = None, history: History | None = None) -> None:
         super().__init__(table, history)
         self.recorder = recorder
+        self.reads_only = False
+        """Whether no edit is taken."""
 
     # ---- edits of cells
 
@@ -415,6 +419,8 @@ class Sheet(DisplayedTable):
         return in_turn(lambda: self._made(edit))
 
     def _made(self, edit: Edit) -> Done:
+        if self.reads_only:
+            return Done(warnings=(READS_ONLY,))
         before, position = self.table, self.history.position
         step = self.history.do(edit)
         if self.history.position == position:

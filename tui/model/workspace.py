@@ -43,8 +43,8 @@ FOLDERS = (Path("tables"), Path())
 class Workspace:
     """A folder of tables. A table is read when it is first requested, and then stays open with its edits."""
 
-    def __init__(self, path: str | Path | None = None) -> None:
-        """Look at a folder, or at the folder of a table; without a path in tables/ or here.
+    def __init__(self, path: str | Path | None = None, reads_only: bool = False) -> None:
+        """Look at a folder, or at the folder of a table; without a path in tables/ or here. `reads_only`: nothing is edited.
 
         Where there is no table yet, `first` is empty and `beginning` says what the path may become.
 
@@ -54,6 +54,7 @@ class Workspace:
             The folder of the path does not exist, or its contextdb.toml cannot be read.
         """
         self.sessions: dict[str, Session] = {}
+        self._reads_only = reads_only
         self._renames: list[tuple[Renaming, dict[str, str]]] = []
         """The renames that were written, each with the names of facts that it changed."""
         self._n_renamed = 0
@@ -76,7 +77,7 @@ class Workspace:
     def session(self, name: str) -> Session:
         """A table, opened when it is not yet; errors as of `Session`."""
         if name not in self.sessions:
-            self.sessions[name] = Session(self.files[name])
+            self.sessions[name] = Session(self.files[name], reads_only=self._reads_only)
         return self.sessions[name]
 
     def begin_from(self, path: Path) -> bool:
@@ -101,7 +102,7 @@ class Workspace:
         before = self.sessions.pop(name, None)
         if before is not None:
             before.close()
-        self.sessions[name] = session = Session(self.files[name], takes_over)
+        self.sessions[name] = session = Session(self.files[name], takes_over, self._reads_only)
         if before is not None:  # of one that is read-only nothing was stored
             session.sheet.show_columns(before.sheet.visible_columns)
         return session

@@ -24,7 +24,7 @@ from ..model.column_values import selection_summary
 from ..model.find import PatternError, Search
 from ..model.notes import COLOURS, Notes
 from ..model.selection import Block
-from ..model.sheet import Done, Sheet
+from ..model.sheet import READS_ONLY, Done, Sheet
 from ..model.table_answer import Offered, fact_fault
 from ..screens.ask import AskDialog, ChooseDialog
 from ..widgets.bar import Bar, CellLine, Item
@@ -169,6 +169,9 @@ class AssetsPane(SheetView):
     def _open_editor(self, event: Grid.EditWanted) -> None:
         event.stop()
         if self.editor is not None:
+            return
+        if self.sheet.reads_only and not self.grid.is_in_test_row:
+            self.post_message(Notice(READS_ONLY, "warning"))
             return
         column = self.grid.field
         self._edited = _Place(column, self.grid.is_in_test_row, self.grid.is_in_new_row)

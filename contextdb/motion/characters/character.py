@@ -242,8 +242,10 @@ class Character:
     @property
     def state(self) -> CharacterState:
         """Where the character is, to come back to with `restore`. The facts of live contexts are the game's and not in it."""
-        stream = None if self.stream is None else self.stream.state
-        return CharacterState(self._row.tobytes(), self.controller.state, stream)
+        stream, walk, controller = None if self.stream is None else self.stream.state, self._row.tobytes(), self.controller
+        displayed = np.array((-1.0, 0.0, 0.0) if self.stream is None else self.stream.displayed, np.float64)
+        row = b"" if stream is None else stream.row.tobytes()
+        return CharacterState(walk, controller.state, stream, walk + controller.row.tobytes() + displayed.tobytes() + row)
 
     def restore(self, state: CharacterState) -> None:
         """Go on from a state of this character, or of another one with the same parts; raises ContextError for anything else."""

@@ -125,6 +125,11 @@ class PoseStream:
         self._rows, self._at, self._state = Rows(state.row[None], [state.playing]), 0, state
 
     @property
+    def displayed(self) -> tuple[int, int, float]:
+        """What was displayed last, as the core has it: the number of a bank, -1 for none, its range and second."""
+        return self._pipeline.moment_of(self._rows.playing[self._at])
+
+    @property
     def _place(self) -> tuple[Rows, int]:
         """The rows that the stream is among, and its own."""
         return self._rows, self._at

@@ -19,7 +19,7 @@ from contextdb.motion.clips.clip import Clip
 from contextdb.motion.clips.mirror import partners_of
 from contextdb.motion.clips.rig import Rig
 from contextdb.motion.preparing.cells_of_clips import CONDITIONS, OUTPUTS, cells_of
-from contextdb.motion.preparing.clip_facts import GAITS, NORMAL, ClipFacts, common_words, facts_of
+from contextdb.motion.preparing.clip_facts import GAITS, NORMAL, ClipFacts, common_words, facts_of, style_of
 
 RATE = 30.0
 MOST_TURN_DPS = 1080.0
@@ -85,14 +85,19 @@ def describe(clips: Sequence[Clip], *, mirrored: bool = False, progress: Tell | 
     ]
     if faults:
         raise MotionError(*faults)
-    common = common_words([clip.name for clip in clips])
     facts = []
     for i, clip in enumerate(clips):
         if progress is not None:
             progress(i, len(clips), clip.name)
-        facts.append(facts_of(clip, common))
-    cells = cells_of(facts, [clip.skeleton.names for clip in clips], mirrored)
-    return [Described(each.asset, row, each) for each, row in zip(facts, cells, strict=True)]
+        facts.append(facts_of(clip))
+    return described(facts, [clip.skeleton.names for clip in clips], mirrored)
+
+
+def described(facts: Sequence[ClipFacts], rigs: Sequence[tuple[str, ...]], mirrored: bool) -> list[Described]:
+    """The rows of clips that show some facts, of rigs with these bones."""
+    common = common_words([each.asset for each in facts])
+    styled = [replace(each, style=style_of(each.asset, common)) for each in facts]
+    return [Described(each.asset, row, each) for each, row in zip(styled, cells_of(styled, rigs, mirrored), strict=True)]
 
 
 def joint_clips(clips: Sequence[Clip]) -> dict[str, dict[str, int]]:
@@ -111,11 +116,11 @@ def joint_clips(clips: Sequence[Clip]) -> dict[str, dict[str, int]]:
     }
 
 
-def joint_row(asset: str, clip: Clip) -> Described:
-    """The row of clips that were recorded together, of which `clip` is the first role's: its cells ask nothing of one body, since
+def joint_row(asset: str, facts: ClipFacts) -> Described:
+    """The row of clips that were recorded together, of which `facts` are the first role's: its cells ask nothing of one body, since
     the facts that it needs are those of several actors, such as `Host.speed`."""
-    facts = replace(facts_of(clip), asset=asset, style=NORMAL)
-    return Described(asset, {**dict.fromkeys((*CONDITIONS, *OUTPUTS), ""), "duration_s": f"{facts.duration_s:g}"}, facts)
+    own = replace(facts, asset=asset, style=NORMAL)
+    return Described(asset, {**dict.fromkeys((*CONDITIONS, *OUTPUTS), ""), "duration_s": f"{own.duration_s:g}"}, own)
 
 
 def _counts(clips: Sequence[Clip]) -> Counter[str]:

@@ -216,7 +216,7 @@ class Chooser:
         is_remembering = settings.history_s > 0.0
         self.n_played = min(16 + math.ceil(min(settings.history_s, 1e3) * a_second), MOST_PLAYED) if is_remembering else 0
         self.core = Controllers(
-            tuple(self._part(*each) for each in zip(selector.entries, self.databases, self.rates, strict=True)),
+            tuple(self.part(*each) for each in zip(selector.entries, self.databases, self.rates, strict=True)),
             self.n_played,
             settings.search_every_s,
             settings.jump_threshold_s,
@@ -244,7 +244,7 @@ class Chooser:
             known = selector.choosers[settings] = cls(selector, settings)
         return cast("Chooser", known)
 
-    def _part(self, entry: Any, database: MotionDatabase | None, rate: float) -> tuple[Any, ...]:
+    def part(self, entry: Any, database: MotionDatabase | None, rate: float) -> tuple[Any, ...]:
         """One database as the core takes it."""
         threshold = math.nan if entry.threshold is None else float(entry.threshold)
         if database is None:
@@ -393,7 +393,7 @@ class Chooser:
         n_before = 0
         for name, each in answers.items():
             masks, costs = each.of_length(n_masks)
-            table, written = self._table(name, each.assets), None if costs is None else biases
+            table, written = self.rows_of(name, each.assets), None if costs is None else biases
             plays = each.plays, None if each.plays is None else chosen
             fill_ranges(*table, *masks, *(costs or (None, None)), all_biases[0], ranges, written, *plays)
             if each.plays is not None and chosen is not None and n_before:
@@ -438,7 +438,7 @@ class Chooser:
     def _loaded(self) -> list[tuple[str, MotionDatabase]]:
         return list(self.selector.databases.items())
 
-    def _table(self, name: str | None, assets: Sequence[str]) -> tuple[Any, ...]:
+    def rows_of(self, name: str | None, assets: Sequence[str]) -> tuple[Any, ...]:
         """The rows of a table for each range of a database, or of all: as `fill_ranges` takes them."""
         known = self._tables.get((name, id(assets)))
         if known is None or known[0] is not assets:

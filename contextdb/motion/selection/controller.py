@@ -170,6 +170,12 @@ class Controller:
         return self._rows[self._at : self._at + 1]
 
     @property
+    def row(self) -> Floats:
+        """Where the controller is, as the core has it: [1, W], not to be changed."""
+        self.chooser  # noqa: B018  (the selector may have been exchanged)
+        return self._row
+
+    @property
     def _state(self) -> ControllerState:
         return self._chooser.state(self._rows[self._at].tolist(), self.playing, self._recent)
 

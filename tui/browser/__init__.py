@@ -1,0 +1,1 @@
+"""The editor in a browser of this machine: what `contextdb edit --browser` runs."""

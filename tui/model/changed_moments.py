@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from contextdb.checks.cases import Case, judge, read_cases
+from contextdb.compiled.choosing import Choosing
 from contextdb.compiled.data import CompiledData
 from contextdb.disk.boundary import why_outside
 from contextdb.errors import ContextDBError, plural
@@ -108,7 +109,7 @@ class _Asked:
             if verdict.faults:
                 return None
             flags = np.array([[verdict.valid >> row & 1 for row in range(compiled.n_rows)]], np.bool_)
-            rows = np.flatnonzero(side.candidates(flags)[0]).tolist()
+            rows = np.flatnonzero(side.compiled.once(Choosing.of).pickable_of(flags)[0]).tolist()
             plays.append(list(dict.fromkeys(compiled.assets[row] for row in rows)) or [compiled.fallback or NOTHING])
         if set(plays[0]) == set(plays[1]):
             return None

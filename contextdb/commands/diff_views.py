@@ -15,7 +15,6 @@ from contextdb.console import aligned, printable, styled
 from contextdb.edits.diffing import CellChange, Diff
 from contextdb.errors import Fault, plural, row_name, safe_text
 from contextdb.findings import Finding
-from contextdb.report.document import Block, Document, Picture, Row, Rows, Section, Table
 from contextdb.report.render_markdown import MOST_BYTES, escaped
 from contextdb.tables.table import EitherTable
 
@@ -32,8 +31,8 @@ Part = tuple[str, str]
 def as_text(changes: Diff, colour: bool, shows_all: bool = False) -> str:
     """Differences as aligned lines."""
     name = printable(str(changes.after.path or changes.after.name))
-    lines = [styled(f"{name}: {changes.summary}", "bold", colour)]
-    for title, parts in (("columns", _columns(changes)), ("rows", _rows(changes))):
+    lines = [styled(f"{name}: {changes.summary}", "bold", colour), *map(printable, owners(changes))]
+    for title, parts in (("columns", columns_changed(changes)), ("rows", rows_changed(changes))):
         if parts:
             displayed = [styled(f"  {MARKS[verb][0]} {printable(text)}", MARKS[verb][1], colour) for verb, text in parts]
             lines += ["", title, *_first(displayed, sys.maxsize if shows_all else MOST)]
@@ -44,9 +43,9 @@ def as_text(changes: Diff, colour: bool, shows_all: bool = False) -> str:
 def as_markdown(changes: Diff, shows_all: bool = False, more: str = "") -> str:
     """Differences as Markdown with more below it, together small enough for a comment."""
     name = str(changes.after.path or changes.after.name)
-    lines = [f"### {escaped(name)}", "", f"{escaped(changes.summary)}"]
-    parts = [f"- column {verb}: {escaped(text)}" for verb, text in _columns(changes)]
-    parts += [f"- row {verb}: {escaped(text)}" for verb, text in _rows(changes)]
+    lines = [f"### {escaped(name)}", "", f"{escaped(changes.summary)}", *(f"\n{escaped(text)}" for text in owners(changes))]
+    parts = [f"- column {verb}: {escaped(text)}" for verb, text in columns_changed(changes)]
+    parts += [f"- row {verb}: {escaped(text)}" for verb, text in rows_changed(changes)]
     rows = [f"| {' | '.join(escaped(safe_text(t, 200)) for t in _markdown_texts(c))} |" for c in changes.cells]
     room = sys.maxsize if shows_all else MOST_BYTES - len(more.encode())
     for head, listed in (([], parts), (["| asset | column | before | after |", "| --- | --- | --- | --- |"], rows)):
@@ -59,17 +58,13 @@ def as_markdown(changes: Diff, shows_all: bool = False, more: str = "") -> str:
     return "\n".join(lines) + "\n" + more
 
 
-def as_document(changes: Diff, effect: Effects | Fault | None, replayed: str = "") -> Document:
-    """Differences, what they do and what recorded moments say, as a document with all of them."""
-    headings = [] if effect is None else list(_headings(effect, shows_all=True))
-    rows = [_markdown_texts(change) for change in changes.cells]
-    parts = [f"{what} {verb}: {text}" for what, of in (("column", _columns), ("row", _rows)) for verb, text in of(changes)]
-    blocks: list[Block] = [Rows("Columns and rows", [Row((part,)) for part in parts])] if parts else []
-    blocks += [Table(("asset", "column", "before", "after"), rows, "Cells")] if rows else []
-    blocks += [Rows(heading, [Row((line,)) for line in lines]) for heading, lines in headings if lines]
-    blocks += [Picture("Recorded moments", lambda colour: replayed.splitlines())] if replayed else []
-    sentences = [heading for heading, lines in headings if not lines]
-    return Document("diff", "table", [Section(str(changes.after.path or changes.after.name), changes.summary, sentences, blocks)])
+def owners(changes: Diff) -> list[str]:
+    """Who answers for the table, and for the conditions whose cells change, in a sentence; nothing where nobody is named."""
+    columns = {changes.after.columns[at].name for at in changes.changed} | {*changes.columns_added, *changes.columns_removed}
+    known = {c.condition.name: c.condition.owner for table in (changes.before, changes.after) for c in table.conditions}
+    parts = [f"the table by {safe_text(changes.after.settings.owner)}"] if changes.after.settings.owner else []
+    parts += [f"{safe_text(name)} by {safe_text(owner)}" for name, owner in known.items() if owner and name in columns]
+    return [f"Owned: {', '.join(parts)}."] if parts else []
 
 
 def _size(line: str) -> int:
@@ -81,7 +76,8 @@ def _markdown_texts(change: CellChange) -> tuple[str, str, str, str]:
     return change.asset, change.column, change.before, after
 
 
-def _columns(changes: Diff) -> list[Part]:
+def columns_changed(changes: Diff) -> list[Part]:
+    """What became of the columns that are not where they were."""
     parts = [("added", safe_text(name)) for name in changes.columns_added]
     parts += [("removed", safe_text(name)) for name in changes.columns_removed]
     parts += [("renamed", f"{safe_text(one.before)} → {safe_text(one.after)}") for one in changes.columns_renamed]
@@ -90,7 +86,8 @@ def _columns(changes: Diff) -> list[Part]:
     ]
 
 
-def _rows(changes: Diff) -> list[Part]:
+def rows_changed(changes: Diff) -> list[Part]:
+    """What became of the rows that are not where they were."""
     before, after = changes.before, changes.after
     parts = [("added", f"{_asset(after.assets[row])}, {_place(after, row)}") for row in changes.rows_added]
     parts += [("removed", f"{_asset(before.assets[row])}, {_place(before, row)} before") for row in changes.rows_removed]
@@ -167,7 +164,7 @@ def effects_text(effect: Effects | Fault | None, colour: bool, shows_all: bool =
     if effect is None:
         return ""
     lines = ["", TITLE]
-    for heading, items in _headings(effect, shows_all):
+    for heading, items in headings(effect, shows_all):
         lines.append(styled(f"  {printable(heading)}", "bold" if items else "dim", colour))
         lines += [f"    {printable(line)}" for line in items]
     return "".join(f"{line}\n" for line in lines)
@@ -178,28 +175,17 @@ def effects_markdown(effect: Effects | Fault | None, shows_all: bool = False) ->
     if effect is None:
         return ""
     lines = ["", f"#### {TITLE.capitalize()}", ""]
-    for heading, items in _headings(effect, shows_all):
+    for heading, items in headings(effect, shows_all):
         lines.append(f"- {escaped(heading)}")
         lines += [f"  - {escaped(line)}" for line in items]
     return "".join(f"{line}\n" for line in lines)
 
 
-def _to_look_at(effect: Effects) -> str:
-    """What a reviewer looks at first."""
-    if effect.opened:
-        return f"Look first at {plural(len(effect.opened), 'gap')} that it opens, the largest {_line(effect.opened[0])}."
-    if effect.dead:
-        return f"Look first at {plural(len(effect.dead), 'row')} that can no longer be chosen."
-    if not effect:
-        return "Nothing to look at: every context keeps its assets."
-    return "No context loses its last asset." if effect.is_complete else "No gap is known that it opens."
-
-
-def _headings(effect: Effects | Fault, shows_all: bool) -> Iterator[Heading]:
+def headings(effect: Effects | Fault, shows_all: bool) -> Iterator[Heading]:
+    """What a change does, under headings."""
     if isinstance(effect, Fault):
         yield f"That cannot be determined: {effect}", []
         return
-    yield _to_look_at(effect), []
     most = sys.maxsize if shows_all else MOST_EFFECTS
     if effect.before is not None and effect.after is not None:
         yield _covered(effect), []
@@ -210,8 +196,8 @@ def _headings(effect: Effects | Fault, shows_all: bool) -> Iterator[Heading]:
         yield f"… and {plural(left, 'asset')} more; --all shows every one", []
     if effect.n_left_out:
         yield f"{plural(effect.n_left_out, 'more changed asset')} not looked at", []
-    yield from _listed("gaps opened", [_line(box) for box in effect.opened], most)
-    yield from _listed("gaps closed", [_line(box) for box in effect.closed], most)
+    yield from _listed("gaps opened", [gap_line(box) for box in effect.opened], most)
+    yield from _listed("gaps closed", [gap_line(box) for box in effect.closed], most)
     yield from _listed("rows that can no longer be chosen", [_finding(each) for each in effect.dead], most)
     yield from _listed("rows that may not be valid together", [_finding(each) for each in effect.overlaps], most)
     if not effect:
@@ -233,7 +219,7 @@ def _reach(reach: Reach, shows_all: bool) -> Iterator[Heading]:
     for verb, boxes, share in (("gains", reach.gained, reach.share_gained), ("loses", reach.lost, reach.share_lost)):
         if boxes:
             most = len(boxes) if shows_all else MOST_BOXES
-            yield f"{safe_text(reach.asset)} {verb} {_percent(share)}", _first(list(map(_line, boxes)), most, "… and {:,} more")
+            yield f"{safe_text(reach.asset)} {verb} {_percent(share)}", _first(list(map(gap_line, boxes)), most, "… and {:,} more")
 
 
 def _listed(title: str, lines: Sequence[str], most: int) -> Iterator[Heading]:
@@ -246,7 +232,8 @@ def _finding(finding: Finding) -> str:
     return f"{safe_text(finding.asset or '(no name)')}{line}: {safe_text(finding.message, 300)}"
 
 
-def _line(box: Box) -> str:
+def gap_line(box: Box) -> str:
+    """A gap with its share."""
     return f"{_percent(box.share)}  {safe_text(box.text, 400)}"
 
 

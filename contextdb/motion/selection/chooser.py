@@ -86,6 +86,11 @@ class Plays(NamedTuple):
     rows: Floats
     of: NDArray[np.int64]
 
+    def of_range(self, at: int) -> RowPlay | None:
+        """That of a range in the first update."""
+        row = int(self.of[0, at])
+        return None if row < 0 else RowPlay.of(self.rows[row].tolist())
+
 
 class Ranges(NamedTuple):
     """Which ranges may play in each of n updates, bool [n or 1, R], their biases, float64 [n or 1, R], and how they play; None
@@ -335,6 +340,18 @@ class Chooser:
         moved, features = np.empty((len(rows), N_MOVED)), np.zeros((len(rows), self.n_features)) if poses else None
         self.core.move(rows, dt_s, moved, features)
         return moved, features
+
+    def are_rows(self, rows: Floats) -> bool:
+        """Whether rows may be those of characters, such as of bytes that come from elsewhere."""
+        known = rows[:, [0, 1, 2, 3, 5, 6, 7, 8, N_REMEMBERED]]
+        if not np.isfinite(known).all():
+            return False
+        try:
+            self.move(np.ascontiguousarray(rows), 0.0)
+        except ValueError:
+            return False
+        databases = rows[:, N_STATE::N_PLAYED]
+        return bool(np.isin(databases, np.arange(len(self.names))).all() if databases.size else True)
 
     # ---- what may be chosen
 

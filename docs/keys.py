@@ -6,6 +6,7 @@ python docs/keys.py
 
 from __future__ import annotations
 
+import functools
 import importlib
 import pkgutil
 import re
@@ -85,10 +86,17 @@ window is split, Alt and Alt+Shift with arrows.
 def page() -> str:
     """The page as it should be now."""
     groups = dict.fromkeys(command.group for command in COMMANDS)
-    others = [_of_widgets(title, [rows for name in names for rows in rows_of(name)]) for title, names in SECTIONS.items()]
+    named = [(title, names) for title, names in SECTIONS.items() if _is_listed(names)]
+    others = [_of_widgets(title, [rows for name in names for rows in rows_of(name)]) for title, names in named]
     return "\n".join([HEAD, *(_section(group) for group in groups), _debugger(), "## In tabs and dialogs\n", *others, _sent()])
 
 
+def _is_listed(names: tuple[str, ...]) -> bool:
+    """Whether the page has the keys of these widgets: a dialog shows its own at its foot, and the page those of every dialog."""
+    return "Dialog" in names or not any(issubclass(widgets()[name], widgets()["Dialog"]) for name in names)
+
+
+@functools.cache
 def widgets() -> dict[str, type[DOMNode]]:
     """Every widget with keys of its own."""
     for module in pkgutil.walk_packages(tui.__path__, "tui."):

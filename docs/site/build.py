@@ -125,10 +125,11 @@ def _outside(found: re.Match[str]) -> str:
     """A link to a file outside docs/: a page of its own, or a copy of the file."""
     if found[1] in ROOT_PAGES:
         return f"]({ROOT_PAGES[found[1]]}"
-    target = SOURCE / "files" / found[1]
+    name = f"{found[1]}.txt" if found[1].endswith(".md") else found[1]  # Sphinx would take it for a page
+    target = SOURCE / "files" / name
     target.parent.mkdir(parents=True, exist_ok=True)
     shutil.copy(ROOT / found[1], target)
-    return f"](files/{found[1]}"
+    return f"](files/{name}"
 
 
 def make_live_pages(folder: Path) -> None:

@@ -17,6 +17,8 @@ from .ball import Ball
 from .crowd import Throng
 from .stick import PACES_MPS, Stick
 
+MOVES = "moves"
+"""The table that says what may play all the time; `vaults` and `catches` are asked now and then."""
 LOOK_EVERY_S, GATE, GATE_CLOSES = 0.2, 1.0, 1.5
 """How often the files of the tables are looked at, below which cost a vault begins, and above which one may no more."""
 
@@ -36,9 +38,11 @@ class Game(AbstractContextManager["Game"]):
         n_crowd: int = 0,
     ) -> None:
         self.watch = cdb.watch(folder, self._reloaded, self._refused, poll_s=None, settle_s=settle_s)
-        self.trouble, self.asking, self.time_s, self._look_in_s = "", "", 0.0, 0.0
+        self.trouble = ""
+        self.asking = ""
+        self.time_s = self._look_in_s = 0.0
         stock = motion.MotionProject.of(self.watch.project) if stock is None else stock
-        moves = next(iter(self.watch.snapshot().values()))  # the first that contextdb.toml declares
+        moves = self.watch.snapshot()[MOVES]
         self.player = Actor("player", stock, moves, (0.0, 0.0))
         self.actors = [self.player]
         if "once" in stock.databases:  # the game's own clips; a folder of others has none of these
@@ -96,8 +100,8 @@ class Game(AbstractContextManager["Game"]):
 
     def _reloaded(self, snapshot: cdb.Snapshot) -> None:
         """The designer has saved: obey the new table, if it takes what the game says."""
-        moves = next(iter(snapshot.values()))
         try:
+            moves = snapshot[MOVES]
             for gait in PACES_MPS:
                 moves.query({**self.player.moved.facts, "gait": gait}, unknown="any")
         except cdb.ContextDBError as error:

@@ -174,9 +174,11 @@ def test_cells_of_the_base_that_cannot_be_read_are_reported_at_their_place(tmp_p
 
 def test_check_reports_what_a_base_has_once(tmp_path):
     base = [("walk", "0..2", "", ""), ("walk", "0..1", "", ""), ("fly", "20..30", "", "")]
-    folder = project_of(tmp_path, base, [("land", "40..50", "", "", "")])
+    own = [("walk", "", "True", "", ""), ("walk", "0..3", "", "", ""), ("land", "40..50", "", "", "")]
+    folder = project_of(tmp_path, base, own)
     out = run("check", folder, "--format", "json").out
     assert out.count('"outside-domain"') == 2
+    assert out.count('"duplicate-asset"') == 1
     assert run("check", folder).code == 0
 
 
@@ -186,3 +188,10 @@ def test_merging_the_file_of_a_variant_needs_no_base(tmp_path):
     ours, theirs = base.with_cell(0, "Air", "True"), base.with_rows(1, [{"Asset": "run", "speed": "3..5"}])
     one, other = merge(base, ours, theirs).table, merge(base, theirs, ours).table
     assert texts_of(one.flat()) == texts_of(other.flat()) == [["walk", "0..1", "True", "1"], ["run", "3..5", "", "1"]]
+
+
+def test_saved_contexts_are_counted_against_all_rows(tmp_path):
+    folder = project_of(tmp_path, [("walk", "0..2", "", ""), ("fall", "", "True", "")], [("fall", "", "", "", "True")])
+    (folder / "orc.cases.csv").write_text("Case,Expected,speed,Air\nslow,walk,1,False\n")
+    done = run("cases", folder / "orc.csv", "--json").json
+    assert (done["rows"], done["rows_reached"], done["rows_without_case"]) == (1, 1, [])

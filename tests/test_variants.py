@@ -195,3 +195,24 @@ def test_saved_contexts_are_counted_against_all_rows(tmp_path):
     (folder / "orc.cases.csv").write_text("Case,Expected,speed,Air\nslow,walk,1,False\n")
     done = run("cases", folder / "orc.csv", "--json").json
     assert (done["rows"], done["rows_reached"], done["rows_without_case"]) == (1, 1, [])
+
+
+def test_an_index_lists_all_rows_with_their_files_and_moments(tmp_path):
+    import polars as pl
+
+    folder = project_of(
+        tmp_path, [("walk", "0..2", "", ""), ("fall", "", "True", "")], [("fall", "", "", "", "True"), ("fly", "", "True", "", "")]
+    )
+    (tmp_path / "seen").mkdir()
+    (tmp_path / "seen" / "a.csv").write_text("speed,Air\n1,True\n1,False\n9,True\n")
+    assert run("index", folder, "--out", tmp_path / "rows.parquet", "--telemetry", tmp_path / "seen" / "a.csv").code == 0
+    rows = pl.read_parquet(tmp_path / "rows.parquet").filter(pl.col("table") == "orc")
+    assert rows.select("asset", "file", "line", "moments").rows() == [("walk", "human.csv", 2, 2), ("fly", "orc.csv", 3, 2)]
+
+
+def test_who_answers_is_named_in_the_report(tmp_path):
+    folder = project_of(
+        tmp_path, [("walk", "0..2", "", "")], [], schema=SCHEMA.replace("[tables.human]", '[tables.human]\nowner = "combat"')
+    )
+    assert run("coverage", folder / "human.csv").lines[0].endswith("; owned by combat")
+    assert "owned" not in run("coverage", folder / "orc.csv").lines[0]

@@ -174,9 +174,11 @@ def test_cells_of_the_base_that_cannot_be_read_are_reported_at_their_place(tmp_p
 
 def test_check_reports_what_a_base_has_once(tmp_path):
     base = [("walk", "0..2", "", ""), ("walk", "0..1", "", ""), ("fly", "20..30", "", "")]
-    folder = project_of(tmp_path, base, [("land", "40..50", "", "", "")])
+    own = [("walk", "", "True", "", ""), ("walk", "0..3", "", "", ""), ("land", "40..50", "", "", "")]
+    folder = project_of(tmp_path, base, own)
     out = run("check", folder, "--format", "json").out
     assert out.count('"outside-domain"') == 2
+    assert out.count('"duplicate-asset"') == 1
     assert run("check", folder).code == 0
 
 
@@ -186,3 +188,31 @@ def test_merging_the_file_of_a_variant_needs_no_base(tmp_path):
     ours, theirs = base.with_cell(0, "Air", "True"), base.with_rows(1, [{"Asset": "run", "speed": "3..5"}])
     one, other = merge(base, ours, theirs).table, merge(base, theirs, ours).table
     assert texts_of(one.flat()) == texts_of(other.flat()) == [["walk", "0..1", "True", "1"], ["run", "3..5", "", "1"]]
+
+
+def test_saved_contexts_are_counted_against_all_rows(tmp_path):
+    folder = project_of(tmp_path, [("walk", "0..2", "", ""), ("fall", "", "True", "")], [("fall", "", "", "", "True")])
+    (folder / "orc.cases.csv").write_text("Case,Expected,speed,Air\nslow,walk,1,False\n")
+    done = run("cases", folder / "orc.csv", "--json").json
+    assert (done["rows"], done["rows_reached"], done["rows_without_case"]) == (1, 1, [])
+
+
+def test_an_index_lists_all_rows_with_their_files_and_moments(tmp_path):
+    import polars as pl
+
+    folder = project_of(
+        tmp_path, [("walk", "0..2", "", ""), ("fall", "", "True", "")], [("fall", "", "", "", "True"), ("fly", "", "True", "", "")]
+    )
+    (tmp_path / "seen").mkdir()
+    (tmp_path / "seen" / "a.csv").write_text("speed,Air\n1,True\n1,False\n9,True\n")
+    assert run("index", folder, "--out", tmp_path / "rows.parquet", "--telemetry", tmp_path / "seen" / "a.csv").code == 0
+    rows = pl.read_parquet(tmp_path / "rows.parquet").filter(pl.col("table") == "orc")
+    assert rows.select("asset", "file", "line", "moments").rows() == [("walk", "human.csv", 2, 2), ("fly", "orc.csv", 3, 2)]
+
+
+def test_who_answers_is_named_in_the_report(tmp_path):
+    folder = project_of(
+        tmp_path, [("walk", "0..2", "", "")], [], schema=SCHEMA.replace("[tables.human]", '[tables.human]\nowner = "combat"')
+    )
+    assert run("coverage", folder / "human.csv").lines[0].endswith("; owned by combat")
+    assert "owned" not in run("coverage", folder / "orc.csv").lines[0]

@@ -29,6 +29,7 @@ from contextdb.schema.table_settings import TableSettings
 from contextdb.tables.nesting.flat import FlatTable
 from contextdb.tables.nesting.plain import as_plain
 from contextdb.tables.table import Table
+from contextdb.tables.variants import WholeTable
 
 VALID, PICKED, LEFT_OUT = "valid", "picked", "left out"
 
@@ -140,6 +141,8 @@ def _slips(table: Table) -> Iterator[Slip]:
 def _plain(table: Table) -> Table:
     """A table whose rows are all its own; what refers to other tables becomes their rows."""
     flat = table.flat()
+    if isinstance(flat, WholeTable):
+        return Table.build(flat.name, flat.columns, flat.schema, flat.settings, table.path)
     if not isinstance(flat, FlatTable):
         return table
     plain = as_plain(flat)

@@ -208,7 +208,9 @@ def measure(arguments: argparse.Namespace, table: EitherTable) -> Measured:
     file = str(table.path) if table.path else None
     space = declared(table, report.assumed)
     inside = _inside(table)
-    return Measured(report, file, tuple(table.assets), lines, compared, None, seen, (), inside, space, expected)
+    return Measured(
+        report, file, tuple(table.assets), lines, compared, None, seen, (), inside, space, expected, table.settings.owner
+    )
 
 
 def _expected(arguments: argparse.Namespace, table: EitherTable) -> Expectation | None:

@@ -26,6 +26,7 @@ from contextdb.disk import write_atomic
 from contextdb.errors import ContextDBError, Fault, FileError, Place, plural
 from contextdb.tables.project import Project
 from contextdb.tables.table import Table
+from contextdb.tables.variants import known_whole
 
 if TYPE_CHECKING:
     import polars as pl
@@ -78,30 +79,32 @@ def _columns() -> dict[str, Any]:
 
 
 def _rows(table: Table, project: str, telemetry: Sequence[str]) -> Iterator[dict[str, object]]:
-    names = {column.condition.name: column for column in table.conditions}
-    data = [column for column in table.columns if column.name in table.settings.outputs]
-    changed, hits = _last_changes(table), _hits(table, telemetry)
-    for row, asset in enumerate(table.assets):
+    whole = known_whole(table) or table
+    names = {column.condition.name: column for column in whole.conditions}
+    data = [column for column in whole.columns if column.name in whole.settings.outputs]
+    changed, hits = _last_changes(table), _hits(table, whole.n_rows, telemetry)
+    for row, asset in enumerate(whole.assets):
         cells = [(name, c.texts[row]) for name, c in names.items() if not c.cells[int(c.texts.codes[row])].is_any]
-        line = table.place(row).line
+        place = whole.place(row)
+        own = place.line if place.file == str(table.path) else None  # else it is a row of the base
         yield {
             "project": project,
             "table": table.name,
             "owner": table.settings.owner or None,
-            "file": None if table.path is None else table.path.name,
+            "file": None if place.file is None else Path(place.file).name,
             "row": row,
-            "line": line,
+            "line": place.line,
             "asset": asset,
             "cells": [{"name": name, "text": text} for name, text in cells],
             "outputs": [{"name": column.name, "text": column[row]} for column in data],
-            "last_change": changed.get(line, changed[None]),
+            "last_change": changed.get(own, changed[None]),
             "moments": None if hits is None else hits[row],
         }
 
 
-def _hits(table: Table, telemetry: Sequence[str]) -> Sequence[int] | None:
+def _hits(table: Table, n_rows: int, telemetry: Sequence[str]) -> Sequence[int] | None:
     """For each row the recorded moments in which it is valid; None where nothing is recorded, or rows refer to tables."""
-    if not telemetry or table.flat().n_rows != table.n_rows:
+    if not telemetry or table.flat().n_rows != n_rows:
         return None
     from contextdb.telemetry.observe import observe
 

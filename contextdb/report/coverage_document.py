@@ -67,6 +67,7 @@ def section(
     blocks += [*_telemetry(measured, most_gaps), *_change(measured, most_gaps)]
     blocks += [*_each_finding(measured), *_each_row(measured)] if is_page else []
     size = f"{measured.summary.size}, in {as_path(measured.file)}" if is_page and measured.file else measured.summary.size
+    size = f"{size}; owned by {measured.owner}" if measured.owner else size
     return Section(report.table, size, sentences, blocks, measured.gates, is_dense=is_brief)
 
 

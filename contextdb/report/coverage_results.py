@@ -58,6 +58,8 @@ class Measured:
     """What the shares are shares of."""
     expected: Expectation | None = None
     """The coverage of the contexts that a designer expects."""
+    owner: str = ""
+    """Who answers for the table."""
 
     @property
     def summary(self) -> TableSummary:

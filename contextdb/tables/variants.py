@@ -52,6 +52,8 @@ class WholeTable(TableData):
     def is_inherited(self, row: int, column: str | None = None) -> bool:
         """Whether the variant's file says nothing of a row, or of its cell in a column."""
         row_of_own = int(self.own_rows[row])
+        if column == self.asset_column:  # by which a row belongs to its base
+            return int(self.base_rows[row]) >= 0
         if row_of_own < 0 or column is None or int(self.base_rows[row]) < 0:
             return row_of_own < 0
         return self.own is not None and not says(self.own, row_of_own, column)

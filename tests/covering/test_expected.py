@@ -109,7 +109,7 @@ def test_coverage_begins_with_what_is_asked(tmp_path):
     (tmp_path / "moves.csv").write_text("Asset,gait\nidle,Idle\nwalk,Walk\n")
     (tmp_path / "asked.csv").write_text("Situation,gait,Weight\nstrolling,Walk,3\nrunning,Run,1\n")
     out = run("coverage", tmp_path).lines
-    assert out[1] == "75.00 % of what 2 expected situations ask for has a valid row."
+    assert out[2] == "75.00 % of what 2 expected situations ask for has a valid row."
     assert "Of all contexts alike: 66.67 % of the contexts have a valid row (exact)." in out
     assert any("running: nothing plays; idle (line 2) would, with gait Idle Run" in line for line in out)
     (tmp_path / "seen.csv").write_text("gait\nWalk\nWalk\nIdle\n")

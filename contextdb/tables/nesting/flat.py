@@ -120,6 +120,7 @@ def flatten(table: TableData, tables: Mapping[str, TableData]) -> FlatTable:
         policy=table.settings.policy,
         assume=table.settings.assume,
         expected=table.settings.expected,
+        owner=table.settings.owner,
         when=rules.name if rules else None,
     )
     texts = (asset, *outputs, *([rules] if rules else []), *(c.texts for c in columns))

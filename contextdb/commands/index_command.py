@@ -26,6 +26,7 @@ from contextdb.disk import write_atomic
 from contextdb.errors import ContextDBError, Fault, FileError, Place, plural
 from contextdb.tables.project import Project
 from contextdb.tables.table import Table
+from contextdb.tables.variants import known_whole
 
 if TYPE_CHECKING:
     import polars as pl
@@ -77,31 +78,34 @@ def _columns() -> dict[str, Any]:
     )
 
 
-def _rows(table: Table, project: str, telemetry: Sequence[str]) -> Iterator[dict[str, object]]:
-    names = {column.condition.name: column for column in table.conditions}
+def _rows(own: Table, project: str, telemetry: Sequence[str]) -> Iterator[dict[str, object]]:
+    table = known_whole(own) or own
     data = [column for column in table.columns if column.name in table.settings.outputs]
-    changed, hits = _last_changes(table), _hits(table, telemetry)
+    hits = _hits(own, table.n_rows, telemetry)
+    changed: dict[str, Mapping[int | None, datetime]] = {}
     for row, asset in enumerate(table.assets):
-        cells = [(name, c.texts[row]) for name, c in names.items() if not c.cells[int(c.texts.codes[row])].is_any]
-        line = table.place(row).line
+        cells = [(c.condition.name, c.texts[row]) for c in table.conditions if not c.cells[int(c.texts.codes[row])].is_any]
+        place = table.place(row)
+        file = place.file or str(own.path)
+        changed[file] = changed[file] if file in changed else _last_changes(Path(file))
         yield {
             "project": project,
             "table": table.name,
-            "owner": table.settings.owner or None,
-            "file": None if table.path is None else table.path.name,
+            "owner": own.settings.owner or None,
+            "file": Path(file).name,
             "row": row,
-            "line": line,
+            "line": place.line,
             "asset": asset,
             "cells": [{"name": name, "text": text} for name, text in cells],
             "outputs": [{"name": column.name, "text": column[row]} for column in data],
-            "last_change": changed.get(line, changed[None]),
+            "last_change": changed[file].get(place.line, changed[file][None]),
             "moments": None if hits is None else hits[row],
         }
 
 
-def _hits(table: Table, telemetry: Sequence[str]) -> Sequence[int] | None:
+def _hits(table: Table, n_rows: int, telemetry: Sequence[str]) -> Sequence[int] | None:
     """For each row the recorded moments in which it is valid; None where nothing is recorded, or rows refer to tables."""
-    if not telemetry or table.flat().n_rows != table.n_rows:
+    if not telemetry or table.flat().n_rows != n_rows:
         return None
     from contextdb.telemetry.observe import observe
 
@@ -112,16 +116,14 @@ def _hits(table: Table, telemetry: Sequence[str]) -> Sequence[int] | None:
         return None
 
 
-def _last_changes(table: Table) -> Mapping[int | None, datetime]:
-    """When each line of a table's file was changed last, by its number from 1; under None when the file was."""
-    assert table.path is not None
-    written = datetime.fromtimestamp(os.path.getmtime(table.path), UTC)
-    folder = table.path.parent
-    if not is_in_a_repository(folder):
+def _last_changes(path: Path) -> Mapping[int | None, datetime]:
+    """When each line of a file was changed last, by its number from 1; under None when the file was."""
+    written = datetime.fromtimestamp(os.path.getmtime(path), UTC)
+    if not is_in_a_repository(path.parent):
         return {None: written}
-    code, blamed = run_git(folder, "blame", "--porcelain", "--", table.path.name)
-    if code or table.path.suffix.lower() == ".parquet":
-        code, committed = run_git(folder, "log", "-1", "--format=%ct", "--", table.path.name)
+    code, blamed = run_git(path.parent, "blame", "--porcelain", "--", path.name)
+    if code or path.suffix.lower() == ".parquet":
+        code, committed = run_git(path.parent, "log", "-1", "--format=%ct", "--", path.name)
         return {None: datetime.fromtimestamp(int(committed), UTC) if not code and committed.strip() else written}
     return {None: written} | dict(_blamed(blamed, written))
 

@@ -196,8 +196,8 @@ def headings(effect: Effects | Fault, shows_all: bool) -> Iterator[Heading]:
         yield f"… and {plural(left, 'asset')} more; --all shows every one", []
     if effect.n_left_out:
         yield f"{plural(effect.n_left_out, 'more changed asset')} not looked at", []
-    yield from _listed("gaps opened", [_line(box) for box in effect.opened], most)
-    yield from _listed("gaps closed", [_line(box) for box in effect.closed], most)
+    yield from _listed("gaps opened", [gap_line(box) for box in effect.opened], most)
+    yield from _listed("gaps closed", [gap_line(box) for box in effect.closed], most)
     yield from _listed("rows that can no longer be chosen", [_finding(each) for each in effect.dead], most)
     yield from _listed("rows that may not be valid together", [_finding(each) for each in effect.overlaps], most)
     if not effect:
@@ -219,7 +219,7 @@ def _reach(reach: Reach, shows_all: bool) -> Iterator[Heading]:
     for verb, boxes, share in (("gains", reach.gained, reach.share_gained), ("loses", reach.lost, reach.share_lost)):
         if boxes:
             most = len(boxes) if shows_all else MOST_BOXES
-            yield f"{safe_text(reach.asset)} {verb} {_percent(share)}", _first(list(map(_line, boxes)), most, "… and {:,} more")
+            yield f"{safe_text(reach.asset)} {verb} {_percent(share)}", _first(list(map(gap_line, boxes)), most, "… and {:,} more")
 
 
 def _listed(title: str, lines: Sequence[str], most: int) -> Iterator[Heading]:
@@ -232,7 +232,8 @@ def _finding(finding: Finding) -> str:
     return f"{safe_text(finding.asset or '(no name)')}{line}: {safe_text(finding.message, 300)}"
 
 
-def _line(box: Box) -> str:
+def gap_line(box: Box) -> str:
+    """A gap with its share."""
     return f"{_percent(box.share)}  {safe_text(box.text, 400)}"
 
 

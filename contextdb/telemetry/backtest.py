@@ -86,6 +86,8 @@ class Comparison:
     boxes: tuple[ChangedBox, ...] = ()
     box_table: CompiledData | None = None
     """A row for each of the boxes."""
+    n_examples: int = MOST_EXAMPLES
+    """So many moments that change are given."""
 
     @cached_property
     def sides(self) -> tuple[_Side, _Side]:
@@ -151,7 +153,7 @@ class Backtest:
     unread: list[tuple[str, tuple[Fault, ...]]] = field(default_factory=list)
     """Files that could not be read; nothing of them is counted."""
 
-    def add(self, other: Backtest) -> None:
+    def add(self, other: Backtest, n_examples: int = MOST_EXAMPLES) -> None:
         """Add the sums of other files, or of another chunk."""
         self.moments += other.moments
         self.changed += other.changed
@@ -160,7 +162,7 @@ class Backtest:
         self.gains.update(other.gains)
         self.loses.update(other.loses)
         self.boxes.update(other.boxes)
-        self.examples = sorted((*self.examples, *other.examples), key=lambda example: example.rank)[:MOST_EXAMPLES]
+        self.examples = sorted((*self.examples, *other.examples), key=lambda example: example.rank)[:n_examples]
         self.characters = joined(self.characters, other.characters)
         self.unread += other.unread
 
@@ -203,7 +205,7 @@ def backtest(
     here = (backtest_file(comparison, path, tell) for path in paths)
     there = (part for _, part in with_dask(backtest_file, comparison, paths, scheduler))
     for part in there if engine == "dask" else here:
-        total.add(part)
+        total.add(part, comparison.n_examples)
         n_done += 1
         tell(0.0)
     if total.unread and len(total.unread) == len(paths):
@@ -217,7 +219,7 @@ def backtest_file(comparison: Comparison, path: Path, tell: Callable[[float], No
     wanted = {*comparison.asked, *comparison.named}
     try:
         for names, chunk in chunks_of(path, wanted, comparison.after.name):
-            total.add(_of_chunk(comparison, names, chunk, str(path)))
+            total.add(_of_chunk(comparison, names, chunk, str(path)), comparison.n_examples)
             if tell is not None and chunk.share_done < 1.0:
                 tell(chunk.share_done)
     except ContextDBError as error:
@@ -297,12 +299,12 @@ def _sums(comparison: Comparison, pairs: Sequence[Flags], sums: Counts) -> tuple
         if flags is None:
             flags = (gains if box.what == GAINS else loses)[:, number[box.asset or ""]]
         part.boxes[box] = int(sums[flags & pairs[2][:, i]].sum())
-    return part, list(_chosen(emptied, filled, is_other)), [is_other, emptied, filled]
+    return part, list(_chosen(emptied, filled, is_other, comparison.n_examples)), [is_other, emptied, filled]
 
 
-def _chosen(emptied: Flags, filled: Flags, is_other: Flags) -> Iterator[tuple[str, int]]:
+def _chosen(emptied: Flags, filled: Flags, is_other: Flags, n_examples: int) -> Iterator[tuple[str, int]]:
     for what, flags in ((EMPTIED, emptied), (FILLED, filled), ("changed", is_other & ~emptied & ~filled)):
-        for i in np.flatnonzero(flags)[:MOST_EXAMPLES].tolist():
+        for i in np.flatnonzero(flags)[:n_examples].tolist():
             yield what, i
 
 

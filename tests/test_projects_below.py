@@ -127,3 +127,16 @@ def test_the_last_change_of_a_row_is_that_of_its_line(games):
         datetime(2026, 1, 2, tzinfo=UTC),
         datetime(2026, 3, 4, tzinfo=UTC),
     ]
+
+
+def test_the_rows_of_a_variant_are_all_that_it_answers_with(games):
+    folder = games / "games" / "one"
+    (folder / "contextdb.toml").write_text((folder / "contextdb.toml").read_text() + '[tables.orc]\nbase = "moves"\n')
+    (folder / "orc.csv").write_text("Asset,speed\nroar,3..\n")
+    (games / "play.csv").write_text("speed\n1\n1.5\n3\n")
+    run("index", games, "--out", games / "rows.parquet", "--telemetry", games / "play.csv")
+    rows = pl.read_parquet(games / "rows.parquet").filter(pl.col("table") == "orc").rows(named=True)
+    assert [(r["asset"], r["file"], r["line"], r["moments"]) for r in rows] == [
+        ("walk", "moves.csv", 2, 2),
+        ("roar", "orc.csv", 2, 1),
+    ]

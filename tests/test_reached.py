@@ -230,6 +230,16 @@ def test_rows_of_tables_inside_a_table_are_reached_too(game):
     assert run("check", game).code == 0
 
 
+def test_rows_of_a_base_are_reached_in_its_variant(game):
+    (game / "contextdb.toml").write_text(TOML + '[tables.orc]\nbase = "moves"\nremove = "Gone"\n')
+    (game / "orc.csv").write_text("Asset,speed,hit,Gone\nwalk,0..3,,\nroar,,True,\nrun,,,True\n")
+    result = run("cases", game / "orc.csv", "--write", "--json")
+    assert (result.code, result.json["rows"], result.json["rows_without_case"]) == (0, 2, ["walk", "roar"])
+    after = run("cases", game / "orc.csv", "--json").json
+    assert (after["rows_reached"], after["mutants_killed"]) == (2, after["mutants"])
+    assert run("check", game).code == 0
+
+
 def test_a_table_that_cannot_be_read_is_refused(game):
     (game / "moves.csv").write_text(GAME.replace("2..6", "2..x"))
     result = run("cases", game / "moves.csv")

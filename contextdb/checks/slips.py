@@ -11,7 +11,7 @@ then the slips of cells: T = 3 n + M of them. Flags of rows are those of the tab
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -29,7 +29,6 @@ from contextdb.schema.table_settings import TableSettings
 from contextdb.tables.nesting.flat import FlatTable
 from contextdb.tables.nesting.plain import as_plain
 from contextdb.tables.table import Table
-from contextdb.tables.variants import WholeTable
 
 VALID, PICKED, LEFT_OUT = "valid", "picked", "left out"
 
@@ -139,12 +138,13 @@ def _slips(table: Table) -> Iterator[Slip]:
 
 
 def _plain(table: Table) -> Table:
-    """A table whose rows are all its own; what refers to other tables becomes their rows."""
+    """A table whose rows are all its own: those of a base are among them, and what refers to other tables becomes their rows."""
     flat = table.flat()
-    if isinstance(flat, WholeTable):
-        return Table.build(flat.name, flat.columns, flat.schema, flat.settings, table.path)
+    if isinstance(flat, Table):
+        return flat
     if not isinstance(flat, FlatTable):
-        return table
+        own = replace(flat.settings, base=None, remove=None)
+        return Table.build(flat.name, flat.columns, flat.schema, own, table.path)
     plain = as_plain(flat)
     if plain is None:
         problem = f"tags of {in_quotes(table.name)} and of a table inside it have requirements that no single cell can describe."

@@ -1,18 +1,21 @@
 """Show what changed between two versions of a table: rows by asset, columns, and cells, with changes of text alone listed apart.
 
 Exits with 0 if nothing changed, with 1 if something did, with 2 if a table cannot be read. With --telemetry both versions are asked
-in every recorded moment; with --max-changed or --max-emptied only these decide between 0 and 1.
+in every recorded moment; with --max-changed or --max-emptied only these decide between 0 and 1. With --session the searches of
+recorded motion are repeated with both.
 
   contextdb diff old/hit_mid_air.csv tables/hit_mid_air.csv
   contextdb diff a.csv b.csv --format markdown
   contextdb diff a.csv b.csv --format html -o review.html
   contextdb diff a.csv b.csv --telemetry "play/*.parquet" --max-emptied 0.1
+  contextdb diff a.csv b.csv --session "sessions/*.parquet"
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,12 +28,15 @@ from contextdb.disk import write_atomic
 from contextdb.edits.diffing import Diff, diff
 from contextdb.errors import ContextDBError, ContextError, Fault
 from contextdb.report.render_json import as_json
+from contextdb.report.render_markdown import escaped
 from contextdb.tables.nesting.names import inner_name
 from contextdb.tables.places import table_path
 from contextdb.tables.project import load_table
+from contextdb.tables.table import Table
 
 if TYPE_CHECKING:
     from contextdb.commands.diff_backtest import Replayed
+    from contextdb.commands.diff_sessions import RepeatedSession
 
 ENGINES = ("local", "dask")
 FORMATS = ("text", "markdown", "json", "html")
@@ -51,6 +57,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--time", metavar="COLUMN", help="the column of seconds: changes are counted per character and minute")
     group.add_argument("--engine", choices=ENGINES, default="local", help="read files here, or on Dask workers (default: local)")
     group.add_argument("--scheduler", metavar="ADDRESS", help="the Dask scheduler; without it, workers on this machine")
+    motion = parser.add_argument_group("recorded sessions of motion")
+    motion.add_argument("--session", action="append", metavar="GLOB", help="repeat their searches with both; may be repeated")
+    motion.add_argument("--project", metavar="FOLDER", help="the project of the sessions, where they do not say")
     parser.add_argument("--all", action="store_true", help="print every difference, not the first of each kind")
 
 
@@ -65,7 +74,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         from contextdb.commands.diff_backtest import replayed_moments
 
         replayed = replayed_moments(arguments, before, after, effect)
-    text = _rendered(changes, effect, replayed, arguments)
+    text = _rendered(changes, effect, replayed, arguments, _sessions(arguments, before, after))
     if arguments.output:
         write_atomic(Path(arguments.output), text.encode("utf-8", "backslashreplace"))
     else:
@@ -74,6 +83,14 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     if replayed is not None and replayed.gates:
         return ExitCode.OK if all(gate.passed for gate in replayed.gates) else ExitCode.FOUND
     return ExitCode.FOUND if changes else ExitCode.OK
+
+
+def _sessions(arguments: argparse.Namespace, before: Table, after: Table) -> list[RepeatedSession]:
+    if not arguments.session:
+        return []
+    from contextdb.commands.diff_sessions import repeated_sessions
+
+    return repeated_sessions(arguments.session, arguments.project, before, after)
 
 
 def require_moments(arguments: argparse.Namespace) -> None:
@@ -105,17 +122,27 @@ def _effects(changes: Diff) -> Effects | Fault:
         return error.faults[0]
 
 
-def _rendered(changes: Diff, effect: Effects | Fault | None, replayed: Replayed | None, arguments: argparse.Namespace) -> str:
+def _rendered(
+    changes: Diff,
+    effect: Effects | Fault | None,
+    replayed: Replayed | None,
+    arguments: argparse.Namespace,
+    sessions: Sequence[RepeatedSession],
+) -> str:
+    lines = [line for session in sessions for line in session.lines]
     if arguments.format == "json":
         more = {} if replayed is None else replayed.to_json()
+        more |= {"sessions": [session.to_json() for session in sessions]} if sessions else {}
         return as_json(changes.to_json() | {"effects": effects_json(effect)} | more)
     if arguments.format == "html":
         from contextdb.commands.diff_page import as_page
 
-        return as_page(changes, effect, replayed)
+        return as_page(changes, effect, replayed, lines)
     if arguments.format == "markdown":
         below = "" if replayed is None else replayed.markdown
+        below += "".join(f"\n- {escaped(line)}" for line in lines) + "\n" if lines else ""
         return as_markdown(changes, arguments.all, effects_markdown(effect, arguments.all) + below)
     colour = wants_colour(sys.stdout) and not arguments.output
     below = "" if replayed is None else replayed.text(colour, arguments.all)
+    below += "\nsessions\n" + "".join(f"  {line}\n" for line in lines) if lines else ""
     return as_text(changes, colour, arguments.all) + effects_text(effect, colour, arguments.all) + below

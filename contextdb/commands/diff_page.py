@@ -19,11 +19,12 @@ CELLS = ("line", "asset", "column", "before", "after")
 WORDS = {True: "holds", False: "broken", None: "open"}
 
 
-def as_page(changes: Diff, effect: Effects | Fault | None, replayed: Replayed | None) -> str:
-    """The page, complete: nothing is left out for want of room."""
+def as_page(changes: Diff, effect: Effects | Fault | None, replayed: Replayed | None, more: Sequence[str] = ()) -> str:
+    """The page, complete: nothing is left out for want of room. `more` are further sentences."""
     blocks = [*_cells(changes), *_effect(effect), *_contracts(changes), *([] if replayed is None else replayed.blocks)]
     name = str(changes.after.path or changes.after.name)
-    sentences = [*_to_look_at(effect), changes.summary, *owners(changes), *([] if replayed is None else replayed.sentences)]
+    of_moments = [] if replayed is None else replayed.sentences
+    sentences = [*_to_look_at(effect), changes.summary, *owners(changes), *of_moments, *more]
     gates = () if replayed is None else replayed.gates
     return as_html(Document("diff", "table", [Section(changes.after.name, name, sentences, blocks, gates)]))
 

@@ -78,26 +78,27 @@ def _columns() -> dict[str, Any]:
     )
 
 
-def _rows(table: Table, project: str, telemetry: Sequence[str]) -> Iterator[dict[str, object]]:
-    whole = known_whole(table) or table
-    names = {column.condition.name: column for column in whole.conditions}
-    data = [column for column in whole.columns if column.name in whole.settings.outputs]
-    changed, hits = _last_changes(table), _hits(table, whole.n_rows, telemetry)
-    for row, asset in enumerate(whole.assets):
-        cells = [(name, c.texts[row]) for name, c in names.items() if not c.cells[int(c.texts.codes[row])].is_any]
-        place = whole.place(row)
-        own = place.line if place.file == str(table.path) else None  # else it is a row of the base
+def _rows(own: Table, project: str, telemetry: Sequence[str]) -> Iterator[dict[str, object]]:
+    table = known_whole(own) or own
+    data = [column for column in table.columns if column.name in table.settings.outputs]
+    hits = _hits(own, table.n_rows, telemetry)
+    changed: dict[str, Mapping[int | None, datetime]] = {}
+    for row, asset in enumerate(table.assets):
+        cells = [(c.condition.name, c.texts[row]) for c in table.conditions if not c.cells[int(c.texts.codes[row])].is_any]
+        place = table.place(row)
+        file = place.file or str(own.path)
+        changed[file] = changed[file] if file in changed else _last_changes(Path(file))
         yield {
             "project": project,
             "table": table.name,
-            "owner": table.settings.owner or None,
-            "file": None if place.file is None else Path(place.file).name,
+            "owner": own.settings.owner or None,
+            "file": Path(file).name,
             "row": row,
             "line": place.line,
             "asset": asset,
             "cells": [{"name": name, "text": text} for name, text in cells],
             "outputs": [{"name": column.name, "text": column[row]} for column in data],
-            "last_change": changed.get(own, changed[None]),
+            "last_change": changed[file].get(place.line, changed[file][None]),
             "moments": None if hits is None else hits[row],
         }
 
@@ -115,16 +116,14 @@ def _hits(table: Table, n_rows: int, telemetry: Sequence[str]) -> Sequence[int] 
         return None
 
 
-def _last_changes(table: Table) -> Mapping[int | None, datetime]:
-    """When each line of a table's file was changed last, by its number from 1; under None when the file was."""
-    assert table.path is not None
-    written = datetime.fromtimestamp(os.path.getmtime(table.path), UTC)
-    folder = table.path.parent
-    if not is_in_a_repository(folder):
+def _last_changes(path: Path) -> Mapping[int | None, datetime]:
+    """When each line of a file was changed last, by its number from 1; under None when the file was."""
+    written = datetime.fromtimestamp(os.path.getmtime(path), UTC)
+    if not is_in_a_repository(path.parent):
         return {None: written}
-    code, blamed = run_git(folder, "blame", "--porcelain", "--", table.path.name)
-    if code or table.path.suffix.lower() == ".parquet":
-        code, committed = run_git(folder, "log", "-1", "--format=%ct", "--", table.path.name)
+    code, blamed = run_git(path.parent, "blame", "--porcelain", "--", path.name)
+    if code or path.suffix.lower() == ".parquet":
+        code, committed = run_git(path.parent, "log", "-1", "--format=%ct", "--", path.name)
         return {None: datetime.fromtimestamp(int(committed), UTC) if not code and committed.strip() else written}
     return {None: written} | dict(_blamed(blamed, written))
 

@@ -27,6 +27,7 @@ class Ball:
         stock = game.player.stock
         self.contest = motion.JointNode(stock.config.joint_searcher("contest", stock.databases))
         self.contest.searcher.search({}, {}, casts=[])  # the first one compiles the loops: at the start, not in a frame
+        self.picker = game.watch["catches"].picker()  # kept: it remembers what it picked, over a hot reload too
         self.holder: Actor | None = None
         self.game, self._spots, self.said, self.caught_s = game, cycle(SPOTS), "", 0.0
         self._throw()
@@ -71,7 +72,7 @@ class Ball:
         queries = {name: actor.character.features() for name, actor in actors.items()}
         places = {name: actor.pose.root for name, actor in actors.items()}
         both = self.contest.enter(queries, places, valid=valid, in_match_range=True)
-        pick = catches.picker().pick(valid if both is None else valid.only([str(both.hit.asset)]))
+        pick = self.picker.pick(valid if both is None else valid.only([str(both.hit.asset)]))
         if both is not None:
             cast = {role: actors[str(name)] for role, name in both.hit.cast.items()}
             for role, actor in cast.items():

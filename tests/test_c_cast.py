@@ -7,7 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from asking_c import TIMES, artefact, ask_program, asked
 from c_compilers import PROGRAMS, C, built, compiler_for, ran, sanitizers
+from damaged_files import mutated
 
 import contextdb as cdb
 from contextdb.compiled.c_header import c_header_of
@@ -130,3 +132,20 @@ def test_a_table_whose_rules_need_facts_of_a_role_is_not_cast(program: Path, tmp
     compiled.save(tmp_path / "t.safetensors")
     (tmp_path / "q.txt").write_text("f\tspeed\t1\na\tDefender\t1\t-\nx\tDefender.dist\t1\ngo\t0\n", encoding="utf-8")
     assert ran(program, tmp_path / "t.safetensors", tmp_path / "q.txt") == "4\n"
+
+
+def test_damaged_roles_are_refused_or_cast_and_never_crash_it(tmp_path: Path):
+    rng = random.Random(12)
+    compiled = table(rng, 70)
+    whole = artefact(compiled, tmp_path)
+    slots = whole.index(b"slots.000")
+    damaged = [mutated(rng, whole) for _ in range(1000 * TIMES)]
+    for _ in range(500 * TIMES):
+        at = rng.choice(
+            [rng.randrange(slots, slots + 300), whole.index(b"Mandatory"), rng.randrange(len(whole) - 4000, len(whole))]
+        )
+        damaged.append(whole[:at] + bytes(rng.randrange(256) for _ in range(rng.choice([1, 4]))) + whole[at + 1 :])
+    found = asked(ask_program(tmp_path), tmp_path, compiled.conditions, [whole, *damaged], [("any", {"speed": 1.0})])
+    statuses = [status for status, _ in found]
+    assert statuses[0] == 0
+    assert 100 < statuses.count(0) < len(statuses)

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from contextdb.compiled.many import ManyMatches
     from contextdb.compiled.picker import Picker
 
-    ManyContexts = Mapping[str, Sequence[object] | NDArray[Any]] | pl.DataFrame
+    ManyContexts = Mapping[str, Any] | pl.DataFrame  # Any: a dict of lists and arrays is one of objects for a type checker
 
 NO_FACTS: Context = MappingProxyType({})
 

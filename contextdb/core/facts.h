@@ -40,6 +40,19 @@ CDBI_HOT int cdbi_is_missing(const cdb_condition *condition, const cdb_fact *fac
     return condition->n_values > 0 ? fact->tags == NULL || (fact->tags[0] & 1) == 0 : fact->texts.count < 0;
 }
 
+/* A fact of a condition that is not known. */
+static inline cdb_fact cdbi_missing(const cdb_condition *condition)
+{
+    cdb_fact fact;
+    memset(&fact, 0, sizeof fact);
+    if (condition->type == CDB_NUMBER || condition->type == CDB_ANGLE || (condition->type == CDB_INT && condition->expr))
+        fact.number = cdb_missing_number();
+    else if (condition->type == CDB_INT || condition->type == CDB_DATE) fact.whole = CDB_MISSING_INT;
+    else if (condition->type == CDB_TAGS && condition->n_values == 0) fact.texts.count = CDB_MISSING;
+    else if (condition->type == CDB_BOOL || condition->type == CDB_ENUM) fact.whole = CDB_MISSING;
+    return fact;
+}
+
 CDBI_HOT double cdbi_number(const cdb_condition *condition, const cdb_fact *fact)
 {
     if (condition->type == CDB_DATE || (condition->type == CDB_INT && !condition->expr)) return (double)fact->whole;

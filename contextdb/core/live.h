@@ -44,23 +44,8 @@ static inline int cdbi_is_given(const cdb_live *live, int at)
 /* Make a fact missing. Other numbers than those of given facts are CDB_WRONG_FACT, here and below. */
 CDB_API cdb_status cdb_set_missing(cdb_live *live, int at)
 {
-    const cdb_condition *condition;
-    cdb_fact *fact;
     if (!cdbi_is_given(live, at)) return CDB_WRONG_FACT;
-    condition = &live->schema->conditions[at];
-    fact = &live->facts[at];
-    memset(fact, 0, sizeof *fact);
-    switch (condition->type) {
-    case CDB_NUMBER:
-    case CDB_ANGLE: fact->number = cdb_missing_number(); break;
-    case CDB_INT:
-    case CDB_DATE: fact->whole = CDB_MISSING_INT; break;
-    case CDB_TAGS:
-        if (condition->n_values == 0) fact->texts.count = CDB_MISSING;
-        break;
-    case CDB_TEXT: break;
-    default: fact->whole = CDB_MISSING;
-    }
+    live->facts[at] = cdbi_missing(&live->schema->conditions[at]);
     cdbi_keep_mask(live, (size_t)at);
     return CDB_OK;
 }

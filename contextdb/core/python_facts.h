@@ -228,20 +228,3 @@ static int cdbp_read_fact(cdbp_frame *frame, const cdb_schema *schema, const cdb
     Py_DecRef(plain);
     return how == CDBP_CAREFUL ? cdbp_raised(unusual) : how;
 }
-
-/* Make a fact one that is missing. */
-static void cdbp_set_missing(const cdb_condition *condition, cdb_fact *fact)
-{
-    switch (condition->type) {
-    case CDB_BOOL:
-    case CDB_ENUM: fact->whole = CDB_MISSING; break;
-    case CDB_INT:
-    case CDB_DATE: fact->whole = CDB_MISSING_INT; break;
-    case CDB_NUMBER:
-    case CDB_ANGLE: fact->number = cdb_missing_number(); break;
-    case CDB_TEXT: fact->text = NULL; break;
-    case CDB_TAGS:
-        fact->tags = NULL;
-        if (condition->n_values == 0) fact->texts.count = CDB_MISSING;
-    }
-}

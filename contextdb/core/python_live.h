@@ -116,7 +116,7 @@ static int cdbp_live_init(PyObject *self, PyObject *arguments, PyObject *named)
     for (i = 0; i < n; i++) {
         if (own->columns[i].kind != CDBI_VALUE && own->columns[i].kind != CDBI_FLAT) live->has_masks = 0;
         if (own->conditions[i].expr) continue;
-        cdbp_set_missing(&own->conditions[i], &live->now.facts[i]);
+        live->now.facts[i] = cdbi_missing(&own->conditions[i]);
         live->given[i] = cdbp_new_ref(Py_None);
         cdbp_find_mask(live, i, 1);
     }
@@ -187,7 +187,7 @@ static int cdbp_keep(cdbp_live *live, size_t at, int is_missing, PyObject *value
     cdb_fact *fact = &live->now.facts[at];
     PyObject *old = live->own[at], *before = live->given[at], *taken = NULL;
     if (!is_missing && live->read.n_held > 0 && !(taken = cdbp_taken(&live->read))) return -1;
-    if (is_missing) cdbp_set_missing(condition, fact);
+    if (is_missing) *fact = cdbi_missing(condition);
     else {
         *fact = live->read.facts[at];
         if (condition->type == CDB_TAGS && condition->n_values > 0) {

@@ -538,7 +538,7 @@ static int cdbp_read_facts(const cdbp_table *own, PyObject *context, cdbp_frame 
         } else if (PyErr_Occurred()) how = cdbp_raised(own->unusual);
         if (how > CDBP_MISSING) return how;
         if (how == CDBP_MISSING) {
-            cdbp_set_missing(&own->conditions[i], &frame->facts[i]);
+            frame->facts[i] = cdbi_missing(&own->conditions[i]);
             if (!own->conditions[i].expr) *is_missing = 1;
         }
     }

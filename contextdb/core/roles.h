@@ -84,19 +84,6 @@ static inline void cdbi_read_slots(cdbi_opening *opening, int is_optional, size_
     }
 }
 
-/* A fact of a condition that is not known. */
-static inline cdb_fact cdbi_missing(const cdb_condition *condition)
-{
-    cdb_fact fact;
-    memset(&fact, 0, sizeof fact);
-    if (condition->type == CDB_NUMBER || condition->type == CDB_ANGLE || (condition->type == CDB_INT && condition->expr))
-        fact.number = cdb_missing_number();
-    else if (condition->type == CDB_INT || condition->type == CDB_DATE) fact.whole = CDB_MISSING_INT;
-    else if (condition->type == CDB_TAGS && condition->n_values == 0) fact.texts.count = CDB_MISSING;
-    else if (condition->type == CDB_BOOL || condition->type == CDB_ENUM) fact.whole = CDB_MISSING;
-    return fact;
-}
-
 /* The roles of conditions, then those that slots alone name; which rows need each, and which may have it. */
 static inline void cdbi_make_roles(cdbi_opening *opening)
 {

@@ -26,7 +26,6 @@ class Ball:
     def __init__(self, game: "Game") -> None:
         stock = game.player.stock
         self.contest = motion.JointNode(stock.config.joint_searcher("contest", stock.databases))
-        self.contest.searcher.search({}, {}, casts=[])  # the first one compiles the loops: at the start, not in a frame
         self.picker = game.watch["catches"].picker()  # kept: it remembers what it gave, through a reload too
         self.holder: Actor | None = None
         self.game = game

@@ -129,6 +129,28 @@ static int picks_same(cdb_unknown unknown, const uint64_t *rows, double time_s, 
     return is_right;
 }
 
+/* Offer somebody for every role, and cast all rows. */
+static void cast_all(uint64_t *rows)
+{
+    cdb_actor actors[CDB_MOST_ACTORS];
+    size_t n = any->table.n_roles < CDB_MOST_ACTORS ? any->table.n_roles : CDB_MOST_ACTORS, i;
+    uint64_t *masks = (uint64_t *)malloc((n * any->table.n_words + 1) * 8);
+    int *playing = (int *)malloc((any->table.n_roles + 1) * sizeof(int));
+    cdb_live *nobody = cdb_live_of(any, CDB_UNKNOWN_NEVER, malloc(cdb_live_bytes(&any->schema)));
+    int64_t row;
+    for (i = 0; i < n; i++) {
+        actors[i].role = (int)i;
+        actors[i].id = (int64_t)i / 2;
+        actors[i].cost = cdb_missing_number();
+        actors[i].facts = nobody->facts;
+    }
+    cdb_cast(&any->table, any->columns, &any->schema, nobody->facts, CDB_UNKNOWN_ANY, actors, n, masks, rows, any->table.n_words, NULL);
+    for (row = -1; (row = cdb_next_row(rows, any->table.n_words, row)) >= 0;) cdb_casting(&any->table, actors, n, masks, row, playing);
+    free(nobody);
+    free(playing);
+    free(masks);
+}
+
 /* One answer: rows met one after another must be those that are counted, and their assets must be there to read. */
 static void answer(FILE *out, const cdb_table *table, const cdb_column *columns, const cdb_schema *schema, cdb_fact *facts,
     cdb_unknown unknown)
@@ -271,6 +293,7 @@ int main(int argc, char **argv)
             uint64_t *rows = (uint64_t *)malloc(any->table.n_words * 8 + 8);
             for (j = 0; j < n_contexts * n; j++) set(lives[unknown[j / n]], &conditions[j % n], &facts[j]);
             for (j = 0; j < 3; j++) cdb_live_query(lives[j], rows, any->table.n_words, NULL);
+            cast_all(rows);
             for (j = 0; j < 3; j++) free(lives[j]);
             free(rows);
             cdb_close_any(any);

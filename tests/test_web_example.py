@@ -1,4 +1,4 @@
-"""The example in a browser: it plays what Python plays to the bit, and shows what it plays and why, without a request to elsewhere."""
+"""The example in a browser: it plays what Python plays to the bit, shows what it plays and why, and asks nobody elsewhere."""
 
 from __future__ import annotations
 

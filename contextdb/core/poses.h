@@ -6,6 +6,10 @@
  *   cdbo_receive       from what was decided to what happens to a pose
  *   cdbo_pose_one      one character through all stages; or, where a game has a ground, up to it, and then from there */
 
+#if defined(__clang__) /* numbers of words go among others, as doubles */
+#pragma clang diagnostic ignored "-Wunknown-warning-option"
+#pragma clang diagnostic ignored "-Wenum-float-conversion"
+#endif
 #include <float.h>
 #include <math.h>
 #include <stddef.h>

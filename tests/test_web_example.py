@@ -1,4 +1,4 @@
-"""The example in a browser: it plays what Python plays to the bit, shows what it plays and why, and asks nobody elsewhere."""
+"""The example in a browser: it plays what Python plays to the bit, and shows what it plays and why, with no request elsewhere."""
 
 from __future__ import annotations
 

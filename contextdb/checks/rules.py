@@ -99,6 +99,12 @@ RULES: dict[str, Rule] = {
         "Fill in the cell, or declare `default` for the output in contextdb.toml.",
         ("cells.outputs",),
     ),
+    "row-against-markup": Rule(
+        "error",
+        "A row says that its clip plays otherwise than the markup of its database says.",
+        "Correct the cell, or the markup of the clip.",
+        ("authoring.rows_against_markup",),
+    ),
     "no-asset": Rule(
         "error",
         "A row names no asset.",

@@ -86,6 +86,11 @@ class Plays(NamedTuple):
     rows: Floats
     of: NDArray[np.int64]
 
+    def of_range(self, at: int) -> RowPlay | None:
+        """That of a range in the first update."""
+        row = int(self.of[0, at])
+        return None if row < 0 else RowPlay.of(self.rows[row].tolist())
+
 
 class Ranges(NamedTuple):
     """Which ranges may play in each of n updates, bool [n or 1, R], their biases, float64 [n or 1, R], and how they play; None

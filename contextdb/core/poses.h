@@ -17,6 +17,9 @@
 #include <string.h>
 
 #ifndef CDBI_MINUS_ZERO /* with the tables' parts it is there already */
+#ifndef CDB_API
+#define CDB_API static inline
+#endif
 #include "arithmetic.h"
 #endif
 #include "elementary.h"

@@ -375,6 +375,16 @@ class Frames:
     @property
     def n_bytes(self) -> int:
         """The bytes that it takes beside the arrays."""
+    def levels(
+        self,
+        step: NDArray[np.float64],
+        group_lows: NDArray[np.int16],
+        group_highs: NDArray[np.int16],
+        cluster_lows: NDArray[np.int16],
+        cluster_highs: NDArray[np.int16],
+        /,
+    ) -> None:
+        """Write its bounds, for those who keep them."""
     def search(self, *arguments: NDArray[Any] | float | None) -> int:
         """search(query, ranges, range_biases, allowed, kind_biases, playable, flags, frame_biases, skips, current, continuing,
         within, totals, best_frames): the lowest total that is not above `within`, and its frame (-1 for none), into the last two,

@@ -13,7 +13,7 @@ enum {  /* kinds of parts; of a database, of a bank, of a controller, of a table
     CDBM_P_BLOCKS = 1, CDBM_P_ORDER, CDBM_P_RANK, CDBM_P_BOX_STARTS, CDBM_P_BOX_SIZES, CDBM_P_BOX_RANGES, CDBM_P_BOX_KINDS,
     CDBM_P_RANGE_BOXES, CDBM_P_KINDS, CDBM_P_OFFSET, CDBM_P_SCALE, CDBM_P_CHANNELS, CDBM_P_WEIGHTS, CDBM_P_ROOTS, CDBM_P_STARTS,
     CDBM_P_STOPS, CDBM_P_LOOPING, CDBM_P_ROOT, CDBM_P_MARKS, CDBM_P_ROOT_WEIGHTS, CDBM_P_DATABASE, CDBM_P_POSE_RANGES, CDBM_P_ASSETS,
-    CDBM_P_MIRRORED, CDBM_P_ROW_STARTS, CDBM_P_ROWS, CDBM_P_NAME,
+    CDBM_P_MIRRORED, CDBM_P_ROW_STARTS, CDBM_P_ROWS, CDBM_P_NAME, CDBM_P_LEVEL_STEP, CDBM_P_LEVELS,
     CDBM_P_POSE_ROTATIONS = 40, CDBM_P_POSE_POSITIONS, CDBM_P_POSE_ROOT, CDBM_P_POSE_WAYS, CDBM_P_POSE_CONTACTS, CDBM_P_POSE_STEPS,
     CDBM_P_POSE_STARTS, CDBM_P_POSE_N_STEPS, CDBM_P_POSE_LOOPING, CDBM_P_POSE_RATE,
     CDBM_P_ENTRIES = 60, CDBM_P_SETTINGS, CDBM_P_THRESHOLDS, CDBM_P_BARS, CDBM_P_RANGE_BIASES, CDBM_P_ALLOWED, CDBM_P_PLAYABLE,
@@ -141,7 +141,17 @@ static inline size_t cdbm_size_from(double number)
     return number >= 0.0 && number < 4e9 ? (size_t)number : (size_t)-1;
 }
 
-/* Read a database of a bundle; its levels are made, and are to be given back with cdbm_free_levels. */
+/* The bounds of a database, which lie in the bundle. */
+static inline void cdbm_read_levels(cdbm_bundle *bundle, size_t number, cdbm_frames *frames)
+{
+    const double *step = CDBM_TAKE(double, CDBM_P_LEVEL_STEP, 1);
+    const int16_t *levels[4];
+    size_t sizes[4], i;
+    for (i = 0; i < 4; i++) levels[i] = CDBM_TAKE_ALL(int16_t, CDBM_P_LEVELS + (uint32_t)i, &sizes[i]);
+    if (!bundle->why && !cdbm_use_levels(frames, *step, levels, sizes)) cdbm_refuse(bundle, "the bounds of a database are none");
+}
+
+/* Read a database of a bundle; what is made of it is to be given back with cdbm_free_levels. */
 static inline void cdbm_read_database(cdbm_bundle *bundle, size_t number, cdbm_frames *frames, cdbm_clips *clips)
 {
     const double *own = CDBM_TAKE(double, CDBM_P_DATABASE, 8);
@@ -181,7 +191,7 @@ static inline void cdbm_read_database(cdbm_bundle *bundle, size_t number, cdbm_f
     if (bundle->why) return;
     if (!cdbm_is_whole(frames) || !cdbm_are_clips(clips, n_all) || !cdbm_are_boxes_in_ranges(clips))
         cdbm_refuse(bundle, "the boxes, ranges, channels or kinds of a database do not go together");
-    else if (!cdbm_make_levels(frames)) cdbm_refuse(bundle, "there is not enough memory");
+    else cdbm_read_levels(bundle, number, frames);
 }
 
 /* ---- banks of poses */

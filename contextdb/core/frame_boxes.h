@@ -43,7 +43,8 @@ typedef struct cdbm_frames {        /* a database: what all its searches read */
     const double *roots;            /* [F] the root of the weight of each feature */
     /* What follows is made of it by cdbm_make_levels. */
     size_t n_groups, n_clusters, n_pairs;
-    double unit;                    /* the square of a level, of a feature whose weight is 1 */
+    double step, unit;              /* levels in one, of a feature whose weight is 1, and their square */
+    int are_given;                  /* whether the bounds lie in memory of others */
     cdbm_box *boxes;                /* [B] */
     cdbm_run *runs;                 /* of all boxes */
     size_t *cluster_runs;           /* [n_clusters + 1] the first of each cluster */
@@ -114,15 +115,20 @@ static float cdbm_narrow_limit(const cdbm_frames *frames, double budget, double 
     return widened < 3e38 ? (float)widened : (float)INFINITY;
 }
 
-/* How many levels one is, from the spread of one frame of each box. */
-static void cdbm_measure(cdbm_frames *frames)
+/* The greatest level at which no sum of squares is too large. */
+static void cdbm_find_most(cdbm_frames *frames)
 {
-    double all = 0.0, n = (double)frames->n_boxes, step, n_features = (double)(frames->n_features ? frames->n_features : 1);
-    size_t f, i;
     for (frames->most = 16000; frames->most > 0; frames->most--) {
         double widest = 2.0 * frames->most + 2.0;
         if (2.0 * (double)frames->n_pairs * widest * widest < 2147483647.0) break;
     }
+}
+
+/* How many levels one is, from the spread of one frame of each box. */
+static double cdbm_measure(const cdbm_frames *frames)
+{
+    double all = 0.0, n = (double)frames->n_boxes, step, n_features = (double)(frames->n_features ? frames->n_features : 1);
+    size_t f, i;
     for (f = 0; f < frames->n_features; f++) {
         double root = frames->roots[frames->order[f]], sum = 0.0, squares = 0.0;
         for (i = 0; i < frames->n_boxes; i++) {
@@ -136,11 +142,17 @@ static void cdbm_measure(cdbm_frames *frames)
     step = all > 1e-100 && all < 1e100 ? 1.0 : 0.0; /* where bounds are of no use, all are 0 */
     while (all * step * step > 1.0) step *= 0.875;
     while (all * step * step < 0.75 && step > 0.0) step *= 1.125;
-    frames->unit = step * step;
+    return step;
+}
+
+static void cdbm_set_step(cdbm_frames *frames, double step)
+{
+    size_t f;
+    frames->step = step, frames->unit = step * step;
     for (f = 0; f < frames->n_features; f++) {
-        double steps = step * frames->roots[frames->order[f]];
+        double root = frames->roots[frames->order[f]], steps = step * root;
         frames->steps[f] = steps < 1e200 ? steps : 1e200;
-        frames->narrow_weights[f] = (float)(frames->roots[frames->order[f]] * frames->roots[frames->order[f]]);
+        frames->narrow_weights[f] = (float)(root * root);
     }
 }
 
@@ -152,6 +164,7 @@ static void cdbm_free_levels(cdbm_frames *frames)
     CDB_FREE(frames->cluster_ranges);
     CDB_FREE(frames->steps);
     CDB_FREE(frames->narrow_weights);
+    if (frames->are_given) return;
     CDB_FREE(frames->groups.lows);
     CDB_FREE(frames->groups.highs);
     CDB_FREE(frames->clusters.lows);
@@ -204,10 +217,10 @@ static void cdbm_gather_boxes(cdbm_frames *frames)
     frames->cluster_runs[frames->n_clusters] = n_runs;
 }
 
-/* Make the bounds of a checked database; 0 where memory is missing. They are given back by cdbm_free_levels, made or not. */
-static inline int cdbm_make_levels(cdbm_frames *frames)
+/* Memory for what is made of a checked database but for its bounds; 0 where it is missing. */
+static int cdbm_take_boxes(cdbm_frames *frames)
 {
-    size_t n_features = frames->n_features, box, f, lane, i;
+    size_t n_features = frames->n_features;
     frames->n_groups = (frames->n_boxes + CDBM_LANES - 1) / CDBM_LANES;
     frames->n_clusters = (frames->n_groups + CDBM_LANES - 1) / CDBM_LANES;
     frames->n_pairs = (n_features + 1) / 2;
@@ -220,9 +233,48 @@ static inline int cdbm_make_levels(cdbm_frames *frames)
     frames->cluster_ranges = (int32_t *)CDB_MALLOC(frames->n_clusters * 2 * sizeof *frames->cluster_ranges + 1);
     if (!frames->boxes || !frames->runs || !frames->cluster_runs || !frames->cluster_ranges) return 0;
     cdbm_gather_boxes(frames);
-    if (!frames->steps || !frames->narrow_weights || !cdbm_take_level(&frames->groups, frames->n_groups, frames)) return 0;
+    cdbm_find_most(frames);
+    return frames->steps && frames->narrow_weights;
+}
+
+/* How many numbers the lows of the groups, or of the clusters, are. */
+static inline size_t cdbm_level_size(const cdbm_frames *frames, size_t n)
+{
+    return n * frames->n_pairs * 2 * CDBM_LANES;
+}
+
+static int cdbm_are_levels(const cdbm_frames *frames, const int16_t *levels, size_t n)
+{
+    int16_t least = 0, most = 0;
+    size_t i;
+    for (i = 0; i < n; i++) least = levels[i] < least ? levels[i] : least, most = levels[i] > most ? levels[i] : most;
+    return least >= -frames->most - 1 && most <= frames->most + 1;
+}
+
+/* Take over bounds that were made before: lows and highs of groups and of clusters, for whom there is room (cdbm_level_size). They stay
+ * where they are. 0 where they are none, or memory is missing. */
+static inline int cdbm_use_levels(cdbm_frames *frames, double step, const int16_t *const *levels, const size_t *sizes)
+{
+    size_t i;
+    if (!cdbm_take_boxes(frames) || !(step >= 0.0 && step < 1e100)) return 0;
+    frames->are_given = 1;
+    cdbm_set_step(frames, step);
+    for (i = 0; i < 4; i++) {
+        size_t n = cdbm_level_size(frames, i < 2 ? frames->n_groups : frames->n_clusters);
+        if (!levels[i] || sizes[i] != n || !cdbm_are_levels(frames, levels[i], n)) return 0;
+    }
+    frames->groups.lows = (int16_t *)(uintptr_t)levels[0], frames->groups.highs = (int16_t *)(uintptr_t)levels[1];
+    frames->clusters.lows = (int16_t *)(uintptr_t)levels[2], frames->clusters.highs = (int16_t *)(uintptr_t)levels[3];
+    return 1;
+}
+
+/* Make the bounds of a checked database; 0 where memory is missing. They are given back by cdbm_free_levels, made or not. */
+static inline int cdbm_make_levels(cdbm_frames *frames)
+{
+    size_t n_features = frames->n_features, box, f, lane, i;
+    if (!cdbm_take_boxes(frames) || !cdbm_take_level(&frames->groups, frames->n_groups, frames)) return 0;
     if (!cdbm_take_level(&frames->clusters, frames->n_clusters, frames)) return 0;
-    cdbm_measure(frames);
+    cdbm_set_step(frames, cdbm_measure(frames));
     for (box = 0; box < frames->n_boxes; box++)
         for (f = 0; f < n_features; f++) {
             const float *own = frames->blocks + (box * n_features + f) * CDBM_FRAMES;

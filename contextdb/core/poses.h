@@ -6,6 +6,10 @@
  *   cdbo_receive       from what was decided to what happens to a pose
  *   cdbo_pose_one      one character through all stages; or, where a game has a ground, up to it, and then from there */
 
+#if defined(__clang__) /* numbers of words go among others, as doubles */
+#pragma clang diagnostic ignored "-Wunknown-warning-option"
+#pragma clang diagnostic ignored "-Wenum-float-conversion"
+#endif
 #include <float.h>
 #include <math.h>
 #include <stddef.h>
@@ -13,6 +17,9 @@
 #include <string.h>
 
 #ifndef CDBI_MINUS_ZERO /* with the tables' parts it is there already */
+#ifndef CDB_API
+#define CDB_API static inline
+#endif
 #include "arithmetic.h"
 #endif
 #include "elementary.h"

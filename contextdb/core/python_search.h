@@ -245,6 +245,27 @@ done:
 }
 
 /* The bytes of the bounds. */
+/* frames.levels(step, group_lows, group_highs, cluster_lows, cluster_highs): its bounds, for those who keep them. */
+static PyObject *cdbp_frames_levels(PyObject *self, PyObject *const *in, Py_ssize_t n)
+{
+    const cdbp_frames *own = (const cdbp_frames *)self;
+    const cdbm_frames *frames = &own->frames;
+    const int16_t *from[4];
+    cdbp_arrays a;
+    double *step = NULL;
+    size_t s[3], i = 0;
+    a.n = 0;
+    from[0] = frames->groups.lows, from[1] = frames->groups.highs, from[2] = frames->clusters.lows, from[3] = frames->clusters.highs;
+    if (own->is_made && n == 5 && (step = cdbp_to_numbers(&a, in[0], s, 1, 1, 0, 0)))
+        for (*step = frames->step; i < 4; i++) {
+            size_t size = cdbm_level_size(frames, i < 2 ? frames->n_groups : frames->n_clusters);
+            int16_t *to = (int16_t *)cdbp_shaped(&a, in[i + 1], 'i', 2, 1, s, 1, size, 0, 0);
+            if (!to) break;
+            memcpy(to, from[i], size * sizeof *to);
+        }
+    return cdbp_given_back(&a, i == 4, "levels takes five arrays of the right lengths");
+}
+
 static PyObject *cdbp_frames_n_bytes(PyObject *self, void *unused)
 {
     const cdbm_frames *frames = &((const cdbp_frames *)self)->frames;
@@ -257,6 +278,7 @@ static PyGetSetDef cdbp_frames_members[] = {
     {NULL, NULL, NULL, NULL, NULL},
 };
 static PyMethodDef cdbp_frames_methods[] = {
+    {"levels", CDBP_CALL(cdbp_frames_levels), METH_FASTCALL, "Write its bounds."},
     {"search", CDBP_CALL(cdbp_frames_search), METH_FASTCALL, "The best frame of all, or of each range."},
     {"search_many", CDBP_CALL(cdbp_frames_search_many), METH_FASTCALL, "The best frame for each of some queries."},
     {NULL, NULL, 0, NULL},

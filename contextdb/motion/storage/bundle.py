@@ -175,7 +175,9 @@ def _add_database(bundle: Bundle, number: int, player: Played, name: str, bank: 
         rows = mirrored, row_starts, row_numbers
     measures = kinds, offset, scale, channels, channel_weights, roots
     played = starts, stops, looping, root, marks, weights, own
-    bundle.add(DATABASE, number, [*arrays, *measures, *played, ranges, _texts(database.assets), *rows, _texts([name])])
+    bundle.add(
+        DATABASE, number, [*arrays, *measures, *played, ranges, _texts(database.assets), *rows, _texts([name]), *_levels(database)]
+    )
     if bank is not None:
         *frames, bank_rate = bank.frame_parts(bank.steps)
         bundle.add(BANK, number, [*frames, np.array([bank_rate])])
@@ -207,6 +209,16 @@ def _controller(name: str, player: Played, entries: list[tuple[int, int, int]]) 
     joints = np.array([n_moving, most_accel], np.float64)
     names = _texts(banks[0].skeleton.names)
     return [*parts, np.array([output[key] for key in OUTPUT]), *rig, joints, _texts([name]), names]
+
+
+def _levels(database: MotionDatabase) -> list[NDArray[Any]]:
+    """The bounds by which a database is searched: levels in one, then lows and highs of groups and of clusters of boxes."""
+    n_groups = -(-len(database.layout.box_starts) // 16)
+    n_clusters, n_each = -(-n_groups // 16), (database.n_features + 1) // 2 * 32
+    sizes = [n * n_each for n in (n_groups, n_groups, n_clusters, n_clusters)]
+    step, levels = np.empty(1), [np.empty(size, np.int16) for size in sizes]
+    database.frames.levels(step, *levels)
+    return [step, *levels]
 
 
 def _clips(database: MotionDatabase) -> list[tuple[str, bool]]:

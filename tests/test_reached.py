@@ -7,7 +7,7 @@ from itertools import combinations, product
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from running import run
 from strategies import examples
@@ -85,6 +85,7 @@ def contexts_near(table: Table) -> list[dict[str, object]]:
 
 @examples(0.6)
 @given(st.integers(0, 2**32))
+@example(1033964)  # a space of one context
 def test_written_contexts_hold_and_every_slip_that_some_context_notices_makes_one_fail(seed):
     table = random_table(random.Random(seed))
     cases = with_names(reached_by(table, []).new_cases, [])

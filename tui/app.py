@@ -33,9 +33,10 @@ from .screens.begin import Begin
 from .screens.conflicts import ConflictsDialog
 from .screens.leaving import HeldDialog, LeavingDialog
 from .screens.main import MainScreen
-from .screens.palette import Palette
+from .screens.palette import KEY_WIDTH, Commands, Palette
 from .themes import DARK, THEMES
 
+MOST_USED = 6
 LOW, TALL = 14, 30
 """On a screen of fewer lines than the first the details give way to the rows. On one of as many as the second a dialog with a list
 is no higher than its lines."""
@@ -100,6 +101,8 @@ class EditorApp(Editor):
             self.register_theme(one)
         self.theme = theme or self.settings.theme or DARK
         self.set_keymap(dict(self.settings.keys))
+        self._used: list[str] = []
+        """The commands that were run by the palette, the last one last."""
         self._outer: list[str] = []
         """The tables whose rows were gone into, and not come back from."""
 
@@ -120,7 +123,14 @@ class EditorApp(Editor):
 
     def action_command_palette(self) -> None:
         if not CommandPalette.is_open(cast(App[object], self)):
-            self.push_screen(Palette("Commands"))
+            self.push_screen(Palette("Commands", [Commands]))
+
+    def likely_commands(self) -> dict[str, int]:
+        """The places of the commands that come first in the palette: those used last, then those for where the cursor is."""
+        group = self.main.likely_group if self._has_table else "File"
+        labels = [BY_ID[name].label for name in reversed(self._used)]
+        labels += [command.label for command in COMMANDS if command.group == group and command.is_listed]
+        return {label: place for place, label in enumerate(dict.fromkeys(labels))}
 
     def search_themes(self) -> None:
         self.push_screen(Palette("Theme", [ThemeProvider]))
@@ -212,7 +222,7 @@ class EditorApp(Editor):
     def _show_table(self, name: str, session: Session) -> None:
         self.workspace.know_others(name)
         screen = MainScreen(self.workspace, name)
-        if any(isinstance(one, MainScreen) for one in self.screen_stack):
+        if self._has_table:
             self.switch_screen(screen)
         else:
             self.push_screen(screen)
@@ -238,22 +248,26 @@ class EditorApp(Editor):
         self.push_screen(ConflictsDialog(merged.conflicts, path.name, sides_in(path)), decided)
 
     def _refused(self, text: str) -> None:
-        if any(isinstance(one, MainScreen) for one in self.screen_stack):
+        if self._has_table:
             self.main.say(text, "error")
         else:
             self.exit(return_code=2, message=text)
 
     def get_system_commands(self, screen: Screen[object]) -> Iterable[SystemCommand]:
-        has_table = any(isinstance(one, MainScreen) for one in self.screen_stack)
-        for command in COMMANDS if has_table else ():
+        for command in COMMANDS if self._has_table else ():
             if command.is_listed and command.id != "palette":
                 keys = key_names(self.settings.keys.get(command.id, command.keys))
-                about = f"{keys[0] if keys else '':<11} {command.about}"
+                about = f"{keys[0] if keys else '':<{KEY_WIDTH}} {command.about}"
                 yield SystemCommand(command.label, about, partial(self._run, command.id))
         yield SystemCommand("Theme", "Other colours.", self.action_change_theme)
         yield SystemCommand("Screenshot", "Keep a picture of the screen as SVG.", self.deliver_screenshot)
 
+    @property
+    def _has_table(self) -> bool:
+        return any(isinstance(one, MainScreen) for one in self.screen_stack)
+
     def _run(self, name: str) -> None:
+        self._used = [*(one for one in self._used if one != name), name][-MOST_USED:]
         self.call_later(self.main.run_command, name)
 
     async def action_quit(self) -> None:

@@ -137,6 +137,14 @@ GRID: tuple[Command, ...] = (
     Command(
         "delete-rows", "ctrl+k,ctrl+delete", "Delete rows", "Delete the selected rows.", "Rows", verb=lambda s: s.delete_rows()
     ),
+    Command(
+        "remove-duplicates",
+        "",
+        "Drop duplicates",
+        "Delete each row that is in all columns as one above it.",
+        "Rows",
+        verb=lambda s: s.remove_duplicates(),
+    ),
     Command("row-up", "alt+i,alt+shift+up", "Move up", "Move the selected rows up.", "Rows", verb=_move_up),
     Command("row-down", "alt+m,alt+shift+down", "Move down", "Move the selected rows down.", "Rows", verb=_move_down),
     Command(
@@ -212,6 +220,9 @@ _OF_SCREEN = (
         "back", "alt+q,alt+up,alt+b", "Back", "Leave an inner table, and go back to the row that refers to it.", "File", "back"
     ),
     Command("new-table", "", "New table", "Make a table, with the columns of a blueprint.", "File", "new_table"),
+    Command("rename-table", "", "Rename table", "Give the table another name, everywhere.", "File", "rename_table"),
+    Command("duplicate-table", "", "Duplicate table", "Copy the table and its saved contexts.", "File", "duplicate_table"),
+    Command("delete-table", "", "Delete table", "Delete the table's file, after a question.", "File", "delete_table"),
     Command("refresh", "f5", "Refresh", "Read changes from disk; sort and filter again.", "File", "refresh"),
     Command("import", "", "Import", "Read rows from Excel, CSV, Parquet or JSON.", "File", "import"),
     Command("export", "", "Export", "Write the table for Excel or other tools.", "File", "export"),
@@ -226,6 +237,14 @@ _OF_SCREEN = (
     Command("contexts", "f9", "Contexts", "Load a saved or recorded context.", "Test row", "contexts", in_footer=True),
     Command("next-context", "f8", "Next context", "Load the next context of the file.", "Test row", "step(1)"),
     Command("previous-context", "f7", "Previous context", "Load the previous context.", "Test row", "step(-1)"),
+    Command(
+        "changes",
+        "",
+        "What changes",
+        "Which moments your edits change, before you save.",
+        "Test row",
+        "changes",
+    ),
     Command("live", "alt+u", "Follow a game", "Let the test row follow a running game, or a recording.", "Test row", "live"),
     Command("live-pause", "alt+6", "Pause the game", "Pause the game that is followed, or go on.", "Test row", "live_pause"),
     Command("live-back", "alt+8", "A second back", "Go back one second in the game.", "Test row", "live_by(-1)"),
@@ -250,6 +269,7 @@ _OF_SCREEN = (
     Command("priorities", "alt+3", "Priorities", "Which database comes first.", "Tabs", "tab('priorities')"),
     Command("coverage", "alt+4", "Coverage", "Which contexts have no asset.", "Tabs", "tab('coverage')"),
     Command("problems", "alt+5", "Problems", "What is wrong with the table.", "Tabs", "tab('problems')"),
+    Command("contracts", "", "Contracts", "What must hold of the table, proved as you type.", "Tabs", "tab('contracts')"),
     Command("motion", "", "Motion", "The recorded sessions of the project, to debug.", "Tabs", "tab('motion')"),
     Command("quit", "ctrl+q", "Quit", "Quit; asks about unsaved edits.", "File", "quit"),
 )

@@ -75,6 +75,11 @@ class FolderClips:
         return {seen.head.name: seen.proposals for seen in self.seen if seen.proposals is not None}
 
     @property
+    def is_by_feet(self) -> bool:
+        """Whether standing feet move the roots of clips on the spot."""
+        return any(at.is_by_feet for at in self.places)
+
+    @property
     def paths(self) -> list[Path]:
         """The file of each clip."""
         return [at.file for at in self.places]
@@ -88,9 +93,13 @@ def clips_of(
     wants: Wanted | None = None,
     looks: Looks = NO_LOOKS,
     engines: Engines = here,
+    root: str | None = None,
 ) -> FolderClips:
     """Look at the clips of a folder; of a project with `wants` at those of the databases that it leaves of all. Raises
-    ContextDBError where there is no such folder, no clip in it, or two clips of one name."""
+    ContextDBError where there is no such folder, no clip in it, or two clips of one name.
+
+    `root` is that of databases, in the place of what a project says.
+    """
     folder = folder_of(Path(path), CLIPS_OR_TABLES)
     folder_clips = FolderClips(folder)
     if (folder / SCHEMA_FILE).is_file():
@@ -98,7 +107,7 @@ def clips_of(
         folder_clips.config = MotionConfig.from_dict(schema.motion, file=schema.file)
     if wants is not None and folder_clips.config.databases:
         folder_clips.config = replace(folder_clips.config, databases=wants(folder_clips.config.databases))
-    files = _files(folder_clips, metres_per_unit, up)
+    files = _files(folder_clips, metres_per_unit, up, root)
     if not files:
         raise FileError(_none_below(folder))
     first: dict[str, Path] = {}
@@ -169,18 +178,18 @@ def _none_below(folder: Path) -> Fault:
     )
 
 
-def _files(clips: FolderClips, unit: float | None, up: Up | None) -> dict[tuple[Path, str], Read]:
+def _files(clips: FolderClips, unit: float | None, up: Up | None, root: str | None) -> dict[tuple[Path, str], Read]:
     """The files and takes with how each is read; of a file in several databases as the first has it."""
     files: dict[tuple[Path, str], Read] = {}
     for settings in clips.config.databases.values():
         rig = Rig.of(settings, clips.folder, clips.config.file)
         for _, file, take in named_takes(settings, clips.folder, clips.config.file):
             own = settings.metres_per_unit if unit is None else unit
-            files.setdefault((file, take), (own, up or settings.up, rig, settings.root == "feet"))
+            files.setdefault((file, take), (own, up or settings.up, rig, (root or settings.root) == "feet"))
     if clips.config.databases:
         return files
     takes = ((file, take) for file in clips_below(clips.folder, needs=True) for take in takes_of(file) or ("",))
-    return dict.fromkeys(takes, (unit, up or "y", None, False))
+    return dict.fromkeys(takes, (unit, up or "y", None, root == "feet"))
 
 
 def _rigs(clips: Sequence[Clip], numbers: Iterable[int]) -> list[list[int]]:

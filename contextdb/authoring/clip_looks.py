@@ -130,5 +130,5 @@ def _on_its_way(clip: Clip, is_by_feet: bool, notes: list[str]) -> Clip:
     if is_by_feet:
         notes.append(f"{about}, which its root is given.")
         return with_ground_motion(clip, motion)
-    notes.append(f'{about}. root = "feet" in [databases.NAME] gives its root this motion.')
+    notes.append(f'{about}. root = "feet" in [databases.NAME], or --root-from feet, gives its root this motion.')
     return clip

@@ -144,7 +144,7 @@ class ClipRows:
             return None
         has_markup = inside(self.source.folder / MARKUP, self.source.folder).is_file()
         markup = below([self.source.folder / MARKUP], folder) if has_markup else None
-        return motion_sections(by_rig(self.source.clips, paths), table.stem, markup[0] if markup else None)
+        return motion_sections(by_rig(self.source.clips, paths), table.stem, markup[0] if markup else None, self.source.is_by_feet)
 
 
 def rows_for(
@@ -154,6 +154,7 @@ def rows_for(
     metres_per_unit: float | None = None,
     up: Up | None = None,
     engines: Engines = here,
+    root: str | None = None,
 ) -> ClipRows:
     """Read and describe the clips of a folder: in a project those of the databases of the table that is filled, where it has any.
 
@@ -163,7 +164,7 @@ def rows_for(
     notes: list[str] = []
     with progress("reading clips") as tell:
         wants = lambda all_of: _playing_alone(all_of, into, notes)  # noqa: E731
-        folder_clips = clips_of(folder, metres_per_unit, up, tell, wants, Looks(facts=True), engines)
+        folder_clips = clips_of(folder, metres_per_unit, up, tell, wants, Looks(facts=True), engines, root)
     clips = folder_clips.clips
     measures = [(seen.head.name, None, seen.measures) for seen in folder_clips.seen]
     folder_clips.notes += [*notes, *grouped(doubts(measures), len(clips))]

@@ -6,6 +6,7 @@ Exits with 1 if there are findings at the level of --fail-on, with 2 if the path
   contextdb check tables/
   contextdb check tables/ --format github --fail-on warning
   contextdb check tables/hit_mid_air.cases.csv
+  contextdb check --projects games/
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ from contextdb.disk import CASES_SUFFIX, TABLE_SUFFIXES, path_in_quotes, read_by
 from contextdb.errors import ContextDBError, Fault, in_quotes, nearest
 from contextdb.files.file_names import alike, composed, confusable, why_unportable
 from contextdb.files.texts import read_texts
-from contextdb.findings import LEVELS, Finding
+from contextdb.findings import LEVELS, Finding, Level
 from contextdb.report.results import CheckReport, TableSummary
 from contextdb.schema.settings import Schema
 from contextdb.schema.toml_lines import key_lines
@@ -45,7 +46,8 @@ from contextdb.tables.table import Table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("path", metavar="PATH", help="a folder of tables, one table or its name, or its cases")
+    parser.add_argument("path", metavar="PATH", nargs="?", help="a folder of tables, one table or its name, or its cases")
+    parser.add_argument("--projects", metavar="ROOT", help="check every project below a folder, and say which fail")
     add_format_arguments(parser, report.formats("check"))
     parser.add_argument(
         "--fail-on", choices=("error", "warning", "none"), default="error", help="the lowest level that fails (default: error)"
@@ -65,11 +67,34 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
-    """Check one table or a folder of them."""
+    """Check one table, a folder of them, or all projects below one."""
+    _require_one(arguments)
     if arguments.propose:
         return _propose(arguments)
     bar = CaseBar(arguments.min_cases, arguments.min_rows_reached)
+    if arguments.projects is not None:
+        return printed(_of_projects(arguments.projects, bar, failing_levels(arguments.fail_on)), arguments)
     return printed(check_path(arguments.path, bar), arguments)
+
+
+def _require_one(arguments: argparse.Namespace) -> None:
+    """Refuse no path, and two; and contracts proposed for many projects."""
+    if (arguments.path is None) == (arguments.projects is None) or (arguments.propose and arguments.projects is not None):
+        given = "PATH is missing." if arguments.path is None and arguments.projects is None else "--projects ROOT stands by itself."
+        raise ContextDBError(Fault(given, "PATH, or --projects ROOT"))
+
+
+def _of_projects(root: str, bar: CaseBar, failing: Sequence[Level]) -> CheckReport:
+    from contextdb.commands.projects_below import ProjectCheck, ProjectsReport, extend_up_to, project_folders
+
+    folders = project_folders(root)
+    extend_up_to(root)
+    return ProjectsReport.of([ProjectCheck(folder, check_path(str(folder), bar)) for folder in folders], failing)
+
+
+def failing_levels(fail_on: str) -> tuple[Level, ...]:
+    """The levels that fail, by the lowest of them or "none"."""
+    return LEVELS[: LEVELS.index(fail_on) + 1] if fail_on != "none" else ()
 
 
 def _propose(arguments: argparse.Namespace) -> ExitCode:
@@ -92,7 +117,7 @@ def _propose(arguments: argparse.Namespace) -> ExitCode:
 
 def printed(checked: CheckReport, arguments: argparse.Namespace) -> ExitCode:
     """Print a report in the wanted format; the code says whether anything in it fails."""
-    failing = LEVELS[: LEVELS.index(arguments.fail_on) + 1] if arguments.fail_on != "none" else ()
+    failing = failing_levels(arguments.fail_on)
     text = report.render(
         arguments.format,
         checked,

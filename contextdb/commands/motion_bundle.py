@@ -7,10 +7,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from random import Random
 
+from contextdb.cells.conditions import Condition
+from contextdb.cells.mirroring import changed_in_mirror, mirrored_fact, partner_of, way_of
+from contextdb.compiled.table import CompiledTable
 from contextdb.disk import make_folder, path_in_quotes, write_atomic
-from contextdb.errors import ContextDBError, Fault, FileError, Place
+from contextdb.errors import ContextDBError, Fault, FileError, MotionError, Place, in_quotes
+from contextdb.motion.characters.facts import FACTS, is_asked
 from contextdb.motion.search.database import MotionDatabase
-from contextdb.motion.storage.bundle import Played, bundle_of
+from contextdb.motion.storage.bundle import Played, TableFile, bundle_of
 from contextdb.motion.storage.config import MotionConfig
 from contextdb.motion.storage.pose_files import poses_alone
 from contextdb.tables.table import Table, leaf_assets
@@ -44,12 +48,7 @@ def bundled(tables: Mapping[str, Table], config: MotionConfig, databases: Mappin
     banks = poses_alone(config, folder, assets, names=filled) if filled else {}
     table_of = {name: each.table for name, each in config.databases.items() if each.table is not None}
     used = {name: tables[name].compile() for name in dict.fromkeys(table_of.values())}
-    compiled = {}
-    for name, table in used.items():
-        with tempfile.TemporaryDirectory() as scratch:
-            file = Path(scratch, "table.safetensors")
-            table.save(file)
-            compiled[name] = file.read_bytes(), table.leaves
+    compiled = {name: file_of(name, table) for name, table in used.items()}
     players = {}
     for name in config.controllers:
         names = config.databases_of(config.selector_of(name))
@@ -57,3 +56,28 @@ def bundled(tables: Mapping[str, Table], config: MotionConfig, databases: Mappin
         own = {each: banks[each] for each in names if each in banks}
         players[name] = Played(config.controller(name, databases, rng=Random(0)), schema, own or None, config.output_of(name))
     return bundle_of(players, table_of, compiled)
+
+
+def file_of(name: str, table: CompiledTable) -> TableFile:
+    """A table as a bundle has it. Raises MotionError for what a bundle cannot say of it yet."""
+    with tempfile.TemporaryDirectory() as scratch:
+        file = Path(scratch, "table.safetensors")
+        table.save(file)
+        octets = file.read_bytes()
+    asked = table.asked
+    own = {each: each[0] for each, of in FACTS.items() if each in asked and is_asked(each, of, asked[each])}
+    changed = {each.name: _mirror_text(name, each) for each in changed_in_mirror(asked.values()).values()}
+    return TableFile(octets, table.leaves, own, changed)
+
+
+def _mirror_text(table: str, condition: Condition) -> str:
+    """How the facts of a condition change, as a bundle says it. Raises MotionError for tags, which it cannot say yet."""
+    if (partner := partner_of(condition)) is not None:
+        return f"p={partner}"
+    if way_of(condition) == "negate":
+        return "n"
+    values = list(condition.domain.values or ())
+    if condition.domain.type.is_tags or not values:
+        problem = f"a bundle cannot exchange the facts of the condition {in_quotes(condition.name)} in a mirror yet."
+        raise MotionError(Fault(problem, 'mirror = "negate", or names of an enum', place=Place(f"[tables.{table}]")))
+    return "v=" + " ".join(str(values.index(str(mirrored_fact(value, condition)))) for value in values)

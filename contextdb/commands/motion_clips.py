@@ -9,6 +9,7 @@ from contextdb.commands.engine_options import add_engine_arguments
 from contextdb.commands.numbers import unit_of
 from contextdb.commands.progress import building_bar
 from contextdb.motion.clips.clip import UPS
+from contextdb.motion.storage.database_settings import ROOTS
 from contextdb.tables.project import SCHEMA_FILE
 
 
@@ -20,6 +21,12 @@ def add_clip_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--up", choices=UPS, help="the axis that points up (default: as the project says, else in which bodies stand)"
+    )
+    parser.add_argument(
+        "--root-from",
+        choices=ROOTS,
+        help="where clips that run on the spot get their motion: from themselves, or from their standing feet; in a project its "
+        "databases say it",
     )
     add_engine_arguments(parser)
 

@@ -102,7 +102,13 @@ def _prepare(arguments: argparse.Namespace) -> ExitCode:
     looks = Looks(kinds=tuple(arguments.only or KINDS), known=prepared.cached.clips)
     with progress_of("reading clips") as tell:
         folder_clips = clips_of(
-            arguments.path, arguments.metres_per_unit, arguments.up, tell, looks=looks, engines=engines_of(arguments)
+            arguments.path,
+            arguments.metres_per_unit,
+            arguments.up,
+            tell,
+            looks=looks,
+            engines=engines_of(arguments),
+            root=arguments.root_from,
         )
     prepared.cached.clips |= folder_clips.proposals()
     proposals, changes = [], []

@@ -235,7 +235,7 @@ class Picker:
         self._picked.forget(np.array([known[one] for one in ids if one in known], np.int64))
 
     def digest(self) -> int:
-        """A number of 64 bits that is the same for pickers whose characters picked the same. Never fails.
+        """A number of 64 bits that is the same for pickers whose characters picked the same.
 
         Two machines that play in step compare it each frame. It is the sum of `cdb_digest` of C over the characters.
         """

@@ -257,6 +257,23 @@ static inline int cdbi_take_way(cdbi_opening *opening, const char *key, const cd
     return cdbi_take_level(&table->levels[number], part + 1, array);
 }
 
+/* Take a part of the columns of slots, "slots.001.codes"; 0 where it does not fit. */
+static inline int cdbi_take_slots(cdbi_opening *opening, const char *key, const cdbi_array *array)
+{
+    const char *part = key + strlen("slots.");
+    int number = 0, i;
+    for (; *part >= '0' && *part <= '9' && number < 1000; part++) number = number * 10 + (*part - '0');
+    for (i = 0; i < 2; i++) {
+        cdbi_slots *slots = &opening->slots[i];
+        if (slots->number != number + 1) continue;
+        if (strcmp(part, ".texts") == 0) slots->texts = cdbi_take_texts(opening, array, key);
+        if (strcmp(part, ".codes") != 0) return 1;
+        slots->codes = (const int32_t *)(const void *)array->at;
+        return cdbi_fits(array, "I32", 1, opening->table->n_rows);
+    }
+    return 1;
+}
+
 /* Take every array that is asked for. */
 static inline void cdbi_arrays(cdbi_opening *opening, cdbi_json header)
 {
@@ -280,6 +297,7 @@ static inline void cdbi_arrays(cdbi_opening *opening, cdbi_json header)
         if (at < opening->schema->n_conditions) fits = cdbi_take_condition(opening, at, part, &array);
         else if (strncmp(key, "programs.", strlen("programs.")) == 0) fits = cdbi_take_program(opening, key, &array);
         else if (strncmp(key, "ways.", strlen("ways.")) == 0) fits = cdbi_take_way(opening, key, &array);
+        else if (strncmp(key, "slots.", strlen("slots.")) == 0) fits = cdbi_take_slots(opening, key, &array);
         else if (strcmp(key, "assets") == 0 && !table->assets) {
             cdbi_list assets = cdbi_take_texts(opening, &array, key);
             table->assets = assets.texts;

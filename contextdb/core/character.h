@@ -253,6 +253,12 @@ static inline void cdbm_lay_out(const cdbm_player *player, cdbm_pose *pose, void
     pose->contacts = (unsigned char *)memory + cdbm_rounded(10 * n_joints * sizeof(double));
 }
 
+/* How many bytes the answer of a table takes. */
+static inline size_t cdbm_answer_room(const cdbm_player *player)
+{
+    return 2 * (cdbm_rounded(player->n_most_rows / 8 + 8) + cdbm_rounded(player->n_most_rows * sizeof(double))) + 64;
+}
+
 /* How many bytes of room a call for so many characters takes. */
 static inline size_t cdbm_room_size(const cdbm_player *player, size_t n)
 {
@@ -337,6 +343,18 @@ static inline const char *cdbm_said_of(const cdbm_player *player, uint32_t kind,
     return NULL;
 }
 
+/* A fact that is not known; of a condition that is computed it is not looked at. */
+static inline cdb_fact cdbm_missing_fact(const cdb_condition *condition)
+{
+    cdb_fact fact;
+    memset(&fact, 0, sizeof fact);
+    if (condition->type == CDB_NUMBER || condition->type == CDB_ANGLE) fact.number = cdb_missing_number();
+    else if (condition->type == CDB_INT || condition->type == CDB_DATE) fact.whole = CDB_MISSING_INT;
+    else if (condition->type == CDB_BOOL || condition->type == CDB_ENUM) fact.whole = CDB_MISSING;
+    else if (condition->type == CDB_TAGS && condition->n_values == 0) fact.texts.count = CDB_MISSING;
+    return fact;
+}
+
 /* A fact that a game does not give and that the character knows itself. */
 static inline void cdbm_add_own(const cdbm_player *player, size_t table, size_t at, const cdbm_walk *walk, const cdbo_goal *goal, cdb_fact *fact)
 {
@@ -382,12 +400,6 @@ typedef struct cdbm_answer {        /* of a table, as it is and with mirrored fa
     const double *costs[2];
 } cdbm_answer;
 
-/* How many bytes the answer of a table takes. */
-static inline size_t cdbm_answer_room(const cdbm_player *player)
-{
-    return 2 * (cdbm_rounded(player->n_most_rows / 8 + 8) + cdbm_rounded(player->n_most_rows * sizeof(double))) + 64;
-}
-
 /* Ask a table. 1; -2 for a fact that is refused. */
 static inline int cdbm_ask_table(const cdbm_player *player, size_t table, const cdbm_input *input, const cdbm_walk *walk,
     cdbm_answer *answer, cdbm_room *room)
@@ -396,9 +408,8 @@ static inline int cdbm_ask_table(const cdbm_player *player, size_t table, const 
     const cdb_schema *schema = &any->schema;
     cdb_fact own[CDB_MOST_FACTS], mirrored[CDB_MOST_FACTS], *facts = own;
     size_t n_words = any->table.n_words, n_rows = any->table.n_rows, i, side;
-    memset(own, 0, sizeof own);
     for (i = 0; i < schema->n_conditions; i++) {
-        own[i] = input->facts && input->facts[table] ? input->facts[table][i] : cdb_missing_fact(&schema->conditions[i]);
+        own[i] = input->facts && input->facts[table] ? input->facts[table][i] : cdbm_missing_fact(&schema->conditions[i]);
         cdbm_add_own(player, table, i, walk, &input->goal, &own[i]);
     }
     for (side = 0; side < 2; side++) {

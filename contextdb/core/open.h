@@ -1,4 +1,19 @@
 
+/* Which columns of slots there are. */
+static inline void cdbi_find_slots(cdbi_opening *opening, const cdbi_json *about)
+{
+    static const char *const names[] = {"Mandatory_Slots", "Optional_Slots"};
+    cdbi_json slots = cdbi_member(about, "slots"), name;
+    size_t n = 0;
+    int i;
+    if (slots.why) return;
+    for (cdbi_take(&slots, '['); cdbi_next(&slots, ']', &n); cdbi_skip(&slots, 0))
+        for (i = 0; i < 2; i++) {
+            name = slots;
+            if (n < 100 && cdbi_is(&name, names[i])) opening->slots[i].number = (int)n;
+        }
+}
+
 /* What the text `about` says: the number of rows, the conditions, and how each column is kept. */
 static inline void cdbi_about(cdbi_opening *opening, const cdbi_json *about, size_t depths)
 {
@@ -12,6 +27,7 @@ static inline void cdbi_about(cdbi_opening *opening, const cdbi_json *about, siz
     opening->table->n_rows = (size_t)n_rows;
     opening->table->n_words = (size_t)((n_rows + 63) / 64);
     cdbi_refuse_unknown(opening, *about);
+    cdbi_find_slots(opening, about);
     why = opening->status == CDB_OK ? cdbi_columns(opening, about) : NULL;
     if (!why && opening->status == CDB_OK) why = cdbi_read_levels(opening, about, depths);
     if (why) cdbi_refuse(opening, CDB_BAD_FILE, why, -1, "about");
@@ -61,6 +77,7 @@ static inline void cdbi_read(cdbi_opening *opening, const cdbi_json *header)
     if (opening->status == CDB_OK) cdbi_link(opening);
     if (opening->status == CDB_OK) cdbi_levels(opening);
     if (opening->status == CDB_OK) cdbi_outputs(opening, header);
+    if (opening->status == CDB_OK) cdbi_make_roles(opening);
     if (opening->status == CDB_OK) cdbi_plays(opening, header);
 }
 

@@ -22,6 +22,12 @@ static inline cdb_status cdbi_fault(cdb_fault *fault, cdb_status status, const c
     return status;
 }
 
+typedef struct cdbi_slots {         /* the column that names roles that rows need, or may have */
+    int number;                     /* among the columns of slots, from 1; 0 where there is none */
+    const int32_t *codes;
+    cdbi_list texts;
+} cdbi_slots;
+
 typedef struct cdbi_opening {
     cdb_table *table;
     cdb_column *columns;
@@ -31,6 +37,7 @@ typedef struct cdbi_opening {
     cdb_strange strange;
     int has_ways;                   /* the table has tables inside */
     int has_programs;               /* the table has rules or derived facts */
+    cdbi_slots slots[2];            /* mandatory, optional */
     struct cdb_any *any;            /* what gets the schema out of the file; NULL where the caller has one */
 } cdbi_opening;
 

@@ -240,6 +240,15 @@ typedef struct cdbi_soft {          /* the soft cells of a condition, a row for 
     size_t n_cells, n_spans, n_starts;
 } cdbi_soft;
 
+#define CDB_MOST_ROLES 8            /* roles that can be cast at once, */
+#define CDB_MOST_ACTORS 64          /* and actors */
+
+typedef struct cdb_role {           /* a part that actors play: see cdb_cast */
+    const char *name;
+    uint64_t *required, *optional;  /* the rows that cannot do without it, and those in which somebody plays it who fits */
+    int is_computed;                /* a rule, a derived fact, or a cost that decides picks needs facts of it */
+} cdb_role;
+
 typedef struct cdb_table {
     size_t n_rows;
     size_t n_words;                 /* words of a mask: n_rows / 64, rounded up */
@@ -262,6 +271,8 @@ typedef struct cdb_table {
     uint64_t *asset_keys;           /* a hash of each asset */
     int32_t *asset_numbers;         /* of each row its asset, from 0 in the order in which they come first */
     size_t n_assets;
+    cdb_role *roles;
+    size_t n_roles;
     cdbi_programs programs;
     void *blocks;                   /* the memory that was taken */
     const unsigned char *data;

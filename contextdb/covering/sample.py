@@ -91,7 +91,7 @@ class Sampler:
     def held(self, codes: Codes) -> NDArray[np.bool_]:
         """Which boxes hold each of N contexts: bool [N, boxes]."""
         words, starts = self.masks
-        bits = np.full((len(codes), words.shape[1]), ~np.uint64(0))
+        bits = np.full((len(codes), bitmask.n_words(len(self.space.boxes))), ~np.uint64(0))
         for f in range(codes.shape[1]):
             bits &= words[starts[f] + codes[:, f]]
         return np.unpackbits(bits.view(np.uint8), axis=1, bitorder="little", count=len(self.space.boxes)).astype(np.bool_)

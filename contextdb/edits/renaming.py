@@ -334,8 +334,11 @@ def _premise(part: dict[str, Any], names: Mapping[str, str]) -> None:
         part["when"] = with_names(part["when"], names)
 
 
-def rewritten_toml(path: Path, raw: bytes, change: Callable[[dict[str, Any]], None], moved: Mapping[str, str]) -> Iterator[Rewrite]:
-    """contextdb.toml with a change; only the keys that say something else are written, and a section that moves keeps its lines."""
+def rewritten_toml(
+    path: Path, raw: bytes, change: Callable[[dict[str, Any]], None], moved: Mapping[str, str], kind: str = "conditions"
+) -> Iterator[Rewrite]:
+    """contextdb.toml with a change; only the keys that say something else are written, and a section of `kind` that moves keeps its
+    lines."""
     bom = _BOM if raw.startswith(_BOM) else b""
     text = raw.removeprefix(_BOM).decode()
     before, wanted = tomllib.loads(text), tomllib.loads(text)
@@ -343,7 +346,7 @@ def rewritten_toml(path: Path, raw: bytes, change: Callable[[dict[str, Any]], No
     if wanted == before:
         return
     for old, new in moved.items():
-        text = toml_edit.rename_section(text, ("conditions", old), ("conditions", new)) or text
+        text = toml_edit.rename_section(text, (kind, old), (kind, new)) or text
     for section in ("conditions", "tables", "blueprints", "contracts"):
         text = _with_section(text, section, tomllib.loads(text).get(section, {}), wanted.get(section, {}))
     if tomllib.loads(text) != wanted:

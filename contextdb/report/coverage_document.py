@@ -52,7 +52,7 @@ def section(
     page, where there is room for each finding and row."""
     report, is_page = measured.report, page_number is not None
     asked = measured.asked
-    sentences: list[str | Bar] = [asked.headline, Bar(asked.lower, asked.upper, asked.headline)]
+    sentences: list[str | Bar] = [words.to_do_sentence(measured), asked.headline, Bar(asked.lower, asked.upper, asked.headline)]
     sentences += [] if asked.by == "domain" else [f"Of all contexts alike: {report.headline}"]
     sentences += words.assumed_sentences(report)
     is_listed = measured.expected is None or asked.by == "telemetry" or is_page or most_gaps == MANY
@@ -119,11 +119,8 @@ def _sure(report: CoverageReport) -> str:
 
 def _todo(measured: Measured, most: int) -> Iterator[Block]:
     """What to do for the contexts that are expected, the most expected first."""
-    if measured.expected is None:
-        return
-    todo = measured.expected.todo
+    todo = () if measured.expected is None else measured.expected.todo
     if not todo:
-        yield "Nothing to do: something plays in every situation that is expected."
         return
     rows = [
         Row((words.todo_sentence(measured, item),), (str(i), format_percent(item.share) if item.share else "point"))

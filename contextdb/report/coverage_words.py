@@ -23,6 +23,32 @@ MOST_COUNTS = 6
 """Numbers of rows that the histogram tells one by one."""
 
 
+def to_do_sentence(measured: Measured) -> str:
+    """What to do first about a table."""
+    report, change = measured.report, measured.change
+    if change is not None and change.opened:
+        return f"To do first: close the gap that this change opened, {cells_text(change.opened[0].cells)}."
+    if measured.expected is not None:
+        todo = measured.expected.todo
+        if todo:
+            return f"To do first: {todo_sentence(measured, todo[0]).partition(';')[0]}."
+        return "Nothing to do: something plays in every situation that is expected."
+    played = max(report.gaps, key=lambda gap: gap.telemetry or 0.0, default=None)
+    if played is not None and played.telemetry:
+        moments = format_percent(played.telemetry)
+        return f"To do first: a row for {cells_text(played.cells)}; {moments} of the recorded moments have none."
+    if wrong := next((each for each in report.findings if each.level != "info" and each.row is not None), None):
+        return f"To do first: {measured.named(wrong.row or 0)}, {wrong.rule}: {wrong.message}"
+    if measured.telemetry is not None:
+        return "Nothing to do in play: every recorded moment that the list of gaps holds has a valid row."
+    if change is not None:
+        return "Nothing new to do: this change opened no gap."
+    if played is not None:
+        cells = cells_text(played.cells)
+        return f'To do first: decide whether {cells} can happen. If so, give it a row; if not, exclude it with "assume".'
+    return "Nothing to do: every context has a valid row." if report.gaps_complete else "Nothing to do that is known."
+
+
 def assumed_sentences(report: CoverageReport) -> Iterator[str]:
     """What the share rests on."""
     if report.method == "bounds":

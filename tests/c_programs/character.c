@@ -39,20 +39,27 @@ static void write_all(FILE *out, const void *items, size_t size, size_t n)
     if (fwrite(items, size, n, out) != n) exit(2);
 }
 
-/* An update: seconds, whether there is a ground, and for each its goal, and the words of the rows of a table. */
+/* An update: seconds, whether there is a ground, and for each its goal, and the number of its gait, a fact of the one table. */
 static void update(const cdbm_player *player, size_t n, double *states, cdbm_pose *poses, cdbm_input *inputs, cdbm_room room, FILE *out)
 {
     double dt_s = *(const double *)take(8, 1);
     int64_t numbers[2];
-    const uint64_t **rows = (const uint64_t **)calloc(2 * n + 1, sizeof *rows);
-    size_t i, width = cdbm_state_width(player), n_joints = player->poses.rig.n_joints;
+    const cdb_schema *schema = player->n_tables > 0 ? &player->opened[0]->schema : NULL;
+    int gait = schema ? cdb_condition_number(schema, "gait") : -1;
+    const cdb_fact **lists = (const cdb_fact **)calloc(n, sizeof *lists);
+    cdb_fact *facts = (cdb_fact *)calloc(n * 8, sizeof *facts);
+    size_t i, k, width = cdbm_state_width(player), n_joints = player->poses.rig.n_joints;
+    if (!lists || !facts || (schema && schema->n_conditions > 8)) exit(1);
     memcpy(numbers, take(8, 2), sizeof numbers);
     for (i = 0; i < n; i++) {
         memset(&inputs[i], 0, sizeof inputs[i]);
         memcpy(&inputs[i].goal, take(8, 3), sizeof inputs[i].goal);
         if (numbers[0]) inputs[i].ground = slope;
-        rows[2 * i] = (const uint64_t *)take(8, (size_t)numbers[1]), rows[2 * i + 1] = (const uint64_t *)take(8, (size_t)numbers[1]);
-        if (numbers[1]) inputs[i].rows = rows + 2 * i, inputs[i].mirrored = rows + 2 * i + 1;
+        for (k = 0; schema && k < schema->n_conditions; k++) facts[8 * i + k] = cdbm_missing_fact(&schema->conditions[k]);
+        memcpy(&numbers[1], take(8, 1), 8);
+        if (gait >= 0) facts[8 * i + (size_t)gait].whole = numbers[1];
+        lists[i] = facts + 8 * i;
+        inputs[i].facts = lists + i;
     }
     if (cdbm_update_all(player, n, states, dt_s, inputs, poses, room) != 1) exit(5);
     write_all(out, states, sizeof(double), n * width);
@@ -61,7 +68,8 @@ static void update(const cdbm_player *player, size_t n, double *states, cdbm_pos
         write_all(out, poses[i].root, sizeof(double), 3);
         write_all(out, poses[i].rotations, sizeof(double), 10 * n_joints);
     }
-    free(rows);
+    free(lists);
+    free(facts);
 }
 
 static void try_out(const cdbm_player *player, double *state, cdbm_pose *pose, cdbm_room room)
@@ -71,6 +79,7 @@ static void try_out(const cdbm_player *player, double *state, cdbm_pose *pose, c
     int tick;
     memset(&input, 0, sizeof input);
     input.goal.facing = NAN;
+    input.unknown = CDB_UNKNOWN_ANY;
     for (tick = 0; tick < 40; tick++) {
         input.goal.velocity[1] = tick < 20 ? 1.2 : -2.0;
         if (tick > 10) input.ground = slope;

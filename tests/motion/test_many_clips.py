@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import pickle
+import signal
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -73,6 +75,25 @@ def test_all_cores_build_the_same_bytes_and_fill_the_same_cache(folder: Path):
     *cores, computed = saved(folder, "cores", on_two_cores)
     assert (cores, len(computed)) == (here, N)
     assert saved(folder, "again", engines.here) == (*here, ())
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL here")
+def test_dask_builds_the_same_bytes_although_a_worker_is_killed(folder: Path):
+    distributed = pytest.importorskip("distributed", reason='dask is not installed: pip install "contextdb[dask]"')
+    built = build_all(CONFIG, folder, cache=None)["jog"]
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+        victim, killed = next(iter(cluster.workers.values())).pid, []
+
+        def kill(done: int, total: int, name: str) -> None:
+            if not killed:
+                killed.append(victim)
+                os.kill(victim, signal.SIGKILL)
+
+        there = build_all(CONFIG, folder, None, kill, engines=engines.dask(cluster.scheduler_address, ""))["jog"]
+    assert killed
+    assert there.digest == built.digest
+    assert there.database.layout.blocks.tobytes() == built.database.layout.blocks.tobytes()
+    assert build_all(CONFIG, folder)["jog"].computed == ()  # the workers filled the cache
 
 
 def test_arrays_that_are_too_large_for_memory_give_the_same_bytes(folder: Path, monkeypatch: pytest.MonkeyPatch):

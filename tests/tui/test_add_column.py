@@ -10,10 +10,12 @@ from textual.app import App
 from textual.widgets import Input, Select
 
 from contextdb.edits.edits import NewColumn
+from contextdb.schema.settings import conditions_from_dict
 from contextdb.tables.project import load
 from contextdb.tables.table import Table
 from tui.model.column_choices import Insertion, NewColumnForm, blueprint_fault, blueprints, choices, missing_conditions, places
 from tui.model.condition_form import ConditionForm
+from tui.model.options import CONDITION_OPTIONS
 from tui.screens.add_column import AddColumn
 from tui.screens.blueprints import Blueprints, Drop, Keep
 from tui.screens.dialog import Dialog
@@ -314,3 +316,19 @@ def test_a_rule_is_a_column_to_add_too(table: Table):
     after = Insertion(1, (column,)).edit(table).apply(table)
     assert after.settings.when == "only if"
     assert NewColumnForm("another", "when").read(after)[1] == {"job": 'The table has one already: "only if".'}
+
+
+def test_every_setting_of_a_condition_is_in_the_form_and_comes_back_as_it_was():
+    settings = {
+        "type": "number",
+        "min": 1,
+        "max": 5,
+        "unit": "m",
+        "description": "d",
+        "mirror": "negate",
+        "weight": 2,
+        "owner": "we",
+    }
+    form = ConditionForm.of(conditions_from_dict({"x": settings})["x"])
+    assert {key for key in CONDITION_OPTIONS if key not in ("type", "values") and not getattr(form, key)} == set()
+    assert form.declared() == (settings, {})

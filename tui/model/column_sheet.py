@@ -36,12 +36,12 @@ WORDS = (CONDITION, OUTPUT, ASSET, RULE, *PLAIN_JOBS, DECLARED)
 """What a row can be; "declared": contextdb.toml tells of the condition, and the table has no column of it."""
 HINTS = {
     NAME: "name", IS: "job", TYPE: "type", "Unit": "m/s", "Least": "bound", "Most": "bound", "Values": "names",
-    "Default": "output", "Weight": "number", "Mirror": "pairs", "Expression": "computed as", "Description": "text",
+    "Default": "output", "Weight": "number", "Mirror": "pairs", "Expression": "computed as", "Description": "text", "Owner": "team",
 }  # fmt: skip
 """The columns of the sheet, and what is below their names."""
 _FORM = {key: CONDITION_OPTIONS[key].label for key in TYPED}
 _KEYS = _FORM | {"size": "Values", "default": "Default", "expr": "Expression"}
-_OF_CONDITIONS = ("Weight", "Mirror", "Expression")
+_OF_CONDITIONS = ("Weight", "Mirror", "Expression", "Owner")
 _TOLD = tuple(HINTS)[2:]
 _JOB_OF = {RULE: "when"}
 Parts = dict[str, Mapping[str, object] | None]
@@ -193,7 +193,7 @@ def _require_row(row: ColumnRow) -> dict[str, Any]:
         raise row.wrong(NAME, "A column needs a name; Ctrl+K deletes one.")
     for key in () if row.is_condition else _OF_CONDITIONS:
         if row.texts[key].strip() and row.job not in ("", *JOBS):
-            raise row.wrong(key, f"Only a condition has {'an' if key[0] == 'E' else 'a'} {key.lower()}.")
+            raise row.wrong(key, f"Only a condition has {'an' if key[0] in 'EO' else 'a'} {key.lower()}.")
     if row.is_condition:
         return _condition_keys(row)
     return _output_keys(row) if row.job == OUTPUT else {}
@@ -333,7 +333,7 @@ def _conditions(
         if not row.is_condition or not part or (row.name in declared and not row.is_changed):
             continue
         if row.is_changed or row.job == DECLARED:
-            unchanged = {} if was is None else {k: v for k, v in condition_to_dict(was).items() if k == "hysteresis"}
+            unchanged = {} if was is None else {k: v for k, v in condition_to_dict(was).items() if k in ("hysteresis", "owner")}
             parts[row.name] = {**{k: v for k, v in unchanged.items() if has_place(k, part["type"])}, **part}
     for row, part in zip(rows, texts_of_rows, strict=True):  # an expression names what is declared
         if row.is_condition and part and row.name in _named(rows) and row.name not in declared:

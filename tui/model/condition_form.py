@@ -36,6 +36,7 @@ class ConditionForm:
     """"negate", "none", or names that change places: Left = Right, Up = Down."""
     weight: str = ""
     """What a cell counts under the policy "specific"; empty: 1."""
+    owner: str = ""
 
     @classmethod
     def of(cls, condition: Condition) -> ConditionForm:
@@ -45,7 +46,7 @@ class ConditionForm:
         values = " ".join(quoted(value) for value in domain.values or ())
         weight = "" if condition.weight == 1.0 else repr(condition.weight).removesuffix(".0")
         mirror = _mirror_text(condition.mirror)
-        return cls(domain.kind, low, high, condition.unit, values, condition.description, mirror, weight)
+        return cls(domain.kind, low, high, condition.unit, values, condition.description, mirror, weight, condition.owner)
 
     def of_kind(self, kind: str) -> ConditionForm:
         """The same for another type, without a mirror that has no place there."""
@@ -55,7 +56,8 @@ class ConditionForm:
 
     def declared(self) -> tuple[dict[str, object], dict[str, str]]:
         """What `[conditions.NAME]` would say, and for each field that cannot be read why; fields without a place are left out."""
-        keys: dict[str, object] = {"type": self.kind, "unit": self.unit.strip(), "description": self.description.strip()}
+        texts = {"unit": self.unit, "description": self.description, "owner": self.owner}
+        keys: dict[str, object] = {"type": self.kind, **{key: text.strip() for key, text in texts.items()}}
         wrong: dict[str, str] = {}
         for key, text in (("min", self.min), ("max", self.max)):
             if has_place(key, self.kind) and text.strip():

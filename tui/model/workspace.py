@@ -13,6 +13,7 @@ from contextdb.tables.nesting.links import Neighbours
 from contextdb.tables.places import table_path
 from contextdb.tables.project import read_folder_schema, schema_for, table_files
 from contextdb.tables.table import Table
+from contextdb.tables.variants import is_variant
 
 from .beginning import Beginning, beginning, beginning_from
 from .session import Session
@@ -91,7 +92,7 @@ class Workspace:
         """Let a table whose rows refer to others know of those as they are being edited."""
         session = self.sessions[name]
         table = session.sheet.table
-        if table.around is None or not session.sheet.query.is_nested:
+        if table.around is None or not (session.sheet.query.is_nested or is_variant(table)):
             return
         edited = {other: one.sheet.table for other, one in self.sessions.items() if other != name}
         if edited:
@@ -174,6 +175,12 @@ class Workspace:
         """Take in tables that came to the folder; those that are open stay."""
         open_files = {name: self.files[name] for name in self.sessions if name in self.files}
         self.files = open_files | {n: p for n, p in _tables(self.folder).items() if p not in open_files.values()}
+
+    def forget(self) -> None:
+        """Let go of every table: their files have changed. Each is read again when it is next wanted; what was edited before
+        cannot be taken back."""
+        self.close()
+        self.sessions, self._renames, self._n_renamed = {}, [], 0
 
     def close(self, keep_journals: bool = False) -> None:
         """Let go of every table."""

@@ -16,7 +16,7 @@ from contextdb.tables.changes import Edit
 from contextdb.tables.table import Table
 
 from ..commands import ASSETS, BY_ID, SCREEN, bindings, key_names
-from ..messages import Edited, FillGap, GoToCell, RenameWanted, ValueRenameWanted
+from ..messages import Edited, FillGap, GoToCell, RenameWanted, SetContext, ValueRenameWanted
 from ..model.importing import Import
 from ..model.new_table import make_table, name_fault
 from ..panes.why import WIDE
@@ -25,6 +25,7 @@ from .ask import AskDialog, ChooseDialog
 from .disk_care import LOOK_EVERY_S
 from .export_table import Export
 from .following import Followed
+from .table_files import TableFiles
 from .table_screen import TableScreen
 
 
@@ -119,6 +120,18 @@ class MainScreen(TableScreen):
         make_table(self.workspace.folder, name, conditions)
         self.workspace.look_again()
         self.app.open_table(name)
+
+    def action_rename_table(self) -> None:
+        """Give the table another name, everywhere."""
+        TableFiles(self).rename()
+
+    def action_duplicate_table(self) -> None:
+        """Copy the table, and go to the copy."""
+        TableFiles(self).duplicate()
+
+    def action_delete_table(self) -> None:
+        """Delete the table after a question."""
+        TableFiles(self).delete()
 
     def action_save(self) -> None:
         """Write the table to its file, and what changes to contextdb.toml."""
@@ -302,6 +315,17 @@ class MainScreen(TableScreen):
 
         expected = ExpectedGame(game, self.table_name, self.following.start)
         expected.timer = self.set_interval(LOOK_EVERY_S, expected.look)
+
+    def action_changes(self) -> None:
+        """Which moments play something else since the last save; Enter loads one into the test row."""
+        from .changes import ChangesDialog
+
+        def chosen(answer: SetContext | None) -> None:
+            if answer is not None:
+                self.post_message(answer)
+
+        session = self.session
+        self.app.push_screen(ChangesDialog(session.saved_table, session.sheet.table, self.workspace.folder), chosen)
 
     def action_live(self) -> None:
         """Let the test row follow a game, or a recording."""

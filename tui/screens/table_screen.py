@@ -39,7 +39,7 @@ from .disk_care import DiskCare
 from .following import Following
 from .renames import Renames
 
-TABS = ("assets", "options", "priorities", "coverage", "problems")
+TABS = ("assets", "options", "priorities", "coverage", "problems", "contracts")
 MOTION = "motion"
 """The tab that there is where the project declares motion databases and has a recorded session, and where it was gone to."""
 WITH_TOOLS = 30
@@ -244,6 +244,10 @@ class TableScreen(Screen[None]):
             from ..panes.motion import MotionPane  # loads the motion search
 
             return MotionPane(self.workspace.folder, id=name)
+        if name == "contracts":
+            from ..panes.contracts import ContractsPane  # loads the prover
+
+            return ContractsPane(sheet, id=name)
         return self._coverage_pane(name) if name == "coverage" else ProblemsPane(sheet, id=name)
 
     def _coverage_pane(self, name: str) -> Pane:
@@ -296,6 +300,14 @@ class TableScreen(Screen[None]):
         elif why := session.why_read_only:
             self.say(f"This table is read-only: {why}.", "warning")
         self._show_bars()
+
+    @property
+    def likely_group(self) -> str:
+        """The group of the commands that somebody likely wants here."""
+        grid = self.assets.grid
+        if self.tab != "assets" or grid.is_in_test_row:
+            return "Test row" if grid.is_in_test_row else "Tabs"
+        return "Columns" if self.session.sheet.block.shape[0] > 1 == self.session.sheet.block.shape[1] else "Edit"
 
     def try_to(self, verb: Callable[[], None]) -> None:
         """Do something; what cannot be done is reported."""

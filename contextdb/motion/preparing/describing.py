@@ -201,18 +201,25 @@ def by_rig(clips: Sequence[Clip], paths: Sequence[str]) -> list[RigClips]:
 
 
 def patterns_of(own: Sequence[str], others: set[str]) -> list[str]:
-    """Patterns of files that fit some paths, of one ending each, and none of some others."""
+    """Patterns of files that fit some paths, and none of some others."""
     folders = defaultdict[tuple[str, str], list[str]](list)
     for path in own:
         folder, _, name = path.rpartition("/")
         stem, dot, ending = name.rpartition(".")
         folders[f"{folder}/" if folder else "", f"{dot}{ending}"].append(stem)
-    patterns = []
+    endings = defaultdict[str, list[str]](list)
     for (folder, ending), stems in folders.items():
         beside = [path.removeprefix(folder).removesuffix(ending) for path in others if path.startswith(folder)]
         beside = [stem for stem in beside if "/" not in stem]
-        patterns += [f"{_escaped(folder)}{pattern}{_escaped(ending)}" for pattern in _parted(stems, beside, "")]
-    return patterns
+        for pattern in _parted(stems, beside, ""):
+            endings[f"{_escaped(folder)}{pattern}"].append(_escaped(ending))
+    return [f"{pattern}{_one_of(own)}" for pattern, own in endings.items()]
+
+
+def _one_of(endings: Sequence[str]) -> str:
+    """A pattern of some endings."""
+    has_dots = all(ending.startswith(".") and not set(ending) & set("{},/") for ending in endings)
+    return f".{{{','.join(ending[1:] for ending in endings)}}}" if len(endings) > 1 and has_dots else endings[0]
 
 
 def _parted(own: Sequence[str], others: Sequence[str], start: str) -> Iterator[str]:
@@ -231,8 +238,9 @@ def _escaped(text: str) -> str:
     return "".join(f"[{letter}]" if letter in "*?[" else letter for letter in text)
 
 
-def motion_sections(rigs: Sequence[RigClips], table: str, markup: str | None = None) -> Sections:
-    """What is compared, which databases there are, and a controller for each rig: "player", then "player_2" and so on."""
+def motion_sections(rigs: Sequence[RigClips], table: str, markup: str | None = None, is_by_feet: bool = False) -> Sections:
+    """What is compared, which databases there are, and a controller for each rig: "player", then "player_2" and so on. `is_by_feet`
+    says whether standing feet move the roots of clips on the spot."""
     sections: Sections = {}
     for i, rig in enumerate(rigs):
         behind = "" if i == 0 else f"_{i + 1}"
@@ -247,6 +255,7 @@ def motion_sections(rigs: Sequence[RigClips], table: str, markup: str | None = N
                 "metres_per_unit": rig.clips[0].metres_per_unit,
                 "up": rig.clips[0].up,
                 "mirror": bool(mirror),
+                **({"root": "feet"} if is_by_feet else {}),
                 **({"markup": markup} if markup is not None else {}),
                 **({"roles": list(rig.roles)} if rig.roles else {}),
             }

@@ -53,6 +53,35 @@ class Played:
     output: PoseSettings
 
 
+@dataclass(frozen=True, eq=False)
+class TableFile:
+    """A table to put into a bundle.
+
+    Attributes
+    ----------
+    octets : bytes
+        Its compiled file.
+    assets : sequence of str
+        Those of its rows.
+    own_facts : mapping of condition to letter
+        The facts that a character adds: "s" its speed, "d" the direction of its stick, "t" its turn.
+    mirror : mapping of condition to text
+        How facts change in a mirror: "n" negated, "p=NAME" that of another condition, "v=1 0" enum values by their numbers.
+    """
+
+    octets: bytes
+    assets: Sequence[str]
+    own_facts: Mapping[str, str] = field(default_factory=dict)
+    mirror: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def parts(self) -> list[bytes]:
+        """What a bundle says of facts."""
+        own = [f"{letter}{name}" for name, letter in self.own_facts.items()]
+        mirrored = [f"{text[0]}{name}{text[1:]}" for name, text in self.mirror.items()]
+        return [_texts(own), _texts(mirrored)]
+
+
 @dataclass
 class Bundle:
     """Parts as they are collected. `bytes()` of it is the file."""
@@ -81,9 +110,7 @@ class Bundle:
         return MAGIC + np.array([24 + len(head), digest], "<u8").tobytes() + head
 
 
-def bundle_of(
-    players: Mapping[str, Played], table_of: Mapping[str, str], tables: Mapping[str, tuple[bytes, Sequence[str]]]
-) -> bytes:
+def bundle_of(players: Mapping[str, Played], table_of: Mapping[str, str], tables: Mapping[str, TableFile]) -> bytes:
     """The bytes of a bundle.
 
     Parameters
@@ -92,8 +119,7 @@ def bundle_of(
         The controllers by their names.
     table_of : mapping of str to str
         The table of each database, of those that have one.
-    tables : mapping of str to (bytes, sequence of str)
-        The compiled file of each table, and the assets of its rows.
+    tables : mapping of str to TableFile
 
     Raises
     ------
@@ -103,8 +129,8 @@ def bundle_of(
     _check(players)
     bundle, numbers, names = Bundle(), {name: i for i, name in enumerate(tables)}, list[str]()
     banks = {name: bank for player in players.values() for name, bank in (player.banks or {}).items()}
-    for number, (name, (octets, _)) in enumerate(tables.items()):
-        bundle.add(TABLE, number, [octets, _texts([name])])
+    for number, (name, table) in enumerate(tables.items()):
+        bundle.add(TABLE, number, [table.octets, _texts([name]), *table.parts])
     for number, (name, player) in enumerate(players.items()):
         entries = []
         for database in player.controller.chooser.names:
@@ -132,9 +158,7 @@ def _check(players: Mapping[str, Played]) -> None:
         raise MotionError(*faults)
 
 
-def _add_database(
-    bundle: Bundle, number: int, player: Played, name: str, bank: PoseBank | None, table: tuple[bytes, Sequence[str]] | None
-) -> None:
+def _add_database(bundle: Bundle, number: int, player: Played, name: str, bank: PoseBank | None, table: TableFile | None) -> None:
     chooser = player.controller.chooser
     at = chooser.names.index(name)
     database = chooser.databases[at]
@@ -147,7 +171,7 @@ def _add_database(
     ranges = None if bank is None else np.array([bank.range_of(*each) for each in _clips(database)], np.int64)
     rows: Sequence[Part] = (None, None, None)
     if table is not None:
-        row_starts, row_numbers, mirrored, _ = chooser.rows_of(name, table[1])
+        row_starts, row_numbers, mirrored, _ = chooser.rows_of(name, table.assets)
         rows = mirrored, row_starts, row_numbers
     measures = kinds, offset, scale, channels, channel_weights, roots
     played = starts, stops, looping, root, marks, weights, own

@@ -16,13 +16,13 @@ _TEXT = """
 #ifdef __cplusplus
 extern "C" {{
 #endif
-#if defined(__clang__) && defined(__cplusplus) /* numbers of words go among others, as doubles */
+#if defined(__clang__) /* numbers of words go among others, as doubles */
 #pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wunknown-warning-option"
 #pragma clang diagnostic ignored "-Wenum-float-conversion"
 #endif
 {motion}
-#if defined(__clang__) && defined(__cplusplus)
+#if defined(__clang__)
 #pragma clang diagnostic pop
 #endif
 #ifdef __cplusplus

@@ -54,6 +54,12 @@ def test_the_same_clips_give_the_same_bytes(game: Path):
     assert describe("game/clips", "--json").out == describe("game/clips", "--json").out
 
 
+def test_clips_of_which_none_stands_are_told_so(game: Path):
+    assert "no clip stands" not in describe("game/clips").err
+    (game / "clips" / "idle.bvh").unlink()
+    assert "no clip stands: whoever stops marches on the spot. Expected: a clip with the gait Idle." in describe("game/clips").err
+
+
 def test_a_document_has_cells_and_measures(game: Path):
     document = describe("game/clips", "--json").json
     assert document["format"] == 1

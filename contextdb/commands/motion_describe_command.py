@@ -21,7 +21,6 @@ import io
 from collections.abc import Sequence
 from pathlib import Path
 
-from contextdb.authoring.clip_folder import FolderClips
 from contextdb.authoring.described_table import (
     ASSET,
     ClipRows,
@@ -70,7 +69,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         is_playable = motion is not None
         made = described_table(fills, motion or {}, updates=arguments.update)
         made.write()
-    _tell(folder_clips, made, fills, is_playable, arguments)
+    _tell(clips, made, fills, is_playable, arguments)
     with output():
         if arguments.json:
             print(as_json(_document(clips, made, fills)), end="")
@@ -82,12 +81,16 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     return ExitCode.FOUND if folder_clips.left_out or differs or not is_playable else ExitCode.OK
 
 
+NOTHING_STANDS = ["no clip stands: whoever stops marches on the spot. Expected: a clip with the gait Idle."]
+
+
 def _tell(
-    folder_clips: FolderClips, made: DescribedTable | None, fills: Filling | None, is_playable: bool, arguments: argparse.Namespace
+    clips: ClipRows, made: DescribedTable | None, fills: Filling | None, is_playable: bool, arguments: argparse.Namespace
 ) -> None:
     """Say on standard error what was taken for granted or left out."""
-    lines = [*folder_clips.notes, *(f"left out: {message}" for message in folder_clips.left_out)]
+    lines = [*clips.source.notes, *(f"left out: {message}" for message in clips.source.left_out)]
     lines += [] if fills is None else fills.notes
+    lines += NOTHING_STANDS if clips.rows and all(row.facts.gait != "Idle" for row in clips.rows) else []
     if fills is not None and fills.without_clip:
         lines.append(f"no clip for {plural(len(fills.without_clip), 'row')}: {some(fills.without_clip)}")
     if not is_playable:

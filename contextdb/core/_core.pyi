@@ -408,6 +408,7 @@ class Controllers:
         min_rate: float,
         max_rate: float,
         grace_s: float,
+        settle_s: float,
         until_natural: bool,
     ) -> None: ...
     @property

@@ -35,6 +35,7 @@ typedef struct cdbm_clips {   /* a database, as a controller sees it; without fr
     const uint8_t *marks;            /* [K] flags of each kind of frames */
     const double *root_weights;      /* [K] */
     size_t n_ranges, n_kinds, n_permutations;
+    double settle;                   /* added to the cost of what was entered just now */
     double rate, threshold, bar, continuing; /* frames a second; the cost below which it wins outright; what a forced jump may cost */
     size_t pace, n_pace;             /* the features that say how fast a path goes, none where n_pace is 0 */
     double pace_s;
@@ -44,7 +45,7 @@ typedef struct cdbm_clips {   /* a database, as a controller sees it; without fr
 typedef struct cdbm_controller { /* what characters share */
     const cdbm_clips *databases;
     size_t n_databases, n_features, n_played; /* n_played: so much of what was played is remembered at most */
-    double search_every_s, jump_threshold_s, history_s, min_rate, max_rate, grace_s;
+    double search_every_s, jump_threshold_s, history_s, min_rate, max_rate, grace_s, settle_s;
     int until_natural;
 } cdbm_controller;
 
@@ -56,6 +57,7 @@ typedef struct cdbm_state {
     cdbm_playing playing;
     double n_played;             /* behind the state */
     cdb_row_play play;           /* how the row of what plays says that it does */
+    double entered_s;            /* when it was entered */
 } cdbm_state;
 
 typedef struct cdbm_moved {
@@ -773,6 +775,17 @@ static inline void cdbm_compare(const cdbm_controller *controller, const cdbm_gi
         decision->continuing_cost = cdbm_continuing_cost(controller, given, i, &move->to, is_wide ? given->wide[i] : NAN, room);
 }
 
+/* Whether what plays was entered so lately that it plays on though something else costs a little less. */
+static inline int cdbm_settles(const cdbm_controller *controller, const cdbm_state *state, const cdbm_moved *move,
+    const cdbm_decision *decision)
+{
+    double stayed_s = decision->time_s - state->entered_s, left = 1.0 - stayed_s / controller->settle_s;
+    double settle = move->to.database < 0.0 ? 0.0 : controller->databases[(size_t)move->to.database].settle;
+    if (!(decision->continuing_cost == decision->continuing_cost) || settle == 0.0 || !(left > 0.0)) return 0;
+    if (decision->is_under != 0.0 && decision->winner != move->to.database) return 0; /* a priority database wins outright */
+    return decision->continuing_cost + settle * left <= decision->chosen[3];
+}
+
 /* Put a decision into the next row. */
 static inline void cdbm_go_on(const cdbm_controller *controller, const cdbm_state *state, double *after, const cdbm_decision *decision)
 {
@@ -785,6 +798,7 @@ static inline void cdbm_go_on(const cdbm_controller *controller, const cdbm_stat
         double span[2];
         span[0] = decision->playing.frame, span[1] = decision->playing.frame + 1.0;
         cdbm_remember(controller, after, (size_t)decision->playing.range, span);
+        next->entered_s = next->time_s;
     }
     if (decision->held == CDBM_NOT_HELD || decision->held == CDBM_BY_HYSTERESIS) next->waiting_since_s = NAN;
     else if (decision->held == CDBM_BY_BAR && !(next->waiting_since_s == next->waiting_since_s)) next->waiting_since_s = next->time_s;
@@ -799,7 +813,7 @@ static inline void cdbm_decide(const cdbm_controller *controller, const cdbm_giv
     const double *query = given->queries + i * controller->n_features;
     int is_there = move->to.database >= 0.0, is_searched = decision->cause != CDBM_NOT_DUE;
     int goes_on = decision->chosen[0] == CDBM_GO_ON || (decision->current >= 0.0 && decision->chosen[0] == move->to.database
-        && decision->chosen[2] == decision->current);
+        && decision->chosen[2] == decision->current) || cdbm_settles(controller, state, move, decision);
     double wanted;
     decision->playing = move->to;
     decision->action = move->n_loops != 0.0 ? CDBM_LOOPS : CDBM_PLAYS_ON;

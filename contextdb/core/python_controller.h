@@ -10,15 +10,15 @@ typedef struct cdbp_controller {
     int is_made;
 } cdbp_controller;
 
-/* One database: (frames, starts, stops, looping, root or None, marks, root_weights, rate, threshold, bar, continuing, permutations, pace, n_pace,
+/* One database: (frames, starts, stops, looping, root or None, marks, root_weights, rate, threshold, bar, continuing, settle, permutations, pace, n_pace,
  * pace_s). */
 static int cdbp_take_clips(cdbp_controller *own, PyObject *part, cdbm_clips *to, cdbp_arrays *a)
 {
     PyObject *frames, *in[6];
     long long n_permutations, pace, n_pace;
     size_t s[3];
-    if (!PyArg_ParseTuple(part, "OOOOOOOddddLLLd", &frames, &in[0], &in[1], &in[2], &in[3], &in[4], &in[5], &to->rate, &to->threshold,
-        &to->bar, &to->continuing, &n_permutations, &pace, &n_pace, &to->pace_s)) return -1;
+    if (!PyArg_ParseTuple(part, "OOOOOOOdddddLLLd", &frames, &in[0], &in[1], &in[2], &in[3], &in[4], &in[5], &to->rate, &to->threshold,
+        &to->bar, &to->continuing, &to->settle, &n_permutations, &pace, &n_pace, &to->pace_s)) return -1;
     to->range_at = own->n_ranges, to->kind_at = own->n_kinds, to->frame_at = own->n_frames;
     if (frames == Py_None) return 0;
     if (!cdbp_is_freed_by(Py_TYPE(frames), cdbp_frames_free) || !((cdbp_frames *)frames)->is_made) {
@@ -39,7 +39,7 @@ static int cdbp_take_clips(cdbp_controller *own, PyObject *part, cdbm_clips *to,
     return 0;
 }
 
-/* Controllers(databases, n_played, search_every_s, jump_threshold_s, history_s, min_rate, max_rate, grace_s, until_natural) */
+/* Controllers(databases, n_played, search_every_s, jump_threshold_s, history_s, min_rate, max_rate, grace_s, settle_s, until_natural) */
 static int cdbp_controller_init(PyObject *self, PyObject *arguments, PyObject *named)
 {
     cdbp_controller *own = (cdbp_controller *)self;
@@ -49,8 +49,8 @@ static int cdbp_controller_init(PyObject *self, PyObject *arguments, PyObject *n
     Py_ssize_t n, i;
     int is_right = 1;
     (void)named;
-    if (own->parts || !PyArg_ParseTuple(arguments, "OLddddddp", &parts, &n_played, &to->search_every_s, &to->jump_threshold_s,
-        &to->history_s, &to->min_rate, &to->max_rate, &to->grace_s, &to->until_natural)) {
+    if (own->parts || !PyArg_ParseTuple(arguments, "OLdddddddp", &parts, &n_played, &to->search_every_s, &to->jump_threshold_s,
+        &to->history_s, &to->min_rate, &to->max_rate, &to->grace_s, &to->settle_s, &to->until_natural)) {
         if (!PyErr_Occurred()) PyErr_SetString(PyExc_TypeError, "Controllers are made once");
         return -1;
     }

@@ -492,3 +492,19 @@ def test_recording_changes_no_decision():
     database = line(walk=range(10), run=range(2, 12))
     plain, recorded = controller(database), controller(database, recorder=Recorder(3))
     assert [told(plain.update(DT, place)) for place in asked] == [told(recorded.update(DT, place)) for place in asked]
+
+
+def test_what_was_entered_just_now_is_left_for_a_large_gain_alone_and_says_so():
+    settings = ControllerSettings(
+        rate=RATE, search_every_s=0.1, jump_threshold_s=0.0, history_s=0.0, settle_bias=-5.0, settle_s=1.0
+    )
+    one = Controller(Selector([Entry("a", line(walk=range(20), run=[9.0] * 20))]), settings)
+    assert one.update(DT, [0.0]).playing.asset == "walk"
+    held = one.update(DT, [3.0])
+    assert (held.playing.asset, held.action, held.continuing_cost) == ("walk", Action.CONTINUE, 4.0)
+    assert held.why == (
+        "A search was due: playing on costs 4; the best, 0, is too little less to leave it 0.10 s after it was entered."
+    )
+    later = [one.update(DT, [float(tick)]) for tick in range(2, 10)][-1]
+    assert later.playing.asset == "walk"
+    assert one.update(DT, [7.5]).action is Action.JUMP

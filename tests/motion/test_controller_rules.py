@@ -35,6 +35,7 @@ def scenes(draw):
     rules = {key: draw(seconds) for key in ("search_every_s", "jump_threshold_s", "history_s", "grace_s")}
     rules["cost_bar"] = draw(st.sampled_from([None, 0.0, 1.0, 4.0]))
     rules["until_natural"] = draw(st.booleans())
+    rules["settle_bias"], rules["settle_s"] = draw(st.sampled_from([None, -0.77, -2.3, -9.1])), draw(st.sampled_from([0.2, 0.5]))
     masks = st.one_of(st.none(), st.lists(st.booleans(), min_size=len(names), max_size=len(names)))
     asked = draw(st.lists(st.tuples(st.integers(0, 6), masks, st.sampled_from([False] * 4 + [True])), min_size=1, max_size=25))
     return made, rules, asked
@@ -61,7 +62,8 @@ class Oracle:
         self.n = {key: round(seconds * RATE) for key, seconds in rules.items() if key.endswith("_s")}
         self.bar, self.is_until_natural = math.inf if rules["cost_bar"] is None else rules["cost_bar"], rules["until_natural"]
         self.frame, self.tick, self.searched_at, self.played = None, 0, 0, {}
-        self.held, self.waiting_from = "", None
+        self.held, self.waiting_from, self.entered_at = "", None, 0
+        self.settle_bias, self.settle_s = rules["settle_bias"] or 0.0, rules["settle_s"]
 
     def update(self, place, mask, interrupt=False):
         self.tick += 1
@@ -89,6 +91,7 @@ class Oracle:
             return Action.HOLD if following is None else onward, True, self.frame
         if chosen == following and (may_continue or not searched):
             return onward, searched, chosen
+        self.entered_at = self.tick
         return Action.START if before is None else Action.JUMP, True, chosen
 
     def _held_by_nature(self, following, is_looped):
@@ -133,10 +136,14 @@ class Oracle:
             if not is_current and not self._may_enter(frame, mask, here, is_ended):
                 continue
             cost = self._cost(frame, place)
-            cost += self.database.biases.continuing if is_current else 0.0
+            cost += self.database.biases.continuing + self._settling() if is_current else 0.0
             if cost < least or (cost == least and is_current):
                 found, least = frame, cost
         return found
+
+    def _settling(self):
+        """What was entered just now is left for a large gain only."""
+        return self.settle_bias * max(0.0, 1.0 - (self.tick - self.entered_at) / RATE / self.settle_s)
 
     def _may_enter(self, frame, mask, here, is_ended):
         mark = self.database.marks.mark_of(frame)

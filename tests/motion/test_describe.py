@@ -201,6 +201,14 @@ def test_a_mirrored_turn_leaves_the_other_side_to_its_mirror():
     assert both["walk_turn_left_90"] == alone["walk_turn_left_90"] == ">=35"
 
 
+def test_where_no_normal_clip_stands_another_stands_for_all_styles():
+    clips = [make_clip(name).clip for name in ("idle", "walk", "walk_tired")]
+    clips[0] = replace(clips[0], name="idle_sad")
+    rows = motion.describe(clips)
+    assert {row.asset: row.cells["style"] for row in rows} == {"idle_sad": "Any", "walk": "normal sad", "walk_tired": "tired"}
+    assert table_section(rows, "Asset Name")["fallback"] == "idle_sad"
+
+
 def test_a_normal_clip_serves_styles_without_one_of_its_gait():
     clips = [make_clip(name).clip for name in ("idle", "walk", "walk_tired")]
     styles = {row.asset: row.cells["style"] for row in motion.describe(clips)}

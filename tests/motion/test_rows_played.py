@@ -116,7 +116,7 @@ def test_a_row_is_entered_at_its_second_and_nowhere_else():
     trace = one.record(2000)
     entered = [update.decision for update in driven(one, 300) if update.decision.action in (Action.START, Action.JUMP)]
     of_rows = [(each.playing.asset, each.playing.time_s) for each in entered if starts[each.playing.asset]]
-    assert len(of_rows) > 3
+    assert len(of_rows) > 2
     assert all(time_s == pytest.approx(float(starts[asset]), abs=0.5 / 30.0) for asset, time_s in of_rows)
     assert any(candidates.counts.get(LeftOut.START) for each in trace if each.searched for _, candidates in each.candidates)
 

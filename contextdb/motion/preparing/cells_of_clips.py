@@ -83,7 +83,8 @@ def _grouped(members: Iterable[int], key: Callable[[int], Key]) -> dict[Key, lis
 
 
 def _styles(facts: Sequence[ClipFacts], rigs: Sequence[Hashable]) -> dict[int, str]:
-    """The styles of each clip: its own; of a normal clip also those of its rig that have no clip of its gait."""
+    """The styles of each clip: its own; of a normal clip also those of its rig that have no clip of its gait. Where no normal clip
+    stands, those that do stand for all styles without one."""
     styles = sorted({each.style for each in facts})
     if len(styles) == 1:
         return {}
@@ -94,7 +95,8 @@ def _styles(facts: Sequence[ClipFacts], rigs: Sequence[Hashable]) -> dict[int, s
         has |= {(rig, gait, each.style) for gait in each.gaits}
     style_of = {}
     for i, each in enumerate(facts):
-        also = {style for style in of_rig[rigs[i]] if each.style == NORMAL and (rigs[i], each.gait, style) not in has}
+        lends = each.style == NORMAL or (each.gait == "Idle" and (rigs[i], "Idle", NORMAL) not in has)
+        also = {style for style in of_rig[rigs[i]] if lends and (rigs[i], each.gait, style) not in has}
         own = [style for style in styles if style in {each.style, *also}]
         others = [style for style in styles if style not in own]
         style_of[i] = " ".join(own) if len(own) <= len(others) + 1 else " ".join(("not", *others)) if others else ANY

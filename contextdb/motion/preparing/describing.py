@@ -167,9 +167,14 @@ def table_section(rows: Sequence[Described], asset_column: str) -> dict[str, obj
     """What a new table of some rows is, beside its file."""
     outputs = {"duration_s": {"type": "number", "default": 0.0}, "start": {"type": "text"}, "end": {"type": "text"}}
     alone = [row for row in rows if row.cells["gait"]]
-    fallback = min(alone, key=lambda row: (row.facts.style != NORMAL, row.facts.speed_mps.middle), default=None)
+    fallback = min(alone, key=_fallback_rank, default=None)
     section: dict[str, object] = {"asset": asset_column, "policy": "collect", "outputs": outputs}
     return section | ({"fallback": fallback.asset} if fallback is not None else {})
+
+
+def _fallback_rank(row: Described) -> tuple[bool, bool, float]:
+    """A clip that stands comes first, then a normal one, then the slowest."""
+    return row.facts.gait != "Idle", row.facts.style != NORMAL, row.facts.speed_mps.middle
 
 
 @dataclass(frozen=True, eq=False)

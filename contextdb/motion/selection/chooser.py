@@ -37,8 +37,8 @@ from contextdb.motion.selection.search_options import Among, OfPenalties, OfTags
 from contextdb.motion.selection.selector import Selector, choice_of
 
 ASK, CHOOSE, DECIDE = 1, 2, 4
-N_STATE, N_PLAYED, N_MOVED, N_DECISION = 18, 4, 16, 39
-PLAYING, N_REMEMBERED, PLAY = slice(5, 9), 9, slice(10, 18)
+N_STATE, N_PLAYED, N_MOVED, N_DECISION = 19, 4, 16, 39
+PLAYING, N_REMEMBERED, PLAY, ENTERED = slice(5, 9), 9, slice(10, 18), 18
 ACTION, CAUSE, HELD, STANDING, WINNER, IS_UNDER, CHOSEN, CURRENT = 2, 3, 4, 5, 16, 17, slice(18, 22), 29
 """Columns of a row, and of a decision."""
 NEW, WIDENED = (0.0, 2.0), 1.0
@@ -229,6 +229,7 @@ class Chooser:
             settings.min_play_rate,
             settings.max_play_rate,
             settings.grace_s,
+            settings.settle_s,
             settings.until_natural,
         )
         self.width: int = self.core.width
@@ -253,7 +254,7 @@ class Chooser:
         """One database as the core takes it."""
         threshold = math.nan if entry.threshold is None else float(entry.threshold)
         if database is None:
-            return (None,) * 7 + (rate, threshold, math.inf, 0.0, 1, 0, 0, 1.0)
+            return (None,) * 7 + (rate, threshold, math.inf, 0.0, 0.0, 1, 0, 0, 1.0)
         marks, root = database.marks, database.root
         pace = None if database.schema is None else database.schema.speed_features
         columns, pace_s = (slice(0, 0), 1.0) if pace is None else pace
@@ -266,6 +267,7 @@ class Chooser:
             threshold,
             self.settings.bar_of(database),
             database.biases.continuing,
+            self.settings.settle_of(database),
             database.n_permutations,
             columns.start,
             columns.stop - columns.start,
@@ -285,6 +287,7 @@ class Chooser:
         row[0, :5] = state.tick, state.time_s, state.since_search_s, state.play_rate, waiting_s
         row[0, PLAYING] = NO_DATABASE, 0.0, 0.0, 0.0
         row[0, PLAY] = np.nan if state.play is None else state.play.numbers
+        row[0, ENTERED] = state.entered_s
         if (playing := state.playing) is not None:
             at = self._range_of(playing)
             row[0, PLAYING] = (GONE, 0.0, 0.0, 0.0) if at is None else (*at, self._frame_at(at, playing.time_s), playing.time_s)
@@ -320,7 +323,8 @@ class Chooser:
         each = [row[N_STATE + N_PLAYED * i : N_STATE + N_PLAYED * (i + 1)] for i in range(int(row[N_REMEMBERED]))]
         history = tuple(Played(self.names[int(d)], int(start), int(stop), played_s) for d, start, stop, played_s in each)
         waiting_since_s = None if math.isnan(waiting_s) else waiting_s
-        return ControllerState(int(tick), time_s, playing, since_s, history, recent, rate, waiting_since_s, RowPlay.of(row[PLAY]))
+        known = waiting_since_s, RowPlay.of(row[PLAY]), row[ENTERED]
+        return ControllerState(int(tick), time_s, playing, since_s, history, recent, rate, *known)
 
     def playing(self, numbers: Sequence[float]) -> Playing | None:
         """What plays, of its database, range, frame and second; None for nothing."""

@@ -21,6 +21,10 @@ from contextdb.motion.selection.variation import Variation
 USUAL_BAR = 1.0
 """Half of what two frames cost on average that have nothing to do with each other."""
 
+USUAL_SETTLING = -0.6
+"""Measured with `settle_s` on halves of captured clips: the smallest with which circles and eights jump less than once a second;
+turns and stops are reached as soon as without."""
+
 
 def _seconds(about: str, default: float, note: str = "") -> Any:
     return number(about, default, 0.0, unit="seconds", note=note)
@@ -60,6 +64,11 @@ class ControllerSettings(Declared, error=MotionError):
         without=f"{USUAL_BAR}; into a database made from features, whose costs have a scale of their own, none waits",
     )  # fmt: skip
     grace_s: float = _seconds("For how long such a jump waits at most; then it is taken, as the last resort.", 0.3, "0 is no grace")
+    settle_bias: float | None = number(
+        "Added to the cost of what was entered just now, so that a small gain brings no other jump soon.", None, -1e3, 0.0,
+        unit="a cost", such_as=USUAL_SETTLING, without=f"{USUAL_SETTLING}; 0 where a database is made from features",
+    )  # fmt: skip
+    settle_s: float = number("The time in which that fades to nothing.", 1.5, 1e-3, unit="seconds")
     until_natural: bool = flag("Whether an asset that does not loop plays on to its end when it is no longer valid.", False)
 
     def bar_of(self, database: MotionDatabase) -> float:
@@ -67,6 +76,12 @@ class ControllerSettings(Declared, error=MotionError):
         if self.cost_bar is not None:
             return self.cost_bar
         return math.inf if database.schema is None else USUAL_BAR
+
+    def settle_of(self, database: MotionDatabase) -> float:
+        """What is added to the cost of a frame of a database that was entered just now."""
+        if self.settle_bias is not None:
+            return self.settle_bias
+        return 0.0 if database.schema is None else USUAL_SETTLING
 
 
 _VARIATION = {f"variation_{key}": each for key, each in settings_of(Variation).items()}

@@ -45,6 +45,8 @@ class ControllerState:
         Since when a forced jump over the cost bar waits, in seconds of play; None when none does.
     play : RowPlay or None
         How the row of what plays says that it does; None where it says nothing.
+    entered_s : float
+        When what plays was entered, in seconds of play.
     rng : object
         Where the random generator is; None without one.
     """
@@ -58,4 +60,5 @@ class ControllerState:
     play_rate: float = 1.0
     waiting_since_s: float | None = None
     play: RowPlay | None = None
+    entered_s: float = 0.0
     rng: object = None

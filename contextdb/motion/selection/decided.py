@@ -13,7 +13,7 @@ from contextdb.motion.search.candidates import Candidates
 from contextdb.motion.search.filters import Filter
 from contextdb.motion.selection import trigger
 from contextdb.motion.selection.choice import Choice
-from contextdb.motion.selection.chooser import Updates
+from contextdb.motion.selection.chooser import ENTERED, Updates
 from contextdb.motion.selection.decision import Action, Decision, Playing
 from contextdb.motion.selection.guards import Held
 from contextdb.motion.selection.inputs import Inputs
@@ -89,7 +89,7 @@ def decision_of(updates: Updates, i: int, was: Playing | None, asked: Told) -> D
         tick=int(numbers.tick),
         time_s=numbers.time_s,
         action=ACTIONS[int(numbers.action)],
-        why=_why(updates, numbers, cause, before, choice),
+        why=_why(updates, i, numbers, cause, before, choice),
         searched=cause is not None,
         playing=before if is_same else chooser.playing(numbers.playing),
         before=before,
@@ -123,7 +123,7 @@ def _inputs(updates: Updates, asked: Told) -> Inputs:
     return Inputs(updates.given.dt_s, asked.force, asked.interrupt, among, tags, chooser.settings)
 
 
-def _why(updates: Updates, numbers: Numbers, cause: Trigger | None, before: Playing | None, choice: Choice | None) -> str:
+def _why(updates: Updates, i: int, numbers: Numbers, cause: Trigger | None, before: Playing | None, choice: Choice | None) -> str:
     """The decision in one sentence."""
     held, chooser = HELD[int(numbers.held)], updates.chooser
     if cause is None or choice is None:
@@ -149,5 +149,10 @@ def _why(updates: Updates, numbers: Numbers, cause: Trigger | None, before: Play
         return trigger.last_resort(why, bar, numbers.waited_s) if is_over else why
     assert before is not None, "only what plays can play on"
     assert numbers.continuing_cost is not None, "a frame that wins has a cost"
-    why = trigger.continued(cause, before, numbers.continuing_cost, choice.hit.cost)
+    varies, best = chooser.settings.variation, choice.hit.cost
+    if numbers.continuing_cost > best + (0.0 if varies is None else varies.within):
+        stayed_s = numbers.time_s - float(updates.before[i, ENTERED])
+        why = trigger.settling(cause, before, numbers.continuing_cost, best, stayed_s)
+    else:
+        why = trigger.continued(cause, before, numbers.continuing_cost, best)
     return trigger.by_hysteresis(why, before) if held is Held.HYSTERESIS else why

@@ -75,6 +75,12 @@ def continued(trigger: Trigger, before: Playing, cost: float, best: float) -> st
     return f"{text}, the least." if cost <= best else f"{text}, about as little as the best, {best:.4g}."
 
 
+def settling(trigger: Trigger, before: Playing, cost: float, best: float, stayed_s: float) -> str:
+    """The reason when something else costs less, and what plays was entered only now."""
+    text = f"{trigger.sentence(before)}: playing on costs {cost:.4g}"
+    return f"{text}; the best, {best:.4g}, is too little less to leave it {stayed_s:.2f} s after it was entered."
+
+
 def nothing_else(trigger: Trigger, before: Playing | None, is_held: bool) -> str:
     """The reason when the search finds nothing."""
     if before is None or trigger is Trigger.LOST:

@@ -51,6 +51,7 @@ SECTIONS = {
     "Blueprints": ("Blueprints",),
     "Autofill": ("AutofillDialog",),
     "Find in all tables": ("FindEverywhere",),
+    "What changes": ("ChangesDialog",),
     "Why, and nearest rows": ("NearestDialog",),
     "Actors": ("ActorsDialog",),
     "Contexts": ("ContextsDialog",),

@@ -10,10 +10,11 @@ from datetime import date, timedelta
 from pathlib import Path
 
 import pytest
-from c_compilers import C, built
+from c_compilers import CXX, C, built, compiler_for, ran, sanitizers
 
 import contextdb as cdb
 from contextdb.compiled.c_header import c_header_of
+from contextdb.compiled.engine_facts import csharp_of, godot_of, unreal_of
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 LIBRARY = ["-fPIC", "-shared", "-fvisibility=hidden", "-O1"]
@@ -179,3 +180,183 @@ def test_mono_gives_the_rows_and_picks_of_python(project: Path):
     done = run("env", f"LD_LIBRARY_PATH={project}", mono, "Play.exe", "moves.safetensors", "bad.txt", cwd=project)
     assert (done.returncode, done.stdout) == (1, "")
     assert "header" in done.stderr
+
+
+# ---- facts as types of the engines
+
+FACTS = {
+    "gait": "Run",
+    "speed": 3.25,
+    "heading": -170.5,
+    "wounds": 4,
+    "day": "2026-02-03",
+    "mood": "Größe",
+    "tags": ["Größe"],
+    "heard": ["shot"],
+}
+CSHARP = """
+using System;
+using ContextDB;
+
+static class Game
+{
+    static void Main()
+    {
+        using (var table = ContextTable.Open("moves.safetensors", 7))
+        {
+            var facts = new MovesFacts(table);
+            facts.Gait = Gait.Run;
+            facts.Speed = 3.25;
+            facts.Heading = -170.5;
+            facts.Wounds = 4;
+            facts.Day = new DateTime(2026, 2, 3);
+            facts.Mood = "Gr\u00f6\u00dfe";
+            facts.Tags = new[] { "Gr\u00f6\u00dfe" };
+            facts.Heard = new[] { "shot" };
+            table.Query();
+            Console.WriteLine(string.Join(" ", table.Rows));
+        }
+    }
+}
+"""
+GDSCRIPT = """extends SceneTree
+
+const Facts = preload("res://facts.gd")
+const ContextTable = preload("res://context_table.gdns")
+
+func _init():
+	var facts = Facts.MovesFacts.new()
+	facts.fact_Gait = Facts.Gait.Run
+	facts.fact_Speed = 3.25
+	facts.fact_Heading = -170.5
+	facts.fact_Wounds = 4
+	facts.fact_Day = "2026-02-03"
+	facts.fact_Mood = "Größe"
+	facts.fact_Tags = ["Größe"]
+	facts.fact_Heard = ["shot"]
+	var table = ContextTable.new()
+	table.open(ProjectSettings.globalize_path("res://moves.safetensors"), 7)
+	var answer = File.new()
+	answer.open("res://answer.json", File.WRITE)
+	answer.store_string(to_json(table.query(facts.facts())))
+	answer.close()
+	quit()
+"""
+UNREAL = """#define CDB_FILES
+#include <stdio.h>
+#include "Facts.h"
+
+int main(int argc, char **argv)
+{
+    size_t size = 0;
+    void *bytes = cdb_read_file(argv[argc - 1], &size, NULL);
+    cdb_any *any = cdb_open_any(bytes, size, NULL);
+    cdb_live *live = cdb_live_of(any, CDB_UNKNOWN_ERROR, malloc(cdb_live_bytes(&any->schema)));
+    uint64_t rows[1];
+    FCdbTexts texts;
+    FMovesFacts facts;
+    facts.Gait = EGait::Run;
+    facts.Speed = 3.25;
+    facts.Heading = -170.5;
+    facts.Wounds = 4;
+    facts.Day = "2026-02-03";
+    facts.Mood = "Gr\\xc3\\xb6\\xc3\\x9f" "e";
+    facts.Tags.Add("Gr\\xc3\\xb6\\xc3\\x9f" "e");
+    facts.Heard.Add("shot");
+    for (int again = 0; again < 2; again++)
+        if (!facts.SetIn(live, texts) || cdb_live_query(live, rows, 1, NULL) != CDB_OK) return 1;
+    for (int64_t row = -1; (row = cdb_next_row(rows, 1, row)) >= 0;) printf("%d ", (int)row);
+    free(live);
+    cdb_close_any(any);
+    CDB_FREE(bytes);
+    return 0;
+}
+"""
+ENGINE = """// What the struct needs of Unreal, as simple as it can be.
+#pragma once
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <vector>
+#define UENUM(...)
+#define UMETA(...)
+#define USTRUCT(...)
+#define UPROPERTY(...)
+#define GENERATED_BODY()
+typedef std::uint8_t uint8;
+typedef std::int32_t int32;
+typedef std::int64_t int64;
+typedef char ANSICHAR;
+struct FString : std::string { using std::string::string; const char *operator*() const { return c_str(); } };
+struct FTCHARToUTF8 {
+    explicit FTCHARToUTF8(const char *given) : text(given) {}
+    const char *Get() const { return text; }
+    int32 Length() const { return static_cast<int32>(std::strlen(text)); }
+    const char *text;
+};
+template <typename T> struct TArray : std::vector<T> {
+    void Add(const T &one) { this->push_back(one); }
+    void Append(const T *from, int32 n) { this->insert(this->end(), from, from + n); }
+    void AddZeroed(int32 n) { this->resize(this->size() + static_cast<std::size_t>(n)); }
+    T &AddDefaulted_GetRef() { this->emplace_back(); return this->back(); }
+    T *GetData() { return this->data(); }
+    int32 Num() const { return static_cast<int32>(this->size()); }
+    void Reset() { this->clear(); }
+};
+struct FMemory { static void Memcpy(void *to, const void *from, std::size_t n) { std::memcpy(to, from, n); } };
+"""
+
+
+def rows_of_facts(compiled: cdb.CompiledTable) -> list[int]:
+    own = {**FACTS, "day": date(2026, 2, 3), "tags": {"Größe"}, "heard": {"shot"}}
+    rows: list[int] = compiled.query(own).rows.tolist()
+    assert rows
+    return rows
+
+
+@pytest.mark.parametrize("project", ["unity"], indirect=True)
+def test_facts_in_csharp_are_those_of_the_table(project: Path):
+    mono, compiler = needed("mono", "it runs C# as Unity does"), needed("mcs", "mono's compiler of C#")
+    built(project / "contextdb.c", project / "libcontextdb.so", C, *LIBRARY)
+    compiled = table(random.Random(4))
+    compiled.save(project / "moves.safetensors")
+    (project / "Facts.cs").write_text(csharp_of({"moves": compiled}), encoding="utf-8")
+    (project / "Game.cs").write_text(CSHARP, encoding="utf-8")
+    done = run(compiler, "-warnaserror", "ContextTable.cs", "Facts.cs", "Game.cs", "-out:Game.exe", cwd=project)
+    assert done.returncode == 0, done.stdout + done.stderr
+    done = run("env", f"LD_LIBRARY_PATH={project}", mono, "Game.exe", cwd=project)
+    assert [*map(int, done.stdout.split())] == rows_of_facts(compiled), done.stderr
+
+
+@pytest.mark.parametrize("project", ["godot"], indirect=True)
+def test_facts_in_gdscript_are_those_of_the_table(project: Path):
+    godot = needed("godot3-server", "Debian's package of that name runs scripts without a screen")
+    built(project / "contextdb_godot.c", project / "libcontextdb.so", C, *LIBRARY)
+    compiled = table(random.Random(4))
+    compiled.save(project / "moves.safetensors")
+    (project / "facts.gd").write_text(godot_of({"moves": compiled}), encoding="utf-8")
+    (project / "game.gd").write_text(GDSCRIPT, encoding="utf-8")
+    done = run(godot, "--path", ".", "-s", "game.gd", cwd=project)
+    assert json.loads((project / "answer.json").read_text(encoding="utf-8")) == rows_of_facts(compiled), done.stderr
+
+
+def test_facts_for_unreal_are_those_of_the_table(tmp_path: Path):
+    compiled = table(random.Random(4))
+    compiled.save(tmp_path / "moves.safetensors")
+    (tmp_path / "tables.h").write_text(c_header_of({}), encoding="ascii")
+    (tmp_path / "CoreMinimal.h").write_text(ENGINE, encoding="ascii")
+    (tmp_path / "Facts.generated.h").write_text("", encoding="ascii")
+    (tmp_path / "Facts.h").write_text(unreal_of({"moves": compiled}, "Facts"), encoding="utf-8")
+    (tmp_path / "game.cpp").write_text(UNREAL, encoding="ascii")
+    program = built(
+        tmp_path / "game.cpp", tmp_path / "game.exe", [*CXX[:1], "-std=c++17", *CXX[2:]], *sanitizers(compiler_for(CXX))
+    )
+    assert [*map(int, ran(program, tmp_path / "moves.safetensors").split())] == rows_of_facts(compiled)
+
+
+def test_samples_with_odd_names_are_written_for_every_engine():
+    schema = {name: {"type": "enum", "values": ["ö", "a b", "1", "class"]} for name in ("class", "Größe", "a b", "A.b", "1")}
+    odd = cdb.Table.from_columns({"Asset": ["x"], **{name: ["Any"] for name in schema}}, schema, name="int").compile()
+    assert "public enum Class\n" in csharp_of({"int": odd, "Int": odd})
+    assert 'const Class = {"T": "ö", "AB": "a b", "T1": "1", "Class": "class"}' in godot_of({"int": odd})
+    assert "enum class EClass : uint8" in unreal_of({"int": odd}, "x")

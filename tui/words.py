@@ -82,6 +82,7 @@ WORDS: Mapping[str, str] = {
     "contexts": "saved tests, scenario, examples, test cases, scenarios, load context",
     "next-context": "next test, next scenario",
     "previous-context": "previous test, previous scenario",
+    "changes": "what would this change, impact, effect, before saving, compare with saved, diff, what if, regression, backtest",
     "live": "play, running game, connect, debug game, watch, real time",
     "live-pause": "stop game, freeze game, hold",
     "live-back": "rewind, time",

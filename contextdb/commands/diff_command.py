@@ -47,6 +47,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--max-changed", type=percent, metavar="PERCENT", help="fail if the answer changes in more of the moments")
     group.add_argument("--max-emptied", type=percent, metavar="PERCENT", help="fail if more of the moments are left without a row")
     group.add_argument("--count", metavar="COLUMN", help="the column that says how often each moment was seen")
+    group.add_argument("--character", metavar="COLUMN", help="the column that says whose moment it is")
+    group.add_argument("--time", metavar="COLUMN", help="the column of seconds: changes are counted per character and minute")
     group.add_argument("--engine", choices=ENGINES, default="local", help="read files here, or on Dask workers (default: local)")
     group.add_argument("--scheduler", metavar="ADDRESS", help="the Dask scheduler; without it, workers on this machine")
     parser.add_argument("--all", action="store_true", help="print every difference, not the first of each kind")
@@ -78,7 +80,7 @@ def require_moments(arguments: argparse.Namespace) -> None:
     """Refuse options about recorded moments where there are none."""
     if arguments.telemetry:
         return
-    for option in ("max_changed", "max_emptied", "count", "scheduler"):
+    for option in ("max_changed", "max_emptied", "count", "character", "time", "scheduler"):
         if getattr(arguments, option) is not None:
             sentence = f"--{option.replace('_', '-')} is about recorded moments."
             raise ContextError(Fault(sentence, "--telemetry GLOB with it"))

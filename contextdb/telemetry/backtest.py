@@ -25,6 +25,7 @@ from contextdb.compiled.choosing import Choosing
 from contextdb.compiled.data import CompiledData
 from contextdb.disk.engines import Engine, with_dask
 from contextdb.errors import ContextDBError, Fault, FileError
+from contextdb.telemetry.characters import Characters, Played, characters_json, joined
 from contextdb.telemetry.chunks import Chunk, chunks_of
 from contextdb.telemetry.contexts import context_files
 from contextdb.telemetry.facts_read import FactColumn, read_facts
@@ -79,9 +80,14 @@ class Comparison:
     before: CompiledData
     after: CompiledData
     count: str | None = None
+    character: str | None = None
+    time: str | None = None
+    """The columns that say how often a moment was seen, whose it is, and at which second."""
     boxes: tuple[ChangedBox, ...] = ()
     box_table: CompiledData | None = None
     """A row for each of the boxes."""
+    n_examples: int = MOST_EXAMPLES
+    """So many moments that change are given."""
 
     @cached_property
     def sides(self) -> tuple[_Side, _Side]:
@@ -93,6 +99,11 @@ class Comparison:
     def assets(self) -> tuple[str, ...]:
         """The assets of both, in the order of the rows before, then of those after."""
         return tuple(dict.fromkeys((*self.before.assets, *self.after.assets)))
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """The columns that are no facts."""
+        return tuple(name for name in (self.count, self.character, self.time) if name is not None)
 
     @property
     def tables(self) -> tuple[CompiledData, ...]:
@@ -137,10 +148,12 @@ class Backtest:
     """For each asset the moments in which it becomes valid, and in which it no longer is."""
     boxes: Counter[ChangedBox] = field(default_factory=Counter)
     examples: list[Example] = field(default_factory=list)
+    characters: Characters = field(default_factory=dict)
+    """What each character did, by file: where columns for both are named."""
     unread: list[tuple[str, tuple[Fault, ...]]] = field(default_factory=list)
     """Files that could not be read; nothing of them is counted."""
 
-    def add(self, other: Backtest) -> None:
+    def add(self, other: Backtest, n_examples: int = MOST_EXAMPLES) -> None:
         """Add the sums of other files, or of another chunk."""
         self.moments += other.moments
         self.changed += other.changed
@@ -149,7 +162,8 @@ class Backtest:
         self.gains.update(other.gains)
         self.loses.update(other.loses)
         self.boxes.update(other.boxes)
-        self.examples = sorted((*self.examples, *other.examples), key=lambda example: example.rank)[:MOST_EXAMPLES]
+        self.examples = sorted((*self.examples, *other.examples), key=lambda example: example.rank)[:n_examples]
+        self.characters = joined(self.characters, other.characters)
         self.unread += other.unread
 
     def to_json(self) -> dict[str, object]:
@@ -162,7 +176,7 @@ class Backtest:
             "by_asset": [{"asset": a, "gains": self.gains[a], "loses": self.loses[a]} for a in assets],
             "boxes": [{"what": box.what, "asset": box.asset, "cells": box.cells, "moments": n} for box, n in self.ordered_boxes],
             "examples": [example.to_json() for example in self.examples],
-        }
+        } | ({"characters": characters_json(self.characters)} if self.characters else {})
 
     @property
     def ordered_boxes(self) -> list[tuple[ChangedBox, int]]:
@@ -191,7 +205,7 @@ def backtest(
     here = (backtest_file(comparison, path, tell) for path in paths)
     there = (part for _, part in with_dask(backtest_file, comparison, paths, scheduler))
     for part in there if engine == "dask" else here:
-        total.add(part)
+        total.add(part, comparison.n_examples)
         n_done += 1
         tell(0.0)
     if total.unread and len(total.unread) == len(paths):
@@ -202,10 +216,10 @@ def backtest(
 def backtest_file(comparison: Comparison, path: Path, tell: Callable[[float], None] | None = None) -> Backtest:
     """The sums of one file; one that cannot be read says why."""
     total = Backtest()
-    wanted = {*comparison.asked, *([comparison.count] if comparison.count else [])}
+    wanted = {*comparison.asked, *comparison.named}
     try:
         for names, chunk in chunks_of(path, wanted, comparison.after.name):
-            total.add(_of_chunk(comparison, names, chunk, str(path)))
+            total.add(_of_chunk(comparison, names, chunk, str(path)), comparison.n_examples)
             if tell is not None and chunk.share_done < 1.0:
                 tell(chunk.share_done)
     except ContextDBError as error:
@@ -217,10 +231,14 @@ def _of_chunk(comparison: Comparison, names: Sequence[str], chunk: Chunk, file: 
     moments = moments_of(comparison.count, names, chunk, file)
     known: dict[tuple[str, Condition], FactColumn] = {}
     masks = [_masks(table, names, chunk, known) for table in comparison.tables]
-    words = np.ascontiguousarray(np.concatenate(masks, axis=1).T)
+    played = Played.of(comparison.character, comparison.time, names, chunk, file)
+    keys = [*masks, *([] if played is None else [played.codes[:, None].astype(np.uint64)])]
+    words = np.ascontiguousarray(np.concatenate(keys, axis=1).T)
     _, first, sums = grouped(words, moments)
     pairs = [_bits(mask[first], table.n_rows) for mask, table in zip(masks, comparison.tables, strict=True)]
-    part, own = _sums(comparison, pairs, sums)
+    part, own, flags = _sums(comparison, pairs, sums)
+    if played is not None:
+        part.characters = played.sums(file, moments, played.codes[first], sums, flags)
     part.moments = int(moments.sum())
     for what, i in own:
         row = int(first[i])
@@ -255,8 +273,9 @@ def _bits(masks: Words, n_rows: int) -> Flags:
     return np.unpackbits(np.ascontiguousarray(masks).view(np.uint8), axis=1, bitorder="little", count=n_rows).astype(np.bool_)
 
 
-def _sums(comparison: Comparison, pairs: Sequence[Flags], sums: Counts) -> tuple[Backtest, list[tuple[str, int]]]:
-    """What M distinct pairs of answers say, with their moments, and a few of those that change, by number."""
+def _sums(comparison: Comparison, pairs: Sequence[Flags], sums: Counts) -> tuple[Backtest, list[tuple[str, int]], list[Flags]]:
+    """What M distinct pairs of answers say, with their moments; a few of those that change, by number; and which change, are
+    emptied and are filled."""
     old, new = comparison.sides
     was, now = (np.asarray(valid.any(axis=1)) for valid in pairs[:2])
     is_other = _differs(pairs[0], old.keys, pairs[1], new.keys)
@@ -280,12 +299,12 @@ def _sums(comparison: Comparison, pairs: Sequence[Flags], sums: Counts) -> tuple
         if flags is None:
             flags = (gains if box.what == GAINS else loses)[:, number[box.asset or ""]]
         part.boxes[box] = int(sums[flags & pairs[2][:, i]].sum())
-    return part, list(_chosen(emptied, filled, is_other))
+    return part, list(_chosen(emptied, filled, is_other, comparison.n_examples)), [is_other, emptied, filled]
 
 
-def _chosen(emptied: Flags, filled: Flags, is_other: Flags) -> Iterator[tuple[str, int]]:
+def _chosen(emptied: Flags, filled: Flags, is_other: Flags, n_examples: int) -> Iterator[tuple[str, int]]:
     for what, flags in ((EMPTIED, emptied), (FILLED, filled), ("changed", is_other & ~emptied & ~filled)):
-        for i in np.flatnonzero(flags)[:MOST_EXAMPLES].tolist():
+        for i in np.flatnonzero(flags)[:n_examples].tolist():
             yield what, i
 
 

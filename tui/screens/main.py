@@ -16,7 +16,7 @@ from contextdb.tables.changes import Edit
 from contextdb.tables.table import Table
 
 from ..commands import ASSETS, BY_ID, SCREEN, bindings, key_names
-from ..messages import Edited, FillGap, GoToCell, RenameWanted, ValueRenameWanted
+from ..messages import Edited, FillGap, GoToCell, RenameWanted, SetContext, ValueRenameWanted
 from ..model.importing import Import
 from ..model.new_table import make_table, name_fault
 from ..panes.why import WIDE
@@ -315,6 +315,17 @@ class MainScreen(TableScreen):
 
         expected = ExpectedGame(game, self.table_name, self.following.start)
         expected.timer = self.set_interval(LOOK_EVERY_S, expected.look)
+
+    def action_changes(self) -> None:
+        """Which moments play something else since the last save; Enter loads one into the test row."""
+        from .changes import ChangesDialog
+
+        def chosen(answer: SetContext | None) -> None:
+            if answer is not None:
+                self.post_message(answer)
+
+        session = self.session
+        self.app.push_screen(ChangesDialog(session.saved_table, session.sheet.table, self.workspace.folder), chosen)
 
     def action_live(self) -> None:
         """Let the test row follow a game, or a recording."""

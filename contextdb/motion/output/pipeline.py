@@ -124,6 +124,18 @@ class Pipeline:
             raise MotionError(no_such("pose bank of the database", playing.database, self.banks))
         return number, self.all[number].range_of(playing.asset, playing.mirrored)
 
+    def playing_at(self, moment: Sequence[float]) -> Playing | None:
+        """What plays at a moment as the core has it, with frames counted in its bank; None where there is none such."""
+        number, at, time_s = moment
+        if number not in range(len(self.all)) or not math.isfinite(time_s):
+            return None
+        bank, names = self.all[int(number)], list(self.banks)
+        if at not in range(len(bank.assets)):
+            return None
+        name = names[int(number)] if names else ""
+        frame = int(bank.starts[int(at)]) + round(time_s * bank.rate)
+        return Playing(name, bank.assets[int(at)], int(at), frame, time_s, bool(bank.mirrored[int(at)]))
+
     def _given(
         self, rows: Rows, decisions: Sequence[Decision], dt: float, grounds: Grounds | None
     ) -> tuple[Floats, Floats, list[Playing | None], list[bool], list[bool]]:

@@ -130,6 +130,21 @@ class PoseStream:
         return self._pipeline.moment_of(self._rows.playing[self._at])
 
     @property
+    def width(self) -> int:
+        """How many numbers its row has."""
+        return self._pipeline.width
+
+    def stand_on(self, displayed: Floats, row: Floats) -> bool:
+        """Go on from what was displayed, as the core has it, and a row; False where there is no such moment."""
+        playing = None
+        if displayed[0] >= 0.0:
+            playing = self._pipeline.playing_at(displayed.tolist())
+            if playing is None:
+                return False
+        self._rows, self._at, self._state = Rows(row[None], [playing]), 0, None
+        return True
+
+    @property
     def _place(self) -> tuple[Rows, int]:
         """The rows that the stream is among, and its own."""
         return self._rows, self._at

@@ -341,6 +341,18 @@ class Chooser:
         self.core.move(rows, dt_s, moved, features)
         return moved, features
 
+    def are_rows(self, rows: Floats) -> bool:
+        """Whether rows may be those of characters, such as of bytes that come from elsewhere."""
+        known = rows[:, [0, 1, 2, 3, 5, 6, 7, 8, N_REMEMBERED]]
+        if not np.isfinite(known).all():
+            return False
+        try:
+            self.move(np.ascontiguousarray(rows), 0.0)
+        except ValueError:
+            return False
+        databases = rows[:, N_STATE::N_PLAYED]
+        return bool(np.isin(databases, np.arange(len(self.names))).all() if databases.size else True)
+
     # ---- what may be chosen
 
     def shared(self, tags: OfTags | None, bias: Mapping[str, ArrayLike] | None) -> Shared:

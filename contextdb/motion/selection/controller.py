@@ -179,6 +179,11 @@ class Controller:
     def _state(self) -> ControllerState:
         return self._chooser.state(self._rows[self._at].tolist(), self.playing, self._recent)
 
+    def stand_on(self, row: Floats) -> None:
+        """Go on from a row [1, W] of this controller, or of another one with the same selector and settings, that is checked."""
+        self._rows, self._at, self._moved = row, 0, None
+        self._playing, self._recent, self._is_decoded = None, (), False
+
     @property
     def place(self) -> Place:
         """Where the controller is, to `put_back` this one with the same selector and settings; it costs less than `state`."""

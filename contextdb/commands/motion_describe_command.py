@@ -4,6 +4,8 @@ Cells are ranges from the clips' own movement; neighbours overlap a little, so t
 the table with the contextdb.toml that it needs: conditions, outputs, features, databases, a selector and a controller. --into adds
 missing columns and rows to a table, fills its empty cells, and reports each cell that does not accept what its clip shows.
 
+More than 64 clips are read on all cores, or with --engine dask on workers; the table is the same.
+
 Exits with 1 if a cell disagrees with its clip, a clip could not be read, or the clips are not in the folder of
 contextdb.toml or below it.
 

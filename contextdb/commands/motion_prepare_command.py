@@ -5,7 +5,8 @@ starts and turns to play as a whole, and near-duplicates. If hips sway, it also 
 databases: a build then computes the body's path from the hips (forward) and the feet (sideways). No clip file changes. Existing
 marks stay, and nothing is proposed where there is one. In the folder, `patch -p1` applies the diff, and `patch -p1 -R` reverts it.
 With --write the results are cached in .contextdb-cache: the next run reads only changed clips, and replaces the marks that were
-written for their earlier versions, except those that were edited.
+written for their earlier versions, except those that were edited. More than 64 clips are read on all cores, or with --engine dask
+on workers; the marks are the same.
 
 Exits with 1 if a proposal is not written, or a clip could not be read.
 

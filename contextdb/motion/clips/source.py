@@ -177,7 +177,7 @@ def clips_by_file(paths: Iterable[str | PathLike[str]], metres_per_unit: float, 
 
 
 PICKLES = (b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05")
-UNPICKLE = 'data = pickle.load(open("FILE.pkl", "rb")); np.savez("FILE.npz", **data), where you trust the file'
+UNPICKLE = 'to convert it, where you trust it: data = pickle.load(open("FILE.pkl", "rb")); np.savez("FILE.npz", **data)'
 
 
 def _one_take(content: bytes, file: str) -> tuple[str, ...]:

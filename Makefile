@@ -97,6 +97,8 @@ measure: $(VENV)/.bench
 	$(PY) benchmarks/reload.py
 	$(PY) benchmarks/live_link.py
 	$(PY) benchmarks/prepare.py
+	$(PY) benchmarks/clip_formats.py
+	$(PY) benchmarks/many_clips.py --clips 500 1000
 	$(PY) benchmarks/c_header.py
 	$(PY) benchmarks/search.py
 	$(PY) benchmarks/crowd.py

@@ -57,6 +57,7 @@ COMMANDS: Mapping[str, Sequence[str]] = {
     "query": ("query", "locomotion", *_SAID),
     "evaluate": ("evaluate", "locomotion", "moments.csv"),
     "check": ("check", "tables"),
+    "cases": ("cases", "tables/hit_mid_air.csv"),
     "coverage": ("coverage", "tables/hit_mid_air.csv"),
     "ci": ("ci", "tables"),
     "diff": ("diff", "tables/locomotion.csv", "moves.csv"),

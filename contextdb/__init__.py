@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from contextdb.compiled.casting.facts import Actors, Prefer
     from contextdb.compiled.explain import Explanation, Failure, RowExplanation
     from contextdb.compiled.live import LiveContext
+    from contextdb.compiled.live_many import LiveMany
     from contextdb.compiled.many import ManyMatches
     from contextdb.compiled.matches import Matches
     from contextdb.compiled.memory import Rng
@@ -61,6 +62,7 @@ _HOMES = {
     "compiled.casting.facts": "Actors Prefer",
     "compiled.explain": "Explanation Failure RowExplanation",
     "compiled.live": "LiveContext",
+    "compiled.live_many": "LiveMany",
     "compiled.many": "ManyMatches",
     "compiled.matches": "Matches",
     "compiled.memory": "Rng",
@@ -81,7 +83,7 @@ _HOMES = {
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names.split()}
 
 __all__ = ["Link", "Project", "Schema", "Snapshot", "Table", "TableSettings", "Watch", "link", "load", "watch"]
-__all__ += ["CompiledTable", "Context", "FactSet", "LiveContext", "ManyMatches", "Matches", "Unknown", "cell"]
+__all__ += ["CompiledTable", "Context", "FactSet", "LiveContext", "LiveMany", "ManyMatches", "Matches", "Unknown", "cell"]
 __all__ += ["Actors", "Explanation", "Failure", "Pick", "Picker", "Prefer", "Rng", "RowExplanation"]
 __all__ += ["CoverageReport", "Fault", "Finding", "Gap", "Place", "ProjectMotion", "TableMotion", "coverage", "motion_coverage"]
 __all__ += ["ArtefactError", "CellError", "ContextDBError", "ContextError", "FileError", "PolicyError", "SchemaError", "TableError"]

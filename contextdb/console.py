@@ -10,6 +10,7 @@ import unicodedata
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from enum import IntEnum
+from threading import Event, Thread
 from time import monotonic
 from typing import IO, TypeVar
 
@@ -24,6 +25,10 @@ READING = logging.getLogger("contextdb.reading")
 """Where the library reports that it reads a large file: silent by itself; commands show it on standard error."""
 MANY_BYTES = 2_000_000
 """A table's file of so many bytes is large: to read it may take a second."""
+VERY_MANY_BYTES = 50_000_000
+"""The same for a file of clips."""
+TELL_S = 5.0
+"""So often it is said for how long a file has been read."""
 
 STYLES = {"bold": "1", "dim": "2", "red": "31", "green": "32", "yellow": "33", "cyan": "36"}
 
@@ -141,6 +146,27 @@ def announce_file(file: str, n_bytes: int) -> None:
     """Say that a file is read, where it is large."""
     if n_bytes >= MANY_BYTES:
         READING.info("reading %s, %.1f MB", printable(file), n_bytes / 1e6)
+
+
+@contextmanager
+def announced_while(file: str, n_bytes: int) -> Iterator[None]:
+    """Say that a file is read, where it is very large, and every few seconds for how long it has been."""
+    if not READING.isEnabledFor(logging.INFO):
+        yield
+        return
+    if n_bytes >= VERY_MANY_BYTES:
+        announce_file(file, n_bytes)
+    done, start = Event(), monotonic()
+
+    def tell() -> None:
+        while not done.wait(TELL_S):
+            READING.info("still reading %s, for %.0f s", printable(file), monotonic() - start)
+
+    Thread(target=tell, daemon=True).start()
+    try:
+        yield
+    finally:
+        done.set()
 
 
 class _OnStandardError(logging.Handler):

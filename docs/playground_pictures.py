@@ -1,4 +1,4 @@
-"""Draw the pictures of docs/playground.md, without a screen and a graphics card: six moments, and a short film for the README.
+"""Draw the pictures of docs/playground.md, without a screen and a graphics card: six moments, and the film of the README.
 
     python docs/playground_pictures.py [FOLDER]
 
@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from playground_film import GAME_SIZE, PER_SECOND, film
 from png_files import Picture, halved, write_png
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
@@ -27,7 +28,6 @@ from examples.playground.stick import REST, Stick
 from examples.playground.window import SIZE, Window
 
 FOLDER = Path(__file__).parent / "pictures"
-PER_SECOND = 12
 Sticks = list[tuple[float, Stick]]
 """For so many seconds each."""
 
@@ -68,7 +68,6 @@ MOMENTS = {
     "playground-tired": Moment((0.0, -9.0, 0.0), [(3.0, pushed(0, run=True))], 50.0, 10.0, 4.4, stamina=0.06),
     "playground-gap": Moment((0.0, 0.0, 0.0), [(1.2, pushed(0)), (1.2, pushed(180, strafe=True))], 25.0),
 }
-FILM: Sticks = [(0.6, pushed(0)), (1.0, pushed(70)), (2.2, pushed(-35, True)), (2.6, pushed(0, True)), (1.0, pushed(0))]
 
 
 def put(actor: Actor, place: tuple[float, float, float]) -> None:
@@ -106,27 +105,17 @@ def picture(window: Window) -> Picture:
     return flat.reshape(texture.getYSize(), texture.getXSize(), 3)[::-1]
 
 
-def film() -> list[Picture]:
-    """The pictures of the film, 480 pixels wide."""
-    with _game() as game, drawn(game, words=0.075) as window:
-        put(game.player, (-1.5, -5.0, 0.0))
-        found: list[Picture] = []
-        window.scene.tilt, window.scene.away = 12.0, 5.2
-        every, frame = round(RATE / PER_SECOND), 0
-        for seconds, stick in FILM:
-            for _ in range(round(seconds * RATE)):
-                game.update(1.0 / RATE, stick)
-                window.scene.turn += 0.08
-                if frame % every == 0:
-                    found.append(halved(halved(picture(window))))
-                frame += 1
-        return found
+def filmed(game: Game) -> Iterator[Callable[[], Picture]]:
+    """The window of a film's game, and what gives its picture."""
+    with drawn(game, words=0.075, size=(2 * GAME_SIZE[0], 2 * GAME_SIZE[1])) as window:
+        window.scene.tilt, window.scene.away, window.scene.turn = 11.0, 4.6, 14.0
+        yield lambda: halved(picture(window))
 
 
 @contextmanager
-def drawn(game: Game, words: float = SIZE) -> Iterator[Window]:
+def drawn(game: Game, words: float = SIZE, size: tuple[int, int] = (1920, 1080)) -> Iterator[Window]:
     """A picture in memory of a game; Panda has one at a time."""
-    window = Window(game, is_offscreen=True, size=(1920, 1080), words=words)
+    window = Window(game, is_offscreen=True, size=size, words=words)
     try:
         yield window
     finally:
@@ -138,7 +127,7 @@ def main(folder: Path = FOLDER) -> None:
     write_game_clips(TABLES / "clips")
     for name in MOMENTS:
         write_png(folder / f"{name}.png", moment(name))
-    write_png(folder / "playground.png", *film(), per_second=PER_SECOND)
+    write_png(folder / "playground.png", *film(filmed), per_second=PER_SECOND)
 
 
 if __name__ == "__main__":

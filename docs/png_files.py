@@ -28,18 +28,31 @@ def write_png(path: Path, *pictures: Picture, per_second: int = 12) -> None:
     parts.append(_chunk(b"PLTE", palette.tobytes()))
     if len(pictures) > 1:
         parts.append(_chunk(b"acTL", struct.pack(">II", len(pictures), 0)))
-    number = 0
+    number, before = 0, None
     for i, picture in enumerate(pictures):
+        rows = indexed(picture, palette)
+        x, y, changed = (0, 0, rows) if before is None else _changed(before, rows)
+        before = rows
         if len(pictures) > 1:
-            parts.append(_chunk(b"fcTL", struct.pack(">IIIIIHHBB", number, width, height, 0, 0, 1, per_second, 0, 0)))
+            high, wide = changed.shape
+            parts.append(_chunk(b"fcTL", struct.pack(">IIIIIHHBB", number, wide, high, x, y, 1, per_second, 0, 0)))
             number += 1
-        packed = _packed(indexed(picture, palette))
+        packed = _packed(changed)
         if i == 0:
             parts.append(_chunk(b"IDAT", packed))
         else:
             parts.append(_chunk(b"fdAT", struct.pack(">I", number) + packed))
             number += 1
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(parts) + _chunk(b"IEND", b""))
+
+
+def _changed(before: Picture, rows: Picture) -> tuple[int, int, Picture]:
+    """The smallest part of a picture that holds all that is not as it was before, and where it begins."""
+    differs = before != rows
+    ys, xs = np.flatnonzero(differs.any(axis=1)), np.flatnonzero(differs.any(axis=0))
+    if not len(ys):
+        return 0, 0, rows[:1, :1]
+    return int(xs[0]), int(ys[0]), rows[ys[0] : ys[-1] + 1, xs[0] : xs[-1] + 1]
 
 
 def read_png(path: Path) -> Picture:

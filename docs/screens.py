@@ -19,6 +19,7 @@ from drawing import Look, Run, Sheet, svg
 from rich.segment import Segment
 from rich.style import Style
 from slips import Slip, make
+from textual.app import App
 from textual.pilot import Pilot
 from textual.widgets import Input
 
@@ -271,7 +272,12 @@ async def _lines(app: EditorApp, scene: Scene, folder: Path) -> list[list[Run]]:
         for field in app.screen.query(Input):
             field.cursor_blink = False
         await _settle(pilot)
-        return [list(_runs(strip)) for strip in app.screen._compositor.render_strips()]
+        return screen_lines(app)
+
+
+def screen_lines(app: App[Any]) -> list[list[Run]]:
+    """What stands on the screen now."""
+    return [list(_runs(strip)) for strip in app.screen._compositor.render_strips()]
 
 
 WAIT_S = 60.0

@@ -171,6 +171,8 @@ class Told:
     """Status and costs."""
     pick: tuple[int, int]
     """Status and row, -1 for none."""
+    digest: int
+    """The picker's, without sign."""
     outputs: list[int]
     """The outputs of that row: whole numbers, doubles by their bits, texts by their hash."""
     why_not: list[int]
@@ -229,9 +231,10 @@ def all_asked(
             at += 2 + n_words
             if memory >= 0:
                 n, status, rest = int(words[at]), int(words[at + 1]), words[at + 2 :]
-                costs, pick, why = rest[:n].view("<f8").tolist(), (int(rest[n]), int(rest[n + 1])), n + 2 + n_values
-                answers.told.append(Told((status, costs), pick, rest[n + 2 : why].tolist(), rest[why : why + n].tolist()))
-                at += 4 + 2 * n + n_values
+                costs, pick, why = rest[:n].view("<f8").tolist(), (int(rest[n]), int(rest[n + 1])), n + 3 + n_values
+                digest, outputs, why_not = int(rest[n + 2]) % 2**64, rest[n + 3 : why].tolist(), rest[why : why + n].tolist()
+                answers.told.append(Told((status, costs), pick, digest, outputs, why_not))
+                at += 5 + 2 * n + n_values
         found.append(answers)
     assert at == len(words)
     return found

@@ -23,7 +23,7 @@ Plain = bool | float | str | frozenset[str] | None
 Interval = tuple[float, bool, float, bool]
 """Low end, whether it is open, high end, whether it is open."""
 
-SOFT = re.compile(r"(.*)~\s*([\d.eE+-]+)\s*", re.DOTALL)
+SOFT = re.compile(r"(.*)~\s*([\d.eE+-]+)\s*(?:/\s*([\d.eE+-]+)\s*)?", re.DOTALL)
 WORD = re.compile(r'([+-]?)(?:"((?:[^"]|"")*)"|(\S+))')
 NUMBER = re.compile(r"(?:inf|\d+\.?\d*(?:e[+-]?\d+)?|\.\d+(?:e[+-]?\d+)?)", re.IGNORECASE)
 
@@ -57,7 +57,20 @@ def cost(text: str, domain: Domain, fact: Plain, unknown: str = "error") -> floa
     if penalty(text) is None or is_any_word(hard_part(text)):
         return 0.0
     is_held = unknown == "any" if fact is None else accepts(text, domain, fact)
-    return 0.0 if is_held else penalty(text)
+    if is_held or not penalty(text):
+        return 0.0
+    per = SOFT.fullmatch(text)[3]
+    apart = None if per is None or fact is None else distance(text, domain, fact)
+    return penalty(text) if apart is None else penalty(text) * apart / float(per)
+
+
+def distance(text: str, domain: Domain, fact: float) -> float | None:
+    """How far a number is from the nearest one that a cell accepts; None where it accepts none."""
+    accepted = [value for value in representatives([text], domain) if accepts(text, domain, value)]
+    apart = [abs(fact - value) for value in accepted]
+    if domain.kind == "angle":
+        apart = [min(each % 360.0, 360.0 - each % 360.0) for each in apart]
+    return min(apart, default=None)
 
 
 def hard_part(text: str) -> str:

@@ -193,7 +193,10 @@ def cells(draw: st.DrawFn, domain: Domain) -> str:
         body = draw(one_of("not Any", NOTHING.get(domain.kind, "not -")))
     else:
         body = draw(sets(domain))
-    return body + (draw(one_of(" ~2.5", "~0", " ~ 1e-3")) if form in (2, 3) else "")
+    if form not in (2, 3):
+        return body
+    grows = draw(one_of("", "/10", " / 0.5")) if domain.type.is_numeric else ""
+    return body + draw(one_of(" ~2.5", "~0", " ~ 1e-3")) + grows
 
 
 # ---- tables

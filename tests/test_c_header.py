@@ -459,3 +459,59 @@ def test_the_header_refuses_a_machine_that_is_big_endian(tmp_path: Path):
 def test_the_program_in_the_documents_is_the_one_that_is_compiled_here():
     shown = (ROOT / "docs" / "programmers.md").read_text(encoding="utf-8")
     assert f"```c\n{(PROGRAMS / 'game.c').read_text(encoding='utf-8')}```" in shown
+
+
+EXPORTING = '#define CDB_API __attribute__((visibility("default")))\n#define CDB_IMPLEMENTATION\n#include "tables.h"\n'
+CALLING = """#define CDB_API extern
+#define CDB_FILES
+#include <stdio.h>
+#include "tables.h"
+
+int main(int argc, char **argv)
+{
+    size_t size;
+    cdb_fault fault;
+    void *bytes = cdb_read_file(argv[argc - 1], &size, &fault);
+    cdb_any *any = bytes ? cdb_open_any(bytes, size, &fault) : NULL;
+    puts(any ? cdb_asset(&any->table, 1) : fault.reason);
+    cdb_close_any(any);
+    CDB_FREE(bytes);
+    return 0;
+}
+"""
+
+
+def test_one_file_has_the_functions_and_others_call_them(tmp_path: Path):
+    compiled = Table.from_columns({"Asset": ["walk", "run"], "speed": ["<2", "2.."]}, {"speed": {"type": "number"}}).compile()
+    compiled.save(tmp_path / "t.safetensors")
+    (tmp_path / "tables.h").write_text(c_header_of({"moves": compiled}), encoding="ascii")
+    (tmp_path / "all.c").write_text(
+        EXPORTING.replace("#include", "#define CDB_FILES\n#include <stdio.h>\n#include"), encoding="ascii"
+    )
+    (tmp_path / "game.c").write_text(CALLING, encoding="ascii")
+    for options in (C, CXX):
+        all_functions = built(tmp_path / "all.c", tmp_path / "all.o", options, "-c")
+        program = built(tmp_path / "game.c", tmp_path / "game.exe", options, "-c")
+        compiler = compiler_for(options)
+        subprocess.run([compiler, str(program), str(all_functions), "-o", str(tmp_path / "whole.exe")], check=True)
+        assert ran(tmp_path / "whole.exe", tmp_path / "t.safetensors") == "run\n"
+
+
+def test_what_the_page_of_engines_shows_is_compiled_and_picks_a_row(tmp_path: Path):
+    page = (ROOT / "docs" / "engines.md").read_text(encoding="utf-8")
+    [shown] = re.findall(r"```c\n(cdb_fault fault;\n.*?)```", page, re.S)
+    head = '#define CDB_FILES\n#include <stdio.h>\n#include "tables.h"\nint main(int argc, char **argv)\n{\n'
+    head += "    size_t size, n_words = 1;\n    void *bytes = cdb_read_file(argv[argc - 1], &size, NULL);\n"
+    head += "    double time_s = 0.0;\n    int64_t row;\n    uint64_t rows[1];\n    cdb_picker picker = cdb_new_picker(1, 0, 1);\n"
+    tail = '    cdb_set_number(live, 2, 0.0);\n    cdb_set_text(live, 3, "normal");\n'
+    last = shown.index("cdb_live_query")
+    body = (
+        shown[:last] + tail + shown[last:] + "    puts(cdb_asset_of(&any->table, row));\n    free(live);\n    cdb_close_any(any);\n"
+    )
+    compiled = Project.load(ROOT / "tables").tables["locomotion"].compile()
+    compiled.save(tmp_path / "t.safetensors")
+    (tmp_path / "tables.h").write_text(c_header_of({"locomotion": compiled}), encoding="ascii")
+    (tmp_path / "frame.c").write_text(f"{head}{body}    CDB_FREE(bytes);\n    return 0;\n}}\n", encoding="ascii")
+    program = built(tmp_path / "frame.c", tmp_path / "frame.exe", C, *sanitizers(compiler_for(C)))
+    facts = {"gait": "Run", "speed": 3.0, "direction": 0.0, "style": "normal"}
+    assert ran(program, tmp_path / "t.safetensors").strip() == compiled.picker(seed=1).pick(compiled.query(facts)).asset

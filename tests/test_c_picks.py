@@ -140,15 +140,17 @@ def picked_table(rng: random.Random, n_rows: int, name: str, assets: str, has_in
 PICK_CELLS = {"ok": ["True", "False"], "state": ["A", "B C"], "speed": ["<5", "1..", "0..10"]}
 
 
-def picks_in_python(compiled: CompiledTable, moments: list[tuple[str, Facts]], memory: int) -> list[tuple[bool, int, list[int]]]:
-    """Whether a query and the pick from it are refused, the row that is picked, and its outputs."""
+def picks_in_python(
+    compiled: CompiledTable, moments: list[tuple[str, Facts]], memory: int
+) -> list[tuple[bool, int, list[int], int]]:
+    """Whether a query and the pick from it are refused, the row that is picked, its outputs, and the digest of the picker."""
     picker, found = compiled.picker(seed=7, memory=memory), []
     for turn, (unknown, facts) in enumerate(moments):
         try:
             pick = picker.pick(compiled.query(facts, unknown=unknown), time_s=0.5 * turn, who=3)  # type: ignore[arg-type]
-            found.append((False, -1 if pick.row is None else pick.row, output_words(pick.outputs)))
+            found.append((False, -1 if pick.row is None else pick.row, output_words(pick.outputs), picker.digest()))
         except (ContextError, PolicyError):
-            found.append((True, -1, output_words(compiled.outputs.fallback)))
+            found.append((True, -1, output_words(compiled.outputs.fallback), picker.digest()))
     return found
 
 
@@ -156,16 +158,18 @@ def assert_picks(ask: Path, folder: Path, compiled: CompiledTable, moments: list
     """How many picks gave a row."""
     about = conditions_of(data_of(compiled)), [artefact(compiled, folder)], moments, 0, memory, compiled.outputs.declared
     [answers] = all_asked(ask, folder, *about)
-    found = [(told.pick[0] > 0, told.pick[1], told.outputs) for told in answers.told]
-    assert found == picks_in_python(compiled, moments, memory)
-    return sum(row >= 0 for _, row, _ in found)
+    expected = picks_in_python(compiled, moments, memory)
+    digests = [told.digest if digest else 0 for told, (*_, digest) in zip(answers.told, expected, strict=True)]  # 0: nobody yet
+    picks = [(told.pick[0] > 0, *told.pick[1:], told.outputs, digest) for told, digest in zip(answers.told, digests, strict=True)]
+    assert picks == expected
+    return sum(row >= 0 for _, row, *_ in picks)
 
 
 def test_picks_are_those_of_a_picker_in_python(ask: Path, tmp_path: Path):
     rng = random.Random(SEED + 31)
     n_picked = 0
     for turn in range(40 * TIMES):
-        outer = picked_table(rng, rng.choice([1, 6, 30]), "outer", "abcd", has_inner=turn % 3 == 0)
+        outer = picked_table(rng, rng.choice([1, 6, 30, 30, 150]), "outer", "abcd", has_inner=turn % 3 == 0)
         inner = picked_table(rng, 8, "inner", "aef")
         compiled = outer.compile({"inner": inner})
         moments = [random_moment(rng, ["ok", "state", "speed"], 0.01) for _ in range(N_MOMENTS)]

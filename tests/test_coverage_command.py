@@ -251,6 +251,19 @@ def test_a_baseline_that_cannot_hold_the_gate_is_refused_with_the_mend(change: C
     assert (result.code, said in result.err, "Try to write it again." in result.err) == (2, True, True)
 
 
+def test_a_report_opens_with_what_to_do_first_a_gap_that_players_meet_before_one_that_is_large(tmp_path: Path):
+    (tmp_path / "contextdb.toml").write_text('[conditions.speed]\ntype = "number"\nmin = 0\nmax = 10\n')
+    (tmp_path / "jog.csv").write_text("Asset,speed\njog,1..4\n")
+    (tmp_path / "play.csv").write_text("speed\n0.5\n2\n3\n")
+    table = str(tmp_path / "jog.csv")
+    first = run("coverage", table).lines[1]
+    assert first.startswith("To do first: decide whether speed: [0..1) | (4..10] can happen.")
+    second = " ".join(run("coverage", table, "--telemetry", str(tmp_path / "play.csv")).lines[1:3])  # of 80 columns
+    assert second.startswith("To do first: a row for speed: [0..1) | (4..10]; 33.33 % of the recorded moments have none.")
+    (tmp_path / "jog.csv").write_text("Asset,speed\njog,Any\n")
+    assert run("coverage", table).lines[1] == "Nothing to do: every context has a valid row."
+
+
 @pytest.mark.parametrize("table", ["locomotion", "hit_mid_air", "contested_catch"])
 @pytest.mark.parametrize("format_name", ["text", "markdown"])
 def test_the_report_of_a_sample_table_is_the_golden_one(table: str, format_name: str, monkeypatch: pytest.MonkeyPatch):

@@ -57,3 +57,17 @@ def test_escape_codes_in_cells_do_not_reach_the_terminal(here):
 def test_a_renamed_file_type_is_compared_by_its_texts(here):
     load("a.csv").save("a.parquet")
     assert run("diff", "a.csv", "a.parquet").code == 0
+
+
+def test_a_page_of_a_change_says_first_what_to_look_at_and_holds_every_cell(tmp_path: Path):
+    for name, cell in (("old", "0..5"), ("new", "0..2")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "contextdb.toml").write_text('[conditions.speed]\ntype = "number"\nmin = 0\nmax = 5\n')
+        (tmp_path / name / "jog.csv").write_text(f"Asset,speed\n<b>jog</b>,{cell}\n")
+    page = tmp_path / "diff.html"
+    files = [str(tmp_path / name / "jog.csv") for name in ("old", "new")]
+    assert run("diff", *files, "--format", "html", "-o", str(page)).code == 1
+    text = page.read_text(encoding="utf-8")
+    assert "Look first at 1 gap that it opens" in text
+    assert "<td>0..5</td>" in text
+    assert "<b>jog" not in text

@@ -57,6 +57,21 @@ def page(here: Path) -> str:
     return (here / "session.html").read_text(encoding="utf-8")
 
 
+def test_a_page_is_written_by_its_format_as_by_its_option(page: str, here: Path):
+    assert replayed("session.parquet", "--format", "html", "-o", "same.html").out
+    assert (here / "same.html").read_text(encoding="utf-8") == page
+    assert "-o FILE with --format html" in replayed("session.parquet", "--format", "html", code=2).err
+    assert "--format html with -o FILE" in replayed("session.parquet", "-o", "same.html", code=2).err
+    assert replayed("session.parquet", "--format", "markdown").out == replayed("session.parquet", "--markdown").out
+
+
+def test_the_page_opens_with_where_to_look_first_and_begins_there(page: str):
+    found = re.search(r'<p>Look first at <a href="#t=([\d.]+)">[\d.]+ s</a>: ([^<]+)\.</p>', page)
+    assert found
+    assert document_in(page)["first_s"] == float(found[1])
+    assert found[2].startswith(("what plays ends there", "a planted foot slides", "a joint accelerates"))
+
+
 def test_the_page_holds_the_poses_that_motion_run_wrote(page: str, here: Path):
     poses = np.load(here / "poses.npz")
     session = document_in(page)["sessions"][0]

@@ -269,6 +269,7 @@ _OF_SCREEN = (
     Command("priorities", "alt+3", "Priorities", "Which database comes first.", "Tabs", "tab('priorities')"),
     Command("coverage", "alt+4", "Coverage", "Which contexts have no asset.", "Tabs", "tab('coverage')"),
     Command("problems", "alt+5", "Problems", "What is wrong with the table.", "Tabs", "tab('problems')"),
+    Command("contracts", "", "Contracts", "What must hold of the table, proved as you type.", "Tabs", "tab('contracts')"),
     Command("motion", "", "Motion", "The recorded sessions of the project, to debug.", "Tabs", "tab('motion')"),
     Command("quit", "ctrl+q", "Quit", "Quit; asks about unsaved edits.", "File", "quit"),
 )

@@ -10,14 +10,19 @@ from pathlib import Path
 
 import numpy as np
 
+from contextdb.authoring.clip_looks import ClipAt, LeftOut, Looks, Seen
+from contextdb.authoring.saved_looks import SavedLooks, look_at_all
 from contextdb.disk import path_in_quotes
 from contextdb.disk.boundary import inside
-from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, plural, some
-from contextdb.motion.clips.clip import CENTIMETRE, MOST_RATE, Clip, Unit, Up
-from contextdb.motion.clips.clip_measures import UNITS, measure, unit_by_size
+from contextdb.disk.engines import Engines, here
+from contextdb.errors import Fault, FileError, MotionError, Place, in_quotes, plural, some
+from contextdb.motion.clips.clip import CENTIMETRE, Clip, Unit, Up
+from contextdb.motion.clips.clip_measures import UNITS, Measures, measure, unit_of
 from contextdb.motion.clips.doubts import LEAST_BODY_M, LYING_SHARE
-from contextdb.motion.clips.on_the_spot import ground_motion, with_ground_motion
-from contextdb.motion.clips.source import ENDINGS, ClipSource, clip_name, takes_of
+from contextdb.motion.clips.skeleton import Skeleton
+from contextdb.motion.clips.source import ENDINGS, clip_name, takes_of
+from contextdb.motion.preparing.clip_facts import ClipFacts
+from contextdb.motion.preparing.proposal import ClipHead, KeptClip
 from contextdb.motion.storage.clip_files import named_takes
 from contextdb.motion.storage.config import MotionConfig
 from contextdb.motion.storage.database_settings import DatabaseSettings
@@ -25,9 +30,11 @@ from contextdb.motion.storage.rigs import Rig
 from contextdb.tables.project import SCHEMA_FILE, folder_of, read_folder_schema
 
 MARKUP = "marks.csv"
+CLIPS_OR_TABLES = f"a folder of clips, or of tables with {SCHEMA_FILE}"
 Databases = Mapping[str, DatabaseSettings]
+NO_LOOKS = Looks()
 Tell = Callable[[int, int, str], None]
-"""Takes how many clips are done of how many, and the name of the next."""
+"""Takes how many clips are done of how many, and the name of the last."""
 Read = tuple[Unit | None, Up, Rig | None, bool]
 """A clip's unit, axis, rig, and whether feet move its root."""
 Wanted = Callable[[Databases], Databases]
@@ -44,28 +51,63 @@ class FolderClips:
     was taken for granted, `config` what the project says of motion (nothing of a folder of clips)."""
 
     folder: Path
-    clips: list[Clip] = field(default_factory=list)
-    paths: list[Path] = field(default_factory=list)
-    without_unit: list[int] = field(default_factory=list)
-    """Clips of formats that say neither a unit nor which axis points up."""
+    seen: list[Seen] = field(default_factory=list)
+    places: list[ClipAt] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     config: MotionConfig = field(default_factory=MotionConfig)
 
+    @property
+    def clips(self) -> list[ClipHead]:
+        """The clips, without their motion."""
+        return [seen.head for seen in self.seen]
+
+    def facts(self) -> list[ClipFacts]:
+        """What each clip shows. Raises MotionError where one could not be looked at."""
+        if faults := [fault for seen in self.seen for fault in seen.faults]:
+            raise MotionError(*faults)
+        return [seen.facts for seen in self.seen if seen.facts is not None]
+
+    def proposals(self) -> dict[str, KeptClip]:
+        """What marks are for each clip, by its name. Raises MotionError where one could not be looked at."""
+        if faults := [fault for seen in self.seen for fault in seen.faults]:
+            raise MotionError(*faults)
+        return {seen.head.name: seen.proposals for seen in self.seen if seen.proposals is not None}
+
+    @property
+    def is_by_feet(self) -> bool:
+        """Whether standing feet move the roots of clips on the spot."""
+        return any(at.is_by_feet for at in self.places)
+
+    @property
+    def paths(self) -> list[Path]:
+        """The file of each clip."""
+        return [at.file for at in self.places]
+
 
 def clips_of(
-    path: str | Path, metres_per_unit: float | None, up: Up | None, tell: Tell, wants: Wanted | None = None
+    path: str | Path,
+    metres_per_unit: float | None,
+    up: Up | None,
+    tell: Tell,
+    wants: Wanted | None = None,
+    looks: Looks = NO_LOOKS,
+    engines: Engines = here,
+    root: str | None = None,
 ) -> FolderClips:
-    """Read the clips of a folder; of a project with `wants` those of the databases that it leaves of all. Raises ContextDBError
-    where there is no such folder, no clip in it, or two clips of one name."""
-    folder = folder_of(Path(path), f"a folder of clips, or of tables with {SCHEMA_FILE}")
+    """Look at the clips of a folder; of a project with `wants` at those of the databases that it leaves of all. Raises
+    ContextDBError where there is no such folder, no clip in it, or two clips of one name.
+
+    `root` is that of databases, in the place of what a project says.
+    """
+    folder = folder_of(Path(path), CLIPS_OR_TABLES)
     folder_clips = FolderClips(folder)
     if (folder / SCHEMA_FILE).is_file():
         schema = read_folder_schema(folder)
         folder_clips.config = MotionConfig.from_dict(schema.motion, file=schema.file)
     if wants is not None and folder_clips.config.databases:
         folder_clips.config = replace(folder_clips.config, databases=wants(folder_clips.config.databases))
-    files = _files(folder_clips, metres_per_unit, up)
+    files = _files(folder_clips, metres_per_unit, up, root)
     if not files:
         raise FileError(_none_below(folder))
     first: dict[str, Path] = {}
@@ -77,16 +119,48 @@ def clips_of(
             twice.append(Fault(f"two clips are named {in_quotes(name)}: {both}.", "a different name for each asset"))
     if twice:
         raise FileError(*twice)
-    for i, ((file, take), (unit, axis, rig, is_by_feet)) in enumerate(files.items()):
-        tell(i, len(files), clip_name(file, take))
-        _read(folder_clips, file, take, CENTIMETRE if unit is None else unit, axis, rig, is_by_feet)
+    wanted = [
+        ClipAt(file, take, CENTIMETRE if unit is None else unit, axis, rig, is_by_feet)
+        for (file, take), (unit, axis, rig, is_by_feet) in files.items()
+    ]
+    results: list[Seen | LeftOut] = [()] * len(wanted)
+    saved = SavedLooks.of(folder)
+    for n_done, (i, seen) in enumerate(look_at_all(wanted, looks, engines, saved), start=1):
+        results[i] = seen
+        tell(n_done, len(wanted), wanted[i].name)
+    rigs: dict[object, Skeleton] = {}
+    for at, seen in zip(wanted, results, strict=True):
+        if isinstance(seen, Seen):
+            folder_clips.places.append(at)
+            folder_clips.seen.append(_of_one_rig(seen, rigs))
+        else:
+            folder_clips.left_out += seen
     if not folder_clips.config.databases:
-        rigs = _rigs(folder_clips.clips, folder_clips.without_unit)
-        if up is None:
-            _guess_axes(folder_clips, rigs)
-        if metres_per_unit is None:
-            _guess_units(folder_clips, rigs)
+        _guess(folder_clips, up is None, metres_per_unit is None, looks, engines, saved)
+    saved.remove()
+    folder_clips.notes[:0] = [note for seen in folder_clips.seen for note in seen.notes]
     return folder_clips
+
+
+def _of_one_rig(seen: Seen, rigs: dict[object, Skeleton]) -> Seen:
+    """The same with a skeleton that many clips share, where it is equal: each came from a worker by itself."""
+    own = seen.head.skeleton
+    skeleton = rigs.setdefault((own.names, own.parents.tobytes(), own.offsets.tobytes(), own.channels, own.end_sites), own)
+    return seen if skeleton is own else replace(seen, head=replace(seen.head, skeleton=skeleton))
+
+
+def _guess(clips: FolderClips, guesses_axes: bool, guesses_units: bool, looks: Looks, engines: Engines, saved: SavedLooks) -> None:
+    """Choose what files leave open, and look again at clips that are read in another way then."""
+    rigs = _rigs(clips.clips, [i for i, seen in enumerate(clips.seen) if not seen.states_unit])
+    before = list(clips.places)
+    if guesses_axes:
+        _guess_axes(clips, rigs)
+    if guesses_units:
+        _guess_units(clips, rigs)
+    changed = [i for i, (old, new) in enumerate(zip(before, clips.places, strict=True)) if old != new]
+    for k, seen in look_at_all([clips.places[i] for i in changed], looks, engines, saved):
+        if isinstance(seen, Seen):
+            clips.seen[changed[k]] = seen
 
 
 def clips_below(folder: Path, *, needs: bool = False) -> list[Path]:
@@ -104,54 +178,18 @@ def _none_below(folder: Path) -> Fault:
     )
 
 
-def _files(clips: FolderClips, unit: float | None, up: Up | None) -> dict[tuple[Path, str], Read]:
+def _files(clips: FolderClips, unit: float | None, up: Up | None, root: str | None) -> dict[tuple[Path, str], Read]:
     """The files and takes with how each is read; of a file in several databases as the first has it."""
     files: dict[tuple[Path, str], Read] = {}
     for settings in clips.config.databases.values():
         rig = Rig.of(settings, clips.folder, clips.config.file)
         for _, file, take in named_takes(settings, clips.folder, clips.config.file):
             own = settings.metres_per_unit if unit is None else unit
-            files.setdefault((file, take), (own, up or settings.up, rig, settings.root == "feet"))
+            files.setdefault((file, take), (own, up or settings.up, rig, (root or settings.root) == "feet"))
     if clips.config.databases:
         return files
     takes = ((file, take) for file in clips_below(clips.folder, needs=True) for take in takes_of(file) or ("",))
-    return dict.fromkeys(takes, (unit, up or "y", None, False))
-
-
-def _read(clips: FolderClips, file: Path, take: str, unit: Unit, up: Up, rig: Rig | None, is_by_feet: bool) -> None:
-    try:
-        source = ClipSource.of(file)
-        clip = source.clip(take, metres_per_unit=unit, up=up)
-        clips.notes += [f"{file}: {note}" for note in clip.notes]
-        clip = _on_its_way(clips, clip, is_by_feet)
-        clip = clip if rig is None or not clip.n_frames else rig.clip(clip)
-    except ContextDBError as error:
-        clips.left_out += [str(fault) for fault in error.faults]
-        return
-    if clip.n_frames == 0:
-        clips.left_out.append(f"{file}: the clip has no frame (Frames: 0).")
-        return
-    if clip.rate > MOST_RATE:
-        problem = f"the frame time is {clip.frame_time_s!r} s."
-        clips.left_out.append(str(Fault(problem, f"{1.0 / MOST_RATE:g} or more", place=Place(str(file)))))
-        return
-    if not source.format.states_unit:
-        clips.without_unit.append(len(clips.clips))
-    clips.clips.append(clip)
-    clips.paths.append(file)
-
-
-def _on_its_way(clips: FolderClips, clip: Clip, is_by_feet: bool) -> Clip:
-    """A clip, with the motion of its feet where that is asked for; one that runs on the spot is reported."""
-    motion = ground_motion(clip)
-    if motion is None:
-        return clip
-    about = f"{clip.name} runs on the spot: its standing feet are those of {motion.speed_mps:.2f} m/s"
-    if is_by_feet:
-        clips.notes.append(f"{about}, which its root is given.")
-        return with_ground_motion(clip, motion)
-    clips.notes.append(f'{about}. root = "feet" in [databases.NAME] gives its root this motion.')
-    return clip
+    return dict.fromkeys(takes, (unit, up or "y", None, root == "feet"))
 
 
 def _rigs(clips: Sequence[Clip], numbers: Iterable[int]) -> list[list[int]]:
@@ -173,35 +211,39 @@ def _guess_axes(clips: FolderClips, rigs: Sequence[Sequence[int]]) -> None:
     """Take clips in which bodies lie for such with another axis up, where they stand with it, rig by rig, and tell of it."""
     others: tuple[Up, ...] = ("z", "x")
     for members in rigs:
-        seen = [clips.clips[i] for i in members[:: math.ceil(len(members) / MOST_SEEN)]]
-        up = next((up for up in others if not _lie([replace(clip, up=up) for clip in seen])), None) if _lie(seen) else None
+        some = members[:: math.ceil(len(members) / MOST_SEEN)]
+        if not _lie(clips.seen[i].measures for i in some):
+            continue
+        read = [at.clip(at.source()) for at in (clips.places[i] for i in some)]
+        up = next((up for up in others if not _lie(measure(replace(clip, up=up)) for clip in read)), None)
         if up is None:
             continue
-        about = f"{clips.clips[members[0]].name} and its rig ({plural(len(members), 'clip')}) would lie if y pointed up"
+        about = f"{clips.seen[members[0]].head.name} and its rig ({plural(len(members), 'clip')}) would lie if y pointed up"
         clips.notes.append(f"{about}: {up} is taken to point up. --up says otherwise.")
         for i in members:
-            clips.clips[i] = replace(clips.clips[i], up=up)
+            clips.places[i] = replace(clips.places[i], up=up)
 
 
-def _lie(clips: Sequence[Clip]) -> bool:
+def _lie(measures: Iterable[Measures]) -> bool:
     """Whether the body lies in most of some clips."""
-    return sum(measure(clip).lying >= LYING_SHARE for clip in clips) > len(clips) / 2
+    lying = [each.lying >= LYING_SHARE for each in measures]
+    return sum(lying) > len(lying) / 2
 
 
 def _guess_units(clips: FolderClips, rigs: Sequence[Sequence[int]]) -> None:
     """Take clips of an unlikely size for such in another unit, rig by rig, and tell of it."""
     for members in rigs:
-        first = clips.clips[members[0]]
-        size, unit = measure(first).size_m, unit_by_size(first)
+        first = clips.seen[members[0]]
+        size, unit = first.measures.size_m, unit_of(first.measures)
         if size <= 0.0 or unit == CENTIMETRE:
             continue
-        about = f"{first.name} and its rig ({plural(len(members), 'clip')}) would be {size:.2g} m tall in centimetres"
+        about = f"{first.head.name} and its rig ({plural(len(members), 'clip')}) would be {size:.2g} m tall in centimetres"
         if unit is None:
             clips.notes.append(f"{about}; --metres-per-unit says what a unit is. Expected: from {LEAST_BODY_M:g} m.")
             continue
         clips.notes.append(f"{about}: a unit of {unit:g} m ({UNITS[unit]}) is taken. --metres-per-unit says otherwise.")
         for i in members:
-            clips.clips[i] = replace(clips.clips[i], metres_per_unit=unit)
+            clips.places[i] = replace(clips.places[i], unit=unit)
 
 
 def below(paths: Sequence[Path], folder: Path) -> list[str] | None:

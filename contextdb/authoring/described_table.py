@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from contextdb.authoring.clip_folder import MARKUP, Databases, FolderClips, Tell, below, clips_of
+from contextdb.authoring.clip_looks import Looks
 from contextdb.cells.conditions import Condition
 from contextdb.cells.grammar import parse_cell
 from contextdb.cells.kinds import Family
@@ -22,6 +23,7 @@ from contextdb.cells.output_types import OutputType
 from contextdb.columns import TextColumn
 from contextdb.disk import read_bytes
 from contextdb.disk.boundary import inside
+from contextdb.disk.engines import Engines, here
 from contextdb.disk.together import NewFile, write_together
 from contextdb.edits.schema_file import schema_change
 from contextdb.errors import ContextDBError, Fault, FileError, Place, TableError, row_name, some
@@ -30,13 +32,13 @@ from contextdb.files.texts import new_source
 from contextdb.files.toml_text import Path as KeyPath
 from contextdb.motion.characters.facts import UNITS
 from contextdb.motion.clips.clip import Up
-from contextdb.motion.clips.doubts import doubts_of, grouped
+from contextdb.motion.clips.doubts import doubts, grouped
 from contextdb.motion.preparing.cells_of_clips import CONDITIONS, OUTPUTS
 from contextdb.motion.preparing.describing import (
     Described,
     by_rig,
     condition_sections,
-    describe,
+    described,
     joint_clips,
     joint_row,
     mirror_of,
@@ -142,7 +144,7 @@ class ClipRows:
             return None
         has_markup = inside(self.source.folder / MARKUP, self.source.folder).is_file()
         markup = below([self.source.folder / MARKUP], folder) if has_markup else None
-        return motion_sections(by_rig(self.source.clips, paths), table.stem, markup[0] if markup else None)
+        return motion_sections(by_rig(self.source.clips, paths), table.stem, markup[0] if markup else None, self.source.is_by_feet)
 
 
 def rows_for(
@@ -151,6 +153,8 @@ def rows_for(
     progress: Callable[[str], AbstractContextManager[Tell]],
     metres_per_unit: float | None = None,
     up: Up | None = None,
+    engines: Engines = here,
+    root: str | None = None,
 ) -> ClipRows:
     """Read and describe the clips of a folder: in a project those of the databases of the table that is filled, where it has any.
 
@@ -159,18 +163,21 @@ def rows_for(
     """
     notes: list[str] = []
     with progress("reading clips") as tell:
-        folder_clips = clips_of(folder, metres_per_unit, up, tell, lambda all_of: _playing_alone(all_of, into, notes))
-    folder_clips.notes += [*notes, *grouped(doubts_of(folder_clips.clips), len(folder_clips.clips))]
-    if not folder_clips.clips:
+        wants = lambda all_of: _playing_alone(all_of, into, notes)  # noqa: E731
+        folder_clips = clips_of(folder, metres_per_unit, up, tell, wants, Looks(facts=True), engines, root)
+    clips = folder_clips.clips
+    measures = [(seen.head.name, None, seen.measures) for seen in folder_clips.seen]
+    folder_clips.notes += [*notes, *grouped(doubts(measures), len(clips))]
+    if not clips:
         raise ContextDBError(*(Fault(message) for message in folder_clips.left_out))
-    joint = {} if folder_clips.config.databases else joint_clips(folder_clips.clips)
+    joint = {} if folder_clips.config.databases else joint_clips(clips)
     together = {i for roles in joint.values() for i in roles.values()}
-    alone = [i for i in range(len(folder_clips.clips)) if i not in together]
-    with progress("describing") as tell:
-        clips = [folder_clips.clips[i] for i in alone]
-        rows = describe(clips, mirrored=_is_mirrored(folder_clips), progress=tell) if clips else []
+    alone = [i for i in range(len(clips)) if i not in together]
+    facts = folder_clips.facts()
+    bones = [clips[i].skeleton.names for i in alone]
+    rows = described([facts[i] for i in alone], bones, _is_mirrored(folder_clips)) if alone else []
     first = {asset: next(iter(roles.values())) for asset, roles in joint.items()}
-    rows += [joint_row(asset, folder_clips.clips[i]) for asset, i in first.items()]
+    rows += [joint_row(asset, facts[i]) for asset, i in first.items()]
     if joint:
         folder_clips.notes.append(f"one row each for the joint clips {some(list(joint))}: its cells ask nothing of a single body.")
     return ClipRows(folder_clips, rows, [folder_clips.paths[i] for i in (*alone, *first.values())])

@@ -22,7 +22,7 @@ from contextdb.cells.domains import Domain
 from contextdb.cells.grammar import parse_cell, parse_tags
 from contextdb.cells.intervals import EVERYTHING
 from contextdb.cells.sets import SET_OF, Cell, NumberSet, ValueSet, covers
-from contextdb.cells.words import truth_of
+from contextdb.cells.words import quoted, truth_of
 from contextdb.errors import (
     CellError,
     ContextError,
@@ -133,6 +133,13 @@ def read_fact_text(text: str, condition: Condition) -> Fact:
     if kind.is_tags:
         return _read_tags(body, condition)
     return _plain_if_single(_read_set(body, condition)) if body.casefold() != "nan" else None
+
+
+def fact_text(value: object) -> str:
+    """A fact as JSON has it, written so that `read_fact_text` gives it again."""
+    if isinstance(value, list):
+        return " ".join(map(quoted, value)) or '""'
+    return quoted(value) if isinstance(value, str) else str(value)
 
 
 def missing_error(missing: list[str], given: Iterable[str]) -> ContextError:

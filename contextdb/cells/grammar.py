@@ -3,6 +3,7 @@
     every kind    Any  -  (empty)          every value
                   not CELL                 what CELL does not hold, within the domain
                   CELL ~2.5                soft: a row that does not match is not excluded, it costs 2.5 more in a search
+                  CELL ~2.5/10             of numbers: it costs 2.5 more for each 10 that the fact is away from CELL
     bool          True  False              t f yes no 1 0 in any case
     int, number   20, 9.99  20 ± 9.99      centre and tolerance, in double arithmetic
                   10..30  (10..30]  10..   closed, half open, without an end
@@ -86,20 +87,34 @@ def reads(text: str, domain: Domain) -> bool:
 
 
 def _read(text: str, domain: Domain) -> Cell:
-    body, penalty = _split_penalty(text.strip(), domain)
-    return Cell(_read_set(body, domain), penalty)
+    body, penalty, per = _split_penalty(text.strip(), domain)
+    return Cell(_read_set(body, domain), penalty, per)
 
 
-def _split_penalty(text: str, domain: Domain) -> tuple[str, float | None]:
+def _split_penalty(text: str, domain: Domain) -> tuple[str, float | None, float | None]:
+    """The text before a penalty, the penalty, and the distance that it is for."""
     body, tilde, tail = text.rpartition("~")
     if not tilde or tail.count('"') % 2:
-        return text, None
-    number = _NUMBER.fullmatch(tail.strip())
-    penalty = float(number[0]) if number else math.nan
+        return text, None, None
+    first, slash, last = tail.strip().partition("/")
+    penalty, per = _positive(first), _positive(last) if slash else 1.0
     if not 0.0 <= penalty < math.inf:
-        why = f'the penalty after "~" must be a number from 0 up, not {in_quotes(tail.strip())}'
-        raise CellError(replace(_unreadable(text, domain, why).faults[0], rule="unreadable-penalty"))
-    return body.strip(), penalty
+        raise _no_penalty(text, domain, f'the penalty after "~" must be a number from 0 up, not {in_quotes(tail.strip())}')
+    if not 0.0 < per < math.inf:
+        raise _no_penalty(text, domain, f'the distance after "/" must be a number above 0, not {in_quotes(last.strip())}')
+    if slash and not domain.type.is_numeric:
+        raise _no_penalty(text, domain, 'only numbers have a distance that a penalty can grow with, such as "~2.5/10"')
+    return body.strip(), penalty, per if slash else None
+
+
+def _positive(text: str) -> float:
+    """A number; NaN for what is none."""
+    number = _NUMBER.fullmatch(text.strip())
+    return float(number[0]) if number else math.nan
+
+
+def _no_penalty(text: str, domain: Domain, why: str) -> CellError:
+    return CellError(replace(_unreadable(text, domain, why).faults[0], rule="unreadable-penalty"))
 
 
 def _read_set(text: str, domain: Domain) -> Accepted | None:
@@ -259,7 +274,9 @@ def _unreadable(text: str, domain: Domain, why: str = "") -> CellError:
 def format_cell(cell: Cell, domain: Domain) -> str:
     """The shortest common way to write a cell; reading it gives an equal cell."""
     body = "Any" if cell.accepts is None else _format_set(cell.accepts, domain)
-    return body if cell.penalty is None else f"{body} ~{format_number(cell.penalty)}"
+    if cell.penalty is None:
+        return body
+    return f"{body} ~{format_number(cell.penalty)}{'' if cell.per is None else f'/{format_number(cell.per)}'}"
 
 
 def _format_set(accepts: Accepted, domain: Domain) -> str:

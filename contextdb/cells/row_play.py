@@ -78,6 +78,11 @@ class RowPlay:
         )
 
     @property
+    def rate(self) -> float:
+        """How fast it plays where nothing asks for a speed: 1, or the nearest rate that it may have."""
+        return 1.0 if self.min_rate is None or self.max_rate is None else min(max(1.0, self.min_rate), self.max_rate)
+
+    @property
     def numbers(self) -> list[float]:
         """As the core has it."""
         words: dict[object, float] = {word: float(i) for words in (MIRRORS, ROOTS, UNTILS) for i, word in enumerate(words)}

@@ -86,10 +86,12 @@ SET_OF: dict[Family, type[Accepted]] = {Family.NUMBERS: NumberSet, Family.VALUES
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """What a row accepts for a condition: `accepts` is None for Any. `penalty` makes the cell soft."""
+    """What a row accepts for a condition: `accepts` is None for Any. `penalty` makes the cell soft; with `per` it is the cost of so
+    much of a distance, and grows."""
 
     accepts: Accepted | None = None
     penalty: float | None = None
+    per: float | None = None
 
     @property
     def is_any(self) -> bool:
@@ -192,11 +194,14 @@ _OF_ONE_TYPE = "sets of one condition are of one type"
 def meet(cells: Sequence[Cell]) -> Cell:
     """The cell that holds what all of some cells hold.
 
-    Soft cells are left out where one is not soft; where all are, the meet is soft too, at the sum of their penalties.
+    Soft cells are left out where one is not soft; where all are, the meet is soft too, at the sum of their penalties, and does not
+    grow with a distance.
     """
     specified = [c for c in cells if not c.is_any]
     if not specified:
         return ANY
+    if len(specified) == 1:
+        return specified[0]
     hard = [c for c in specified if not c.is_soft]
     accepted = None
     for cell in hard or specified:

@@ -29,8 +29,9 @@ from contextdb.columns import TextColumn
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.table import data_of
 from contextdb.covering.baseline import CaseCounts
+from contextdb.covering.shares import format_percent
 from contextdb.disk import write_atomic
-from contextdb.errors import CellError, ContextError, Fault, Place, TableError, in_quotes, mend_for, nearest, some
+from contextdb.errors import CellError, ContextError, Fault, Place, TableError, in_quotes, mend_for, nearest, plural, some
 from contextdb.files.csv_rewrite import Origin
 from contextdb.files.texts import AnySource, new_source, read_texts
 from contextdb.findings import Finding
@@ -123,22 +124,36 @@ def read_cases(path: Path) -> list[Case]:
 def keep_case(path: Path, case: Case) -> None:
     """Write a case into a file, in the place of one of its name or at the end. Other lines stay as they are. Raises TableError or
     FileError where the file cannot be read or written, or a condition has a name that such a file uses itself."""
-    if taken := [name for name in CASE_COLUMNS if name in case.facts]:
+    keep_cases(path, [case])
+
+
+def keep_cases(path: Path, cases: Sequence[Case]) -> None:
+    """The same for several, written at once."""
+    if taken := [name for case in cases for name in CASE_COLUMNS if name in case.facts]:
         problem = f"a condition named {in_quotes(taken[0])} cannot be saved: a file of cases has such a column itself."
         raise TableError(Fault(problem, "another name of the condition", place=Place(str(path))))
     empty = [TextColumn.of(NAME, ()), TextColumn.of(EXPECTED, ())]
-    texts = {NAME: case.name, EXPECTED: case.expected, **case.facts} | ({NOTE: case.note} if case.note else {})
 
-    def with_case(source: AnySource | None, columns: Columns) -> tuple[Columns, Origin]:
+    def with_cases(source: AnySource | None, columns: Columns) -> tuple[Columns, Origin]:
         columns = columns or empty
-        row, n_rows = _row_of(case, source, columns), columns[0].n_rows
-        known = {c.name for c in columns}
-        columns = [*columns, *(TextColumn.of(name, [""] * n_rows) for name in texts if name not in known)]
-        if row is not None:
-            return [c.with_text(row, texts.get(c.name, "")) for c in columns], np.arange(n_rows)
-        return [c.with_inserted(n_rows, [texts.get(c.name, "")]) for c in columns], np.append(np.arange(n_rows), -1)
+        origin: Origin = np.arange(columns[0].n_rows)
+        for case in cases:
+            columns, at = _with_case(case, source, columns)
+            origin = origin if at is None else np.append(origin, -1)
+        return columns, origin
 
-    _rewrite(path, with_case)
+    _rewrite(path, with_cases)
+
+
+def _with_case(case: Case, source: AnySource | None, columns: Columns) -> tuple[Columns, int | None]:
+    """The columns with a case, and where it was added; None where one of its name is replaced."""
+    texts = {NAME: case.name, EXPECTED: case.expected, **case.facts} | ({NOTE: case.note} if case.note else {})
+    row, n_rows = _row_of(case, source, columns), columns[0].n_rows
+    known = {c.name for c in columns}
+    columns = [*columns, *(TextColumn.of(name, [""] * n_rows) for name in texts if name not in known)]
+    if row is not None:
+        return [c.with_text(row, texts.get(c.name, "")) for c in columns], None
+    return [c.with_inserted(n_rows, [texts.get(c.name, "")]) for c in columns], n_rows
 
 
 def rename_case(path: Path, case: Case, name: str) -> None:
@@ -239,6 +254,20 @@ def check_cases(table: Table, cases: Sequence[Case], file: str | None = None) ->
 def judge(compiled: CompiledData, case: Case, readable: int | None = None) -> Verdict:
     """Whether what a case expects comes out. Facts that the table has no condition for are left out of the question. `readable` are
     the rows that may be valid, as bits, of a table with cells that cannot be read; None: all."""
+    expected, facts, faults = question_of(compiled, case)
+    if faults:
+        return Verdict(faults=faults)
+    matches = compiled.query(facts, unknown="any")
+    matches = matches if readable is None else compiled.matches(matches.bits & readable)
+    valid = set(matches.assets)
+    extra = valid - expected.wanted if expected.is_exact else valid & expected.banned
+    return Verdict(
+        tuple(sorted(expected.wanted - valid)), tuple(sorted(extra)), (), not expected.is_anything, len(matches), matches.bits
+    )
+
+
+def question_of(compiled: CompiledData, case: Case) -> tuple[Expected, dict[str, Fact], tuple[Fault, ...]]:
+    """What a case expects, its facts as a query takes them, and why they cannot be read."""
     facts: dict[str, Fact] = {}
     faults: list[Fault] = []
     expected = Expected()
@@ -254,15 +283,7 @@ def judge(compiled: CompiledData, case: Case, readable: int | None = None) -> Ve
                 compiled.derivation.refuse([name])
         except ContextError as error:
             faults += [fault.at(Place(column=name)) for fault in error.faults]
-    if faults:
-        return Verdict(faults=tuple(faults))
-    matches = compiled.query(facts, unknown="any")
-    matches = matches if readable is None else compiled.matches(matches.bits & readable)
-    valid = set(matches.assets)
-    extra = valid - expected.wanted if expected.is_exact else valid & expected.banned
-    return Verdict(
-        tuple(sorted(expected.wanted - valid)), tuple(sorted(extra)), (), not expected.is_anything, len(matches), matches.bits
-    )
+    return expected, facts, tuple(faults)
 
 
 def counted(table: Table, cases: Sequence[Case]) -> CaseCounts:
@@ -280,6 +301,29 @@ def counted(table: Table, cases: Sequence[Case]) -> CaseCounts:
             exact += expected.is_exact
             reached |= verdict.valid
     return CaseCounts(len(different), exact, compiled.n_rows, reached.bit_count())
+
+
+@dataclass(frozen=True, slots=True)
+class CaseBar:
+    """How many saved contexts each table must have that expect something, and the share of its rows that they must reach."""
+
+    least: int = 0
+    least_share: float = 0.0
+
+    def findings(self, table: Table, cases: Sequence[Case], file: str | None) -> Iterator[Finding]:
+        """What a table misses; nothing where it cannot be read, which is a finding of its own."""
+        if table.faults:
+            return
+        counts = counted(table, cases)
+        if counts.count < self.least:
+            verb = "expects" if counts.count == 1 else "expect"
+            sentence = f"{plural(counts.count, 'saved context')} of the table {verb} something; wanted: {self.least:,}."
+            yield Finding("few-cases", "error", sentence, table.name, file)
+        if counts.rows_reached < self.least_share * counts.rows:
+            share = format_percent(counts.rows_reached / counts.rows)
+            reached = f"{counts.rows_reached:,} of {plural(counts.rows, 'row')} ({share})"
+            sentence = f"{reached} are valid in a saved context that expects something; wanted: {format_percent(self.least_share)}."
+            yield Finding("few-cases", "error", sentence, table.name, file)
 
 
 def mismatch(verdict: Verdict, assets: Sequence[str]) -> str:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
+from contextdb.cells.facts import fact_text
 from contextdb.cells.words import quoted
 from contextdb.covering.contracts import Proof, Witness, prove
 from contextdb.covering.progress import Stops, Tell
@@ -82,6 +83,5 @@ def _example(witness: Witness) -> str:
 
 def _written(value: object) -> str:
     """A fact as `contextdb query` takes it."""
-    if isinstance(value, list):
-        return quoted(" ".join(f"+{tag}" for tag in value)) if value else '""'
-    return quoted(value) if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else f"{value}"
+    text = fact_text(value)
+    return quoted(text) if isinstance(value, list) and len(value) > 1 else text.lower() if isinstance(value, bool) else text

@@ -37,6 +37,7 @@ RULES: dict[str, Rule] = {
             "commands.motion_replay_command",
             "commands.motion_run_command",
             "disk",
+            "disk.boundary",
             "tables.places",
             "tables.project",
             "tables.watching.snapshot",
@@ -48,12 +49,12 @@ RULES: dict[str, Rule] = {
         "error",
         "The text of a cell does not follow the grammar of its type.",
         "Write the cell in an accepted form, or correct the type of the condition in contextdb.toml.",
-        ("cells.grammar", "expressions.rules.column", "tables.plain_columns"),
+        ("cells.grammar", "expressions.rules.column", "tables.expected_file", "tables.plain_columns"),
     ),
     "unreadable-penalty": Rule(
         "error",
         "The text after the ~ of a soft cell is not a penalty.",
-        "Write a number from 0 up after the ~, such as 3..5 ~2.5, or put a text that contains a ~ in double quotes.",
+        "Write a number from 0 up after the ~, such as 3..5 ~2.5 or 3..5 ~2.5/10, or put a text with a ~ in double quotes.",
         ("cells.grammar",),
     ),
     "unknown-value": Rule(
@@ -98,6 +99,12 @@ RULES: dict[str, Rule] = {
         "Fill in the cell, or declare `default` for the output in contextdb.toml.",
         ("cells.outputs",),
     ),
+    "row-against-markup": Rule(
+        "error",
+        "A row says that its clip plays otherwise than the markup of its database says.",
+        "Correct the cell, or the markup of the clip.",
+        ("authoring.rows_against_markup",),
+    ),
     "no-asset": Rule(
         "error",
         "A row names no asset.",
@@ -106,15 +113,15 @@ RULES: dict[str, Rule] = {
     ),
     "no-such-table": Rule(
         "error",
-        "A row refers to a missing table.",
-        "Correct the name after the @, restore the table, or put the asset in quotes if its name begins with @.",
-        ("tables.nesting.links", "tables.table"),
+        "A row refers to a missing table, or the base of a variant is missing.",
+        "Correct the name after the @ or of the base, restore the table, or put the asset in quotes if its name begins with @.",
+        ("tables.nesting.links", "tables.table", "tables.variants"),
     ),
     "cyclic-tables": Rule(
         "error",
-        "A table contains itself, directly or through an inner table.",
-        "Remove one of the rows on the path, or let it refer to another table.",
-        ("tables.nesting.links",),
+        "A table contains itself, directly or through an inner table, or is a variant of itself.",
+        "Remove one of the rows on the path, or let it refer to another table; of a variant name another base.",
+        ("tables.nesting.links", "tables.variants"),
     ),
     "unusable-table": Rule(
         "error",
@@ -370,6 +377,12 @@ RULES: dict[str, Rule] = {
         "Look at what the message names; if the change is intended, name the table with `--redefined`, or make a new baseline.",
         ("report.coverage_results",),
     ),
+    "few-cases": Rule(
+        "error",
+        "A table has fewer saved contexts than `--min-cases`, or they reach fewer rows than `--min-rows-reached`.",
+        "Restore a file of cases that was deleted, or let `contextdb cases --write` add the fewest contexts.",
+        ("checks.cases",),
+    ),
     "cases-fewer": Rule(
         "error",
         "The saved contexts of a table expect less than in the baseline, or reach fewer rows.",
@@ -404,6 +417,9 @@ OF_COVERAGE = (
 )
 """The rules that only `contextdb coverage` reports."""
 
+OF_OPTIONS = ("few-cases",)
+"""The rules of bars that an option of check sets."""
+
 OF_CONTRACTS = ("broken-contract", "unreadable-contract", "open-contract", "empty-contract")
 """The rules of contracts, which are of contextdb.toml."""
 
@@ -419,6 +435,7 @@ TABLE_RULES: tuple[str, ...] = tuple(
         "unportable-name",
         "not-a-table",
         *OF_CONTRACTS,
+        *OF_OPTIONS,
         *OF_COVERAGE,
     )
 )

@@ -28,7 +28,7 @@ from contextdb.tables.condition_column import ConditionColumn
 from contextdb.tables.data import TableData
 from contextdb.tables.nesting.names import inner_name
 from contextdb.tables.table import Table
-from contextdb.tables.variants import whole_of
+from contextdb.tables.variants import known_whole, whole_of
 from contextdb.tables.variety import gathered
 
 LINE_ENDS = {"\n": "LF", "\r\n": "CRLF", "\r": "CR"}
@@ -92,9 +92,12 @@ def _undeclared(table: TableData, column: ConditionColumn, file: str | None, abs
 
 
 def _unreadable(table: TableData) -> Iterator[Finding]:
+    whole = known_whole(table)
+    rows = None if whole is None else {own: row for row, own in enumerate(whole.own_rows.tolist()) if own >= 0}
     for fault in table.faults:
-        row = fault.place.row
-        yield Finding.of(fault, "error", table.name, None if row is None else table.assets[row])
+        own = fault.place.row
+        finding = Finding.of(fault, "error", table.name, None if own is None else table.assets[own])
+        yield finding if rows is None or own is None else replace(finding, row=rows.get(own))
 
 
 def _cells(table: TableData) -> Iterator[Finding]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 
-from contextdb.errors import ContextError
+from contextdb.errors import ContextError, Fault, QueryError
 
 
 def add_format_arguments(parser: argparse.ArgumentParser, formats: Sequence[str]) -> None:
@@ -15,6 +15,24 @@ def add_format_arguments(parser: argparse.ArgumentParser, formats: Sequence[str]
     parser.add_argument("--format", choices=formats, default="text", metavar="FORMAT", help=f"{', '.join(formats)} (default: text)")
     same = "the same as --format json"
     parser.add_argument("--json", action="store_const", const="json", dest="format", default=argparse.SUPPRESS, help=same)
+
+
+def add_page_arguments(parser: argparse.ArgumentParser, formats: Sequence[str]) -> None:
+    """The format of what is printed or written, as other commands take it, beside an older option for each."""
+    parser.add_argument("--format", choices=formats, default="text", metavar="FORMAT", help=f"{', '.join(formats)} (default: text)")
+    parser.add_argument("-o", "--output", metavar="FILE", help="where --format html writes the page")
+
+
+def take_page_arguments(arguments: argparse.Namespace) -> None:
+    """Set the older option that a --format is the same as; raises QueryError for a page without a file."""
+    if arguments.format == "html":
+        if arguments.output is None:
+            raise QueryError(Fault("a page is written to a file.", "-o FILE with --format html"))
+        arguments.html = arguments.output
+    elif arguments.output is not None:
+        raise QueryError(Fault(f"-o writes a page, and --format {arguments.format} prints.", "--format html with -o FILE"))
+    elif arguments.format != "text":
+        setattr(arguments, arguments.format, True)
 
 
 @contextmanager

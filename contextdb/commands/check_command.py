@@ -6,6 +6,7 @@ Exits with 1 if there are findings at the level of --fail-on, with 2 if the path
   contextdb check tables/
   contextdb check tables/ --format github --fail-on warning
   contextdb check tables/hit_mid_air.cases.csv
+  contextdb check --projects games/
 """
 
 from __future__ import annotations
@@ -19,11 +20,13 @@ from functools import partial
 from pathlib import Path
 
 from contextdb import report
-from contextdb.checks.cases import check_cases, read_cases
+from contextdb.authoring.rows_against_markup import check_against_markup
+from contextdb.checks.cases import CaseBar, check_cases, read_cases
 from contextdb.checks.contracts import contract_findings, proofs_of, strayed
 from contextdb.checks.rows import check_rows, unused_conditions
 from contextdb.checks.run import check
 from contextdb.commands import add_format_arguments
+from contextdb.commands.numbers import percent, whole_type
 from contextdb.commands.progress import Bar, has_many_cells, log_of
 from contextdb.console import ExitCode, output, printable, progress, terminal_width, wants_colour
 from contextdb.covering.contracts import Proof
@@ -31,23 +34,31 @@ from contextdb.disk import CASES_SUFFIX, TABLE_SUFFIXES, path_in_quotes, read_by
 from contextdb.errors import ContextDBError, Fault, in_quotes, nearest
 from contextdb.files.file_names import alike, composed, confusable, why_unportable
 from contextdb.files.texts import read_texts
-from contextdb.findings import LEVELS, Finding
+from contextdb.findings import LEVELS, Finding, Level
 from contextdb.report.results import CheckReport, TableSummary
 from contextdb.schema.settings import Schema
 from contextdb.schema.toml_lines import key_lines
 from contextdb.tables import project
+from contextdb.tables.expected_file import expected_path, read_situations
 from contextdb.tables.other_files import cases_path, notes_path
 from contextdb.tables.places import table_path
 from contextdb.tables.table import Table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("path", metavar="PATH", help="a folder of tables, one table or its name, or its cases")
+    parser.add_argument("path", metavar="PATH", nargs="?", help="a folder of tables, one table or its name, or its cases")
+    parser.add_argument("--projects", metavar="ROOT", help="check every project below a folder, and say which fail")
     add_format_arguments(parser, report.formats("check"))
     parser.add_argument(
         "--fail-on", choices=("error", "warning", "none"), default="error", help="the lowest level that fails (default: error)"
     )
     parser.add_argument("--all", action="store_true", help="print every finding, not the first few of each kind")
+    number = whole_type("a number of saved contexts, such as 10.")
+    parser.add_argument(
+        "--min-cases", type=number, default=0, metavar="N", help="fail if a table has fewer saved contexts that expect something"
+    )
+    share = "fail if they reach a smaller part of the rows of a table"
+    parser.add_argument("--min-rows-reached", type=percent, default=0.0, metavar="PCT", help=share)
     parser.add_argument(
         "--propose",
         action="store_true",
@@ -56,10 +67,34 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
-    """Check one table or a folder of them."""
+    """Check one table, a folder of them, or all projects below one."""
+    _require_one(arguments)
     if arguments.propose:
         return _propose(arguments)
-    return printed(check_path(arguments.path), arguments)
+    bar = CaseBar(arguments.min_cases, arguments.min_rows_reached)
+    if arguments.projects is not None:
+        return printed(_of_projects(arguments.projects, bar, failing_levels(arguments.fail_on)), arguments)
+    return printed(check_path(arguments.path, bar), arguments)
+
+
+def _require_one(arguments: argparse.Namespace) -> None:
+    """Refuse no path, and two; and contracts proposed for many projects."""
+    if (arguments.path is None) == (arguments.projects is None) or (arguments.propose and arguments.projects is not None):
+        given = "PATH is missing." if arguments.path is None and arguments.projects is None else "--projects ROOT stands by itself."
+        raise ContextDBError(Fault(given, "PATH, or --projects ROOT"))
+
+
+def _of_projects(root: str, bar: CaseBar, failing: Sequence[Level]) -> CheckReport:
+    from contextdb.commands.projects_below import ProjectCheck, ProjectsReport, extend_up_to, project_folders
+
+    folders = project_folders(root)
+    extend_up_to(root)
+    return ProjectsReport.of([ProjectCheck(folder, check_path(str(folder), bar)) for folder in folders], failing)
+
+
+def failing_levels(fail_on: str) -> tuple[Level, ...]:
+    """The levels that fail, by the lowest of them or "none"."""
+    return LEVELS[: LEVELS.index(fail_on) + 1] if fail_on != "none" else ()
 
 
 def _propose(arguments: argparse.Namespace) -> ExitCode:
@@ -82,7 +117,7 @@ def _propose(arguments: argparse.Namespace) -> ExitCode:
 
 def printed(checked: CheckReport, arguments: argparse.Namespace) -> ExitCode:
     """Print a report in the wanted format; the code says whether anything in it fails."""
-    failing = LEVELS[: LEVELS.index(arguments.fail_on) + 1] if arguments.fail_on != "none" else ()
+    failing = failing_levels(arguments.fail_on)
     text = report.render(
         arguments.format,
         checked,
@@ -96,13 +131,13 @@ def printed(checked: CheckReport, arguments: argparse.Namespace) -> ExitCode:
     return ExitCode.FOUND if any(f.level in failing for f in checked.findings) else ExitCode.OK
 
 
-def check_path(text: str) -> CheckReport:
-    """Check everything under a path, saved contexts too; what cannot be read at all is a finding."""
+def check_path(text: str, bar: CaseBar | None = None) -> CheckReport:
+    """Check everything under a path, saved contexts too; what cannot be read at all is a finding. `bar`: of saved contexts."""
     path = Path(text)
     if not os.path.isdir(text) and path.name != project.SCHEMA_FILE:
         file = table_path(text)
         table = _table_of(file) if _is_cases(file) else file
-        return CheckReport((), (_stray(file),)) if table is None else _check_files([(None, table)])
+        return CheckReport((), (_stray(file),)) if table is None else _check_files([(None, table)], None, bar)
     folder = project.folder_of(path)
     try:
         schema = project.read_folder_schema(folder)
@@ -114,7 +149,7 @@ def check_path(text: str) -> CheckReport:
         return CheckReport(
             (), (Finding("no-tables", "error", f"the folder holds no table. Accepted: {accepted}.", file=str(folder)),)
         )
-    report = _check_files(files, schema)
+    report = _check_files(files, schema, bar)
     others = (Finding("not-a-table", "info", sentence, file=str(path)) for path, sentence in project.stray_files(folder, schema))
     strays = _strays(folder, [file for _, file in files])
     return replace(report, findings=(*report.findings, *_unportable(files, schema), *others, *strays))
@@ -137,7 +172,7 @@ def _unportable(files: Sequence[tuple[str, Path]], schema: Schema) -> Iterator[F
         yield from (Finding("unportable-name", "warning", message, name, str(path)) for message in messages)
 
 
-def _check_files(files: Sequence[tuple[str | None, Path]], schema: Schema | None = None) -> CheckReport:
+def _check_files(files: Sequence[tuple[str | None, Path]], schema: Schema | None = None, bar: CaseBar | None = None) -> CheckReport:
     """Check some tables; `schema` is given when they are all of its folder."""
     tables: list[TableSummary] = []
     read: list[Table] = []
@@ -158,8 +193,8 @@ def _check_files(files: Sequence[tuple[str | None, Path]], schema: Schema | None
         tell = None if log is None else partial(_tell, log)
         findings += check_rows(table, progress=tell)
         proofs += proofs_of(table, tell)
-        findings += _check_cases(table, cases_path(path))
-        findings += _check_notes(table, notes_path(path))
+        findings += _check_cases(table, cases_path(path), bar or CaseBar())
+        findings += [*_check_notes(table, notes_path(path)), *_check_expected(table)]
     if schema is not None:
         names = [name for name, _ in files if name is not None]
         proofs += strayed(schema, names, [name for name in names if name not in {table.name for table in read}])
@@ -168,6 +203,7 @@ def _check_files(files: Sequence[tuple[str | None, Path]], schema: Schema | None
         lines = key_lines(read_bytes(Path(known.file)).decode("utf-8-sig"))
         findings += contract_findings(proofs, [table.name for table in read if table.faults], known, lines)
         findings += unused_conditions(known, read, lines) if schema is not None and len(read) == len(files) else []
+        findings += check_against_markup(read, Path(known.file).parent)
     return CheckReport(tuple(tables), tuple(findings), tuple(proofs))
 
 
@@ -175,11 +211,25 @@ def _tell(progress: Bar, part: str, share: float) -> None:
     progress(int(1000 * share), 1000, part)
 
 
-def _check_cases(table: Table, path: Path) -> list[Finding]:
+def _check_cases(table: Table, path: Path, bar: CaseBar) -> list[Finding]:
     try:
-        return check_cases(table, read_cases(path), str(path))
+        cases = read_cases(path)
+        return [*check_cases(table, cases, str(path)), *bar.findings(table, cases, str(table.path) if table.path else None)]
     except ContextDBError as error:
         return _as_findings(error, table.name)
+
+
+def _check_expected(table: Table) -> list[Finding]:
+    """What is wrong in the file of the contexts that are expected of a table."""
+    if table.settings.expected is None or table.faults:
+        return []
+    try:
+        path = expected_path(table)
+        if path is not None:
+            read_situations(path, [column.condition for column in table.flat().conditions])
+    except ContextDBError as error:
+        return _as_findings(error, table.name)
+    return []
 
 
 def _check_notes(table: Table, path: Path) -> list[Finding]:

@@ -2,7 +2,9 @@
 
 Prints the path of each written file. --stubs also writes the facts of these tables as Python types, for completion in editors and
 for type checkers. --c-header also writes one header for games in C or C++, which opens and queries the compiled files, and
---c-link a second one, by which such a game shows live what it asks.
+--c-link a second one, by which such a game shows live what it asks. --c-motion writes the header by which it plays the
+characters of the bundle that "motion build --bundle" writes. --csharp, --godot and --unreal write the facts and the values of
+these tables as types of those languages.
 
   contextdb compile tables/                  one compiled file next to each table
   contextdb compile tables/ -o build/        all of them into a folder
@@ -10,6 +12,8 @@ for type checkers. --c-header also writes one header for games in C or C++, whic
   contextdb compile tables/ -o build/ --stubs game/facts.py
   contextdb compile tables/ -o build/ --c-header game/tables.h
   contextdb compile tables/ -o build/ --c-header game/tables.h --c-link game/cdb_link.h
+  contextdb compile tables/ -o build/ --c-motion game/contextdb_motion.h
+  contextdb compile tables/ -o build/ --csharp Assets/Facts.cs
 """
 
 from __future__ import annotations
@@ -17,15 +21,19 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+from collections.abc import Callable, Mapping
 from pathlib import Path, PurePath
 
 from contextdb.compiled.c_header import c_header_of, c_link_of
+from contextdb.compiled.engine_facts import csharp_of, godot_of, unreal_of
 from contextdb.compiled.stubs import stubs_of
+from contextdb.compiled.table import CompiledTable
 from contextdb.console import ExitCode, output, printable, progress
 from contextdb.disk import make_folder, path_in_quotes, write_atomic
 from contextdb.disk.boundary import inside
 from contextdb.errors import ContextDBError, Fault, FileError, Place, plural
 from contextdb.files.tensors import SUFFIX
+from contextdb.motion.storage.c_header import c_motion_header
 from contextdb.tables.places import table_path
 from contextdb.tables.project import SCHEMA_FILE, Project, load_table
 from contextdb.tables.table import Table
@@ -33,6 +41,13 @@ from contextdb.tables.table import Table
 SEPARATORS = ("/", "\\")
 STUBS = (".py", ".pyi")
 HEADERS = (".h", ".hpp", ".hh", ".hxx")
+Generator = Callable[[Mapping[str, CompiledTable], str], str]
+ENGINES: Mapping[str, tuple[tuple[str, ...], str, Generator]] = {
+    "csharp": ((".cs",), "C#", lambda tables, _: csharp_of(tables)),
+    "godot": ((".gd",), "GDScript", lambda tables, _: godot_of(tables)),
+    "unreal": (HEADERS, "Unreal", unreal_of),
+}
+"""The flags that write facts as types of a language: the endings of its files, its name, and what writes a file of that name."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -45,6 +60,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--c-header", metavar="FILE", help="also write one C99 header that opens and queries the compiled files: a .h file"
     )
     parser.add_argument(
+        "--c-motion", metavar="FILE", help="also write a C99 header that plays characters of a motion bundle: a .h file"
+    )
+    for flag, (suffixes, what, _) in ENGINES.items():
+        text = f"also write the facts of the tables as types of {what}: a {suffixes[0]} file"
+        parser.add_argument(f"--{flag}", metavar="FILE", help=text)
+    parser.add_argument(
         "--c-link", metavar="FILE", help="with --c-header: also write a header that publishes what the game asks: a .h file"
     )
 
@@ -53,7 +74,9 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     """Compile one table or a folder of them; prints the path of each file."""
     stubs = None if arguments.stubs is None else _written_as(arguments.stubs, STUBS, "a Python file")
     header = None if arguments.c_header is None else _written_as(arguments.c_header, HEADERS, "a C header")
+    motion = None if arguments.c_motion is None else _written_as(arguments.c_motion, HEADERS, "a C header")
     link = _link_path(arguments)
+    engines = {flag: path for flag in ENGINES if (path := _engine_path(arguments, flag)) is not None}
     tables = _tables(arguments.path)
     targets = [_target(table, arguments.out, len(tables), _is_folder(arguments.path)) for table in tables]
     _require_different(targets)
@@ -68,11 +91,20 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         print(printable(f"{table.name}: {size}"), file=sys.stderr)
     if stubs is not None:
         _write(stubs, stubs_of({table.name: table.compile() for table in tables}))
+    for flag, path in engines.items():
+        _write(path, ENGINES[flag][2]({table.name: table.compile() for table in tables}, path.stem))
     if header is not None and header_text is not None:
         _write(header, header_text)
         if link is not None:
             _write(link, _link_text(tables, header, link))
+    if motion is not None:
+        _write(motion, c_motion_header(c_header_of({}, "CDB_MOTION_READER_H")))
     return ExitCode.OK
+
+
+def _engine_path(arguments: argparse.Namespace, flag: str) -> Path | None:
+    text = getattr(arguments, flag)
+    return None if text is None else _written_as(text, ENGINES[flag][0], f"a file of {ENGINES[flag][1]}")
 
 
 def _link_path(arguments: argparse.Namespace) -> Path | None:
@@ -107,7 +139,7 @@ def _written_as(text: str, suffixes: tuple[str, ...], what: str) -> Path:
     if path.suffix in suffixes and not text.endswith(SEPARATORS) and not os.path.isdir(text):
         return path
     mend = "" if os.path.isdir(text) or text.endswith(SEPARATORS) else path_in_quotes(path.with_suffix(suffixes[0]))
-    accepted = f"a name that ends in {', '.join(suffixes[:-1])} or {suffixes[-1]}"
+    accepted = f"a name that ends in {' or '.join(filter(None, [', '.join(suffixes[:-1]), suffixes[-1]]))}"
     raise FileError(Fault(f"this is not a valid name for {what}.", accepted, mend, Place(text)))
 
 

@@ -38,6 +38,7 @@ from contextdb.commands.progress import Bar, bar, has_many_cells
 from contextdb.console import ExitCode, output, printable, terminal_width, wants_colour
 from contextdb.covering.baseline import ACCEPTED, Baseline, CaseCounts, read_baseline
 from contextdb.covering.engine import MOST_GAPS, SAMPLES, WORK
+from contextdb.covering.expected import Expectation
 from contextdb.covering.pairs import PairTable
 from contextdb.covering.progress import Tell
 from contextdb.disk import write_atomic
@@ -45,6 +46,7 @@ from contextdb.errors import ContextDBError, ContextError, Fault, FileError, Pla
 from contextdb.report import formats, render
 from contextdb.report.coverage_results import CoverageResults, Measured
 from contextdb.report.results import Gate, as_path
+from contextdb.tables.expected_file import expected_path, read_situations
 from contextdb.tables.nesting.flat import FlatTable
 from contextdb.tables.other_files import cases_path
 from contextdb.tables.places import table_path
@@ -200,11 +202,25 @@ def measure(arguments: argparse.Namespace, table: EitherTable) -> Measured:
                 progress=_tell(progress),
             )
         seen = coverage_telemetry.observed(arguments, table, report.gaps)
+        expected = _expected(arguments, table)
         compared = _pairs(arguments, table)
     lines = tuple(table.place(row).line for row in range(table.n_rows))
     file = str(table.path) if table.path else None
     space = declared(table, report.assumed)
-    return Measured(report, file, tuple(table.assets), lines, compared, telemetry=seen, inside=_inside(table), space=space)
+    inside = _inside(table)
+    return Measured(report, file, tuple(table.assets), lines, compared, None, seen, (), inside, space, expected)
+
+
+def _expected(arguments: argparse.Namespace, table: EitherTable) -> Expectation | None:
+    """The coverage of the contexts that are expected of a table; None where none are."""
+    from contextdb.covering.expected import expectation
+
+    path = expected_path(table)
+    if path is None:
+        return None
+    situations = read_situations(path, [column.condition for column in table.conditions])
+    file = table.settings.expected or ""
+    return expectation(table, file, situations, seed=arguments.seed, work=arguments.work, samples=arguments.samples)
 
 
 def _pairs(arguments: argparse.Namespace, table: EitherTable) -> PairTable | None:

@@ -19,6 +19,7 @@ from pathlib import Path
 import contextdb
 from contextdb import motion
 from contextdb.cells.facts import Context
+from contextdb.commands import add_page_arguments, take_page_arguments
 from contextdb.commands.demo_teams import cast_lines
 from contextdb.commands.demo_world import world
 from contextdb.commands.motion_page import page_file
@@ -65,10 +66,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--keep", metavar="FOLDER", help="a new folder for the tables, the synthetic clips and the poses, to experiment with"
     )
     parser.add_argument("--html", metavar="FILE", help="write the page of a minute over stairs and slopes")
+    add_page_arguments(parser, ("text", "html"))
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Print each step of the way."""
+    take_page_arguments(arguments)
     page = page_file(arguments.html) if arguments.html else None
     source = Path(arguments.tables) if arguments.tables else sample_folder()
     with tempfile.TemporaryDirectory() as temporary:

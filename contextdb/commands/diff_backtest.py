@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from contextdb.checks.effects import Box, Effects
 from contextdb.checks.effects_space import shared_space
@@ -17,6 +17,7 @@ from contextdb.report.document import Block, Document, Numbered, Section, as_mar
 from contextdb.report.results import Gate
 from contextdb.tables.table import Table
 from contextdb.telemetry.backtest import EMPTIED, FILLED, GAINS, LOSES, Backtest, ChangedBox, Comparison, Example, backtest
+from contextdb.telemetry.characters import by_character, per_minute
 from contextdb.telemetry.contexts import context_files
 
 MOST_BOXES = 64
@@ -47,10 +48,27 @@ class Replayed:
     def _section(self) -> Section:
         """The same for people."""
         result = self.result
-        shares = [(f"{_percent(n, result.moments)} {what}", n) for what, n in self._counts]
-        parts = ", ".join(text for text, n in shares if n) or "nothing changes"
-        unread = [f"{printable(file)} was not read: {faults[0].message}" for file, faults in result.unread]
-        return Section(f"{plural(result.moments, 'recorded moment')}", parts, unread, tuple(self._blocks()), self.gates)
+        moments, parts = plural(result.moments, "recorded moment"), self._parts
+        return Section(moments, parts, self._unread, tuple(self._blocks()), self.gates)
+
+    @property
+    def sentences(self) -> list[str]:
+        """What becomes of the moments, and which files were not read."""
+        return [f"Of {plural(self.result.moments, 'recorded moment')}: {self._parts}.", *self._unread]
+
+    @property
+    def blocks(self) -> list[Block]:
+        """By assets, by boxes, and moments to open."""
+        return [replace(b, title=f"Recorded moments: {b.title}") if isinstance(b, Numbered) else b for b in self._blocks()]
+
+    @property
+    def _parts(self) -> str:
+        shares = [(f"{_percent(n, self.result.moments)} {what}", n) for what, n in self._counts]
+        return ", ".join(text for text, n in shares if n) or "nothing changes"
+
+    @property
+    def _unread(self) -> list[str]:
+        return [f"{printable(file)} was not read: {faults[0].message}" for file, faults in self.result.unread]
 
     @property
     def _counts(self) -> list[tuple[str, int]]:
@@ -63,6 +81,8 @@ class Replayed:
         if assets:
             lines = [f"{safe_text(a)}: {_both(result.gains[a], result.loses[a], result.moments)}" for a in assets]
             yield Numbered("assets", lines)
+        if result.characters:
+            yield Numbered(_per_minute(result), list(_characters(result)))
         if boxes := result.ordered_boxes:
             yield Numbered("where", [f"{_percent(n, result.moments)}  {_words(box)}: {_cells(box)}" for box, n in boxes])
         if result.examples:
@@ -74,7 +94,7 @@ def replayed_moments(arguments: argparse.Namespace, before: Table, after: Table,
     boxes = _boxes(effect) if isinstance(effect, Effects) else []
     own = data_of(shared_space(before, after).table([[dict(box.cells) for box in boxes]]).compile()) if boxes else None
     old, new = (data_of(table.flat().compile()) for table in (before, after))
-    comparison = Comparison(old, new, arguments.count, tuple(boxes), own)
+    comparison = Comparison(old, new, arguments.count, arguments.character, arguments.time, tuple(boxes), own)
     files = [file for pattern in arguments.telemetry for file in context_files(pattern)]
     with bar("asking in recorded moments", has_many_bytes(files)) as tell:
         result = backtest(comparison, arguments.telemetry, arguments.engine, arguments.scheduler, tell)
@@ -127,6 +147,24 @@ def _example(example: Example) -> str:
     facts = " ".join(f"{name}={value}" for name, value in example.context.items())
     before, after = (", ".join(assets) or "no row" for assets in (example.before, example.after))
     return safe_text(f"{example.file}, {place}: {facts}: {before} → {after}", 400)
+
+
+CHANGES = (("changed", "change"), ("emptied", "are left without a row"), ("filled", "have a row at last"))
+
+
+def _per_minute(result: Backtest) -> str:
+    """How many moments change per character and minute, as a title."""
+    rates = per_minute(result.characters)
+    if rates is None:
+        return "characters"
+    return "per character and minute " + ", ".join(f"{rates[name]:.3g} {verb}" for name, verb in CHANGES)
+
+
+def _characters(result: Backtest) -> Iterator[str]:
+    for name, minutes, counts in by_character(result.characters):
+        how = ", ".join(f"{counts[key]:,} {verb}" for key, verb in CHANGES if counts[key]) or "none changes"
+        lasting = f" in {minutes:,.1f} minutes" if minutes else ""
+        yield f"{safe_text(name)}: {plural(counts['moments'], 'moment')}{lasting}: {how}"
 
 
 def _percent(n: int, moments: int) -> str:

@@ -5,6 +5,7 @@ in every recorded moment; with --max-changed or --max-emptied only these decide 
 
   contextdb diff old/hit_mid_air.csv tables/hit_mid_air.csv
   contextdb diff a.csv b.csv --format markdown
+  contextdb diff a.csv b.csv --format html -o review.html
   contextdb diff a.csv b.csv --telemetry "play/*.parquet" --max-emptied 0.1
 """
 
@@ -12,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from contextdb.checks.effects import Effects
@@ -19,6 +21,7 @@ from contextdb.commands import add_format_arguments
 from contextdb.commands.diff_views import as_markdown, as_text, effects_json, effects_markdown, effects_text
 from contextdb.commands.numbers import percent
 from contextdb.console import ExitCode, output, wants_colour
+from contextdb.disk import write_atomic
 from contextdb.edits.diffing import Diff, diff
 from contextdb.errors import ContextDBError, ContextError, Fault
 from contextdb.report.render_json import as_json
@@ -30,19 +33,22 @@ if TYPE_CHECKING:
     from contextdb.commands.diff_backtest import Replayed
 
 ENGINES = ("local", "dask")
-FORMATS = ("text", "markdown", "json")
+FORMATS = ("text", "markdown", "json", "html")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("before", metavar="A", help="the table as it was: a .csv or .parquet file, or the name of a table")
     parser.add_argument("after", metavar="B", help="the table as it is")
     add_format_arguments(parser, FORMATS)
+    parser.add_argument("-o", "--output", metavar="FILE", help="write the differences to a file")
     parser.add_argument("--no-effects", action="store_false", dest="effects", help="leave out the effects of the change")
     group = parser.add_argument_group("recorded moments")
     group.add_argument("--telemetry", action="append", metavar="GLOB", help="files of recorded contexts; may be repeated")
     group.add_argument("--max-changed", type=percent, metavar="PERCENT", help="fail if the answer changes in more of the moments")
     group.add_argument("--max-emptied", type=percent, metavar="PERCENT", help="fail if more of the moments are left without a row")
     group.add_argument("--count", metavar="COLUMN", help="the column that says how often each moment was seen")
+    group.add_argument("--character", metavar="COLUMN", help="the column that says whose moment it is")
+    group.add_argument("--time", metavar="COLUMN", help="the column of seconds: changes are counted per character and minute")
     group.add_argument("--engine", choices=ENGINES, default="local", help="read files here, or on Dask workers (default: local)")
     group.add_argument("--scheduler", metavar="ADDRESS", help="the Dask scheduler; without it, workers on this machine")
     parser.add_argument("--all", action="store_true", help="print every difference, not the first of each kind")
@@ -60,8 +66,11 @@ def run(arguments: argparse.Namespace) -> ExitCode:
 
         replayed = replayed_moments(arguments, before, after, effect)
     text = _rendered(changes, effect, replayed, arguments)
-    with output():
-        print(text, end="")
+    if arguments.output:
+        write_atomic(Path(arguments.output), text.encode("utf-8", "backslashreplace"))
+    else:
+        with output():
+            print(text, end="")
     if replayed is not None and replayed.gates:
         return ExitCode.OK if all(gate.passed for gate in replayed.gates) else ExitCode.FOUND
     return ExitCode.FOUND if changes else ExitCode.OK
@@ -71,7 +80,7 @@ def require_moments(arguments: argparse.Namespace) -> None:
     """Refuse options about recorded moments where there are none."""
     if arguments.telemetry:
         return
-    for option in ("max_changed", "max_emptied", "count", "scheduler"):
+    for option in ("max_changed", "max_emptied", "count", "character", "time", "scheduler"):
         if getattr(arguments, option) is not None:
             sentence = f"--{option.replace('_', '-')} is about recorded moments."
             raise ContextError(Fault(sentence, "--telemetry GLOB with it"))
@@ -100,9 +109,13 @@ def _rendered(changes: Diff, effect: Effects | Fault | None, replayed: Replayed 
     if arguments.format == "json":
         more = {} if replayed is None else replayed.to_json()
         return as_json(changes.to_json() | {"effects": effects_json(effect)} | more)
+    if arguments.format == "html":
+        from contextdb.commands.diff_page import as_page
+
+        return as_page(changes, effect, replayed)
     if arguments.format == "markdown":
         below = "" if replayed is None else replayed.markdown
         return as_markdown(changes, arguments.all, effects_markdown(effect, arguments.all) + below)
-    colour = wants_colour(sys.stdout)
+    colour = wants_colour(sys.stdout) and not arguments.output
     below = "" if replayed is None else replayed.text(colour, arguments.all)
     return as_text(changes, colour, arguments.all) + effects_text(effect, colour, arguments.all) + below

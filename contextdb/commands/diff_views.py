@@ -31,8 +31,8 @@ Part = tuple[str, str]
 def as_text(changes: Diff, colour: bool, shows_all: bool = False) -> str:
     """Differences as aligned lines."""
     name = printable(str(changes.after.path or changes.after.name))
-    lines = [styled(f"{name}: {changes.summary}", "bold", colour)]
-    for title, parts in (("columns", _columns(changes)), ("rows", _rows(changes))):
+    lines = [styled(f"{name}: {changes.summary}", "bold", colour), *map(printable, owners(changes))]
+    for title, parts in (("columns", columns_changed(changes)), ("rows", rows_changed(changes))):
         if parts:
             displayed = [styled(f"  {MARKS[verb][0]} {printable(text)}", MARKS[verb][1], colour) for verb, text in parts]
             lines += ["", title, *_first(displayed, sys.maxsize if shows_all else MOST)]
@@ -43,9 +43,9 @@ def as_text(changes: Diff, colour: bool, shows_all: bool = False) -> str:
 def as_markdown(changes: Diff, shows_all: bool = False, more: str = "") -> str:
     """Differences as Markdown with more below it, together small enough for a comment."""
     name = str(changes.after.path or changes.after.name)
-    lines = [f"### {escaped(name)}", "", f"{escaped(changes.summary)}"]
-    parts = [f"- column {verb}: {escaped(text)}" for verb, text in _columns(changes)]
-    parts += [f"- row {verb}: {escaped(text)}" for verb, text in _rows(changes)]
+    lines = [f"### {escaped(name)}", "", f"{escaped(changes.summary)}", *(f"\n{escaped(text)}" for text in owners(changes))]
+    parts = [f"- column {verb}: {escaped(text)}" for verb, text in columns_changed(changes)]
+    parts += [f"- row {verb}: {escaped(text)}" for verb, text in rows_changed(changes)]
     rows = [f"| {' | '.join(escaped(safe_text(t, 200)) for t in _markdown_texts(c))} |" for c in changes.cells]
     room = sys.maxsize if shows_all else MOST_BYTES - len(more.encode())
     for head, listed in (([], parts), (["| asset | column | before | after |", "| --- | --- | --- | --- |"], rows)):
@@ -58,6 +58,15 @@ def as_markdown(changes: Diff, shows_all: bool = False, more: str = "") -> str:
     return "\n".join(lines) + "\n" + more
 
 
+def owners(changes: Diff) -> list[str]:
+    """Who answers for the table, and for the conditions whose cells change, in a sentence; nothing where nobody is named."""
+    columns = {changes.after.columns[at].name for at in changes.changed} | {*changes.columns_added, *changes.columns_removed}
+    known = {c.condition.name: c.condition.owner for table in (changes.before, changes.after) for c in table.conditions}
+    parts = [f"the table by {safe_text(changes.after.settings.owner)}"] if changes.after.settings.owner else []
+    parts += [f"{safe_text(name)} by {safe_text(owner)}" for name, owner in known.items() if owner and name in columns]
+    return [f"Owned: {', '.join(parts)}."] if parts else []
+
+
 def _size(line: str) -> int:
     return len(line.encode()) + 1
 
@@ -67,7 +76,8 @@ def _markdown_texts(change: CellChange) -> tuple[str, str, str, str]:
     return change.asset, change.column, change.before, after
 
 
-def _columns(changes: Diff) -> list[Part]:
+def columns_changed(changes: Diff) -> list[Part]:
+    """What became of the columns that are not where they were."""
     parts = [("added", safe_text(name)) for name in changes.columns_added]
     parts += [("removed", safe_text(name)) for name in changes.columns_removed]
     parts += [("renamed", f"{safe_text(one.before)} → {safe_text(one.after)}") for one in changes.columns_renamed]
@@ -76,7 +86,8 @@ def _columns(changes: Diff) -> list[Part]:
     ]
 
 
-def _rows(changes: Diff) -> list[Part]:
+def rows_changed(changes: Diff) -> list[Part]:
+    """What became of the rows that are not where they were."""
     before, after = changes.before, changes.after
     parts = [("added", f"{_asset(after.assets[row])}, {_place(after, row)}") for row in changes.rows_added]
     parts += [("removed", f"{_asset(before.assets[row])}, {_place(before, row)} before") for row in changes.rows_removed]
@@ -153,7 +164,7 @@ def effects_text(effect: Effects | Fault | None, colour: bool, shows_all: bool =
     if effect is None:
         return ""
     lines = ["", TITLE]
-    for heading, items in _headings(effect, shows_all):
+    for heading, items in headings(effect, shows_all):
         lines.append(styled(f"  {printable(heading)}", "bold" if items else "dim", colour))
         lines += [f"    {printable(line)}" for line in items]
     return "".join(f"{line}\n" for line in lines)
@@ -164,13 +175,14 @@ def effects_markdown(effect: Effects | Fault | None, shows_all: bool = False) ->
     if effect is None:
         return ""
     lines = ["", f"#### {TITLE.capitalize()}", ""]
-    for heading, items in _headings(effect, shows_all):
+    for heading, items in headings(effect, shows_all):
         lines.append(f"- {escaped(heading)}")
         lines += [f"  - {escaped(line)}" for line in items]
     return "".join(f"{line}\n" for line in lines)
 
 
-def _headings(effect: Effects | Fault, shows_all: bool) -> Iterator[Heading]:
+def headings(effect: Effects | Fault, shows_all: bool) -> Iterator[Heading]:
+    """What a change does, under headings."""
     if isinstance(effect, Fault):
         yield f"That cannot be determined: {effect}", []
         return
@@ -184,8 +196,8 @@ def _headings(effect: Effects | Fault, shows_all: bool) -> Iterator[Heading]:
         yield f"… and {plural(left, 'asset')} more; --all shows every one", []
     if effect.n_left_out:
         yield f"{plural(effect.n_left_out, 'more changed asset')} not looked at", []
-    yield from _listed("gaps opened", [_line(box) for box in effect.opened], most)
-    yield from _listed("gaps closed", [_line(box) for box in effect.closed], most)
+    yield from _listed("gaps opened", [gap_line(box) for box in effect.opened], most)
+    yield from _listed("gaps closed", [gap_line(box) for box in effect.closed], most)
     yield from _listed("rows that can no longer be chosen", [_finding(each) for each in effect.dead], most)
     yield from _listed("rows that may not be valid together", [_finding(each) for each in effect.overlaps], most)
     if not effect:
@@ -207,7 +219,7 @@ def _reach(reach: Reach, shows_all: bool) -> Iterator[Heading]:
     for verb, boxes, share in (("gains", reach.gained, reach.share_gained), ("loses", reach.lost, reach.share_lost)):
         if boxes:
             most = len(boxes) if shows_all else MOST_BOXES
-            yield f"{safe_text(reach.asset)} {verb} {_percent(share)}", _first(list(map(_line, boxes)), most, "… and {:,} more")
+            yield f"{safe_text(reach.asset)} {verb} {_percent(share)}", _first(list(map(gap_line, boxes)), most, "… and {:,} more")
 
 
 def _listed(title: str, lines: Sequence[str], most: int) -> Iterator[Heading]:
@@ -220,7 +232,8 @@ def _finding(finding: Finding) -> str:
     return f"{safe_text(finding.asset or '(no name)')}{line}: {safe_text(finding.message, 300)}"
 
 
-def _line(box: Box) -> str:
+def gap_line(box: Box) -> str:
+    """A gap with its share."""
     return f"{_percent(box.share)}  {safe_text(box.text, 400)}"
 
 

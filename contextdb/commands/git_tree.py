@@ -39,15 +39,15 @@ class Commit:
     def of(cls, folder: Path, ref: str) -> Commit:
         """The commit that a ref names. Raises ContextError where there is none, and FileError where there is no git or no
         repository."""
-        if not _is_in_a_repository(folder):
+        if not is_in_a_repository(folder):
             sentence = "the folder is in no git repository, so that there is nothing to compare with."
             raise FileError(Fault(sentence, "--baseline FILE, or a folder of a repository", place=Place(str(folder))))
-        code, commit = (1, b"") if _is_no_ref(ref) else _git(folder, *_lookup(ref))
+        code, commit = (1, b"") if _is_no_ref(ref) else run_git(folder, *_lookup(ref))
         if code == 0:
             return cls(folder, ref, commit.decode("ascii", "replace").strip())
-        is_shallow = _git(folder, "rev-parse", "--is-shallow-repository")[1].strip() == b"true"
+        is_shallow = run_git(folder, "rev-parse", "--is-shallow-repository")[1].strip() == b"true"
         mend = "git fetch --unshallow, or fetch-depth: 0 of actions/checkout, as this clone is shallow" if is_shallow else ""
-        if not mend and not _is_no_ref(ref) and _git(folder, *_lookup(f"origin/{ref}"))[0] == 0:
+        if not mend and not _is_no_ref(ref) and run_git(folder, *_lookup(f"origin/{ref}"))[0] == 0:
             mend = in_quotes(f"origin/{ref}")
         raise ContextError(Fault(f"git has no commit {in_quotes(ref)} here.", "a branch, a tag or a commit of this clone", mend))
 
@@ -60,16 +60,18 @@ class Commit:
         """Write the folder's tables, as they are in the commit, into an empty folder, at their path in the repository, with what
         their project extends; gives their folder, None where it has no file there. Raises ContextDBError where its contextdb.toml
         cannot be read, or git does not have a file."""
-        prefix = _git(self.folder, "rev-parse", "--show-prefix")[1].decode("utf-8", "surrogateescape").strip("\n")
+        prefix = run_git(self.folder, "rev-parse", "--show-prefix")[1].decode("utf-8", "surrogateescape").strip("\n")
         target = root.joinpath(*PurePosixPath(prefix).parts)
-        code, listed = _git(self.folder, "ls-tree", "-r", "-z", "--full-tree", f"{self.hash}:{prefix.rstrip('/')}")
+        code, listed = run_git(self.folder, "ls-tree", "-r", "-z", "--full-tree", f"{self.hash}:{prefix.rstrip('/')}")
         blobs = dict(_plain_files(listed)) if code == 0 else {}
         make_folder(root / ".git")  # what is extended may climb to here
         if SCHEMA_FILE in blobs:
             self._write(blobs, [SCHEMA_FILE], target)
             self._write_extended(target / SCHEMA_FILE, root)
-        declared = {alike(file) for settings in read_folder_schema(target).tables.values() for file in settings.files}
-        declared |= {alike(cases_path(Path(file)).as_posix()) for file in declared}
+        schema = read_folder_schema(target)
+        declared = {alike(file) for settings in schema.tables.values() for file in settings.files}
+        expected = {alike(settings.expected) for settings in schema.tables.values() if settings.expected is not None}
+        declared |= expected | {alike(cases_path(Path(file)).as_posix()) for file in declared}
         wanted = [name for name in blobs if _is_tabular(name) and ("/" not in name or alike(name) in declared)]
         self._write(blobs, wanted, target)
         return target if wanted else None
@@ -82,7 +84,7 @@ class Commit:
             if extends is None or not schema.is_relative_to(root) or schema.exists():
                 return
             name = schema.relative_to(root).as_posix()
-            code, listed = _git(self.folder, "ls-tree", "-z", "--full-tree", self.hash, name)
+            code, listed = run_git(self.folder, "ls-tree", "-z", "--full-tree", self.hash, name)
             blobs = dict(_plain_files(listed)) if code == 0 else {}
             if name not in blobs:
                 return
@@ -92,7 +94,7 @@ class Commit:
         if not names:
             return
         request = "".join(f"{blobs[name]}\n" for name in names).encode()
-        code, out = _git(self.folder, "cat-file", "--batch", given=request)
+        code, out = run_git(self.folder, "cat-file", "--batch", given=request)
         at = 0
         for name in names:
             head, _, _ = out[at : at + 200].partition(b"\n")
@@ -110,9 +112,9 @@ class Commit:
             write_atomic(path, raw, syncs=False)
 
 
-def _is_in_a_repository(folder: Path) -> bool:
+def is_in_a_repository(folder: Path) -> bool:
     """Whether a folder is in the work tree of a repository that is not itself made of files of that tree."""
-    code, out = _git(folder, "rev-parse", "--is-inside-work-tree", "--show-toplevel", "--absolute-git-dir")
+    code, out = run_git(folder, "rev-parse", "--is-inside-work-tree", "--show-toplevel", "--absolute-git-dir")
     is_inside, *paths = os.fsdecode(out).splitlines() or [""]
     if code != 0 or is_inside != "true" or len(paths) != 2:
         return False
@@ -145,7 +147,7 @@ def _is_tabular(name: str) -> bool:
     return name.lower().endswith(TABLE_SUFFIXES)
 
 
-def _git(folder: Path, *arguments: str, given: bytes = b"") -> tuple[int, bytes]:
+def run_git(folder: Path, *arguments: str, given: bytes = b"") -> tuple[int, bytes]:
     """The exit code of git and its standard output. Raises FileError where it cannot be run."""
     command = ["git", "-c", "safe.bareRepository=explicit", "--no-replace-objects", "--literal-pathspecs", *arguments]
     environment = os.environ | {"LC_ALL": "C", "GIT_TERMINAL_PROMPT": "0"}

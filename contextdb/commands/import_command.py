@@ -3,10 +3,14 @@
 Columns are matched with the conditions that contextdb.toml declares. For others the command infers a type from their cells, and
 declares it there with the new table. It prints its decisions and their reasons; --dry-run writes nothing else.
 
+--learn takes a recording, a row for each moment, and makes the fewest rows that say in each the asset of --asset. Without DST the
+table is printed. It exits with 1 if the facts do not tell the asset.
+
   contextdb import moves.xlsx tables/moves.csv --dry-run
   contextdb import moves.xlsx tables/moves.csv --sheet Moves --map Sped=speed --map Notes=
   contextdb import german.csv tables/jog.csv --decimal comma --type heading=angle
   pbpaste | contextdb import - tables/pasted.csv --as tsv
+  contextdb import machine_log.parquet tables/moves.csv --learn --asset played --map time=
 """
 
 from __future__ import annotations
@@ -18,6 +22,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from contextdb.cells.kinds import KINDS
+from contextdb.commands.import_learn import learn, require_learning
 from contextdb.console import ExitCode, aligned, output, printable
 from contextdb.disk import TABLE_SUFFIXES, is_stream, path_in_quotes, read_bytes
 from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, mend_for, nearest, plural, row_name
@@ -36,7 +41,7 @@ LARGE_BYTES, LARGE_CELLS, LARGE_COLUMNS = 10_000_000, 1_000_000, 2_000
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("source", metavar="SRC", help="the file to import; - for standard input")
-    parser.add_argument("target", metavar="DST", help="the table file to write: .csv or .parquet, in a folder of tables")
+    parser.add_argument("target", metavar="DST", nargs="?", help="the table file to write: .csv or .parquet, in a folder of tables")
     names = [name for name, one in FORMATS.items() if one.is_read]
     parser.add_argument("--as", dest="format", metavar="FORMAT", choices=names, help=f"the format of SRC: {', '.join(names)}")
     parser.add_argument(
@@ -58,11 +63,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--names", choices=importing.NAMES, help=whole)
     parser.add_argument("--dry-run", action="store_true", help="write nothing")
     parser.add_argument("--force", action="store_true", help="overwrite an existing table")
+    group = parser.add_argument_group("learning")
+    group.add_argument("--learn", action="store_true", help="SRC is a recording: make the fewest rows that say the same")
+    group.add_argument("--asset", metavar="COLUMN", help="the column of the recording that names what was played")
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Read, decide, say what was decided, write."""
-    target = _target(arguments.target, arguments.force or arguments.dry_run)
+    require_learning(arguments)
+    target = None if arguments.target is None else _target(arguments.target, arguments.force or arguments.dry_run)
     raw, name = _bytes(arguments.source)
     if len(raw) >= LARGE_BYTES:
         _say(name, f"reading {len(raw) / 1e6:,.0f} MB …")
@@ -73,6 +82,8 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         _say(name, f"{size} read; finding the type of each column …")
     for remark in reading.remarks:
         print(printable(f"{name}: {remark}"), file=sys.stderr)
+    if arguments.learn or target is None:
+        return learn(reading, _pairs(arguments.map, "--map", "COLUMN=NAME"), arguments, name)
     plan = _plan(reading, target, arguments)
     if arguments.names is None and (note := importing.whole_names_sentence(plan.columns, reading, "--names words")):
         print(printable(f"{name}: {note}"), file=sys.stderr)

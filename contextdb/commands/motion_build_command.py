@@ -8,6 +8,7 @@ The features of each clip are cached in .contextdb-cache, so the next build comp
   contextdb motion build tables/ --keep-going            without faulty clips and databases
   contextdb motion build tables/ --poses                 and their poses, for what plays them
   contextdb motion build tables/ --watch                 and again whenever a clip is saved
+  contextdb motion build tables/ --bundle game.motion    and one file with all that a game in C needs
   contextdb motion build tables/ --engine dask --scheduler tcp://10.0.0.5:8786
 
 More than 64 clips are computed on all cores; with --engine dask on workers, which see the files under the same paths. The databases
@@ -27,6 +28,7 @@ from functools import partial
 from pathlib import Path
 
 from contextdb.commands.engine_options import add_engine_arguments, engines_of
+from contextdb.commands.motion_bundle import bundle_path, write_bundle
 from contextdb.commands.progress import building_bar
 from contextdb.commands.watched_work import watched
 from contextdb.console import ExitCode, aligned, note, output
@@ -43,7 +45,7 @@ from contextdb.motion.storage.config import MotionConfig
 from contextdb.motion.storage.pose_files import poses_alone, poses_path, save_poses
 from contextdb.motion.storage.stored import STORED, save_database
 from contextdb.tables.project import SCHEMA_FILE, Project
-from contextdb.tables.table import leaf_assets
+from contextdb.tables.table import Table, leaf_assets
 
 HEADER = ("database", "assets", "clips", "frames", "features", "MB", "computed", "cached", "file")
 
@@ -56,6 +58,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--keep-going", action="store_true", help="leave out faulty clips and databases, build the rest, and exit with 1"
     )
     parser.add_argument("--poses", action="store_true", help="save the poses of the clips too; not with --keep-going")
+    parser.add_argument(
+        "--bundle",
+        metavar="FILE",
+        help="also write all databases, poses, controllers and tables as one file for games: a .motion file; not with --keep-going",
+    )
     parser.add_argument("--no-cache", action="store_true", help="compute every clip, and cache nothing")
     parser.add_argument(
         "--watch", action="store_true", help="build again whenever a clip, a table, markup or contextdb.toml is saved"
@@ -74,6 +81,7 @@ def _build(arguments: argparse.Namespace) -> ExitCode:
     targets = project.targets(arguments.out, arguments.database)
     if arguments.poses and arguments.keep_going:
         raise ContextDBError(Fault("--poses takes the poses of all clips, --keep-going leaves faulty ones out.", "one of the two"))
+    bundle = None if arguments.bundle is None else bundle_path(arguments.bundle, arguments.keep_going or arguments.database)
     left_out, engines = LeftOut(), engines_of(arguments)
     with building_bar() as progress:
         built = building.build_all(
@@ -93,6 +101,8 @@ def _build(arguments: argparse.Namespace) -> ExitCode:
         save_database(built[name].database, target, inputs=built[name].digest)
     if arguments.poses:
         _save_poses(project, built, targets, engines)
+    if bundle is not None:
+        write_bundle(bundle, project.tables, project.config, {name: each.database for name, each in built.items()}, project.folder)
     warn([*replaced, *project.warnings(built)])
     with output():
         if arguments.json:
@@ -156,6 +166,7 @@ class MotionProject:
     folder: Path
     config: MotionConfig
     assets: Mapping[str, list[str]]
+    tables: Mapping[str, Table]
 
     @classmethod
     def load(cls, path: str) -> MotionProject:
@@ -166,7 +177,7 @@ class MotionProject:
             place = Place(str(project.folder / SCHEMA_FILE))
             accepted = 'a section such as [databases.jog] with features and clips = "clips/*.bvh"'
             raise ContextDBError(Fault("no motion database is declared.", accepted, place=place))
-        return cls(project.folder, config, {name: leaf_assets(table) for name, table in project.tables.items()})
+        return cls(project.folder, config, {name: leaf_assets(table) for name, table in project.tables.items()}, project.tables)
 
     def targets(self, out: str | None, names: list[str] | None) -> dict[str, Path]:
         """Where the databases of some names, or all, are saved."""

@@ -32,6 +32,7 @@ from contextdb.authoring.described_table import (
     filling,
     rows_for,
 )
+from contextdb.commands.engine_options import engines_of
 from contextdb.commands.motion_clips import add_clip_arguments, progress_of
 from contextdb.console import ExitCode, note, output, printable
 from contextdb.errors import ContextDBError, Fault, plural, some
@@ -58,7 +59,9 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     if arguments.update and not arguments.into:
         raise ContextDBError(Fault("--update replaces cells of a table.", "--into TABLE --update"))
     into = Path(arguments.into) if arguments.into else None
-    clips = rows_for(arguments.path, into, progress_of, arguments.metres_per_unit, arguments.up)
+    clips = rows_for(
+        arguments.path, into, progress_of, arguments.metres_per_unit, arguments.up, engines_of(arguments), arguments.root_from
+    )
     folder_clips, rows = clips.source, clips.rows
     made, fills, is_playable = None, None, True
     if arguments.out or into is not None:

@@ -27,7 +27,9 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-from contextdb.authoring.clip_folder import MARKUP, FolderClips, below, clips_of
+from contextdb.authoring.clip_folder import CLIPS_OR_TABLES, MARKUP, FolderClips, below, clips_of
+from contextdb.authoring.clip_looks import Looks
+from contextdb.commands.engine_options import engines_of
 from contextdb.commands.motion_clips import add_clip_arguments, progress_of
 from contextdb.commands.motion_prepared import BOM, Line, Prepared, line_of, with_marks, without
 from contextdb.commands.watched_work import watched
@@ -44,7 +46,7 @@ from contextdb.motion.preparing.proposals import ROOT_SMOOTH_S, prepare_again
 from contextdb.motion.storage.clip_files import named_takes
 from contextdb.report.render_json import as_json
 from contextdb.schema.toml_edit import set_key
-from contextdb.tables.project import SCHEMA_FILE
+from contextdb.tables.project import SCHEMA_FILE, folder_of
 
 ROOT_KEY = "root_smooth_s"
 JOINT_KINDS = ("roots", "contacts", "noise")
@@ -96,17 +98,27 @@ def run(arguments: argparse.Namespace) -> ExitCode:
 
 
 def _prepare(arguments: argparse.Namespace) -> ExitCode:
+    prepared = Prepared.load(folder_of(Path(arguments.path), CLIPS_OR_TABLES))
+    looks = Looks(kinds=tuple(arguments.only or KINDS), known=prepared.cached.clips)
     with progress_of("reading clips") as tell:
-        folder_clips = clips_of(arguments.path, arguments.metres_per_unit, arguments.up, tell)
-    prepared = Prepared.load(folder_clips.folder)
+        folder_clips = clips_of(
+            arguments.path,
+            arguments.metres_per_unit,
+            arguments.up,
+            tell,
+            looks=looks,
+            engines=engines_of(arguments),
+            root=arguments.root_from,
+        )
+    prepared.cached.clips |= folder_clips.proposals()
     proposals, changes = [], []
     settings: dict[tuple[str, str, str], str | float] = {}
-    done = 0
+    done, n_clips = 0, len(folder_clips.seen)
     with progress_of("preparing") as tell:
         for file in _markup_files(folder_clips):
 
             def report_progress(i: int, _total: int, name: str, before: int = done) -> None:
-                tell(before + i, len(folder_clips.clips), name)
+                tell(before + i, n_clips, name)
 
             old, was = _text(file.path)
             if old:

@@ -8,7 +8,6 @@ every clip is looked at, and nothing is taken back. An edge: this touches the di
 
 from __future__ import annotations
 
-import base64
 import csv
 import io
 import json
@@ -18,13 +17,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from contextdb.disk.own_files import has_own, make_own_folder, read_own, write_own
 from contextdb.errors import FileError
 from contextdb.motion.clips.clip import Clip
 from contextdb.motion.markup.file import COLUMNS
-from contextdb.motion.preparing.proposal import N_SAMPLES, KeptClip, KnownProposals, Proposal, key_of
+from contextdb.motion.preparing.proposal import KeptClip, KnownProposals, Proposal, key_of
 from contextdb.motion.storage.building import CACHE_FOLDER
 
 BOM = "\ufeff"
@@ -93,9 +90,7 @@ class Prepared:
         names = {clip.name for clip in clips}
         document = {
             name: {
-                "key": cached.key,
-                "found": {kind: [each.to_json() for each in proposals] for kind, proposals in cached.found.items()},
-                "shape": None if cached.shape is None else base64.b64encode(cached.shape.astype("<f4").tobytes()).decode(),
+                **cached.to_json(),
                 "written": {kind: [each.key, each.marks] for kind, each in self.written.get(name, {}).items()},
             }
             for name, cached in self.cached.clips.items()
@@ -108,9 +103,7 @@ class Prepared:
 
 def _clips(document: Mapping[str, Any]) -> Iterator[tuple[str, KeptClip]]:
     for name, clip in document.items():
-        proposals = {kind: [Proposal(**each) for each in listed] for kind, listed in clip["found"].items()}
-        shape = None if clip["shape"] is None else np.frombuffer(base64.b64decode(clip["shape"]), "<f4")
-        yield name, KeptClip(str(clip["key"]), proposals, None if shape is None else shape.reshape(2, N_SAMPLES, -1, 3))
+        yield name, KeptClip.of_json(clip)
 
 
 def _written(document: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Written]]]:

@@ -15,7 +15,7 @@ asset to be chosen, --what-if what other weights, biases and thresholds would ha
   contextdb motion replay session.parquet --what-if "LeftFoot velocity=2"
   contextdb motion replay session.parquet --diff other.parquet
   contextdb motion replay session.parquet --trace session.json          for Perfetto
-  contextdb motion replay session.parquet --html session.html           plays in any browser
+  contextdb motion replay session.parquet --format html -o session.html plays in any browser
   contextdb motion replay new.parquet --diff old.parquet --html both.html --markdown
 """
 
@@ -33,6 +33,7 @@ from pathlib import Path
 
 import numpy as np
 
+from contextdb.commands import add_page_arguments, take_page_arguments
 from contextdb.commands.motion_build_command import MotionProject, warn
 from contextdb.commands.motion_page import Played, comment_of, page_file, rerun_file, write_page, write_rerun
 from contextdb.commands.motion_stage import add_view
@@ -85,10 +86,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--markdown", action="store_true", help="the comment of a review: measures, and what changed")
     parser.add_argument("--project", metavar="FOLDER", help="the project with the databases (default: as recorded)")
     parser.add_argument("--json", action="store_true", help="a JSON document instead of text")
+    add_page_arguments(parser, ("text", "json", "markdown", "html"))
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Print a session, or one decision of it."""
+    take_page_arguments(arguments)
     if arguments.at is None:
         for option, given, shows in (("--view", arguments.view, "the costs of"), ("--why", arguments.why, "an asset in")):
             if given is not None:

@@ -52,7 +52,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("controller", metavar="CONTROLLER", help="the name of a [controllers.NAME]")
     parser.add_argument("stick", metavar="STICK", help="a CSV or Parquet file of what the player requests, moment by moment")
     parser.add_argument("--out", metavar="FILE", required=True, help=f"the session to write: a {SUFFIX} file")
-    parser.add_argument("--poses", metavar="FILE", help="write the poses to this file too: .bvh, .npz or .glb")
+    parser.add_argument("--poses", metavar="FILE", help="write the poses to this file too: .bvh, .npz, .glb or .usda")
+    parser.add_argument(
+        "--capsules", action="store_true", help="put a body of capsules on the joints of a .glb, as engines want one"
+    )
     parser.add_argument("--rate", metavar="HZ", type=rate_of, help="updates per second (default: the rate of the features)")
     parser.add_argument("--k", metavar="N", type=_COUNT, default=12, help=K_HELP)
     parser.add_argument("--seed", metavar="N", type=_SEED, default=0, help="seed of the controller's variation (default: 0)")
@@ -60,10 +63,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="a JSON document instead of text")
 
 
+def _pose_file(arguments: argparse.Namespace) -> Path | None:
+    """Where the poses go, if anywhere."""
+    if arguments.poses is None:
+        if arguments.capsules:
+            raise ContextDBError(Fault("--capsules is about a file of poses.", "--poses FILE.glb with it"))
+        return None
+    return _checked_file(pose_file(arguments.poses, has_body=arguments.capsules), Path(arguments.stick), "the poses")
+
+
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Run a controller along a stick."""
     out = _out_file(Path(arguments.out), Path(arguments.stick))
-    poses_out = None if arguments.poses is None else _checked_file(pose_file(arguments.poses), Path(arguments.stick), "the poses")
+    poses_out = _pose_file(arguments)
     stage = Stage.of(arguments.path, lambda config: config.databases_of(config.selector_of(arguments.controller)))
     character = character_of(stage, arguments.controller, arguments.seed, arguments.unknown)
     trace = character.record(arguments.k)
@@ -80,7 +92,9 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     poses = [updated.pose for updated in steer(character, stick, moments, rate)]
     trace.save(out, timings=False)
     if poses_out is not None and character.stream is not None:
-        motion.write_poses([pose for pose in poses if pose is not None], character.stream.rig, poses_out, rate)
+        motion.write_poses(
+            [pose for pose in poses if pose is not None], character.stream.rig, poses_out, rate, has_body=arguments.capsules
+        )
     with output():
         if arguments.json:
             print(as_json({"format": 1, "file": str(out), "updates": len(trace), "bytes": out.stat().st_size}), end="")

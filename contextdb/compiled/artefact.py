@@ -24,6 +24,8 @@ Tensors, R rows, W = ceil(R / 64) words, C conditions; every integer and double 
     when.codes             as CCC.codes and CCC.texts, for the column of rules, named in `about`
     when.texts
     CCC.soft.FIELD         the same for soft cells, and CCC.soft.penalties float64 [R]
+    CCC.soft.per           float64 [K], starts int64 [K + 1], ends float64 [S, 2] and which int32 [R]: where penalties grow with the
+                           distance of a fact, see contextdb.compiled.soft
 
 Value R of an output is what there is without a row: what `fallback` gives, else the default, else False, 0, NaN or "". Infinite
 defaults are "inf" and "-inf" in the JSON. What knows no outputs passes all of these over: they change no answer.
@@ -71,7 +73,6 @@ from contextdb.cells.sets import TagMeet, TagSet
 from contextdb.columns import TextColumn
 from contextdb.compiled.classes import ColumnMasks, NumberMasks, TagMasks, ValueMasks, WideMasks
 from contextdb.compiled.data import CompiledData
-from contextdb.compiled.mask_bits import SoftMasks
 from contextdb.compiled.outputs_stored import (
     known_policy,
     outputs_from,
@@ -82,6 +83,7 @@ from contextdb.compiled.outputs_stored import (
     ways_to_tensors,
 )
 from contextdb.compiled.pick_columns import PickColumns
+from contextdb.compiled.soft import GROWTH, Growth, SoftMasks
 from contextdb.files.tensors import (
     FileKind,
     Tensors,
@@ -120,7 +122,9 @@ def save(compiled: CompiledData, path: Path) -> None:
         tensors[f"{at:03d}.codes"] = texts.codes
         tensors[f"{at:03d}.texts"] = texts_to_array(list(texts.texts))
         if soft is not None:
-            tensors[f"{at:03d}.soft.penalties"] = soft[1]
+            tensors[f"{at:03d}.soft.penalties"] = soft.penalties
+            if soft.growth is not None:
+                tensors |= {f"{at:03d}.soft.{part}": array for part, array in zip(GROWTH, soft.growth.arrays, strict=True)}
     for at, column in enumerate(compiled.slots or ()):
         tensors[f"slots.{at:03d}.codes"] = column.codes
         tensors[f"slots.{at:03d}.texts"] = texts_to_array(list(column.texts))
@@ -180,7 +184,10 @@ def _table(about: dict[str, Any], tensors: Tensors) -> CompiledData:
         conditions=conditions,
         masks=tuple(_column(tensors, prefix, kinds["masks"], n_rows) for prefix, kinds in numbered),
         enabled=tensors["enabled"],
-        soft=tuple(_soft(tensors, f"{prefix}.soft", kinds["soft"], n_rows) for prefix, kinds in numbered),
+        soft=tuple(
+            _soft(tensors, f"{prefix}.soft", kinds["soft"], condition.domain)
+            for (prefix, kinds), condition in zip(numbered, conditions, strict=True)
+        ),
         priorities=tensors["priorities"],
         row_weights=tensors["row_weights"],
         texts=tuple(
@@ -279,11 +286,15 @@ def _column(tensors: Tensors, prefix: str, about: dict[str, Any], n_rows: int) -
     return TagMasks(n_rows, tuple(about["tags"]), negated, masks)
 
 
-def _soft(tensors: Tensors, prefix: str, about: dict[str, Any] | None, n_rows: int) -> SoftMasks | None:
+def _soft(tensors: Tensors, prefix: str, about: dict[str, Any] | None, domain: Domain) -> SoftMasks | None:
     if about is None:
         return None
-    penalties = tensors[f"{prefix}.penalties"]
-    return _column(tensors, prefix, about, len(penalties)), penalties
+    penalties, growth = tensors[f"{prefix}.penalties"], None
+    if f"{prefix}.per" in tensors:
+        per, starts, ends, which = (tensors[f"{prefix}.{part}"] for part in GROWTH)
+        growth = Growth(per, starts, ends, which, domain.type.is_circular)
+        growth.check(len(penalties))
+    return SoftMasks(_column(tensors, prefix, about, len(penalties)), penalties, growth)
 
 
 def _tags_to_json(tags: TagSet) -> list[object]:

@@ -58,6 +58,16 @@ class KeptFacts:
         return {name: column[context] for name, column in self.columns.items()}
 
 
+@dataclass(frozen=True, eq=False)
+class KnownCodes:
+    """Columns that were encoded before."""
+
+    by_slot: Codes
+    """Their codes: int32 [P, N]."""
+    missing: Mapping[str, NDArray[np.bool_]]
+    """Which facts are missing of those columns where some are."""
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class BatchMatches(ManyMatches):
     """The valid rows of many contexts that were encoded together."""
@@ -193,24 +203,36 @@ def query_many(compiled: CompiledData, contexts: Contexts, unknown: Unknown = "e
 def query_encoded(compiled: CompiledData, contexts: Contexts, unknown: Unknown = "error") -> BatchMatches:
     """The same for contexts all of whose facts are single values; raises ContextError for a set."""
     check_mode(unknown)
-    columns = given = facts_of(contexts)
-    n_contexts = common_length(columns)
-    if compiled.derivation is not None:
-        columns = compiled.derivation.complete_frame(columns, n_contexts, needs_all=unknown == "error")
+    columns = facts_of(contexts)
     absent = [n for n in compiled.asked if n not in columns]
     extra = [n for n in columns if n not in compiled.asked and n not in compiled.places] if absent else []
     if absent and (error := misspelt(absent, [n for n in extra if n not in compiled.declared])) is not None:
         raise error
     if unknown == "error" and absent:
         raise missing_error(absent, extra)
-    many = _encoded(compiled, columns, n_contexts, unknown)
+    return kept_facts(query_known(compiled, columns, common_length(columns), unknown), columns, unknown)
+
+
+def kept_facts(many: BatchMatches, given: Mapping[str, Any], unknown: Unknown) -> BatchMatches:
+    """Answers with the facts that they need later on."""
+    compiled = many.compiled
     return many if not compiled.is_bound else replace(many, kept=KeptFacts(kept_columns(given, compiled.asked), unknown))
 
 
-def _encoded(compiled: CompiledData, columns: Mapping[str, Any], n_contexts: int, unknown: Unknown) -> BatchMatches:
-    by_slot = np.empty((compiled.codes.n_codes, n_contexts), np.int32)
+def query_known(
+    compiled: CompiledData, columns: Mapping[str, Any], n_contexts: int, unknown: Unknown, known: KnownCodes | None = None
+) -> BatchMatches:
+    """The same for columns by name. Given ones that are `known` were encoded before."""
+    derived: frozenset[str] = frozenset()
+    if compiled.derivation is not None:
+        columns = compiled.derivation.complete_frame(columns, n_contexts, needs_all=unknown == "error")
+        derived = compiled.derivation.names
+    by_slot = np.empty((compiled.codes.n_codes, n_contexts), np.int32) if known is None else known.by_slot.copy()
     for at, condition in enumerate(compiled.conditions):
-        missing = encode_column(compiled, at, columns.get(condition.name), by_slot, unknown == "any")
+        if known is not None and condition.name in columns and condition.name not in derived:
+            missing = np.flatnonzero(known.missing.get(condition.name, False))
+        else:
+            missing = encode_column(compiled, at, columns.get(condition.name), by_slot, unknown == "any")
         if len(missing) and unknown == "error":
             raise _missing(compiled, condition.name, missing)
     if compiled.when is None:

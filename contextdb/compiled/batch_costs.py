@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.bitmask import Rows, Words
+from contextdb.cells.conditions import Condition
+from contextdb.cells.facts import read_fact
 from contextdb.compiled.data import CompiledData
-from contextdb.compiled.mask_bits import SoftMasks
+from contextdb.compiled.soft import SoftMasks
 
 CostsOfPairs = Callable[[Rows, Rows], NDArray[np.float64]]
 """Of P contexts and rows what the soft cells of each depth cost: float64 [D, P]."""
@@ -29,17 +31,27 @@ def costs_of_pairs(
         if soft is not None:
             name = compiled.conditions[at].name
             given = {name: columns[name]} if name in columns else {name: [None] * n_contexts}
-            parts.append((mask_of(_soft_table(compiled, at, soft), given), soft[1]))
+            parts.append((mask_of(_soft_table(compiled, at, soft), given), soft, compiled.conditions[at], given[name]))
 
     def costs(contexts: Rows, rows: Rows) -> NDArray[np.float64]:
         totals = np.zeros((compiled.n_depths, len(rows)))
-        for masks, penalties in parts:
+        for masks, soft, condition, values in parts:
             for depth in range(len(totals)):
                 at = depth * compiled.n_rows + rows
                 matches = masks[contexts, at >> 6] >> (at & 63).astype(np.uint64) & np.uint64(1)
-                totals[depth] += np.where(matches, 0.0, penalties[at])
+                grown = soft.penalties[at] if soft.growth is None else _grown(soft, condition, values, contexts, at)
+                totals[depth] += np.where(matches, 0.0, grown)
         return totals
 
+    return costs
+
+
+def _grown(soft: SoftMasks, condition: Condition, values: Any, contexts: Rows, rows: Rows) -> NDArray[np.float64]:
+    """What rows that do not match cost in contexts whose facts are some values: float64 [P]."""
+    costs = np.empty(len(rows))
+    for context in np.unique(contexts).tolist():
+        own = contexts == context
+        costs[own] = soft.grown(read_fact(values[context], condition))[rows[own]]
     return costs
 
 

@@ -122,6 +122,21 @@ class Choosing:
         """Whether chance decides anywhere, so that assets that were picked lately are left out."""
         return decided_by("chance", self.compiled.policies)
 
+    def pickable_of(self, valid: Flags) -> Flags:
+        """Of valid rows those that may be picked, whatever was picked before and whatever soft cells cost: both bool [M, n]."""
+        left = valid & self.pickable
+        for groups, ranks in zip(self.groups, self.ranks, strict=True):
+            if not len(groups):
+                break
+            order = np.argsort(groups, kind="stable")
+            starts = np.flatnonzero(np.diff(groups[order], prepend=groups[order][0] - 1))
+            standing = np.where(left, ranks, -np.inf)
+            best = np.maximum.reduceat(standing[:, order], starts, axis=1)
+            of_row = np.empty(len(groups), np.int64)
+            of_row[order] = np.repeat(np.arange(len(starts)), np.diff([*starts, len(groups)]))
+            left &= standing == best[:, of_row]
+        return left
+
     @property
     def wants_costs(self) -> bool:
         """Whether a policy looks at what soft cells cost."""

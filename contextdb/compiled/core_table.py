@@ -16,8 +16,8 @@ from contextdb.cells.facts import UNKNOWN_MODES, Unknown, read_fact
 from contextdb.cells.kinds import KINDS, Kind
 from contextdb.cells.sets import TagMeet, TagSet
 from contextdb.compiled.classes import ColumnMasks, NumberMasks, ValueMasks, WideMasks
-from contextdb.compiled.mask_bits import SoftMasks
 from contextdb.compiled.matches import Answering, Matches
+from contextdb.compiled.soft import SoftMasks
 from contextdb.core import FLAT, SLOTS, VALUE, WIDE, Table
 from contextdb.errors import ContextError
 
@@ -99,8 +99,15 @@ def _condition(
     numbers: dict[Any, int] | None = {value: number for number, value in enumerate((False, True) if kind.is_truth else values)}
     expr = (condition.expr or "") if is_derived else None
     read, column = _reader(condition, kind), None if masks is None else _column(masks)
-    costing = None if soft is None else (_column(soft[0]), _array(soft[1], np.float64))
+    costing = None if soft is None else (_column(soft.masks), _array(soft.penalties, np.float64), *_growth(soft))
     return sys.intern(str(condition.name)), TYPES[kind.name], expr, values, numbers or None, read, column, costing
+
+
+def _growth(soft: SoftMasks) -> tuple[object, ...]:
+    if soft.growth is None:
+        return ()
+    types = (np.float64, np.int64, np.float64, np.int32)
+    return tuple(_array(array.reshape(-1), dtype) for array, dtype in zip(soft.growth.arrays, types, strict=True))
 
 
 def _reader(condition: Condition, kind: Kind) -> Callable[[Any], object] | None:

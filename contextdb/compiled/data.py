@@ -34,12 +34,13 @@ from contextdb.columns import TextColumn
 from contextdb.compiled.classes import ColumnMasks, NumberMasks, WideMasks
 from contextdb.compiled.codes import CodeSlots
 from contextdb.compiled.core_table import UNKNOWN, core_table
-from contextdb.compiled.mask_bits import SoftMasks, bits_of, costs_of, nbytes
+from contextdb.compiled.mask_bits import bits_of, nbytes
 from contextdb.compiled.matches import Answering, Matches, with_mirrored, with_penalties, with_widened
 from contextdb.compiled.memory import Memory
 from contextdb.compiled.number_cells import NumberCells, number_cells
 from contextdb.compiled.outputs import NO_OUTPUTS, Outputs
 from contextdb.compiled.pick_columns import NOTHING, PickColumns
+from contextdb.compiled.soft import SoftMasks
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.compiled.versions import said_by, version_of
 from contextdb.compiled.watcher import Watcher
@@ -77,7 +78,7 @@ class CompiledData(Unchanging):
     enabled: Words
     """The rows that may match at all."""
     soft: tuple[SoftMasks | None, ...]
-    """For each condition with soft cells: masks of the rows that they match, and the penalty of each row float64 [n_rows]."""
+    """For each condition with soft cells: what its rows cost; None for the others."""
     priorities: NDArray[np.int64]
     row_weights: NDArray[np.float64]
     texts: tuple[TextColumn, ...]
@@ -215,7 +216,7 @@ class CompiledData(Unchanging):
         soft = self.soft[at]
         if soft is None or (fact is None and unknown == "any"):
             return np.zeros((self.n_depths, self.n_rows))
-        return costs_of(soft, fact).reshape(self.n_depths, self.n_rows)
+        return soft.costs(fact).reshape(self.n_depths, self.n_rows)
 
     @cached_property
     def mirroring(self) -> dict[str, Condition]:

@@ -1,18 +1,11 @@
-"""Of one column's masks: the rows for a fact, sets of values and missing facts too, what soft cells cost, what the masks weigh."""
+"""Of one column's masks: the rows for a fact, sets of values and missing facts too, and what the masks weigh."""
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
-from contextdb import bitmask
 from contextdb.cells.facts import Fact
 from contextdb.cells.intervals import EVERYTHING
 from contextdb.cells.sets import Cell, NumberSet, TagSet, ValueSet
 from contextdb.compiled.classes import ColumnMasks, TagMasks, ValueMasks, WideMasks
-
-SoftMasks = tuple[ColumnMasks, NDArray[np.float64]]
-"""Masks of a column's soft cells, and the penalty of each row."""
 
 
 def nbytes(masks: ColumnMasks) -> int:
@@ -39,12 +32,3 @@ def _every_value(masks: ColumnMasks) -> tuple[int, int]:
     if isinstance(masks, TagMasks):
         return masks.set_bits(TagSet(frozenset()))
     return masks.set_bits(ValueSet(frozenset(), True)) if isinstance(masks, ValueMasks) else masks.set_bits(NumberSet(EVERYTHING))
-
-
-def costs_of(soft: SoftMasks, fact: Fact) -> NDArray[np.float64]:
-    """What the soft cells of one column cost with a fact in canonical form: float64 [n], n the rows of each depth, one after the
-    other."""
-    masks, penalties = soft
-    n = len(penalties)
-    fails = ~bitmask.unpack(bitmask.from_int(bits_of(masks, fact)[0], n), n)
-    return np.where(fails, penalties, 0.0)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from copy import copy
+from functools import cache
 from typing import Any, Self
 
 import numpy as np
@@ -17,6 +18,7 @@ from contextdb.bitmask import Rows
 from contextdb.compiled.choosing import Key, Limits, PickedArrays
 
 NEVER = -1
+HASH_START, HASH_FACTOR = 0xCBF29CE484222325, 0x100000001B3
 
 
 class Picked:
@@ -118,6 +120,17 @@ class Picked:
         self.recent[slots] = NEVER
         self.rests[slots] = NEVER
 
+    def digest(self, seed: int) -> int:
+        """The sum over all characters of a hash of the seed, the character, its turns and its last assets."""
+        keys = np.array([*map(_asset_key, self.assets), 0], np.uint64)  # the last one for `NEVER`, which is -1
+        ids = np.fromiter(self.slots, np.int64, self.n).view(np.uint64)
+        columns = [np.full(self.n, seed, np.uint64), ids, self.turns[: self.n].view(np.uint64), *keys[self.recent[: self.n]].T]
+        digests = np.full(self.n, HASH_START, np.uint64)
+        for column in columns:
+            digests = (digests ^ column) * np.uint64(0x9E3779B97F4A7C15)
+            digests ^= digests >> np.uint64(32)
+        return int(digests.sum(dtype=np.uint64))
+
     def __getstate__(self) -> dict[str, Any]:
         """What is pickled: what characters remember, in as few bytes as it needs."""
         places = np.nonzero(self.rests[: self.n] >= 0)
@@ -160,3 +173,12 @@ def _short(numbers: NDArray[np.int64]) -> NDArray[np.signedinteger[Any]]:
     least, most = int(numbers.min(initial=0)), int(numbers.max(initial=0))
     fits = (kind for kind in (np.int8, np.int16, np.int32) if np.iinfo(kind).min <= least and most <= np.iinfo(kind).max)
     return numbers.astype(next(fits, np.int64))
+
+
+@cache
+def _asset_key(asset: str) -> int:
+    """The hash by which C knows an asset: FNV-1a of its name, never 0."""
+    key = HASH_START
+    for octet in (*asset.encode("utf-8", "surrogatepass"), 0xFF):
+        key = (key ^ octet) * HASH_FACTOR % 2**64
+    return key | 1

@@ -234,6 +234,13 @@ class Picker:
         known = self._picked.slots
         self._picked.forget(np.array([known[one] for one in ids if one in known], np.int64))
 
+    def digest(self) -> int:
+        """A number of 64 bits that is the same for pickers whose characters picked the same.
+
+        Two machines that play in step compare it each frame. It is the sum of `cdb_digest` of C over the characters.
+        """
+        return self._picked.digest(self._seed % 2**64)
+
     def copy(self) -> Self:
         """A picker that goes on from here on its own."""
         new: Self = object.__new__(type(self))

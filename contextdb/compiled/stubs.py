@@ -41,7 +41,7 @@ _TAKEN = (
 
 def stubs_of(tables: Mapping[str, CompiledTable]) -> str:
     """The text of a Python module with the types of all tables; the same tables give the same text."""
-    names = _Names()
+    names = Names()
     literals: dict[Condition, str] = {}
     parts = []
     for table in tables.values():
@@ -59,7 +59,7 @@ def stubs_of(tables: Mapping[str, CompiledTable]) -> str:
 
 
 @dataclass
-class _Names:
+class Names:
     """Names of types: each is given once."""
 
     taken: set[str] = field(default_factory=lambda: set(_TAKEN.split()))
@@ -86,7 +86,7 @@ def _facts(name: str, table: CompiledTable, literals: Mapping[Condition, str]) -
     return _typed_dict(name, table, lines)
 
 
-def _outputs(names: _Names, table: CompiledTable) -> str:
+def _outputs(names: Names, table: CompiledTable) -> str:
     """The outputs of a row, as `compiled.outputs.of_row` gives them, with a Literal for the values of each enum."""
     types, literals = dict[str, str](), ""
     for output in table.outputs.declared:

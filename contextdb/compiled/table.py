@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from contextdb.compiled.casting.facts import Actors, Prefer
     from contextdb.compiled.explain import Explanation
     from contextdb.compiled.live import LiveContext
+    from contextdb.compiled.live_many import LiveMany
     from contextdb.compiled.many import ManyMatches
     from contextdb.compiled.picker import Picker
 
@@ -242,6 +243,14 @@ class CompiledTable(Unchanging):
         live.update({} if facts is None else facts)
         live.actors(actors, prefer=prefer)
         return live
+
+    def live_many(self, facts: ManyContexts, *, unknown: Unknown = "error") -> LiveMany:
+        """Keep the facts of many characters: `crowd["speed"] = speeds`, then `crowd.query()`. The columns are as in `query_many`,
+        one fact for each character; those that change are set whole or by character. Raises ContextError where a fact cannot be
+        used, or a name looks misspelt."""
+        from contextdb.compiled.live_many import LiveMany
+
+        return LiveMany(self._data, facts, unknown)
 
     def prepare(self, casting: bool = False, batches: bool = False) -> None:
         """Do the work of the first queries now, while the game loads; answers stay the same, and nothing is raised: it asks without

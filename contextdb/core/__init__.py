@@ -82,6 +82,7 @@ __all__ = [
     "header_text",
     "list_rows",
     "lower_hips",
+    "motion_text",
     "move_bodies",
     "pack_codes",
     "place_joints",
@@ -103,8 +104,26 @@ VALUE, FLAT, WIDE, SLOTS = 1, 2, 3, 4
 @cache
 def header_text() -> str:
     """The parts of the core in their order, C99 and C++11, as the header for games has them."""
+    return _parts_of("core.h")
+
+
+@cache
+def motion_text() -> str:
+    """The parts for motion, behind those of `header_text`."""
+    return "".join(_parts_of(name) for name in ("poses.h", "motion.h", "motion_game.h"))
+
+
+def _parts_of(name: str) -> str:
+    """The text of the parts that a file includes, with what else of it is no comment before the first part."""
     from importlib.resources import files
 
     folder = files("contextdb.core")
-    parts = re.findall(r'^#include "(\w+\.h)"$', folder.joinpath("core.h").read_text(encoding="ascii"), re.M)
-    return "".join(folder.joinpath(part).read_text(encoding="ascii") for part in parts)
+    lines = folder.joinpath(name).read_text(encoding="ascii")
+    text, is_begun = "", name == "core.h"
+    for line in lines[lines.index("*/") + 3 :].splitlines(keepends=True):
+        part = re.match(r'#include "(\w+\.h)"$', line.rstrip())
+        if part:
+            text += folder.joinpath(part[1]).read_text(encoding="ascii")
+        elif not (is_begun and line.isspace()):
+            text += line
+    return text

@@ -16,7 +16,7 @@ static inline double cdbi_double(uint64_t bits)
     return number;
 }
 
-static inline double cdb_missing_number(void)
+CDB_API double cdb_missing_number(void)
 {
     return cdbi_double(0x7FF8000000000000);
 }

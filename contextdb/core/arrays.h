@@ -104,6 +104,45 @@ static inline size_t cdbi_column_of(const cdbi_opening *opening, const char *key
     return i;
 }
 
+static inline int cdbi_is_growth(const char *part)
+{
+    return strcmp(part, "per") == 0 || strcmp(part, "starts") == 0 || strcmp(part, "ends") == 0 || strcmp(part, "which") == 0;
+}
+
+/* Take an array of how penalties grow; 0 where it does not fit. */
+static inline int cdbi_take_growth(cdbi_soft *soft, const char *part, const cdbi_array *array, size_t n_soft)
+{
+    if (strcmp(part, "per") == 0) {
+        soft->per = (const double *)(const void *)array->at, soft->n_cells = array->shape[0];
+        return cdbi_fits(array, "F64", 1, array->shape[0]);
+    }
+    if (strcmp(part, "starts") == 0) {
+        soft->starts = (const int64_t *)(const void *)array->at, soft->n_starts = array->shape[0];
+        return cdbi_fits(array, "I64", 1, array->shape[0]);
+    }
+    if (strcmp(part, "ends") == 0) {
+        soft->ends = (const double *)(const void *)array->at, soft->n_spans = array->shape[0];
+        return cdbi_fits(array, "F64", 2, 2);
+    }
+    soft->which = (const int32_t *)(const void *)array->at;
+    return cdbi_fits(array, "I32", 1, n_soft);
+}
+
+/* Whether the parts of a growth go together. */
+static inline int cdbi_is_sound_growth(const cdbi_soft *soft, size_t n_soft)
+{
+    size_t i;
+    if (!soft->per) return 1;
+    if (!soft->starts || !soft->ends || !soft->which || soft->n_starts != soft->n_cells + 1 || soft->starts[0] != 0) return 0;
+    for (i = 0; i < soft->n_cells; i++) {
+        if (soft->starts[i + 1] < soft->starts[i] || (uint64_t)soft->starts[i + 1] > soft->n_spans) return 0;
+        if (soft->per[i] == soft->per[i] && soft->starts[i + 1] == soft->starts[i]) return 0;
+    }
+    for (i = 0; i < n_soft; i++)
+        if (soft->which[i] < 0 || (size_t)soft->which[i] >= soft->n_cells) return 0;
+    return 1;
+}
+
 /* Take an array for a condition's column or its soft cells; 0 where it does not fit. */
 static inline int cdbi_take_condition(cdbi_opening *opening, size_t at, const char *part, const cdbi_array *array)
 {
@@ -111,6 +150,7 @@ static inline int cdbi_take_condition(cdbi_opening *opening, size_t at, const ch
     size_t n_soft = table->n_depths * table->n_rows;
     if (strncmp(part, "soft.", 5) != 0) return cdbi_take_part(&opening->columns[at], part, array, table->n_words);
     if (!table->soft || table->soft[at].column.kind == 0) return 1;
+    if (cdbi_is_growth(part + 5)) return cdbi_take_growth(&table->soft[at], part + 5, array, n_soft);
     if (strcmp(part + 5, "penalties") != 0) return cdbi_take_part(&table->soft[at].column, part + 5, array, (n_soft + 63) / 64);
     table->soft[at].penalties = (const double *)(const void *)array->at;
     return cdbi_fits(array, "F64", 1, n_soft);
@@ -217,6 +257,23 @@ static inline int cdbi_take_way(cdbi_opening *opening, const char *key, const cd
     return cdbi_take_level(&table->levels[number], part + 1, array);
 }
 
+/* Take a part of the columns of slots, "slots.001.codes"; 0 where it does not fit. */
+static inline int cdbi_take_slots(cdbi_opening *opening, const char *key, const cdbi_array *array)
+{
+    const char *part = key + strlen("slots.");
+    int number = 0, i;
+    for (; *part >= '0' && *part <= '9' && number < 1000; part++) number = number * 10 + (*part - '0');
+    for (i = 0; i < 2; i++) {
+        cdbi_slots *slots = &opening->slots[i];
+        if (slots->number != number + 1) continue;
+        if (strcmp(part, ".texts") == 0) slots->texts = cdbi_take_texts(opening, array, key);
+        if (strcmp(part, ".codes") != 0) return 1;
+        slots->codes = (const int32_t *)(const void *)array->at;
+        return cdbi_fits(array, "I32", 1, opening->table->n_rows);
+    }
+    return 1;
+}
+
 /* Take every array that is asked for. */
 static inline void cdbi_arrays(cdbi_opening *opening, cdbi_json header)
 {
@@ -240,6 +297,7 @@ static inline void cdbi_arrays(cdbi_opening *opening, cdbi_json header)
         if (at < opening->schema->n_conditions) fits = cdbi_take_condition(opening, at, part, &array);
         else if (strncmp(key, "programs.", strlen("programs.")) == 0) fits = cdbi_take_program(opening, key, &array);
         else if (strncmp(key, "ways.", strlen("ways.")) == 0) fits = cdbi_take_way(opening, key, &array);
+        else if (strncmp(key, "slots.", strlen("slots.")) == 0) fits = cdbi_take_slots(opening, key, &array);
         else if (strcmp(key, "assets") == 0 && !table->assets) {
             cdbi_list assets = cdbi_take_texts(opening, &array, key);
             table->assets = assets.texts;
@@ -306,6 +364,8 @@ static inline void cdbi_check_columns(cdbi_opening *opening)
         cdbi_check_column(opening, &opening->columns[i], i);
         if (!table->soft || table->soft[i].column.kind == 0 || opening->status != CDB_OK) continue;
         if (!table->soft[i].penalties) cdbi_refuse(opening, CDB_BAD_FILE, "its penalties are not there", (int)i, cdbi_name(opening, i));
+        else if (!cdbi_is_sound_growth(&table->soft[i], table->n_depths * table->n_rows))
+            cdbi_refuse(opening, CDB_BAD_FILE, "how its penalties grow does not go together", (int)i, cdbi_name(opening, i));
         else cdbi_check_column(opening, &table->soft[i].column, i);
     }
 }

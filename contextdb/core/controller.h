@@ -97,6 +97,33 @@ typedef struct cdbm_given {      /* what some characters may choose from; of all
     const double *wide;          /* [n] the bias of what plays by hysteresis, NaN where that does not hold; or NULL */
 } cdbm_given;
 
+/* ---- what can be played */
+
+/* Whether all ranges, and all that is said of them, are there. */
+static inline int cdbm_are_clips(const cdbm_clips *clips, size_t n_features)
+{
+    size_t i;
+    if (clips->n_kinds < clips->frames->n_kinds || clips->frames->n_features != n_features || !(clips->rate > 0.0)) return 0;
+    if (clips->n_permutations < 1 || clips->n_ranges % clips->n_permutations || clips->n_pace > 2) return 0;
+    if (clips->n_pace && (clips->pace > n_features || clips->n_pace > n_features - clips->pace)) return 0;
+    for (i = 0; i < clips->n_ranges; i++) {
+        if (clips->starts[i] < 0 || clips->stops[i] < clips->starts[i] || (uint64_t)clips->stops[i] > clips->frames->n_frames) return 0;
+        if (i % clips->n_permutations && clips->stops[i] - clips->starts[i] != clips->stops[i - 1] - clips->starts[i - 1]) return 0;
+    }
+    return 1;
+}
+
+/* Whether what plays is of a database that is there, or none plays. */
+static inline int cdbm_is_playing(const cdbm_controller *controller, const cdbm_playing *playing)
+{
+    const cdbm_clips *clips;
+    if (playing->database < 0.0) return 1;
+    if (!(playing->database < (double)controller->n_databases)) return 0;
+    clips = &controller->databases[(size_t)playing->database];
+    if (!clips->frames || !(playing->range >= 0.0 && playing->range < (double)clips->n_ranges) || playing->at_s != playing->at_s) return 0;
+    return (double)clips->starts[(size_t)playing->range] <= playing->frame && playing->frame < (double)clips->stops[(size_t)playing->range];
+}
+
 /* ---- movements over the ground */
 
 static inline void cdbm_then(const double *first, const double *then, double *to)
@@ -213,7 +240,7 @@ static inline void cdbm_loop(const cdbm_clips *clips, size_t range, double wante
     move->n_loops = n_loops;
     if (n_loops > 1.0) {
         cdbm_leg(clips, range, 0.0, last_s, start, move);
-        if (move->is_ended) {
+        if (move->is_ended != 0.0) {
             move->n_loops = 1.0;
             cdbm_then(motion, move->motion, move->motion);
             return;
@@ -239,7 +266,7 @@ static inline void cdbm_play(const cdbm_controller *controller, const cdbm_playi
     last_s = cdbm_last_s(clips, range), at_s = cdbo_least(playing->at_s, last_s), wanted_s = at_s + passed_s;
     cdbm_leg(clips, range, at_s, cdbo_least(wanted_s, last_s), cdbm_frame_at(clips, range, at_s) + 1, move);
     if (wanted_s <= last_s + CDBM_TOLERANCE_S) return;
-    if (!move->is_ended && cdbm_is_looping(clips, range, play) && !(cdbm_mark_of(clips, clips->starts[range]) & CDBM_EXCLUDED))
+    if (move->is_ended == 0.0 && cdbm_is_looping(clips, range, play) && !(cdbm_mark_of(clips, clips->starts[range]) & CDBM_EXCLUDED))
         cdbm_loop(clips, range, wanted_s, move);
     else move->is_ended = 1.0;
 }

@@ -4,7 +4,7 @@
 #ifdef CDB_FILES
 
 /* The bytes of a file, for cdb_open; give them to CDB_FREE behind cdb_close. NULL where it cannot be read. */
-static inline void *cdb_read_file(const char *path, size_t *size, cdb_fault *fault)
+CDB_API void *cdb_read_file(const char *path, size_t *size, cdb_fault *fault)
 {
     FILE *file = NULL;
     void *bytes = NULL;
@@ -59,7 +59,7 @@ static inline int cdbi_stamp(const char *path, int64_t stamp[4])
 }
 
 /* The bytes of the file where it is another one than the last time it was looked at; else NULL. Give them to CDB_FREE. */
-static inline void *cdb_read_changed(cdb_watch *watch, size_t *size, cdb_fault *fault)
+CDB_API void *cdb_read_changed(cdb_watch *watch, size_t *size, cdb_fault *fault)
 {
     int64_t stamp[4] = {0, 0, 0, 0};
     int is_there = cdbi_stamp(watch->path, stamp);

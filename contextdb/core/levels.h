@@ -131,6 +131,29 @@ static inline void cdbi_key_rows(cdbi_opening *opening, size_t number, uint64_t 
     }
 }
 
+/* Number the assets, by a table of hashes. */
+static inline void cdbi_number_assets(cdbi_opening *opening)
+{
+    cdb_table *table = opening->table;
+    size_t room = 4, row, at;
+    int32_t *firsts;
+    while (room < 2 * table->n_rows) room *= 2;
+    table->asset_numbers = (int32_t *)cdbi_memory(opening, table->n_rows, sizeof(int32_t));
+    firsts = table->asset_numbers ? (int32_t *)CDB_MALLOC(room * sizeof(int32_t)) : NULL;
+    if (!firsts) {
+        cdbi_refuse(opening, CDB_NO_MEMORY, "there is not enough memory", -1, "");
+        return;
+    }
+    memset(firsts, -1, room * sizeof(int32_t));
+    for (row = 0; row < table->n_rows; row++) {
+        at = (size_t)table->asset_keys[row] & (room - 1);
+        while (firsts[at] >= 0 && strcmp(table->assets[firsts[at]], table->assets[row]) != 0) at = (at + 1) & (room - 1);
+        table->asset_numbers[row] = firsts[at] >= 0 ? table->asset_numbers[firsts[at]] : (int32_t)table->n_assets++;
+        if (firsts[at] < 0) firsts[at] = (int32_t)row;
+    }
+    CDB_FREE(firsts);
+}
+
 /* Check what picks look at, and work out the hashes by which pickers know assets and rows. */
 static inline void cdbi_levels(cdbi_opening *opening)
 {
@@ -144,6 +167,7 @@ static inline void cdbi_levels(cdbi_opening *opening)
     table->asset_keys = (uint64_t *)cdbi_memory(opening, table->n_rows, sizeof(uint64_t));
     for (row = 0; table->asset_keys && row < table->n_rows; row++)
         table->asset_keys[row] = cdbi_hash(CDBI_HASH, table->assets[row]) | 1;
+    if (table->asset_keys) cdbi_number_assets(opening);
     for (i = 0; i < table->n_levels; i++)
         if (table->levels[i].n_rows > most) most = table->levels[i].n_rows;
     for (i = 0; i < table->n_levels && opening->status == CDB_OK; i++) {

@@ -22,6 +22,12 @@ static inline cdb_status cdbi_fault(cdb_fault *fault, cdb_status status, const c
     return status;
 }
 
+typedef struct cdbi_slots {         /* the column that names roles that rows need, or may have */
+    int number;                     /* among the columns of slots, from 1; 0 where there is none */
+    const int32_t *codes;
+    cdbi_list texts;
+} cdbi_slots;
+
 typedef struct cdbi_opening {
     cdb_table *table;
     cdb_column *columns;
@@ -31,6 +37,8 @@ typedef struct cdbi_opening {
     cdb_strange strange;
     int has_ways;                   /* the table has tables inside */
     int has_programs;               /* the table has rules or derived facts */
+    cdbi_slots slots[2];            /* mandatory, optional */
+    struct cdb_any *any;            /* what gets the schema out of the file; NULL where the caller has one */
 } cdbi_opening;
 
 /* Keep the first fault of an opening. */
@@ -58,7 +66,7 @@ static inline void *cdbi_memory(cdbi_opening *opening, size_t n, size_t size)
     return memset((char *)block + 16, 0, n * size);
 }
 
-static inline void cdb_close(cdb_table *table)
+CDB_API void cdb_close(cdb_table *table)
 {
     void **block = (void **)table->blocks;
     while (block) {

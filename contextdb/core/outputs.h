@@ -124,35 +124,35 @@ static inline const cdb_row_play *cdb_play_of(const cdb_table *table, int64_t ro
 }
 
 /* The value of an output in a row; -1, as of a pick without a row, reads what there is then: the fallback's, else the default. */
-static inline int cdb_output_bool(const cdb_table *table, size_t output, int64_t row)
+CDB_API int cdb_output_bool(const cdb_table *table, size_t output, int64_t row)
 {
     return table->outputs[output].bools[cdbi_output_row(table, row)] != 0;
 }
 
-static inline int64_t cdb_output_int(const cdb_table *table, size_t output, int64_t row)
+CDB_API int64_t cdb_output_int(const cdb_table *table, size_t output, int64_t row)
 {
     return table->outputs[output].ints[cdbi_output_row(table, row)];
 }
 
-static inline double cdb_output_number(const cdb_table *table, size_t output, int64_t row)
+CDB_API double cdb_output_number(const cdb_table *table, size_t output, int64_t row)
 {
     return table->outputs[output].numbers[cdbi_output_row(table, row)];
 }
 
 /* The text of a text or an enum. */
-static inline const char *cdb_output_text(const cdb_table *table, size_t output, int64_t row)
+CDB_API const char *cdb_output_text(const cdb_table *table, size_t output, int64_t row)
 {
     return table->outputs[output].texts.texts[table->outputs[output].codes[cdbi_output_row(table, row)]];
 }
 
 /* The number of an enum's value; CDB_MISSING where it has none. */
-static inline int cdb_output_enum(const cdb_table *table, size_t output, int64_t row)
+CDB_API int cdb_output_enum(const cdb_table *table, size_t output, int64_t row)
 {
     return *cdb_output_text(table, output, row) ? (int)table->outputs[output].codes[cdbi_output_row(table, row)] : CDB_MISSING;
 }
 
 /* The first of the numbers of an output of several. */
-static inline const double *cdb_output_numbers(const cdb_table *table, size_t output, int64_t row)
+CDB_API const double *cdb_output_numbers(const cdb_table *table, size_t output, int64_t row)
 {
     return table->outputs[output].numbers + cdbi_output_row(table, row) * table->outputs[output].size;
 }

@@ -18,10 +18,18 @@ typedef struct cdbo_goal {
     double velocity[2], facing; /* NaN: where the body goes */
 } cdbo_goal;
 
+/* The heading that a body comes to. */
+static inline double cdbo_facing(const cdbo_body *body, const cdbo_goal *goal)
+{
+    if (goal->facing == goal->facing) return goal->facing;
+    if (!(cdbo_flat_length(goal->velocity[0], goal->velocity[1]) >= CDBO_KEEPS_FACING_MPS)) return body->heading;
+    return cdbo_atan2(goal->velocity[0], goal->velocity[1]);
+}
+
 /* A body some time later, while the stick stays as it is. */
 static inline void cdbo_move(const cdbo_body *body, const cdbo_goal *goal, double t, cdbo_body *to)
 {
-    double y = cdbo_damping(body->velocity_halflife_s), left = cdbo_exp(-y * t), facing = goal->facing, apart, drift;
+    double y = cdbo_damping(body->velocity_halflife_s), left = cdbo_exp(-y * t), facing = cdbo_facing(body, goal), apart, drift;
     size_t i;
     *to = *body;
     for (i = 0; i < 2; i++) {
@@ -31,10 +39,6 @@ static inline void cdbo_move(const cdbo_body *body, const cdbo_goal *goal, doubl
         to->position[i] += drift / (y * y) + apart / y + goal->velocity[i] * t + body->position[i];
         to->velocity[i] = left * (apart + drift * t) + goal->velocity[i];
         to->acceleration[i] = left * (body->acceleration[i] - drift * y * t);
-    }
-    if (facing != facing) {
-        double speed = cdbo_flat_length(goal->velocity[0], goal->velocity[1]);
-        facing = speed >= CDBO_KEEPS_FACING_MPS ? cdbo_atan2(goal->velocity[0], goal->velocity[1]) : body->heading;
     }
     y = cdbo_damping(body->heading_halflife_s), left = cdbo_exp(-y * t);
     apart = -cdbo_remainder(facing - body->heading);
@@ -60,10 +64,12 @@ static inline void cdbo_unwrap(double *headings, size_t n)
 static inline void cdbo_steer(const cdbo_body *body, const cdbo_goal *goal, double rate, size_t n_past, size_t n, double *positions,
     double *headings)
 {
+    cdbo_goal fixed = *goal;
     cdbo_body moved;
     size_t i;
+    fixed.facing = cdbo_facing(body, goal);
     for (i = n_past; i < n; i++) {
-        cdbo_move(body, goal, (double)(i - n_past + 1) / rate, &moved);
+        cdbo_move(body, &fixed, (double)(i - n_past + 1) / rate, &moved);
         positions[2 * i] = moved.position[0], positions[2 * i + 1] = moved.position[1], headings[i] = moved.heading;
     }
     cdbo_unwrap(headings, n);

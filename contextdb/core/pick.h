@@ -26,7 +26,7 @@ typedef struct cdb_picker {
 } cdb_picker;
 
 /* A character that has picked nothing yet, and whose rows do not rest: give `rests` and `n_rests` where they do. */
-static inline cdb_picker cdb_new_picker(uint64_t seed, int64_t who, size_t memory)
+CDB_API cdb_picker cdb_new_picker(uint64_t seed, int64_t who, size_t memory)
 {
     cdb_picker picker;
     memset(&picker, 0, sizeof picker);
@@ -240,6 +240,68 @@ static inline size_t cdbi_drawn(cdbi_pick *pick, size_t oldest)
     }
 }
 
+/* The row that is picked, -1 for none, through any depths of tables. */
+static inline int64_t cdbi_pick_of_many(cdbi_pick *pick)
+{
+    size_t oldest = cdbi_oldest(pick, 0, 0, pick->table->n_rows);
+    return oldest > 0 && !pick->is_refused ? (int64_t)cdbi_drawn(pick, oldest) : -1;
+}
+
+#define CDBI_FEW 64                 /* rows of the highest rank that are listed */
+#define CDBI_TOO_MANY (-2)
+
+/* Of some rows one by their weights: see cdbi_drawn, which does the same without a list. */
+static inline size_t cdbi_drawn_of(const cdbi_pick *pick, const cdbi_level *level, const size_t *list, size_t n)
+{
+    double weights[CDBI_FEW], sums[CDBI_FEW], most = 0.0, sum = 0.0, wanted;
+    size_t i;
+    for (i = 0; i < n; i++) {
+        weights[i] = level->choose == CDB_CHANCE ? level->row_weights[list[i]] : 1.0;
+        if (i == 0 || cdbi_is_less(most, weights[i])) most = weights[i];
+    }
+    for (i = 0; i < n; i++) sums[i] = sum = cdbi_sum(sum, cdbi_ratio(weights[i], most));
+    wanted = cdbi_product(cdbi_chance(pick->picker, 0), sum);
+    for (i = 0; i + 1 < n && !cdbi_is_less(wanted, sums[i]); i++) {}
+    return list[i];
+}
+
+/* The same for a table without tables inside, in one walk; CDBI_TOO_MANY where the list of the best rows is too short. */
+static inline int64_t cdbi_pick_of_few(cdbi_pick *pick)
+{
+    const cdb_table *table = pick->table;
+    const cdbi_level *level = &table->levels[0];
+    size_t list[CDBI_FEW], ages[CDBI_FEW], n = 0, n_parts = 0, oldest = 0, w, i;
+    uint64_t best = 0, best_cost = 0;
+    for (w = 0; w < table->n_words; w++) {
+        uint64_t word = pick->rows[w];
+        for (; word; word &= word - 1) {
+            size_t row = w * 64 + cdbi_first_bit(word);
+            uint64_t rank = cdbi_place(level->ranks[row]), cost = 0;
+            if (level->choose == CDB_CHANCE && !cdbi_is_less(0.0, level->row_weights[row])) continue;
+            if (level->keys && cdbi_rests(pick, level, row)) continue;
+            n_parts++;
+            if (n > 0 && rank < best) continue;
+            if (level->by_cost) cost = cdbi_place(cdbi_cost(table, pick->schema, pick->facts, pick->unknown, 0, row));
+            if (n > 0 && rank == best && cost > best_cost) continue;
+            if (rank != best || cost != best_cost) n = 0;
+            if (n == CDBI_FEW) return CDBI_TOO_MANY;
+            best = rank;
+            best_cost = cost;
+            list[n++] = row;
+        }
+    }
+    pick->is_refused = level->choose == CDB_REFUSE && n_parts > 1;
+    if (n == 0 || pick->is_refused) return -1;
+    if (n == 1) return (int64_t)list[0];
+    for (i = 0; i < n; i++) {
+        ages[i] = cdbi_age(pick, list[i]);
+        if (ages[i] > oldest) oldest = ages[i];
+    }
+    for (w = 0, i = 0; i < n; i++)
+        if (ages[i] == oldest) list[w++] = list[i];
+    return (int64_t)(w == 1 ? list[0] : cdbi_drawn_of(pick, level, list, w));
+}
+
 /* Let a row rest that was picked; 0 where the picker has no room to remember it. */
 static inline int cdbi_let_rest(const cdb_table *table, cdb_picker *picker, size_t row, double time_s, int is_trial)
 {
@@ -260,16 +322,19 @@ static inline int cdbi_let_rest(const cdb_table *table, cdb_picker *picker, size
 /* Pick one of the valid rows that a query gave: *row, or -1 where none can be picked and the fallback is in force (cdb_asset_of).
  * `facts` are needed for the policy "cheapest" alone; `time_s` is the time of the game, for rows that rest for seconds. Each call is
  * a turn of the character, with and without a row; one that gives a fault is none. */
-static inline cdb_status cdb_pick(const cdb_table *table, const cdb_column *columns, const cdb_schema *schema, cdb_fact *facts,
-    cdb_unknown unknown, const uint64_t *rows, size_t room, double time_s, cdb_picker *picker, int64_t *row, cdb_fault *fault)
+CDB_API cdb_status cdb_pick(const cdb_table *table, const cdb_column *columns, const cdb_schema *schema,
+    const cdb_fact *facts, cdb_unknown unknown, const uint64_t *rows, size_t room, double time_s, cdb_picker *picker, int64_t *row,
+    cdb_fault *fault)
 {
     cdbi_pick pick;
-    size_t oldest, picked, i;
+    cdb_fact own[CDB_MOST_FACTS];
+    size_t i;
+    int64_t picked;
     cdb_status status = CDB_OK;
     *row = -1;
     if (room < table->n_words)
         return cdbi_fault(fault, CDB_TOO_SHORT, "the array for the rows is shorter than a mask of the table", -1, "");
-    if (table->soft && table->by_cost) status = cdbi_ready(table, columns, schema, facts, unknown, fault);
+    if (table->soft && table->by_cost) status = cdbi_ready(table, columns, schema, &facts, own, unknown, fault);
     if (status != CDB_OK) return status;
     pick.table = table;
     pick.schema = schema;
@@ -279,30 +344,30 @@ static inline cdb_status cdb_pick(const cdb_table *table, const cdb_column *colu
     pick.unknown = unknown;
     pick.time_s = time_s;
     pick.is_refused = 0;
-    oldest = cdbi_oldest(&pick, 0, 0, table->n_rows);
+    picked = table->way_rows ? CDBI_TOO_MANY : cdbi_pick_of_few(&pick);
+    if (picked == CDBI_TOO_MANY) picked = cdbi_pick_of_many(&pick);
     if (pick.is_refused)
         return cdbi_fault(fault, CDB_NOT_UNIQUE, "several rows are valid at once, and the policy of their table is \"unique\"", -1, "");
-    if (oldest > 0) {
-        picked = cdbi_drawn(&pick, oldest);
-        if (!cdbi_let_rest(table, picker, picked, time_s, 1))
+    if (picked >= 0) {
+        if (!cdbi_let_rest(table, picker, (size_t)picked, time_s, 1))
             return cdbi_fault(fault, CDB_TOO_SHORT, "the picker has no room for another row that rests", -1, table->assets[picked]);
-        cdbi_let_rest(table, picker, picked, time_s, 0);
+        cdbi_let_rest(table, picker, (size_t)picked, time_s, 0);
         for (i = picker->memory; i > 1; i--) picker->recent[i - 1] = picker->recent[i - 2];
         if (picker->memory > 0) picker->recent[0] = table->asset_keys[picked];
-        *row = (int64_t)picked;
+        *row = picked;
     }
     picker->turn++;
     return cdbi_fault(fault, CDB_OK, "", -1, "");
 }
 
 /* The asset of a row that was picked, or the fallback of the table for -1; NULL where it has none. */
-static inline const char *cdb_asset_of(const cdb_table *table, int64_t picked)
+CDB_API const char *cdb_asset_of(const cdb_table *table, int64_t picked)
 {
     return picked < 0 ? table->fallback : cdb_asset(table, picked);
 }
 
 /* The next row behind `row` that has this asset, with the path that it has in a table inside the table; -1 behind the last. */
-static inline int64_t cdb_next_row_of(const cdb_table *table, const char *asset, int64_t row)
+CDB_API int64_t cdb_next_row_of(const cdb_table *table, const char *asset, int64_t row)
 {
     for (row++; row >= 0 && (uint64_t)row < table->n_rows; row++)
         if (strcmp(table->assets[row], asset) == 0) return row;

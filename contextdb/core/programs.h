@@ -400,6 +400,20 @@ static inline cdb_status cdbi_derive(const cdb_table *table, const cdb_schema *s
     return CDB_OK;
 }
 
+/* The same, computed into `own`, which *facts then is; it has room for CDB_MOST_FACTS, or is where the facts are. */
+CDBI_HOT cdb_status cdbi_derived(const cdb_table *table, const cdb_schema *schema, const cdb_fact **facts, cdb_fact *own,
+    cdb_unknown unknown, cdb_fault *fault)
+{
+    if (!table->has_programs) return CDB_OK;
+    if (own != *facts) {
+        if (schema->n_conditions > CDB_MOST_FACTS)
+            return cdbi_fault(fault, CDB_TOO_SHORT, "the table has more conditions than CDB_MOST_FACTS", -1, "");
+        memcpy(own, *facts, schema->n_conditions * sizeof *own);
+        *facts = own;
+    }
+    return cdbi_derive(table, schema, own, unknown, fault);
+}
+
 /* ---- Rules */
 
 /* Whether a row's rule holds: 1 where it has none, CDB_MISSING where it is open. */

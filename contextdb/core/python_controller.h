@@ -39,21 +39,6 @@ static int cdbp_take_clips(cdbp_controller *own, PyObject *part, cdbm_clips *to,
     return 0;
 }
 
-/* Whether the parts of a database go together. */
-static int cdbp_are_clips(const cdbm_controller *controller, const cdbm_clips *clips)
-{
-    size_t i;
-    if (!clips->frames) return 1;
-    if (clips->n_kinds < clips->frames->n_kinds || clips->frames->n_features != controller->n_features || !(clips->rate > 0.0)) return 0;
-    if (clips->n_permutations < 1 || clips->n_ranges % clips->n_permutations || clips->n_pace > 2) return 0;
-    if (clips->n_pace && (clips->pace > clips->frames->n_features || clips->n_pace > clips->frames->n_features - clips->pace)) return 0;
-    for (i = 0; i < clips->n_ranges; i++) {
-        if (clips->starts[i] < 0 || clips->stops[i] < clips->starts[i] || (uint64_t)clips->stops[i] > clips->frames->n_frames) return 0;
-        if (i % clips->n_permutations && clips->stops[i] - clips->starts[i] != clips->stops[i - 1] - clips->starts[i - 1]) return 0;
-    }
-    return 1;
-}
-
 /* Controllers(databases, n_played, search_every_s, jump_threshold_s, history_s, min_rate, max_rate, grace_s, until_natural) */
 static int cdbp_controller_init(PyObject *self, PyObject *arguments, PyObject *named)
 {
@@ -81,7 +66,7 @@ static int cdbp_controller_init(PyObject *self, PyObject *arguments, PyObject *n
     to->databases = own->databases, to->n_databases = own->n_arrays = (size_t)n, to->n_played = (size_t)n_played;
     for (i = 0; i < n; i++)
         if (cdbp_take_clips(own, PyTuple_GetItem(parts, i), &own->databases[i], &own->arrays[i]) != 0) return -1;
-    for (i = 0; i < n; i++) is_right = is_right && cdbp_are_clips(to, &own->databases[i]);
+    for (i = 0; i < n; i++) is_right = is_right && (!to->databases[i].frames || cdbm_are_clips(&to->databases[i], to->n_features));
     own->is_made = is_right && n_played >= 0;
     if (!own->is_made) PyErr_SetString(PyExc_ValueError, "the parts of the databases do not go together");
     return own->is_made ? 0 : -1;
@@ -98,24 +83,13 @@ static void cdbp_controller_free(PyObject *self)
     cdbp_free(self);
 }
 
-/* Whether what plays is of a database that is there, or none plays. */
-static int cdbp_is_playing(const cdbm_controller *controller, const cdbm_playing *playing)
-{
-    const cdbm_clips *clips;
-    if (playing->database < 0.0) return 1;
-    if (!(playing->database < (double)controller->n_databases)) return 0;
-    clips = &controller->databases[(size_t)playing->database];
-    if (!clips->frames || !(playing->range >= 0.0 && playing->range < (double)clips->n_ranges) || playing->at_s != playing->at_s) return 0;
-    return (double)clips->starts[(size_t)playing->range] <= playing->frame && playing->frame < (double)clips->stops[(size_t)playing->range];
-}
-
 /* Whether rows are those of characters of these databases. */
 static int cdbp_are_rows(const cdbm_controller *controller, const double *rows, size_t n)
 {
     size_t i, width = cdbm_width(controller);
     for (i = 0; i < n; i++) {
         const cdbm_state *state = (const cdbm_state *)(rows + i * width);
-        if (!cdbp_is_playing(controller, &state->playing)) return 0;
+        if (!cdbm_is_playing(controller, &state->playing)) return 0;
         if (!(state->n_played >= 0.0 && state->n_played <= (double)controller->n_played)) return 0;
     }
     return 1;
@@ -221,7 +195,7 @@ static int cdbp_are_moved(const cdbm_controller *controller, const cdbp_update *
     size_t i;
     for (i = 0; i < to->given.n; i++) {
         const cdbm_moved *moved = &to->moved[i];
-        if (!cdbp_is_playing(controller, &moved->to) || !(moved->n_spans >= 0.0 && moved->n_spans <= 3.0)) return 0;
+        if (!cdbm_is_playing(controller, &moved->to) || !(moved->n_spans >= 0.0 && moved->n_spans <= 3.0)) return 0;
     }
     return cdbp_are_rows(controller, to->before, to->given.n);
 }
@@ -235,7 +209,7 @@ static int cdbp_are_chosen(const cdbm_controller *controller, const cdbp_update 
     for (i = 0; i < to->given.n; i++) {
         cdbm_playing chosen = {0.0, 0.0, 0.0, 0.0};
         chosen.database = to->decisions[i].chosen[0], chosen.range = to->decisions[i].chosen[1], chosen.frame = to->decisions[i].chosen[2];
-        if (!cdbp_is_playing(controller, &chosen)) return 0;
+        if (!cdbm_is_playing(controller, &chosen)) return 0;
         if (chosen.database == CDBM_GO_ON && to->moved[i].to.database < 0.0) return 0;
     }
     return cdbp_are_rows(controller, to->after, to->given.n);
@@ -309,7 +283,7 @@ static PyObject *cdbp_controller_skips(PyObject *self, PyObject *const *in, Py_s
         && (skips.spans = (int64_t *)cdbp_shaped(&a, in[4], 'i', 8, 1, s, 2, cdbm_most_skips(controller, &controller->databases[database]), 2, 0))
         && (skips.whys = (uint8_t *)cdbp_shaped(&a, in[5], 'u', 1, 1, s, 1, s[0], 0, 0))
         && cdbp_take_plays(own, &a, in + 6, &given) == 0
-        && cdbp_are_rows(controller, row, 1) && cdbp_is_playing(controller, &((const cdbm_moved *)moved)->to)) {
+        && cdbp_are_rows(controller, row, 1) && cdbm_is_playing(controller, &((const cdbm_moved *)moved)->to)) {
         cdbm_list_skips(controller, &given, 0, row, (const cdbm_moved *)moved, (const cdbm_decision *)decision, (size_t)database, &skips);
         cdbp_release(&a);
         return PyLong_FromLongLong((long long)skips.n);

@@ -70,7 +70,8 @@ static cdb_status cdbp_live_rows(cdbp_live *live, uint64_t *rows)
     }
     for (i = 0; live->has_masks && i < n && live->masks[i]; i++) {}
     if (!live->has_masks || i < n)
-        return cdb_query(&own->table, own->columns, &own->schema, live->now.facts, live->unknown, rows, own->table.n_words, &fault);
+        return cdbi_query(&own->table, own->columns, &own->schema, live->now.facts, live->now.facts, live->unknown, rows,
+            own->table.n_words, &fault);
     cdbp_and(rows, own->table.enabled, live->masks, n, own->table.n_words);
     return CDB_OK;
 }

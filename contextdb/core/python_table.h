@@ -200,20 +200,38 @@ static int cdbp_know_values(cdbp_making *making, cdbp_reader *reader, PyObject *
     return 0;
 }
 
-/* The soft cells of a condition: a tuple (column, penalties). The column has the rows of each depth, one after the other. */
+/* How the penalties of soft cells grow: (per, starts, ends, which), all flat. */
+static int cdbp_growth(cdbp_making *making, PyObject *const *in, cdbi_soft *soft, size_t n_soft)
+{
+    size_t n_ends, n_which;
+    soft->per = (const double *)cdbp_row(making, in[0], sizeof(double), &soft->n_cells);
+    soft->starts = (const int64_t *)cdbp_row(making, in[1], sizeof(int64_t), &soft->n_starts);
+    soft->ends = (const double *)cdbp_row(making, in[2], sizeof(double), &n_ends);
+    soft->which = (const int32_t *)cdbp_row(making, in[3], sizeof(int32_t), &n_which);
+    if (PyErr_Occurred()) return -1;
+    soft->n_spans = n_ends / 2;
+    if (n_which == n_soft && cdbi_is_sound_growth(soft, n_soft)) return 0;
+    PyErr_SetString(PyExc_ValueError, "how penalties grow does not go together");
+    return -1;
+}
+
+/* The soft cells of a condition: a tuple (column, penalties), with how they grow behind. The column has the rows of each depth, one
+ * after the other. */
 static int cdbp_soft(cdbp_making *making, PyObject *about, size_t at)
 {
     cdb_table *table = &making->own->table;
-    PyObject *column, *penalties;
+    PyObject *column, *penalties, *growth[4] = {NULL, NULL, NULL, NULL};
     cdbi_soft *soft;
     size_t n = 0;
-    if (cdbp_length(about) < 0 || !PyArg_ParseTuple(about, "OO", &column, &penalties)) return -1;
+    if (cdbp_length(about) < 0
+        || !PyArg_ParseTuple(about, "OO|OOOO", &column, &penalties, &growth[0], &growth[1], &growth[2], &growth[3])) return -1;
     if (!table->soft) table->soft = (cdbi_soft *)cdbi_memory(&making->opening, making->own->schema.n_conditions, sizeof *soft);
     if (!table->soft) return -1;
     soft = &table->soft[at];
     soft->penalties = (const double *)cdbp_row(making, penalties, sizeof(double), &n);
     if (!soft->penalties) return -1;
     if (table->n_depths == 0) table->n_depths = n / table->n_rows;
+    if (growth[3] && cdbp_growth(making, growth, soft, n) != 0) return -1;
     if (table->n_depths > 0 && n == table->n_depths * table->n_rows)
         return cdbp_column(making, &making->own->conditions[at], column, (n + 63) / 64, &soft->column);
     PyErr_SetString(PyExc_ValueError, "soft cells have no penalty for each row of each depth");
@@ -625,7 +643,7 @@ static PyObject *cdbp_ask(const cdbp_table *own, PyObject *context, cdb_unknown 
     cdbp_lay_out(own, memory, &frame);
     if (cdbp_read_all(own, context, unknown, &frame) == CDBP_READ) answer = cdbp_new_answer(own->answers, own->shared, own->table.n_words);
     if (answer
-        && cdb_query(&own->table, own->columns, &own->schema, frame.facts, unknown, answer->words, own->table.n_words, &fault)) {
+        && cdbi_query(&own->table, own->columns, &own->schema, frame.facts, frame.facts, unknown, answer->words, own->table.n_words, &fault)) {
         Py_DecRef((PyObject *)answer);
         answer = NULL;
     }
@@ -676,7 +694,7 @@ static void cdbp_add_costs(const cdbp_table *own, size_t at, const cdb_fact *fac
         uint64_t failing = ~(mask ? mask[word] : cdbi_accepted(&soft->column, condition, fact, unknown, word, n_words));
         for (; failing; failing &= failing - 1) {
             row = word * 64 + cdbi_first_bit(failing);
-            if (row < n) costs[row] = cdbi_sum(costs[row], soft->penalties[row]);
+            if (row < n) costs[row] = cdbi_sum(costs[row], cdbi_grown(soft, condition, fact, row));
         }
     }
 }
@@ -700,6 +718,7 @@ static int cdbp_put_each(const cdbp_table *own, PyObject *context, cdb_unknown u
     void (*put)(const cdbp_table *, size_t, const cdb_fact *, cdb_unknown, void *))
 {
     void *memory = PyMem_Malloc(own->frame_bytes);
+    const cdb_fact *facts;
     cdbp_frame frame;
     cdb_fault fault;
     size_t i;
@@ -708,7 +727,8 @@ static int cdbp_put_each(const cdbp_table *own, PyObject *context, cdb_unknown u
     if (!memory) return -1;
     cdbp_lay_out(own, memory, &frame);
     how = cdbp_read_all(own, context, unknown, &frame);
-    if (how == CDBP_READ && cdbi_ready(&own->table, own->columns, &own->schema, frame.facts, unknown, &fault) != CDB_OK)
+    facts = frame.facts;
+    if (how == CDBP_READ && cdbi_ready(&own->table, own->columns, &own->schema, &facts, frame.facts, unknown, &fault) != CDB_OK)
         how = CDBP_CAREFUL;
     for (i = 0; how == CDBP_READ && i < n; i++) put(own, i, &frame.facts[i], unknown, items);
     cdbp_let_go(&frame);

@@ -1,6 +1,6 @@
 /* ---- Rotations: unit quaternions (w, x, y, z), and turns: an axis times an angle in radians.
  *
- * Source: J. Solà and others, "A micro Lie theory for state estimation in robotics", 2018 (the Jacobian of a rotation vector). */
+ * Source: J. Sola and others, "A micro Lie theory for state estimation in robotics", 2018 (the Jacobian of a rotation vector). */
 
 typedef struct cdbo_vector {
     double x, y, z;

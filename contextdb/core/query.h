@@ -162,10 +162,10 @@ static inline void cdbi_and_others(uint64_t *rows, const cdb_table *table, const
 }
 
 /* The rows whose every cell accepts its fact and whose rule holds, one bit a row, in `rows`, which has room for `room` words; words
- * behind those of the table become 0. Facts are in the order of the schema; those of derived conditions are computed here and
- * written into `facts`. On a fault no row is valid. */
-static inline cdb_status cdb_query(const cdb_table *table, const cdb_column *columns, const cdb_schema *schema, cdb_fact *facts,
-    cdb_unknown unknown, uint64_t *rows, size_t room, cdb_fault *fault)
+ * behind those of the table become 0. Facts are in the order of the schema; those of derived conditions are computed here, into
+ * `own`. On a fault no row is valid. */
+static inline cdb_status cdbi_query(const cdb_table *table, const cdb_column *columns, const cdb_schema *schema, const cdb_fact *facts,
+    cdb_fact *own, cdb_unknown unknown, uint64_t *rows, size_t room, cdb_fault *fault)
 {
     const uint64_t *masks[CDBI_MASKS], *mask, *from = table->enabled;
     size_t n = 0, i, n_words = table->n_words;
@@ -175,10 +175,8 @@ static inline cdb_status cdb_query(const cdb_table *table, const cdb_column *col
     memset(rows, 0, room * sizeof *rows);
     if (room < n_words)
         return cdbi_fault(fault, CDB_TOO_SHORT, "the array for the rows is shorter than a mask of the table", -1, "");
-    if (table->has_programs) {
-        status = cdbi_derive(table, schema, facts, unknown, fault);
-        if (status != CDB_OK) return status;
-    }
+    status = cdbi_derived(table, schema, &facts, own, unknown, fault);
+    if (status != CDB_OK) return status;
     for (i = 0; i < schema->n_conditions; i++) {
         if (columns[i].kind == 0) continue;
         is_missing = cdbi_is_missing(&schema->conditions[i], &facts[i]);
@@ -204,9 +202,34 @@ static inline cdb_status cdb_query(const cdb_table *table, const cdb_column *col
     return status;
 }
 
+/* The valid rows for some facts, which stay as they are: those of derived conditions are passed over. See cdbi_query. */
+CDB_API cdb_status cdb_query(const cdb_table *table, const cdb_column *columns, const cdb_schema *schema, const cdb_fact *facts,
+    cdb_unknown unknown, uint64_t *rows, size_t room, cdb_fault *fault)
+{
+    cdb_fact own[CDB_MOST_FACTS];
+    return cdbi_query(table, columns, schema, facts, own, unknown, rows, room, fault);
+}
+
+/* The same for `n` contexts, whose facts stand one after another, as do their rows, n_words for each. Of a context with a fault no
+ * row is valid, the others are answered; gives the first fault, with the number of its context in *context. */
+CDB_API cdb_status cdb_query_many(const cdb_table *table, const cdb_column *columns, const cdb_schema *schema,
+    const cdb_fact *facts, size_t n, cdb_unknown unknown, uint64_t *rows, size_t *context, cdb_fault *fault)
+{
+    cdb_fact own[CDB_MOST_FACTS];
+    cdb_status first = cdbi_fault(fault, CDB_OK, "", -1, "");
+    size_t i;
+    for (i = 0; i < n; i++) {
+        cdb_status status = cdbi_query(table, columns, schema, facts + i * schema->n_conditions, own, unknown, rows + i * table->n_words,
+            table->n_words, first == CDB_OK ? fault : NULL);
+        if (first == CDB_OK && status != CDB_OK) *context = i;
+        if (first == CDB_OK) first = status;
+    }
+    return first;
+}
+
 /* ---- Answers */
 
-static inline int64_t cdb_count(const uint64_t *rows, size_t n_words)
+CDB_API int64_t cdb_count(const uint64_t *rows, size_t n_words)
 {
     uint64_t count = 0;
     size_t i;
@@ -215,7 +238,7 @@ static inline int64_t cdb_count(const uint64_t *rows, size_t n_words)
 }
 
 /* The next valid row behind `row`; -1 behind the last. The first one: behind -1. */
-static inline int64_t cdb_next_row(const uint64_t *rows, size_t n_words, int64_t row)
+CDB_API int64_t cdb_next_row(const uint64_t *rows, size_t n_words, int64_t row)
 {
     size_t at = (size_t)((row + 1) / 64);
     uint64_t word = at < n_words ? rows[at] & (~(uint64_t)0 << ((row + 1) % 64)) : 0;
@@ -226,8 +249,15 @@ static inline int64_t cdb_next_row(const uint64_t *rows, size_t n_words, int64_t
     return (int64_t)(at * 64 + cdbi_first_bit(word));
 }
 
+/* The number of a row's asset, from 0 up to, not including, n_assets; -1 for a row that is not there. It holds for this version of
+ * the table; the key of an asset, asset_keys[row], is a hash of its name, which holds for all. */
+CDB_API int32_t cdb_asset_number(const cdb_table *table, int64_t row)
+{
+    return row >= 0 && (uint64_t)row < table->n_rows ? table->asset_numbers[row] : -1;
+}
+
 /* The name of a row's asset, in UTF-8; NULL for a row that is not there. */
-static inline const char *cdb_asset(const cdb_table *table, int64_t row)
+CDB_API const char *cdb_asset(const cdb_table *table, int64_t row)
 {
     return row >= 0 && (uint64_t)row < table->n_rows ? table->assets[row] : NULL;
 }
@@ -235,7 +265,7 @@ static inline const char *cdb_asset(const cdb_table *table, int64_t row)
 /* ---- Facts that are missing, and lists of facts */
 
 /* A date of the calendar as whole days since 1970-01-01: cdb_date(2026, 1, 31). */
-static inline int64_t cdb_date(int year, int month, int day)
+CDB_API int64_t cdb_date(int year, int month, int day)
 {
     int64_t since_march = month > 2 ? month - 3 : month + 9, y = (int64_t)year - (month <= 2);
     int64_t era = (y >= 0 ? y : y - 399) / 400, of_era = y - era * 400;
@@ -243,7 +273,7 @@ static inline int64_t cdb_date(int year, int month, int day)
 }
 
 /* Put a tag into a set of declared tags, which is then known. */
-static inline void cdb_add_tag(uint64_t *words, size_t tag)
+CDB_API void cdb_add_tag(uint64_t *words, size_t tag)
 {
     words[0] |= 1;
     words[tag / 64] |= (uint64_t)1 << (tag % 64);

@@ -26,19 +26,44 @@ static inline int cdbi_accepts(const cdb_column *column, const cdb_condition *co
 }
 
 /* Refuse facts that are wrong or missing, and compute those that are derived. */
-static inline cdb_status cdbi_ready(const cdb_table *table, const cdb_column *columns, const cdb_schema *schema, cdb_fact *facts,
-    cdb_unknown unknown, cdb_fault *fault)
+static inline cdb_status cdbi_ready(const cdb_table *table, const cdb_column *columns, const cdb_schema *schema,
+    const cdb_fact **facts, cdb_fact *own, cdb_unknown unknown, cdb_fault *fault)
 {
     size_t i;
-    cdb_status status = CDB_OK;
-    if (table->has_programs) status = cdbi_derive(table, schema, facts, unknown, fault);
+    cdb_status status = cdbi_derived(table, schema, facts, own, unknown, fault);
     for (i = 0; i < schema->n_conditions && status == CDB_OK; i++) {
+        const cdb_fact *fact = &(*facts)[i];
         if (columns[i].kind == 0) continue;
-        if (!cdbi_is_missing(&schema->conditions[i], &facts[i])) {
-            if (cdbi_is_wrong(&schema->conditions[i], &facts[i])) status = cdbi_fact_fault(fault, CDB_WRONG_FACT, schema, i);
-        } else if (unknown == CDB_UNKNOWN_ERROR) status = cdbi_missing_fault(fault, table, schema, facts, i);
+        if (!cdbi_is_missing(&schema->conditions[i], fact)) {
+            if (cdbi_is_wrong(&schema->conditions[i], fact)) status = cdbi_fact_fault(fault, CDB_WRONG_FACT, schema, i);
+        } else if (unknown == CDB_UNKNOWN_ERROR) status = cdbi_missing_fault(fault, table, schema, *facts, i);
     }
     return status;
+}
+
+/* How far a number is from a span. */
+static inline double cdbi_gap(double number, const double *span)
+{
+    return span[0] > number ? span[0] - number : number > span[1] ? number - span[1] : 0.0;
+}
+
+/* What a soft cell that does not accept its fact costs: its penalty, or so many as the fact is away from it. */
+static inline double cdbi_grown(const cdbi_soft *soft, const cdb_condition *condition, const cdb_fact *fact, size_t row)
+{
+    double penalty = soft->penalties[row], least, number, gap;
+    int64_t k;
+    int turn, is_circular = condition->type == CDB_ANGLE;
+    size_t cell = soft->per ? (size_t)soft->which[row] : 0;
+    if (!soft->per || !(soft->per[cell] == soft->per[cell]) || cdbi_is_missing(condition, fact)) return penalty;
+    if (!(penalty > 0.0)) return 0.0;
+    number = cdbi_number(condition, fact);
+    least = cdbi_gap(number, soft->ends + 2 * soft->starts[cell]);
+    for (k = soft->starts[cell]; k < soft->starts[cell + 1]; k++)
+        for (turn = is_circular ? -1 : 0; turn <= is_circular; turn++) {
+            gap = cdbi_gap(number + 360.0 * (double)turn, soft->ends + 2 * k);
+            if (gap < least) least = gap;
+        }
+    return penalty * (least / soft->per[cell]);
 }
 
 /* What the soft cells of one row cost at one depth of tables inside tables. */
@@ -50,20 +75,21 @@ static inline double cdbi_cost(const cdb_table *table, const cdb_schema *schema,
     for (i = 0; table->soft && i < schema->n_conditions; i++)
         if (table->soft[i].column.kind != 0
             && !cdbi_accepts(&table->soft[i].column, &schema->conditions[i], &facts[i], unknown, at, n_words))
-            cost = cdbi_sum(cost, table->soft[i].penalties[at]);
+            cost = cdbi_sum(cost, cdbi_grown(&table->soft[i], &schema->conditions[i], &facts[i], at));
     return cost;
 }
 
 /* What the soft cells of every row that do not accept their facts cost: `penalties` has room for so many numbers. */
-static inline cdb_status cdb_penalties(const cdb_table *table, const cdb_column *columns, const cdb_schema *schema, cdb_fact *facts,
-    cdb_unknown unknown, double *penalties, size_t room, cdb_fault *fault)
+CDB_API cdb_status cdb_penalties(const cdb_table *table, const cdb_column *columns, const cdb_schema *schema,
+    const cdb_fact *facts, cdb_unknown unknown, double *penalties, size_t room, cdb_fault *fault)
 {
+    cdb_fact own[CDB_MOST_FACTS];
     size_t row, depth;
     cdb_status status;
     for (row = 0; row < room; row++) penalties[row] = 0.0;
     if (room < table->n_rows)
         return cdbi_fault(fault, CDB_TOO_SHORT, "the array for the penalties is shorter than the table", -1, "");
-    status = table->soft ? cdbi_ready(table, columns, schema, facts, unknown, fault) : CDB_OK;
+    status = table->soft ? cdbi_ready(table, columns, schema, &facts, own, unknown, fault) : CDB_OK;
     if (status != CDB_OK) return status;
     for (row = 0; table->soft && row < table->n_rows; row++)
         for (depth = 0; depth < table->n_depths; depth++)
@@ -77,15 +103,16 @@ static inline cdb_status cdb_penalties(const cdb_table *table, const cdb_column 
 /* Why a row is not valid: the numbers of the conditions whose cells fail, CDB_RULE and CDB_DISABLED, as many as have room in
  * `reasons`; *n is their whole number, 0 for a valid row. With CDB_UNKNOWN_ERROR a row that an open rule alone keeps from being
  * valid is a fault, as in a query. */
-static inline cdb_status cdb_why_not(const cdb_table *table, const cdb_column *columns, const cdb_schema *schema, cdb_fact *facts,
-    cdb_unknown unknown, int64_t row, int *reasons, size_t room, size_t *n, cdb_fault *fault)
+CDB_API cdb_status cdb_why_not(const cdb_table *table, const cdb_column *columns, const cdb_schema *schema,
+    const cdb_fact *facts, cdb_unknown unknown, int64_t row, int *reasons, size_t room, size_t *n, cdb_fault *fault)
 {
+    cdb_fact own[CDB_MOST_FACTS];
     size_t i;
     int truth, is_open;
     cdb_status status;
     *n = 0;
     if (row < 0 || (uint64_t)row >= table->n_rows) return cdbi_fault(fault, CDB_TOO_SHORT, "the table has no such row", -1, "");
-    status = cdbi_ready(table, columns, schema, facts, unknown, fault);
+    status = cdbi_ready(table, columns, schema, &facts, own, unknown, fault);
     if (status != CDB_OK) return status;
     truth = cdbi_rule(table, schema, facts, (size_t)row);
     is_open = truth < 0 && unknown == CDB_UNKNOWN_ERROR;

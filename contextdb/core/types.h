@@ -4,6 +4,7 @@
  *   cdb_query   the rows that are valid for some facts, one bit a row; takes no memory
  *   cdb_pick    one of these rows, by the policy of the table; its memory is yours
  *   cdb_close   gives back what cdb_open took
+ *   cdb_open_any, cdb_live_of    a table whose schema is not known before, and facts that are set by number or name
  *
  * The faces of single tables, further down, call these with types of their own. Bit r % 64 of word r / 64 is row r. A table that is
  * open is never changed and may be asked from several threads. The layout of the file is told in docs/format.md of contextdb.
@@ -34,6 +35,15 @@
 #define CDB_FREE(block) free(block)
 #endif
 
+#ifndef CDB_API                     /* as a rule every file that includes this has its own functions */
+#define CDB_API static inline
+#define CDBI_HAS_BODIES 1
+#elif defined(CDB_IMPLEMENTATION)   /* with a CDB_API of yours, that exports or is nothing, one file has those of all, and defines this */
+#define CDBI_HAS_BODIES 1
+#else
+#define CDBI_HAS_BODIES 0
+#endif
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -50,6 +60,10 @@ typedef char cdbi_doubles_have_8_bytes[sizeof(double) == 8 ? 1 : -1];
 #define CDB_TRUE 1
 #define CDB_MISSING (-1)            /* a bool, an enum or a list of tags that is not known */
 #define CDB_MISSING_INT INT64_MIN   /* an int or a date that is not known; a number or an angle: NaN; a text: NULL */
+
+#ifndef CDB_MOST_FACTS
+#define CDB_MOST_FACTS 512          /* conditions of a table with rules or derived facts, which takes 16 bytes of stack for each */
+#endif
 
 #define CDB_FIRST_DATE (-719162)    /* 0001-01-01 */
 #define CDB_LAST_DATE 2932896       /* 9999-12-31 */
@@ -220,7 +234,20 @@ typedef struct cdb_output {         /* n_rows + 1 values: the last is what there
 typedef struct cdbi_soft {          /* the soft cells of a condition, a row for each row of each depth */
     cdb_column column;
     const double *penalties;
+    const double *per, *ends;       /* how penalties grow, NULL where none does: of each distinct cell the distance that one is for, */
+    const int64_t *starts;          /* NaN for any; its spans, two ends each, from which to which; */
+    const int32_t *which;           /* and the cell of each row */
+    size_t n_cells, n_spans, n_starts;
 } cdbi_soft;
+
+#define CDB_MOST_ROLES 8            /* roles that can be cast at once, */
+#define CDB_MOST_ACTORS 64          /* and actors */
+
+typedef struct cdb_role {           /* a part that actors play: see cdb_cast */
+    const char *name;
+    uint64_t *required, *optional;  /* the rows that cannot do without it, and those in which somebody plays it who fits */
+    int is_computed;                /* a rule, a derived fact, or a cost that decides picks needs facts of it */
+} cdb_role;
 
 typedef struct cdb_table {
     size_t n_rows;
@@ -242,6 +269,10 @@ typedef struct cdb_table {
     const char **leaves;
     int has_chance, by_cost;        /* whether chance, or what soft cells cost, decides at some level */
     uint64_t *asset_keys;           /* a hash of each asset */
+    int32_t *asset_numbers;         /* of each row its asset, from 0 in the order in which they come first */
+    size_t n_assets;
+    cdb_role *roles;
+    size_t n_roles;
     cdbi_programs programs;
     void *blocks;                   /* the memory that was taken */
     const unsigned char *data;

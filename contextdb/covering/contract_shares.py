@@ -135,12 +135,7 @@ class Shares:
     def _broken_at(self, codes: NDArray[np.int32]) -> NDArray[np.bool_]:
         """Whether contexts, as classes of the factors, break the contract."""
         self.demand.finder.progress.check()
-        words, starts = self._sampler.masks
-        held = np.full((len(codes), words.shape[1]), ~np.uint64(0))
-        for f in range(codes.shape[1]):
-            held &= words[starts[f] + codes[:, f]]
-        bits = np.unpackbits(held.view(np.uint8), axis=1, bitorder="little", count=len(self.space.boxes))
-        return self.demand.broken(bits.astype(np.bool_))
+        return self.demand.broken(self._sampler.held(codes))
 
     @cached_property
     def _sampler(self) -> Sampler:

@@ -1,8 +1,8 @@
 """Whether contracts hold of a table, proved by boxes: a contract is broken where some box of contexts leaves it open.
 
-Whether a part holds a context is decided exactly,
-single points too, by search, and where that is long by the core. The share of the contexts in which a contract holds is counted by
-the core, within a budget of steps; where it is not finished, and where only draws tell what can happen, it has two bounds.
+Whether a box of what breaks it holds a context is decided exactly, single points too, by search, and where that is long by the
+core. The share of the contexts in which a contract holds is counted by the core, within a budget of steps; where it is not
+finished, and where only draws tell what can happen, it has two bounds.
 
 Every counterexample is put to the compiled table before it is reported.
 """

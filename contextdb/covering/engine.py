@@ -18,10 +18,10 @@ from contextdb.compiled.table import CompiledTable
 from contextdb.covering.assumed import Opened, opened
 from contextdb.covering.count import Bounds, uncovered_share
 from contextdb.covering.crowded import find_crowds
-from contextdb.covering.gaps import SHARE_WORK, Measure, described, find_gaps, share_of
+from contextdb.covering.gaps import SHARE_WORK, Gaps, Measure, described, find_gaps, share_of
 from contextdb.covering.judge import Judge
-from contextdb.covering.progress import Progress, Stops, Tell
-from contextdb.covering.report import CoverageReport, Crowd, Method, Overlap
+from contextdb.covering.progress import SILENT, Progress, Stops, Tell
+from contextdb.covering.report import CoverageReport, Crowd, Gap, Method, Overlap
 from contextdb.covering.sample import LITTLE, Counts, Sampler, samples_of
 from contextdb.covering.sampled_shares import SampledShares
 from contextdb.covering.shares import wilson
@@ -111,7 +111,24 @@ def coverage(
     return report if drawn.ruled is None else drawn.ruled.with_rules(report)
 
 
-def _report(opened: Opened, seed: int, work: int, max_samples: int | None, max_gaps: int, watcher: Progress) -> CoverageReport:
+@dataclass(frozen=True, slots=True)
+class Counted:
+    """The covered share of a table's contexts, and the gaps; what it takes to say more of them."""
+
+    possible: Bounds
+    left: Bounds
+    certain: Bounds
+    is_whole: bool
+    """Whether every context was looked at."""
+    counts: Counts
+    covered: Covered
+    gap_boxes: Gaps
+    gaps: list[Gap]
+    measure: Measure
+
+
+def counted(opened: Opened, seed: int, work: int, max_samples: int | None, max_gaps: int, watcher: Progress = SILENT) -> Counted:
+    """The covered share of an opened table, and its gaps; the arguments are those of `coverage`."""
     space, compiled, drawer = opened.space, opened.compiled, opened.drawer
     samples = samples_of(max_samples, SAMPLES, space)
     possible = uncovered_share(space, space.impossible, work, watcher.within("Counting contexts", COUNT_AT, COUNT_AT))
@@ -129,19 +146,24 @@ def _report(opened: Opened, seed: int, work: int, max_samples: int | None, max_g
     sizing = watcher.within("Measuring gaps", SHARES_AT, FINDINGS_AT)
     measure = _measure(opened, possible, work, samples, seed)
     gaps = described(space, compiled, gap_boxes.boxes, measure, max_gaps, sizing)
-    n_open = len(gap_boxes.boxes)
     if drawer is not None:
         gaps = [gap for gap in gaps if gap.share > 0.0]
+    if possible.lower + possible.upper == 0.0 and drawer is None:
+        covered = _of_nothing(gap_boxes.is_complete and not gap_boxes.boxes)
+    return Counted(possible, left, certain, whole is not None, counts, covered, gap_boxes, gaps, measure)
+
+
+def _report(opened: Opened, seed: int, work: int, max_samples: int | None, max_gaps: int, watcher: Progress) -> CoverageReport:
+    space, compiled, drawer = opened.space, opened.compiled, opened.drawer
+    of = counted(opened, seed, work, max_samples, max_gaps, watcher)
+    covered, n_open = of.covered, len(of.gap_boxes.boxes)
     judging = watcher.within("Comparing rows", FINDINGS_AT, CROWDS_AT)
     compared = space.first(comparable_rows(compiled))
     judge = Judge(compared, compiled, opened.table, finding_steps(work, len(compared.boxes)), judging, drawer)
     findings = judge.findings()
-    middle = (possible.lower + possible.upper) / 2.0
-    if middle == 0.0 and drawer is None:
-        covered = _of_nothing(gap_boxes.is_complete and not gap_boxes.boxes)
-    hits = _hits(space, counts, drawer is not None)
+    hits = _hits(space, of.counts, drawer is not None)
     crowding = watcher.within("Looking for crowded contexts", CROWDS_AT, 1.0)
-    crowded = _crowded(space, counts, measure, crowding)
+    crowded = _crowded(space, of.counts, of.measure, crowding)
     return CoverageReport(
         table=compiled.name,
         n_rows=compiled.n_rows,
@@ -150,16 +172,16 @@ def _report(opened: Opened, seed: int, work: int, max_samples: int | None, max_g
         lower=covered.lower,
         upper=covered.upper,
         method=covered.method,
-        gaps=tuple(gaps),
-        gaps_complete=gap_boxes.is_complete and n_open <= max_gaps and len(gaps) == n_open,
+        gaps=tuple(of.gaps),
+        gaps_complete=of.gap_boxes.is_complete and n_open <= max_gaps and len(of.gaps) == n_open,
         findings=tuple(judge.gathered(findings)),
         needless=tuple(judge.needless(findings)),
         findings_complete=judge.is_complete,
-        overlap=_overlap(counts, hits, whole is not None),
-        certain=(certain.lower, certain.upper) if middle else (covered.lower, covered.upper),
+        overlap=_overlap(of.counts, hits, of.is_whole),
+        certain=(of.certain.lower, of.certain.upper) if of.possible.upper else (covered.lower, covered.upper),
         seed=int(seed),
-        n_samples=0 if whole else counts.n_contexts,
-        work=possible.work + left.work,
+        n_samples=0 if of.is_whole else of.counts.n_contexts,
+        work=of.possible.work + of.left.work,
         hits=_of_all_rows(hits, space, compiled.n_rows),
         assumed=space.assumed,
         weighted=space.weighted,

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from bisect import bisect_left
-from collections.abc import Callable, Iterable, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -33,6 +35,11 @@ Measure = Callable[[Sides, Sequence[Sides]], tuple[float, bool]]
 """Tells which share of the possible contexts is in a box and in none of some others, and whether it is exact."""
 SHARE_WORK = 200_000
 """Steps for the share of one gap; one that needs more is the middle of its bounds, and not `is_exact`."""
+
+MOST_NEAR = 256
+"""So many rows that change in as few cells are compared by how much these grow."""
+ROUNDED = 9
+"""Digits to which growths are compared."""
 
 
 @dataclass(frozen=True)
@@ -136,6 +143,14 @@ def gap_id(cells: dict[str, str]) -> str:
     return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:12]
 
 
+def most_alike(rows: Sequence[int], assets: Sequence[str]) -> int:
+    """Of some rows the one whose asset has most words in common with those of the others; the first of equals."""
+    words = [frozenset(re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", asset)) for asset in assets]
+    counts = Counter(word for own in words for word in own)
+    likeness = [sum(counts[word] for word in own) / max(1, len(own)) for own in words]
+    return rows[likeness.index(max(likeness))]
+
+
 @dataclass(frozen=True, eq=False)
 class NearRows:
     """The rows of a table, to be asked which of them is nearest to a gap."""
@@ -145,7 +160,8 @@ class NearRows:
     rows: BoxSet
 
     def nearest(self, gap: Sides) -> Nearest | None:
-        """The row with fewest cells to change so that it holds the gap, the first of these, and the first cell to change."""
+        """The row that has to change least to hold the gap: the fewest cells; of equal ones by how little these grow, then the one
+        whose asset is most like the others; and its cells that change."""
         space, compiled = self.space, self.compiled
         if not space.boxes:
             return None
@@ -153,11 +169,27 @@ class NearRows:
         for at in dict.fromkeys(space.condition_of[f] for f in gap):
             n_failing += self._flags(self._failing(at, gap))
             n_failing -= self._flags(self._failing(at, {}))
-        i = int(n_failing.argmin())
-        at = next(at for at in range(len(space.conditions)) if self._failing(at, gap) >> i & 1)
-        n_changes, row, condition = int(n_failing[i]), space.rows[i], space.conditions[at]
-        now = compiled.cells(at)[int(compiled.texts[at].codes[row])]
-        return Nearest(row, compiled.assets[row], n_changes, condition.name, _cell_with(now, space, at, gap))
+        near = np.flatnonzero(n_failing == n_failing.min())[:MOST_NEAR].tolist()
+        failing = {at: self._failing(at, gap) for at in range(len(space.conditions))}
+        growths = {i: round(self._growth(i, gap, failing), ROUNDED) for i in near}
+        least = [i for i in near if growths[i] == min(growths.values())]
+        i = most_alike(least, [compiled.assets[space.rows[i]] for i in least])
+        row = space.rows[i]
+        changes = [at for at, rows in failing.items() if rows >> i & 1]
+        cells = [(space.conditions[at].name, self._cell_with(at, row, gap)) for at in changes]
+        return Nearest(row, compiled.assets[row], len(changes), *cells[0], tuple(cells[1:])) if cells else None
+
+    def _cell_with(self, at: int, row: int, gap: Sides) -> str:
+        cell = self.compiled.cells(at)[int(self.compiled.texts[at].codes[row])]
+        return _cell_with(cell, self.space, at, gap)
+
+    def _growth(self, i: int, gap: Sides, failing: Mapping[int, int]) -> float:
+        """How much the cells of a row grow that come to hold a gap: the shares of their domains, added up."""
+        space, box, growth = self.space, self.space.boxes[i], 0.0
+        for f in (f for at, rows in failing.items() if rows >> i & 1 for f in space.of_condition[at]):
+            more = gap.get(f, space.full[f]) & ~box[f]
+            growth += float(space.factors[f].weights[bitmask.flags_of(more, len(space.factors[f].weights))].sum())
+        return growth
 
     @cached_property
     def _n_limited(self) -> NDArray[np.int64]:

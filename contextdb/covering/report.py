@@ -28,9 +28,23 @@ class Nearest:
     n_changes: int
     condition: str
     cell: str
+    more: tuple[tuple[str, str], ...] = ()
+    """The other cells to change, with what they would say."""
+
+    @property
+    def cells(self) -> dict[str, str]:
+        """All cells to change, with what they would say."""
+        return {self.condition: self.cell, **dict(self.more)}
 
     def to_json(self) -> dict[str, object]:
-        return {"row": self.row, "asset": self.asset, "changes": self.n_changes, "condition": self.condition, "cell": self.cell}
+        return {
+            "row": self.row,
+            "asset": self.asset,
+            "changes": self.n_changes,
+            "condition": self.condition,
+            "cell": self.cell,
+            "cells": self.cells,
+        }
 
 
 @dataclass(frozen=True, slots=True)

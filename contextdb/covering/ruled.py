@@ -16,7 +16,7 @@ from contextdb.cells.domains import BOOL
 from contextdb.cells.grammar import format_cell
 from contextdb.cells.sets import Accepted, Cell, TagSet, meet_plainly
 from contextdb.columns import TextColumn
-from contextdb.covering.report import CoverageReport, Nearest
+from contextdb.covering.report import CoverageReport, Gap, Nearest
 from contextdb.errors import safe_text
 from contextdb.expressions import constant_truth
 from contextdb.expressions.boxes import Box
@@ -50,11 +50,15 @@ class RuledTable:
         """A report in which cells of columns that the table does not have are a rule."""
         if self.column is None:
             return report
-        gaps = tuple(replace(gap, cells=self.cells(gap.cells), nearest=self._nearest(gap.nearest)) for gap in report.gaps)
+        gaps = tuple(map(self.gap, report.gaps))
         crowded = tuple(replace(crowd, cells=self.cells(crowd.cells)) for crowd in report.crowded)
         n_conditions = report.n_conditions - len(self.rules) - len(self.others)
         findings = tuple(self.findings(report.findings))
         return replace(report, gaps=gaps, crowded=crowded, findings=findings, n_conditions=n_conditions)
+
+    def gap(self, gap: Gap) -> Gap:
+        """A gap by the columns of the table with rules."""
+        return gap if self.column is None else replace(gap, cells=self.cells(gap.cells), nearest=self._nearest(gap.nearest))
 
     def findings(self, findings: Iterable[Finding]) -> Iterator[Finding]:
         """Findings of rows; a row that is dead and has a rule may be so by its rule."""

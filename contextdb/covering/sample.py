@@ -88,6 +88,14 @@ class Sampler:
     def _impossible(self) -> tuple[Words, NDArray[np.int64]]:
         return _masks(self.space, self.space.impossible, self.progress)
 
+    def held(self, codes: Codes) -> NDArray[np.bool_]:
+        """Which boxes hold each of N contexts: bool [N, boxes]."""
+        words, starts = self.masks
+        bits = np.full((len(codes), bitmask.n_words(len(self.space.boxes))), ~np.uint64(0))
+        for f in range(codes.shape[1]):
+            bits &= words[starts[f] + codes[:, f]]
+        return np.unpackbits(bits.view(np.uint8), axis=1, bitorder="little", count=len(self.space.boxes)).astype(np.bool_)
+
     def sampled(self, n_samples: int, rng: np.random.Generator) -> Counts:
         """Look random possible contexts up; those drawn that are impossible do not count."""
         return self._counted(self.random_contexts(n_samples, rng))

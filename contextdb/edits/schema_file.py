@@ -19,6 +19,7 @@ from contextdb.files.file_names import alike
 from contextdb.files.toml_text import Path as KeyPath
 from contextdb.files.toml_text import as_toml, dotted, plain_numbers
 from contextdb.schema import toml_edit
+from contextdb.schema.inheriting import resolved, without_inherited
 from contextdb.schema.parts import header
 from contextdb.schema.sections import schema_to_dict, settings_to_dict
 from contextdb.schema.settings import EMPTY, Schema, TableSettings
@@ -115,11 +116,17 @@ def _keys(table: Table, path: Path, only_own: bool = False) -> Keys:
         own = {c.condition.name for c in table.conditions}
         document = {"conditions": {name: part for name, part in document["conditions"].items() if name in own}}
     keys = _flat(document)
-    settings = settings_to_dict(table.settings)
+    settings = settings_to_dict(own_settings(table))
     name = _settings_name(table, path)
     if settings or only_own:
         settings = {"file": None} | settings | {"file": _file(table, path)}
     return keys | {("tables", name, key): value for key, value in settings.items()}
+
+
+def own_settings(table: Table) -> TableSettings:
+    """The settings of a table without those that it has from its base."""
+    base = table.schema.tables.get(table.settings.base or "")
+    return table.settings if base is None else without_inherited(table.settings, resolved(base, table.schema.tables))
 
 
 def _settings_name(table: Table, path: Path) -> str:

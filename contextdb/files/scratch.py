@@ -15,7 +15,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-LARGE_BYTES = 64 << 20
+LARGE_BYTES = 16 << 20
 """An array that takes fewer is a plain one."""
 ALIGNED = 64
 

@@ -16,7 +16,7 @@ from contextdb.report.results import as_path
 from contextdb.tables.variety import VARIETY
 
 MANY = sys.maxsize
-OVERVIEW = ("table", "covered", "known as", "gaps", "rows")
+OVERVIEW = ("table", "of what is asked", "of all contexts", "known as", "gaps", "rows")
 MOST_ROWS = 5_000
 """Rows that a page lists, those with findings before others."""
 
@@ -40,7 +40,9 @@ def _overview(measured: Measured) -> tuple[str, ...]:
     report = measured.report
     covered = format_percent(report.covered) if report.method == "exact" else f"at least {format_percent(report.lower)}"
     n_gaps = f"{len(report.gaps):,}{'' if report.gaps_complete else ' or more'}"
-    return report.table, covered, report.method, n_gaps, f"{report.n_rows:,}"
+    of = measured.asked
+    asked = "" if of.by == "domain" else f"{'' if of.lower == of.upper else 'at least '}{format_percent(of.lower)}"
+    return report.table, asked, covered, report.method, n_gaps, f"{report.n_rows:,}"
 
 
 def section(
@@ -49,9 +51,12 @@ def section(
     """A table with at most some gaps, changes and moments, pairs of conditions, and rows of a rule; `page_number` is its place in a
     page, where there is room for each finding and row."""
     report, is_page = measured.report, page_number is not None
-    share = Bar(report.lower, report.upper, report.headline)
-    sentences: list[str | Bar] = [report.headline, share, *words.assumed_sentences(report)]
-    blocks: list[Block] = [_gaps(measured, most_gaps, is_page)]
+    asked = measured.asked
+    sentences: list[str | Bar] = [words.to_do_sentence(measured), asked.headline, Bar(asked.lower, asked.upper, asked.headline)]
+    sentences += [] if asked.by == "domain" else [f"Of all contexts alike: {report.headline}"]
+    sentences += words.assumed_sentences(report)
+    is_listed = measured.expected is None or asked.by == "telemetry" or is_page or most_gaps == MANY
+    blocks: list[Block] = [*_todo(measured, most_gaps), *([_gaps(measured, most_gaps, is_page)] if is_listed else [])]
     if is_brief:
         counts = ", ".join(f"{len(group)} {rule}" for rule, group in by_rule(report.findings).items())
         blocks += [f"findings: {counts}"] if counts else []
@@ -112,18 +117,30 @@ def _sure(report: CoverageReport) -> str:
     return "" if report.findings_complete else " (the work ended before every row was decided)"
 
 
+def _todo(measured: Measured, most: int) -> Iterator[Block]:
+    """What to do for the contexts that are expected, the most expected first."""
+    todo = () if measured.expected is None else measured.expected.todo
+    if not todo:
+        return
+    rows = [
+        Row((words.todo_sentence(measured, item),), (str(i), format_percent(item.share) if item.share else "point"))
+        for i, item in enumerate(todo[:most], 1)
+    ]
+    more = f"… and {len(todo) - most:,} more; --all lists them" if len(todo) > most else ""
+    yield Rows("To do, the most expected first", rows, ("", "share", "what"), more)
+
+
 def _gaps(measured: Measured, most: int, is_page: bool) -> Rows:
     report = measured.report
     moments = ("moments",) if has_moments(report) else ()
     rows = []
     for i, gap in enumerate(report.gaps[:most], 1):
-        nearest = [] if gap.nearest is None else [words.nearest_sentence(measured, gap)]
         new = [format_percent(gap.new_share)] if is_page else []
         sizes = (str(i), gap_size(gap), *([gap_moments(gap)] if moments else []), *new)
-        rows.append(Row((gap.text if is_page else words.cells_text(gap.cells), *nearest), sizes))
+        rows.append(Row((words.gap_sentence(measured, gap, sys.maxsize if is_page else words.MOST_TOLD),), sizes))
     n_more = len(report.gaps) - len(rows)
     more = f"… and {n_more:,} more; --gap N shows one in full, --all lists them" if n_more else ""
-    head = ("", "share", *moments, *(["in no gap above"] if is_page else []), "contexts without a valid row", "nearest")
+    head = ("", "share", *moments, *(["in no gap above"] if is_page else []), "contexts without a valid row, and what would play")
     return Rows(words.gaps_sentence(report), rows, head, more)
 
 

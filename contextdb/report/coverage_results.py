@@ -6,11 +6,12 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from contextdb.covering import CoverageReport, Gap, PairTable, Slice, format_percent
 from contextdb.covering.baseline import CaseCounts, Change
 from contextdb.covering.declared import Declared
+from contextdb.covering.expected import Expectation
 from contextdb.covering.pairs import left_out
 from contextdb.covering.shares import distinct_percents
 from contextdb.errors import in_quotes, plural, row_name, some
@@ -22,6 +23,20 @@ from contextdb.telemetry.observed import Observed, SeenGap
 ROUNDING = 1e-12
 """Shares are as exact as this; a bar of 100 % takes nothing less all the same."""
 MOST_GAP_FINDINGS = 10
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """The covered share of what a table is asked, and of what it is the share."""
+
+    by: Literal["telemetry", "expected", "domain"]
+    value: float
+    lower: float
+    upper: float
+    headline: str
+
+    def to_json(self) -> dict[str, object]:
+        return {"by": self.by, "value": self.value, "lower": self.lower, "upper": self.upper}
 
 
 @dataclass(frozen=True)
@@ -41,6 +56,8 @@ class Measured:
     """For the rows of inner tables that are in other files: the file, from the folder of the table."""
     space: Declared = field(default_factory=dict)
     """What the shares are shares of."""
+    expected: Expectation | None = None
+    """The coverage of the contexts that a designer expects."""
 
     @property
     def summary(self) -> TableSummary:
@@ -76,6 +93,18 @@ class Measured:
         measured = [s for s in worst if s is not None and s.covered is not None and s.covered < 1.0 and s.share > 0.0]
         return sorted(measured, key=lambda s: (*s.rank, *s.cells.items()))
 
+    @property
+    def asked(self) -> Asked:
+        """The share of what the table is asked: of the recorded moments, else of what is expected, else of all that can happen."""
+        if self.telemetry is not None and self.telemetry.moments:
+            covered = self.telemetry.covered
+            return Asked("telemetry", covered, covered, covered, self.telemetry.headline)
+        if self.expected is not None:
+            of = self.expected.covered
+            return Asked("expected", of.value, of.lower, of.upper, self.expected.headline)
+        report = self.report
+        return Asked("domain", report.covered, report.lower, report.upper, report.headline)
+
     def to_json(self) -> dict[str, object]:
         """One entry of `tables` in the JSON document."""
         report = self.report.to_json()
@@ -87,6 +116,8 @@ class Measured:
             "pairs": worst,
             "pairs_left_out": bool(self.left_out),
             "telemetry": None if self.telemetry is None else self.telemetry.to_json(),
+            "expected": None if self.expected is None else self.expected.to_json(),
+            "asked": self.asked.to_json(),
             "baseline": None if self.change is None else self.change.to_json(),
             "gates": [gate.to_json() for gate in self.gates],
         }

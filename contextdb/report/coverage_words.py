@@ -6,9 +6,10 @@ from collections.abc import Iterator, Mapping
 
 from contextdb.covering import CoverageReport, Gap, Slice, format_percent
 from contextdb.covering.baseline import Change
+from contextdb.covering.expected import Todo
 from contextdb.covering.report import share_at_once
 from contextdb.covering.shares import distinct_percents
-from contextdb.errors import in_quotes, joined, nearest, plural
+from contextdb.errors import in_quotes, joined, nearest, plural, row_name
 from contextdb.findings import Finding
 from contextdb.report.coverage_results import Measured, has_moments
 from contextdb.tables.variety import VARIETY
@@ -16,8 +17,36 @@ from contextdb.telemetry.observed import FactNote, Observed
 
 MOST_TOLD = 8
 """Conditions and assumptions that are reported one by one."""
+MOST_CHANGES = 3
+"""Cells to change that are named."""
 MOST_COUNTS = 6
 """Numbers of rows that the histogram tells one by one."""
+
+
+def to_do_sentence(measured: Measured) -> str:
+    """What to do first about a table."""
+    report, change = measured.report, measured.change
+    if change is not None and change.opened:
+        return f"To do first: close the gap that this change opened, {cells_text(change.opened[0].cells)}."
+    if measured.expected is not None:
+        todo = measured.expected.todo
+        if todo:
+            return f"To do first: {todo_sentence(measured, todo[0]).partition(';')[0]}."
+        return "Nothing to do: something plays in every situation that is expected."
+    played = max(report.gaps, key=lambda gap: gap.telemetry or 0.0, default=None)
+    if played is not None and played.telemetry:
+        moments = format_percent(played.telemetry)
+        return f"To do first: a row for {cells_text(played.cells)}; {moments} of the recorded moments have none."
+    if wrong := next((each for each in report.findings if each.level != "info" and each.row is not None), None):
+        return f"To do first: {measured.named(wrong.row or 0)}, {wrong.rule}: {wrong.message}"
+    if measured.telemetry is not None:
+        return "Nothing to do in play: every recorded moment that the list of gaps holds has a valid row."
+    if change is not None:
+        return "Nothing new to do: this change opened no gap."
+    if played is not None:
+        cells = cells_text(played.cells)
+        return f'To do first: decide whether {cells} can happen. If so, give it a row; if not, exclude it with "assume".'
+    return "Nothing to do: every context has a valid row." if report.gaps_complete else "Nothing to do that is known."
 
 
 def assumed_sentences(report: CoverageReport) -> Iterator[str]:
@@ -56,14 +85,33 @@ def gaps_sentence(report: CoverageReport) -> str:
 
 
 def nearest_sentence(measured: Measured, gap: Gap) -> str:
-    """The row nearest to a gap, and the one cell to change."""
+    """The row nearest to a gap, and the cells to change."""
     nearest = gap.nearest
     if nearest is None:
         return "there is no row to start from"
-    change = f"{nearest.condition}: {nearest.cell}"
-    if nearest.n_changes == 1:
-        return f"nearest: {measured.named(nearest.row)}, which would cover it with {change}"
-    return f"nearest: {measured.named(nearest.row)}, {nearest.n_changes} cells to change, first {change}"
+    return (
+        f"{named_asset(measured, nearest.row)} would, with {joined([f'{n} {c}' for n, c in nearest.cells.items()], MOST_CHANGES)}"
+    )
+
+
+def named_asset(measured: Measured, row: int) -> str:
+    """The asset of a row, and where it is."""
+    line, file = measured.lines[row], measured.inside.get(row)
+    where = row_name(row) if line is None else f"line {line}"
+    return f"{measured.assets[row]} ({where}{f' of {file}' if file else ''})"
+
+
+def gap_sentence(measured: Measured, gap: Gap, most: int = MOST_TOLD) -> str:
+    """What to do about a gap."""
+    return f"{cells_text(gap.cells, most)}: nothing plays; {nearest_sentence(measured, gap)}"
+
+
+def todo_sentence(measured: Measured, todo: Todo) -> str:
+    """What to do about a part of an expected situation."""
+    own = todo.situation.cells
+    more = {name: text for name, text in todo.gap.cells.items() if own.get(name) != text}
+    where = f"{todo.situation.text}, where {cells_text(more)}" if more else todo.situation.text
+    return f"{where}: nothing plays; {nearest_sentence(measured, todo.gap)}"
 
 
 def overlap_sentence(report: CoverageReport) -> str:

@@ -39,7 +39,7 @@ def _contents(sections: Sequence[Section]) -> str:
     items = []
     for number, section in enumerate(sections):
         missed = [gate.name for gate in section.gates if not gate.passed]
-        first = [sentence for sentence in section.sentences[:1] if isinstance(sentence, str)]
+        first = [sentence for sentence in section.sentences[:2] if isinstance(sentence, str)]
         texts = [section.summary, *first, *([f"missed: {', '.join(missed)}"] if missed else [])]
         items.append(f'<li><a href="#t{number}">{escaped(section.title)}</a>: {escaped("; ".join(filter(None, texts)))}</li>\n')
     return f"<ul>\n{''.join(items)}</ul>\n"

@@ -72,7 +72,17 @@ def _section(measured: MotionMeasured, shows_all: bool, is_page: bool) -> Sectio
         blocks.append(Numbered("Contexts that miss most", items, FEW_CONTEXTS, "--all; --context ID shows the maps of one"))
     blocks += [Listing(title.capitalize(), items, meaning) for title, meaning, items in measured.asides() if items]
     bar = [Bar(coverage.covered, coverage.covered, measured.headline)] if is_page else []
-    return Section(measured.motion.name, measured.headline, (*bar, measured.size, *measured.notes()), blocks, measured.gates)
+    sentences: list[str | Bar] = [_to_do(measured), *bar, measured.size, *measured.notes()]
+    return Section(measured.motion.name, measured.headline, sentences, blocks, measured.gates)
+
+
+def _to_do(measured: MotionMeasured) -> str:
+    """What to do first about the clips."""
+    if measured.lost:
+        return f"To do first: bring back {measured.lost[0].words}, which this change lost."
+    if first := next(iter(measured.motion.coverage.to_capture), None):
+        return f"To do first: capture {first.words}, which fills {format_percent(first.fills, 1)} of what is wanted."
+    return "Nothing to capture: every wanted movement has a valid clip."
 
 
 def _folded(each: ContextCoverage) -> tuple[str, str, list[Block]]:

@@ -533,7 +533,7 @@ async function start() {
   addEventListener("hashchange", fromAddress);
   addEventListener("resize", draw);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
-  go(0);
+  go(Math.max(0, data.first_s - 1));
   fromAddress();
   if (!location.hash && !reduced && data.plays) play(true);
   document.documentElement.dataset.ready = "yes";

@@ -23,6 +23,8 @@ SEARCHED, JUMPED, FORCED, MIRRORED = 1, 2, 4, 8
 MAY_NOT, MAY = 1, 128
 """A bar of the landscape: 0 without a frame, from 1 one that may not play, from 128 one that may; the higher, the cheaper."""
 BAR_STEPS = 127
+WORST = (("skate", "a planted foot slides {:.0f} cm/s", 3.0), ("accel", "a joint accelerates most, {:.0f} m/s²", 0.0))
+"""Strips of which the worst moment is looked at first, and above what."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,10 +165,27 @@ class SessionView:
     def seconds(self) -> float:
         return max(0, len(self.positions) - 1) / self.rate
 
+    @property
+    def first_look(self) -> tuple[float, str]:
+        """The moment to look at first, in seconds, and why: the most expensive forced jump, the most sliding, or acceleration."""
+        forced = np.flatnonzero((self.flags & FORCED).astype(np.bool_) & (np.arange(len(self.flags)) > 0))
+        costs = self.strips.get("cost")
+        if len(forced) and costs is not None and not np.isnan(costs[forced]).all():
+            at = int(forced[np.nanargmax(costs[forced])])
+            return at / self.rate, f"what plays ends there and nothing fits well: {self.playing[at][0]} costs {costs[at]:.3g}"
+        for strip, sentence, least in WORST:
+            values = self.strips.get(strip)
+            if values is not None and not np.isnan(values).all() and np.nanmax(values) > least:
+                at = int(np.nanargmax(values))
+                return at / self.rate, sentence.format(values[at])
+        return 0.0, ""
+
 
 def document_of(sessions: Sequence[SessionView], detail: Detail) -> dict[str, object]:
     """What the page's script reads."""
-    return {"format": 1, "plays": len(sessions) > 0, "sessions": [_session(session, detail) for session in sessions]}
+    first_s = sessions[0].first_look[0] if len(sessions) == 1 else 0.0
+    parts = [_session(session, detail) for session in sessions]
+    return {"format": 1, "plays": len(sessions) > 0, "first_s": round(first_s, 2), "sessions": parts}
 
 
 def _session(session: SessionView, detail: Detail) -> dict[str, object]:

@@ -42,7 +42,8 @@ def render(sessions: Sequence[SessionView], *, parting: str = "") -> str:
 def _page(sessions: Sequence[SessionView], detail: Detail, parting: str) -> str:
     names = [printable(session.name) for session in sessions]
     title = f"Session {names[0]}" if len(names) == 1 else f"Sessions {' and '.join(names)}"
-    parted = f"<p>{escape(parting)}</p>\n" if parting else ""
+    opening = parting or (_first_look(sessions[0]) if len(sessions) == 1 else "")
+    parted = f"<p>{opening if not parting else escape(parting)}</p>\n" if opening else ""
     changes = "".join(_changes(session, name) for session, name in zip(sessions, names, strict=True))
     body = (
         f"<header><h1>{escape(title)}</h1>\n{parted}</header>\n<main>\n"
@@ -51,6 +52,12 @@ def _page(sessions: Sequence[SessionView], detail: Detail, parting: str) -> str:
         f'<script type="application/json" id="session">{embedded(document_of(sessions, detail))}</script>\n'
     )
     return page(title, "session", body)
+
+
+def _first_look(session: SessionView) -> str:
+    """Where to look first, as a sentence with a link."""
+    time_s, why = session.first_look
+    return f"Look first at {_link(time_s)}: {escape(printable(why))}." if why else ""
 
 
 def _player(names: Sequence[str]) -> str:

@@ -14,6 +14,8 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
 from contextdb.errors import Fault, SchemaError, in_quotes, mend_for, nearest, some
 from contextdb.files.toml_shapes import no_key, wrong_name
+from contextdb.schema.contracts import Contract
+from contextdb.schema.faults import section_faults
 from contextdb.schema.outputs import fallback_to_toml, outputs_faults, outputs_to_toml
 from contextdb.schema.parts import PLAIN, keys_of
 from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict, settings_fields
@@ -23,7 +25,7 @@ from contextdb.schema.table_settings import columns_checked
 Part = dict[str, object]
 """The keys of one named section, such as `[conditions.speed]`, and their values as TOML has them."""
 
-EDITED_SECTIONS = ("conditions", "blueprints", "selectors")
+EDITED_SECTIONS = ("conditions", "blueprints", "contracts", "selectors")
 """The sections that edits may change, next to the settings of a table."""
 
 
@@ -63,11 +65,21 @@ def settings_to_dict(settings: TableSettings) -> Part:
     return part
 
 
+def contract_to_dict(contract: Contract) -> Part:
+    """What `[contracts.NAME]` says of a contract."""
+    part: Part = {key: value for key in keys_of("contracts") if (value := getattr(contract, key)) not in (None, "")}
+    if contract.at_most is not None:
+        n, of = contract.at_most
+        part["at_most"] = n if of is None else {"n": n, "of": of}
+    return part
+
+
 def schema_to_dict(schema: Schema) -> dict[str, dict[str, Part]]:
     """The sections that edits may change: section to name to keys."""
     return {
         "conditions": {name: condition_to_dict(condition) for name, condition in schema.conditions.items()},
         "blueprints": {name: {"conditions": list(names)} for name, names in schema.blueprints.items()},
+        "contracts": {name: contract_to_dict(contract) for name, contract in schema.contracts.items()},
         "selectors": {name: dict(part) for name, part in schema.selectors.items()},
     }
 
@@ -92,6 +104,8 @@ def schema_with(schema: Schema, parts: Mapping[str, Mapping[str, Mapping[str, ob
         document["conditions"] = {name: new.get(name, condition) for name, condition in document["conditions"].items()}
     if "blueprints" in parts:
         document["blueprints"] = {name: _names(name, part) for name, part in document["blueprints"].items()}
+    if "contracts" in parts:
+        document["contracts"] = {name: _contract(name, part) for name, part in document["contracts"].items()}
     return replace(schema, **document)
 
 
@@ -138,6 +152,15 @@ def blueprint_faults(schema: Schema) -> Iterator[Fault]:
 def _with(parts: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
     now = {**parts, **changes}
     return {name: part for name, part in now.items() if part is not None}
+
+
+def _contract(name: str, part: Any) -> Contract:
+    """A contract: as it was, or checked where it changes."""
+    if isinstance(part, Contract):
+        return part
+    if faults := list(section_faults("contracts", {name: part})):
+        raise SchemaError(*(fault for _, fault in faults))
+    return Contract(name, **part)
 
 
 def _names(blueprint: str, part: Any) -> tuple[str, ...]:

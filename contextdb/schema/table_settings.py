@@ -89,6 +89,11 @@ class TableSettings(Declared, error=SchemaError):
     remove: str | None = _job(
         "Of a variant: a row that says True here is taken out of the base.", "True and False; empty is False.", "none is taken out"
     )
+    expected: str | None = setting(
+        FILE, "A file of the contexts that are expected, which coverage is first about.", None,
+        more="Cells as in any table, and a column `weight` for how often. See [expected contexts](designers.md#expected-contexts).",
+        without="nothing is expected",
+    )  # fmt: skip
     owner: str = setting(TEXT, "Who answers for the table, such as a team.", "", without="nobody is named", label="Owner")
     typed: tuple[Output, ...] = ()
     fallback_outputs: tuple[tuple[str, OutputValue], ...] = ()

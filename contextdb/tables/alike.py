@@ -61,6 +61,6 @@ def finding_at(
 def _meanings(column: ConditionColumn) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
     """For each row a number that is the same for cells that mean the same; a cell that cannot be read means itself."""
     known: dict[object, int] = {}
-    keys = [("fault", i) if i in column.faults else (c.accepts, c.penalty) for i, c in enumerate(column.cells)]
+    keys = [("fault", i) if i in column.faults else (c.accepts, c.penalty, c.per) for i, c in enumerate(column.cells)]
     numbers = np.array([known.setdefault(k, len(known)) for k in keys], np.int64)
     return numbers[column.texts.codes]

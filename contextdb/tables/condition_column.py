@@ -20,6 +20,7 @@ from contextdb.cells.sets import ANY, Cell
 from contextdb.cells.words import says_any
 from contextdb.columns import TextColumn
 from contextdb.compiled.classes import ColumnMasks, column_masks
+from contextdb.compiled.soft import SoftMasks
 from contextdb.errors import CellError, Fault
 
 MOST_MENDS = 20
@@ -96,14 +97,11 @@ class ConditionColumn:
         return column_masks(self.cells, self.texts.codes, self.condition.domain)
 
     @cached_property
-    def soft(self) -> tuple[ColumnMasks, NDArray[np.float64]] | None:
-        """Of soft cells: masks of the rows they match, and the penalty float64 [n_rows] where they do not; None when none is
-        soft."""
+    def soft(self) -> SoftMasks | None:
+        """What soft cells cost; None when none is soft."""
         if not has_soft(self.cells):
             return None
-        hard = [Cell(c.accepts) if c.is_soft else ANY for c in self.cells]
-        penalties = np.array([c.penalty or 0.0 for c in self.cells])
-        return column_masks(hard, self.texts.codes, self.condition.domain), penalties[self.texts.codes]
+        return SoftMasks.of([c if c.is_soft else ANY for c in self.cells], self.texts.codes, self.condition.domain)
 
 
 def _followed(cells: ColumnCells, texts: Sequence[str], more: ColumnCells) -> ColumnCells:

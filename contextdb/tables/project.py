@@ -307,7 +307,8 @@ def stray_files(folder: Path, schema: Schema) -> Iterator[tuple[Path, str]]:
 def _files_in(folder: Path, schema: Schema) -> tuple[list[tuple[str, Path]], list[Path]]:
     """The declared tables of a folder, and the other files that may be tables."""
     declared = list(_declared_files(folder, schema))
-    others = list(_undeclared_files(folder, declared))
+    expected = {folder / settings.expected for settings in schema.tables.values() if settings.expected is not None}
+    others = [path for path in _undeclared_files(folder, declared) if path not in expected]
     paths = [*(path for _, path in declared), *others]
     if faults := [fault for path in paths if (fault := why_outside(path, folder)) is not None]:
         raise FileError(*faults)

@@ -8,6 +8,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from contextdb.cells.arguments import require_kind, require_many, require_mapping, require_path, require_text
 from contextdb.cells.fact_columns import is_frame
 from contextdb.columns import TextColumn
@@ -174,6 +177,16 @@ def flat_table(table: TableData, tables: Mapping[str, TableData] | None) -> Flat
         fault = Fault(problem, f'compile(tables={{"{name}": ...}}), or a table out of a folder', rule="no-such-table")
         raise TableError(fault.at(table.place(rows[0], table.asset_column)))
     return flatten(table, tables or {})
+
+
+def rows_of_file(flat: TableData) -> NDArray[np.int64] | None:
+    """For each row of a flat table the row of the table's own file, -1 for one that is all inherited; None where they are the
+    same."""
+    outer = flat.expansion.tables[0] if isinstance(flat, FlatTable) and flat.expansion.tables else flat
+    rows = flat.expansion.rows[0].astype(np.int64) if isinstance(flat, FlatTable) else None
+    if not isinstance(outer, WholeTable):
+        return rows
+    return outer.own_rows if rows is None else outer.own_rows[rows]
 
 
 def leaf_assets(table: Table) -> list[str]:

@@ -82,22 +82,32 @@ def whole_of(table: TableData, tables: Tables | None) -> TableData:
         return table
     last = table.__dict__.get("_whole")
     if last is None or last[0] is not tables:
-        rows_of = _Matched(table, _base_of(table, tables))
+        rows_of = _Matched(table, base_of(table, tables))
         last = table.__dict__["_whole"] = tables, rows_of.whole
     whole: WholeTable = last[1]
     return whole
 
 
+def known_whole(table: TableData) -> WholeTable | None:
+    """All rows of a variant among the tables that it knows; None for another table, or one whose base cannot be used."""
+    try:
+        whole = whole_of(table, table.around)
+    except ContextDBError:
+        return None
+    return whole if isinstance(whole, WholeTable) else None
+
+
 def as_displayed(table: TableData, tables: Tables | None) -> WholeTable:
     """The rows of a variant's own table, in their order, with the cells that they inherit; those that are taken out are disabled.
     Raises TableError as `whole_of`."""
-    matched = _Matched(table, _base_of(table, tables))
+    matched = _Matched(table, base_of(table, tables))
     rows = matched.made(np.arange(table.n_rows), matched.base_rows)
     rows.__dict__["_plain"] = replace(rows._plain, enabled=rows.enabled & ~removed_rows(table))
     return rows
 
 
-def _base_of(table: TableData, tables: Tables | None) -> TableData:
+def base_of(table: TableData, tables: Tables | None) -> TableData:
+    """All rows of the base of a variant. Raises TableError as `whole_of`."""
     if faults := variant_faults(table, tables or {}):
         raise TableError(*faults)
     assert tables is not None
@@ -140,13 +150,18 @@ def occurrences(assets: Iterable[str]) -> list[tuple[str, int]]:
     return keys
 
 
+def base_rows_of(own: TableData, base: TableData) -> Places:
+    """For each row of a variant's own table the row of its base that it belongs to; -1 for a new one."""
+    places = {key: row for row, key in enumerate(occurrences(base.assets))}
+    return np.array([places.get(key, -1) for key in occurrences(own.assets)], np.int64).reshape(-1)
+
+
 class _Matched:
     """A variant's own table and its base, and which rows of the two belong together."""
 
     def __init__(self, own: TableData, base: TableData) -> None:
         self._own, self._base, self._removed = own, base, removed_rows(own)
-        places = {key: row for row, key in enumerate(occurrences(base.assets))}
-        self.base_rows = np.array([places.get(key, -1) for key in occurrences(own.assets)], np.int64).reshape(-1)
+        self.base_rows = base_rows_of(own, base)
 
     @property
     def whole(self) -> WholeTable:

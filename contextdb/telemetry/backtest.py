@@ -25,6 +25,7 @@ from contextdb.compiled.choosing import Choosing
 from contextdb.compiled.data import CompiledData
 from contextdb.disk.engines import Engine, with_dask
 from contextdb.errors import ContextDBError, Fault, FileError
+from contextdb.telemetry.characters import Characters, Played, characters_json, joined
 from contextdb.telemetry.chunks import Chunk, chunks_of
 from contextdb.telemetry.contexts import context_files
 from contextdb.telemetry.facts_read import FactColumn, read_facts
@@ -79,6 +80,9 @@ class Comparison:
     before: CompiledData
     after: CompiledData
     count: str | None = None
+    character: str | None = None
+    time: str | None = None
+    """The columns that say how often a moment was seen, whose it is, and at which second."""
     boxes: tuple[ChangedBox, ...] = ()
     box_table: CompiledData | None = None
     """A row for each of the boxes."""
@@ -95,6 +99,11 @@ class Comparison:
     def assets(self) -> tuple[str, ...]:
         """The assets of both, in the order of the rows before, then of those after."""
         return tuple(dict.fromkeys((*self.before.assets, *self.after.assets)))
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """The columns that are no facts."""
+        return tuple(name for name in (self.count, self.character, self.time) if name is not None)
 
     @property
     def tables(self) -> tuple[CompiledData, ...]:
@@ -125,22 +134,6 @@ class _Side:
         numbers = [assets.setdefault(asset, len(assets)) for asset in compiled.assets]
         return cls(compiled, np.array(own, np.int64), np.array(numbers, np.int64))
 
-    def candidates(self, valid: Flags) -> Flags:
-        """The rows that the policy may pick, whatever was picked before and whatever soft cells cost: bool [M, n_rows]."""
-        choosing = self.compiled.once(Choosing.of)
-        left = valid & choosing.pickable
-        for groups, ranks in zip(choosing.groups, choosing.ranks, strict=True):
-            if not len(groups):
-                break
-            order = np.argsort(groups, kind="stable")
-            starts = np.flatnonzero(np.diff(groups[order], prepend=groups[order][0] - 1))
-            standing = np.where(left, ranks, -np.inf)
-            best = np.maximum.reduceat(standing[:, order], starts, axis=1)
-            of_row = np.empty(len(groups), np.int64)
-            of_row[order] = np.repeat(np.arange(len(starts)), np.diff([*starts, len(groups)]))
-            left &= standing == best[:, of_row]
-        return left
-
 
 @dataclass(eq=False)
 class Backtest:
@@ -155,6 +148,8 @@ class Backtest:
     """For each asset the moments in which it becomes valid, and in which it no longer is."""
     boxes: Counter[ChangedBox] = field(default_factory=Counter)
     examples: list[Example] = field(default_factory=list)
+    characters: Characters = field(default_factory=dict)
+    """What each character did, by file: where columns for both are named."""
     unread: list[tuple[str, tuple[Fault, ...]]] = field(default_factory=list)
     """Files that could not be read; nothing of them is counted."""
 
@@ -168,6 +163,7 @@ class Backtest:
         self.loses.update(other.loses)
         self.boxes.update(other.boxes)
         self.examples = sorted((*self.examples, *other.examples), key=lambda example: example.rank)[:n_examples]
+        self.characters = joined(self.characters, other.characters)
         self.unread += other.unread
 
     def to_json(self) -> dict[str, object]:
@@ -180,7 +176,7 @@ class Backtest:
             "by_asset": [{"asset": a, "gains": self.gains[a], "loses": self.loses[a]} for a in assets],
             "boxes": [{"what": box.what, "asset": box.asset, "cells": box.cells, "moments": n} for box, n in self.ordered_boxes],
             "examples": [example.to_json() for example in self.examples],
-        }
+        } | ({"characters": characters_json(self.characters)} if self.characters else {})
 
     @property
     def ordered_boxes(self) -> list[tuple[ChangedBox, int]]:
@@ -220,7 +216,7 @@ def backtest(
 def backtest_file(comparison: Comparison, path: Path, tell: Callable[[float], None] | None = None) -> Backtest:
     """The sums of one file; one that cannot be read says why."""
     total = Backtest()
-    wanted = {*comparison.asked, *([comparison.count] if comparison.count else [])}
+    wanted = {*comparison.asked, *comparison.named}
     try:
         for names, chunk in chunks_of(path, wanted, comparison.after.name):
             total.add(_of_chunk(comparison, names, chunk, str(path)), comparison.n_examples)
@@ -235,10 +231,14 @@ def _of_chunk(comparison: Comparison, names: Sequence[str], chunk: Chunk, file: 
     moments = moments_of(comparison.count, names, chunk, file)
     known: dict[tuple[str, Condition], FactColumn] = {}
     masks = [_masks(table, names, chunk, known) for table in comparison.tables]
-    words = np.ascontiguousarray(np.concatenate(masks, axis=1).T)
+    played = Played.of(comparison.character, comparison.time, names, chunk, file)
+    keys = [*masks, *([] if played is None else [played.codes[:, None].astype(np.uint64)])]
+    words = np.ascontiguousarray(np.concatenate(keys, axis=1).T)
     _, first, sums = grouped(words, moments)
     pairs = [_bits(mask[first], table.n_rows) for mask, table in zip(masks, comparison.tables, strict=True)]
-    part, own = _sums(comparison, pairs, sums)
+    part, own, flags = _sums(comparison, pairs, sums)
+    if played is not None:
+        part.characters = played.sums(file, moments, played.codes[first], sums, flags)
     part.moments = int(moments.sum())
     for what, i in own:
         row = int(first[i])
@@ -273,12 +273,13 @@ def _bits(masks: Words, n_rows: int) -> Flags:
     return np.unpackbits(np.ascontiguousarray(masks).view(np.uint8), axis=1, bitorder="little", count=n_rows).astype(np.bool_)
 
 
-def _sums(comparison: Comparison, pairs: Sequence[Flags], sums: Counts) -> tuple[Backtest, list[tuple[str, int]]]:
-    """What M distinct pairs of answers say, with their moments, and a few of those that change, by number."""
+def _sums(comparison: Comparison, pairs: Sequence[Flags], sums: Counts) -> tuple[Backtest, list[tuple[str, int]], list[Flags]]:
+    """What M distinct pairs of answers say, with their moments; a few of those that change, by number; and which change, are
+    emptied and are filled."""
     old, new = comparison.sides
     was, now = (np.asarray(valid.any(axis=1)) for valid in pairs[:2])
     is_other = _differs(pairs[0], old.keys, pairs[1], new.keys)
-    candidates = old.candidates(pairs[0]), new.candidates(pairs[1])
+    candidates = tuple(s.compiled.once(Choosing.of).pickable_of(p) for s, p in zip((old, new), pairs, strict=False))
     is_other |= _differs(candidates[0], old.keys, candidates[1], new.keys)
     if old.compiled.fallback != new.compiled.fallback:
         is_other |= ~was & ~now
@@ -298,7 +299,7 @@ def _sums(comparison: Comparison, pairs: Sequence[Flags], sums: Counts) -> tuple
         if flags is None:
             flags = (gains if box.what == GAINS else loses)[:, number[box.asset or ""]]
         part.boxes[box] = int(sums[flags & pairs[2][:, i]].sum())
-    return part, list(_chosen(emptied, filled, is_other, comparison.n_examples))
+    return part, list(_chosen(emptied, filled, is_other, comparison.n_examples)), [is_other, emptied, filled]
 
 
 def _chosen(emptied: Flags, filled: Flags, is_other: Flags, n_examples: int) -> Iterator[tuple[str, int]]:

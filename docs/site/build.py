@@ -18,6 +18,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import names
+import sections
 from sphinx.cmd.build import main as sphinx
 
 from contextdb import cli
@@ -28,12 +29,13 @@ DOCS = HERE.parent
 ROOT = DOCS.parent
 BUILD = ROOT / "build"
 SOURCE, SITE, CACHE = BUILD / "site-source", BUILD / "site", BUILD / "site-cache"
+SEARCH = '<script src="_static/sections.js"></script><script src="_static/rank.js"></script>'
 NAMES = [f"names-{where}" for where in names.MODULES]
-SITE_ONLY = {"Start": ["live-pages"], "Reference": NAMES, "Project": ["changelog", "security"]}
+SITE_ONLY = {"Start": ["live-pages"], "Reference": NAMES, "Project": ["lab-book", "changelog", "security"]}
 """Pages that the site has beside those of docs/, by group."""
 
-ROOT_PAGES = {"CHANGELOG.md": "changelog.md", "SECURITY.md": "security.md"}
-"""Files at the top of the repository that are pages of the site too."""
+ROOT_PAGES = {"benchmarks/README.md": "lab-book.md", "CHANGELOG.md": "changelog.md", "SECURITY.md": "security.md"}
+"""Files outside docs/ that are pages of the site too."""
 
 MENDS = {
     'role="heading"': 'role="heading" aria-level="2"',
@@ -50,7 +52,7 @@ def main() -> int:
         shutil.rmtree(folder, ignore_errors=True)
     for folder in ("pictures", "pages"):
         shutil.copytree(DOCS / folder, SOURCE / folder)
-    for file in ("conf.py", "site.css"):
+    for file in ("conf.py", "site.css", "favicon.svg"):
         shutil.copy(HERE / file, SOURCE)
     for page in DOCS.glob("*.md"):
         write_page(page.name, page.read_text(encoding="utf-8"))
@@ -63,7 +65,20 @@ def main() -> int:
     code = sphinx(["--fail-on-warning", "--keep-going", "--quiet", "-d", str(CACHE), str(SOURCE), str(SITE)])
     for page in SITE.glob("*.html"):
         mend(page)
+    rank_search()
     return code
+
+
+def rank_search() -> None:
+    """Let the page of the search rank by sections: rank.js, over what sections.js lists."""
+    static = SITE / "_static"
+    (static / "sections.js").write_text(sections.script(sections.pages_in(SOURCE)), encoding="utf-8")
+    shutil.copy(HERE / "rank.js", static)
+    page = SITE / "search.html"
+    text = page.read_text(encoding="utf-8")
+    new, n = re.subn(r'(<script src="_static/searchtools\.js[^>]*></script>)', rf"\1{SEARCH}", text)
+    assert n == 1, "search.html does not load searchtools.js as it did"
+    page.write_text(new, encoding="utf-8")
 
 
 def mend(page: Path) -> None:
@@ -78,10 +93,11 @@ def write_page(name: str, text: str) -> None:
     """Put a page among the sources, as Sphinx wants it."""
     text = re.sub(r"(?m)^```(\w+) ([^\s`]+)$", r"```{code-block} \1\n:caption: \2\n", text)
     text = re.sub(r"!\[([^]]*)\]\((pictures/[\w-]+)\.svg\)", _in_both_themes, text)
-    text = re.sub(r"\]\(\.\./([^)#]+)", _outside, text)
+    text = re.sub(r"\]\(\.\./([^)#]+)", _outside, text.replace("](../docs/", "]("))
     if name == "api.md":
         text += f"\nWith types and docstrings: {', '.join(f'[{page[6:]}]({page}.md)' for page in NAMES)}.\n"
     if name == "index.md":
+        text = text.replace("\n## Three doors", f"{LIVE}\n## Three doors", 1)
         text += "".join(_contents(caption, [*pages, *SITE_ONLY.get(caption, [])]) for caption, pages in groups(text))
     (SOURCE / name).write_text(text, encoding="utf-8")
 
@@ -147,6 +163,18 @@ Two pages that the commands made of the sample tables when this site was built. 
 - <a href="live/coverage.html">The coverage of the sample tables</a>, as `contextdb coverage --format html` writes it: which
   contexts have an asset, which have none, and what would close the largest gaps. [CI](ci.md#coverage) says more.
 """
+
+LIVE = """
+## See it live
+
+<iframe class="live" src="live/session.html" title="A session that plays: a character follows a stick" loading="lazy"></iframe>
+
+A <a href="live/session.html">session</a>, as `contextdb motion replay` writes it: press play, scrub, and read why each clip was
+chosen. Below, the <a href="live/coverage.html">coverage</a> of the sample tables.
+
+<iframe class="live low" src="live/coverage.html" title="The coverage of the sample tables" loading="lazy"></iframe>
+"""
+"""What the front page of the site has beside that of docs/."""
 
 STICK = """\
 time_s,x_mps,z_mps,gait,style

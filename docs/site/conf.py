@@ -15,7 +15,26 @@ html_title = "contextdb"
 html_show_sourcelink = False
 html_copy_source = False
 html_static_path = ["site.css"]
+html_favicon = html_logo = "favicon.svg"
 html_css_files = ["site.css"]
 html_extra_path = ["extra"]
-html_theme_options = {"navigation_with_keys": True, "top_of_page_buttons": []}
+_LIGHT = {
+    "color-brand-primary": "#a3440a",
+    "color-brand-content": "#a3440a",
+    "color-background-secondary": "#f4f1ea",
+    "color-sidebar-link-text--top-level": "#3a3530",
+    "font-stack": "Inter, 'Segoe UI', 'Helvetica Neue', Arial, sans-serif",
+}
+_DARK = {
+    "color-brand-primary": "#f2a65a",
+    "color-brand-content": "#f2a65a",
+    "color-background-primary": "#14181c",
+    "color-background-secondary": "#1b2126",
+}
+html_theme_options = {
+    "navigation_with_keys": True,
+    "top_of_page_buttons": [],
+    "light_css_variables": _LIGHT,
+    "dark_css_variables": _DARK,
+}
 html_use_index = False

@@ -19,6 +19,25 @@ from contextdb import motion, telemetry
 
 DOCS = Path(__file__).parent.parent
 MODULES: dict[str, ModuleType] = {"contextdb": contextdb, "motion": motion, "telemetry": telemetry}
+ROOMS = {
+    "characters": "Characters",
+    "clips": "Clips",
+    "features": "Features",
+    "storage": "Databases and settings",
+    "search": "The search",
+    "selection": "What plays: selectors and controllers",
+    "nodes": "What plays once",
+    "joint": "Several characters",
+    "markup": "Marks of clips",
+    "preparing": "Marks of clips",
+    "output": "Poses",
+    "trace": "Sessions",
+    "measuring": "Measures",
+    "made": "Clips made by formulas",
+}
+"""The topics of motion, by the package that a name comes from; those of one topic are beside each other."""
+API = (DOCS / "api.md").read_text(encoding="utf-8")
+_HEADINGS = re.compile(r"(?m)^## (.+)$")
 SPELT = {"cdb": "contextdb", "motion": "motion", "telemetry": "telemetry"}
 """What the pages call each module."""
 WIDTH = 100
@@ -43,8 +62,34 @@ class Name:
 def page(where: str) -> str:
     """The page of a module, in Markdown."""
     about = "Every public name, with its types, what it does, and a line that uses it; the [overview](api.md) groups them by use."
-    head = f"# All names of {where}\n\n{about}\n"
-    return "\n".join([head, *(_section(where, name) for name in names_of(where))])
+    parts = [f"# All names of {where}\n\n{about}\n"]
+    known = list(names_of(where))
+    for topic, names in topics(where).items():
+        parts.append(f"## {topic}\n")
+        parts += [_section(where, each) for name in names for each in known if each.path.partition(".")[0] == name]
+    return "\n".join(parts)
+
+
+def topics(where: str) -> dict[str, list[str]]:
+    """The names of a module by what they are for: as docs/api.md groups them, those of motion by the room they come from."""
+    names = sorted(set(MODULES[where].__all__) - set(MODULES), key=str.lower)
+    found: dict[str, list[str]] = {}
+    for name in names:
+        found.setdefault(_room(where, name) if where == "motion" else _heading(name), []).append(name)
+    order = list(ROOMS.values()) if where == "motion" else _HEADINGS.findall(API)
+    return {topic: found[topic] for topic in sorted(found, key=lambda topic: order.index(topic) if topic in order else len(order))}
+
+
+def _heading(name: str) -> str:
+    """The first section of docs/api.md whose tables list a name."""
+    parts = _HEADINGS.split(API)
+    listed = re.compile(rf"(?m)^\|[^|]*`{name}\b")
+    return next((heading for heading, text in zip(parts[1::2], parts[2::2], strict=True) if listed.search(text)), "More")
+
+
+def _room(where: str, name: str) -> str:
+    parts = getattr(getattr(MODULES[where], name), "__module__", "").split(".")
+    return ROOMS.get(parts[2] if len(parts) > 2 else "", "More")
 
 
 def names_of(where: str) -> Iterator[Name]:
@@ -79,7 +124,7 @@ def _about(value: object) -> str:
 
 
 def _section(where: str, name: Name) -> str:
-    level = "###" if name.is_member else "##"
+    level = "####" if name.is_member else "###"
     parts = [f"{level} {name.path}", f"```py\n{signature(name)}\n```", _markdown(name.about), *_shown(where, name)]
     return "\n\n".join(part for part in parts if part) + "\n"
 

@@ -109,8 +109,8 @@ class Game(AbstractContextManager["Game"]):
         lines = [
             f"{'tired' if player.is_tired else 'stamina'}  {100 * player.stamina:.0f} %",
             f"gate  {seen}" if seen else "",
-            "" if ball is None else "the ball is free" if ball.holder is None else ball.said,
-            "" if link is None else f"link  {link.name}, {'followed' if link.is_heard else 'nobody follows'}",
+            "" if ball is None or ball.holder is None else ball.said,
+            "" if link is None else "the editor follows" if link.is_heard else "no editor follows yet",
             f"recording  {len(player.trace)} moments" if player.trace.most > LAST_MINUTE else "",
             f"not loaded: {self.trouble}" if self.trouble else "",
         ]

@@ -18,7 +18,8 @@ ZENITH, HORIZON, HILLS, STONE, SHADOW = (
 SUN = LVector3(0.45, 0.35, -1.0)
 EDGE_M = 60.0
 TILE_M, PIXELS = 4.0, 256
-"""How wide one picture of the ground is, and of how many pixels."""
+ROUGH = 1.0
+"""How wide one picture of the ground is, of how many pixels, and how speckled."""
 THICK = {
     "hip": 0.15,
     "spine": 0.15,
@@ -106,8 +107,8 @@ def squares(own: Floats, rough: float, line: float = 0.3, seed: int = 1) -> Floa
     rng = np.random.default_rng(seed)
     at = np.arange(PIXELS) * TILE_M / PIXELS
     check = (np.floor(at)[:, None] + np.floor(at)) % 2.0
-    speckle = rng.normal(0.0, rough, (PIXELS, PIXELS))
-    blotch = rng.normal(0.0, rough, (16, 16)).repeat(PIXELS // 16, 0).repeat(PIXELS // 16, 1)
+    speckle = rng.normal(0.0, ROUGH * rough, (PIXELS, PIXELS))
+    blotch = rng.normal(0.0, ROUGH * rough, (16, 16)).repeat(PIXELS // 16, 0).repeat(PIXELS // 16, 1)
     shade = 1.0 + 0.11 * (check - 0.5) + speckle + 0.3 * blotch
     edge = np.minimum(at, TILE_M - at) < 0.035
     shade = np.where(edge[:, None] | edge, shade + line, shade)

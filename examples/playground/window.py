@@ -79,7 +79,7 @@ class Window:
         core.TextNode.getDefaultFont().setLineHeight(1.15)
         left, top = 0.09 - self.base.getAspectRatio(), 0.92 - words
         self.top, self.state, self.middle = (self._text(x, y, words) for x, y in ((left, top), (left, -0.68), (-0.1, top)))
-        self.lesson = self._text(0.0, -0.78, 1.15 * words, is_centred=True)
+        self.lesson = self._text(0.45, -0.8, 1.1 * words, is_centred=True)
 
     def begin(self) -> ShowBase:
         """Listen to the keys, and update the game in each frame that is run."""

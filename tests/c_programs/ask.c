@@ -63,6 +63,72 @@ static void put(FILE *out, int64_t value)
     fwrite(&value, 8, 1, out);
 }
 
+/* The same table with the schema of the file, and facts that are kept; NULL where it was not opened so. */
+static cdb_any *any;
+static cdb_live *lives[3];
+
+/* Set a fact by its name, in the way that its type has. */
+static cdb_status set(cdb_live *live, const cdb_condition *condition, const cdb_fact *given)
+{
+    const char *names[64];
+    int number = cdb_condition_number(live->schema, condition->name);
+    size_t i, n = 0;
+    if (condition->expr || number < 0) return CDB_OK; /* it is computed, or the file does not ask for it */
+    if (cdbi_is_missing(condition, given)) return cdb_set_missing(live, number);
+    switch (condition->type) {
+    case CDB_NUMBER:
+    case CDB_ANGLE: return cdb_set_number(live, number, given->number);
+    case CDB_ENUM: return given->whole < 0 || (uint64_t)given->whole >= condition->n_values ? CDB_WRONG_FACT : cdb_set_text(live, number, condition->values[given->whole]);
+    case CDB_TEXT: return cdb_set_text(live, number, given->text);
+    case CDB_TAGS:
+        if (condition->n_values == 0) return cdb_set_tags(live, number, given->texts.texts, (size_t)given->texts.count);
+        for (i = 1; i < condition->n_values; i++)
+            if (given->tags[i / 64] >> (i % 64) & 1 && n < 64) names[n++] = condition->values[i];
+        return cdb_set_tags(live, number, names, n);
+    default: return cdb_set_whole(live, number, given->whole);
+    }
+}
+
+/* Whether a query with the facts set in another way gives the same. */
+static int is_same(const cdb_schema *schema, const cdb_fact *facts, cdb_unknown unknown, cdb_status status, const uint64_t *rows)
+{
+    cdb_live *live = any ? lives[unknown] : NULL;
+    uint64_t *own = live ? (uint64_t *)malloc(any->table.n_words * 8 + 16) : NULL;
+    size_t i;
+    int is_right = 1;
+    for (i = 0; live && i < schema->n_conditions; i++)
+        if (set(live, &schema->conditions[i], &facts[i]) != CDB_OK) live = NULL; /* as some facts of the tests are */
+    if (live) {
+        is_right = cdb_live_query(live, own, any->table.n_words + 1, NULL) == status;
+        is_right = is_right && memcmp(own, rows, any->table.n_words * 8) == 0 && own[any->table.n_words] == 0;
+    }
+    free(own);
+    return is_right;
+}
+
+/* Whether a picker that went through bytes picks the same row, and is the same after that. */
+static int picks_same(cdb_unknown unknown, const uint64_t *rows, double time_s, const cdb_picker *before, const cdb_picker *after,
+    cdb_status status, int64_t picked)
+{
+    size_t size = cdb_picker_bytes(before), i;
+    unsigned char *bytes = (unsigned char *)malloc(size);
+    cdb_rest rests[64];
+    cdb_picker copy;
+    int64_t row;
+    int is_right = 1;
+    if (!any || any->table.by_cost) { /* the live facts may be those of another context */
+        free(bytes);
+        return 1;
+    }
+    cdb_pack_picker(before, bytes);
+    for (i = 0; i < size; i++) is_right = is_right && cdb_unpack_picker(&copy, bytes, i, rests, 64) == CDB_BAD_FILE;
+    is_right = is_right && cdb_unpack_picker(&copy, bytes, size, rests, 64) == CDB_OK;
+    is_right = is_right && cdb_live_pick(lives[unknown], rows, any->table.n_words, time_s, &copy, &row, NULL) == status;
+    is_right = is_right && row == picked && cdb_digest(&copy) == cdb_digest(after);
+    free(bytes);
+    return is_right;
+}
+
 /* One answer: rows met one after another must be those that are counted, and their assets must be there to read. */
 static void answer(FILE *out, const cdb_table *table, const cdb_column *columns, const cdb_schema *schema, cdb_fact *facts,
     cdb_unknown unknown)
@@ -73,7 +139,7 @@ static void answer(FILE *out, const cdb_table *table, const cdb_column *columns,
     int64_t row, n = 0;
     for (row = cdb_next_row(rows, table->n_words, -1); row >= 0; row = cdb_next_row(rows, table->n_words, row))
         n += strlen(cdb_asset(table, row)) < 100000;
-    put(out, n == cdb_count(rows, table->n_words) ? (int64_t)status : -1);
+    put(out, n == cdb_count(rows, table->n_words) && is_same(schema, facts, unknown, status, rows) ? (int64_t)status : -1);
     put(out, (int64_t)table->n_words);
     fwrite(rows, 8, table->n_words, out);
     free(rows);
@@ -108,10 +174,17 @@ static void more(FILE *out, const cdb_table *table, const cdb_column *columns, c
     put(out, (int64_t)table->n_rows);
     put(out, (int64_t)cdb_penalties(table, columns, schema, facts, unknown, penalties, table->n_rows, &fault));
     fwrite(penalties, 8, table->n_rows, out);
-    if (status == CDB_OK)
+    if (status == CDB_OK) {
+        cdb_rest rests[64];
+        cdb_picker before = *picker;
+        memcpy(rests, picker->rests, sizeof rests);
+        before.rests = rests;
         status = cdb_pick(table, columns, schema, facts, unknown, rows, table->n_words, time_s, picker, &picked, &fault);
+        if (!picks_same(unknown, rows, time_s, &before, picker, status, picked)) status = (cdb_status)99;
+    }
     put(out, (int64_t)status);
     put(out, picked);
+    put(out, (int64_t)cdb_digest(picker));
     read_outputs(out, table, schema, picked);
     for (row = 0; (uint64_t)row < table->n_rows; row++) {
         int reasons[63];
@@ -191,11 +264,25 @@ int main(int argc, char **argv)
         memcpy(bytes, at, (size_t)length);
         at += length + 1;
         put(out, (int64_t)cdb_open(&table, columns, &schema, bytes, (size_t)length, strange, &fault));
+        any = cdb_open_any(bytes, (size_t)length, NULL);
+        if (i == 0 && fault.status == CDB_OK && table.n_strange == 0 && strange == CDB_STRANGE_REFUSED && !any) return 3;
+        for (j = 0; any && j < 3; j++) lives[j] = cdb_live_of(any, (cdb_unknown)j, malloc(cdb_live_bytes(&any->schema)));
+        if ((i > 0 || strange != CDB_STRANGE_REFUSED) && any && fault.status == CDB_OK) { /* one that may be damaged: what it answers is not compared */
+            uint64_t *rows = (uint64_t *)malloc(any->table.n_words * 8 + 8);
+            for (j = 0; j < n_contexts * n; j++) set(lives[unknown[j / n]], &conditions[j % n], &facts[j]);
+            for (j = 0; j < 3; j++) cdb_live_query(lives[j], rows, any->table.n_words, NULL);
+            for (j = 0; j < 3; j++) free(lives[j]);
+            free(rows);
+            cdb_close_any(any);
+            any = NULL;
+        }
         if (fault.status == CDB_OK)
             for (j = 0; j < n_contexts; j++) {
                 answer(out, &table, columns, &schema, facts + j * n, unknown[j]);
                 if (memory >= 0) more(out, &table, columns, &schema, facts + j * n, unknown[j], 0.5 * (double)j, &picker);
             }
+        for (j = 0; any && j < 3; j++) free(lives[j]);
+        cdb_close_any(any);
         cdb_close(&table);
         free(bytes);
     }

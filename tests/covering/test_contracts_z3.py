@@ -68,7 +68,7 @@ class World:
             return f"{sign}{tag}", own if sign == "+" else z3.Not(own)
         ends = (-170, 171) if kind == "angle" else (0, 7)
         low, high = sorted((rng.randrange(*ends), rng.randrange(*ends)))
-        if kind == "angle" and rng.random() < 0.3:
+        if kind == "angle" and low < high and rng.random() < 0.3:
             return f"{high}..{low}", z3.Or(fact >= high, fact <= low)
         if low < high - 1 and rng.random() < 0.5:
             return f"({low}..{high}]", z3.And(fact > low, fact <= high)

@@ -247,3 +247,9 @@ def test_a_clip_that_is_too_far_away_is_refused():
     for call in (motion.describe, motion.prepare):
         with pytest.raises(ContextDBError, match="too far away"):
             call([replace(walk, values=walk.values * 1e300)])
+
+
+def test_files_of_several_formats_share_a_pattern():
+    paths = ["clips/a.bvh", "clips/b.fbx", "clips/c.glb", "more/d.bvh"]
+    assert patterns_of(paths, set()) == ["clips/*.{bvh,fbx,glb}", "more/*.bvh"]
+    assert patterns_of(paths[:2], {"clips/cc.fbx"}) == ["clips/a*.bvh", "clips/b*.fbx"]

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import pickle
+import signal
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -11,11 +14,13 @@ import pytest
 from running import run
 
 from contextdb import motion
+from contextdb.authoring import clip_looks, saved_looks
 from contextdb.disk import engines
 from contextdb.errors import MotionError
 from contextdb.files import scratch, tensors
 from contextdb.motion.features.normalisation import Normalisation
 from contextdb.motion.made.recipes import make_clip
+from contextdb.motion.preparing.proposal import ClipHead, key_of
 from contextdb.motion.storage import extracting, pose_files
 from contextdb.motion.storage.building import build_all
 from contextdb.motion.storage.pose_files import poses_alone, save_poses
@@ -72,6 +77,25 @@ def test_all_cores_build_the_same_bytes_and_fill_the_same_cache(folder: Path):
     assert saved(folder, "again", engines.here) == (*here, ())
 
 
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL here")
+def test_dask_builds_the_same_bytes_although_a_worker_is_killed(folder: Path):
+    distributed = pytest.importorskip("distributed", reason='dask is not installed: pip install "contextdb[dask]"')
+    built = build_all(CONFIG, folder, cache=None)["jog"]
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+        victim, killed = next(iter(cluster.workers.values())).pid, []
+
+        def kill(done: int, total: int, name: str) -> None:
+            if not killed:
+                killed.append(victim)
+                os.kill(victim, signal.SIGKILL)
+
+        there = build_all(CONFIG, folder, None, kill, engines=engines.dask(cluster.scheduler_address, ""))["jog"]
+    assert killed
+    assert there.digest == built.digest
+    assert there.database.layout.blocks.tobytes() == built.database.layout.blocks.tobytes()
+    assert build_all(CONFIG, folder)["jog"].computed == ()  # the workers filled the cache
+
+
 def test_arrays_that_are_too_large_for_memory_give_the_same_bytes(folder: Path, monkeypatch: pytest.MonkeyPatch):
     *plain, _ = saved(folder, "plain", engines.here)
     for module in (scratch, tensors):
@@ -102,6 +126,52 @@ def test_a_build_that_was_stopped_goes_on_where_it_stopped(folder: Path):
     with pytest.raises(Stopped):
         build_all(CONFIG, folder, progress=stop, engines=on_two_cores)
     assert len(build_all(CONFIG, folder)["jog"].computed) <= N - 5
+
+
+@pytest.mark.parametrize("command", ["describe", "prepare"])
+def test_all_cores_describe_and_prepare_as_one_process_does(folder: Path, command: str, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(clip_looks, "MANY", 3)
+    monkeypatch.setattr(clip_looks, "CHUNK", 4)
+    (folder / "clips/05.bvh").write_text("HIERARCHY", encoding="utf-8")
+    results = []
+    for n_cores in (1, 2):
+        monkeypatch.setattr(engines, "n_cores", lambda n=n_cores: n)
+        results.append(run("motion", command, folder / "clips"))
+    assert (results[0].code, results[0].out, results[0].err) == (results[1].code, results[1].out, results[1].err)
+    assert results[0].out.count("\n") >= N
+
+
+@pytest.mark.parametrize("command", ["describe", "prepare"])
+def test_a_run_that_was_stopped_does_not_look_again_at_what_it_saw(folder: Path, command: str, monkeypatch: pytest.MonkeyPatch):
+    for module in (clip_looks, saved_looks):
+        monkeypatch.setattr(module, "MANY", 3)
+    monkeypatch.setattr(clip_looks, "CHUNK", 4)
+    monkeypatch.setattr(engines, "n_cores", lambda: 1)
+    whole = run("motion", command, folder / "clips")
+    assert not list(folder.rglob("seen"))
+    names: list[str] = []
+    real = clip_looks.look_at
+
+    def look(looks: clip_looks.Looks, at: clip_looks.ClipAt) -> clip_looks.Seen | clip_looks.LeftOut:
+        names.append(at.name)
+        if len(names) == 7:
+            raise KeyboardInterrupt
+        return real(looks, at)
+
+    monkeypatch.setattr(clip_looks, "look_at", look)
+    assert run("motion", command, folder / "clips").code == 130
+    again = run("motion", command, folder / "clips")
+    assert names[7:] == [f"{i:02}" for i in range(4, N)]
+    assert (again.code, again.out, again.err) == (whole.code, whole.out, whole.err)
+    assert not list(folder.rglob("seen"))
+
+
+def test_a_head_of_a_clip_has_its_first_frame_and_its_length(folder: Path):
+    clip = motion.load_bvh(folder / "clips/01.bvh")
+    for head in (ClipHead.of(clip, "key"), pickle.loads(pickle.dumps(ClipHead.of(clip, "key")))):
+        assert (head.n_frames, head.duration_s, key_of(head)) == (clip.n_frames, clip.duration_s, "key")
+        assert np.array_equal(head.values[0], clip.values[0])
+    assert len(pickle.dumps(ClipHead.of(clip, "key"))) < len(pickle.dumps(clip)) / 3
 
 
 def test_a_normalisation_of_blocks_is_that_of_all_frames_at_once():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -98,6 +99,24 @@ def test_a_walk_on_the_spot_is_reported_and_described_as_a_walk_with_root_feet(t
         speeds.append(float(np.linalg.norm(database.raw(30))))
     assert speeds[0] < 0.2
     assert speeds[1] == pytest.approx(1.29, rel=0.05)
+
+
+def test_a_folder_of_walks_on_the_spot_is_described_by_their_feet_and_its_project_says_so(tmp_path: Path):
+    spot, _ = taken_out(make_clip("walk").clip)
+    (tmp_path / "clips").mkdir()
+    scaled = replace(spot, skeleton=replace(spot.skeleton, offsets=0.01 * spot.skeleton.offsets), values=_in_metres(spot))
+    motion.write_bvh(scaled, tmp_path / "clips/walk.bvh", digits=9)
+    result = run("motion", "describe", tmp_path / "clips", "--root-from", "feet", "--out", tmp_path / "moves.csv")
+    assert "walk runs on the spot: its standing feet are those of 1.2" in result.err  # in metres, as is guessed from its size
+    assert "walk,Walk," in (tmp_path / "moves.csv").read_text("utf-8")
+    assert 'root = "feet"' in (tmp_path / "contextdb.toml").read_text("utf-8")
+    assert "runs on the spot" not in run("motion", "check", tmp_path).out
+
+
+def _in_metres(clip: motion.Clip) -> np.ndarray:
+    values = clip.values.copy()
+    values[:, :3] *= 0.01
+    return values
 
 
 @pytest.mark.skipif(not (MOCAP / "assets.csv").is_file(), reason="no captured clips: set CONTEXTDB_MOCAP to their folder")

@@ -72,7 +72,7 @@ def test_what_cannot_be_written_is_told(tmp_path, monkeypatch):
         glb_of_poses([], bank(), RATE)
     with pytest.raises(ContextError):
         glb_of_poses(["walk"], bank(), RATE)
-    with pytest.raises(FileError, match=r"\.bvh, \.npz or \.glb"):
+    with pytest.raises(FileError, match=r"\.bvh, \.npz, \.glb or \.usda"):
         write_poses(made(2), bank(), tmp_path / "walk.fbx", RATE)
     monkeypatch.setitem(sys.modules, "pygltflib", None)
     with pytest.raises(MotionError, match=r"pygltflib is not installed.*contextdb\[gltf\]"):

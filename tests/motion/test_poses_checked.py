@@ -69,7 +69,7 @@ def poses(**changed):
         **{"parents": parents, "offsets": offsets, "places": places, "legs": LEGS},
         **{"hinges": pipelines.hinges_of(RIG, LEGS, bank().rotations), "tops": np.array(pipelines.tops_of(RIG))},
         **{"spine": spine.joints, "left": spine.left, "most_accel": 60.0, "n_moving": len(bank().moving)},
-        **{"settings": pipelines._numbers(PoseSettings()), "banks": (frames(),)},
+        **{"settings": pipelines.numbers_of(PoseSettings()), "banks": (frames(),)},
     }
     return core.Poses(*(given | {key: change(given[key]) for key, change in changed.items()}).values())
 

@@ -139,7 +139,7 @@ def test_poses_are_the_same_bits_by_all_compilers_and_in_python(tmp_path):
         pose = stream.update(decision, dt, place, slope)
         arrays = stream.state.row, np.array(pose.root), pose.rotations, pose.translations, pose.positions
         expected.append(b"".join(padded(each) for each in arrays))
-    numbers = pipelines._numbers(settings)
+    numbers = pipelines.numbers_of(settings)
     given = struct.pack("q", len(numbers)) + b"".join(struct.pack("32sd", key.encode(), value) for key, value in numbers.items())
     given += rig_and_frames() + struct.pack("q", len(ticks)) + b"".join(ticks)
     for made in results(tmp_path, "play", given):

@@ -159,3 +159,34 @@ def test_dask_gives_the_same_sums(versions: Path):
     (versions / "m2.csv").write_text("speed,times\n5.7,3\n")
     arguments = ("--telemetry", versions / "m*.csv", "--count", "times", "--json")
     assert json.loads(diff(versions, *arguments, "--engine", "dask").out) == json.loads(diff(versions, *arguments).out)
+
+
+def test_the_sums_of_characters_are_those_of_their_moments_alone(versions: Path):
+    rng = random.Random(0)
+    rows = [(rng.choice(["ann", "bob", "Größe"]), round(rng.uniform(0, 10), 1), i / 2) for i in range(400)]
+    for name in ("all", "ann", "bob", "Größe"):
+        own = [row for row in rows if name in ("all", row[0])]
+        pl.DataFrame(own, schema=["who", "speed", "at"], orient="row").write_csv(versions / f"{name}.csv")
+    a, b = versions / "a" / "t.csv", versions / "b" / "t.csv"
+    options = ("--character", "who", "--time", "at", "--json")
+    whole = run("diff", a, b, "--telemetry", versions / "all.csv", *options).json["backtest"]
+    assert len(whole["characters"]["items"]) == 3
+    minutes = 0.0
+    for item in whole["characters"]["items"]:
+        alone = run("diff", a, b, "--telemetry", versions / f"{item['character']}.csv", "--json").json["backtest"]
+        assert {key: item[key] for key in ("moments", "changed", "emptied", "filled")} == {
+            key: alone[key] for key in ("moments", "changed", "emptied", "filled")
+        }
+        times = [at for who, _, at in rows if who == item["character"]]
+        assert item["minutes"] == pytest.approx((max(times) - min(times)) / 60)
+        minutes += item["minutes"]
+    assert whole["characters"]["per_minute"]["emptied"] == pytest.approx(whole["emptied"] / minutes)
+    text = run("diff", a, b, "--telemetry", versions / "all.csv", "--character", "who", "--time", "at")
+    assert "per character and minute" in text.out
+
+
+def test_a_column_that_there_is_not_is_refused_with_the_nearest(versions: Path):
+    result = run("diff", versions / "a" / "t.csv", versions / "b" / "t.csv", "--telemetry", versions / "m.csv", "--time", "time")
+    assert result.code == 2
+    assert 'there is no column "time"' in result.err
+    assert 'Did you mean "times"?' in result.err

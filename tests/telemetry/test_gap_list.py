@@ -110,8 +110,9 @@ def test_every_format_tells_a_gap_with_its_share_of_the_moments(tmp_path):
     seen = observe(table, tmp_path / "a.parquet", known=report.gaps)
     found = Measured(ranked(report, opened(table), seen, 10**6, 10**4), None, ("a",), (2,), telemetry=seen)
     told = {name: render(name, CoverageResults((found,))) for name in formats("coverage")}
-    assert "      share    moments  contexts without a valid row\n   1  50.00 %  87.50 %  air: False\n" in told["text"]
-    assert "| 1 | 50.00 % | 87.50 % | air: False; nearest: line 2 a, " in told["markdown"]
+    head = "      share    moments  contexts without a valid row, and what would play\n"
+    assert f"{head}   1  50.00 %  87.50 %  air: False: nothing plays; a (line 2) would, with " in told["text"]
+    assert "| 1 | 50.00 % | 87.50 % | air: False: nothing plays; a (line 2) would, with " in told["markdown"]
     assert '<td class="n" data-v="87.5">87.50 %</td>' in told["html"]
     assert "(50.00 % of the contexts, 87.50 % of the recorded moments; gap " in told["sarif"]
     assert "(50.00 %25 of the contexts, 87.50 %25 of the recorded moments; gap " in told["github"]

@@ -83,12 +83,12 @@ def test_each_tab_opens_and_the_way_back_is_to_the_same_cell(path, key, tab):
 def test_the_tabs_go_round(path):
     async def script(app, pilot):
         tabs = []
-        for key in ["ctrl+pagedown"] * 5 + ["ctrl+pageup"]:
+        for key in ["ctrl+pagedown"] * 6 + ["ctrl+pageup"]:
             await press(pilot, key)
             tabs.append(app.main.tab)
         return tabs
 
-    assert with_editor(path, script) == ["options", "priorities", "coverage", "problems", "assets", "problems"]
+    assert with_editor(path, script) == ["options", "priorities", "coverage", "problems", "contracts", "assets", "contracts"]
 
 
 def test_the_tabs_go_round_also_where_the_table_is_wider_than_the_screen(path):
@@ -102,7 +102,7 @@ def test_the_tabs_go_round_also_where_the_table_is_wider_than_the_screen(path):
             tabs.append(app.main.tab)
         return tabs
 
-    assert with_editor(path, script) == ["options", "assets", "problems"]
+    assert with_editor(path, script) == ["options", "assets", "contracts"]
 
 
 def test_the_row_for_a_gap_is_named_where_it_stands_also_when_one_was_in_the_test_row(path):

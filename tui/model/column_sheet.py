@@ -333,7 +333,7 @@ def _conditions(
         if not row.is_condition or not part or (row.name in declared and not row.is_changed):
             continue
         if row.is_changed or row.job == DECLARED:
-            unchanged = {} if was is None else {k: v for k, v in condition_to_dict(was).items() if k == "hysteresis"}
+            unchanged = {} if was is None else {k: v for k, v in condition_to_dict(was).items() if k in ("hysteresis", "owner")}
             parts[row.name] = {**{k: v for k, v in unchanged.items() if has_place(k, part["type"])}, **part}
     for row, part in zip(rows, texts_of_rows, strict=True):  # an expression names what is declared
         if row.is_condition and part and row.name in _named(rows) and row.name not in declared:

@@ -20,8 +20,7 @@ from contextdb.covering import Cancelled, CoverageReport, PairTable, coverage, p
 from contextdb.covering.pairs import left_out
 from contextdb.covering.progress import Stops, Tell
 from contextdb.errors import ContextDBError, plural, safe_text
-from contextdb.tables.nesting.flat import FlatTable
-from contextdb.tables.table import Table
+from contextdb.tables.table import Table, rows_of_file
 
 State = Literal["none", "running", "done", "stale", "failed"]
 MOST_GAPS = 100
@@ -59,10 +58,10 @@ def measured(table: Table, tell: Tell, should_stop: Stops) -> Result:
 
 def with_rows_of_file(report: CoverageReport, table: Table) -> CoverageReport:
     """A report whose rows are those of the table's file: where rows refer to other tables it counts the rows behind them."""
-    flat = table.flat()
-    if not isinstance(flat, FlatTable) or flat.expansion is None:
+    rows = rows_of_file(table.flat())
+    if rows is None:
         return report
-    own = flat.expansion.rows[0].tolist()
+    own = rows.tolist()
     gaps = [replace(g, nearest=replace(g.nearest, row=own[g.nearest.row])) if g.nearest else g for g in report.gaps]
     crowded = [replace(crowd, rows=tuple(own[row] for row in crowd.rows)) for crowd in report.crowded]
     findings, needless = (

@@ -125,6 +125,23 @@ class DisplayedTable:
         """The text of a cell."""
         return self.table.columns[column][int(self.view.rows[row])]
 
+    def inherited(self, row: int, column: int) -> str:
+        """What a cell that says nothing has from the base of a variant; "" where it says something, or there is nothing."""
+        own, texts = self.text(row, column), self.inherited_texts(column)
+        return "" if own.strip() or texts is None else texts[int(self.view.rows[row])]
+
+    def inherited_texts(self, column: int) -> TextColumn | None:
+        """The texts of a column with those of the base where the sheet's are empty; None where nothing is inherited."""
+        whole, name = self.query.whole, self.table.columns[column].name
+        if whole is None or name == self.table.settings.remove:
+            return None
+        return next((texts for texts in whole.columns if texts.name == name), None)
+
+    @property
+    def enabled(self) -> NDArray[np.bool_]:
+        """Whether each row may match: of a variant those of the base that it takes out may not."""
+        return self.table.enabled if self.query.whole is None else self.query.whole.enabled
+
     def row_number(self, row: int) -> int:
         """The number next to a row: its place in the file, from 1."""
         return int(self.view.rows[row]) + 1

@@ -45,6 +45,7 @@ from contextdb.disk.own_files import (
 from contextdb.edits.edits import edit_between
 from contextdb.edits.history import History, Step
 from contextdb.edits.schema_file import SchemaChange, schema_path
+from contextdb.edits.variant_rows import expanded, known_base
 from contextdb.errors import ContextDBError, Fault, FileError, Place, plural
 from contextdb.files.journal_lines import FORMAT, Record, line_of, n_lost, read_records
 from contextdb.files.texts import texts_of
@@ -72,11 +73,12 @@ class Journal:
     When the disk refuses, editing continues without a journal, and `problem` says why.
     """
 
-    def __init__(self, table: Path, digest: str, recovered: History | None = None) -> None:
+    def __init__(self, table: Path, digest: str, recovered: History | None = None, salt: str = "") -> None:
         self.path = journal_path(table)
         self.problem: Fault | None = None
         self._table = table
         self._digest = digest
+        self._salt = salt
         self._first = 0
         """The position of the history that the journal starts from."""
         self._least = 0
@@ -163,7 +165,7 @@ class Journal:
 
     def _begin(self, first: bytes = b"") -> None:
         make_own_folder(self.path.parent)
-        head = line_of({"format": FORMAT, "file": self._table.name, "digest": self._digest})
+        head = line_of({"format": FORMAT, "file": self._table.name, "digest": self._digest + self._salt})
         write_own(self.path, head + first)
         self._is_begun = True
 
@@ -176,6 +178,12 @@ class Journal:
             self._is_broken = True
             why = str(error) if isinstance(error, ContextDBError) else error.strerror
             self.problem = Fault(f"unsaved edits are not stored: {why}.", mend="to save often", place=Place(str(self.path)))
+
+
+def salt_of(table: Table) -> str:
+    """What edits of a variant were made for besides its file: the rows of its base; "" for another table."""
+    base = known_base(table)
+    return "" if base is None else "+" + digest_of("\0".join(base.assets).encode("utf-8", "surrogatepass"))
 
 
 def set_aside(table: Path) -> Path:
@@ -226,7 +234,8 @@ def recover(table: Table) -> Recovery | None:
         problem = Fault("it belongs to another contextdb.toml, which is not written.", place=Place(str(path)))
         # killed between the save and the end of the journal: all of it is in the file
         return Recovery(History(table), 0, problem) if is_foreign else None
-    base = table if records[0].get("digest") == digest else _base_of(table, records[0].get("digest"))
+    made_for = records[0].get("digest")
+    base = table if made_for == digest + salt_of(table) else _base_of(table, made_for)
     if records[0].get("format") != FORMAT or base is None:
         n_edits = sum("do" in r for r in records)
         reason = f"the file has changed since {plural(n_edits, 'unsaved edit')} of it were stored, so they cannot be applied again."
@@ -293,11 +302,11 @@ def _base_of(table: Table, digest: object) -> Table | None:
     assert table.path is not None
     try:
         raw = read_second_name(base_path(table.path))
-        if digest_of(raw) != digest:
+        if digest_of(raw) + salt_of(table) != digest:
             return None
         source, columns = texts_of(raw, str(table.path))
         base = Table.build(table.name, columns, table.schema, table.settings, table.path, source)
-        return replace(base, around=table.around)
+        return expanded(replace(base, around=table.around))
     except (ContextDBError, FileNotFoundError):
         return None
 

@@ -42,7 +42,8 @@ def _cell_meaning(text: str, condition: Condition) -> Meaning:
     cell = parse_cell(text, condition.domain, wants_mend=False)
     words = _words_of(text, cell, condition)
     if cell.penalty is not None:
-        words += f"; others cost {format_number(cell.penalty)} more"
+        each = "" if cell.per is None else f" for each {format_number(cell.per)} that they are away"
+        words += f"; others cost {format_number(cell.penalty)} more{each}"
     return Meaning(words, cell=cell)
 
 

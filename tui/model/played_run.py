@@ -16,8 +16,7 @@ import numpy as np
 from contextdb.cells.grammar import parse_cell
 from contextdb.disk import write_atomic
 from contextdb.errors import ContextDBError, Fault, TableError, plural
-from contextdb.tables.nesting.flat import FlatTable
-from contextdb.tables.table import Table
+from contextdb.tables.table import Table, rows_of_file
 from contextdb.telemetry import Observed, observe
 from contextdb.telemetry.contexts import context_files
 from contextdb.telemetry.link.lines import ASK, FORMAT, HEADER, dumped
@@ -119,10 +118,9 @@ def _written_moments(path: Path, table: Table, moments: Sequence[Moment], name: 
 
 def _of_file(table: Table, name: str, files: Sequence[Path], observed: Observed) -> Played:
     """What was observed, with the rows of the table's file."""
-    flat, hits = table.flat(), np.asarray(observed.hits)
-    if not isinstance(flat, FlatTable) or flat.expansion is None:
+    own, hits = rows_of_file(table.flat()), np.asarray(observed.hits)
+    if own is None:
         return Played(table, name, files, observed, observed.gaps, observed.never_used)
-    own = flat.expansion.rows[0]
     gaps = [replace(g, nearest=replace(g.nearest, row=int(own[g.nearest.row]))) if g.nearest else g for g in observed.gaps]
     used = np.bincount(own, weights=hits, minlength=table.n_rows) > 0
     return Played(table, name, files, observed, gaps, np.flatnonzero(~used).tolist())

@@ -18,6 +18,7 @@ from contextdb.errors import ContextDBError, Fault, plural
 from contextdb.findings import LEVELS, Finding, Level
 from contextdb.tables.other_files import cases_path
 from contextdb.tables.table import Table
+from contextdb.tables.variants import known_whole
 
 from .coverage_lines import in_rows, rows_text
 from .coverage_run import is_quick
@@ -112,6 +113,10 @@ def cell_findings(table: Table) -> list[Finding]:
 
 
 def _in_rows(findings: Sequence[Finding], table: Table) -> list[Finding]:
+    whole = known_whole(table)
+    if whole is not None:
+        own = whole.own_rows.tolist()
+        findings = [replace(f, row=None if f.row is None else own[f.row], by=tuple(own[row] for row in f.by)) for f in findings]
     return [replace(one, message=in_rows(one, table)) if one.by else one for one in findings]
 
 

@@ -28,6 +28,7 @@ from contextdb.compiled.pick import Outcome, percent
 from contextdb.errors import ContextError, Fault, some
 from contextdb.tables.readable import unreadable_rows
 from contextdb.tables.table import Table
+from contextdb.tables.variants import WholeTable
 
 from .table_answer import Inside, Offered, QueriedTable, TableAnswer, bits_of_rows
 from .wanted import Wanted
@@ -75,6 +76,11 @@ class QueryRow:
     def is_nested(self) -> bool:
         """Whether some row refers to another table."""
         return self._queried.is_nested
+
+    @property
+    def whole(self) -> WholeTable | None:
+        """The rows of the sheet with the cells that they inherit, where the table is a variant whose base can be used."""
+        return self._queried.sheet if isinstance(self._queried.sheet, WholeTable) else None
 
     def set(self, condition: str, text: str) -> Fault | None:
         """Write one fact; an empty text leaves it out. Gives what is wrong with it."""

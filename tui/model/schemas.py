@@ -26,8 +26,8 @@ def under_schema(saved: Table, present: Table, path: Path, folder: Path, schema:
     settings = schema.settings_for(_below(path, folder))
 
     def renewed(table: Table) -> Table:
-        conditions, blueprints, selectors = (_merged_section(saved.schema, table.schema, schema, part) for part in EDITED_SECTIONS)
-        wanted = replace(schema, conditions=conditions, blueprints=blueprints, selectors=selectors)
+        sections: dict[str, Any] = {part: _merged_section(saved.schema, table.schema, schema, part) for part in EDITED_SECTIONS}
+        wanted = replace(schema, **sections)
         merged = _merged_settings(saved.settings, table.settings, settings)
         changed = Sections.between(table, replace(table, schema=wanted, settings=merged)).apply(table)
         return replace(changed, schema=replace(changed.schema, **_rest(schema)))
@@ -75,7 +75,7 @@ def _three_way(was: Mapping[str, Any], mine: Mapping[str, Any], yours: Mapping[s
 
 def _rest(schema: Schema) -> dict[str, Any]:
     """What edits do not change."""
-    names = ("name", "tables", "features", "databases", "controllers", "output", "file")
+    names = ("name", "tables", "features", "databases", "controllers", "output", "file", "transitions", "studio", "shared")
     return {name: getattr(schema, name) for name in names}
 
 

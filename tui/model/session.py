@@ -21,6 +21,7 @@ from contextdb.disk.together import NewFile, write_together
 from contextdb.edits.diffing import diff
 from contextdb.edits.history import History
 from contextdb.edits.schema_file import schema_change
+from contextdb.edits.variant_rows import contracted, expanded
 from contextdb.errors import ContextDBError, Fault, FileError, Place, plural
 from contextdb.files.texts import new_source
 from contextdb.tables.merging.merging import Merge, merge
@@ -28,7 +29,7 @@ from contextdb.tables.project import SCHEMA_FILE, load_table, schema_for
 from contextdb.tables.saving import require_related
 from contextdb.tables.table import Table
 
-from .journal import Journal, finish_save, journal_path, recover, set_aside
+from .journal import Journal, finish_save, journal_path, recover, salt_of, set_aside
 from .lock import Holder, Lock
 from .notes import Notes
 from .schemas import under_schema, with_settings
@@ -75,7 +76,7 @@ class Session:
         FileError, SchemaError, TableError
             The file cannot be read at all; cells that cannot be read are no hindrance.
         """
-        table = load_table(Path(path), strict=False)
+        table = expanded(load_table(Path(path), strict=False))
         assert table.path is not None
         self.path: Path = table.path
         self.lock = Lock(self.path)
@@ -85,7 +86,7 @@ class Session:
         self._clear_leftovers()
         is_own = self.holder is None and not reads_only
         if is_own and finish_save(table):
-            table = load_table(self.path, strict=False)
+            table = expanded(load_table(self.path, strict=False))
         recovery = recover(table) if is_own else None
         self.n_recovered = recovery.n_edits if recovery else 0
         """How many unsaved edits were brought back."""
@@ -97,7 +98,7 @@ class Session:
         """The actors for the roles of the test row, once they were requested."""
         self._history = recovery.history if recovery and recovery.n_edits else History(self.saved_table)
         self._watch_files()
-        self.journal = Journal(self.path, self._digest, self._history if self.n_recovered else None)
+        self.journal = Journal(self.path, self._digest, self._history if self.n_recovered else None, salt_of(table))
         if is_own:
             self._begin_journal()
         self.sheet = Sheet(self._history.table, self.journal if is_own else None, self._history)
@@ -149,7 +150,7 @@ class Session:
         """
         if self._schema_file.state != "same":
             self.reload_schema()
-        on_disk = load_table(self.path, strict=False)
+        on_disk = expanded(load_table(self.path, strict=False))
         require_related(self.saved_table, on_disk, "to open it again, or to save over it")
         merged = merge(self.saved_table, self.sheet.table, on_disk)
         if not merged.conflicts:
@@ -237,7 +238,8 @@ class Session:
         was: Was = "any" if not is_merged else None if self._file.state == "gone" else self._raw
         table = self.sheet.table
         schema = schema_change(self.saved_table if is_own else None, replace(table, path=target))
-        source = new_source(target, table.columns, table.source, table.origin)
+        of_file, rows = contracted(table)
+        source = new_source(target, of_file.columns, of_file.source, of_file.origin)
         n_bytes = len(source.raw) + (0 if schema is None else len(schema.raw))
         n_bytes += self.journal.saving(source.raw, schema) if is_own else 0
         with needing(n_bytes):
@@ -247,7 +249,9 @@ class Session:
                 is_written = write_together(schema.path.parent, [NewFile(target, source.raw, was), schema.new_file])
         if is_written and schema is not None:
             self.schema_written()
-        return replace(table, path=target, source=source, origin=np.arange(table.n_rows)) if is_written else None
+        origin = np.full(table.n_rows, -1, np.int64)
+        origin[rows] = np.arange(len(rows))
+        return replace(table, path=target, source=source, origin=origin) if is_written else None
 
     def close(self, keep_journal: bool = False) -> None:
         """Let go of the table. Unsaved edits are gone then, unless the journal is stored for the next time."""

@@ -28,6 +28,7 @@ from .find import Search, find, next_hit, replace_all
 from .long_work import in_turn, with_progress
 from .selection import Block
 from .series import continued, tells_step
+from .variant_edits import asset_fault, deletion, require_own_order
 from .views import Sort, sorted_rows
 
 READS_ONLY = "Nothing is edited: the editor was started with --read-only."
@@ -66,6 +67,8 @@ class Sheet(DisplayedTable):
 
     def check(self, text: str) -> Fault | None:
         """What would be wrong with a text in the cell of the cursor."""
+        if len(self.view) and self.selection.column == self.asset_at and (fault := asset_fault(self, self.cursor[0], text)):
+            return fault
         return self.check_at(self.selection.column, text)
 
     def check_at(self, column: int, text: str) -> Fault | None:
@@ -81,7 +84,8 @@ class Sheet(DisplayedTable):
         if fault := self.check(text):
             return fault
         row, column = self.cursor
-        self._set([(row, column, text)])
+        if not text.strip() or text != self.inherited(row, column):  # as it was: it follows the base further
+            self._set([(row, column, text)])
         return None
 
     def fill(self, text: str) -> Done:
@@ -252,7 +256,7 @@ class Sheet(DisplayedTable):
 
     def insert_rows(self, n_rows: int = 1, below: bool = False, texts: Sequence[Mapping[str, str]] = ()) -> Done:
         """Insert rows above the selection, or below it, empty ones or with texts; they are then selected."""
-        chosen = self.selected_rows
+        chosen = self.selected_rows if self.query.whole is None else []  # new rows of a variant are behind those of its base
         at = (max(chosen) + 1 if below else min(chosen)) if chosen else self.table.n_rows
         rows = list(texts) or [{}] * n_rows
         done = self._do(edits.insert_rows(self.table, at, rows))
@@ -261,7 +265,7 @@ class Sheet(DisplayedTable):
 
     def delete_rows(self) -> Done:
         row = self.block.top
-        done = self._do(edits.delete_rows(self.table, self.selected_rows))
+        done = self._do(deletion(self))
         self._select(self.selection.at(row, self.selection.column, self.shape))
         return done
 
@@ -277,6 +281,8 @@ class Sheet(DisplayedTable):
     def duplicate_rows(self) -> Done:
         """Copy the selected rows to below them; the copies are then selected."""
         rows = self.selected_rows
+        if (whole := self.query.whole) is not None:
+            return self.append_rows([whole[row] for row in rows])
         done = self._do(edits.duplicate_rows(self.table, rows))
         self._select_file_rows(max(rows) + 1, len(rows))
         return done
@@ -299,6 +305,7 @@ class Sheet(DisplayedTable):
 
     def sort_file(self, sort: Sort) -> Done:
         """Put the rows of the file itself in order."""
+        require_own_order(self)
         way = ", descending" if sort.is_descending else ""
         name = f"Sort the file by {safe_text(sort.column)}{way}"
         return self._do(edits.reorder_rows(self.table, sorted_rows(self.table, sort), name))
@@ -409,6 +416,7 @@ class Sheet(DisplayedTable):
     # ---- parts
 
     def _require_unsorted(self) -> None:
+        require_own_order(self)
         if self.view.is_sorted:
             raise TableError(
                 Fault("the rows are shown sorted.", "the order of the file", "to show them as in the file: Alt+S, again")

@@ -28,7 +28,8 @@ from contextdb.tables.compiling import compile_table
 from contextdb.tables.nesting.flat import FlatTable
 from contextdb.tables.nesting.links import inner_rows, is_nested
 from contextdb.tables.readable import readable, refused_rows
-from contextdb.tables.table import EitherTable, Table
+from contextdb.tables.table import EitherTable, flat_table
+from contextdb.tables.variants import as_displayed, is_variant
 
 Offered = Mapping[str, Sequence[Actor]]
 """The actors of each role."""
@@ -67,12 +68,13 @@ class Inside:
 class QueriedTable:
     """A table that is queried, as far as it can be read."""
 
-    def __init__(self, table: Table, before: QueriedTable | None = None) -> None:
+    def __init__(self, table: EitherTable, before: QueriedTable | None = None) -> None:
         """`before`: another version of it."""
+        table = _with_inherited(table)
         self.is_nested = is_nested(table)
         """Whether some row refers to another table."""
-        self.sheet = readable(table)
-        """The rows of the sheet."""
+        self.sheet: EitherTable = readable(table)
+        """The rows of the sheet; of a variant with the cells that they inherit."""
         self.flat: EitherTable = self.sheet
         """The same with the rows of tables inside instead of those that refer to them."""
         self.refused = refused_rows(table, table.around or {}) if self.is_nested else {}
@@ -83,7 +85,7 @@ class QueriedTable:
         """The rows of the sheet, with the conditions of `_names`; at first those of the version before."""
         self._is_current = False
         try:
-            self.flat = self.sheet.flat()
+            self.flat = flat_table(self.sheet, self.sheet.around) if self.is_nested else self.sheet
         except ContextDBError as error:
             self.refused = dict.fromkeys(self.inner, error.faults[0])
 
@@ -118,6 +120,16 @@ class QueriedTable:
             return bits
         rows = self.own[bitmask.rows(bitmask.from_int(bits, self.flat.n_rows))]
         return bits_of_rows(rows, self.n_rows) & ~bitmask.int_of(sorted(self.refused))
+
+
+def _with_inherited(table: EitherTable) -> EitherTable:
+    """A variant with the cells of its base, as far as that can be used; else the table itself."""
+    if not is_variant(table):
+        return table
+    try:
+        return as_displayed(table, table.around)
+    except ContextDBError:
+        return table
 
 
 class TableAnswer:

@@ -13,10 +13,10 @@ from contextdb.tables.condition_column import ConditionColumn
 from .alignment import indented
 from .displayed_table import DisplayedTable
 
-Kind = Literal["text", "any", "failing", "fault"]
-"""How a cell is meant: it accepts everything; it does not accept its fact; it cannot be read."""
+Kind = Literal["text", "any", "inherited", "failing", "fault"]
+"""How a cell is meant: it accepts everything; it is that of the base; it does not accept its fact; it cannot be read."""
 
-MARKS: dict[Kind, str] = {"text": " ", "any": " ", "failing": "×", "fault": "!"}
+MARKS: dict[Kind, str] = {"text": " ", "any": " ", "inherited": " ", "failing": "×", "fault": "!"}
 """What is before the text of a cell, so that no colour is needed to tell them apart."""
 
 
@@ -68,7 +68,7 @@ class Window:
         self._sheet = sheet
         is_asked = not sheet.query.is_empty
         self._failing = sheet.failing(top, top + n_rows) if is_asked else None
-        enabled = sheet.table.enabled[rows]
+        enabled = sheet.enabled[rows]
         self.rows = [WindowRow(r + 1, e, False) for r, e in zip(rows.tolist(), enabled.tolist(), strict=True)]
         if is_asked:
             query = sheet.query
@@ -137,13 +137,23 @@ class Window:
 
     def _read(self, column: int) -> list[tuple[str, Kind]]:
         if column not in self._texts:
-            self._texts[column] = self._read_texts(column)
+            self._texts[column] = self._with_inherited(column, self._read_texts(column))
         cells, condition = self._texts[column], self._sheet.condition(column)
         is_rule = self._sheet.table.columns[column].name == self._sheet.table.settings.when
         if self._failing is None or (condition is None and not is_rule):
             return cells
         fails = self._failing[:, column].tolist()
         return [(text, "failing") if f and kind != "fault" else (text, kind) for (text, kind), f in zip(cells, fails, strict=True)]
+
+    def _with_inherited(self, column: int, cells: list[tuple[str, Kind]]) -> list[tuple[str, Kind]]:
+        """The cells of a column with those of the base where they say nothing."""
+        texts = self._sheet.inherited_texts(column)
+        if texts is None:
+            return cells
+        of_base = [texts[row] for row in self._rows.tolist()]
+        return [
+            cell if cell[0].strip() or not text.strip() else (text, "inherited") for cell, text in zip(cells, of_base, strict=True)
+        ]
 
     def _read_texts(self, column: int) -> list[tuple[str, Kind]]:
         condition = self._sheet.condition(column)

@@ -13,6 +13,7 @@ from contextdb.tables.nesting.links import Neighbours
 from contextdb.tables.places import table_path
 from contextdb.tables.project import read_folder_schema, schema_for, table_files
 from contextdb.tables.table import Table
+from contextdb.tables.variants import is_variant
 
 from .beginning import Beginning, beginning, beginning_from
 from .session import Session
@@ -91,7 +92,7 @@ class Workspace:
         """Let a table whose rows refer to others know of those as they are being edited."""
         session = self.sessions[name]
         table = session.sheet.table
-        if table.around is None or not session.sheet.query.is_nested:
+        if table.around is None or not (session.sheet.query.is_nested or is_variant(table)):
             return
         edited = {other: one.sheet.table for other, one in self.sessions.items() if other != name}
         if edited:

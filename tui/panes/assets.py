@@ -162,7 +162,10 @@ class AssetsPane(SheetView):
             place = f"row {sheet.row_number(row)} · {name}"
             file_row = int(sheet.view.rows[row])
             message = " · ".join(filter(None, (sheet.marked(file_row, column), sheet.row_summary(file_row)))) or about
-            self.query_one(CellLine).show(place, sheet.text(row, column), _short(sheet.fault(row, column)), message)
+            inherited = sheet.inherited(row, column)
+            message = f"from {sheet.table.settings.base}: typing overrides it" if inherited else message
+            text = sheet.text(row, column) or inherited
+            self.query_one(CellLine).show(place, text, _short(sheet.fault(row, column)), message)
         else:
             self.query_one(CellLine).show(name, "", "", about)
 

@@ -19,6 +19,7 @@ CELLS = (
     ("+InAir -Stunned", "tags: all of the first, none of the second"),
     ("not …", "everything except what follows"),
     ("… ~2.5", "soft: a row that does not match costs 2.5 more in a search"),
+    ("… ~2.5/10", "of numbers: 2.5 more for each 10 that the fact is away"),
 )
 MARKS = (
     ("◉", "the row is valid for the test row's context, and the policy may pick it"),

@@ -39,7 +39,7 @@ from .disk_care import DiskCare
 from .following import Following
 from .renames import Renames
 
-TABS = ("assets", "options", "priorities", "coverage", "problems")
+TABS = ("assets", "options", "priorities", "coverage", "problems", "contracts")
 MOTION = "motion"
 """The tab that there is where the project declares motion databases and has a recorded session, and where it was gone to."""
 WITH_TOOLS = 30
@@ -245,6 +245,10 @@ class TableScreen(Screen[None]):
             from ..panes.motion import MotionPane  # loads the motion search
 
             return MotionPane(self.workspace.folder, id=name)
+        if name == "contracts":
+            from ..panes.contracts import ContractsPane  # loads the prover
+
+            return ContractsPane(sheet, id=name)
         return self._coverage_pane(name) if name == "coverage" else ProblemsPane(sheet, id=name)
 
     def _coverage_pane(self, name: str) -> Pane:

@@ -360,7 +360,7 @@ class Grid(GridView, can_focus=True):
             return "" if fact is None else self.sheet.query.text(fact.name)
         if self.is_in_new_row:
             return ""
-        return self.sheet.text(row, column) if len(self.sheet.view) else ""
+        return (self.sheet.text(row, column) or self.sheet.inherited(row, column)) if len(self.sheet.view) else ""
 
     def _want_edit(self, text: str, is_typing: bool = False, opens_list: bool = False) -> None:
         if self.is_in_test_row and not self._is_condition():

@@ -48,6 +48,8 @@ from contextdb.motion.selection.variation import Rng
 from contextdb.motion.trace.session import MOST, Trace
 
 AT_REST = Steered()
+N_DISPLAYED = 3
+NO_BLOCK = Fault("the bytes are no state of such a character.", "what bytes(character.state) gives")
 PoseOf = Callable[["Character", float], ArrayLike]
 """Gives the pose features of a query, as all features of the schema: of a character and the seconds since its last update."""
 
@@ -242,11 +244,17 @@ class Character:
     @property
     def state(self) -> CharacterState:
         """Where the character is, to come back to with `restore`. The facts of live contexts are the game's and not in it."""
-        stream = None if self.stream is None else self.stream.state
-        return CharacterState(self._row.tobytes(), self.controller.state, stream)
+        stream, walk, controller = None if self.stream is None else self.stream.state, self._row.tobytes(), self.controller
+        displayed = np.array((-1.0, 0.0, 0.0) if self.stream is None else self.stream.displayed, np.float64)
+        row = b"" if stream is None else stream.row.tobytes()
+        return CharacterState(walk, controller.state, stream, walk + controller.row.tobytes() + displayed.tobytes() + row)
 
-    def restore(self, state: CharacterState) -> None:
-        """Go on from a state of this character, or of another one with the same parts; raises ContextError for anything else."""
+    def restore(self, state: CharacterState | bytes) -> None:
+        """Go on from a state of this character, or of another one with the same parts, or from the bytes of one, which do not say
+        where a random generator is; raises ContextError for anything else."""
+        if isinstance(state, bytes):
+            self._restore_block(state)
+            return
         require_kind(state, CharacterState, "state", "a CharacterState, what `state` gives")
         if (state.stream is None) != (self.stream is None):
             raise ContextError(Fault("the state is of a character with other parts.", "a state of this character"))
@@ -254,6 +262,18 @@ class Character:
             self.stream.restore(state.stream)
         self.controller.restore(state.controller)
         self._stand(state.row, None)
+
+    def _restore_block(self, block: bytes) -> None:
+        ways, chooser, stream = self.schema.ways, self.controller.chooser, self.stream
+        widths = ways.width, chooser.width, N_DISPLAYED, 0 if stream is None else stream.width
+        if len(block) != 8 * sum(widths):
+            raise ContextError(NO_BLOCK)
+        walk, row, displayed, pose = np.split(np.frombuffer(block).copy(), np.cumsum(widths[:3]).tolist())
+        is_right = walks.are_walks(ways, walk[None]) and chooser.are_rows(row[None]) and bool(np.isfinite(pose).all())
+        if not is_right or (stream is not None and not stream.stand_on(displayed, pose)):
+            raise ContextError(NO_BLOCK)
+        self.controller.stand_on(row[None])
+        self._stand(walk[None], None)
 
     def update(
         self,

@@ -56,6 +56,11 @@ class CharacterState:
     walk: bytes
     controller: ControllerState
     stream: PoseState | None
+    block: bytes = b""
+
+    def __bytes__(self) -> bytes:
+        """One flat block, which a game in C goes on from; see the core's character.h."""
+        return self.block
 
     @property
     def body(self) -> Steered:

@@ -120,3 +120,10 @@ def place_of(row: Floats) -> Place3:
     x, z, heading = row[0, 0], row[0, 1], body.heading
     place = RootMotion(float(x), float(z), heading).then(apart)
     return place.left_m, place.ahead_m, place.turn_rad
+
+
+def are_walks(ways: Ways, rows: Floats) -> bool:
+    """Whether rows may be walks: of finite numbers, and no longer a way behind than is remembered."""
+    n_most = (ways.width - N_WALK) // 4
+    halflives = rows[:, N_NUMBERS - 2 : N_NUMBERS]
+    return bool(np.isfinite(rows).all() and (halflives > 0.0).all() and (np.isin(rows[:, N_WALK - 1], np.arange(n_most + 1))).all())

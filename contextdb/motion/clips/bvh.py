@@ -29,6 +29,8 @@ LONGEST_FRAME_S = 1.0
 IN_JOINT = '"OFFSET", "CHANNELS", "JOINT", "End Site" or "}"'
 JOINT_WORDS = ("OFFSET", "CHANNELS", "JOINT", "End Site", "}")
 CHANNEL_NAMES = {name.casefold(): name for name in CHANNELS}
+LINES = 4096
+"""So many lines are read at a time: between them it can be interrupted."""
 COUNT = re.compile(r"\d{1,12}", re.ASCII)
 FRAMES = re.compile(r"\s*Frames[^\S\n]*:?[^\S\n]*(\S*)", re.IGNORECASE)
 FRAME_TIME = re.compile(r"\s*Frame[^\S\n]*Time[^\S\n]*:?[^\S\n]*(\S*)", re.IGNORECASE)
@@ -246,24 +248,32 @@ def _read_values(words: Words, n_frames: int, n_channels: int) -> Floats:
     """The values [n_frames, n_channels]: all lines at once; one by one only where something may be wrong."""
     text = words.text[words.position :]
     lines = text.split("\n")
-    rows = [row for line in lines if (row := line.split())]
     is_plain = text.isascii() and "_" not in text  # float() also takes "1_0" and the digits of other scripts
-    if is_plain and len(rows) == n_frames and all(len(row) == n_channels for row in rows):
-        values = _numbers(rows)
-        if values is not None:
-            return values.reshape(n_frames, n_channels)
+    if is_plain:
+        values = _plain_values(lines, n_channels)
+        if values is not None and len(values) == n_frames:
+            return values
     faults = _value_faults(words, lines, n_frames, n_channels)
     if faults:
         raise ClipError(*faults)
-    return np.array(rows, np.float64).reshape(n_frames, n_channels)
+    return np.array([row for line in lines if (row := line.split())], np.float64).reshape(n_frames, n_channels)
 
 
-def _numbers(rows: list[list[str]]) -> Floats | None:
-    try:
-        values = np.array(list(map(float, chain.from_iterable(rows))), np.float64)
-    except ValueError:
-        return None
-    return values if np.isfinite(values).all() else None
+def _plain_values(lines: list[str], n_channels: int) -> Floats | None:
+    """The values of lines, some at a time; None where one is not made of so many finite numbers."""
+    blocks = [np.zeros((0, n_channels))]
+    for first in range(0, len(lines), LINES):
+        rows = [row for line in lines[first : first + LINES] if (row := line.split())]
+        if not all(len(row) == n_channels for row in rows):
+            return None
+        try:
+            values = np.array(list(map(float, chain.from_iterable(rows))), np.float64)
+        except ValueError:
+            return None
+        if not np.isfinite(values).all():
+            return None
+        blocks.append(values.reshape(len(rows), n_channels))
+    return np.concatenate(blocks)
 
 
 def _value_faults(words: Words, lines: list[str], n_frames: int, n_channels: int) -> list[Fault]:

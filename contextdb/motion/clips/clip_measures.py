@@ -137,12 +137,16 @@ def measure(clip: Clip) -> Measures:
 
 def unit_by_size(clip: Clip) -> float | None:
     """The unit in which a clip's body is of a usual size: its own if it is, else the nearest; None where there is none."""
-    size = measure(clip).size_m
+    return unit_of(measure(clip))
+
+
+def unit_of(measures: Measures) -> float | None:
+    """The same of what is measured of a clip."""
+    size, own = measures.size_m, measures.metres_per_unit
     if not 0.0 < size < math.inf:
         return None
-    unit = min(UNITS, key=lambda unit: abs(math.log(size * unit / clip.metres_per_unit / USUAL_BODY_M)))
-    units = (each for each in (clip.metres_per_unit, unit) if LEAST_USUAL_M <= size * each / clip.metres_per_unit <= MOST_USUAL_M)
-    return next(units, None)
+    unit = min(UNITS, key=lambda unit: abs(math.log(size * unit / own / USUAL_BODY_M)))
+    return next((each for each in (own, unit) if LEAST_USUAL_M <= size * each / own <= MOST_USUAL_M), None)
 
 
 def _is_never_down(clip: Clip) -> bool:

@@ -8,14 +8,16 @@ the file's name; of a file with several each is `FILE:TAKE`.
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 from os import PathLike
 from pathlib import Path
 
 from contextdb.cells.arguments import require_many, require_path
+from contextdb.console import announced_while
 from contextdb.disk import read_bytes
 from contextdb.errors import ClipError, Fault, FileError, Place, in_quotes, mend_for, some
 from contextdb.motion.clips import gltf, npz, scenes
@@ -102,7 +104,8 @@ class ClipSource:
             problem = f"the file has {len(takes)} takes, and none is named {in_quotes(take)}."
             raise ClipError(Fault(problem, some(takes), mend_for(take, takes), Place(self.file)))
         plain = CENTIMETRE if metres_per_unit == BY_SIZE else metres_per_unit
-        clip = self.format.read(self, clip_name(self.path, take) if name is None else name, take, plain, up)
+        with announced_while(self.file, len(self.content)):
+            clip = self.format.read(self, clip_name(self.path, take) if name is None else name, take, plain, up)
         if metres_per_unit != BY_SIZE or self.format.states_unit:
             return clip
         return replace(clip, metres_per_unit=unit_by_size(clip) or CENTIMETRE)
@@ -132,6 +135,16 @@ def takes_of(path: Path) -> tuple[str, ...]:
     """The takes of a file with several, which may have to be opened; none of one that cannot be read: whoever reads it says why."""
     if path.suffix.casefold() in (*BVH.endings, *NPZ.endings):
         return ONE_TAKE
+    try:
+        status = os.stat(path)
+    except (OSError, ValueError):
+        return ONE_TAKE
+    return _takes_of(path, status.st_size, status.st_mtime_ns, status.st_ino)
+
+
+@lru_cache(maxsize=1 << 16)
+def _takes_of(path: Path, *_state: int) -> tuple[str, ...]:
+    """The takes of a file in a state: several questions about a project ask for them."""
     try:
         return ClipSource.of(path).takes
     except (ClipError, FileError):

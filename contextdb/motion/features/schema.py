@@ -151,16 +151,21 @@ class FeatureSchema(Declared, error=MotionError):
                 features += [(is_along, WHATS.index(channel.what), part.start + i * size) for i, (is_along, _) in enumerate(points)]
         return np.array(steps, np.float64), np.array(features, np.int64).reshape(-1, 3)
 
-    @cached_property
-    def ways(self) -> Ways:
-        """How far the paths of characters are looked at, for the core."""
+    @property
+    def velocity_features(self) -> Ints:
+        """The features at which the velocities of joints begin that move as the body does: int64."""
         columns = [
             self.slices[channel.name].start + 3 * i
             for channel in self.channels
             if channel.type == "velocity" and channel.relative_to is None
             for i in range(channel.n_features // 3)
         ]
-        return Ways(*self.path_features, np.array(columns, np.int64), self.n_features, float(self.rate))
+        return np.array(columns, np.int64)
+
+    @cached_property
+    def ways(self) -> Ways:
+        """How far the paths of characters are looked at, for the core."""
+        return Ways(*self.path_features, self.velocity_features, self.n_features, float(self.rate))
 
     def __getstate__(self) -> dict[str, object]:
         """The fields alone: what is prepared for the core is prepared again where the schema is unpickled or copied."""

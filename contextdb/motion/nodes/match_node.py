@@ -24,8 +24,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from contextdb.cells.arguments import as_number, require_kind, require_text
+from contextdb.cells.row_play import RowPlay
 from contextdb.errors import Fault, MotionError, QueryError, in_quotes
-from contextdb.motion.arguments import Valid
+from contextdb.motion.answers import is_answer
+from contextdb.motion.arguments import Valid, ValidRanges
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.clips.trajectory import to_own_frame
@@ -36,9 +38,12 @@ from contextdb.motion.search.candidates import Candidates
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.filtering import Penalties, Tags
 from contextdb.motion.search.hit import Hit
+from contextdb.motion.selection.chooser import Chooser, Ranges
+from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.decision import Action, Decision
 from contextdb.motion.selection.playhead import Playhead, playing_at
 from contextdb.motion.selection.root_motion import RootMotion, between
+from contextdb.motion.selection.selector import Entry, Selector
 
 
 class MatchOptions(TypedDict, total=False):
@@ -91,6 +96,11 @@ class MatchPlay:
         Seconds since the entry.
     since_s : float
         Those before the last `advance`.
+    how : RowPlay or None
+        How the row of what plays says that it does: `blend_s`, `start_s`, `mirror`, `play_rate` and `root` count. It plays once,
+        to its end.
+    play_rate : float
+        Seconds of the clip that pass in a second.
     """
 
     hit: Hit
@@ -100,6 +110,8 @@ class MatchPlay:
     playhead: Playhead
     time_s: float = 0.0
     since_s: float = 0.0
+    how: RowPlay | None = None
+    play_rate: float = 1.0
 
     @property
     def entry_s(self) -> float:
@@ -119,7 +131,12 @@ class MatchPlay:
     @property
     def frame(self) -> int:
         """The frame that shows now, counted over the whole database."""
-        return self.playhead.frame_at(self.entry_s + self.time_s)
+        return self.playhead.frame_at(self.clip_s)
+
+    @property
+    def clip_s(self) -> float:
+        """Which second of the clip shows now."""
+        return self.entry_s + self.time_s * self.play_rate
 
     def advance(self, dt_s: float) -> RootMotion:
         """Play on for some seconds, and say where the body is then; at the end it stays."""
@@ -136,7 +153,7 @@ class MatchPlay:
         Its root weight is 0, for the game has the body on the warped path; its root motion is that path's, for the root mode
         "animation". Raises ContextError where `database` is no text.
         """
-        head, time_s = self.playhead, self.entry_s + self.time_s
+        head, time_s = self.playhead, self.clip_s
         playing = playing_at(require_text(database, "database"), head, head.frame_at(time_s), time_s)
         motion = between(self.at(self.since_s), self.at(self.time_s))
         action = Action.JUMP if self.since_s == 0.0 else Action.CONTINUE
@@ -144,7 +161,10 @@ class MatchPlay:
         why = (
             f"plays {playing.asset} on to its target; its cost was {self.hit.cost:.4g}{f', {way:.4g} of it the way' if way else ''}"
         )
-        return Decision(0, self.time_s, action, why, False, playing, None, root_motion=motion, root_weight=0.0)
+        return Decision(
+            0, self.time_s, action, why, False, playing, None,
+            root_motion=motion, root_weight=0.0, play_rate=self.play_rate, play=self.how,
+        )  # fmt: skip
 
     def at(self, time_s: float) -> RootMotion:
         """Where the body is some seconds after the entry, seen from where it was then; behind the end, as there."""
@@ -210,8 +230,9 @@ class MatchNode:
 
     def search(self, query: ArrayLike, target: Target, valid: Valid | None = None, **options: Unpack[MatchOptions]) -> Hit:
         """The frame that `enter` would start at."""
-        bias = self._target_bias(target)
-        return self.database.search(query, valid, bias=bias, in_match_range=True, **options)
+        ranges = self._ranges(valid)
+        bias = self._target_bias(target) + self._start_bias(ranges)
+        return self.database.search(query, self._valid(valid, ranges), bias=bias, in_match_range=True, **options)
 
     def candidates(
         self, query: ArrayLike, target: Target, k: int = 10, valid: Valid | None = None, **options: Unpack[MatchOptions]
@@ -220,18 +241,51 @@ class MatchNode:
 
         Where they would bring the body by themselves is `ends[candidate.frame]`.
         """
-        bias = self._target_bias(target)
-        return self.database.candidates(query, k, valid, bias=bias, in_match_range=True, **options)
+        ranges = self._ranges(valid)
+        bias = self._target_bias(target) + self._start_bias(ranges)
+        return self.database.candidates(query, k, self._valid(valid, ranges), bias=bias, in_match_range=True, **options)
 
     def play(
         self, hit: Hit, query: ArrayLike, target: Target, valid: Valid | None = None, **options: Unpack[MatchOptions]
     ) -> MatchPlay:
         """Start at a frame that `search` has found with the same arguments."""
-        costs = self._costs(hit, query, target, valid, **options)
+        ranges = self._ranges(valid)
+        how = None if ranges is None or ranges.plays is None else ranges.plays.of_range(hit.range)
+        rate = 1.0 if how is None else how.rate
+        costs = self._costs(hit, query, target, self._valid(valid, ranges), **options)
         frames = np.arange(hit.frame, self._last[hit.frame] + 1)
-        position, rotation = (Window(*each) for each in self._windows(frames[:1])[0].tolist())
-        path = warped((frames - hit.frame) / self.rate, _path(self._root, frames), position, rotation, target)
-        return MatchPlay(hit, target, costs, path, Playhead(self.database, hit.range, self.rate))
+        position, rotation = (Window(*each) for each in (self._windows(frames[:1])[0] / rate).tolist())
+        path = warped((frames - hit.frame) / (self.rate * rate), _path(self._root, frames), position, rotation, target)
+        return MatchPlay(hit, target, costs, path, Playhead(self.database, hit.range, self.rate), how=how, play_rate=rate)
+
+    # ---- how the rows of an answer play
+
+    @cached_property
+    def _chooser(self) -> Chooser:
+        return Chooser(Selector([Entry("", self.database)]), ControllerSettings(rate=self.rate))
+
+    def _ranges(self, valid: Valid | None) -> Ranges | None:
+        """Which ranges an answer lets play, and how; None for what does not say how."""
+        if not is_answer(valid) or valid.plays is None:
+            return None
+        return self._chooser.ranges(valid, 1)
+
+    def _valid(self, valid: Valid | None, ranges: Ranges | None) -> Valid | None:
+        return valid if ranges is None else ValidRanges(ranges.flags[0], ranges.biases[0])
+
+    def _start_bias(self, ranges: Ranges | None) -> Floats | float:
+        """What forbids all frames of ranges but that at which their row says that they are entered."""
+        if ranges is None or ranges.plays is None:
+            return 0.0
+        bias = np.zeros(self.database.n_frames)
+        for at in np.flatnonzero(ranges.flags[0]).tolist():
+            how = ranges.plays.of_range(at)
+            if how is not None and how.start_s is not None:
+                own = slice(int(self.database.starts[at]), int(self.database.stops[at]))
+                entry = Playhead(self.database, at, self.rate).frame_at(how.start_s)
+                bias[own] = np.inf
+                bias[entry] = 0.0
+        return bias
 
     def target_costs(self, target: Target) -> tuple[Floats, Floats]:
         """What distance and rotation add to the cost of each frame: two float64 arrays [N], 0 between ranges."""

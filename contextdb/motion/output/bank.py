@@ -261,12 +261,21 @@ class PoseBank:
         return self._frames(self._steps)
 
     def _frames(self, steps: Floats | None) -> PoseFrames:
+        return PoseFrames(*self.frame_parts(steps))
+
+    def frame_parts(self, steps: Floats | None) -> tuple[Any, ...]:
+        """The arrays of which the core makes frames; without steps for those who feel no ground."""
         rotations, positions, root = (
             np.require(each, np.float32, ("C", "A")) for each in (self.rotations, self.positions, self.root)
         )
         starts, looping, contacts = np.array(self.starts, np.int64), np.array(self.looping), np.ascontiguousarray(self.contacts)
         n_steps, ways = np.array(self.stops, np.int64) - starts - 1, np.ascontiguousarray(self._ways, np.float64)
-        return PoseFrames(rotations, positions, root, ways, contacts, steps, starts, n_steps, looping, float(self.rate))
+        return rotations, positions, root, ways, contacts, steps, starts, n_steps, looping, float(self.rate)
+
+    @property
+    def steps(self) -> Floats:
+        """Of each foot in each frame how far it is through its swing, and where that puts it down: [N, feet, 3]."""
+        return self._steps
 
     def __getstate__(self) -> dict[str, object]:
         """The fields alone: what is prepared for the core is prepared again where the bank is unpickled or copied."""

@@ -124,6 +124,18 @@ class Pipeline:
             raise MotionError(no_such("pose bank of the database", playing.database, self.banks))
         return number, self.all[number].range_of(playing.asset, playing.mirrored)
 
+    def playing_at(self, moment: Sequence[float]) -> Playing | None:
+        """What plays at a moment as the core has it, with frames counted in its bank; None where there is none such."""
+        number, at, time_s = moment
+        if number not in range(len(self.all)) or not math.isfinite(time_s):
+            return None
+        bank, names = self.all[int(number)], list(self.banks)
+        if at not in range(len(bank.assets)):
+            return None
+        name = names[int(number)] if names else ""
+        frame = int(bank.starts[int(at)]) + round(time_s * bank.rate)
+        return Playing(name, bank.assets[int(at)], int(at), frame, time_s, bool(bank.mirrored[int(at)]))
+
     def _given(
         self, rows: Rows, decisions: Sequence[Decision], dt: float, grounds: Grounds | None
     ) -> tuple[Floats, Floats, list[Playing | None], list[bool], list[bool]]:
@@ -133,7 +145,7 @@ class Pipeline:
         for decision, displayed, ground in zip(decisions, rows.playing, _gives(grounds, len(rows)), strict=True):
             motion = decision.root_motion
             plays += (
-                *self._moment(decision.playing), *self._moment(decision.before), *self._moment(displayed),
+                *self.moment_of(decision.playing), *self.moment_of(decision.before), *self.moment_of(displayed),
                 NUMBERS[decision.action], decision.play_rate,
                 motion.left_m, motion.ahead_m, motion.turn_rad, decision.root_weight, ground,
                 *_said(decision.play),
@@ -148,7 +160,7 @@ class Pipeline:
         forced = [jump and decision.continuing_cost is None for jump, decision in zip(jumps, decisions, strict=True)]
         return given, moments[:n_seams], all_playing, jumps, forced
 
-    def _moment(self, playing: Playing | None) -> Moment:
+    def moment_of(self, playing: Playing | None) -> Moment:
         """What plays as the core has it: its bank, range and second."""
         return NO_MOMENT if playing is None else (*self.find(playing), playing.time_s)
 
@@ -168,17 +180,26 @@ def _gives(grounds: Grounds | None, n: int) -> Sequence[bool]:
 
 def _poses(banks: Sequence[PoseBank], settings: PoseSettings, *, feels_ground: bool) -> Poses:
     """The stages in the core: a rig, its banks and settings."""
+    frames = tuple(each.frames_on_ground if feels_ground else each.frames for each in banks)
+    return Poses(*rig_parts(banks), numbers_of(settings), frames)
+
+
+Rig = tuple[Ints, Floats, Ints, Ints, Floats, Ints, Ints, Floats, float, int]
+
+
+def rig_parts(banks: Sequence[PoseBank]) -> Rig:
+    """The rig of banks as the core takes it: parents, offsets, places, legs, hinges, tops, the spine and what is left of its turn,
+    what joints may be accelerated by, and how many have positions of their own."""
     bank, spine = banks[0], spine_of(banks[0])
     rig = bank.skeleton
     joints, left = (np.zeros(0, np.int64), np.zeros(0)) if spine is None else (spine.joints, spine.left)
     legs = legs_of(rig, bank.feet)
     most = ADDED_SHARE * max(each.most_accel for each in banks)
-    frames = tuple(each.frames_on_ground if feels_ground else each.frames for each in banks)
     hinges, tops = hinges_of(rig, legs, bank.rotations), np.array(tops_of(rig), np.int64)
-    return Poses(*bank.joints, legs, hinges, tops, joints, left, most, len(bank.moving), _numbers(settings), frames)
+    return *bank.joints, legs, hinges, tops, joints, left, most, len(bank.moving)
 
 
-def _numbers(settings: PoseSettings) -> dict[str, float]:
+def numbers_of(settings: PoseSettings) -> dict[str, float]:
     """Settings as numbers: of a word its place among those that are accepted."""
     values: dict[str, Any] = {key: getattr(settings, key) for key in settings_of(PoseSettings)}
     words = {key: each.shape.words for key, each in settings_of(PoseSettings).items()}

@@ -125,6 +125,26 @@ class PoseStream:
         self._rows, self._at, self._state = Rows(state.row[None], [state.playing]), 0, state
 
     @property
+    def displayed(self) -> tuple[int, int, float]:
+        """What was displayed last, as the core has it: the number of a bank, -1 for none, its range and second."""
+        return self._pipeline.moment_of(self._rows.playing[self._at])
+
+    @property
+    def width(self) -> int:
+        """How many numbers its row has."""
+        return self._pipeline.width
+
+    def stand_on(self, displayed: Floats, row: Floats) -> bool:
+        """Go on from what was displayed, as the core has it, and a row; False where there is no such moment."""
+        playing = None
+        if displayed[0] >= 0.0:
+            playing = self._pipeline.playing_at(displayed.tolist())
+            if playing is None:
+                return False
+        self._rows, self._at, self._state = Rows(row[None], [playing]), 0, None
+        return True
+
+    @property
     def _place(self) -> tuple[Rows, int]:
         """The rows that the stream is among, and its own."""
         return self._rows, self._at

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import re
 import unicodedata
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -119,6 +119,12 @@ class ClipFacts:
 
     def to_json(self) -> dict[str, Any]:
         return asdict(self) | {"gaits": list(self.gaits)}
+
+    @classmethod
+    def of_json(cls, document: Mapping[str, Any]) -> ClipFacts:
+        """What `to_json` made plain data of."""
+        spreads = {name: document[name] and Spread(**document[name]) for name in ("speed_mps", "direction_deg", "turn_dps")}
+        return cls(**{**document, **spreads, "gaits": tuple(document["gaits"])})
 
 
 @dataclass(frozen=True, eq=False)

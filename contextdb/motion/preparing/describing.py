@@ -19,7 +19,7 @@ from contextdb.motion.clips.clip import Clip
 from contextdb.motion.clips.mirror import partners_of
 from contextdb.motion.clips.rig import Rig
 from contextdb.motion.preparing.cells_of_clips import CONDITIONS, OUTPUTS, cells_of
-from contextdb.motion.preparing.clip_facts import GAITS, NORMAL, ClipFacts, common_words, facts_of
+from contextdb.motion.preparing.clip_facts import GAITS, NORMAL, ClipFacts, common_words, facts_of, style_of
 
 RATE = 30.0
 MOST_TURN_DPS = 1080.0
@@ -85,14 +85,19 @@ def describe(clips: Sequence[Clip], *, mirrored: bool = False, progress: Tell | 
     ]
     if faults:
         raise MotionError(*faults)
-    common = common_words([clip.name for clip in clips])
     facts = []
     for i, clip in enumerate(clips):
         if progress is not None:
             progress(i, len(clips), clip.name)
-        facts.append(facts_of(clip, common))
-    cells = cells_of(facts, [clip.skeleton.names for clip in clips], mirrored)
-    return [Described(each.asset, row, each) for each, row in zip(facts, cells, strict=True)]
+        facts.append(facts_of(clip))
+    return described(facts, [clip.skeleton.names for clip in clips], mirrored)
+
+
+def described(facts: Sequence[ClipFacts], rigs: Sequence[tuple[str, ...]], mirrored: bool) -> list[Described]:
+    """The rows of clips that show some facts, of rigs with these bones."""
+    common = common_words([each.asset for each in facts])
+    styled = [replace(each, style=style_of(each.asset, common)) for each in facts]
+    return [Described(each.asset, row, each) for each, row in zip(styled, cells_of(styled, rigs, mirrored), strict=True)]
 
 
 def joint_clips(clips: Sequence[Clip]) -> dict[str, dict[str, int]]:
@@ -111,11 +116,11 @@ def joint_clips(clips: Sequence[Clip]) -> dict[str, dict[str, int]]:
     }
 
 
-def joint_row(asset: str, clip: Clip) -> Described:
-    """The row of clips that were recorded together, of which `clip` is the first role's: its cells ask nothing of one body, since
+def joint_row(asset: str, facts: ClipFacts) -> Described:
+    """The row of clips that were recorded together, of which `facts` are the first role's: its cells ask nothing of one body, since
     the facts that it needs are those of several actors, such as `Host.speed`."""
-    facts = replace(facts_of(clip), asset=asset, style=NORMAL)
-    return Described(asset, {**dict.fromkeys((*CONDITIONS, *OUTPUTS), ""), "duration_s": f"{facts.duration_s:g}"}, facts)
+    own = replace(facts, asset=asset, style=NORMAL)
+    return Described(asset, {**dict.fromkeys((*CONDITIONS, *OUTPUTS), ""), "duration_s": f"{own.duration_s:g}"}, own)
 
 
 def _counts(clips: Sequence[Clip]) -> Counter[str]:
@@ -191,18 +196,25 @@ def by_rig(clips: Sequence[Clip], paths: Sequence[str]) -> list[RigClips]:
 
 
 def patterns_of(own: Sequence[str], others: set[str]) -> list[str]:
-    """Patterns of files that fit some paths, of one ending each, and none of some others."""
+    """Patterns of files that fit some paths, and none of some others."""
     folders = defaultdict[tuple[str, str], list[str]](list)
     for path in own:
         folder, _, name = path.rpartition("/")
         stem, dot, ending = name.rpartition(".")
         folders[f"{folder}/" if folder else "", f"{dot}{ending}"].append(stem)
-    patterns = []
+    endings = defaultdict[str, list[str]](list)
     for (folder, ending), stems in folders.items():
         beside = [path.removeprefix(folder).removesuffix(ending) for path in others if path.startswith(folder)]
         beside = [stem for stem in beside if "/" not in stem]
-        patterns += [f"{_escaped(folder)}{pattern}{_escaped(ending)}" for pattern in _parted(stems, beside, "")]
-    return patterns
+        for pattern in _parted(stems, beside, ""):
+            endings[f"{_escaped(folder)}{pattern}"].append(_escaped(ending))
+    return [f"{pattern}{_one_of(own)}" for pattern, own in endings.items()]
+
+
+def _one_of(endings: Sequence[str]) -> str:
+    """A pattern of some endings."""
+    has_dots = all(ending.startswith(".") and not set(ending) & set("{},/") for ending in endings)
+    return f".{{{','.join(ending[1:] for ending in endings)}}}" if len(endings) > 1 and has_dots else endings[0]
 
 
 def _parted(own: Sequence[str], others: Sequence[str], start: str) -> Iterator[str]:
@@ -221,8 +233,9 @@ def _escaped(text: str) -> str:
     return "".join(f"[{letter}]" if letter in "*?[" else letter for letter in text)
 
 
-def motion_sections(rigs: Sequence[RigClips], table: str, markup: str | None = None) -> Sections:
-    """What is compared, which databases there are, and a controller for each rig: "player", then "player_2" and so on."""
+def motion_sections(rigs: Sequence[RigClips], table: str, markup: str | None = None, is_by_feet: bool = False) -> Sections:
+    """What is compared, which databases there are, and a controller for each rig: "player", then "player_2" and so on. `is_by_feet`
+    says whether standing feet move the roots of clips on the spot."""
     sections: Sections = {}
     for i, rig in enumerate(rigs):
         behind = "" if i == 0 else f"_{i + 1}"
@@ -237,6 +250,7 @@ def motion_sections(rigs: Sequence[RigClips], table: str, markup: str | None = N
                 "metres_per_unit": rig.clips[0].metres_per_unit,
                 "up": rig.clips[0].up,
                 "mirror": bool(mirror),
+                **({"root": "feet"} if is_by_feet else {}),
                 **({"markup": markup} if markup is not None else {}),
                 **({"roles": list(rig.roles)} if rig.roles else {}),
             }

@@ -17,7 +17,7 @@ from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.clips.trajectory import Trajectory, root_trajectory
 from contextdb.motion.markup.reserved import ReservedTag
 from contextdb.motion.preparing.clip_facts import ENDS_S, SLOW_SHARE, STANDING_MPS, Moments, falls_of, require_finite, step_of
-from contextdb.motion.preparing.proposal import Kind, Proposal
+from contextdb.motion.preparing.proposal import ClipHead, Kind, Proposal
 
 NEAR_MS = 1e-6
 """Times that differ by less are the same."""
@@ -41,6 +41,7 @@ class Look:
     @classmethod
     def at(cls, clip: Clip) -> Look:
         """Look at a clip of one frame or more."""
+        assert not isinstance(clip, ClipHead), "its motion is forgotten"
         poses = poses_of(clip)
         require_finite(clip, poses)
         return cls(clip, poses, root_trajectory(poses), falls_of(poses))

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import cache, partial
 
 import numpy as np
@@ -27,7 +27,7 @@ from contextdb.motion.markup.markup import Markup
 from contextdb.motion.markup.reserved import CONTACTS, ReservedTag
 from contextdb.motion.preparing.clip_facts import ENDS_S, STANDING_MPS, step_of
 from contextdb.motion.preparing.look import LOOP_M, Look
-from contextdb.motion.preparing.proposal import KINDS, N_SAMPLES, Kind, KnownProposals, Proposal, Shape
+from contextdb.motion.preparing.proposal import KINDS, N_SAMPLES, KeptClip, Kind, KnownProposals, Proposal, Shape
 
 ROOT_SMOOTH_S = 0.2
 """What is proposed for `root_smooth_s`: it evens out a step, and keeps a start and a bend."""
@@ -120,13 +120,11 @@ def prepare_again(
     for i, clip in enumerate(clips):
         if progress is not None:
             progress(i, len(clips), clip.name)
-        known, look = previous.of(clip), cache(partial(Look.at, clip))
+        known = previous.of(clip)
+        look_for(known, clip, wanted)
         for kind in (kind for kind in KINDS if kind in wanted and kind in _OF_ONE):
-            if kind not in known.found:
-                known.found[kind] = list(_OF_ONE[kind](look()))
             proposals[clip.name] += known.found[kind]
-        if "duplicates" in wanted:
-            known.shape = _shape(look()) if known.shape is None else known.shape
+        if "duplicates" in wanted and known.shape is not None:
             shapes.append((clip, known.shape))
     for each in _duplicates(shapes):
         proposals[each.asset].append(each)
@@ -134,6 +132,16 @@ def prepare_again(
     return [
         each for clip in dict.fromkeys(clip.name for clip in clips) for each in proposals[clip] if not _is_marked(each, current)
     ]
+
+
+def look_for(known: KeptClip, clip: Clip, kinds: Collection[str]) -> None:
+    """Look for what is not known yet of a clip. Raises MotionError where its joints are too far away to be measured."""
+    look = cache(partial(Look.at, clip))
+    for kind in (kind for kind in KINDS if kind in kinds and kind in _OF_ONE):
+        if kind not in known.found:
+            known.found[kind] = list(_OF_ONE[kind](look()))
+    if "duplicates" in kinds and known.shape is None:
+        known.shape = _shape(look())
 
 
 def _wanted(kinds: Sequence[str] | None) -> set[str]:

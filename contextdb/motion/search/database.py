@@ -416,6 +416,11 @@ class MotionDatabase(Searched):
         """What the core searches."""
         return self._searcher.frames
 
+    @property
+    def frame_parts(self) -> tuple[Any, ...]:
+        """The arrays and numbers of which the core makes that."""
+        return self._searcher.frame_parts
+
     def valid_of_each(self, valid: ValidForMany | None, n: int) -> list[ValidRanges]:
         """What the masks of n characters mean to this database, see `search_many`: each serves as `valid` of `search`."""
         return self._filters.valid_of_each(valid, n)

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property, partial
 from itertools import pairwise
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -88,13 +88,18 @@ class Searcher:
     @cached_property
     def frames(self) -> Frames:
         """What the core searches; it is handed over once, as that takes longer than some searches."""
+        return Frames(*self.frame_parts)
+
+    @property
+    def frame_parts(self) -> tuple[Any, ...]:
+        """What the core makes that of."""
         lay, kinds = self.layout, self.kinds.astype(np.int32)
         most = int(kinds.max(initial=0))
         own = (lay.blocks, lay.order, lay.rank, lay.box_starts, lay.box_sizes, lay.box_ranges, lay.kinds_of_boxes(kinds))
         channels = np.array([0, *(columns.stop for columns in self.slices)], np.int64)
         roots = np.sqrt(cost.weights_of_features(self.slices, self.weights))
         scaling = (self.normalisation.offset, self.normalisation.scale)
-        return Frames(
+        return (
             *map(np.ascontiguousarray, (*own, lay.range_boxes)),
             kinds if most else None,
             len(kinds),

@@ -86,6 +86,11 @@ class Plays(NamedTuple):
     rows: Floats
     of: NDArray[np.int64]
 
+    def of_range(self, at: int) -> RowPlay | None:
+        """That of a range in the first update."""
+        row = int(self.of[0, at])
+        return None if row < 0 else RowPlay.of(self.rows[row].tolist())
+
 
 class Ranges(NamedTuple):
     """Which ranges may play in each of n updates, bool [n or 1, R], their biases, float64 [n or 1, R], and how they play; None
@@ -216,7 +221,7 @@ class Chooser:
         is_remembering = settings.history_s > 0.0
         self.n_played = min(16 + math.ceil(min(settings.history_s, 1e3) * a_second), MOST_PLAYED) if is_remembering else 0
         self.core = Controllers(
-            tuple(self._part(*each) for each in zip(selector.entries, self.databases, self.rates, strict=True)),
+            tuple(self.part(*each) for each in zip(selector.entries, self.databases, self.rates, strict=True)),
             self.n_played,
             settings.search_every_s,
             settings.jump_threshold_s,
@@ -244,7 +249,7 @@ class Chooser:
             known = selector.choosers[settings] = cls(selector, settings)
         return cast("Chooser", known)
 
-    def _part(self, entry: Any, database: MotionDatabase | None, rate: float) -> tuple[Any, ...]:
+    def part(self, entry: Any, database: MotionDatabase | None, rate: float) -> tuple[Any, ...]:
         """One database as the core takes it."""
         threshold = math.nan if entry.threshold is None else float(entry.threshold)
         if database is None:
@@ -336,6 +341,18 @@ class Chooser:
         self.core.move(rows, dt_s, moved, features)
         return moved, features
 
+    def are_rows(self, rows: Floats) -> bool:
+        """Whether rows may be those of characters, such as of bytes that come from elsewhere."""
+        known = rows[:, [0, 1, 2, 3, 5, 6, 7, 8, N_REMEMBERED]]
+        if not np.isfinite(known).all():
+            return False
+        try:
+            self.move(np.ascontiguousarray(rows), 0.0)
+        except ValueError:
+            return False
+        databases = rows[:, N_STATE::N_PLAYED]
+        return bool(np.isin(databases, np.arange(len(self.names))).all() if databases.size else True)
+
     # ---- what may be chosen
 
     def shared(self, tags: OfTags | None, bias: Mapping[str, ArrayLike] | None) -> Shared:
@@ -393,7 +410,7 @@ class Chooser:
         n_before = 0
         for name, each in answers.items():
             masks, costs = each.of_length(n_masks)
-            table, written = self._table(name, each.assets), None if costs is None else biases
+            table, written = self.rows_of(name, each.assets), None if costs is None else biases
             plays = each.plays, None if each.plays is None else chosen
             fill_ranges(*table, *masks, *(costs or (None, None)), all_biases[0], ranges, written, *plays)
             if each.plays is not None and chosen is not None and n_before:
@@ -438,7 +455,7 @@ class Chooser:
     def _loaded(self) -> list[tuple[str, MotionDatabase]]:
         return list(self.selector.databases.items())
 
-    def _table(self, name: str | None, assets: Sequence[str]) -> tuple[Any, ...]:
+    def rows_of(self, name: str | None, assets: Sequence[str]) -> tuple[Any, ...]:
         """The rows of a table for each range of a database, or of all: as `fill_ranges` takes them."""
         known = self._tables.get((name, id(assets)))
         if known is None or known[0] is not assets:

@@ -170,8 +170,19 @@ class Controller:
         return self._rows[self._at : self._at + 1]
 
     @property
+    def row(self) -> Floats:
+        """Where the controller is, as the core has it: [1, W], not to be changed."""
+        self.chooser  # noqa: B018  (the selector may have been exchanged)
+        return self._row
+
+    @property
     def _state(self) -> ControllerState:
         return self._chooser.state(self._rows[self._at].tolist(), self.playing, self._recent)
+
+    def stand_on(self, row: Floats) -> None:
+        """Go on from a row [1, W] of this controller, or of another one with the same selector and settings, that is checked."""
+        self._rows, self._at, self._moved = row, 0, None
+        self._playing, self._recent, self._is_decoded = None, (), False
 
     @property
     def place(self) -> Place:

@@ -27,6 +27,7 @@ starts and stops as soon as without."""
 END_S = 0.3
 """Seconds before the end of a range in which entering it is pointless, unless the settings say otherwise."""
 
+ROOTS = ("clip", "feet")
 RIG = file_below("a file of clips", "file of clips", ENDINGS, '"clips/idle.bvh"')
 WEIGHT = between("a weight", 0.0, MOST_WEIGHT, 2.0)
 METRES = between("metres", 1e-9, 1e9, 0.01)
@@ -132,7 +133,7 @@ class DatabaseSettings(Declared, error=MotionError):
         without="all bodies rest alike",
     )
     root: str = word(
-        ("clip", "feet"),
+        ROOTS,
         "Where a clip that runs on the spot has its motion from: from itself, so that it stays, or from its standing feet.",
         "clip",
         "source of motion",

@@ -1,4 +1,4 @@
-"""Poses in a file that other tools read: .bvh, .npz of numpy, or .glb, which is glTF. An edge: this touches the disk."""
+"""Poses in a file that other tools read: .bvh, .npz of numpy, .glb (glTF) or .usda (USD). An edge: this touches the disk."""
 
 from __future__ import annotations
 
@@ -18,26 +18,33 @@ from contextdb.errors import ArtefactError, ContextError, Fault, FileError, Moti
 from contextdb.motion.clips.clip import write_bvh
 from contextdb.motion.output.bank import PoseBank
 from contextdb.motion.output.stream import Pose
-from contextdb.motion.output.track import checked_poses, clip_of_poses, pose_arrays
+from contextdb.motion.output.track import checked_poses, clip_of_poses, local_tracks, pose_arrays
 from contextdb.motion.storage.glb import glb_of, require_gltf
+from contextdb.motion.storage.usda import usda_of
 
-BVH, NPZ, GLB = ".bvh", ".npz", ".glb"
-A_POSE_FILE = f"a name that ends in {BVH}, {NPZ} or {GLB}"
+BVH, NPZ, GLB, USDA = ".bvh", ".npz", ".glb", ".usda"
+POSE_FILES = (BVH, NPZ, GLB, USDA)
+A_POSE_FILE = f"a name that ends in {BVH}, {NPZ}, {GLB} or {USDA}"
 
 
-def write_poses(poses: Sequence[Pose], bank: PoseBank, path: str | PathLike[str], rate: float) -> None:
-    """Write poses by the ending of the name: BVH, the arrays of `pose_arrays`, or glTF. The same poses give the same bytes.
+def write_poses(poses: Sequence[Pose], bank: PoseBank, path: str | PathLike[str], rate: float, *, has_body: bool = False) -> None:
+    """Write poses by the ending of the name: BVH, the arrays of `pose_arrays`, glTF, or USD. The same poses give the same bytes.
 
     A `.bvh` has the rig in centimetres and angles in degrees; a `.glb` has a node for each joint and one animation of them, in
-    metres, and needs pygltflib. Raises FileError where the name has another ending, or the disk refuses; the old file is then
-    whole; MotionError for a `.glb` of no pose, or without pygltflib; ContextError for an argument of another type.
+    metres, and needs pygltflib; a `.usda` has a skeleton and its animation, in metres. `has_body` puts one skin of capsules on the
+    joints of a `.glb`. Raises FileError where the name has another ending, or the disk refuses; the old file is then whole;
+    MotionError for a `.glb` or `.usda` of no pose, or without pygltflib; ContextError for an argument of another type.
     """
-    target = pose_file(path)
+    target = pose_file(path, has_body=has_body)
     if target.suffix == BVH:
         write_bvh(clip_of_poses(poses, bank, rate, name=target.stem), target)
         return
     if target.suffix == GLB:
-        write_atomic(target, glb_of_poses(poses, bank, rate, target.stem))
+        write_atomic(target, glb_of_poses(poses, bank, rate, target.stem, has_body=has_body))
+        return
+    if target.suffix == USDA:
+        listed = _some_poses(poses, bank, rate, "USD")
+        write_atomic(target, usda_of(*local_tracks(listed, bank.skeleton), bank.skeleton, rate))
         return
     write_arrays(pose_arrays(poses, bank, rate), target)
 
@@ -63,20 +70,30 @@ def write_arrays(arrays: Mapping[str, NDArray[Any]], path: str | PathLike[str]) 
     write_atomic(target, whole.getvalue())
 
 
-def glb_of_poses(poses: Sequence[Pose], bank: PoseBank, rate: float, name: str = "poses") -> bytes:
-    """Poses as the bytes of a `.glb` file. Raises MotionError where there is no pose, or pygltflib is not installed; ContextError
-    for an argument of another type."""
+def glb_of_poses(poses: Sequence[Pose], bank: PoseBank, rate: float, name: str = "poses", *, has_body: bool = False) -> bytes:
+    """Poses as the bytes of a `.glb` file; with `has_body` a skin of capsules on them.
+
+    Raises MotionError where there is no pose, or pygltflib is not installed; ContextError for an argument of another type.
+    """
+    return glb_of(_some_poses(poses, bank, rate, "glTF"), bank, rate, name, has_body=has_body)
+
+
+def _some_poses(poses: Sequence[Pose], bank: PoseBank, rate: float, what: str) -> list[Pose]:
+    """At least one pose."""
     listed = checked_poses(poses, bank, rate)
     if not listed:
-        raise MotionError(Fault("there is no pose to write as glTF.", "at least one"))
-    return glb_of(listed, bank, rate, name)
+        raise MotionError(Fault(f"there is no pose to write as {what}.", "at least one"))
+    return listed
 
 
-def pose_file(path: str | PathLike[str]) -> Path:
-    """A file that poses can be written to; raises FileError for another ending, MotionError for glTF without pygltflib."""
+def pose_file(path: str | PathLike[str], *, has_body: bool = False) -> Path:
+    """A file that poses can be written to; raises FileError for another ending, or one that has no body; MotionError for glTF
+    without pygltflib."""
     target = require_path(path)
-    if target.suffix not in (BVH, NPZ, GLB):
+    if target.suffix not in POSE_FILES:
         raise FileError(Fault("poses cannot be written to such a file.", A_POSE_FILE, place=Place(str(target))))
+    if has_body and target.suffix != GLB:
+        raise FileError(Fault("such a file has no body of capsules.", f"a name that ends in {GLB}", place=Place(str(target))))
     if target.suffix == GLB:
         require_gltf()
     return target

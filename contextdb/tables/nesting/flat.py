@@ -119,6 +119,7 @@ def flatten(table: TableData, tables: Mapping[str, TableData]) -> FlatTable:
         fallback=table.settings.fallback,
         policy=table.settings.policy,
         assume=table.settings.assume,
+        expected=table.settings.expected,
         when=rules.name if rules else None,
     )
     texts = (asset, *outputs, *([rules] if rules else []), *(c.texts for c in columns))

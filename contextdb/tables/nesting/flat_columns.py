@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.grammar import format_cell
 from contextdb.cells.sets import ANY, Cell, TagMeet, meet
 from contextdb.columns import TextColumn
-from contextdb.compiled.classes import ColumnMasks, column_masks
 from contextdb.compiled.layers import Layers
+from contextdb.compiled.soft import SoftMasks
 from contextdb.tables.condition_column import ConditionColumn
 from contextdb.tables.nesting.expansion import Expansion
 
@@ -42,15 +41,14 @@ class FlatColumn(ConditionColumn):
         return cls(condition, texts, tuple(cell for _, cell in met), {}, tuple(sources), layers)
 
     @cached_property
-    def soft(self) -> tuple[ColumnMasks, NDArray[np.float64]] | None:
-        """Of soft cells, one row for each row of each depth: masks of those that match, and the penalties float64 [D n]."""
+    def soft(self) -> SoftMasks | None:
+        """What soft cells cost, one row for each row of each depth: D n rows."""
         cells, used = _Cells(self.sources), np.unique(self.layers.codes)
         soft = [cells[c] if cells[c].is_soft else ANY for c in used.tolist()]
         if all(cell.is_any for cell in soft):
             return None
         codes = np.searchsorted(used, self.layers.codes).astype(np.int32).reshape(-1)
-        penalties = np.array([cell.penalty or 0.0 for cell in soft])
-        return column_masks([Cell(cell.accepts) for cell in soft], codes, self.condition.domain), penalties[codes]
+        return SoftMasks.of(soft, codes, self.condition.domain)
 
 
 class _Cells:

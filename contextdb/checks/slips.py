@@ -1,0 +1,166 @@
+"""What saved contexts must reach so that a slip in a table makes one of them fail.
+
+A slip is a row left out, an end of a range moved, a bool flipped, or a value or a tag left out (`contextdb.cells.mutated`). One
+more table holds the rows of the table, and behind them the rows after each slip: its answer says what every slip does in a context.
+A slip is noticed where an asset becomes valid, or no longer is; another row of the same asset hides it.
+
+n rows, M slips of cells, N contexts. The targets of contexts are the rows to be valid, the rows to be picked, the rows left out,
+then the slips of cells: T = 3 n + M of them. Flags of rows are those of the table, then those after each slip: bool [N, n + M].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from contextdb.bitmask import Flags
+from contextdb.cells.grammar import format_cell
+from contextdb.cells.mutated import mutated
+from contextdb.columns import TextColumn
+from contextdb.compiled.choosing import Choosing
+from contextdb.compiled.data import CompiledData
+from contextdb.compiled.table import data_of
+from contextdb.covering.assumed import opened
+from contextdb.errors import Fault, Place, TableError, in_quotes
+from contextdb.schema.table_settings import TableSettings
+from contextdb.tables.nesting.flat import FlatTable
+from contextdb.tables.nesting.plain import as_plain
+from contextdb.tables.table import Table
+
+VALID, PICKED, LEFT_OUT = "valid", "picked", "left out"
+
+
+@dataclass(frozen=True, slots=True)
+class Slip:
+    """A cell of a row after a slip."""
+
+    row: int
+    condition: str
+    what: str
+    """What slipped: "from 0.2", "True"."""
+    cell: str
+    is_end: bool
+
+    @property
+    def text(self) -> str:
+        return f"{self.condition} {self.what}"
+
+
+@dataclass(frozen=True, eq=False)
+class Slips:
+    """A table, and the slips of its cells."""
+
+    table: Table
+    """Flat."""
+    choosing: Choosing
+    """How the table as it is written decides between these rows."""
+    slips: tuple[Slip, ...]
+
+    @classmethod
+    def of(cls, table: Table) -> Slips:
+        """Raises TableError where cells cannot be read, or tags are required in a way that no cell can say."""
+        choosing = data_of(table.compile()).once(Choosing.of)
+        plain = _plain(table)
+        return cls(plain, choosing, tuple(_slips(plain)))
+
+    @property
+    def n_rows(self) -> int:
+        return self.table.n_rows
+
+    @property
+    def n_targets(self) -> int:
+        return 3 * self.n_rows + len(self.slips)
+
+    @cached_property
+    def slipped(self) -> Table:
+        """The rows of the table, then those after each slip."""
+        n = self.n_rows
+        longer = self.table.with_rows_taken([*range(n), *(slip.row for slip in self.slips)])
+        return longer.with_cells((n + k, slip.condition, slip.cell) for k, slip in enumerate(self.slips))
+
+    @cached_property
+    def compiled(self) -> CompiledData:
+        """The rows after each slip, compiled with those of the table."""
+        return data_of(self.slipped.compile())
+
+    def hits(self, valid: Flags) -> Flags:
+        """Which targets each of some contexts reaches, by its valid rows: bool [N, T]."""
+        n = self.n_rows
+        own = valid[:, :n]
+        is_hidden = self._is_hidden(own)
+        rows = np.array([slip.row for slip in self.slips], np.int64)
+        is_noticed = (valid[:, n:] != own[:, rows]) & ~is_hidden[:, rows]
+        return np.concatenate([own, self.choosing.pickable_of(own), own & ~is_hidden, is_noticed], axis=1)
+
+    def _is_hidden(self, own: Flags) -> Flags:
+        """Whether another row of its asset is valid: bool [N, n]."""
+        counts = np.zeros((len(own), len(set(self.table.assets))), np.int32)
+        for row, asset in enumerate(self._asset_numbers):
+            counts[:, asset] += own[:, row]
+        return np.asarray(counts[:, self._asset_numbers] > own)
+
+    @cached_property
+    def _asset_numbers(self) -> list[int]:
+        numbers: dict[str, int] = {}
+        return [numbers.setdefault(asset, len(numbers)) for asset in self.table.assets]
+
+    def rows_of_asset(self, row: int) -> list[int]:
+        """The other rows of a row's asset."""
+        number = self._asset_numbers[row]
+        return [other for other, own in enumerate(self._asset_numbers) if own == number and other != row]
+
+    def asset_of(self, target: int) -> str:
+        return self.table.assets[self.row_of(target)]
+
+    def row_of(self, target: int) -> int:
+        return target % self.n_rows if target < 3 * self.n_rows else self.slips[target - 3 * self.n_rows].row
+
+    def kind_of(self, target: int) -> str | Slip:
+        """What a target is: a row to be valid, picked or left out, or a slip."""
+        kinds = (VALID, PICKED, LEFT_OUT)
+        return kinds[target // self.n_rows] if target < 3 * self.n_rows else self.slips[target - 3 * self.n_rows]
+
+
+def _slips(table: Table) -> Iterator[Slip]:
+    is_drawn = opened(table).drawer is not None  # draws meet no single number
+    for column in table.conditions:
+        condition = column.condition
+        of_code = {
+            code: [(m.what, format_cell(m.cell, condition.domain), m.is_end) for m in mutated(cell, condition.domain, is_drawn)]
+            for code, cell in enumerate(column.cells)
+        }
+        for row in np.flatnonzero(table.enabled).tolist():
+            for what, cell, is_end in of_code[int(column.texts.codes[row])]:
+                yield Slip(row, condition.name, what, cell, is_end)
+
+
+def _plain(table: Table) -> Table:
+    """A table whose rows are all its own; what refers to other tables becomes their rows."""
+    flat = table.flat()
+    if not isinstance(flat, FlatTable):
+        return table
+    plain = as_plain(flat)
+    if plain is None:
+        problem = f"tags of {in_quotes(table.name)} and of a table inside it have requirements that no single cell can describe."
+        raise TableError(Fault(problem, place=Place(str(table.path) if table.path else None)))
+    enabled = TextColumn.of("\0enabled", map(str, plain.enabled.tolist()))
+    when = plain.settings.when
+    rules = [column for column in plain.columns if column.name == when]
+    columns = [TextColumn.of(plain.asset_column, plain.assets), enabled, *rules, *(column.texts for column in plain.conditions)]
+    settings = TableSettings(plain.name, asset=plain.asset_column, enabled=enabled.name, when=when, assume=plain.settings.assume)
+    return Table.build(plain.name, columns, plain.schema, settings, table.path)
+
+
+def flags_of(bits: Sequence[int], n_rows: int) -> Flags:
+    """Sets of rows, as bits, as flags: bool [N, n_rows]."""
+    raw = b"".join(one.to_bytes((n_rows + 7) // 8, "little") for one in bits)
+    packed = np.frombuffer(raw, np.uint8).reshape(len(bits), -1)
+    return np.unpackbits(packed, axis=1, bitorder="little", count=n_rows).astype(np.bool_)
+
+
+def bits_of(flags: Flags) -> int:
+    """Flags as bits."""
+    return int.from_bytes(np.packbits(flags, bitorder="little").tobytes(), "little")

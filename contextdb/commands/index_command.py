@@ -1,0 +1,140 @@
+"""Write one Parquet file of the rows of all projects below a folder, for polars, DuckDB or pandas.
+
+Its columns are project, table, owner, file, row (from 0), line, asset, cells (those that are not Any), outputs, last_change and
+moments. last_change is the time of the last commit that changed the row's line, else of the file. moments counts the recorded
+moments in which the row is valid, with --telemetry; without, and where rows refer to tables, it is null. Links and hidden folders
+are passed over. A project that cannot be read is named and left out; the command then exits with 1.
+
+  contextdb index games/ --out rows.parquet
+  contextdb index games/ --out rows.parquet --telemetry "play/*.parquet"
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from contextdb.commands.git_tree import is_in_a_repository, run_git
+from contextdb.commands.projects_below import extend_up_to, project_folders
+from contextdb.console import ExitCode, note, output, printable, progress
+from contextdb.disk import write_atomic
+from contextdb.errors import ContextDBError, Fault, FileError, Place, plural
+from contextdb.tables.project import Project
+from contextdb.tables.table import Table
+
+if TYPE_CHECKING:
+    import polars as pl
+else:
+    from contextdb.columns import polars as pl
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("folder", metavar="ROOT", help="a folder with projects below it")
+    parser.add_argument("--out", metavar="FILE", required=True, help="the .parquet file to write; one that is there is replaced")
+    parser.add_argument("--telemetry", action="append", metavar="GLOB", help="files of recorded contexts; may be repeated")
+
+
+def run(arguments: argparse.Namespace) -> ExitCode:
+    out = Path(arguments.out)
+    if out.suffix.lower() != ".parquet":
+        raise FileError(Fault("the file does not end in .parquet.", "FILE.parquet", place=Place(arguments.out)))
+    folders = project_folders(arguments.folder)
+    extend_up_to(arguments.folder)
+    rows: list[dict[str, object]] = []
+    n_tables = n_left_out = 0
+    for folder in progress(folders, "reading"):
+        try:
+            project = Project.load(folder)
+        except ContextDBError as error:
+            n_left_out += 1
+            note(*error.faults)
+            continue
+        n_tables += len(project)
+        for table in project.tables.values():
+            rows += _rows(table, Path(os.path.relpath(folder, arguments.folder)).as_posix(), arguments.telemetry or ())
+    buffer = io.BytesIO()
+    pl.DataFrame(rows, schema=_columns()).write_parquet(buffer)
+    write_atomic(out, buffer.getvalue())
+    with output():
+        sizes = f"{plural(len(rows), 'row')} of {plural(n_tables, 'table')} in {plural(len(folders) - n_left_out, 'project')}"
+        print(printable(f"{out}: {sizes}"))
+    return ExitCode.FOUND if n_left_out else ExitCode.OK
+
+
+def _columns() -> dict[str, Any]:
+    pairs = pl.List(pl.Struct({"name": pl.String, "text": pl.String}))
+    texts = dict.fromkeys(("project", "table", "owner", "file"), pl.String)
+    whole = {"row": pl.Int64, "line": pl.Int64}
+    return (
+        texts
+        | whole
+        | {"asset": pl.String, "cells": pairs, "outputs": pairs, "last_change": pl.Datetime("ms", "UTC"), "moments": pl.Int64}
+    )
+
+
+def _rows(table: Table, project: str, telemetry: Sequence[str]) -> Iterator[dict[str, object]]:
+    names = {column.condition.name: column for column in table.conditions}
+    data = [column for column in table.columns if column.name in table.settings.outputs]
+    changed, hits = _last_changes(table), _hits(table, telemetry)
+    for row, asset in enumerate(table.assets):
+        cells = [(name, c.texts[row]) for name, c in names.items() if not c.cells[int(c.texts.codes[row])].is_any]
+        line = table.place(row).line
+        yield {
+            "project": project,
+            "table": table.name,
+            "owner": table.settings.owner or None,
+            "file": None if table.path is None else table.path.name,
+            "row": row,
+            "line": line,
+            "asset": asset,
+            "cells": [{"name": name, "text": text} for name, text in cells],
+            "outputs": [{"name": column.name, "text": column[row]} for column in data],
+            "last_change": changed.get(line, changed[None]),
+            "moments": None if hits is None else hits[row],
+        }
+
+
+def _hits(table: Table, telemetry: Sequence[str]) -> Sequence[int] | None:
+    """For each row the recorded moments in which it is valid; None where nothing is recorded, or rows refer to tables."""
+    if not telemetry or table.flat().n_rows != table.n_rows:
+        return None
+    from contextdb.telemetry.observe import observe
+
+    try:
+        return observe(table, list(telemetry)).hits
+    except ContextDBError as error:
+        note(f"{table.name}: {error.faults[0].message}")
+        return None
+
+
+def _last_changes(table: Table) -> Mapping[int | None, datetime]:
+    """When each line of a table's file was changed last, by its number from 1; under None when the file was."""
+    assert table.path is not None
+    written = datetime.fromtimestamp(os.path.getmtime(table.path), UTC)
+    folder = table.path.parent
+    if not is_in_a_repository(folder):
+        return {None: written}
+    code, blamed = run_git(folder, "blame", "--porcelain", "--", table.path.name)
+    if code or table.path.suffix.lower() == ".parquet":
+        code, committed = run_git(folder, "log", "-1", "--format=%ct", "--", table.path.name)
+        return {None: datetime.fromtimestamp(int(committed), UTC) if not code and committed.strip() else written}
+    return {None: written} | dict(_blamed(blamed, written))
+
+
+def _blamed(text: bytes, written: datetime) -> Iterator[tuple[int, datetime]]:
+    """The lines of `git blame --porcelain`: each with its time; a line that is not committed yet has that of the file."""
+    times: dict[bytes, datetime] = {}
+    commit, line = b"", 0
+    for part in text.split(b"\n"):
+        words = part.split(b" ")
+        if part.startswith(b"\t"):
+            yield line, times.get(commit, written)
+        elif len(words) >= 3 and len(words[0]) in (40, 64) and words[1].isdigit():
+            commit, line = words[0], int(words[2])
+        elif words[0] == b"committer-time" and commit.strip(b"0"):
+            times[commit] = datetime.fromtimestamp(int(words[1]), UTC)

@@ -1,0 +1,671 @@
+/* ---- Characters of a bundle, for games.
+ *
+ *   cdbm_open_player      a controller of a bundle: what its characters share, checked; never changed, so threads may share it
+ *   cdbm_state_size, cdbm_pose_size, cdbm_room_size   how much memory a character, a pose and a call take
+ *   cdbm_begin            a character that has not done anything yet
+ *   cdbm_update           body, path, search and pose, some time later
+ *   cdbm_update_all       a crowd: each database is searched once for all
+ *
+ * A character is one flat block of numbers without an address in it: copied, it is another one that stands where the first does; put
+ * back, it goes on from there. Equal blocks have equal futures, on every machine. Only opening takes memory (CDB_MALLOC); a call
+ * works in room that it is given, which only one call uses at a time.
+ *
+ * A game gives the facts of each table, or its valid rows. A fact that is missing and that the character knows itself (its speed, the
+ * direction of its stick, its turn) it adds. */
+
+#define CDBM_MOST_DATABASES 64
+#define CDBM_MOST_TABLES 16
+#define CDBM_MOST_BELOW 16          /* so many feet may feel a ground */
+
+typedef struct cdbm_player {
+    cdbm_controller controller;
+    cdbm_clips clips[CDBM_MOST_DATABASES];
+    cdbm_frames frames[CDBM_MOST_DATABASES];
+    cdbm_table_ranges tables[CDBM_MOST_DATABASES]; /* the rows that name the ranges of each database, where it has a table */
+    int64_t table_of[CDBM_MOST_DATABASES], bank_of[CDBM_MOST_DATABASES], database_of[CDBM_MOST_DATABASES]; /* in the bundle; -1: none */
+    const int64_t *pose_ranges[CDBM_MOST_DATABASES]; /* [R] the range of poses of each range */
+    cdbm_ways ways;
+    cdbo_poses poses;
+    cdbo_frames banks[CDBM_MOST_DATABASES];
+    const cdbo_frames *bank_list[CDBM_MOST_DATABASES];
+    const double *range_biases, *kind_biases;
+    const uint8_t *allowed, *playable;
+    size_t n_ranges, n_kinds;
+    double velocity_halflife_s, heading_halflife_s;
+    int has_poses, has_costs;
+    cdb_any *opened[CDBM_MOST_TABLES];
+    cdb_row_play *plays;            /* of the rows of all tables, one after the other; NULL where none says */
+    int64_t plays_at[CDBM_MOST_TABLES]; /* where those of each table begin; -1 where it says nothing */
+    size_t n_tables, n_most_rows;
+    cdbm_bundle bundle;
+    size_t number;                  /* of the controller */
+} cdbm_player;
+
+/* The ground at a place: its height, and by how much it rises along x and z. */
+typedef void (*cdbm_ground)(void *user, double x, double z, double *ground);
+
+typedef struct cdbm_input {
+    cdbo_goal goal;                 /* the velocity that the stick asks for, m/s, and the heading, NaN: where the body goes */
+    const cdbo_body *body;          /* where a game that moves bodies itself has this one now; or NULL */
+    const double *positions, *headings; /* the path that a game plans, from now on, [n_path, 2] and [n_path]; or NULL */
+    size_t n_path;
+    double path_rate;
+    const cdb_fact *const *facts;   /* of each table of the bundle the facts in the order of its schema, NULL: none is known; or NULL */
+    cdb_unknown unknown;            /* what a missing fact does */
+    cdb_fault *fault;               /* which fact was refused; or NULL */
+    const uint64_t *const *rows;    /* in place of facts the valid rows of each table, NULL: all are valid; or NULL */
+    const uint64_t *const *mirrored; /* and those with the facts as a mirror shows them; NULL: the same */
+    cdbm_ground ground;             /* or NULL, where all is flat */
+    void *user;                     /* what the ground is asked with */
+    int force, interrupt;           /* search now; and leave what plays */
+} cdbm_input;
+
+typedef struct cdbm_pose {          /* where an update writes; cdbm_lay_out gives it its places */
+    cdbm_decision decision;
+    double root[3];                 /* x, z and heading */
+    double *rotations, *translations, *positions; /* [J, 4] and [J, 3] against parents, [J, 3] in the world */
+    unsigned char *contacts;        /* [F] which feet are down */
+    int is_jump;
+} cdbm_pose;
+
+/* ---- opening */
+
+static inline void cdbm_close_player(cdbm_player *player)
+{
+    size_t i;
+    for (i = 0; i < player->controller.n_databases; i++) cdbm_free_levels(&player->frames[i]);
+    for (i = 0; i < player->n_tables; i++) cdb_close_any(player->opened[i]);
+    CDB_FREE(player->plays);
+    player->controller.n_databases = player->n_tables = 0, player->plays = NULL;
+}
+
+/* Open the tables, and put together how their rows play. */
+static inline void cdbm_read_tables(cdbm_bundle *bundle, cdbm_player *player)
+{
+    size_t n_tables = cdbm_count(bundle, CDBM_P_TABLE), size, n = 0, i;
+    if (n_tables > CDBM_MOST_TABLES) cdbm_refuse(bundle, "it has more tables than can be read");
+    for (i = 0; !bundle->why && i < n_tables; i++) {
+        const void *bytes = cdbm_find(bundle, CDBM_P_TABLE, i, 1, &size);
+        cdb_any *any = player->opened[i] = cdb_open_any(bytes, size, NULL);
+        if (!any || any->schema.n_conditions > CDB_MOST_FACTS) cdbm_refuse(bundle, "a table of the bundle cannot be opened");
+        player->n_tables = i + 1, player->plays_at[i] = -1;
+        if (!any) return;
+        if (any->table.n_rows + 64 > player->n_most_rows) player->n_most_rows = any->table.n_rows + 64;
+        player->has_costs |= any->table.soft != NULL;
+        if (any->table.plays) player->plays_at[i] = (int64_t)n, n += any->table.n_rows + 1;
+    }
+    if (bundle->why || n == 0) return;
+    player->plays = (cdb_row_play *)CDB_MALLOC(n * sizeof(cdb_row_play));
+    if (!player->plays) cdbm_refuse(bundle, "there is not enough memory");
+    for (i = 0; player->plays && i < n_tables; i++)
+        if (player->plays_at[i] >= 0)
+            memcpy(player->plays + player->plays_at[i], player->opened[i]->table.plays, (player->opened[i]->table.n_rows + 1) * sizeof(cdb_row_play));
+}
+
+/* Which rows name the ranges of a database. */
+static inline void cdbm_read_rows(cdbm_bundle *bundle, size_t number, size_t n_ranges, size_t n_table_rows, cdbm_table_ranges *of)
+{
+    size_t n_rows = 0, i;
+    memset(of, 0, sizeof *of);
+    of->n_ranges = n_ranges;
+    of->starts = CDBM_TAKE(int64_t, CDBM_P_ROW_STARTS, n_ranges + 1), of->rows = CDBM_TAKE_ALL(int64_t, CDBM_P_ROWS, &n_rows);
+    of->mirrored = CDBM_TAKE(uint8_t, CDBM_P_MIRRORED, n_ranges);
+    if (bundle->why) return;
+    if (of->starts[0] != 0 || (uint64_t)of->starts[n_ranges] != n_rows) cdbm_refuse(bundle, "the rows of a table do not go together");
+    for (i = 0; i < n_ranges; i++)
+        if (of->starts[i] > of->starts[i + 1] || of->starts[i] < 0 || of->mirrored[i] > 1)
+            cdbm_refuse(bundle, "the rows of a table do not go together");
+    for (i = 0; i < n_rows; i++)
+        if (of->rows[i] < 0 || (uint64_t)of->rows[i] >= n_table_rows) cdbm_refuse(bundle, "a row of a table is not there");
+}
+
+static inline void cdbm_read_entry(cdbm_bundle *bundle, cdbm_player *player, size_t i, const int64_t *entry, double threshold, double bar)
+{
+    cdbm_clips *clips = &player->clips[i];
+    size_t number = (size_t)entry[0], r;
+    cdbo_frames *bank;
+    cdbm_read_database(bundle, number, &player->frames[i], clips);
+    clips->threshold = threshold, clips->bar = bar;
+    clips->range_at = player->n_ranges, clips->kind_at = player->n_kinds;
+    player->database_of[i] = entry[0], player->table_of[i] = entry[2];
+    if (bundle->why) return;
+    if (i == 0) player->controller.n_features = clips->frames->n_features;
+    if (clips->frames->n_features != player->controller.n_features) cdbm_refuse(bundle, "two databases have other features");
+    player->n_ranges += clips->n_ranges, player->n_kinds += clips->n_kinds;
+    if (entry[2] >= (int64_t)player->n_tables) cdbm_refuse(bundle, "a database has a table that is not there");
+    else if (entry[2] >= 0) {
+        cdbm_read_rows(bundle, number, clips->n_ranges, player->opened[entry[2]]->table.n_rows, &player->tables[i]);
+        player->tables[i].plays = player->opened[entry[2]]->table.plays;
+    }
+    player->tables[i].at = clips->range_at;
+    if (!player->has_poses || entry[1] < 0) {
+        if (player->has_poses && clips->n_ranges > 0) cdbm_refuse(bundle, "a database has no poses");
+        return;
+    }
+    player->pose_ranges[i] = CDBM_TAKE(int64_t, CDBM_P_POSE_RANGES, clips->n_ranges);
+    bank = &player->banks[player->poses.n_banks];
+    cdbm_read_bank(bundle, (size_t)entry[1], &player->poses.rig, bank);
+    for (r = 0; !bundle->why && r < clips->n_ranges; r++)
+        if (player->pose_ranges[i][r] < 0 || (uint64_t)player->pose_ranges[i][r] >= bank->n_ranges) cdbm_refuse(bundle, "a clip has no poses");
+    player->bank_of[i] = (int64_t)player->poses.n_banks;
+    player->bank_list[player->poses.n_banks++] = bank;
+}
+
+static inline void cdbm_read_output(cdbm_bundle *bundle, size_t number, cdbm_player *player)
+{
+    const double *settings = CDBM_TAKE(double, CDBM_P_OUTPUT, CDBO_N_SETTINGS), *joints = CDBM_TAKE(double, CDBM_P_JOINTS, 2);
+    if (bundle->why) return;
+    memcpy(player->poses.settings, settings, sizeof player->poses.settings);
+    player->poses.banks = player->bank_list;
+    cdbm_read_rig(bundle, number, &player->poses.rig, joints);
+    if (player->poses.rig.n_feet > CDBM_MOST_BELOW) cdbm_refuse(bundle, "a rig has more feet than can feel a ground");
+}
+
+/* Read a controller of a bundle, by its name, or the first where that is NULL; the player stays where it is while it is used. Gives why
+ * it is refused, and NULL where it is not. */
+static inline const char *cdbm_open_player(cdbm_player *player, const cdbm_bundle *from, const char *name)
+{
+    cdbm_bundle *bundle = &player->bundle;
+    cdbm_controller *to = &player->controller;
+    size_t number = 0, n_entries = 0, n_settings = 0, i;
+    const int64_t *entries;
+    const double *settings, *thresholds, *bars;
+    const char *own;
+    memset(player, 0, sizeof *player);
+    *bundle = *from;
+    while (name && (own = cdbm_text(bundle, CDBM_P_CONTROLLER_NAME, number, 0)) != NULL && strcmp(own, name) != 0) number++;
+    player->number = number;
+    if (!cdbm_text(bundle, CDBM_P_CONTROLLER_NAME, number, 0)) return "the bundle has no controller of that name";
+    entries = CDBM_TAKE_ALL(int64_t, CDBM_P_ENTRIES, &n_entries);
+    settings = CDBM_TAKE_ALL(double, CDBM_P_SETTINGS, &n_settings);
+    if (n_entries % 3 || n_entries == 0 || n_entries / 3 > CDBM_MOST_DATABASES || n_settings != 11) cdbm_refuse(bundle, "a controller is damaged");
+    if (bundle->why) return bundle->why;
+    n_entries /= 3;
+    thresholds = CDBM_TAKE(double, CDBM_P_THRESHOLDS, n_entries), bars = CDBM_TAKE(double, CDBM_P_BARS, n_entries);
+    to->n_played = cdbm_size_from(settings[0]), to->search_every_s = settings[1], to->jump_threshold_s = settings[2];
+    to->history_s = settings[3], to->min_rate = settings[4], to->max_rate = settings[5], to->grace_s = settings[6];
+    to->until_natural = settings[7] != 0.0, player->has_poses = settings[8] != 0.0;
+    player->velocity_halflife_s = player->heading_halflife_s = settings[9], player->ways.rate = settings[10];
+    for (i = 0; i < n_settings; i++)
+        if (!(settings[i] >= 0.0 && settings[i] <= 1e6)) cdbm_refuse(bundle, "a setting of a controller is none");
+    if (to->n_played > 1024) cdbm_refuse(bundle, "a controller is damaged");
+    cdbm_read_tables(bundle, player);
+    if (player->has_poses && !bundle->why) cdbm_read_output(bundle, number, player);
+    to->databases = player->clips;
+    for (i = 0; !bundle->why && i < n_entries; i++) {
+        to->n_databases = i + 1;
+        cdbm_read_entry(bundle, player, i, entries + 3 * i, thresholds[i], bars[i]);
+        if (!bundle->why && !(player->clips[i].rate <= 1e6)) cdbm_refuse(bundle, "the rate of a database is none");
+    }
+    player->range_biases = CDBM_TAKE(double, CDBM_P_RANGE_BIASES, player->n_ranges);
+    player->allowed = CDBM_TAKE(uint8_t, CDBM_P_ALLOWED, player->n_kinds), player->playable = CDBM_TAKE(uint8_t, CDBM_P_PLAYABLE, player->n_kinds);
+    player->kind_biases = CDBM_TAKE(double, CDBM_P_KIND_BIASES, player->n_kinds);
+    player->ways.steps = CDBM_TAKE_ALL(double, CDBM_P_STEPS, &player->ways.n_points);
+    player->ways.features = (const cdbo_path_feature *)CDBM_TAKE(int64_t, CDBM_P_FEATURES, 3 * player->ways.n_points);
+    player->ways.velocities = CDBM_TAKE_ALL(int64_t, CDBM_P_VELOCITIES, &player->ways.n_velocities);
+    player->ways.n_features = to->n_features;
+    if (!bundle->why && !cdbm_open_ways(&player->ways)) cdbm_refuse(bundle, "a feature of a path is not there");
+    if (!bundle->why && player->has_poses && !cdbo_poses_open(&player->poses)) cdbm_refuse(bundle, "the rig and its banks do not go together");
+    if (bundle->why) cdbm_close_player(player);
+    return bundle->why;
+}
+
+/* ---- memory */
+
+/* How many numbers a character is: its walk, what it plays, what it displays, and its pose. */
+static inline size_t cdbm_state_width(const cdbm_player *player)
+{
+    return cdbm_walk_width(&player->ways) + cdbm_width(&player->controller) + 3 + (player->has_poses ? player->poses.width : 0);
+}
+
+static inline size_t cdbm_state_size(const cdbm_player *player)
+{
+    return cdbm_state_width(player) * sizeof(double);
+}
+
+static inline double *cdbm_played_part(const cdbm_player *player, double *state)
+{
+    return state + cdbm_walk_width(&player->ways);
+}
+
+static inline cdbo_instant *cdbm_displayed(const cdbm_player *player, double *state)
+{
+    return (cdbo_instant *)(void *)(cdbm_played_part(player, state) + cdbm_width(&player->controller));
+}
+
+static inline double *cdbm_pose_part(const cdbm_player *player, double *state)
+{
+    return cdbm_played_part(player, state) + cdbm_width(&player->controller) + 3;
+}
+
+/* How many bytes a pose takes beside its cdbm_pose. */
+static inline size_t cdbm_pose_size(const cdbm_player *player)
+{
+    return cdbm_rounded(10 * player->poses.rig.n_joints * sizeof(double)) + cdbm_rounded(player->poses.rig.n_feet + 1);
+}
+
+static inline void cdbm_lay_out(const cdbm_player *player, cdbm_pose *pose, void *memory)
+{
+    size_t n_joints = player->poses.rig.n_joints;
+    memset(pose, 0, sizeof *pose);
+    pose->rotations = (double *)memory, pose->translations = pose->rotations + 4 * n_joints;
+    pose->positions = pose->translations + 3 * n_joints;
+    pose->contacts = (unsigned char *)memory + cdbm_rounded(10 * n_joints * sizeof(double));
+}
+
+/* How many bytes the answer of a table takes. */
+static inline size_t cdbm_answer_room(const cdbm_player *player)
+{
+    return 2 * (cdbm_rounded(player->n_most_rows / 8 + 8) + cdbm_rounded(player->n_most_rows * sizeof(double))) + 64;
+}
+
+/* How many bytes of room a call for so many characters takes. */
+static inline size_t cdbm_room_size(const cdbm_player *player, size_t n)
+{
+    size_t n_features = player->controller.n_features, n_frames = cdbm_most_frames(&player->ways);
+    size_t each = cdbm_rounded(cdbm_state_size(player)) + cdbm_rounded(n_features * sizeof(double)) + cdbm_rounded(sizeof(cdbm_moved))
+        + cdbm_rounded(player->n_ranges) + 2 * cdbm_rounded(player->n_ranges * sizeof(double)) + 2 * cdbm_rounded(cdbm_width(&player->controller) * sizeof(double)) + 64
+        + cdbm_rounded(player->controller.n_databases * sizeof(cdbm_found)) + cdbm_rounded(sizeof(cdbm_decision));
+    return n * each + cdbm_rounded((4 * n_frames + 3 * n_features) * sizeof(double)) + cdbm_choice_room(&player->controller, n)
+        + cdbm_rounded((player->has_poses ? cdbo_pose_room(&player->poses) : 0) * sizeof(double)) + cdbm_rounded(CDBM_MOST_DATABASES) + cdbm_answer_room(player) + 256;
+}
+
+/* A character that stands at a place and has not done anything yet. */
+static inline void cdbm_begin(const cdbm_player *player, double *state, double x, double z, double heading)
+{
+    cdbm_state *played;
+    cdbo_body body;
+    memset(&body, 0, sizeof body);
+    memset(state, 0, cdbm_state_size(player));
+    body.position[0] = x, body.position[1] = z, body.heading = heading;
+    body.velocity_halflife_s = player->velocity_halflife_s, body.heading_halflife_s = player->heading_halflife_s;
+    cdbm_begin_walk(&player->ways, &body, state);
+    played = (cdbm_state *)(void *)cdbm_played_part(player, state);
+    played->play = cdbm_plain_play(), played->rate = 1.0, played->waiting_since_s = NAN, played->playing.database = CDBM_NO_DATABASE;
+    cdbm_displayed(player, state)->bank = -1.0;
+    if (player->has_poses) cdbo_poses_begin(&player->poses, cdbm_pose_part(player, state));
+}
+
+/* Whether a block may be a character of this player: to be asked of one that comes from elsewhere. */
+static inline int cdbm_is_state(const cdbm_player *player, const double *state)
+{
+    double *own = (double *)(uintptr_t)state;
+    const cdbm_walk *walk = (const cdbm_walk *)(const void *)state;
+    const cdbm_state *played = (const cdbm_state *)(const void *)cdbm_played_part(player, own);
+    const cdbo_instant *displayed = cdbm_displayed(player, own);
+    if (!(walk->n_trail >= 0.0 && walk->n_trail <= (double)player->ways.n_trail)) return 0;
+    if (!(played->n_played >= 0.0 && played->n_played <= (double)player->controller.n_played)) return 0;
+    if (!cdbm_is_playing(&player->controller, &played->playing)) return 0;
+    return !player->has_poses || displayed->bank < 0.0 || cdbo_is_moment(&player->poses, displayed->bank, displayed->range);
+}
+
+/* ---- an update */
+
+typedef struct cdbm_many {          /* a crowd in an update, in room */
+    double *states, *queries, *biases;
+    int64_t *play_of;
+    cdbm_moved *moved;
+    cdbm_found *found;
+    cdbm_decision *decisions;
+    uint8_t *ranges, *among, *urgent;
+} cdbm_many;
+
+static inline int cdbm_take_many(const cdbm_player *player, size_t n, cdbm_many *many, cdbm_room *room)
+{
+    many->states = (double *)cdbm_part(room, n * cdbm_state_size(player));
+    many->queries = (double *)cdbm_part(room, n * player->controller.n_features * sizeof(double));
+    many->moved = (cdbm_moved *)cdbm_part(room, n * sizeof *many->moved);
+    many->found = (cdbm_found *)cdbm_part(room, n * player->controller.n_databases * sizeof *many->found);
+    many->decisions = (cdbm_decision *)cdbm_part(room, n * sizeof *many->decisions);
+    many->ranges = (uint8_t *)cdbm_part(room, n * player->n_ranges), many->urgent = (uint8_t *)cdbm_part(room, n);
+    many->biases = (double *)cdbm_part(room, n * player->n_ranges * sizeof(double));
+    many->play_of = (int64_t *)cdbm_part(room, n * player->n_ranges * sizeof(int64_t));
+    if (!many->biases || !many->play_of) return 0;
+    many->among = (uint8_t *)cdbm_part(room, player->controller.n_databases);
+    return many->states && many->queries && many->moved && many->found && many->decisions && many->ranges && many->urgent && many->among;
+}
+
+/* ---- what the tables say */
+
+/* What follows a letter in the texts of a part, where one of them begins with it and goes on with a name; NULL where none does. A text
+ * of two parts has its second behind a '='. */
+static inline const char *cdbm_said_of(const cdbm_player *player, uint32_t kind, size_t table, const char *name, char *letter)
+{
+    size_t n, at, length = strlen(name);
+    const char *texts = (const char *)cdbm_find(&player->bundle, kind, table, 1, &n);
+    if (!texts || n == 0 || texts[n - 1] != 0) return NULL;
+    for (at = 0; at < n; at += strlen(texts + at) + 1) {
+        const char *own = texts + at;
+        if (own[0] == 0 || strncmp(own + 1, name, length) != 0 || (own[length + 1] != 0 && own[length + 1] != '=')) continue;
+        *letter = own[0];
+        return own + length + 1 + (own[length + 1] == '=');
+    }
+    return NULL;
+}
+
+/* A fact that is not known; of a condition that is computed it is not looked at. */
+static inline cdb_fact cdbm_missing_fact(const cdb_condition *condition)
+{
+    cdb_fact fact;
+    memset(&fact, 0, sizeof fact);
+    if (condition->type == CDB_NUMBER || condition->type == CDB_ANGLE) fact.number = cdb_missing_number();
+    else if (condition->type == CDB_INT || condition->type == CDB_DATE) fact.whole = CDB_MISSING_INT;
+    else if (condition->type == CDB_BOOL || condition->type == CDB_ENUM) fact.whole = CDB_MISSING;
+    else if (condition->type == CDB_TAGS && condition->n_values == 0) fact.texts.count = CDB_MISSING;
+    return fact;
+}
+
+/* A fact that a game does not give and that the character knows itself. */
+static inline void cdbm_add_own(const cdbm_player *player, size_t table, size_t at, const cdbm_walk *walk, const cdbo_goal *goal, cdb_fact *fact)
+{
+    const cdb_condition *condition = &player->opened[table]->schema.conditions[at];
+    char letter = 0;
+    if (condition->expr || !cdbi_is_missing(condition, fact)) return;
+    if (condition->type != CDB_NUMBER && condition->type != CDB_ANGLE) return;
+    if (!cdbm_said_of(player, CDBM_P_OWN_FACTS, table, condition->name, &letter)) return;
+    if (letter == 's') fact->number = cdbo_flat_length(walk->body.velocity[0], walk->body.velocity[1]);
+    if (letter == 'd') fact->number = cdbm_direction(goal->velocity, walk->body.heading);
+    if (letter == 't') fact->number = walk->body.turn_rate * (180.0 / CDBO_PI);
+}
+
+/* The facts as a mirror shows them; whether any is another. */
+static inline int cdbm_mirror_facts(const cdbm_player *player, size_t table, const cdb_fact *facts, cdb_fact *to)
+{
+    const cdb_schema *schema = &player->opened[table]->schema;
+    size_t i;
+    int is_other = 0;
+    memcpy(to, facts, schema->n_conditions * sizeof *to);
+    for (i = 0; i < schema->n_conditions; i++) {
+        const cdb_condition *condition = &schema->conditions[i];
+        char letter = 0;
+        const char *more = cdbm_said_of(player, CDBM_P_MIRROR, table, condition->name, &letter);
+        int64_t left = facts[i].whole;
+        if (!more || cdbi_is_missing(condition, &facts[i])) continue;
+        is_other = 1;
+        if (letter == 'p') {
+            int other = cdb_condition_number(schema, more);
+            if (other >= 0 && schema->conditions[other].type == condition->type) to[other] = facts[i];
+        } else if (letter == 'v') { /* numbers of values, one after another */
+            for (; left > 0 && *more; left--) while (*more && *more++ != ' ') {}
+            for (to[i].whole = 0; *more >= '0' && *more <= '9' && to[i].whole < 1 << 20; more++) to[i].whole = 10 * to[i].whole + (*more - '0');
+        } else if (condition->type == CDB_BOOL) to[i].whole = !facts[i].whole;
+        else if (condition->type == CDB_INT) to[i].whole = -facts[i].whole;
+        else to[i].number = 0.0 - facts[i].number;
+    }
+    return is_other;
+}
+
+typedef struct cdbm_answer {        /* of a table, as it is and with mirrored facts */
+    const uint64_t *masks[2];
+    const double *costs[2];
+} cdbm_answer;
+
+/* Ask a table. 1; -2 for a fact that is refused. */
+static inline int cdbm_ask_table(const cdbm_player *player, size_t table, const cdbm_input *input, const cdbm_walk *walk,
+    cdbm_answer *answer, cdbm_room *room)
+{
+    const cdb_any *any = player->opened[table];
+    const cdb_schema *schema = &any->schema;
+    cdb_fact own[CDB_MOST_FACTS], mirrored[CDB_MOST_FACTS], *facts = own;
+    size_t n_words = any->table.n_words, n_rows = any->table.n_rows, i, side;
+    for (i = 0; i < schema->n_conditions; i++) {
+        own[i] = input->facts && input->facts[table] ? input->facts[table][i] : cdbm_missing_fact(&schema->conditions[i]);
+        cdbm_add_own(player, table, i, walk, &input->goal, &own[i]);
+    }
+    for (side = 0; side < 2; side++) {
+        uint64_t *mask = (uint64_t *)cdbm_part(room, n_words * sizeof(uint64_t));
+        double *costs = any->table.soft ? (double *)cdbm_part(room, n_rows * sizeof(double)) : NULL;
+        if (side == 1 && !cdbm_mirror_facts(player, table, own, mirrored)) {
+            answer->masks[1] = answer->masks[0], answer->costs[1] = answer->costs[0];
+            return 1;
+        }
+        if (side == 1) facts = mirrored;
+        if (!mask || (any->table.soft && !costs)) return 0;
+        if (cdb_query(&any->table, any->columns, schema, facts, input->unknown, mask, n_words, input->fault) != CDB_OK) return -2;
+        if (costs && cdb_penalties(&any->table, any->columns, schema, facts, input->unknown, costs, n_rows, input->fault) != CDB_OK) return -2;
+        answer->masks[side] = mask, answer->costs[side] = costs;
+    }
+    return 1;
+}
+
+/* Write which ranges the tables let play, what they add to their costs, and by which rows they play. 1; 0 with too little room; -2 for a
+ * fact that is refused. */
+static inline int cdbm_let_play(const cdbm_player *player, const cdbm_input *input, const double *state, uint8_t *ranges, double *biases,
+    int64_t *play_of, cdbm_room room)
+{
+    size_t table, i, r;
+    memset(ranges, 1, player->n_ranges);
+    memcpy(biases, player->range_biases, player->n_ranges * sizeof(double));
+    for (r = 0; r < player->n_ranges; r++) play_of[r] = -1;
+    for (table = 0; table < player->n_tables; table++) {
+        cdbm_answer answer = {{NULL, NULL}, {NULL, NULL}};
+        cdbm_room left = room;
+        for (i = 0; i < player->controller.n_databases; i++) {
+            if (player->table_of[i] != (int64_t)table) continue;
+            if (!answer.masks[0] && input->rows) {
+                answer.masks[0] = input->rows[table];
+                answer.masks[1] = input->mirrored && input->mirrored[table] ? input->mirrored[table] : answer.masks[0];
+                if (!answer.masks[0]) continue;
+            } else if (!answer.masks[0]) {
+                int is_done = cdbm_ask_table(player, table, input, (const cdbm_walk *)(const void *)state, &answer, &left);
+                if (is_done != 1) return is_done;
+            }
+            cdbm_fill_ranges(&player->tables[i], answer.masks, answer.costs[0] ? answer.costs : NULL, player->range_biases, ranges, biases,
+                player->plays_at[table] >= 0 ? play_of : NULL);
+            if (player->plays_at[table] > 0)
+                for (r = player->tables[i].at; r < player->tables[i].at + player->tables[i].n_ranges; r++)
+                    if (play_of[r] >= 0) play_of[r] += player->plays_at[table];
+        }
+    }
+    return 1;
+}
+
+/* Write the query of one: it is some time later, and wishes to take a path. 0 for a path without a frame. */
+static inline int cdbm_query_of(const cdbm_player *player, const cdbm_input *input, double dt_s, const double *before, double *state,
+    cdbm_moved *moved, double *query, cdbm_room room)
+{
+    const cdbm_ways *ways = &player->ways;
+    size_t n_most = cdbm_most_frames(ways), n_behind, n = cdbm_n_behind(ways, ways->rate);
+    double *positions = (double *)cdbm_part(&room, (4 * n_most + 3 * ways->n_features) * sizeof(double)), rate = ways->rate;
+    double *headings, *lengths, *pose;
+    float *narrow;
+    if (!positions) return 0;
+    headings = positions + 2 * n_most, lengths = headings + n_most, pose = lengths + n_most, narrow = (float *)(void *)(pose + ways->n_features);
+    cdbm_walk_on(ways, before, &input->goal, input->body, dt_s, state);
+    memcpy(cdbm_played_part(player, state), cdbm_played_part(player, (double *)(uintptr_t)before),
+        (cdbm_state_width(player) - cdbm_walk_width(ways)) * sizeof(double));
+    cdbm_move(&player->controller, cdbm_played_part(player, state), dt_s, moved);
+    if (moved->to.database < 0.0) cdbm_rest_pose(ways, state, player->frames[0].offset, pose);
+    else cdbm_features(player->clips[(size_t)moved->to.database].frames, (int64_t)moved->to.frame, pose);
+    if (input->positions) {
+        rate = input->path_rate, n_behind = rate > 0.0 ? cdbm_n_behind(ways, rate) : n_most;
+        if (input->n_path == 0 || n_behind >= n_most) return 0;
+        n = input->n_path < n_most - n_behind ? input->n_path : n_most - n_behind;
+        memcpy(positions + 2 * n_behind, input->positions, 2 * n * sizeof(double));
+        memcpy(headings + n_behind, input->headings, n * sizeof(double));
+        n += n_behind;
+    } else n = cdbm_n_wished(ways, state, &input->goal);
+    cdbm_wish(ways, state, input->positions ? NULL : &input->goal, rate, n, positions, headings);
+    cdbm_ask_path(ways, pose, rate, n, positions, headings, lengths, narrow, query);
+    return 1;
+}
+
+/* What plays, as its bank has it. */
+static inline cdbo_instant cdbm_instant_of(const cdbm_player *player, const cdbm_playing *playing)
+{
+    cdbo_instant at = {-1.0, 0.0, 0.0};
+    if (playing->database < 0.0) return at;
+    at.bank = (double)player->bank_of[(size_t)playing->database];
+    at.range = (double)player->pose_ranges[(size_t)playing->database][(size_t)playing->range], at.at_s = playing->at_s;
+    return at;
+}
+
+/* The pose of one, by what was decided. */
+static inline void cdbm_pose_of(const cdbm_player *player, const cdbm_input *input, double dt_s, const double *before, double *state,
+    cdbm_pose *pose, double *room)
+{
+    const cdbm_decision *decision = &pose->decision;
+    const cdbo_rig *rig = &player->poses.rig;
+    const cdbm_walk *walk = (const cdbm_walk *)(const void *)state;
+    cdbo_instant *displayed = cdbm_displayed(player, state);
+    double points[2 * CDBM_MOST_BELOW], below[3 * CDBM_MOST_BELOW], place[3];
+    size_t n_seams = 0, n_points = rig->n_feet > 0 ? rig->n_feet : 1, i;
+    cdbo_play play;
+    cdbo_given given;
+    cdbo_seam seams[2];
+    cdbo_posed one;
+    memset(&play, 0, sizeof play);
+    memset(&one, 0, sizeof one);
+    play.playing = cdbm_instant_of(player, &decision->playing), play.before = cdbm_instant_of(player, &decision->before);
+    play.displayed = *displayed, play.action = decision->action, play.rate = decision->rate, play.weight = decision->root_weight;
+    play.gives_ground = input->ground ? 1.0 : 0.0;
+    memcpy(play.motion, decision->motion, sizeof play.motion);
+    play.blend_s = decision->play.blend_s, play.root = decision->play.root;
+    one.poses = &player->poses, one.before = cdbm_pose_part(player, (double *)(uintptr_t)before), one.row = cdbm_pose_part(player, state);
+    cdbo_receive(&player->poses, one.before, &play, dt_s, &given, seams, &n_seams);
+    place[0] = walk->body.position[0], place[1] = walk->body.position[1], place[2] = walk->body.heading;
+    one.given = &given, one.place = place, one.root = pose->root, one.rotations = pose->rotations;
+    one.translations = pose->translations, one.positions = pose->positions, one.contacts = pose->contacts;
+    if (input->ground) {
+        cdbo_pose_one(&one, seams, dt_s, room, CDBO_UP_TO_GROUND);
+        cdbo_ask_points(&one, points);
+        for (i = 0; i < n_points; i++) {
+            below[3 * i] = below[3 * i + 1] = below[3 * i + 2] = 0.0;
+            if (points[2 * i] == points[2 * i]) input->ground(input->user, points[2 * i], points[2 * i + 1], below + 3 * i);
+        }
+        one.below = below;
+        cdbo_pose_one(&one, seams, dt_s, room, CDBO_FROM_GROUND);
+    } else cdbo_pose_one(&one, seams, dt_s, room, CDBO_WHOLE);
+    if (play.playing.bank >= 0.0) *displayed = play.playing;
+    pose->is_jump = given.seam >= 0.0 && (decision->action == CDBM_JUMPS || (decision->action != CDBM_STARTS && given.is_ahead != 0.0));
+}
+
+/* Whether the clip alone moves the body, as the row of what plays or the settings say. */
+static inline int cdbm_moves_body(const cdbm_player *player, const cdbm_decision *decision)
+{
+    double root = decision->play.root;
+    return (root == root ? root : player->poses.settings[CDBO_ROOT]) == CDBO_BY_ANIMATION;
+}
+
+/* Update characters: `states` are their blocks, one after another. 1; 0 with too little room, or a path that is none; -1 where what is
+ * asked for is no finite number; -2 for a fact that a table refuses. Where it is not 1 all stand where they stood. */
+static inline int cdbm_update_all(const cdbm_player *player, size_t n, double *states, double dt_s, const cdbm_input *inputs,
+    cdbm_pose *poses, cdbm_room room)
+{
+    const cdbm_controller *controller = &player->controller;
+    size_t width = cdbm_state_width(player), n_features = controller->n_features, played = cdbm_width(controller), i;
+    double *before, *after, *numbers;
+    cdbm_given given;
+    cdbm_many many;
+    cdbm_room left;
+    int is_done = 1;
+    if (!(dt_s >= 0.0 && dt_s <= 1e6) || !cdbm_take_many(player, n, &many, &room)) return dt_s >= 0.0 && dt_s <= 1e6 ? 0 : -1;
+    memset(&given, 0, sizeof given);
+    memset(many.among, 1, controller->n_databases);
+    given.n = n, given.dt_s = dt_s, given.queries = many.queries, given.ranges = many.ranges, given.ranges_step = player->n_ranges;
+    given.range_biases = many.biases, given.biases_step = given.plays_step = player->n_ranges;
+    given.plays = player->plays, given.play_of = many.play_of, given.allowed = player->allowed, given.playable = player->playable;
+    given.kind_biases = player->kind_biases, given.among = many.among, given.urgent = many.urgent;
+    for (i = 0; i < n; i++) {
+        many.urgent[i] = (uint8_t)((inputs[i].force ? CDBM_FORCE : 0) | (inputs[i].interrupt ? CDBM_INTERRUPT : 0));
+        if (!cdbm_query_of(player, &inputs[i], dt_s, states + i * width, many.states + i * width, &many.moved[i],
+                many.queries + i * n_features, room)) return 0;
+        is_done = cdbm_let_play(player, &inputs[i], many.states + i * width, many.ranges + i * player->n_ranges,
+            many.biases + i * player->n_ranges, many.play_of + i * player->n_ranges, room);
+        if (is_done != 1) return is_done;
+    }
+    left = room;
+    before = (double *)cdbm_part(&left, n * played * sizeof(double)), after = (double *)cdbm_part(&left, n * played * sizeof(double));
+    numbers = (double *)cdbm_part(&left, n_features * sizeof(double));
+    if (!before || !after || !numbers) return 0;
+    for (i = 0; i < n; i++) {
+        memcpy(before + i * played, cdbm_played_part(player, states + i * width), played * sizeof(double));
+        cdbm_ask(controller, &given, i, before + i * played, &many.moved[i], after + i * played, &many.decisions[i], numbers);
+    }
+    is_done = cdbm_choose(controller, &given, 0, n, after, many.moved, many.decisions, many.found, left);
+    if (is_done != 1) return is_done;
+    for (i = 0; i < n; i++) {
+        cdbm_compare(controller, &given, i, &many.moved[i], &many.decisions[i], numbers);
+        cdbm_decide(controller, &given, i, before + i * played, &many.moved[i], after + i * played, &many.decisions[i]);
+        memcpy(cdbm_played_part(player, many.states + i * width), after + i * played, played * sizeof(double));
+        poses[i].decision = many.decisions[i];
+    }
+    for (i = 0; i < n; i++) {
+        double *state = many.states + i * width, *own = states + i * width;
+        const cdbm_walk *walk = (const cdbm_walk *)(const void *)state;
+        poses[i].root[0] = walk->body.position[0], poses[i].root[1] = walk->body.position[1], poses[i].root[2] = walk->body.heading;
+        left = room;
+        numbers = (double *)cdbm_part(&left, (player->has_poses ? cdbo_pose_room(&player->poses) : 0) * sizeof(double));
+        if (!numbers) return 0;
+        if (player->has_poses) cdbm_pose_of(player, &inputs[i], dt_s, own, state, &poses[i], numbers);
+        cdbm_settle(state, poses[i].root, player->has_poses && cdbm_moves_body(player, &poses[i].decision));
+    }
+    memcpy(states, many.states, n * width * sizeof(double));
+    return 1;
+}
+
+static inline int cdbm_update(const cdbm_player *player, double *state, double dt_s, const cdbm_input *input, cdbm_pose *pose, cdbm_room room)
+{
+    return cdbm_update_all(player, 1, state, dt_s, input, pose, room);
+}
+
+/* ---- what is to be told */
+
+/* The asset that plays; NULL for nothing. */
+static inline const char *cdbm_asset(const cdbm_player *player, const cdbm_playing *playing)
+{
+    if (!cdbm_is_playing(&player->controller, playing) || playing->database < 0.0) return NULL;
+    return cdbm_text(&player->bundle, CDBM_P_ASSETS, (size_t)player->database_of[(size_t)playing->database], (size_t)playing->range);
+}
+
+/* The name of a joint. */
+static inline const char *cdbm_joint_name(const cdbm_player *player, size_t joint)
+{
+    return cdbm_text(&player->bundle, CDBM_P_JOINT_NAMES, player->number, joint);
+}
+
+/* Why it searched, or what let it play on without. */
+static inline const char *cdbm_reason(const cdbm_decision *decision)
+{
+    static const char *const causes[] = {"no search was due", "nothing played", "what played is no longer there", "the clip has ended",
+        "its database is not one of the moment", "it was interrupted", "what played is no longer valid", "a search was asked for",
+        "a search was due"};
+    static const char *const held[] = {"", "it waits for a natural transition", "it plays on to its end", "the jump would cost too much",
+        "it is valid by hysteresis"};
+    size_t cause = (size_t)decision->cause, by = (size_t)decision->held;
+    if (by > 0 && by < sizeof held / sizeof *held) return held[by];
+    return cause < sizeof causes / sizeof *causes ? causes[cause] : "";
+}
+
+static inline const char *cdbm_action_name(const cdbm_decision *decision)
+{
+    static const char *const names[] = {"starts", "plays on", "jumps", "loops", "holds", "plays nothing"};
+    size_t action = (size_t)decision->action;
+    return action < sizeof names / sizeof *names ? names[action] : "";
+}
+
+/* What the markup says of the frame that plays: the flags of contextdb/motion/markup/marks.py. */
+static inline unsigned cdbm_marks_of(const cdbm_player *player, const cdbm_playing *playing)
+{
+    if (!cdbm_is_playing(&player->controller, playing) || playing->database < 0.0) return 0;
+    return cdbm_mark_of(&player->clips[(size_t)playing->database], (int64_t)playing->frame);
+}
+
+/* Each joint in the world as a matrix of 4 columns: [J, 16]. */
+static inline void cdbm_matrices(const cdbm_player *player, const cdbm_pose *pose, float *to)
+{
+    const cdbo_rig *rig = &player->poses.rig;
+    size_t j, k, up;
+    for (j = 0; j < rig->n_joints; j++) {
+        cdbo_quaternion turn = cdbo_get4(pose->rotations, j);
+        for (up = j; rig->parents[up] >= 0;) up = (size_t)rig->parents[up], turn = cdbo_then(cdbo_get4(pose->rotations, up), turn);
+        turn = cdbo_then(cdbo_heading(pose->root[2]), turn);
+        for (k = 0; k < 3; k++) {
+            cdbo_vector axis = cdbo_rotated(turn, cdbo_xyz(k == 0 ? 1.0 : 0.0, k == 1 ? 1.0 : 0.0, k == 2 ? 1.0 : 0.0));
+            float *column = to + 16 * j + 4 * k;
+            column[0] = (float)axis.x, column[1] = (float)axis.y, column[2] = (float)axis.z, column[3] = 0.0f;
+        }
+        for (k = 0; k < 3; k++) to[16 * j + 12 + k] = (float)pose->positions[3 * j + k];
+        to[16 * j + 15] = 1.0f;
+    }
+}

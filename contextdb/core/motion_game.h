@@ -1,0 +1,3 @@
+/* The parts of the core for motion in games, behind those of motion.h. */
+#include "bundle.h"
+#include "character.h"

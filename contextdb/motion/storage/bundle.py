@@ -1,0 +1,221 @@
+"""One file with all that the characters of a game need of its motion: databases, poses, controllers, and tables.
+
+A game written in C maps it into memory and reads it where it is; see `contextdb/core/bundle.h`, which says what a part holds. All
+numbers are little-endian. R ranges, N frames, F features, K kinds of frames, J joints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb.errors import Fault, MotionError, Place, in_quotes
+from contextdb.motion.clips.steering import Steered
+from contextdb.motion.features.schema import FeatureSchema
+from contextdb.motion.output.bank import PoseBank
+from contextdb.motion.output.pipeline import numbers_of, rig_parts
+from contextdb.motion.output.settings import PoseSettings
+from contextdb.motion.search.database import MotionDatabase
+from contextdb.motion.selection.controller import Controller
+
+MAGIC = b"CDBMOTN1"
+DATABASE, BANK, CONTROLLER, TABLE = 1, 40, 60, 90
+"""The first kinds of the parts of each."""
+OUTPUT = (
+    "blend", "halflife_s", "root", "position_weight", "rotation_weight", "position_pull_s", "rotation_pull_s",
+    "position_clamp_m", "rotation_clamp_deg", "path_alignment", "alignment_limit_deg", "alignment_halflife_s", "min_stride",
+    "max_stride", "foot_lock", "foot_halflife_s", "foot_radius_m",
+)  # fmt: skip
+"""The settings of poses in the order of the core, see pose.h."""
+Part = NDArray[Any] | bytes | None
+
+
+@dataclass(frozen=True, eq=False)
+class Played:
+    """A controller to put into a bundle, with what its characters play.
+
+    Attributes
+    ----------
+    controller : Controller
+    schema : FeatureSchema
+    banks : mapping of database to PoseBank, or None
+        None for characters without poses.
+    output : PoseSettings
+    """
+
+    controller: Controller
+    schema: FeatureSchema
+    banks: Mapping[str, PoseBank] | None
+    output: PoseSettings
+
+
+@dataclass(frozen=True, eq=False)
+class TableFile:
+    """A table to put into a bundle.
+
+    Attributes
+    ----------
+    octets : bytes
+        Its compiled file.
+    assets : sequence of str
+        Those of its rows.
+    own_facts : mapping of condition to letter
+        The facts that a character adds: "s" its speed, "d" the direction of its stick, "t" its turn.
+    mirror : mapping of condition to text
+        How facts change in a mirror: "n" negated, "p=NAME" that of another condition, "v=1 0" enum values by their numbers.
+    """
+
+    octets: bytes
+    assets: Sequence[str]
+    own_facts: Mapping[str, str] = field(default_factory=dict)
+    mirror: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def parts(self) -> list[bytes]:
+        """What a bundle says of facts."""
+        own = [f"{letter}{name}" for name, letter in self.own_facts.items()]
+        mirrored = [f"{text[0]}{name}{text[1:]}" for name, text in self.mirror.items()]
+        return [_texts(own), _texts(mirrored)]
+
+
+@dataclass
+class Bundle:
+    """Parts as they are collected. `bytes()` of it is the file."""
+
+    parts: list[tuple[int, int, bytes]] = field(default_factory=list)
+
+    def add(self, first: int, number: int, parts: Sequence[Part]) -> None:
+        """Add the parts of one thing, whose kinds follow one another."""
+        for kind, part in enumerate(parts, first):
+            if part is not None:
+                octets = part if isinstance(part, bytes) else np.ascontiguousarray(part, part.dtype.newbyteorder("<")).tobytes()
+                self.parts.append((kind, number, octets))
+
+    def __bytes__(self) -> bytes:
+        at = _rounded(64 + 24 * len(self.parts))
+        entries, contents = [], bytearray()
+        for kind, number, octets in self.parts:
+            entries.append((kind | number << 32, at + len(contents), len(octets)))
+            contents += octets + bytes(_rounded(len(octets)) - len(octets))
+        directory = np.array(entries, "<u8").tobytes()
+        body = directory + bytes(at - 64 - len(directory)) + contents
+        head = np.array([len(self.parts), *[0] * 4], "<u8").tobytes() + body
+        words = np.frombuffer(head, "<u8")
+        mixed = (words ^ np.arange(24, 24 + len(head), 8, dtype=np.uint64)) * np.uint64(0x9E3779B97F4A7C15)
+        digest = int((mixed ^ (mixed >> np.uint64(32))).sum(dtype=np.uint64))
+        return MAGIC + np.array([24 + len(head), digest], "<u8").tobytes() + head
+
+
+def bundle_of(players: Mapping[str, Played], table_of: Mapping[str, str], tables: Mapping[str, TableFile]) -> bytes:
+    """The bytes of a bundle.
+
+    Parameters
+    ----------
+    players : mapping of str to Played
+        The controllers by their names.
+    table_of : mapping of str to str
+        The table of each database, of those that have one.
+    tables : mapping of str to TableFile
+
+    Raises
+    ------
+    MotionError
+        What a bundle cannot hold yet; all faults together.
+    """
+    _check(players)
+    bundle, numbers, names = Bundle(), {name: i for i, name in enumerate(tables)}, list[str]()
+    banks = {name: bank for player in players.values() for name, bank in (player.banks or {}).items()}
+    for number, (name, table) in enumerate(tables.items()):
+        bundle.add(TABLE, number, [table.octets, _texts([name]), *table.parts])
+    for number, (name, player) in enumerate(players.items()):
+        entries = []
+        for database in player.controller.chooser.names:
+            if database not in names:
+                names.append(database)
+                _add_database(bundle, len(names) - 1, player, database, banks.get(database), tables.get(table_of.get(database, "")))
+            at, has_bank = names.index(database), player.banks is not None and database in player.banks
+            entries.append((at, at if has_bank else -1, numbers.get(table_of.get(database, ""), -1)))
+        bundle.add(CONTROLLER, number, _controller(name, player, entries))
+    return bytes(bundle)
+
+
+def _check(players: Mapping[str, Played]) -> None:
+    faults = []
+    for name, player in players.items():
+        chooser, place = player.controller.chooser, Place(f"[controllers.{name}]")
+        if player.controller.settings.variation is not None:
+            faults.append(Fault("a bundle has no random choice among near ties.", "no variation_within", place=place))
+        faults += [
+            Fault(f"the database {in_quotes(missing)} is not loaded.", "databases that are there", place=place)
+            for missing, database in zip(chooser.names, chooser.databases, strict=True)
+            if database is None
+        ]
+    if faults:
+        raise MotionError(*faults)
+
+
+def _add_database(bundle: Bundle, number: int, player: Played, name: str, bank: PoseBank | None, table: TableFile | None) -> None:
+    chooser = player.controller.chooser
+    at = chooser.names.index(name)
+    database = chooser.databases[at]
+    assert database is not None, "it was checked"
+    _, starts, stops, looping, root, marks, weights, rate, _, _, *rest = chooser.part(
+        chooser.selector.entries[at], database, chooser.rates[at]
+    )
+    *arrays, kinds, n_frames, n_kinds, offset, scale, channels, channel_weights, roots = database.frame_parts
+    own = np.array([n_frames, n_kinds, rate, *rest], np.float64)
+    ranges = None if bank is None else np.array([bank.range_of(*each) for each in _clips(database)], np.int64)
+    rows: Sequence[Part] = (None, None, None)
+    if table is not None:
+        row_starts, row_numbers, mirrored, _ = chooser.rows_of(name, table.assets)
+        rows = mirrored, row_starts, row_numbers
+    measures = kinds, offset, scale, channels, channel_weights, roots
+    played = starts, stops, looping, root, marks, weights, own
+    bundle.add(DATABASE, number, [*arrays, *measures, *played, ranges, _texts(database.assets), *rows, _texts([name])])
+    if bank is not None:
+        *frames, bank_rate = bank.frame_parts(bank.steps)
+        bundle.add(BANK, number, [*frames, np.array([bank_rate])])
+
+
+def _controller(name: str, player: Played, entries: list[tuple[int, int, int]]) -> list[Part]:
+    chooser, body = player.controller.chooser, Steered()
+    settings, shared = chooser.settings, chooser.shared(None, None)
+    biases = chooser.ranges(None, 1)[1][0]
+    thresholds = np.array([np.nan if each.threshold is None else each.threshold for each in chooser.selector.entries], np.float64)
+    bars = np.array([settings.bar_of(each) for each in chooser.databases if each is not None], np.float64)
+    numbers = np.array(
+        [
+            chooser.n_played, settings.search_every_s, settings.jump_threshold_s, settings.history_s, settings.min_play_rate,
+            settings.max_play_rate, settings.grace_s, settings.until_natural, player.banks is not None, body.velocity_halflife_s,
+            player.schema.rate,
+        ],
+        np.float64,
+    )  # fmt: skip
+    steps, features = player.schema.path_features
+    ways = steps, features, player.schema.velocity_features
+    choice = biases, shared.allowed, shared.playable, shared.kind_biases
+    parts: list[Part] = [np.array(entries, np.int64), numbers, thresholds, bars, *choice, *ways]
+    if player.banks is None:
+        return [*parts, *[None] * 10, _texts([name])]
+    banks = [player.banks[each] for each in chooser.names if each in player.banks]
+    *rig, most_accel, n_moving = rig_parts(banks)
+    output = numbers_of(player.output)
+    joints = np.array([n_moving, most_accel], np.float64)
+    names = _texts(banks[0].skeleton.names)
+    return [*parts, np.array([output[key] for key in OUTPUT]), *rig, joints, _texts([name]), names]
+
+
+def _clips(database: MotionDatabase) -> list[tuple[str, bool]]:
+    return list(zip(database.assets, database.mirrored.tolist(), strict=True))
+
+
+def _texts(texts: Sequence[str]) -> bytes:
+    return b"".join(text.encode() + b"\0" for text in texts)
+
+
+def _rounded(n: int) -> int:
+    return (n + 63) // 64 * 64

@@ -1,0 +1,221 @@
+/* character BUNDLE IN OUT   characters of the first controller, by what a file gives in each update: their states and poses.
+ * character BUNDLE N        N times opened with something damaged; what is not refused is played. Prints how often it was refused. */
+#include <stdio.h>
+#include <stdlib.h>
+#include "contextdb_motion.h"
+
+static const char *at;
+
+static const void *take(size_t size, size_t n)
+{
+    const void *taken = at;
+    at += (size * n + 7) / 8 * 8;
+    return taken;
+}
+
+static char *read_all(const char *path, size_t *size)
+{
+    FILE *file = fopen(path, "rb");
+    char *bytes = NULL;
+    long length;
+    if (file && fseek(file, 0, SEEK_END) == 0 && (length = ftell(file)) >= 0 && fseek(file, 0, SEEK_SET) == 0) {
+        *size = (size_t)length;
+        bytes = (char *)malloc(*size + 16);
+        if (bytes && fread(bytes, 1, *size, file) != *size) exit(1);
+    }
+    if (file) fclose(file);
+    if (!bytes) exit(1);
+    return bytes;
+}
+
+static void slope(void *user, double x, double z, double *ground)
+{
+    (void)user, (void)x;
+    ground[0] = 0.2 * z, ground[1] = -0.0, ground[2] = 0.2;
+}
+
+static void write_all(FILE *out, const void *items, size_t size, size_t n)
+{
+    if (fwrite(items, size, n, out) != n) exit(2);
+}
+
+/* An update: seconds, whether there is a ground, and for each its goal, and the number of its gait, a fact of the one table. */
+static void update(const cdbm_player *player, size_t n, double *states, cdbm_pose *poses, cdbm_input *inputs, cdbm_room room, FILE *out)
+{
+    double dt_s = *(const double *)take(8, 1);
+    int64_t numbers[2];
+    const cdb_schema *schema = player->n_tables > 0 ? &player->opened[0]->schema : NULL;
+    int gait = schema ? cdb_condition_number(schema, "gait") : -1;
+    const cdb_fact **lists = (const cdb_fact **)calloc(n, sizeof *lists);
+    cdb_fact *facts = (cdb_fact *)calloc(n * 8, sizeof *facts);
+    size_t i, k, width = cdbm_state_width(player), n_joints = player->poses.rig.n_joints;
+    if (!lists || !facts || (schema && schema->n_conditions > 8)) exit(1);
+    memcpy(numbers, take(8, 2), sizeof numbers);
+    for (i = 0; i < n; i++) {
+        memset(&inputs[i], 0, sizeof inputs[i]);
+        memcpy(&inputs[i].goal, take(8, 3), sizeof inputs[i].goal);
+        if (numbers[0]) inputs[i].ground = slope;
+        for (k = 0; schema && k < schema->n_conditions; k++) facts[8 * i + k] = cdbm_missing_fact(&schema->conditions[k]);
+        memcpy(&numbers[1], take(8, 1), 8);
+        if (gait >= 0) facts[8 * i + (size_t)gait].whole = numbers[1];
+        lists[i] = facts + 8 * i;
+        inputs[i].facts = lists + i;
+    }
+    if (cdbm_update_all(player, n, states, dt_s, inputs, poses, room) != 1) exit(5);
+    write_all(out, states, sizeof(double), n * width);
+    for (i = 0; i < n; i++) {
+        write_all(out, &poses[i].decision, sizeof(cdbm_decision), 1);
+        write_all(out, poses[i].root, sizeof(double), 3);
+        write_all(out, poses[i].rotations, sizeof(double), 10 * n_joints);
+    }
+    free(lists);
+    free(facts);
+}
+
+static void try_out(const cdbm_player *player, double *state, cdbm_pose *pose, cdbm_room room)
+{
+    cdbm_input input;
+    float *matrices = (float *)malloc(16 * sizeof(float) * player->poses.rig.n_joints + 1);
+    int tick;
+    memset(&input, 0, sizeof input);
+    input.goal.facing = NAN;
+    input.unknown = CDB_UNKNOWN_ANY;
+    for (tick = 0; tick < 40; tick++) {
+        input.goal.velocity[1] = tick < 20 ? 1.2 : -2.0;
+        if (tick > 10) input.ground = slope;
+        if (cdbm_update(player, state, 1.0 / 30.0, &input, pose, room) != 1) break;
+        if (!cdbm_asset(player, &pose->decision.playing) && pose->decision.playing.database >= 0.0) break;
+        if (player->has_poses) cdbm_matrices(player, pose, matrices);
+    }
+    free(matrices);
+}
+
+typedef struct memory {
+    double *states;
+    cdbm_pose *poses;
+    cdbm_input *inputs;
+    char *of_poses;
+    cdbm_room room;
+} memory;
+
+static memory taken(const cdbm_player *player, size_t n)
+{
+    memory own;
+    size_t i;
+    own.room.left = cdbm_room_size(player, n);
+    own.room.at = (char *)malloc(own.room.left);
+    own.states = (double *)malloc(n * cdbm_state_size(player));
+    own.poses = (cdbm_pose *)malloc(n * sizeof *own.poses);
+    own.inputs = (cdbm_input *)malloc(n * sizeof *own.inputs);
+    own.of_poses = (char *)malloc(n * cdbm_pose_size(player));
+    if (!own.room.at || !own.states || !own.poses || !own.inputs || !own.of_poses) exit(1);
+    for (i = 0; i < n; i++) {
+        cdbm_lay_out(player, &own.poses[i], own.of_poses + i * cdbm_pose_size(player));
+        cdbm_begin(player, own.states + i * cdbm_state_width(player), 0.0, 0.0, 0.0);
+        if (!cdbm_is_state(player, own.states + i * cdbm_state_width(player))) exit(7);
+    }
+    return own;
+}
+
+static void give_back(memory *own)
+{
+    free(own->of_poses);
+    free(own->inputs);
+    free(own->poses);
+    free(own->states);
+    free(own->room.at);
+}
+
+static void play(const cdbm_player *player, const char *from, const char *to)
+{
+    size_t size, n;
+    char *input = read_all(from, &size);
+    FILE *out = fopen(to, "wb");
+    int64_t n_ticks, tick;
+    memory own;
+    at = input;
+    n = (size_t)*(const int64_t *)take(8, 1), n_ticks = *(const int64_t *)take(8, 1);
+    own = taken(player, n);
+    if (!out || !cdbm_has_digest(&player->bundle)) exit(6);
+    for (tick = 0; tick < n_ticks; tick++) update(player, n, own.states, own.poses, own.inputs, own.room, out);
+    fclose(out);
+    give_back(&own);
+    free(input);
+}
+
+static uint64_t drawn(uint64_t *seed)
+{
+    uint64_t z = *seed += 0x9E3779B97F4A7C15;
+    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9;
+    z = (z ^ (z >> 27)) * 0x94D049BB133111EB;
+    return z ^ (z >> 31);
+}
+
+/* Write other numbers into some places, as often into the directory and into small parts as into the large ones. */
+static void damage(unsigned char *bytes, size_t size, uint64_t *seed)
+{
+    static const int64_t odd[] = {-1, 0, 1, 255, INT64_MAX, INT64_MIN, 1 << 20};
+    cdbm_bundle bundle;
+    size_t n = 1 + (size_t)(drawn(seed) % 3), at_byte;
+    cdbm_open_bundle(&bundle, bytes, size);
+    for (; n > 0; n--) {
+        if (drawn(seed) % 4 == 0 || bundle.n_parts == 0) at_byte = (size_t)(drawn(seed) % (64 + 24 * (bundle.n_parts + 1)));
+        else {
+            const cdbm_part_entry *part = &bundle.parts[drawn(seed) % bundle.n_parts];
+            if (part->n_bytes == 0) continue;
+            at_byte = (size_t)(part->at + drawn(seed) % part->n_bytes);
+        }
+        if (at_byte + 8 > size || drawn(seed) % 2) bytes[at_byte % size] = (unsigned char)drawn(seed);
+        else memcpy(bytes + at_byte / 8 * 8, &odd[drawn(seed) % 7], 8);
+    }
+}
+
+static void try_damaged(const char *bytes, size_t size, long n_times)
+{
+    unsigned char *copy;
+    cdbm_player *player = (cdbm_player *)malloc(sizeof *player);
+    cdbm_bundle bundle;
+    uint64_t seed = (uint64_t)n_times;
+    long n_refused = 0, i;
+    for (i = 0; player && i < n_times; i++) {
+        size_t own_size = drawn(&seed) % 10 ? size : (size_t)(drawn(&seed) % size);
+        const char *why;
+        copy = (unsigned char *)malloc(own_size + 1);
+        if (!copy) exit(1);
+        memcpy(copy, bytes, own_size);
+        if (own_size == size) damage(copy, size, &seed);
+        why = cdbm_open_bundle(&bundle, copy, own_size);
+        if (!why) why = cdbm_open_player(player, &bundle, NULL);
+        if (!why) {
+            memory own = taken(player, 1);
+            try_out(player, own.states, own.poses, own.room);
+            give_back(&own);
+            cdbm_close_player(player);
+        } else n_refused++;
+        free(copy);
+    }
+    printf("%ld\n", n_refused);
+    free(player);
+}
+
+int main(int n_words, char **words)
+{
+    size_t size;
+    char *bytes = read_all(words[1], &size);
+    cdbm_player *player = (cdbm_player *)malloc(sizeof *player);
+    cdbm_bundle bundle;
+    if (!player) return 1;
+    if (n_words == 3) try_damaged(bytes, size, atol(words[2]));
+    else {
+        const char *why = cdbm_open_bundle(&bundle, bytes, size);
+        if (!why) why = cdbm_open_player(player, &bundle, NULL);
+        if (why) puts(why);
+        else {
+            play(player, words[2], words[3]);
+            cdbm_close_player(player);
+        }
+    }
+    free(player);
+    free(bytes);
+    return 0;
+}

@@ -308,7 +308,7 @@ class Painter:
                 return
             text, kind = window.cell(row, column)
             meant: str = kind if seen.is_enabled or kind == "fault" else "disabled"
-            meant = "muted" if meant == "inherited" or is_far and meant in DIM_WHERE_FAR else meant
+            meant = "muted" if meant == "inherited" or (is_far and meant in DIM_WHERE_FAR) else meant
             under = ground if column >= look.layout.n_frozen or seen.is_valid else "frozen"
             if column == cursor:
                 under, meant = ("cursor", "on-cursor") if look.has_focus else ("cursor-away", "name")

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from terminal import EditorApp, press, screen_text, with_editor
 
+from tui.model.number_forms import three_digits
 from tui.widgets.bar import CellLine
 
 TOML = '[tables.t]\npolicy = "{policy}"\npriority = "Priority"\nfallback = "idle"\n'
@@ -63,3 +64,35 @@ def test_rows_that_miss_by_more_than_one_cell_are_dim(tmp_path: Path) -> None:
 
     near, far = with_editor(path_of(tmp_path, "collect"), script, (120, 24))
     assert len(near) > len(far) or not near & far
+
+
+@pytest.mark.parametrize(
+    ("sent", "text"),
+    [
+        ("0.54167881132", "0.542"),
+        ("-1.2140326691628", "-1.21"),
+        ("123.456789", "123"),
+        ("123456.789012", "123457"),
+        ("0.000123456", "0.000123"),
+        ("0.00000000000000012", "0"),
+        ("1.99999", "2"),
+        ("0.25", "0.25"),
+        ("1.2345, 2", "1.2345, 2"),
+        ("v1.23456", "v1.23456"),
+    ],
+)
+def test_a_number_of_a_game_has_three_digits_and_other_texts_are_as_they_are(sent: str, text: str) -> None:
+    assert three_digits(sent) == text
+
+
+def test_the_test_row_shows_three_digits_and_the_line_of_the_cell_all(tmp_path: Path) -> None:
+    async def script(app: EditorApp, pilot) -> list[str]:
+        app.main.assets.set_context({"speed": "4.123456789"}, "")
+        await press(pilot, "f6")
+        app.main.assets.go_to_column("speed")
+        await press(pilot, "f6")
+        return screen_text(app).splitlines()
+
+    lines = with_editor(path_of(tmp_path, "collect"), script, (120, 24))
+    assert "4.123456789" in lines[1]
+    assert "4.12 " in next(line for line in lines if line.startswith("?") or line.startswith("     ?") or " ? " in line)

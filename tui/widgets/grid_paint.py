@@ -18,6 +18,7 @@ from contextdb.errors import plural
 
 from ..model.displayed_table import DisplayedTable, Header
 from ..model.layout import Layout, cut, cut_middle, name_lines
+from ..model.number_forms import three_digits
 from ..model.selection import Block
 from ..model.window import MARKS, PICKED, PLAYS, Window
 
@@ -397,7 +398,7 @@ class Painter:
             name = condition.name if condition is not None else ""
             is_cast, is_computed = query.role_of(name) is not None, query.is_computed(name)
             is_wrong = name in query.faults and not is_cast
-            text = "cast" if is_cast else query.text(name)
+            text = "cast" if is_cast else three_digits(query.text(name))
             mark = "!" if is_wrong else COMPUTED if is_computed and not is_cast else " "
             meant = "fault" if is_wrong else "muted" if is_cast or is_computed else "text"
             yield Segment(mark + cut(text, width - 1), self.style(ground, "on-cursor" if is_lit else meant))

@@ -75,7 +75,7 @@ def test_the_header_of_motion_is_written_beside_the_tables(game: Path):
 
 def test_a_state_is_one_flat_block_that_a_character_goes_on_from(game: Path):
     one = Character.of(cdb.Project.load(game), "player")
-    for tick in range(40):
+    for _ in range(40):
         one.update(1 / 30, (0.0, 1.2), {"gait": "Walk", "style": "normal"})
     block = bytes(one.state)
     other = Character.of(cdb.Project.load(game), "player")

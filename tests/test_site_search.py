@@ -25,7 +25,7 @@ QUESTIONS = {
     "is it deterministic, for replays and network play": "deciding#is-it-deterministic",
     "how large may a table be": "deciding#how-large-may-a-table-be",
     "how much memory has it at run time": "deciding#consoles-memory-threads",
-    "thread-safe": "programmers#threads",
+    "thread-safe": "programmers#threads or engines#threads",
     "why does my animation not play": "designers#why-does-my-animation-not-play",
     "rename a condition": "editor#rows-and-columns",
     "from Excel and back": "recipes#how-do-i-take-a-table-to-excel-and-back",

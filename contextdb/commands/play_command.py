@@ -43,13 +43,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"its tables; a folder that does not exist yet gets a copy. Without it: those of a checkout, else {OWN_FOLDER}/ here",
     )
     parser.add_argument("--clips", metavar="FOLDER", help="BVH clips to play with; their table is made")
+    parser.add_argument("--crowd", type=int, metavar="N", help="so many others, coloured by the row that they play")
     parser.add_argument("--no-editor", action="store_true", help="open the game alone")
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Open the game, and the editor beside it; stay until the one in this terminal is left."""
     _require_window()
-    words = _game_words()
+    words = [*_game_words(), *([] if arguments.crowd is None else ["--crowd", str(arguments.crowd)])]
     if arguments.clips is not None:
         return ExitCode(subprocess.run([*words, "--clips", arguments.clips], env=_environment()).returncode)
     tables = tables_in(None if arguments.folder is None else Path(arguments.folder))

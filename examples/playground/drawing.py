@@ -17,6 +17,7 @@ from .game import Game
 from .mannequin import Mannequin
 from .meshes import ball, coloured, disc, here, mark, put, solid
 from .scenery import STONE, Shadow
+from .throng_drawing import ThrongView
 
 PLAYER, RIVAL, WISH, CLIP, HOLDS, BALL = (
     LColor(*bytes.fromhex(code), 255) / 255.0 for code in ["ee7f2d", "2f6fc0", "ffffff", "ffd84d", "4fd17c", "e8413c"]
@@ -67,6 +68,8 @@ class Scene:
         self.sky = scenery.sky(base)
         self.wall = scenery.ground(root)
         self.bodies = [Body(root, actor, own) for actor, own in zip(game.actors, (PLAYER, RIVAL), strict=False)]
+        skeleton = next(iter(game.player.stock.banks.values())).skeleton
+        self.throng = None if game.throng is None else ThrongView(root, game.throng, skeleton)
         if game.ball is not None:
             self.ball = solid(root, coloured([(ball(np.zeros(3), 0.13, 0.13, 0.13), BALL)]))
             self.ring = mark(root, disc(0.5, 0.42), BALL)
@@ -90,6 +93,8 @@ class Scene:
         """The game as it is now, from behind the player."""
         for body in self.bodies:
             body.show()
+        if self.throng is not None:
+            self.throng.show()
         gate, player, thing = self.game.gate, self.game.player, self.game.ball
         may_vault = gate is not None and gate.seen is not None and bool(gate.seen.hit)
         tint = HOLDS if player.playing.startswith("vault") else CLIP if may_vault else STONE

@@ -14,6 +14,7 @@ from contextdb import motion
 from . import world
 from .actor import LAST_MINUTE, Actor
 from .ball import Ball
+from .crowd import Throng
 from .stick import PACES_MPS, Stick
 
 LOOK_EVERY_S, GATE, GATE_CLOSES = 0.2, 1.0, 1.5
@@ -27,7 +28,12 @@ class Game(AbstractContextManager["Game"]):
     gate: motion.MatchGate | None = None
 
     def __init__(
-        self, folder: Path, link: str | None = None, settle_s: float = 0.1, stock: motion.MotionProject | None = None
+        self,
+        folder: Path,
+        link: str | None = None,
+        settle_s: float = 0.1,
+        stock: motion.MotionProject | None = None,
+        n_crowd: int = 0,
     ) -> None:
         self.watch = cdb.watch(folder, self._reloaded, self._refused, poll_s=None, settle_s=settle_s)
         self.trouble, self.asking, self.time_s, self._look_in_s = "", "", 0.0, 0.0
@@ -42,6 +48,7 @@ class Game(AbstractContextManager["Game"]):
             self.node = motion.MatchNode(stock.databases["once"], position_weight=0.5, rotation_weight=0.5)
             self.gate = motion.MatchGate(self.node, GATE, GATE_CLOSES)
             self.ball = Ball(self)
+        self.throng = Throng(n_crowd, stock, moves) if n_crowd else None
         self.link = None if link is None else cdb.link(link)
         if self.link is not None:
             self.link.watch(self.watch, lambda: self.asking)
@@ -61,6 +68,8 @@ class Game(AbstractContextManager["Game"]):
             if self.link is not None and self.link.is_heard and actor.playing in actor.readout.valid.assets:
                 row = actor.readout.valid.only([actor.playing]).rows[0]  # the search picked it: the editor marks it
                 self.link.picked(actor.moves, actor.name, row)
+        if self.throng is not None:
+            self.throng.update(dt)
         try:
             self._vault(self.player)
             if self.ball is not None:
@@ -97,6 +106,8 @@ class Game(AbstractContextManager["Game"]):
         self.trouble = ""
         for actor in self.actors:
             actor.moves = actor.character.tables = moves
+        if self.throng is not None:
+            self.throng.use(moves)
 
     def _refused(self, error: cdb.ContextDBError) -> None:
         """What was saved cannot be used: what was good plays on."""
@@ -111,6 +122,7 @@ class Game(AbstractContextManager["Game"]):
             f"gate  {seen}" if seen else "",
             "" if ball is None or ball.holder is None else ball.said,
             "" if link is None else "the editor follows" if link.is_heard else "no editor follows yet",
+            "" if self.throng is None else self.throng.state,
             f"recording  {len(player.trace)} moments" if player.trace.most > LAST_MINUTE else "",
             f"not loaded: {self.trouble}" if self.trouble else "",
         ]

@@ -113,8 +113,9 @@ def test_the_test_row_follows_a_game_and_marks_its_pick(path):
     assert "≠" not in first
     assert "version" not in first
     assert (bits, bits_after) == (0b110, 0b010)
-    assert "2 valid for game · player" in first
-    assert "1 valid for game · player" in second
+    assert "test row: game · player" in first
+    assert "· 2 valid" in first.splitlines()[1]
+    assert "· 1 valid" in second.splitlines()[1]
 
 
 def test_an_edit_that_is_not_saved_is_answered_beside_the_game(path):

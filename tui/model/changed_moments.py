@@ -87,7 +87,6 @@ class _Asked:
     def __init__(self, before: Table, after: Table) -> None:
         self._sides = [ContextList.empty(table).compiled for table in (before, after)]
         self._conditions = {**ContextList.empty(before).conditions, **ContextList.empty(after).conditions}
-        self._comparison = Comparison(*self.compiled)
 
     @property
     def compiled(self) -> tuple[CompiledData, CompiledData]:
@@ -102,14 +101,14 @@ class _Asked:
         """The moment, where other assets may play; None where the same do, or a fact cannot be read."""
         known = {name: text for name, text in facts.items() if name in self._conditions}
         plays = []
-        for (compiled, readable), side in zip(self._sides, self._comparison.sides, strict=True):
+        for compiled, readable in self._sides:
             verdict = judge(
                 compiled, Case("", {name: text for name, text in known.items() if name in compiled.asked}, ""), readable
             )
             if verdict.faults:
                 return None
             flags = np.array([[verdict.valid >> row & 1 for row in range(compiled.n_rows)]], np.bool_)
-            rows = np.flatnonzero(side.compiled.once(Choosing.of).pickable_of(flags)[0]).tolist()
+            rows = np.flatnonzero(compiled.once(Choosing.of).pickable_of(flags)[0]).tolist()
             plays.append(list(dict.fromkeys(compiled.assets[row] for row in rows)) or [compiled.fallback or NOTHING])
         if set(plays[0]) == set(plays[1]):
             return None

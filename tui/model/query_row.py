@@ -33,6 +33,8 @@ from contextdb.tables.variants import WholeTable
 from .table_answer import Inside, Offered, QueriedTable, TableAnswer, bits_of_rows
 from .wanted import Wanted
 
+MOST_PLAYED = 50
+"""So many rows that may be picked are looked at, to name the asset where it is one."""
 MOST_EXPLAINED = 50
 """So many rows behind one row are looked through for the cells of it that keep actors from a role."""
 
@@ -270,15 +272,34 @@ class QueryRow:
         return f"may be valid: its rule needs {named}" if named else "may be valid: its rule has no value"
 
     @property
+    def headline(self) -> str:
+        """What plays for these facts, how many rows are valid, and how many of those the policy passes over."""
+        rows = self.outcome.candidates
+        assets = list(dict.fromkeys(self.outcome.compiled.assets[row] for row in rows[:MOST_PLAYED].tolist()))
+        if self.outcome.refusal is not None:
+            plays = "none is picked: the policy is unique"
+        elif not assets:
+            fallback = self._table.settings.fallback
+            plays = f"plays the fallback {fallback}" if fallback else "nothing plays"
+        else:
+            plays = f"plays {assets[0]}" if len(assets) == 1 else f"plays one of {len(rows):,}"
+        n_passed_over = 0 if self.outcome.refusal is not None else len(self.outcome.rows) - len(rows)
+        return " · ".join([plays, *self._counts, *([f"{n_passed_over:,} outranked"] if n_passed_over else [])])
+
+    @property
     def summary(self) -> str:
         """How many rows are valid, and what is played where that is none of them."""
-        n_sure = self.n_valid - self.n_undecided
-        parts = [f"{n_sure:,} valid", *([f"{self.n_undecided:,} may be"] if self.n_undecided else [])]
+        parts = self._counts
         if self.outcome.refusal is not None:
             parts.append("none is picked: the policy is unique")
         elif not len(self.outcome.candidates) and self._table.settings.fallback:
             parts.append(f"the fallback {self._table.settings.fallback} plays")
         return ", ".join(parts)
+
+    @property
+    def _counts(self) -> list[str]:
+        n_sure = self.n_valid - self.n_undecided
+        return [f"{n_sure:,} valid", *([f"{self.n_undecided:,} may be"] if self.n_undecided else [])]
 
     # ---- counts and marks
 

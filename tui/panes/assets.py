@@ -114,12 +114,9 @@ class AssetsPane(SheetView):
         self.take_focus()
 
     def summary(self) -> str:
-        """What the line at the foot says at its right: valid rows, filter, sort, selection."""
+        """What the line at the foot says at its right: whose facts the test row has, filter, sort, selection."""
         sheet, block = self.sheet, self.sheet.block
-        parts = []
-        if not sheet.query.is_empty:
-            where = f" for {self.grid.test_name}" if self.grid.test_name else ""
-            parts.append(f"{sheet.query.summary}{where}")
+        parts = [f"test row: {self.grid.test_name}"] if self.grid.test_name and not sheet.query.is_empty else []
         if len(sheet.view) < sheet.table.n_rows:
             parts.append(f"{len(sheet.view):,} of {plural(sheet.table.n_rows, 'row')} shown")
         if any(sheet.hidden):
@@ -130,6 +127,12 @@ class AssetsPane(SheetView):
         if block.n_cells > 1:
             parts.append(f"{block.shape[0]:,} × {block.shape[1]:,} selected{selection_summary(sheet)}")
         return " · ".join(parts)
+
+    def show_answer(self) -> None:
+        """Say in the line over the grid what plays for the facts of the test row, and whether edits are unsaved."""
+        query = self.sheet.query
+        unsaved = " · unsaved" if self.sheet.is_modified else ""
+        self.query_one(CellLine).answer("" if query.is_empty else f"{query.headline}{unsaved}", query.n_valid > 0)
 
     @on(Bar.Pressed)
     async def _chip_pressed(self, event: Bar.Pressed) -> None:

@@ -156,7 +156,8 @@ class TableScreen(Screen[None]):
         self.show_summary()
 
     def show_summary(self) -> None:
-        """Say how much of the table is valid, displayed and selected."""
+        """Say what plays, and how much of the table is valid, displayed and selected."""
+        self.assets.show_answer()
         self.query_one(StatusLine).show(right=self.assets.summary())
 
     def say(self, text: str, level: str = "information") -> None:

@@ -148,10 +148,12 @@ class StatusLine(Widget):
 
 
 class CellLine(Widget):
-    """The line over the grid: which cell the cursor is in, all of its text, and what is wrong with it."""
+    """The line over the grid: which cell the cursor is in, all of its text, and what is wrong with it; at its right what plays."""
 
     ALLOW_SELECT = False
-    COMPONENT_CLASSES: ClassVar[set[str]] = {"cell-line--place", "cell-line--text", "cell-line--fault", "cell-line--about"}
+    COMPONENT_CLASSES: ClassVar[set[str]] = {
+        *("cell-line--place", "cell-line--text", "cell-line--fault", "cell-line--about", "cell-line--plays", "cell-line--nothing"),
+    }
 
     DEFAULT_CSS = """
     CellLine {
@@ -160,12 +162,15 @@ class CellLine(Widget):
         .cell-line--text { color: $foreground; }
         .cell-line--fault { color: $text-error; text-style: bold; }
         .cell-line--about { color: $foreground 55%; }
+        .cell-line--plays { background: $success; color: $background; text-style: bold; }
+        .cell-line--nothing { background: $warning; color: $background; text-style: bold; }
     }
     """
 
     def __init__(self) -> None:
         super().__init__()
         self._parts = ("", "", "", "")
+        self._answer = ("", False)
 
     def show(self, place: str, text: str, fault: str = "", about: str = "") -> None:
         """Show a cell: where it is, its text, what is wrong with it, and what its column is about."""
@@ -173,21 +178,36 @@ class CellLine(Widget):
             self._parts = (place, text, fault, about)
             self.refresh()
 
+    def answer(self, text: str, plays: bool) -> None:
+        """Show what plays, the loudest of all; an empty text: nothing was asked."""
+        if (text, plays) != self._answer:
+            self._answer = (text, plays)
+            self.refresh()
+
     def render_line(self, y: int) -> Strip:
+        text, plays = self._answer
+        if not text:
+            return self._cell(self.size.width)
+        answer = f" {cut(text, min(cell_len(text), self.size.width * 3 // 5))} "
+        segment = Segment(answer, self._of("plays" if plays else "nothing"))
+        return Strip([*self._cell(max(self.size.width - cell_len(answer), 0)), segment])
+
+    def _cell(self, width: int) -> Strip:
+        """What stands of the cell, so wide."""
         place, text, fault, about = self._parts
         plain = self._of("about")
         segments = [
-            Segment(f" {cut(place, min(cell_len(place), self.size.width // 2))}  ", self._of("place")),
-            Segment(cut(text, min(cell_len(text), self.size.width)) if text else "", self._of("text")),
+            Segment(f" {cut(place, min(cell_len(place), width // 2))}  ", self._of("place")),
+            Segment(cut(text, min(cell_len(text), width)) if text else "", self._of("text")),
         ]
         if fault:
             segments.append(Segment(f"  ! {fault}", self._of("fault")))
         elif about:
             segments.append(Segment(f"   {about}", plain))
         strip = Strip(segments)
-        if strip.cell_length > self.size.width:
-            strip = Strip.join([strip.crop(0, self.size.width - 1), Strip([Segment("…", plain)])])
-        return strip.adjust_cell_length(self.size.width, plain)
+        if strip.cell_length > width:
+            strip = Strip.join([strip.crop(0, width - 1), Strip([Segment("…", plain)])])
+        return strip.adjust_cell_length(width, plain)
 
     def _of(self, part: str) -> Style:
         return self.get_component_rich_style(f"cell-line--{part}")

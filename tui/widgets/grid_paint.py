@@ -18,6 +18,7 @@ from contextdb.errors import plural
 
 from ..model.displayed_table import DisplayedTable, Header
 from ..model.layout import Layout, cut, cut_middle, name_lines
+from ..model.number_forms import three_digits
 from ..model.selection import Block
 from ..model.window import MARKS, PICKED, PLAYS, Window
 
@@ -28,6 +29,8 @@ LOW, ROOMY = 12, 24
 the fact of the test row leaves; in others both have a line."""
 AT_LEFT, AT_RIGHT = "«", "»"
 """Stand at an edge of the window behind which cells of the row fail."""
+DIM_WHERE_FAR = frozenset(("text", "any", "name", "failing"))
+"""What is dim in a row of which several cells fail: one that misses by a single cell is what somebody looks for."""
 HIDES = "║"
 """Stands behind a column after which others are hidden."""
 UP, DOWN, UNSORTED = "▲", "▼", "↕"
@@ -294,6 +297,7 @@ class Painter:
         window = self._window_at(row, look)
         seen, block, ground = window.row(row), self._block(look), self._ground(row, window)
         asset, cursor = self.sheet.asset_at, self._cursor(row, look)
+        is_far = seen.n_failing > 1
 
         n_columns = len(self.sheet.table.columns)
         noted, colours, names = self.sheet.marks.texts, self.sheet.marks.colours, [c.name for c in self.sheet.table.columns]
@@ -305,7 +309,7 @@ class Painter:
                 return
             text, kind = window.cell(row, column)
             meant: str = kind if seen.is_enabled or kind == "fault" else "disabled"
-            meant = "muted" if meant == "inherited" else meant
+            meant = "muted" if meant == "inherited" or (is_far and meant in DIM_WHERE_FAR) else meant
             under = ground if column >= look.layout.n_frozen or seen.is_valid else "frozen"
             if column == cursor:
                 under, meant = ("cursor", "on-cursor") if look.has_focus else ("cursor-away", "name")
@@ -336,8 +340,9 @@ class Painter:
         if seen.mark != " " or not seen.n_failing:
             return self._joined([Segment(number, style), plays, Segment(f"{seen.mark} ", style)], cell, look, ground, (), corner)
         count = MARKS["failing"] + (str(seen.n_failing) if seen.n_failing < 10 else "+")
-        gutter = [Segment(number, style), Segment(count, self.style(tint, "failing")), plays]
-        return self._joined(gutter, cell, look, ground, window.failing(row), corner)
+        miss = "muted" if is_far else "failing"
+        gutter = [Segment(number, style), Segment(count, self.style(tint, miss)), plays]
+        return self._joined(gutter, cell, look, ground, window.failing(row), corner, miss)
 
     def _window_at(self, row: int, look: Look) -> Window:
         if self._window is None or not self._window.holds(row):
@@ -393,7 +398,7 @@ class Painter:
             name = condition.name if condition is not None else ""
             is_cast, is_computed = query.role_of(name) is not None, query.is_computed(name)
             is_wrong = name in query.faults and not is_cast
-            text = "cast" if is_cast else query.text(name)
+            text = "cast" if is_cast else three_digits(query.text(name))
             mark = "!" if is_wrong else COMPUTED if is_computed and not is_cast else " "
             meant = "fault" if is_wrong else "muted" if is_cast or is_computed else "text"
             yield Segment(mark + cut(text, width - 1), self.style(ground, "on-cursor" if is_lit else meant))
@@ -421,9 +426,10 @@ class Painter:
         ground: str,
         failing: Collection[int] = (),
         corner: int | None = None,
+        miss: str = "failing",
     ) -> Strip:
-        """The gutter, the frozen columns and those that are scrolled, each followed by its separator; an arrow stands at an edge
-        behind which columns fail."""
+        """The gutter, the frozen columns and those that are scrolled, each followed by its separator; an arrow of the colour `miss`
+        stands at an edge behind which columns fail."""
         layout, handle = look.layout, Segment(HANDLE, self.style(ground, "name"))
         bar, double = Segment("│", self.style(ground, "line")), Segment(HIDES, self.style(ground, "muted"))
         hides = layout.hides
@@ -438,12 +444,12 @@ class Painter:
                 moving += [*cell(column), handle if column == corner else double if column in hides else bar]
         start = look.left - (layout.starts[columns.start] - layout.frozen) if len(columns) else 0
         if any(layout.n_frozen <= column < columns.start + (start > 0) for column in failing):
-            line[-1] = _ending(line[-1], AT_LEFT, self.style(ground, "failing"))
+            line[-1] = _ending(line[-1], AT_LEFT, self.style(ground, miss))
         line += _from(moving, start)
         if not any(column >= columns.stop for column in failing):
             return Strip(line).adjust_cell_length(layout.width, self.style(ground, "text"))
         inner = Strip(line).adjust_cell_length(layout.width - 1, self.style(ground, "text"))
-        return Strip([*inner, Segment(AT_RIGHT, self.style(ground, "failing"))], layout.width)
+        return Strip([*inner, Segment(AT_RIGHT, self.style(ground, miss))], layout.width)
 
 
 def _ending(segment: Segment, sign: str, style: Style) -> Segment:

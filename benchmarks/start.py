@@ -58,6 +58,8 @@ COMMANDS: Mapping[str, Sequence[str]] = {
     "evaluate": ("evaluate", "locomotion", "moments.csv"),
     "check": ("check", "tables"),
     "cases": ("cases", "tables/hit_mid_air.csv"),
+    "tidy": ("tidy", "tables/hit_mid_air.csv"),
+    "index": ("index", "tables", "--out", "rows.parquet"),
     "coverage": ("coverage", "tables/hit_mid_air.csv"),
     "ci": ("ci", "tables"),
     "diff": ("diff", "tables/locomotion.csv", "moves.csv"),

@@ -40,6 +40,7 @@ SECTIONS = {
     "Tab Priorities": ("PrioritiesPane",),
     "Tab Coverage": ("CoveragePane", "GapList", "RowList", "PairMap", "HeatMap"),
     "Tab Problems": ("ProblemsPane", "ProblemList"),
+    "Tab Contracts": ("ContractsPane", "ContractList"),
     "Rows below a list": ("RowsBelow",),
     "Tab Motion": ("MotionPane", "SessionList"),
     "Every dialog": ("Dialog", "AskDialog", "ChooseDialog", "StepsDialog"),

@@ -25,6 +25,7 @@ OTHER_WORDS = {
     "contextdb/expressions/check.py": "what functions give",
     "contextdb/expressions/parse.py": "tokens",
     "contextdb/files/parquet.py": "sorts of files",
+    "contextdb/commands/__init__.py": "formats of reports",
     "contextdb/commands/ci_command.py": "formats of reports",
     "contextdb/commands/coverage_command.py": "formats of reports",
     "contextdb/commands/motion_check_command.py": "formats of reports",

@@ -24,6 +24,8 @@ LOADS = {
     "evaluate": "numpy polars",
     "check": "numpy",
     "cases": "numpy",
+    "tidy": "numpy",
+    "index": "numpy polars",
     "coverage": "numpy polars",
     "ci": "numpy polars",
     "diff": "numpy",

@@ -119,6 +119,10 @@ class Kind:
     """Whether a polars type is that of a column of plain facts, for numbers."""
     annotation: str = "str"
     """The Python type of a fact, as a stub says it."""
+    csharp: str = "double"
+    """The same in C#."""
+    unreal: tuple[str, str] = ("double", "0.0")
+    """The type of a fact and its first value in Unreal."""
     synonyms: tuple[str, ...] = ()
     """What people call the type."""
 
@@ -202,6 +206,8 @@ _ALL = (
         dtype="Boolean",
         python=bool,
         annotation="bool",
+        csharp="bool",
+        unreal=("bool", "false"),
         synonyms=("boolean", "flag", "logical", "truth"),
         is_negated=True,
         fixed=(False, True),
@@ -218,6 +224,8 @@ _ALL = (
         unbounded="a number is declared by min and max",
         dtype="Float64",
         annotation="int",
+        csharp="long",
+        unreal=("int64", "0"),
         synonyms=("integer", "long", "int32", "int64", "whole", "count"),
         is_bounded=True,
         is_whole=True,
@@ -272,6 +280,8 @@ _ALL = (
         unbounded="a date is declared by min and max",
         dtype="Date",
         annotation="datetime.date",
+        csharp="DateTime",
+        unreal=("FString", ""),
         synonyms=("day", "datetime", "calendar"),
         spelling=Spelling(dates.DATE_TEXT, dates.read_date, dates.write_date, mends=dates.MENDS),
         from_python=dates.day_from_python,
@@ -310,6 +320,8 @@ _ALL = (
         unbounded="a text can be anything",
         dtype="String",
         python=str,
+        csharp="string",
+        unreal=("FString", ""),
         synonyms=("string", "str", "name"),
         is_open=True,
     ),
@@ -323,6 +335,8 @@ _ALL = (
         value="a set of tags",
         unbounded="tags have no order",
         dtype="List(String)",
+        csharp="IList<string>",
+        unreal=("TArray<FString>", ""),
         synonyms=("tag", "set", "labels", "gameplaytags", "tagset"),
         has_values=True,
     ),

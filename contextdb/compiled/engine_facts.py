@@ -13,6 +13,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from contextdb.cells.conditions import Condition
+from contextdb.cells.kinds import Kind
 from contextdb.compiled.c_header.spelling import literal as c_literal
 from contextdb.compiled.core_table import values_of
 from contextdb.compiled.stubs import Names
@@ -47,8 +48,8 @@ class Fact:
     """The name of the type of its values; "" where none are declared, or it is a condition of tags."""
 
     @property
-    def kind(self) -> str:
-        return self.condition.domain.kind
+    def type(self) -> Kind:
+        return self.condition.domain.type
 
     @property
     def text(self) -> str:
@@ -89,7 +90,7 @@ def faces_of(tables: Mapping[str, CompiledTable]) -> tuple[list[Face], dict[str,
     for name, table in tables.items():
         own, facts = Names(set(RESERVED)), []
         for condition in table.asked.values():
-            if condition.domain.kind == "enum" and condition not in named:
+            if condition.domain.type.needs_values and condition not in named:
                 named[condition] = types.of(_ascii(condition.name))
                 of_values = Names(set(RESERVED))
                 values[named[condition]] = tuple((of_values.of(_ascii(value)), value) for value in values_of(condition))
@@ -103,16 +104,6 @@ def _text(lines: Iterable[str]) -> str:
 
 
 # ---- C#
-
-_CSHARP = {
-    "bool": "bool",
-    "int": "long",
-    "number": "double",
-    "angle": "double",
-    "date": "DateTime",
-    "text": "string",
-    "tags": "IList<string>",
-}
 
 
 def csharp_of(tables: Mapping[str, CompiledTable]) -> str:
@@ -146,9 +137,13 @@ def _csharp_class(face: Face, values: Mapping[str, tuple[tuple[str, str], ...]])
     yield from (f"            at{fact.name} = table[{fact.text}];" for fact in face.facts)
     yield "        }"
     for fact in face.facts:
-        kind = fact.choices or _CSHARP[fact.kind]
+        kind = fact.choices or fact.type.csharp
         value = f"names{fact.name}[(int)value]" if fact.choices else "value"
-        value = 'value.ToString("yyyy-MM-dd", System.Globalization.CultureInfo.InvariantCulture)' if fact.kind == "date" else value
+        value = (
+            'value.ToString("yyyy-MM-dd", System.Globalization.CultureInfo.InvariantCulture)'
+            if fact.type.csharp == "DateTime"
+            else value
+        )
         yield ""
         if fact.choices:
             listed = ", ".join(literal(text) for _, text in values[fact.choices])
@@ -182,15 +177,6 @@ def godot_of(tables: Mapping[str, CompiledTable]) -> str:
 
 # ---- Unreal
 
-_UNREAL = {
-    "bool": ("bool", "false"),
-    "int": ("int64", "0"),
-    "number": ("double", "0.0"),
-    "angle": ("double", "0.0"),
-    "date": ("FString", ""),
-    "text": ("FString", ""),
-    "tags": ("TArray<FString>", ""),
-}
 _UNREAL_TEXTS = """
 #ifndef CDB_UNREAL_TEXTS
 #define CDB_UNREAL_TEXTS
@@ -247,7 +233,9 @@ def _unreal_struct(face: Face, values: Mapping[str, tuple[tuple[str, str], ...]]
     yield "{"
     yield "\tGENERATED_BODY()"
     for fact in face.facts:
-        kind, value = (f"E{fact.choices}", f"E{fact.choices}::{values[fact.choices][0][0]}") if fact.choices else _UNREAL[fact.kind]
+        kind, value = fact.type.unreal
+        if fact.choices:
+            kind, value = f"E{fact.choices}", f"E{fact.choices}::{values[fact.choices][0][0]}"
         yield ""
         yield f"\t/** {fact.about.replace('*/', '* /')} */"
         yield "\tUPROPERTY(EditAnywhere, BlueprintReadWrite)"
@@ -271,11 +259,11 @@ def _unreal_setter(fact: Fact, at: str, values: Mapping[str, tuple[tuple[str, st
         listed = ", ".join(c_literal(value) for _, value in values[fact.choices])
         yield f"static const char* const Names{fact.name}[] = {{{listed}}};"
         yield f"bIsSet &= cdb_set_text(Live, {at}, Names{fact.name}[static_cast<uint8>({fact.name})]) == CDB_OK;"
-    elif fact.kind in ("date", "text"):
+    elif fact.type.unreal[0] == "FString":
         yield f"bIsSet &= cdb_set_text(Live, {at}, CdbKept(Texts, {fact.name})) == CDB_OK;"
-    elif fact.kind == "tags":
+    elif fact.type.is_tags:
         yield f"const char** List{fact.name} = CdbKeptList(Texts, {fact.name});"
         yield f"bIsSet &= cdb_set_tags(Live, {at}, List{fact.name}, static_cast<size_t>({fact.name}.Num())) == CDB_OK;"
     else:
-        setter = "cdb_set_whole" if fact.kind in ("bool", "int") else "cdb_set_number"
+        setter = "cdb_set_number" if fact.type.unreal[0] == "double" else "cdb_set_whole"
         yield f"bIsSet &= {setter}(Live, {at}, {fact.name}) == CDB_OK;"

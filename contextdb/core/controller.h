@@ -781,7 +781,9 @@ static inline int cdbm_settles(const cdbm_controller *controller, const cdbm_sta
 {
     double stayed_s = decision->time_s - state->entered_s, left = 1.0 - stayed_s / controller->settle_s;
     double settle = move->to.database < 0.0 ? 0.0 : controller->databases[(size_t)move->to.database].settle;
-    if (!(decision->continuing_cost == decision->continuing_cost) || settle == 0.0 || !(left > 0.0)) return 0;
+    if (!(decision->chosen[0] >= 0.0) || !(decision->continuing_cost == decision->continuing_cost) || settle == 0.0 || !(left > 0.0)) return 0;
+    if (controller->databases[(size_t)decision->chosen[0]].looping[(size_t)decision->chosen[1]]
+        && !controller->databases[(size_t)move->to.database].looping[(size_t)move->to.range]) return 0; /* a loop may stay for good */
     if (decision->is_under != 0.0 && decision->winner != move->to.database) return 0; /* a priority database wins outright */
     return decision->continuing_cost + settle * left <= decision->chosen[3];
 }

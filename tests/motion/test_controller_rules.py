@@ -136,9 +136,14 @@ class Oracle:
             if not is_current and not self._may_enter(frame, mask, here, is_ended):
                 continue
             cost = self._cost(frame, place)
-            cost += self.database.biases.continuing + self._settling() if is_current else 0.0
+            cost += self.database.biases.continuing if is_current else 0.0
             if cost < least or (cost == least and is_current):
                 found, least = frame, cost
+        if may_continue and found is not None and found != here:
+            into, own = (self.database.range_of(frame) for frame in (found, here))
+            is_to_loop = self.database.marks.looping[into] and not self.database.marks.looping[own]
+            playing_on = self._cost(here, place) + self.database.biases.continuing + self._settling()
+            return here if not is_to_loop and self._settling() and playing_on <= least else found
         return found
 
     def _settling(self):

@@ -40,7 +40,8 @@ DEFAULTS = Biases(0.0, LOOPING_BIAS, CONTINUING_BIAS)
 def jumps_per_s(database: MotionDatabase, speed_mps: float, table: cdb.CompiledTable | None = None) -> float:
     """How often a character jumps who walks straight ahead at one speed."""
     assert database.schema is not None
-    player = Controller(Selector([Entry("loco", database)]), ControllerSettings())
+    settling = {} if database.biases.continuing else {"settle_bias": 0.0}
+    player = Controller(Selector([Entry("loco", database)]), ControllerSettings(**settling))
     pose, past, jumps = database.raw(int(database.starts[0])), [Steered()], 0
     for _ in range(round(SECONDS / DT_S)):
         past = [*past, past[-1].moved(DT_S, (0.0, speed_mps))][-30:]

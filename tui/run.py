@@ -9,6 +9,7 @@ import webbrowser
 from collections.abc import Sequence
 
 from contextdb.disk import refuse_writing
+from contextdb.disk.boundary import real_path
 from contextdb.errors import ContextDBError, Fault, in_quotes, mend_for
 
 from .app import EditorApp
@@ -55,7 +56,7 @@ def edit_in_browser(path: str | None, theme: str | None, options: Sequence[str],
         mend = 'to install it: pip install "contextdb[browser]"'
         raise BrowserError(Fault("textual-serve is not installed, which shows the editor in a browser.", "", mend)) from None
     workspace, _ = _opened(path, theme, True)
-    title = workspace.first or workspace.folder.resolve().name
+    title = workspace.first or real_path(workspace.folder).name
     workspace.close(keep_journals=True)
     command = [sys.executable, "-m", "contextdb", "edit", *options, *(["--", path] if path else [])]
 

@@ -26,6 +26,7 @@ import contextdb
 from contextdb.commands.edit_command import require_terminal, screens
 from contextdb.console import ExitCode, note
 from contextdb.disk import make_folder
+from contextdb.disk.boundary import real_path
 from contextdb.errors import ContextDBError, Fault, FileError, Place
 from contextdb.tables.project import SCHEMA_FILE
 from contextdb.telemetry.link.doors import doors
@@ -152,7 +153,7 @@ def _contextdb() -> list[str]:
 
 
 def _edit_words(tables: Path) -> list[str]:
-    return ["edit", str(tables.resolve()), "--follow", GAME]
+    return ["edit", str(real_path(tables)), "--follow", GAME]
 
 
 def _edit_line(tables: Path) -> str:

@@ -154,14 +154,14 @@ static inline void cdbm_read_levels(cdbm_bundle *bundle, size_t number, cdbm_fra
 /* Read a database of a bundle; what is made of it is to be given back with cdbm_free_levels. */
 static inline void cdbm_read_database(cdbm_bundle *bundle, size_t number, cdbm_frames *frames, cdbm_clips *clips)
 {
-    const double *own = CDBM_TAKE(double, CDBM_P_DATABASE, 8);
+    const double *own = CDBM_TAKE(double, CDBM_P_DATABASE, 9);
     size_t n = 0, n_all, n_kinds = 0;
     memset(frames, 0, sizeof *frames);
     memset(clips, 0, sizeof *clips);
     if (!own) return;
     frames->n_frames = cdbm_size_from(own[0]), frames->n_kinds = cdbm_size_from(own[1]);
-    clips->rate = own[2], clips->continuing = own[3], clips->n_permutations = cdbm_size_from(own[4]);
-    clips->pace = cdbm_size_from(own[5]), clips->n_pace = cdbm_size_from(own[6]), clips->pace_s = own[7];
+    clips->rate = own[2], clips->continuing = own[3], clips->settle = own[4], clips->n_permutations = cdbm_size_from(own[5]);
+    clips->pace = cdbm_size_from(own[6]), clips->n_pace = cdbm_size_from(own[7]), clips->pace_s = own[8];
     frames->offset = CDBM_TAKE_ALL(double, CDBM_P_OFFSET, &frames->n_features);
     frames->box_starts = CDBM_TAKE_ALL(int64_t, CDBM_P_BOX_STARTS, &frames->n_boxes);
     frames->range_boxes = CDBM_TAKE_ALL(int64_t, CDBM_P_RANGE_BOXES, &n);

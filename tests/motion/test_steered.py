@@ -152,7 +152,7 @@ def test_the_same_minute_gives_the_same_decisions():
 def test_without_rules_the_character_jumps_far_more_often():
     jumps = [
         sum(decision.action is Action.JUMP for decision in made_run(**changes)[1])
-        for changes in ({}, {"search_every_s": 0.0, "jump_threshold_s": 0.0, "history_s": 0.0})
+        for changes in ({}, {"search_every_s": 0.0, "jump_threshold_s": 0.0, "history_s": 0.0, "settle_bias": 0.0})
     ]
     assert jumps[0] < 0.6 * jumps[1]
 

@@ -193,7 +193,7 @@ def _controller(name: str, player: Played, entries: list[tuple[int, int, int]]) 
         [
             chooser.n_played, settings.search_every_s, settings.jump_threshold_s, settings.history_s, settings.min_play_rate,
             settings.max_play_rate, settings.grace_s, settings.until_natural, player.banks is not None, body.velocity_halflife_s,
-            player.schema.rate,
+            player.schema.rate, settings.settle_s,
         ],
         np.float64,
     )  # fmt: skip

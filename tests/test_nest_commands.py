@@ -73,7 +73,8 @@ def test_coverage_says_in_which_file_a_row_of_an_inner_table_stands(tmp_path: Pa
     write(tmp_path, tackle="Asset,in_air,speed\nHit,False,..2\n@dive,True,3..\n", dive=dive)
     said = run("coverage", tmp_path / "tackle.csv").out
     assert "line 3 tackle/dive/Twin in dive.csv" in said
-    assert "nearest: line 2 Hit" in said
+    assert "nothing plays; Hit (line 2) would, with speed" in said
+    assert "nothing plays; tackle/dive/Left (line 2 of dive.csv) would, with speed" in " ".join(said.split())
     assert "Hit in" not in said
     told = run("coverage", tmp_path / "tackle.csv", "--explain", "tackle/dive/Twin").out
     assert told.startswith("line 3 tackle/dive/Twin in dive.csv of tackle (row 3)\n")

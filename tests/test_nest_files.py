@@ -352,6 +352,25 @@ def test_a_check_tells_of_missing_cyclic_and_broken_tables_once_each(tmp_path: P
     assert told == [("unusable-table", "tackle", 3), ("unreadable-cell", "dive", 2)]
 
 
+def test_a_check_of_a_variant_tells_what_its_base_has_that_cannot_be_used(tmp_path: Path):
+    (tmp_path / "contextdb.toml").write_text('[conditions.s]\ntype = "number"\n[tables.v]\nbase = "b"\n')
+    (tmp_path / "v.csv").write_text("Asset,s\nB,2\n")
+    for row, rule in (("A,fast", "unreadable-cell"), ("@gone,1", "no-such-table"), ("@v,1", "unusable-table")):
+        (tmp_path / "b.csv").write_text(f"Asset,s\n{row}\n")
+        found = [f for f in run("check", tmp_path, "--json").json["findings"] if f["level"] == "error"]
+        assert {(f["rule"], f["table"]) for f in found} == {("unusable-table", "v"), (rule, "b")}
+        alone = [f for f in run("check", tmp_path / "v.csv", "--json").json["findings"] if f["level"] == "error"]
+        assert [(f["rule"], f["table"]) for f in alone] == [("unusable-table", "v")]
+
+
+def test_a_new_row_of_a_variant_that_lacks_an_output_is_told_once(tmp_path: Path):
+    (tmp_path / "contextdb.toml").write_text('[tables.b]\noutputs = { n = { type = "int" } }\n[tables.v]\nbase = "b"\n')
+    (tmp_path / "b.csv").write_text("Asset,n\nA,1\n")
+    (tmp_path / "v.csv").write_text("Asset,n\nB,\n")
+    found = [f for f in run("check", tmp_path, "--json").json["findings"] if f["level"] == "error"]
+    assert [(f["rule"], f["table"], f["line"]) for f in found] == [("missing-output", "v", 2)]
+
+
 def test_findings_of_an_inner_table_are_told_of_it_and_not_of_the_outer_one_too(tmp_path: Path):
     write(tmp_path, dive="Asset,Weight,speed\nLeft,1,..8\nRight,3,4..6\n")
     outer, inner = cdb.Project.load(tmp_path)["tackle"], cdb.load(tmp_path / "dive.csv")

@@ -230,12 +230,10 @@ def check_cases(table: Table, cases: Sequence[Case], file: str | None = None) ->
 
     A table with cells that cannot be read is not evaluated; those are findings of their own.
     """
-    if table.faults:
+    compiled = _compiled(table)
+    if compiled is None:
         return []
-    try:
-        flat, compiled = table.flat(), data_of(table.compile())
-    except TableError:  # a table inside it cannot be used: reported for the row that refers to it
-        return []
+    flat = table.flat()
     findings = list(_doubtful(flat, cases, file))
     known = _known_facts(flat)
     for case in cases:
@@ -286,9 +284,21 @@ def question_of(compiled: CompiledData, case: Case) -> tuple[Expected, dict[str,
     return expected, facts, tuple(faults)
 
 
+def _compiled(table: Table) -> CompiledData | None:
+    """A table that can be evaluated; None where it, or one that it is made of, cannot be used, which is a finding of its own."""
+    try:
+        return data_of(table.compile())
+    except TableError:
+        return None
+
+
 def counted(table: Table, cases: Sequence[Case]) -> CaseCounts:
+    """How much the cases of a table expect, as `counted_in`. Raises TableError for one that cannot be used."""
+    return counted_in(data_of(table.compile()), cases)
+
+
+def counted_in(compiled: CompiledData, cases: Sequence[Case]) -> CaseCounts:
     """How much the cases of a table expect. One that can only hold, and another of the same facts and expectation, do not count."""
-    compiled = data_of(table.compile())
     exact, different, reached = 0, set[tuple[frozenset[tuple[str, str]], str]](), 0
     for case in cases:
         facts = frozenset((name, text.strip()) for name, text in case.facts.items() if name in compiled.asked)
@@ -311,10 +321,10 @@ class CaseBar:
     least_share: float = 0.0
 
     def findings(self, table: Table, cases: Sequence[Case], file: str | None) -> Iterator[Finding]:
-        """What a table misses; nothing where it cannot be read, which is a finding of its own."""
-        if table.faults:
+        """What a table misses; nothing where it, or one that it is made of, cannot be read, which is a finding of its own."""
+        if (compiled := _compiled(table)) is None:
             return
-        counts = counted(table, cases)
+        counts = counted_in(compiled, cases)
         if counts.count < self.least:
             verb = "expects" if counts.count == 1 else "expect"
             sentence = f"{plural(counts.count, 'saved context')} of the table {verb} something; wanted: {self.least:,}."

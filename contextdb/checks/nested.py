@@ -1,4 +1,4 @@
-"""What a check finds wrong with rows that refer to another table, and what it says of a flat table's rows.
+"""What a check finds wrong with rows that refer to another table or are of a base, and what it says of a flat table's rows.
 
 A finding of a table is about that table's own rows: what concerns rows of an inner table alone is reported there, once.
 """
@@ -10,31 +10,51 @@ from dataclasses import replace
 
 import numpy as np
 
-from contextdb.errors import ContextDBError, in_quotes, plural
+from contextdb.errors import ContextDBError, Fault, in_quotes, plural
 from contextdb.findings import Finding
 from contextdb.tables.alike import finding_at
 from contextdb.tables.data import TableData
 from contextdb.tables.nesting.flat import FlatTable
 from contextdb.tables.nesting.flat_columns import FlatColumn
-from contextdb.tables.nesting.links import inner_rows, is_nested, require_sound
+from contextdb.tables.nesting.links import inner_rows, is_nested, nesting_faults, require_sound
 from contextdb.tables.table import flat_of
-from contextdb.tables.variants import WholeTable
+from contextdb.tables.variants import WholeTable, whole_of
+
+
+def whole_faults(whole: WholeTable, told: Sequence[Finding]) -> Iterator[Finding]:
+    """What cannot be read in all rows of a variant beside what its own file has and `told` says: a finding for each cell that a new
+    row lacks, and one for all that is of its base, whose faults are reported there."""
+    places = {(finding.row, finding.column) for finding in told}
+    faults = [*whole.faults, *nesting_faults(whole, whole.around or {})]
+    of_base = []
+    for fault in faults:
+        row, column = fault.place.row, fault.place.column
+        if row is None or (row, column) in places:
+            continue
+        if whole.is_inherited(row, column):
+            of_base.append(fault)
+        else:
+            yield Finding.of(fault, "error", whole.name, whole.assets[row])
+    if of_base and whole.base is not None:
+        message = _cannot_be_used("base", whole.base.name, of_base)
+        file = str(whole.path) if whole.path else None
+        yield Finding("unusable-table", "error", f"{message}: {of_base[0].found}", whole.name, file)
 
 
 def new_findings(whole: TableData, findings: Iterable[Finding]) -> Iterator[Finding]:
-    """The findings of all rows of a table; of a variant those that its base does not have."""
+    """The findings of all rows of a table; of a variant those that its base does not have, and tables that cannot be used."""
     if not isinstance(whole, WholeTable):
         yield from findings
         return
     for finding in findings:
         rows = () if finding.row is None else (finding.row, *finding.by)
-        if not rows or not all(whole.is_inherited(row, finding.column) for row in rows):
+        if not rows or finding.rule == "unusable-table" or not all(whole.is_inherited(row, finding.column) for row in rows):
             yield finding
 
 
 def check_nesting(table: TableData) -> Iterator[Finding]:
     """What is wrong with the rows of a readable table that refer to others; nothing where no others are known."""
-    if not is_nested(table) or table.around is None or table.faults:
+    if not is_nested(table) or table.around is None or table.faults or nesting_faults(table, table.around):
         return
     unusable = list(_unusable(table))
     yield from unusable
@@ -54,12 +74,15 @@ def _unusable(table: TableData) -> Iterator[Finding]:
     for name, rows in inner_rows(table).items():
         try:
             assert table.around is not None
-            require_sound(table.around[name], table.around)
+            require_sound(whole_of(table.around[name], table.around), table.around)
         except ContextDBError as error:
-            first = error.faults[0]
-            n_faults = plural(len(error.faults), "fault")
-            message = f"the table {in_quotes(name)} cannot be used here: it has {n_faults}, the first in {first.place}."
-            yield finding_at(table, rows[0], "unusable-table", "error", message, table.asset_column)
+            message = _cannot_be_used("table", name, error.faults)
+            yield finding_at(table, rows[0], "unusable-table", "error", f"{message}.", table.asset_column)
+
+
+def _cannot_be_used(what: str, name: str, faults: Sequence[Fault]) -> str:
+    n_faults = plural(len(faults), "fault")
+    return f"the {what} {in_quotes(name)} cannot be used here: it has {n_faults}, the first in {faults[0].place}"
 
 
 def _shut_out(flat: FlatTable) -> Iterator[Finding]:

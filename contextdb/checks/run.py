@@ -15,7 +15,7 @@ from contextdb import bitmask
 from contextdb.cells.domains import Domain
 from contextdb.cells.sets import Cell, NumberSet
 from contextdb.checks.mirrored import check_mirroring
-from contextdb.checks.nested import check_nesting, new_findings
+from contextdb.checks.nested import check_nesting, new_findings, whole_faults
 from contextdb.errors import ContextDBError, in_quotes, nearest
 from contextdb.expressions import constant_truth
 from contextdb.expressions.rules import WhenRules
@@ -91,13 +91,17 @@ def _undeclared(table: TableData, column: ConditionColumn, file: str | None, abs
     return Finding("undeclared-condition", level, message, table.name, file, column=name)
 
 
-def _unreadable(table: TableData) -> Iterator[Finding]:
+def _unreadable(table: TableData) -> list[Finding]:
+    findings = [
+        Finding.of(fault, "error", table.name, None if fault.place.row is None else table.assets[fault.place.row])
+        for fault in table.faults
+    ]
     whole = known_whole(table)
-    rows = None if whole is None else {own: row for row, own in enumerate(whole.own_rows.tolist()) if own >= 0}
-    for fault in table.faults:
-        own = fault.place.row
-        finding = Finding.of(fault, "error", table.name, None if own is None else table.assets[own])
-        yield finding if rows is None or own is None else replace(finding, row=rows.get(own))
+    if whole is None:
+        return findings
+    rows = {own: row for row, own in enumerate(whole.own_rows.tolist()) if own >= 0}
+    findings = [f if f.row is None else replace(f, row=rows.get(f.row)) for f in findings]
+    return [*findings, *whole_faults(whole, findings)]
 
 
 def _cells(table: TableData) -> Iterator[Finding]:

@@ -125,7 +125,7 @@ RULES: dict[str, Rule] = {
     ),
     "unusable-table": Rule(
         "error",
-        "A row refers to a table that cannot be used.",
+        "A row, or a variant, refers to a table that cannot be used.",
         "Correct the faults of that table; they are reported with it.",
         ("checks.nested",),
     ),

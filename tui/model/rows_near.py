@@ -21,16 +21,19 @@ def is_near_at_once(table: Table) -> bool:
     return sum(len(column.texts.texts) for column in table.conditions) <= MOST_TEXTS
 
 
-def rows_near(table: Table, box: Mapping[str, str], most: int) -> dict[int, tuple[str, ...]]:
-    """The rows with fewest cells to change so that they hold all of a box, nearest first, and the conditions of those cells."""
+def rows_near(table: Table, box: Mapping[str, str], most: int, nearest: int | None = None) -> dict[int, tuple[str, ...]]:
+    """The rows with fewest cells to change so that they hold all of a box, and the conditions of those cells.
+
+    The row that a report names as the nearest comes first; of rows with equally many cells the others are in the table's order.
+    """
     short = {c.condition.name: ~_holding(c, box.get(c.condition.name, "")) for c in table.conditions}
     able = np.array(table.enabled, np.bool_)
     for column in table.conditions:
         able &= ~np.isin(column.texts.codes, list(column.faults))
     rows = np.flatnonzero(able)
     n_short = sum((flags.astype(np.int64) for flags in short.values()), np.zeros(table.n_rows, np.int64))
-    nearest = rows[np.argsort(n_short[rows], kind="stable")][:most].tolist()
-    return {row: tuple(name for name, flags in short.items() if flags[row]) for row in nearest}
+    ranked = rows[np.lexsort((n_short[rows], rows != (-1 if nearest is None else nearest)))][:most].tolist()
+    return {row: tuple(name for name, flags in short.items() if flags[row]) for row in ranked}
 
 
 def _holding(column: ConditionColumn, text: str) -> NDArray[np.bool_]:

@@ -315,7 +315,8 @@ class CoveragePane(Pane):
                 below.show_rows(table, IN_TABLE, range(table.n_rows), {}, play.unused[self._at(section)])
         elif section == "played":
             if play is not None and play.table is table and play.gaps:
-                self._show_near(below, play.gaps[self._at(section)].cells)
+                gap = play.gaps[self._at(section)]
+                self._show_near(below, gap.cells, gap.nearest)
         elif result is None or self.run.state != "done":
             return
         elif section == "crowded" and result.report.crowded:
@@ -326,12 +327,13 @@ class CoveragePane(Pane):
             rows = [row for row in (finding.row, *finding.by) if row is not None]
             below.show_compared(table, [row for row in dict.fromkeys(rows) if row < table.n_rows], {}, finding.column)
         elif (cells := self._cells_here()) is not None:
-            self._show_near(below, cells[1])
+            nearest = result.report.gaps[self._at(section)].nearest if section == "gaps" else None
+            self._show_near(below, cells[1], nearest)
 
-    def _show_near(self, below: RowsBelow, cells: Mapping[str, str]) -> None:
+    def _show_near(self, below: RowsBelow, cells: Mapping[str, str], nearest: Nearest | None) -> None:
         table = self.sheet.table
         if is_near_at_once(table) and cells.keys() <= {c.condition.name for c in table.conditions}:
-            near = rows_near(table, cells, MOST)
+            near = rows_near(table, cells, MOST, None if nearest is None else nearest.row)
             tones = {(row, name): "warning" for row, names in near.items() for name in names}
             first = next(iter(near.values()), ())
             below.show_rows(table, NEAREST, list(near), tones, 0, first[0] if first else None)

@@ -39,7 +39,9 @@ from .disk_care import DiskCare
 from .following import Following
 from .renames import Renames
 
-TABS = ("assets", "options", "priorities", "coverage", "problems", "contracts")
+CONTRACTS = "contracts"
+"""The tab that gives way on a narrow screen where the project declares no contracts."""
+TABS = ("assets", "options", "priorities", "coverage", "problems", CONTRACTS)
 MOTION = "motion"
 """The tab that there is where the project declares motion databases and has a recorded session, and where it was gone to."""
 WITH_TOOLS = 30
@@ -145,7 +147,7 @@ class TableScreen(Screen[None]):
     def _show_bars(self) -> None:
         mark = " *" if self.session.sheet.is_modified else ""
         items = [Item("open", f"{self.table_name}{mark}", is_strong=True)]
-        items += [Item(tab, BY_ID[tab].label, is_on=tab == self.tab) for tab in self.tabs]
+        items += [Item(tab, BY_ID[tab].label, is_on=tab == self.tab, is_spare=self._is_spare(tab)) for tab in self.tabs]
         has_tools = self.size.height >= WITH_TOOLS
         self.query_one("#tools", Bar).display = has_tools
         items += [] if has_tools else [Item("palette", f"^P {BY_ID['palette'].label}")]
@@ -154,6 +156,10 @@ class TableScreen(Screen[None]):
         about = f"{plural(table.n_rows, 'row')} · {plural(len(table.columns), 'column')}"
         self.query_one("#tabs", Bar).show(items, about)
         self.show_summary()
+
+    def _is_spare(self, tab: str) -> bool:
+        """Whether a tab gives way on a narrow screen."""
+        return tab == CONTRACTS != self.tab and not self.session.sheet.table.schema.contracts
 
     def show_summary(self) -> None:
         """Say what plays, and how much of the table is valid, displayed and selected."""
@@ -245,7 +251,7 @@ class TableScreen(Screen[None]):
             from ..panes.motion import MotionPane  # loads the motion search
 
             return MotionPane(self.workspace.folder, id=name)
-        if name == "contracts":
+        if name == CONTRACTS:
             from ..panes.contracts import ContractsPane  # loads the prover
 
             return ContractsPane(sheet, id=name)

@@ -27,10 +27,12 @@ class Item:
     is_on: bool = False
     """It is the one that is chosen."""
     is_strong: bool = False
+    is_spare: bool = False
+    """It is left out before any other item is."""
 
 
 class Bar(Widget):
-    """Items from the left, one text at the right. What does not fit is left out, the text first."""
+    """Items from the left, one text at the right. What does not fit is left out: the text first, then spare items, then the last."""
 
     ALLOW_SELECT = False
     COMPONENT_CLASSES: ClassVar[set[str]] = {"bar--item", "bar--on", "bar--strong", "bar--text", "bar--hover"}
@@ -73,9 +75,10 @@ class Bar(Widget):
         return Strip(segments).adjust_cell_length(self.size.width, plain)
 
     def _fitting(self) -> list[Item]:
-        fitting: list[Item] = []
-        used = 0
-        for item in self._items:
+        items, fitting, used = self._items, list[Item](), 0
+        if sum(cell_len(item.label) + 2 for item in items) > self.size.width:
+            items = tuple(item for item in items if not item.is_spare)
+        for item in items:
             used += cell_len(item.label) + 2
             if used > self.size.width and fitting:
                 break

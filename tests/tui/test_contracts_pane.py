@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from terminal import drive, screen_text
+from terminal import drive, screen_text, with_editor
 from textual.pilot import Pilot
 from textual.widgets import Input
 
@@ -156,3 +156,22 @@ def test_what_is_no_contract_is_said_while_it_is_typed(folder: Path):
         await until(pilot, lambda: not pane.contracts)
 
     drive(EditorApp(Workspace(folder)), play, (100, 30))
+
+
+@pytest.mark.parametrize(
+    ("is_declared", "keys", "last"), [(False, (), "^P Commands"), (False, ("ctrl+pageup",), "Contracts"), (True, (), "Contracts")]
+)
+def test_on_a_narrow_screen_the_tab_gives_way_to_the_commands_unless_it_is_used(
+    folder: Path, is_declared: bool, keys: tuple[str, ...], last: str
+):
+    toml = folder / "contextdb.toml"
+    toml.write_text(TOML if is_declared else TOML.partition("[contracts")[0])
+    (folder / "moves.csv").rename(folder / "locomotion.csv")
+
+    async def play(app: EditorApp, pilot: Pilot[Any]) -> str:
+        await pilot.press(*keys)
+        await pilot.pause()
+        return screen_text(app).splitlines()[0]
+
+    assert with_editor(folder / "locomotion.csv", play).endswith(last)
+    assert with_editor(folder / "locomotion.csv", play, (100, 24)).endswith("Contracts  ^P Commands")

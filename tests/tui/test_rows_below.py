@@ -47,9 +47,22 @@ def test_the_nearest_row_of_each_gap_is_that_of_the_report(name):
     gaps = coverage(table).gaps
     assert gaps
     for gap in gaps:
-        row, short = next(iter(rows_near(table, gap.cells, 1).items()))
         assert gap.nearest is not None
-        assert (row, len(short)) == (gap.nearest.row, gap.nearest.n_changes)
+        near = rows_near(table, gap.cells, 9, gap.nearest.row)
+        assert next(iter(near)) == gap.nearest.row
+        assert set(near[gap.nearest.row]) == gap.nearest.cells.keys()
+        n_short = [len(short) for short in near.values()]
+        assert n_short == sorted(n_short)
+
+
+def test_the_nearest_row_of_the_report_is_the_first_below_its_gap(tmp_path):
+    shutil.copytree(TABLES, tmp_path / "game")
+    path = tmp_path / "game" / "hit_mid_air.csv"
+    nearest = coverage(cdb.load(path)).gaps[0].nearest
+    assert nearest is not None
+    assert nearest.row > 0
+    _, _, first, *_ = below(path, "alt+4")
+    assert first.replace("▸", " ").split()[:2] == [str(nearest.row + 1), nearest.asset]
 
 
 def test_a_row_with_a_cell_that_cannot_be_read_or_switched_off_is_not_near(path):
@@ -71,9 +84,9 @@ def test_a_gap_is_shown_with_its_nearest_rows_and_the_cells_that_keep_them_from_
     assert "nearest rows" in title
     assert header.split() == ["Row", "Asset", "speed", "hit"]
     gap = coverage(cdb.load(path, strict=False)).gaps[0]
-    first, short = next(iter(rows_near(cdb.load(path, strict=False), gap.cells, 1).items()))
-    assert rows[0].split()[1] == str(first + 1)
-    assert rows[0].count("×") == len(short)
+    assert gap.nearest is not None
+    assert rows[0].split()[1] == str(gap.nearest.row + 1)
+    assert rows[0].count("×") == gap.nearest.n_changes
 
 
 def test_a_problem_is_shown_at_its_place_among_the_other_rows(path):

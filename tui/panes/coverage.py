@@ -16,7 +16,7 @@ from textual.message import Message
 from textual.widget import Widget
 from textual.widgets import ContentSwitcher, Static
 
-from contextdb.covering import CoverageReport, format_percent
+from contextdb.covering import CoverageReport, Nearest, format_percent
 from contextdb.errors import ContextDBError, in_quotes
 from contextdb.telemetry.observed import SeenGap
 

@@ -32,7 +32,7 @@ class Item:
 
 
 class Bar(Widget):
-    """Items from the left, one text at the right. What does not fit is left out: the text first, then spare items, then the last."""
+    """Items from the left, one text at the right. What does not fit is left out: the text, then spare items, then the last ones."""
 
     ALLOW_SELECT = False
     COMPONENT_CLASSES: ClassVar[set[str]] = {"bar--item", "bar--on", "bar--strong", "bar--text", "bar--hover"}

@@ -18,7 +18,16 @@ from pathlib import Path
 
 from contextdb.authoring.clip_looks import MANY, ClipAt, LeftOut, Looks, Seen, chunks_of, look_at_chunk
 from contextdb.disk.engines import Engines
-from contextdb.disk.own_files import has_own, make_own_folder, own_names, read_own, remove_own, remove_own_folder, write_own
+from contextdb.disk.own_files import (
+    has_own,
+    is_own_folder,
+    make_own_folder,
+    own_names,
+    read_own,
+    remove_own,
+    remove_own_folder,
+    write_own,
+)
 from contextdb.errors import FileError
 from contextdb.motion.clips.clip_measures import Measures
 from contextdb.motion.preparing.clip_facts import ClipFacts
@@ -52,7 +61,7 @@ class SavedLooks:
     def get(self, key: str) -> list[Seen | LeftOut] | None:
         """What was seen of a chunk; None where that is not known."""
         with suppress(FileError, OSError, ValueError, KeyError, TypeError, AttributeError, IndexError, RecursionError):
-            if has_own(self.folder / f"{key}{SUFFIX}"):
+            if is_own_folder(self.folder.parent) and has_own(self.folder / f"{key}{SUFFIX}"):
                 return [_read(each) for each in json.loads(read_own(self.folder / f"{key}{SUFFIX}"))]
         return None
 
@@ -68,6 +77,8 @@ class SavedLooks:
     def remove(self) -> None:
         """Forget all of them."""
         with suppress(FileError, OSError):
+            if not is_own_folder(self.folder.parent):
+                return
             for name in own_names(self.folder):
                 if name.endswith(SUFFIX):
                     remove_own(self.folder / name)

@@ -340,7 +340,7 @@ static int cdbp_table_made(cdbp_making *making, PyObject *enabled, PyObject *con
     own->conditions = (cdb_condition *)cdbi_memory(&making->opening, n + 1, sizeof(cdb_condition));
     own->readers = (cdbp_reader *)cdbi_memory(&making->opening, n + 1, sizeof(cdbp_reader));
     own->names = (PyObject **)cdbi_memory(&making->opening, n + 1, sizeof(PyObject *));
-    making->views_room = 9 * n + 6;
+    making->views_room = 16 * n + 16;
     own->views = (Py_buffer *)cdbi_memory(&making->opening, making->views_room, sizeof(Py_buffer));
     if (making->opening.status == CDB_OK) {
         making->opening.columns = own->columns;

@@ -235,7 +235,7 @@ def test_changing_the_cells_of_the_nearest_row_closes_the_gap(seed):
 
 @examples(2)
 @given(SEEDS)
-def test_no_row_needs_fewer_changes_than_the_nearest_and_no_earlier_one_as_few(seed):
+def test_no_row_needs_fewer_changes_than_the_nearest(seed):
     table = random_table(random.Random(seed), most_rows=12)
     space = Space.of(data_of(table.compile()))
     for gap in coverage(table, samples=0).gaps:
@@ -245,7 +245,7 @@ def test_no_row_needs_fewer_changes_than_the_nearest_and_no_earlier_one_as_few(s
         box = space.box({c.name: parse_cell(gap.cells[c.name], c.domain) for c in space.conditions if c.name in gap.cells})
         changes = [sum(any(box[f] & ~row[f] for f in own) for own in space.of_condition) for row in space.boxes]
         assert gap.nearest.n_changes == min(changes) > 0
-        assert gap.nearest.row == space.rows[changes.index(min(changes))]
+        assert gap.nearest.row in [row for row, n in zip(space.rows, changes, strict=True) if n == min(changes)]
 
 
 @examples(1)

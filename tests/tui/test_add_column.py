@@ -292,7 +292,7 @@ def test_f6_inserts_a_new_column_from_its_name_and_from_a_list(table: Table):
 
 def test_every_job_of_a_new_column_stands_apart_from_what_it_means(table: Table):
     seen = press(DialogApp(AddColumn(table, 0)), *"grip", "enter", "enter")
-    assert "cooldown_turns  picks" in seen
+    assert "cooldown_s" in seen
 
 
 def test_a_job_that_is_taken_is_told(table: Table):

@@ -46,7 +46,7 @@ def tidied(table: Table, progress: Progress = SILENT) -> Table:
     after = work.result
     if after is not table and effects(table, after, most=EFFECTS):
         raise TableError(Fault("the answers would change, which is an error of contextdb; nothing is written."))
-    return after
+    return after if after is table else tidied(after, progress)  # joined rows may be joined with more
 
 
 def _require_own_rows(table: Table) -> None:

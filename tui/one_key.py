@@ -46,10 +46,17 @@ class OneKeyAtATime(App[None]):
         except (KeyboardInterrupt, SystemExit):
             raise
         except BaseException as error:  # a panic of polars is no Exception
+            self._end_painting()
             raise ScreenCrash(error) from error
         if self._exception is not None:
+            self._end_painting()
             raise ScreenCrash(self._exception)
         return self.return_code or 0
+
+    def _end_painting(self) -> None:
+        """Wait until the terminal got all that was painted: a thread paints, and Textual does not wait for it on every way out."""
+        if self._driver is not None:
+            self._driver.close()
 
     def on_load(self) -> None:
         """Watch every task: Textual ends the app for an Exception, but waits for ever for a part that ended by another error."""

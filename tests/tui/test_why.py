@@ -36,6 +36,14 @@ def test_a_row_is_explained_as_explain_does_and_its_mends_make_it_valid(table: T
             query.show(table)
 
 
+def test_a_fact_of_many_digits_is_said_in_few_as_explain_does():
+    table = small("A;1..2;")
+    query = QueryRow(table)
+    query.set("speed", "4.4478483428758864")
+    cell = why_row(query, table, 0).cells[0]
+    assert (cell.state, cell.fact) == ("fails", "4.448 m/s")
+
+
 def small(*rows: str, enabled: str | None = None, is_strict: bool = True) -> Table:
     names = ["Asset", "speed", "hit", *([enabled] if enabled else [])]
     columns = dict(zip(names, zip(*(row.split(";") for row in rows), strict=True), strict=True))

@@ -23,7 +23,7 @@ from contextdb.bitmask import Flags, Rows
 from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import Fact
 from contextdb.cells.sets import Cell
-from contextdb.compiled.explain import Explanation, Failure, RowExplanation, describe_fact
+from contextdb.compiled.explain import Explanation, Failure, RowExplanation, describe_fact, told_fact
 from contextdb.compiled.pick import Outcome, percent
 from contextdb.errors import ContextError, Fault, some
 from contextdb.tables.readable import unreadable_rows
@@ -338,6 +338,15 @@ class QueryRow:
         """Where a condition is among those that are asked; None without a fact of the test row."""
         has_fact = self.facts.get(condition) is not None and self.role_of(condition) is None
         return self._own.compiled.places.get(condition) if has_fact else None
+
+    def fact_text(self, condition: Condition) -> str:
+        """A fact of the test row with its unit, as `explain` says it; empty without one."""
+        fact = self.facts.get(condition.name)
+        if fact is None:
+            return ""
+        at = self._asked_at(condition.name)
+        said = describe_fact(fact, condition) if at is None else told_fact(self._own.compiled, at, fact)
+        return f"{said} {condition.unit}".rstrip()
 
     def failing(self, rows: Sequence[int] | Rows) -> NDArray[np.bool_]:
         """Which cells of some rows fail: bool [rows, conditions], the conditions in the order of the table."""

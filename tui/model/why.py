@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from contextdb.cells.words import says_any
-from contextdb.compiled.explain import describe_fact, mended
+from contextdb.compiled.explain import mended
 from contextdb.edits.edits import check_cell
 from contextdb.errors import some
 from contextdb.tables.condition_column import ConditionColumn
@@ -98,8 +98,7 @@ def _cell(query: QueryRow, column: ConditionColumn, row: int, fails: bool) -> Ce
     if query.role_of(condition.name) is not None:
         return _cast_cell(query, column, row)
     fact = query.facts.get(condition.name)
-    unit = f" {condition.unit}" if condition.unit and fact is not None else ""
-    fact_text = "" if fact is None else describe_fact(fact, condition) + unit
+    fact_text = query.fact_text(condition)
     if code in column.faults:
         return CellWhy(row, condition.name, text, fact_text, "unreadable")
     if fact is None:

@@ -155,8 +155,8 @@ class NearRows:
     compiled: CompiledData
 
     def nearest(self, gap: Sides) -> Nearest | None:
-        """The row that has to change least to hold the gap: the fewest cells; of equal ones by how little these grow, then the one
-        whose asset is most like the others; and its cells that change."""
+        """The row that has to change least to hold the gap: the fewest cells; of equal ones those that grow least, then the one
+        whose asset is most like the others, then the lowest row; and its cells that change."""
         space, compiled = self.space, self.compiled
         if not space.boxes:
             return None

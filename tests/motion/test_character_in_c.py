@@ -144,7 +144,7 @@ def session(rng, n_ticks):
         for stick, facing, updated in zip(sticks, facings, updates, strict=True):
             number = CONDITIONS["gait"]["values"].index(updated.facts["gait"])
             given.append(struct.pack("3dq", *stick, facing, number))
-        states = b"".join(bytes(one.state) for one in crowd)
+        states = b"".join(one.state for one in crowd)
         poses = [updated.pose for updated in updates]
         numbers = [(np.array(pose.root), pose.rotations, pose.translations, pose.positions) for pose in poses]
         expected.append((states, [b"".join(np.ascontiguousarray(each).tobytes() for each in own) for own in numbers]))

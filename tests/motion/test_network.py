@@ -11,7 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from strategies import examples
 from test_character import DT, character, gait, stick_at
-
 from test_rows_played import moves
 
 from contextdb import ContextError, motion

@@ -75,7 +75,6 @@ class SavedLooks:
             write_own(self.folder / f"{key}{SUFFIX}", json.dumps([_written(each) for each in seen]).encode(), syncs=False)
 
     def remove(self) -> None:
-        """Forget all of them."""
         with suppress(FileError, OSError):
             if not is_own_folder(self.folder.parent):
                 return

@@ -6,7 +6,10 @@ import argparse
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 
+from contextdb.console import output
+from contextdb.disk import write_atomic
 from contextdb.errors import ContextError, Fault, QueryError
 
 
@@ -33,6 +36,15 @@ def take_page_arguments(arguments: argparse.Namespace) -> None:
         raise QueryError(Fault(f"-o writes a page, and --format {arguments.format} prints.", "--format html with -o FILE"))
     elif arguments.format != "text":
         setattr(arguments, arguments.format, True)
+
+
+def print_or_write(text: str, file: str | None) -> None:
+    """Print a report, or write it to the file that -o names."""
+    if file:
+        write_atomic(Path(file), text.encode("utf-8", "backslashreplace"))
+    else:
+        with output():
+            print(text, end="")
 
 
 @contextmanager

@@ -23,7 +23,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from contextdb.commands import add_format_arguments, coverage_telemetry
+from contextdb.commands import add_format_arguments, coverage_telemetry, print_or_write
 from contextdb.commands.gating import (
     Accepted,
     add_accepting_arguments,
@@ -35,13 +35,12 @@ from contextdb.commands.gating import (
 )
 from contextdb.commands.numbers import percent
 from contextdb.commands.progress import Bar, bar, has_many_cells
-from contextdb.console import ExitCode, output, printable, terminal_width, wants_colour
+from contextdb.console import ExitCode, printable, terminal_width, wants_colour
 from contextdb.covering.baseline import ACCEPTED, Baseline, CaseCounts, read_baseline
 from contextdb.covering.engine import MOST_GAPS, SAMPLES, WORK
 from contextdb.covering.expected import Expectation
 from contextdb.covering.pairs import PairTable
 from contextdb.covering.progress import Tell
-from contextdb.disk import write_atomic
 from contextdb.errors import ContextDBError, ContextError, Fault, FileError, Place, TableError, in_quotes, no_such, plural
 from contextdb.report import formats, render
 from contextdb.report.coverage_results import CoverageResults, Measured
@@ -92,11 +91,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         code = code_of(results)
         colour = wants_colour(sys.stdout) and not arguments.output
         text = render(arguments.format, results, colour=colour, width=terminal_width(), shows_all=arguments.all)
-    if arguments.output:
-        write_atomic(Path(arguments.output), text.encode("utf-8", "backslashreplace"))
-    else:
-        with output():
-            print(text, end="")
+    print_or_write(text, arguments.output)
     return code
 
 

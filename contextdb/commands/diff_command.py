@@ -16,15 +16,13 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from contextdb.checks.effects import Effects
-from contextdb.commands import add_format_arguments
+from contextdb.commands import add_format_arguments, print_or_write
 from contextdb.commands.diff_views import as_markdown, as_text, effects_json, effects_markdown, effects_text
 from contextdb.commands.numbers import percent
-from contextdb.console import ExitCode, output, wants_colour
-from contextdb.disk import write_atomic
+from contextdb.console import ExitCode, wants_colour
 from contextdb.edits.diffing import Diff, diff
 from contextdb.errors import ContextDBError, ContextError, Fault
 from contextdb.report.render_json import as_json
@@ -75,11 +73,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
 
         replayed = replayed_moments(arguments, before, after, effect)
     text = _rendered(changes, effect, replayed, arguments, _sessions(arguments, before, after))
-    if arguments.output:
-        write_atomic(Path(arguments.output), text.encode("utf-8", "backslashreplace"))
-    else:
-        with output():
-            print(text, end="")
+    print_or_write(text, arguments.output)
     if replayed is not None and replayed.gates:
         return ExitCode.OK if all(gate.passed for gate in replayed.gates) else ExitCode.FOUND
     return ExitCode.FOUND if changes else ExitCode.OK

@@ -17,10 +17,9 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 
 from contextdb.authoring.motion_coverage import TableMotion, motion_coverage
-from contextdb.commands import add_format_arguments
+from contextdb.commands import add_format_arguments, print_or_write
 from contextdb.commands.gating import (
     Accepted,
     add_accepting_arguments,
@@ -32,9 +31,8 @@ from contextdb.commands.gating import (
 from contextdb.commands.motion_build_command import MotionProject
 from contextdb.commands.numbers import number_type, percent
 from contextdb.commands.progress import building_bar
-from contextdb.console import ExitCode, note, output, terminal_width, wants_colour
+from contextdb.console import ExitCode, note, terminal_width, wants_colour
 from contextdb.covering.declared import NOTHING, declared, differences
-from contextdb.disk import write_atomic
 from contextdb.errors import ContextError, Fault, in_quotes, mend_for, some
 from contextdb.motion.measuring.near_clips import NEAR_COST
 from contextdb.motion.measuring.transition_names import PATTERN
@@ -86,11 +84,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         text = _context(results, arguments.context, colour, width)
     else:
         text = render(arguments.format, results, colour=colour, width=width, shows_all=arguments.all)
-    if arguments.output:
-        write_atomic(Path(arguments.output), text.encode("utf-8", "backslashreplace"))
-    else:
-        with output():
-            print(text, end="")
+    print_or_write(text, arguments.output)
     return ExitCode.OK if results.passed else ExitCode.FOUND
 
 
@@ -128,7 +122,6 @@ def _measured(
     accepted: Accepted,
     missing: Sequence[str],
 ) -> MotionMeasured:
-    """One table with its gates."""
     table = None if motion.coverage.table is None else tables[motion.coverage.table]
     space = NOTHING if table is None else declared(table, {})
     gates = [] if limit is None else [fail_under(motion, limit)]

@@ -54,7 +54,8 @@ def why(left: Left, row: int | None) -> str:
     said = [*_preferences(left, row)]
     n_left_out = len(left.may) - len(left.fresh)
     if len(left.fresh) > 1:
-        said.append(f"chance {percent(_chance(left, row))} of {len(left.fresh)}")
+        chance = float(left.choosing.chances(np.array(left.fresh, np.int64))[left.fresh.index(row)])
+        said.append(f"chance {percent(chance)} of {len(left.fresh)}")
     elif n_left_out:
         said.append("picked least lately")
     if not said:
@@ -74,12 +75,12 @@ def _none_left(left: Left) -> str:
 
 def _preferences(left: Left, row: int) -> list[str]:
     """What the policy of each depth, where it had a choice, went by."""
-    choosing, compiled = left.choosing, left.choosing.compiled
+    choosing = left.choosing
     group = np.array([r for r in left.awake if choosing.pickable[r]], np.int64)
     may = np.array(left.may, np.int64)
     said = []
     for depth, taken in enumerate(choosing.taken):
-        table = compiled if compiled.ways is None else compiled.ways.table_at(row, depth)
+        table = choosing.table_at(row, depth)
         if table is None:
             break
         rows, best = np.unique(taken[group]), np.unique(taken[may])
@@ -99,15 +100,3 @@ def _preference(table: Ranked, own: int, rows: np.ndarray[tuple[int], np.dtype[n
     if POLICIES[table.policy].by_cost and len(rows) > 1 and left.matches.has_penalties:
         return f"least penalty {layered_penalties(left.matches)[depth, row]:g}"
     return words
-
-
-def _chance(left: Left, row: int) -> float:
-    """How likely the row was, among those that were left."""
-    chance, group = 1.0, np.array(left.fresh, np.int64)
-    for depth, taken in enumerate(left.choosing.taken):
-        first = group[np.unique(taken[group], return_index=True)[1]]
-        weights = left.choosing.weights[depth, first]
-        shares = weights / weights.max()
-        chance *= float(shares[taken[first] == taken[row]][0] / shares.sum())
-        group = group[taken[group] == taken[row]]
-    return chance

@@ -132,7 +132,6 @@ class QueryRow:
 
     @property
     def is_empty(self) -> bool:
-        """Whether no fact is given."""
         return not self.actors and all(self.facts[name] is None for name in self.wanted.given)
 
     # ---- what the table answers

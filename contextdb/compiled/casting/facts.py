@@ -116,8 +116,6 @@ def _kind(value: object) -> str:
 
 
 class _Reader:
-    """Reads the actors of one moment."""
-
     def __init__(self, compiled: CompiledData, context: Context, ask: Ask) -> None:
         self.compiled, self.context, self.prefer, self.unknown = compiled, context, ask.prefer, ask.unknown
         self.known: dict[object, dict[str, object]] = {}

@@ -76,7 +76,7 @@ WORDS = {"↑": "up", "↓": "down", "←": "left", "→": "right", "Enter": "en
 WORDS |= {"Del": "delete"} | {f"F{n}": f"f{n}" for n in range(1, 13)}
 SENT = """## What terminals send
 
-Keys that some terminal keeps for itself, or sends as another one. *xterm* is also what tmux, screen and most terminals send; *kitty*
+Keys that some terminal keeps for itself, or sends as another. *xterm* is also what tmux, screen and most terminals send; *kitty*
 is kitty's keyboard protocol, which the editor turns on where it is understood; *Windows* is Windows Terminal. `^A` is a control
 character. Kitty keeps most keys with Ctrl+Shift for itself, Windows Terminal, once its window is split, Alt and Alt+Shift with
 arrows.

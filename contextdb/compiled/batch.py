@@ -74,7 +74,7 @@ class BatchMatches(ManyMatches):
     """The codes, one slot after the other: int32 [P, N]."""
     rules: ManyRules | None = None
     """The rows' own rules, with their facts; None for a table without."""
-    kept: KeptFacts | None = None
+    retained: KeptFacts | None = None
     """The facts that soft cells cost with, and that are asked in a mirror; None for a table that needs them for neither."""
 
     @property
@@ -83,9 +83,10 @@ class BatchMatches(ManyMatches):
 
     @cached_property
     def _mirrored(self) -> ManyMatches:
-        assert self.kept is not None
+        facts, mirroring = self.retained, self.compiled.mirroring
+        assert facts is not None
         try:
-            return query_many(self.compiled, mirrored_columns(self.kept.columns, self.compiled.mirroring), self.kept.unknown)
+            return query_many(self.compiled, mirrored_columns(facts.columns, mirroring), facts.unknown)
         except ContextError as error:
             raise in_mirror(error) from None
 
@@ -111,22 +112,22 @@ class BatchMatches(ManyMatches):
         return self._matches(context, mask)
 
     def _matches(self, context: int, mask: Words) -> Matches:
-        matches, kept = self.compiled.matches(bitmask.to_int(mask)), self.kept
-        if kept is None:
+        matches, facts = self.compiled.matches(bitmask.to_int(mask)), self.retained
+        if facts is None:
             return matches
         if self.compiled.mirroring:
             with_mirrored(matches, lambda: self.mirrored[context])
         if self.compiled.widening:
-            with_widened(matches, lambda: self.compiled.query_widened(kept.of_context(context), kept.unknown))
+            with_widened(matches, lambda: self.compiled.query_widened(facts.of_context(context), facts.unknown))
         if self.compiled.is_soft:
-            with_penalties(matches, lambda: self.compiled.layered_penalties(kept.of_context(context), kept.unknown))
+            with_penalties(matches, lambda: self.compiled.layered_penalties(facts.of_context(context), facts.unknown))
         return matches
 
     def _costs_of_pairs(self) -> CostsOfPairs:
-        kept = self.kept
-        assert kept is not None, "a table with soft cells keeps its facts"
+        facts = self.retained
+        assert facts is not None, "a table with soft cells keeps its facts"
         return costs_of_pairs(
-            self.compiled, kept.columns, self.n_contexts, lambda table, given: query_many(table, given, kept.unknown).mask
+            self.compiled, facts.columns, self.n_contexts, lambda table, given: query_many(table, given, facts.unknown).mask
         )
 
     @cached_property
@@ -212,7 +213,7 @@ def query_encoded(compiled: CompiledData, contexts: Contexts, unknown: Unknown =
 def kept_facts(many: BatchMatches, given: Mapping[str, Any], unknown: Unknown) -> BatchMatches:
     """Answers with the facts that they need later on."""
     compiled = many.compiled
-    return many if not compiled.is_bound else replace(many, kept=KeptFacts(kept_columns(given, compiled.asked), unknown))
+    return many if not compiled.is_bound else replace(many, retained=KeptFacts(kept_columns(given, compiled.asked), unknown))
 
 
 def query_known(

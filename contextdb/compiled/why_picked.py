@@ -51,17 +51,17 @@ def why(left: Left, row: int | None) -> str:
     if row is None:
         played = left.choosing.compiled.fallback is not None
         return f"{'fallback: ' if played else ''}{_none_left(left)}"
-    said = [*_preferences(left, row)]
+    phrases = [*_preferences(left, row)]
     n_left_out = len(left.may) - len(left.fresh)
     if len(left.fresh) > 1:
         chance = float(left.choosing.chances(np.array(left.fresh, np.int64))[left.fresh.index(row)])
-        said.append(f"chance {percent(chance)} of {len(left.fresh)}")
+        phrases.append(f"chance {percent(chance)} of {len(left.fresh)}")
     elif n_left_out:
-        said.append("picked least lately")
-    if not said:
+        phrases.append("picked least lately")
+    if not phrases:
         rest = " that does not rest" if len(left.awake) == 1 else " that can be picked"
-        said.append(f"only valid row{rest if len(left.matches) > 1 else ''}")
-    return ", ".join(said)
+        phrases.append(f"only valid row{rest if len(left.matches) > 1 else ''}")
+    return ", ".join(phrases)
 
 
 def _none_left(left: Left) -> str:
@@ -78,7 +78,7 @@ def _preferences(left: Left, row: int) -> list[str]:
     choosing = left.choosing
     group = np.array([r for r in left.awake if choosing.pickable[r]], np.int64)
     may = np.array(left.may, np.int64)
-    said = []
+    phrases = []
     for depth, taken in enumerate(choosing.taken):
         table = choosing.table_at(row, depth)
         if table is None:
@@ -86,9 +86,9 @@ def _preferences(left: Left, row: int) -> list[str]:
         rows, best = np.unique(taken[group]), np.unique(taken[may])
         if len(best) < len(rows):
             words = _preference(table, int(taken[row]), rows, left, row, depth)
-            said.append(words if depth == 0 else f"{words} of {table.name}")
+            phrases.append(words if depth == 0 else f"{words} of {table.name}")
         group, may = group[taken[group] == taken[row]], may[taken[may] == taken[row]]
-    return said
+    return phrases
 
 
 def _preference(table: Ranked, own: int, rows: np.ndarray[tuple[int], np.dtype[np.int64]], left: Left, row: int, depth: int) -> str:

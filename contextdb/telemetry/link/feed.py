@@ -232,8 +232,8 @@ class Moments:
             if source is None:
                 moment.decision = what
             elif isinstance(what, Picked):
-                asked = self._newest.get((name, source.name, False))
-                question = asked if answer is None else self._questions.get(id(answer))
+                newest = self._newest.get((name, source.name, False))
+                question = newest if answer is None else self._questions.get(id(answer))
                 if question is None and label is _UNNAMED:
                     continue
                 if question is not None and not (question.is_sent or question.pick):

@@ -307,7 +307,7 @@ CALLS: dict[str, Call] = {
     "JointPlay.decision(time_s)": lambda x: x is None or MET.decision("Host", time_s=x),
     "JointPlay.decision(database)": lambda x: isinstance(x, str) or MET.decision("Host", x),
     "make_joint_clip(name)": lambda x: make_joint_clip(x),
-    "write_game_clips(folder)": lambda x: isinstance(x, (str, Path)) or motion.write_game_clips(x),
+    "write_made_clips(of_game)": lambda x: x is False or motion.write_made_clips("nowhere", of_game=x),
     "write_joint_clips(folder)": lambda x: isinstance(x, (str, Path)) or write_joint_clips(x),
     "MatchGate(over)": lambda x: motion.MatchGate(x, 1.0),
     "MatchGate(threshold)": lambda x: motion.MatchGate(DATABASE, x),

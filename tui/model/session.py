@@ -192,9 +192,9 @@ class Session:
         """Write the table to its file, or to another one, which is then its file.
 
         What others wrote since is merged first (`overwrite`: written over). A file that is gone is made again. Raises FileError
-        where the disk refuses, another editor has the table, or what others wrote disagrees with edits here (rule "merge-conflict"), see
-        `merge_from_disk`: the old file is then whole; TableError for a text that such a file cannot hold; SchemaError where what
-        shall change in contextdb.toml disagrees with what others wrote into it: then nothing is written.
+        where the disk refuses, another editor has the table, or what others wrote disagrees with edits here (rule
+        "merge-conflict"), see `merge_from_disk`: the old file is then whole. Raises TableError for a text that such a file cannot
+        hold; SchemaError where what shall change in contextdb.toml disagrees with what others wrote: then nothing is written.
         """
         if self.reads_only:
             raise FileError(Fault(f"nothing is written: {self.why_read_only}.", "another way to start it"))

@@ -12,6 +12,7 @@ from typing import TypeVar
 
 import numpy as np
 import oracles
+import pytest
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 
@@ -50,6 +51,10 @@ IS_FULL = not settings.default.derandomize
 def some(states: Iterable[T], n: int = 2) -> list[T]:
     """Every n-th of the states, and all of them with EXAMPLES=full."""
     return list(states)[:: 1 if IS_FULL else n]
+
+
+in_full_runs = pytest.mark.skipif(not IS_FULL, reason="with EXAMPLES=full: it takes seconds")
+"""For a test that takes long, beside another one every day that would notice most faults of the same place."""
 
 
 def examples(times: float, *unchecked: HealthCheck) -> settings:

@@ -28,7 +28,7 @@ LOOKS = re.compile("-(large|light|without-colour).svg$")
 """One scene in another look: every day half of the scenes are drawn, each in one."""
 
 
-@pytest.mark.parametrize("name", some([name for name in NAMES if IS_FULL or not LOOKS.search(name)]))
+@pytest.mark.parametrize("name", some([name for name in NAMES if IS_FULL or not LOOKS.search(name)], 4))
 def test_a_picture_shows_what_is_shown_now(name: str):
     with quick(paints=True):
         now = pictures.draw(pictures.PICTURES[name])

@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from contextdb.console import output, wants_colour
+from contextdb.disk import write_atomic
 from contextdb.errors import ContextError, Fault, QueryError
 
 
@@ -23,18 +24,16 @@ def add_format_arguments(parser: argparse.ArgumentParser, formats: Sequence[str]
 
 def is_coloured(arguments: argparse.Namespace) -> bool:
     """Whether a report goes to a terminal that shows colours."""
-    return arguments.output is None and wants_colour(sys.stdout)
+    return not arguments.output and wants_colour(sys.stdout)
 
 
 def deliver(text: str, arguments: argparse.Namespace) -> None:
     """Write a report to the file of -o, or print it."""
-    if arguments.output is None:
+    if arguments.output:
+        write_atomic(Path(arguments.output), text.encode("utf-8", "backslashreplace"))
+    else:
         with output():
             print(text, end="")
-    else:
-        from contextdb.disk import write_atomic
-
-        write_atomic(Path(arguments.output), text.encode("utf-8", "backslashreplace"))
 
 
 def add_page_arguments(parser: argparse.ArgumentParser, formats: Sequence[str]) -> None:

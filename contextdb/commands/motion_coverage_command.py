@@ -120,7 +120,6 @@ def _measured(
     accepted: Accepted,
     missing: Sequence[str],
 ) -> MotionMeasured:
-    """One table with its gates."""
     table = None if motion.coverage.table is None else tables[motion.coverage.table]
     space = NOTHING if table is None else declared(table, {})
     gates = [] if limit is None else [fail_under(motion, limit)]

@@ -52,7 +52,6 @@ def _section(section: Section, number: int) -> str:
 
 
 def _gates(gates: Iterable[Gate]) -> str:
-    """Thresholds, and whether each is met."""
     items = []
     for gate in gates:
         word = "passed" if gate.passed else "failed"

@@ -88,7 +88,6 @@ class Desk:
         self._linger: asyncio.TimerHandle | None = None
 
     def app(self) -> web.Application:
-        """What answers at the addresses."""
         app = web.Application()
         at = f"/{self._token}"
         app.add_routes(

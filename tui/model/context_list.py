@@ -56,9 +56,7 @@ class Rows(Protocol):
 
     def __len__(self) -> int: ...
 
-    def name(self, i: int) -> str:
-        """What a context is called."""
-        ...
+    def name(self, i: int) -> str: ...
 
     def facts(self, i: int, conditions: Mapping[str, Condition]) -> dict[str, str]:
         """The facts of a context as texts, without those that are missing."""
@@ -80,11 +78,9 @@ class SavedRows:
         return len(self.cases)
 
     def name(self, i: int) -> str:
-        """The name of a case."""
         return self.cases[i].name
 
     def facts(self, i: int, conditions: Mapping[str, Condition]) -> dict[str, str]:
-        """The facts of a case."""
         facts = self.cases[i].facts
         return {name: facts[name] for name in conditions if name in facts}
 
@@ -111,7 +107,6 @@ class RecordedRows:
         return f"row {i + 1:,}"
 
     def facts(self, i: int, conditions: Mapping[str, Condition]) -> dict[str, str]:
-        """The facts of a row."""
         if not self.recording.facts:
             return {}
         values = zip(self.recording.facts, self._block(i // BLOCK).row(i % BLOCK), strict=True)
@@ -211,7 +206,6 @@ class ContextList:
         return "" if self.at is None else f"{self.rows.name(self.at)} ({self.at + 1:,} of {len(self):,})"
 
     def facts(self, i: int) -> dict[str, str]:
-        """The facts of a context as texts."""
         return self.rows.facts(i, self.conditions)
 
     # ---- what is expected

@@ -65,7 +65,6 @@ class SelectorNow:
 
     @property
     def order(self) -> Order:
-        """The databases and their thresholds."""
         return tuple((one.name, one.threshold) for one in self.databases)
 
     @property

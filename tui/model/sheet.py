@@ -397,7 +397,6 @@ class Sheet(DisplayedTable):
     # ---- history
 
     def undo(self) -> Done:
-        """Take back the last step."""
         return self._went(self.history.undo, "Undo")
 
     def redo(self) -> Done:

@@ -57,7 +57,6 @@ class TeamSheet(RoomySheet):
         return self.facts.get(self.table.columns[column].name)
 
     def header(self, column: int) -> Header:
-        """What stands over a column."""
         condition = self.of_column(column)
         return (
             Header(NAME, "name")

@@ -168,7 +168,6 @@ class Workspace:
 
     @property
     def unsaved(self) -> list[str]:
-        """The tables with unsaved edits."""
         return [name for name, session in self.sessions.items() if session.sheet.is_modified]
 
     def look_again(self) -> None:
@@ -183,7 +182,6 @@ class Workspace:
         self.sessions, self._renames, self._n_renamed = {}, [], 0
 
     def close(self, keep_journals: bool = False) -> None:
-        """Let go of every table."""
         for session in self.sessions.values():
             session.close(keep_journals)
 

@@ -120,7 +120,6 @@ class AutofillDialog(Dialog[Autofill]):
         self._worker = self._describe()
 
     def action_cancel(self) -> None:
-        """Stop the work, and leave."""
         self._worker.cancel()
         self.dismiss(None)
 

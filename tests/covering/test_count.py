@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import _thread
 import itertools
-import signal
 import math
 import random
+import signal
 import threading
 from pathlib import Path
 from typing import Any

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from running import ROOT, run, run_process
-from strategies import some
+from strategies import for_each, some
 from telemetry.links import meeting
 
 import contextdb as cdb
@@ -141,7 +141,7 @@ def commands(group: Group) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("command", commands(Group((), COMMANDS)))
+@for_each(commands(Group((), COMMANDS)))
 def test_every_command_has_both_limits(command):
     helped = run(*command.split(), "--help").out
     assert "--max-memory MB" in helped

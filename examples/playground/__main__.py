@@ -83,7 +83,7 @@ def opened(game: Game, is_offscreen: bool = False) -> Any:
 def own_tables(folder: Path = TABLES) -> Path:
     """The folder of the tables, with their clips, which are made where they are not there yet."""
     if not (folder / "clips" / "walk_about_left.bvh").exists():
-        motion.write_game_clips(folder / "clips")
+        motion.write_made_clips(folder / "clips", of_game=True)
     return folder
 
 

@@ -16,7 +16,7 @@ from c_compilers import PROGRAMS, C, built, compiler_for, ran, sanitizers
 from hypothesis import given
 from hypothesis import strategies as st
 from made_boxes import bytes_of, made
-from strategies import IS_FULL, some
+from strategies import IS_FULL, for_each, some
 
 from contextdb.core import Boxes, count_holders
 from contextdb.covering.count import Bounds, _count, table_of
@@ -219,8 +219,7 @@ def test_these_parts_go_together():
     assert boxes.leaves_open(np.array([], np.int32), WEIGHTS, 0, 100, None)[0] == 1
 
 
-@pytest.mark.parametrize(
-    ("name", "value"),
+@for_each(
     [
         ("cells", np.array([[2, -1]], np.int32)),
         ("cells", np.array([[-2, -1]], np.int32)),
@@ -244,7 +243,7 @@ def test_these_parts_go_together():
         ("edges", np.array([0, -2, 5], np.int64)),
         ("edges", np.array([0, 2, -5], np.int64)),
         ("edges", np.array([0, 2, 1 << 62], np.int64)),
-    ],
+    ]
 )
 def test_boxes_that_do_not_go_together_are_refused(name: str, value: object):
     with pytest.raises((ValueError, TypeError, BufferError)):

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from running import run
-from strategies import some
+from strategies import for_each, some
 
 from contextdb import motion
 from contextdb.motion.clips import quaternions
@@ -36,7 +36,7 @@ def taken_out(clip: motion.Clip) -> tuple[motion.Clip, motion.Trajectory]:
     return motion.Clip.from_arrays(body.names, body.parents, offsets, turns, places, clip.rate, name=clip.name), path
 
 
-@pytest.mark.parametrize("name", MOVING)
+@for_each(MOVING)
 def test_feet_give_back_the_motion_that_was_taken_out(name: str):
     clip = make_clip(name).clip
     spot, path = taken_out(clip)
@@ -70,7 +70,7 @@ def test_a_change_of_speed_comes_when_it_came(name: str):
     assert speeds[still].mean() < 0.15 * real.max()
 
 
-@pytest.mark.parametrize("name", RECIPES)
+@for_each(RECIPES)
 def test_clips_that_stand_or_move_along_are_not_on_the_spot(name: str):
     clip = make_clip(name).clip
     assert ground_motion(clip) is None

@@ -53,13 +53,8 @@ def recordings_near(folder: Path) -> list[Path]:
 
 
 def changed_moments(before: Table, after: Table, folder: Path) -> Changes:
-    """Ask two versions of a table in its saved contexts and in the recordings near it.
-
-    Raises
-    ------
-    TableError, FileError
-        A version cannot be used, or the saved contexts cannot be read.
-    """
+    """Ask two versions of a table in its saved contexts and in the recordings near it. Raises TableError or FileError where a
+    version cannot be used, or the saved contexts cannot be read."""
     versions = _Asked(before, after)
     cases = read_cases(cases_file(after)) if after.path is not None else []
     of_cases = [moment for case in cases if (moment := versions.changed(case.name, case.facts)) is not None]

@@ -139,13 +139,7 @@ class ColumnSheet(RoomySheet):
         return rows
 
     def edit(self) -> Edit:
-        """The edit of the table that the sheet was made of.
-
-        Raises
-        ------
-        Wrong
-            With the cell that is to be mended first.
-        """
+        """The edit of the table that the sheet was made of. Raises Wrong with the cell that is to be mended first."""
         return _edit(self.of, [row for row in self._rows if row.before is not None or any(map(str.strip, row.texts.values()))])
 
 

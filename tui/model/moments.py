@@ -225,13 +225,8 @@ class Session:
 
 
 def open_session(path: Path) -> Session:
-    """Find the moments of a recording. A last line that is not whole yet is left out.
-
-    Raises
-    ------
-    TableError, FileError
-        It cannot be read, or a line of it cannot.
-    """
+    """Find the moments of a recording. A last line that is not whole yet is left out. Raises TableError or FileError where it
+    cannot be read, or a line of it cannot."""
     tables: dict[str, Mapping[str, object]] = {}
     tracks: dict[Key, RecordedTrack] = {}
     start = 0

@@ -89,13 +89,7 @@ class Priorities:
 
     @property
     def config(self) -> MotionConfig:
-        """What contextdb.toml says of motion.
-
-        Raises
-        ------
-        SchemaError
-            With every fault of it.
-        """
+        """What contextdb.toml says of motion. Raises SchemaError with every fault of it."""
         schema = self.sheet.table.schema
         return MotionConfig.from_dict(schema.motion, file=schema.file)
 

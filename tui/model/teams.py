@@ -116,13 +116,7 @@ class Teams:
 
     @classmethod
     def beside(cls, table: Table) -> Teams:
-        """The teams of the file next to a table; empty ones where there is none.
-
-        Raises
-        ------
-        FileError
-            The file cannot be read.
-        """
+        """The teams of the file next to a table; empty ones where there is none. Raises FileError where the file cannot be read."""
         path = teams_path(table)
         return cls(table, _texts_in(path, roles_of(table)) if path is not None and path.exists() else None)
 

@@ -178,7 +178,6 @@ CALLS = [
     lambda: partial(MET.at),
     lambda: partial(MET.decision, "Host"),
     lambda: partial(make_joint_clip),
-    lambda: partial(motion.write_game_clips),
     lambda: partial(write_joint_clips),
     lambda: partial(motion.MatchGate, DATABASE, 1.0),
     lambda: partial(motion.MatchGate(DATABASE, 1.0).update),

@@ -20,7 +20,7 @@ from contextdb.motion.characters.motion_project import MotionProject
 from contextdb.motion.characters.one_off import OneOff
 from contextdb.motion.characters.readout import Readout
 from contextdb.motion.characters.table_player import TablePlayer
-from contextdb.motion.characters.updates import CharacterState, Updated
+from contextdb.motion.characters.updates import Updated
 from contextdb.motion.clips.clip import Clip, load_bvh, write_bvh
 from contextdb.motion.clips.mirror import mirrored
 from contextdb.motion.clips.poses import poses_of, resampled
@@ -34,8 +34,7 @@ from contextdb.motion.features.live_query import LivePose, PoseHistory, query_fr
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.joint.database import JointDatabase
 from contextdb.motion.joint.searcher import JointSearcher
-from contextdb.motion.made.game import write_game_clips
-from contextdb.motion.made.recipes import write_made_clips
+from contextdb.motion.made.game import write_made_clips
 from contextdb.motion.markup.marks import TagFilter
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.markup.spans import Span
@@ -73,7 +72,7 @@ from contextdb.motion.trace.session import Trace
 
 __all__ = ["ClipError", "MotionError", "QueryError"]
 __all__ += ["Clip", "Skeleton", "Steered", "Trajectory", "load_bvh", "load_clips", "mirrored", "poses_of", "resampled"]
-__all__ += ["retargeted", "root_trajectory", "steady_path", "write_bvh", "write_game_clips", "write_made_clips"]
+__all__ += ["retargeted", "root_trajectory", "steady_path", "write_bvh", "write_made_clips"]
 __all__ += ["Channel", "FeatureSchema", "LivePose", "Markup", "PoseHistory", "Span", "TagFilter", "query_from"]
 __all__ += ["query_from_pose", "with_path"]
 __all__ += ["Action", "Choice", "Controller", "ControllerGroup", "ControllerSettings", "Decision", "Entry", "Hit"]
@@ -81,4 +80,4 @@ __all__ += ["JointDatabase", "JointSearcher", "MotionDatabase", "RootMotion", "S
 __all__ += ["JointNode", "MatchGate", "MatchNode", "Pose", "PoseBank", "PoseSettings", "PoseStream", "PoseStreams", "Target"]
 __all__ += ["MotionConfig", "best_start", "build", "open_or_build", "open_or_build_poses", "write_poses"]
 __all__ += ["Measures", "Trace", "coverage", "describe", "measure", "prepare"]
-__all__ += ["Character", "CharacterState", "Crowd", "MotionProject", "OneOff", "Readout", "TablePlayer", "Updated"]
+__all__ += ["Character", "Crowd", "MotionProject", "OneOff", "Readout", "TablePlayer", "Updated"]

@@ -61,12 +61,13 @@ class Bars(CursorLines):
         """Database and frame of what the search chooses."""
         self.playing: tuple[str, int] | None = None
         """And of what would have played on."""
+        self.choices: dict[str, bool] = {}
+        """The assets that the person here would have chosen, and would not."""
         self.note = ""
         """Why there are no bars."""
 
     @property
     def row(self) -> Row | None:
-        """The asset under the cursor."""
         return self.rows[self.at] if self.rows else None
 
     def show(self, landscape: Landscape, rows: list[Row], note: str) -> None:
@@ -81,11 +82,9 @@ class Bars(CursorLines):
 
     @property
     def n_lines(self) -> int:
-        """A line for each asset."""
         return len(self.rows)
 
     def moved(self) -> None:
-        """Say which asset it is."""
         self.post_message(self.Moved(self.row))
 
     def on_mouse_scroll_up(self) -> None:
@@ -102,7 +101,6 @@ class Bars(CursorLines):
         return min(max(LEAST_NAME, longest), MOST_NAME, max(LEAST_NAME, self.size.width * 2 // 5))
 
     def render_line(self, y: int) -> Strip:
-        """One line of the screen."""
         width = self.size.width
         if y == 0:
             head = f"  {fitted('asset', self._name_width)} {'best':>{COST}} every frame: tall is cheap"
@@ -120,7 +118,8 @@ class Bars(CursorLines):
         plain = self.get_component_rich_style("bars--name" if row.may_play else "bars--out")
         over = self.get_component_rich_style("bars--cursor") if is_here else Style()
         mark = "▶" if is_chosen else "○" if self.is_in(row, self.playing) else " "
-        text = f"{mark} {shortened(row.name, name_width)} {cost_text(row.cost):>{COST}} "
+        sign = {True: "+", False: "-", None: " "}[self.choices.get(row.asset)]
+        text = f"{mark}{sign}{shortened(row.name, name_width)} {cost_text(row.cost):>{COST}} "
         room = max(0, width - len(text))
         return Strip([Segment(text, plain + over), *self._bars(row, room)]).adjust_cell_length(width, self.rich_style)
 

@@ -23,6 +23,7 @@ from contextdb.motion.selection.decision import Action
 from . import reasons
 from .bars import Bars
 from .channels import Channels, Dial
+from .choosing import NO_FILE, Choosing
 from .figures import figure_of
 from .game import Live
 from .key_line import DebugKeyLine
@@ -85,6 +86,7 @@ class MomentScreen(Screen[None]):
         """Whether the newest moment of the game is displayed, and goes on."""
         self.index = 0
         self.turned = Turned()
+        self.choosing = Choosing.of(recording.file) if live is None else Choosing("", problem=NO_FILE)
         self.order = ORDERS[0]
         self.text = ""
         self.message = ""
@@ -168,7 +170,6 @@ class MomentScreen(Screen[None]):
         self._show_reasons()
 
     def action_pane(self, by: int) -> None:
-        """Give another pane the focus."""
         self._pane = PANES[(PANES.index(self._pane) + by) % len(PANES)]
         self._arrange()
         self.query_one(f"#{self._pane}").focus()
@@ -185,7 +186,6 @@ class MomentScreen(Screen[None]):
     # ---- display of a moment
 
     def _show(self) -> None:
-        """Show the moment in all panes."""
         moment = self.moment
         if moment is None:
             return
@@ -258,6 +258,7 @@ class MomentScreen(Screen[None]):
         bars.chosen = None if choice is None or choice.database is None else (choice.database, choice.hit.frame)
         before = None if moment.searched is None else moment.searched.before
         bars.playing = None if before is None else (before.database, before.frame)
+        bars.choices = {} if moment.searched is None else self.choosing.at(moment.searched.tick)
         note = moment.not_repeated
         if not note and not rows:
             note = f"no asset's name holds {self.text!r}" if self.text else "nothing was searched"
@@ -333,7 +334,6 @@ class MomentScreen(Screen[None]):
         self._show_rest()
 
     def action_order(self) -> None:
-        """Order assets otherwise."""
         self.order = ORDERS[(ORDERS.index(self.order) + 1) % len(ORDERS)]
         self._show_bars()
         self._show_rest()
@@ -370,7 +370,6 @@ class MomentScreen(Screen[None]):
     # ---- messages
 
     def say(self, text: str, is_error: bool = False) -> None:
-        """Say something over the foot."""
         self.message = text
         line = self.query_one("#message", Static)
         line.update(Text(printable(text), style="bold" if is_error else ""))

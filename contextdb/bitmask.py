@@ -83,6 +83,19 @@ def rows_of(bits: int) -> list[int]:
     return [] if bits == 0 else rows(from_int(bits, bits.bit_length())).tolist()
 
 
+def runs_of(bits: int) -> list[tuple[int, int]]:
+    """A set of bits as runs: the first bit, and the one after the last."""
+    runs, at = [], 0
+    while bits:
+        skip = (bits & -bits).bit_length() - 1
+        bits >>= skip
+        length = (~bits & (bits + 1)).bit_length() - 1
+        runs.append((at + skip, at + skip + length))
+        bits >>= length
+        at += skip + length
+    return runs
+
+
 def int_of(row_numbers: Sequence[int]) -> int:
     """One mask as a Python integer from the numbers of its rows, ascending; it costs what the last of them is, once."""
     octets = bytearray((row_numbers[-1] >> 3) + 1 if row_numbers else 0)

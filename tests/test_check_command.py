@@ -157,6 +157,20 @@ def test_a_contract_of_a_table_that_there_is_not_is_an_error(promised: Path):
     assert 'there is no table "tt"' in run("check", promised).out
 
 
+def test_a_fault_of_a_table_is_reported_once_though_contracts_of_tables_made_of_it_cannot_be_proved(tmp_path: Path):
+    tables = {"inner": "Asset,d\nx,tralse\n", "outer": "Asset,d\na,1..2\n@inner,Any\n", "child": "Asset,d\nz,1..2\n"}
+    contracts = "".join(f"[contracts.{name}]\ntable = '{name}'\nat_most = 1\n" for name in tables)
+    schema = f"[conditions.d]\ntype = 'angle'\n[tables.child]\nbase = 'inner'\n{contracts}"
+    (tmp_path / "contextdb.toml").write_text(schema)
+    for name, text in tables.items():
+        (tmp_path / f"{name}.csv").write_text(text)
+    findings = run("check", tmp_path, "--json").json["findings"]
+    assert (
+        sum("tralse" in finding["message"] for finding in findings) == 2
+    )  # where it is, and why the base of "child" cannot be used
+    assert [f["rule"] for f in findings if "[contracts." in f["message"]] == ["open-contract"] * 3
+
+
 def test_a_save_from_python_and_a_rename_keep_contracts(promised: Path):
     table = cdb.Project.load(promised)["t"]
     table.with_cell(0, "p", "Any").save()

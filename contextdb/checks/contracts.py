@@ -14,7 +14,7 @@ from contextdb.cells.facts import fact_text
 from contextdb.cells.words import quoted
 from contextdb.covering.contracts import Proof, Witness, prove
 from contextdb.covering.progress import Stops, Tell
-from contextdb.errors import in_quotes, mend_for, plural, some
+from contextdb.errors import TableError, in_quotes, mend_for, plural, some
 from contextdb.findings import Finding, Level
 from contextdb.schema.parts import header
 from contextdb.schema.settings import Schema
@@ -32,9 +32,9 @@ def proofs_of(table: Table, progress: Tell | None = None, should_stop: Stops | N
             yield prove(contract, table, progress=progress, should_stop=should_stop)
 
 
-def contract_findings(proofs: Sequence[Proof], faulty: Sequence[str], schema: Schema, lines: Mapping[Path, int]) -> list[Finding]:
-    """What is to be said of proved contracts; of tables in `faulty` cells cannot be read. `lines` are those of contextdb.toml."""
-    findings = []
+def contract_findings(proofs: Sequence[Proof], tables: Sequence[Table], schema: Schema, lines: Mapping[Path, int]) -> list[Finding]:
+    """What is to be said of proved contracts of some tables; `lines` are those of contextdb.toml."""
+    findings, faulty = [], {table.name for table in tables if _is_unusable(table)}
     for proof in proofs:
         name = proof.contract.name
         if (verdict := _verdict(proof, proof.contract.table in faulty)) is not None:
@@ -56,9 +56,20 @@ def strayed(schema: Schema, tables: Sequence[str], unread: Sequence[str]) -> Ite
             yield Proof(contract, None, 0.0, 1.0, problem=problem)
 
 
+def _is_unusable(table: Table) -> bool:
+    """Whether the table, or one that it is made of, has faults, which are findings of their own."""
+    try:
+        table.compile()
+    except TableError:
+        return True
+    return False
+
+
 def _verdict(proof: Proof, is_faulty: bool) -> tuple[str, Level, str] | None:
     """The rule, the level and the sentence of a contract that does not simply hold; None for one that does."""
-    if proof.problem and not is_faulty:
+    if proof.problem and is_faulty:
+        return "open-contract", "warning", f"cannot be proved until the table {in_quotes(proof.contract.table)} can be used."
+    if proof.problem:
         return "unreadable-contract", "error", f"cannot be proved: {proof.problem}"
     if proof.holds is None:
         return "open-contract", "warning", f"is neither proved nor broken: {proof.sentence}"

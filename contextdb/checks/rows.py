@@ -63,7 +63,7 @@ def check_rows(
 
 def _judged(table: EitherTable, work: int, progress: Progress) -> list[Finding]:
     try:
-        ready = opened(table, is_cut=True)
+        ready = opened(table, size="cut")
     except ContextDBError:  # such as a domain without a value: reported for the cells already
         return []
     judging = progress.within("Comparing rows", 0.0, 1.0)

@@ -395,6 +395,12 @@ RULES: dict[str, Rule] = {
         "Look at the new gaps; correct them, or make a new baseline if they are intended.",
         ("report.coverage_results",),
     ),
+    "expected-below": Rule(
+        "error",
+        "The covered share of what is expected of a table is below `--fail-under-expected`.",
+        "Add rows for the parts that the report lists first, or lower the threshold.",
+        ("report.coverage_results",),
+    ),
     "telemetry-below": Rule(
         "error",
         "The covered share of the recorded moments is below `--fail-under-telemetry`.",
@@ -413,6 +419,7 @@ OF_COVERAGE = (
     "space-changed",
     "cases-fewer",
     "coverage-dropped",
+    "expected-below",
     "telemetry-below",
 )
 """The rules that only `contextdb coverage` reports."""

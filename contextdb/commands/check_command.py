@@ -198,7 +198,7 @@ def _check_files(files: Sequence[tuple[str | None, Path]], schema: Schema | None
     known = schema or next((table.schema for table in read), None)
     if known is not None and known.file:
         lines = key_lines(read_bytes(Path(known.file)).decode("utf-8-sig"))
-        findings += contract_findings(proofs, [table.name for table in read if table.faults], known, lines)
+        findings += contract_findings(proofs, read, known, lines)
         findings += unused_conditions(known, read, lines) if schema is not None and len(read) == len(files) else []
         findings += check_against_markup(read, Path(known.file).parent)
     return CheckReport(tuple(tables), tuple(findings), tuple(proofs))

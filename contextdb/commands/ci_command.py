@@ -144,7 +144,7 @@ def _of_commit(arguments: argparse.Namespace, commit: Commit) -> Before:
         try:
             if (folder := commit.tables_into(target)) is None:
                 return Before(commit.name, missing=f"{commit.name} has no tables in this folder")
-            plain = argparse.Namespace(**vars(arguments) | {"telemetry": None, "fail_under": None})
+            plain = argparse.Namespace(**vars(arguments) | {"telemetry": None, "fail_under": None, "fail_under_expected": None})
             results = measured_results(plain, Tables.at(str(folder)), None, Accepted({}))
         except ContextDBError as error:
             first = error.faults[0]

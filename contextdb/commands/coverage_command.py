@@ -1,6 +1,7 @@
 """Measure which contexts have a valid row, and which have none.
 
-Exits with 1 if a threshold is missed: --fail-under, --fail-under-telemetry, or --max-drop (by default 0 with a --baseline).
+Exits with 1 if a threshold is missed: --fail-under, --fail-under-expected, --fail-under-telemetry, or --max-drop (by default 0
+with a --baseline).
 With a --baseline also if a table is gone or has lost all its rows, if one is not in it, if one has other conditions, bounds, values
 or assumptions, and if saved contexts expect less: --gone, --new, --redefined and --fewer-cases accept that for a table.
 Thresholds are compared with the lower bound of the covered share, so that a lucky sample does not pass.
@@ -73,6 +74,9 @@ def add_measuring_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--samples", type=_count, metavar="N", help=f"contexts to sample (default: {SAMPLES:,}, fewer above 500 conditions)"
     )
+    parser.add_argument(
+        "--fail-under-expected", type=percent, metavar="PCT", help="fail if the covered percentage of what is expected is lower"
+    )
     coverage_telemetry.add_arguments(parser, percent)
 
 
@@ -135,7 +139,7 @@ def _require_sense(arguments: argparse.Namespace) -> None:
     require_baseline(arguments, bool(arguments.baseline))
     coverage_telemetry.require_telemetry(arguments)
     is_detail = arguments.gap is not None or arguments.explain is not None
-    names = ("fail_under", "fail_under_telemetry", "max_drop", "baseline")
+    names = ("fail_under", "fail_under_expected", "fail_under_telemetry", "max_drop", "baseline")
     bars = [f"--{name.replace('_', '-')}" for name in names if getattr(arguments, name) is not None]
     if is_detail and (arguments.format != "text" or bars):
         other = f"--format {arguments.format}" if arguments.format != "text" else bars[0]
@@ -154,6 +158,9 @@ def measured_results(
     flat = [table.flat() for table in (*tables.outer, *(t for t in tables.inner if t.name in before))]
     cases = tables.case_counts() if counts_cases else {}
     measured, others = [_measured(arguments, table) for table in flat], list[tuple[str, Gate]]()
+    if arguments.fail_under_expected is not None and not any(m.expected for m in measured):
+        problem = "--fail-under-expected has nothing to look at: no table says what is expected of it."
+        raise ContextError(Fault(problem, f'expected = "FILE" of a table in {SCHEMA_FILE}'))
     if baseline is not None:
         names = [table.name for table in (*tables.outer, *tables.inner)]
         missing = [name for name in dict.fromkeys((*before, *baseline.cases)) if name not in names and tables.is_folder]
@@ -169,10 +176,12 @@ def measured_results(
 
 
 def _measured(arguments: argparse.Namespace, table: EitherTable) -> Measured:
-    from contextdb.report.coverage_results import fail_under, fail_under_telemetry
+    from contextdb.report.coverage_results import fail_under, fail_under_expected, fail_under_telemetry
 
     measured = measure(arguments, table)
     gates = [] if arguments.fail_under is None else [fail_under(measured.report, arguments.fail_under)]
+    if measured.expected is not None and arguments.fail_under_expected is not None:
+        gates.append(fail_under_expected(measured.expected, arguments.fail_under_expected))
     if measured.telemetry is not None and arguments.fail_under_telemetry is not None:
         gates.append(fail_under_telemetry(measured.telemetry, arguments.fail_under_telemetry))
     return replace(measured, gates=tuple(gates))

@@ -109,9 +109,10 @@ def with_gates(
 def _change(measured: Measured, table: EitherTable, earlier: Earlier, changes: tuple[str, ...]) -> Change:
     from contextdb.covering.assumed import opened
 
-    if changes:
+    ready = opened(table, size="any")
+    if changes or not ready.space.is_fitting:
         return of_another_space(measured.report, earlier, changes)
-    return compared(opened(table), measured.report, earlier)
+    return compared(ready, measured.report, earlier)
 
 
 def gone_gates(missing: Sequence[str], new: Sequence[str], accepted: Accepted) -> list[tuple[str, Gate]]:

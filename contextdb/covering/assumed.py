@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 from contextdb.cells.arguments import require_kind, require_many
 from contextdb.cells.conditions import Condition
@@ -16,7 +17,7 @@ from contextdb.compiled.table import CompiledTable, data_of
 from contextdb.covering.draw import Drawer
 from contextdb.covering.progress import SILENT, Progress
 from contextdb.covering.ruled import RuledTable, without_rules
-from contextdb.covering.space import CellBox, Space, WeightsOf, comparable_rows, require_measurable, used_factors
+from contextdb.covering.space import CellBox, Space, WeightsOf, comparable_rows, require_comparable, used_factors
 from contextdb.expressions import Assumptions, Derivation, Expression
 from contextdb.expressions.assume import WANTS, read_assumptions
 from contextdb.expressions.expression import read_expression
@@ -25,6 +26,8 @@ from contextdb.expressions.tokens import written_name
 from contextdb.schema.settings import derivation_of
 from contextdb.tables.data import TableData
 from contextdb.tables.table import EitherTable
+
+Size = Literal["comparable", "cut", "any"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,26 +53,26 @@ def opened(
     weights: WeightsOf | None = None,
     assume: bool = True,
     progress: Progress = SILENT,
-    is_cut: bool = False,
+    size: Size = "comparable",
 ) -> Opened:
     """A table with its space; see `contextdb.covering.coverage` for the arguments and what is raised.
 
-    A table that is too large is refused, or where `is_cut` cut to so many rows as can be compared.
+    A table whose rows are too many to be compared is refused, or cut to those that can be, or left whole, by `size`.
     """
     require_kind(table, (TableData, CompiledTable), "table", "a Table, or a CompiledTable")
     if isinstance(table, CompiledTable):
         data = data_of(table)
         data.refuse_rules("what they leave is worked out from the table itself")
-        return Opened(data, None, _space(data, impossible, weights, progress, is_cut), None)
+        return Opened(data, None, _space(data, impossible, weights, progress, size), None)
     ruled = without_rules(table.flat())
     table = ruled.table
     compiled = data_of(table.compile())
     impossible = list(require_many(impossible, "impossible", "a list of mappings of conditions to cells"))
     if not assume and not ruled.rules:
-        return Opened(compiled, table, _space(compiled, impossible, weights, progress, is_cut), None, ruled=ruled)
+        return Opened(compiled, table, _space(compiled, impossible, weights, progress, size), None, ruled=ruled)
     assumed = assumptions_of(table if assume else replace(table, settings=replace(table.settings, assume=())))
     nothing: list[CellBox] = [{}] if assumed.contradictions else []  # a box without cells: no context can happen
-    space = _space(compiled, [*impossible, *assumed.boxes, *nothing], weights, progress, is_cut)
+    space = _space(compiled, [*impossible, *assumed.boxes, *nothing], weights, progress, size)
     texts = tuple(expression.text for expression in assumed.expressions)
     restricted = _restricted(space)
     drawn = [c for c in not_boxed(table, assumed) if c.name in restricted]
@@ -84,11 +87,11 @@ def opened(
 
 
 def _space(
-    compiled: CompiledData, impossible: Sequence[CellBox], weights: WeightsOf | None, progress: Progress, is_cut: bool
+    compiled: CompiledData, impossible: Sequence[CellBox], weights: WeightsOf | None, progress: Progress, size: Size
 ) -> Space:
-    if not is_cut:
-        require_measurable(compiled)
-    return Space.of(compiled, impossible, weights, progress, comparable_rows(compiled) if is_cut else None)
+    if size != "cut":
+        require_comparable(compiled, size == "any")
+    return Space.of(compiled, impossible, weights, progress, comparable_rows(compiled) if size == "cut" else None)
 
 
 def _restricted(space: Space) -> set[str]:

@@ -25,13 +25,14 @@ from contextdb.covering.contract_shares import Drawn, Shares
 from contextdb.covering.draw import Drawer
 from contextdb.covering.gaps import widened
 from contextdb.covering.moments import Moment, Moments
+from contextdb.covering.numbered import NumberedBoxes
 from contextdb.covering.points import PointFinder, slabs
 from contextdb.covering.preferred import Preferred
 from contextdb.covering.progress import Progress, Stops, Tell
 from contextdb.covering.ruled import without_rules
 from contextdb.covering.shares import distinct_percents
 from contextdb.covering.space import Box, Space
-from contextdb.covering.witness import BoxSet, OutOfSteps, Point
+from contextdb.covering.witness import OutOfSteps, Point
 from contextdb.errors import ContextDBError
 from contextdb.expressions import read_expression
 from contextdb.expressions.assume import WANTS, conjuncts
@@ -205,7 +206,7 @@ class _Prover:
         widener = None
         while most > 0 and (point := self.finder.point(within, avoided)) is not None:
             widener = widener or self._widener(part)
-            box = widened(self.space, widener[0], point, widener[1])
+            box = widened(self.space, widener, point)
             witness = self._confirmed(box, self.moments.of_box(box, point, self.rng))
             if witness is not None:
                 yield witness
@@ -213,12 +214,11 @@ class _Prover:
             most -= 1
             avoided |= self.finder.add(box)
 
-    def _widener(self, part: Part) -> tuple[BoxSet, list[int]]:
-        """What a counterexample of a part must not meet while it is widened, and the order of the factors."""
+    def _widener(self, part: Part) -> NumberedBoxes:
+        """What a counterexample of a part must not meet while it is widened."""
         within, avoided = part
         outside = [*self.finder.chosen(avoided), *slabs(within, self.space.full)]
-        rows = BoxSet.of(self.space.full, outside, self.finder.progress)
-        return rows, sorted(range(len(rows.full)), key=lambda f: (rows.restricts[f].bit_count(), -f))
+        return NumberedBoxes.of(self.space.full, outside)
 
     def _around(self, point: Point) -> Box:
         """A box of counterexamples round one."""
@@ -226,8 +226,7 @@ class _Prover:
             within, avoided = part
             is_within = all(side >> k & 1 for side, k in zip(within, point, strict=True))
             if is_within and not self.finder.box_set.behind(point)[0] & avoided:
-                rows, order = self._widener(part)
-                return widened(self.space, rows, point, order)
+                return widened(self.space, self._widener(part), point)
         return tuple(1 << k for k in point)
 
     def _confirmed(self, box: Box, moments: Iterable[Moment]) -> Witness | None:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from contextdb import bitmask
 from contextdb.core import Boxes
 from contextdb.covering.progress import SILENT, Progress
-from contextdb.covering.space import Box, Sides, Space, runs_of
+from contextdb.covering.space import Box, Sides, Space
 from contextdb.covering.witness import BoxSet, OutOfSteps, Steps
 
 ROUNDING = 1e-12
@@ -63,6 +63,15 @@ class Bounds:
 def uncovered_share(space: Space, boxes: Sequence[Box], work: int, progress: Progress = SILENT) -> Bounds:
     """The share of the space that none of the boxes holds."""
     return uncovered_within(space, [space.sides_of(box) for box in boxes], {}, work, progress)
+
+
+def left_open(space: Space, work: int, progress: Progress = SILENT) -> Bounds:
+    """The share of the space that neither a row nor an impossible context holds; of boxes that do not fit into memory only by their
+    measures."""
+    if space.is_fitting:
+        return uncovered_share(space, space.boxes + space.impossible, work, progress)
+    volumes = [*space.volumes.tolist(), *(space.volume(space.sides_of(box)) for box in space.impossible)]
+    return Bounds(max(0.0, 1.0 - math.fsum(volumes) - ROUNDING), min(1.0, 1.0 - max(volumes) + ROUNDING))
 
 
 def uncovered_within(space: Space, boxes: Sequence[Sides], within: Sides, work: int, progress: Progress = SILENT) -> Bounds:
@@ -234,7 +243,7 @@ def table_of(boxes: Sequence[Box], full: Box, n_classes: Sequence[int], progress
         for f, side in enumerate(box):
             if side != full[f]:
                 cells[i, f] = number.setdefault((f, side), len(number))
-    runs = [runs_of(side) for _, side in number]
+    runs = [bitmask.runs_of(side) for _, side in number]
     first = np.cumsum([0, *map(len, runs)]).astype(np.int64)
     hashes = rng.integers(1, 2**63, (len(number), 2), np.uint64)
     flat = np.array([r for own in runs for r in own], np.int32).reshape(-1, 2)

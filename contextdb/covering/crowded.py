@@ -2,7 +2,8 @@
 
 A context with many valid rows is moved, one factor at a time, to the class that keeps most rows, until no class keeps more. The
 rows that are valid there meet in one box. Where the space was gone through whole, the first is the fullest there is; else the best
-that samples led to. Single points of a domain do not count: two ends that touch are no crowd.
+that samples led to, or met, where rows do not fit into memory. Single points of a domain do not count: two ends that touch are no
+crowd.
 """
 
 from __future__ import annotations
@@ -37,14 +38,14 @@ class CrowdBox:
 
 def find_crowds(space: Space, seeds: Iterable[Point], most: int = MOST_CROWDS, progress: Progress = SILENT) -> list[CrowdBox]:
     """The fullest boxes that climbing from the seeds leads to, most rows first; none lies within the rows of another."""
-    rows = BoxSet.of(space.full, space.boxes, progress)
+    rows = BoxSet.of(space.full, space.boxes if space.is_fitting else (), progress)
     impossible = BoxSet.of(space.full, space.impossible, progress)
     crowds: dict[int, Point] = {}
     n_looked_at = sum(len(factor.weights) for factor in space.factors) * (1 + len(space.boxes) // BOXES)
     for point in islice(seeds, max(most, MOST_CLASSES // max(1, n_looked_at))):
         progress.check()
-        top = _climbed(space, rows, impossible, point)
-        crowds[_holding(rows, list(top))] = top
+        top = _climbed(space, rows, impossible, point) if space.is_fitting else point
+        crowds[_holding(rows, list(top)) if space.is_fitting else space.numbered.bits_at(point)] = top
     chosen: list[int] = []
     for bits in sorted(crowds, key=lambda b: (-b.bit_count(), b)):
         if bits.bit_count() > 1 and not any(bits & ~other == 0 for other in chosen):

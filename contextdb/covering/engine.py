@@ -16,7 +16,7 @@ from contextdb import bitmask
 from contextdb.cells.arguments import require_callable
 from contextdb.compiled.table import CompiledTable
 from contextdb.covering.assumed import Opened, opened
-from contextdb.covering.count import Bounds, uncovered_share
+from contextdb.covering.count import Bounds, left_open, uncovered_share
 from contextdb.covering.crowded import find_crowds
 from contextdb.covering.gaps import SHARE_WORK, Gaps, Measure, described, find_gaps, share_of
 from contextdb.covering.judge import Judge
@@ -106,7 +106,7 @@ def coverage(
     require_callable(progress, "progress")
     require_callable(should_stop, "should_stop")
     watcher = Progress(progress, should_stop)
-    drawn = opened(table, impossible, weights, assume, watcher.within("Reading the cells", 0.0, COUNT_AT))
+    drawn = opened(table, impossible, weights, assume, watcher.within("Reading the cells", 0.0, COUNT_AT), "any")
     report = _report(drawn, seed, work, samples, max_gaps, watcher)
     return report if drawn.ruled is None else drawn.ruled.with_rules(report)
 
@@ -132,17 +132,18 @@ def counted(opened: Opened, seed: int, work: int, max_samples: int | None, max_g
     space, compiled, drawer = opened.space, opened.compiled, opened.drawer
     samples = samples_of(max_samples, SAMPLES, space)
     possible = uncovered_share(space, space.impossible, work, watcher.within("Counting contexts", COUNT_AT, COUNT_AT))
-    counting = watcher.within("Counting contexts", COUNT_AT, SAMPLES_AT)
-    left = uncovered_share(space, space.boxes + space.impossible, work, counting)
+    left = left_open(space, work, watcher.within("Counting contexts", COUNT_AT, SAMPLES_AT))
     sampler = Sampler(space, watcher.within("Trying random contexts", SAMPLES_AT, GAPS_AT), drawer)
     rng = np.random.default_rng(seed)
     whole = sampler.all_contexts()
+    if whole is not None and not space.is_fitting:
+        left = Bounds(float(whole.histogram[0]), float(whole.histogram[0]))
     counts = whole or sampler.sampled(samples, rng)
     certain = _certain(space, possible, left, drawer is not None)
     covered = _covered(certain, counts, whole is None, sampler, possible, rng, samples)
     steps = search_steps(work, len(space.boxes))
     searching = watcher.within("Looking for gaps", GAPS_AT, SHARES_AT)
-    gap_boxes = find_gaps(space, () if whole else counts.uncovered, 4 * max_gaps + 1, steps, searching)
+    gap_boxes = find_gaps(space, () if whole and space.is_fitting else counts.uncovered, 4 * max_gaps + 1, steps, searching)
     sizing = watcher.within("Measuring gaps", SHARES_AT, FINDINGS_AT)
     measure = _measure(opened, possible, work, samples, seed)
     gaps = described(space, compiled, gap_boxes.boxes, measure, max_gaps, sizing)
@@ -218,7 +219,7 @@ def _certain(space: Space, possible: Bounds, left: Bounds, is_sampled: bool) -> 
         return Bounds(0.0, 1.0)
     lower = 1.0 - min(1.0, left.upper / possible.lower) if possible.lower > 0.0 else 0.0
     upper = 1.0 - min(1.0, left.lower / possible.upper)
-    least = 0.0 if space.impossible else max((space.volume(space.sides_of(box)) for box in space.boxes), default=0.0)
+    least = 0.0 if space.impossible else float(space.volumes.max(initial=0.0))
     most = math.nextafter(1.0, 0.0) if left.lower > 0.0 else 1.0
     lower, upper = (min(max(share, least), most) for share in (lower, upper))
     if possible.is_exact and left.is_exact:
@@ -262,7 +263,7 @@ def _crowded(space: Space, counts: Counts, measure: Measure, progress: Progress)
 
 def _hits(space: Space, counts: Counts, is_sampled: bool) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     if not space.impossible and not is_sampled:
-        return np.array([space.volume(space.sides_of(box)) for box in space.boxes])
+        return space.volumes
     total = counts.histogram.sum()
     return counts.hits / total if total else np.zeros(len(space.boxes))
 

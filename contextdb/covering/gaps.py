@@ -14,10 +14,8 @@ from bisect import bisect_left
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.bitmask import Flags
@@ -26,6 +24,7 @@ from contextdb.cells.sets import Cell, NumberSet, TagSet, ValueSet, union
 from contextdb.compiled.data import CompiledData
 from contextdb.covering.count import Bounds, uncovered_within
 from contextdb.covering.factors import TagFactor
+from contextdb.covering.numbered import NumberedBoxes
 from contextdb.covering.progress import SILENT, Progress
 from contextdb.covering.report import Gap, Nearest
 from contextdb.covering.space import Box, Sides, Space
@@ -52,9 +51,7 @@ class Gaps:
 
 def find_gaps(space: Space, seeds: Iterable[Point], most: int, steps: int, progress: Progress = SILENT) -> Gaps:
     """Gaps round the seeds, then by search, until there are no more, `most` are found, or the steps are used up."""
-    rows = BoxSet.of(space.full, space.boxes, progress)
-    seen = BoxSet.of(space.full, space.boxes + space.impossible, progress)
-    order = sorted(range(len(rows.full)), key=lambda f: (rows.restricts[f].bit_count(), -f))
+    rows = space.numbered
     gaps: list[Box] = []
     sides: list[Sides] = []
     for point in seeds:
@@ -62,8 +59,11 @@ def find_gaps(space: Space, seeds: Iterable[Point], most: int, steps: int, progr
             break
         progress.at(len(gaps) / most)
         if not any(all(side >> point[f] & 1 for f, side in box.items()) for box in sides):
-            gaps.append(_add(seen, widened(space, rows, point, order)))
+            gaps.append(widened(space, rows, point))
             sides.append(space.sides_of(gaps[-1]))
+    if not space.is_fitting:
+        return Gaps(tuple(gaps), False)
+    seen = BoxSet.of(space.full, (*space.boxes, *space.impossible, *gaps), progress)
     left = Steps(steps, progress)
     is_complete = True
     try:
@@ -72,34 +72,30 @@ def find_gaps(space: Space, seeds: Iterable[Point], most: int, steps: int, progr
                 is_complete = False
                 break
             progress.at(len(gaps) / most)
-            gaps.append(_add(seen, widened(space, rows, point_left, order)))
+            gaps.append(widened(space, rows, point_left))
+            seen.add(gaps[-1])
     except OutOfSteps:
         is_complete = False
     return Gaps(tuple(gaps), is_complete)
 
 
-def widened(space: Space, rows: BoxSet, point: Point, order: Sequence[int]) -> Box:
-    """The widest box round a context that meets no row, one factor after the other in the given order."""
-    box = list(space.full)
+def widened(space: Space, rows: NumberedBoxes, point: Point) -> Box:
+    """The widest box round a context that meets no row, one factor after the other, those that fewest rows restrict first."""
+    box, order = list(space.full), rows.order
     behind = rows.behind(point, order)
-    before = rows.all
+    before = behind[-1]
     for at in range(_n_free(behind), len(order)):
         f, others = order[at], before & behind[at + 1]
-        allowed = sum(1 << k for k, bits in enumerate(rows.rejects[f]) if not others & ~bits)
+        allowed = space.full[f] & ~rows.accepted_by(f, others)
         factor = space.factors[f]
         box[f] = factor.widest(point[f], allowed) if isinstance(factor, TagFactor) else allowed
-        before &= rows.meeting(f, box[f])
+        before = before & rows.meeting(f, box[f])
     return tuple(box)
 
 
-def _n_free(behind: Sequence[int]) -> int:
+def _n_free(behind: Sequence[Flags]) -> int:
     """How many factors, from the first on, may take every class, as no box holds a point's classes of all that come after."""
-    return max(0, bisect_left(behind, True, key=bool) - 1)
-
-
-def _add(seen: BoxSet, box: Box) -> Box:
-    seen.add(box)
-    return box
+    return max(0, bisect_left(behind, True, key=np.any) - 1)
 
 
 def described(
@@ -118,7 +114,7 @@ def described(
     sized.sort(key=lambda item: (-item[0][0], json.dumps(item[1], ensure_ascii=False)))
     gaps: list[Gap] = []
     earlier: list[Sides] = []
-    rows = NearRows(space, compiled, BoxSet.of(space.full, space.boxes, progress))
+    rows = NearRows(space, compiled)
     for (share, is_exact), cells, sides in sized[:most]:
         progress.at(len(gaps) / min(len(sized), most))
         new_share, is_new_exact = measure(sides, earlier)
@@ -157,25 +153,23 @@ class NearRows:
 
     space: Space
     compiled: CompiledData
-    rows: BoxSet
 
     def nearest(self, gap: Sides) -> Nearest | None:
-        """The row that has to change least to hold the gap: the fewest cells; of equal ones by how little these grow, then the one
-        whose asset is most like the others; and its cells that change."""
+        """The row that has to change least to hold the gap: the fewest cells; of equal ones those that grow least, then the one
+        whose asset is most like the others, then the lowest row; and its cells that change."""
         space, compiled = self.space, self.compiled
         if not space.boxes:
             return None
-        n_failing = self._n_limited.copy()
-        for at in dict.fromkeys(space.condition_of[f] for f in gap):
-            n_failing += self._flags(self._failing(at, gap))
-            n_failing -= self._flags(self._failing(at, {}))
-        near = np.flatnonzero(n_failing == n_failing.min())[:MOST_NEAR].tolist()
         failing = {at: self._failing(at, gap) for at in range(len(space.conditions))}
+        n_failing = np.zeros(len(space.boxes), np.int64)
+        for flags in failing.values():
+            n_failing += flags
+        near = np.flatnonzero(n_failing == n_failing.min())[:MOST_NEAR].tolist()
         growths = {i: round(self._growth(i, gap, failing), ROUNDED) for i in near}
         least = [i for i in near if growths[i] == min(growths.values())]
         i = most_alike(least, [compiled.assets[space.rows[i]] for i in least])
         row = space.rows[i]
-        changes = [at for at, rows in failing.items() if rows >> i & 1]
+        changes = [at for at, rows in failing.items() if rows[i]]
         cells = [(space.conditions[at].name, self._cell_with(at, row, gap)) for at in changes]
         return Nearest(row, compiled.assets[row], len(changes), *cells[0], tuple(cells[1:])) if cells else None
 
@@ -183,31 +177,20 @@ class NearRows:
         cell = self.compiled.cells(at)[int(self.compiled.texts[at].codes[row])]
         return _cell_with(cell, self.space, at, gap)
 
-    def _growth(self, i: int, gap: Sides, failing: Mapping[int, int]) -> float:
+    def _growth(self, i: int, gap: Sides, failing: Mapping[int, Flags]) -> float:
         """How much the cells of a row grow that come to hold a gap: the shares of their domains, added up."""
         space, box, growth = self.space, self.space.boxes[i], 0.0
-        for f in (f for at, rows in failing.items() if rows >> i & 1 for f in space.of_condition[at]):
+        for f in (f for at, rows in failing.items() if rows[i] for f in space.of_condition[at]):
             more = gap.get(f, space.full[f]) & ~box[f]
             growth += float(space.factors[f].weights[bitmask.flags_of(more, len(space.factors[f].weights))].sum())
         return growth
 
-    @cached_property
-    def _n_limited(self) -> NDArray[np.int64]:
-        """For each row how many conditions it restricts."""
-        n_limited = np.zeros(self.rows.n_boxes, np.int64)
-        for at in range(len(self.space.conditions)):
-            n_limited += self._flags(self._failing(at, {}))
-        return n_limited
-
-    def _failing(self, at: int, gap: Sides) -> int:
+    def _failing(self, at: int, gap: Sides) -> Flags:
         """The rows whose cell of condition number `at` does not hold all of a gap."""
-        held = self.rows.all
+        failing = np.zeros(len(self.space.boxes), np.bool_)
         for f in self.space.of_condition[at]:
-            held &= self.rows.holding(f, gap.get(f, self.space.full[f]))
-        return self.rows.all & ~held
-
-    def _flags(self, rows: int) -> Flags:
-        return bitmask.flags_of(rows, self.rows.n_boxes)
+            failing |= ~self.space.numbered.holding(f, gap.get(f, self.space.full[f]))
+        return failing
 
 
 def _cell_with(cell: Cell, space: Space, at: int, gap: Sides) -> str:

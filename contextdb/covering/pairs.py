@@ -25,7 +25,7 @@ from contextdb.compiled.table import CompiledTable
 from contextdb.covering.assumed import opened
 from contextdb.covering.parts import parts_of
 from contextdb.covering.progress import Progress, Stops, Tell
-from contextdb.covering.sample import Codes, Sampler, lookup, samples_of
+from contextdb.covering.sample import Codes, Sampler, samples_of
 from contextdb.covering.shares import wilson
 from contextdb.covering.space import CellBox, Sides, Space, WeightsOf, require_counts
 from contextdb.errors import plural
@@ -192,7 +192,7 @@ def pairs(
     """
     require_counts(samples=SAMPLES if samples is None else samples, seed=seed)
     watcher = Progress(progress, should_stop).within("Comparing conditions", 0.0, 1.0)
-    drawn = opened(table, impossible, weights, assume, watcher)
+    drawn = opened(table, impossible, weights, assume, watcher, "any")
     space = drawn.space
     samples = samples_of(samples, SAMPLES, space)
     rules = () if drawn.ruled is None else drawn.ruled.rules
@@ -203,10 +203,10 @@ def pairs(
     every = sampler.every_context()
     is_exact = every is not None
     tally = _Tally(space, sides)
-    for codes, weights_of in every or sampler.random_contexts(samples, np.random.default_rng(seed)):
+    for codes, weights_of in sampler.gathered(every or sampler.random_contexts(samples, np.random.default_rng(seed))):
         watcher.at(tally.n_contexts / max(1, samples))
         is_possible = sampler.is_possible(codes)
-        counts = lookup(codes[is_possible], sampler.masks, len(space.boxes)).counts
+        counts = sampler.holders(codes[is_possible]).counts
         tally.add(codes[is_possible], None if weights_of is None else weights_of[is_possible], counts)
     meets = _meeting(sampler, sides, watcher)
     of_part = [at for at, own in zip(visible, parts, strict=True) for _ in own]
@@ -276,8 +276,7 @@ def _meeting(sampler: Sampler, sides: Sequence[Sides], progress: Progress) -> ND
     for p, part in enumerate(sides):
         progress.check()
         for f, side in part.items():
-            of_box, own = sampler.sides[f]
-            flags[p] &= np.array([bool(one & side) for one in own], np.bool_)[of_box]
+            flags[p] &= sampler.space.numbered.meeting(f, side)
     return flags
 
 
@@ -287,8 +286,7 @@ def _restricted(sampler: Sampler, of_part: Sequence[int]) -> NDArray[np.bool_]:
     for at in dict.fromkeys(of_part):
         known[at] = np.zeros(len(space.boxes), np.bool_)
         for f in space.of_condition[at]:
-            of_box, own = sampler.sides[f]
-            known[at] |= np.array([one != space.full[f] for one in own], np.bool_)[of_box]
+            known[at] |= ~space.numbered.holding(f, space.full[f])
     return np.array([known[at] for at in of_part], np.bool_).reshape(len(of_part), len(space.boxes))
 
 

@@ -21,9 +21,10 @@ from contextdb import bitmask
 from contextdb.bitmask import Words
 from contextdb.core import count_holders
 from contextdb.covering.draw import Drawer
+from contextdb.covering.numbered import NumberedBoxes
 from contextdb.covering.progress import SILENT, Progress
 from contextdb.covering.shares import wilson
-from contextdb.covering.space import Box, Space, runs_of
+from contextdb.covering.space import Space
 from contextdb.covering.witness import Point
 
 Codes = NDArray[np.int32]
@@ -75,18 +76,37 @@ class Sampler:
     """Draws the contexts where boxes cannot tell which can happen."""
 
     @cached_property
-    def sides(self) -> list[tuple[NDArray[np.int64], list[int]]]:
-        """For each factor which side each box has, by number, and the sides."""
-        return [_numbered([box[f] for box in self.space.boxes]) for f in range(len(self.space.factors))]
-
-    @cached_property
     def masks(self) -> tuple[Words, NDArray[np.int64]]:
         """uint64 [classes of all factors, words], and where each factor's begin."""
-        return _masks(self.space, self.space.boxes, self.progress)
+        return _masks(self.space, self.space.numbered, slice(None), self.progress)
 
     @cached_property
     def _impossible(self) -> tuple[Words, NDArray[np.int64]]:
-        return _masks(self.space, self.space.impossible, self.progress)
+        boxes = NumberedBoxes.of(self.space.full, self.space.impossible)
+        return _masks(self.space, boxes, slice(None), self.progress)
+
+    def holders(self, codes: Codes, weights: NDArray[np.float64] | None = None) -> Holders:
+        """What boxes hold contexts. Where their masks do not fit into memory, those of a part of the boxes are made at a time."""
+        n_boxes, most = len(self.space.boxes), self.space.n_fitting
+        if self.space.is_fitting:
+            return lookup(codes, self.masks, n_boxes, weights)
+        whole = Holders(np.zeros(len(codes), np.int64), np.full(len(codes), -1), np.zeros(n_boxes))
+        for first in range(0, n_boxes, most):
+            part = slice(first, min(first + most, n_boxes))
+            own = lookup(codes, _masks(self.space, self.space.numbered, part, self.progress), part.stop - first, weights)
+            is_first = (whole.firsts < 0) & (own.firsts >= 0)
+            whole.firsts[is_first] = own.firsts[is_first] + first
+            whole.counts[:] += own.counts
+            whole.hits[part] = own.hits
+        return whole
+
+    def gathered(self, chunks: Chunks) -> Chunks:
+        """The contexts; all at once where masks are made part by part."""
+        if self.space.is_fitting:
+            yield from chunks
+        elif parts := list(chunks):
+            codes, weights = [codes for codes, _ in parts], [own for _, own in parts if own is not None]
+            yield np.concatenate(codes), np.concatenate(weights) if weights else None
 
     def held(self, codes: Codes) -> NDArray[np.bool_]:
         """Which boxes hold each of N contexts: bool [N, boxes]."""
@@ -144,12 +164,12 @@ class Sampler:
         uncovered: dict[Point, None] = {}
         fullest: dict[Point, int] = {}
         n_contexts = 0
-        for codes, shares in chunks:
+        for codes, shares in self.gathered(chunks):
             self.progress.check()
             possible = self.is_possible(codes)
             codes = codes[possible]
             weights = np.ones(len(codes)) if shares is None else shares[possible]
-            counts, _, held = lookup(codes, self.masks, len(self.space.boxes), weights)
+            counts, _, held = self.holders(codes, weights)
             n_contexts += len(codes)
             histogram = _summed(histogram, np.bincount(counts, weights).astype(np.float64))
             hits += held
@@ -166,16 +186,16 @@ class Sampler:
 
     def out_of_rows(self, n_samples: int, rng: np.random.Generator) -> tuple[float, float, float]:
         """The covered and possible share of the whole space and its 99 % interval, by contexts drawn out of the rows."""
-        volumes = np.array([self.space.volume(self.space.sides_of(box)) for box in self.space.boxes])
+        volumes = self.space.volumes
         total = float(volumes.sum())
         if total == 0.0:
             return 0.0, 0.0, 0.0
-        n_first = 0
-        for at in range(0, n_samples, CHUNK):
-            n = min(CHUNK, n_samples - at)
+        n_first, chunk = 0, CHUNK if self.space.is_fitting else max(1, n_samples)
+        for at in range(0, n_samples, chunk):
+            n = min(chunk, n_samples - at)
             drawn = _drawn(np.cumsum(volumes), rng.random(n))
             codes = self._draw_inside(drawn, rng)
-            firsts = lookup(codes, self.masks, len(volumes)).firsts
+            firsts = self.holders(codes).firsts
             n_first += int((firsts == drawn)[self.is_possible(codes)].sum())
         low, high = wilson(n_first, n_samples)
         return min(1.0, total * n_first / n_samples), min(1.0, total * low), min(1.0, total * high)
@@ -187,7 +207,7 @@ class Sampler:
             if len(factor.weights) == 1:
                 continue
             uniform = rng.random(len(drawn))
-            of_box, sides = self.sides[f]
+            of_box, sides = self.space.numbered.numbers[f], self.space.numbered.sides[f]
             for number in np.unique(of_box[drawn]).tolist():
                 members = np.flatnonzero(of_box[drawn] == number)
                 inside = np.where(bitmask.flags_of(sides[number], len(factor.weights)), factor.weights, 0.0)
@@ -221,16 +241,17 @@ def _fullest(known: dict[Point, int], codes: Codes, counts: NDArray[np.int64]) -
     return dict(sorted(points.items(), key=lambda item: -item[1])[:MOST_FULL])
 
 
-def _masks(space: Space, boxes: tuple[Box, ...], progress: Progress) -> tuple[Words, NDArray[np.int64]]:
+def _masks(space: Space, boxes: NumberedBoxes, part: slice, progress: Progress) -> tuple[Words, NDArray[np.int64]]:
+    """The masks of a part of some boxes, and where each factor's begin."""
     starts = np.cumsum([0, *(len(f.weights) for f in space.factors)])
     parts = []
     for f, factor in enumerate(space.factors):
         progress.check()
-        of_box, sides = _numbered([box[f] for box in boxes])
-        turns = np.zeros((len(factor.weights) + 1, bitmask.n_words(len(boxes))), np.uint64)
-        for number, side in enumerate(sides):
+        of_box = boxes.numbers[f][part]
+        turns = np.zeros((len(factor.weights) + 1, bitmask.n_words(len(of_box))), np.uint64)
+        for number, side in enumerate(boxes.sides[f]):
             bits = bitmask.pack(of_box == number)
-            for first, stop in runs_of(side):
+            for first, stop in bitmask.runs_of(side):
                 turns[first] ^= bits
                 turns[stop] ^= bits
         parts.append(np.bitwise_xor.accumulate(turns, axis=0)[:-1])
@@ -243,12 +264,6 @@ def _summed(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.
     joint[: len(one)] += one
     joint[: len(other)] += other
     return joint
-
-
-def _numbered(sides: list[int]) -> tuple[NDArray[np.int64], list[int]]:
-    """The number of each side among the distinct ones, and these."""
-    numbers: dict[int, int] = {}
-    return np.array([numbers.setdefault(side, len(numbers)) for side in sides], np.int64), list(numbers)
 
 
 def _drawn(sums: NDArray[np.float64], uniform: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -18,6 +18,7 @@ from itertools import chain, compress
 from operator import ne
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.cells.arguments import require_many, require_mapping, require_text
@@ -27,6 +28,7 @@ from contextdb.cells.plain_ends import plain
 from contextdb.cells.sets import Accepted, Cell, NumberSet, TagMeet, TagSet
 from contextdb.compiled.data import CompiledData
 from contextdb.covering.factors import Factor, NumberFactor, TagFactor, ValueFactor, tag_factors, weighted
+from contextdb.covering.numbered import NumberedBoxes
 from contextdb.covering.progress import SILENT, Progress
 from contextdb.errors import ContextError, Fault, Place, TableError, in_quotes, no_such, plural
 from contextdb.schema.policies import decided_by
@@ -39,6 +41,8 @@ MOST_COMPARED = 1 << 37
 """Rows × rows × conditions of a table all of whose rows are compared with each other: seconds."""
 MOST_HELD = 1 << 31
 """Rows × the different cells of all columns, of a table that fits into memory: a bit for each."""
+MOST_SIDES = 1 << 27
+"""The squares of how many different cells each column has, added up, of a table of any number of rows."""
 SMALLEST = math.ulp(0.0)
 
 Box = tuple[int, ...]
@@ -198,6 +202,31 @@ class Space:
         return {f: box[f] for f in compress(range(len(box)), map(ne, box, self.full))}
 
     @cached_property
+    def numbered(self) -> NumberedBoxes:
+        """The rows' boxes by the numbers of their sides."""
+        return NumberedBoxes.of(self.full, self.boxes)
+
+    @cached_property
+    def volumes(self) -> NDArray[np.float64]:
+        """The measure of each row's box: float64 [boxes]; see `volume`."""
+        volumes, is_something = np.ones(len(self.boxes)), np.ones(len(self.boxes), np.bool_)
+        for f, own in enumerate(self.numbered.sides):
+            weights = np.array([1.0 if side == self.full[f] else weight_of(self.factors[f], side) for side in own])
+            volumes *= weights[self.numbered.numbers[f]]
+            is_something &= (weights > 0.0)[self.numbered.numbers[f]]
+        return np.where((volumes == 0.0) & is_something, SMALLEST, volumes)
+
+    @cached_property
+    def n_fitting(self) -> int:
+        """So many boxes fit into memory as bits, one for each class."""
+        return max(1, MOST_HELD // max(1, sum(len(f.weights) for f in self.factors)))
+
+    @property
+    def is_fitting(self) -> bool:
+        """Whether all rows do: else none is searched or counted, and samples are looked up in some of them at a time."""
+        return len(self.boxes) <= self.n_fitting
+
+    @cached_property
     def condition_of(self) -> tuple[int, ...]:
         return tuple(at for at, numbers in enumerate(self.of_condition) for _ in numbers)
 
@@ -261,12 +290,15 @@ def comparable_rows(compiled: CompiledData) -> int:
     return n_rows
 
 
-def require_measurable(compiled: CompiledData) -> None:
-    """Raise TableError where the bits of a table's rows would not fit into memory."""
+def require_comparable(compiled: CompiledData, is_sampled: bool = False) -> None:
+    """Raise TableError where the bits of a table's rows, or for samples those of its cells, would not fit into memory."""
     n_cells = _n_cells(compiled, compiled.n_rows)
-    if compiled.n_rows * n_cells > MOST_HELD:
-        problem = f"the table {in_quotes(compiled.name)} is too large for coverage: {plural(compiled.n_rows, 'row')} x "
-        accepted = f"rows times different cells up to {MOST_HELD:,}, or contextdb check, which compares the first rows"
+    n_sides = sum(len(compiled.cells(at)) ** 2 for at in range(len(compiled.conditions)))
+    if compiled.n_rows * n_cells > MOST_HELD and not (is_sampled and n_sides <= MOST_SIDES):
+        size = f"{plural(compiled.n_rows, 'row')} x "
+        problem = f"the table {in_quotes(compiled.name)} is too large to compare its rows with each other: {size}"
+        others = "coverage samples more where columns have few different cells, and check compares the first rows"
+        accepted = f"rows times different cells up to {MOST_HELD:,}; {others}"
         raise TableError(Fault(f"{problem}{plural(n_cells, 'different cell')}.", accepted))
 
 
@@ -299,7 +331,7 @@ def require_counts(**numbers: object) -> None:
 
 def weight_of(factor: Factor, side: int) -> float:
     """The share of a factor that some classes make up."""
-    parts = [factor.weights[first:stop] for first, stop in runs_of(side)]
+    parts = [factor.weights[first:stop] for first, stop in bitmask.runs_of(side)]
     return float(np.cumsum(np.concatenate(parts))[-1]) if parts else 0.0  # one after the other, as every count adds them
 
 
@@ -350,19 +382,6 @@ def _read_weights(name: str, parts: Mapping[object, float], conditions: Sequence
         cell = parse_cell(str(text), condition.domain)
         read[cell] = read.get(cell, 0.0) + float(weight)
     return read
-
-
-def runs_of(side: int) -> list[tuple[int, int]]:
-    """A set of classes as runs: first class, and the one after the last."""
-    runs, at = [], 0
-    while side:
-        skip = (side & -side).bit_length() - 1
-        side >>= skip
-        length = (~side & (side + 1)).bit_length() - 1
-        runs.append((at + skip, at + skip + length))
-        side >>= length
-        at += skip + length
-    return runs
 
 
 def used_factors(boxes: Iterable[Box], full: Box) -> list[int]:

@@ -15,7 +15,7 @@ from operator import ne
 
 from contextdb import bitmask
 from contextdb.covering.progress import SILENT, Progress
-from contextdb.covering.space import Box, runs_of
+from contextdb.covering.space import Box
 
 Point = tuple[int, ...]
 FACTORS = 100
@@ -85,7 +85,7 @@ class BoxSet:
             for side, members in sides.items():
                 bits = bitmask.int_of(members)
                 restricted |= bits
-                for first, stop in runs_of(side):
+                for first, stop in bitmask.runs_of(side):
                     turns[first] ^= bits
                     turns[stop] ^= bits
             own, so_far = [], restricted
@@ -103,7 +103,7 @@ class BoxSet:
         for f in compress(range(len(box)), map(ne, box, self.full)):
             self.restricts[f] |= bit
             own = self.rejects[f]
-            for first, stop in runs_of(self.full[f] & ~box[f]):
+            for first, stop in bitmask.runs_of(self.full[f] & ~box[f]):
                 for k in range(first, stop):
                     own[k] |= bit
 
@@ -116,7 +116,7 @@ class BoxSet:
         if side == self.full[f]:
             return self.all
         missed = self.all
-        for first, stop in runs_of(side):
+        for first, stop in bitmask.runs_of(side):
             for bits in self.rejects[f][first:stop]:
                 missed &= bits
         return self.all & ~missed
@@ -126,7 +126,7 @@ class BoxSet:
         if side == self.full[f]:
             return self.all & ~self.restricts[f]
         missed = 0
-        for first, stop in runs_of(side):
+        for first, stop in bitmask.runs_of(side):
             for bits in self.rejects[f][first:stop]:
                 missed |= bits
         return self.all & ~missed
@@ -247,7 +247,7 @@ class BoxSet:
         """What each class that is worth trying keeps open, and the class: fewest first. Of equal classes a searched one counts."""
         own = self.rejects[factor]
         choices = {open_boxes & ~own[k]: k for k in searched}
-        for first, stop in runs_of(side):
+        for first, stop in bitmask.runs_of(side):
             for k in range(first, stop):
                 choices.setdefault(open_boxes & ~own[k], k)
         ordered = sorted(choices.items(), key=lambda item: (item[0].bit_count(), item[1]))

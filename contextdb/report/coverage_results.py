@@ -252,6 +252,13 @@ def _accepted_by(option: str, name: str, sentence: str, is_accepted: bool, more:
     return Gate(option, 0.0, 1.0, is_accepted, message, rule=rule, is_accepted=is_accepted)
 
 
+def fail_under_expected(expected: Expectation, limit: float) -> Gate:
+    """The gate of a least covered share of what is expected; an estimate counts with its lower bound."""
+    at_least = "" if expected.covered.method == "exact" else "at least "
+    sentence = f"{at_least}{{}} of what is expected is covered"
+    return bar("fail-under-expected", expected.covered.lower, limit, sentence, rule="expected-below")
+
+
 def fail_under_telemetry(telemetry: Observed, limit: float) -> Gate:
     """The gate of a least covered share of the recorded moments; without a moment it fails."""
     if not telemetry.moments:

@@ -17,7 +17,6 @@ from contextdb.compiled.data import CompiledData
 from contextdb.covering.factors import Factor, NumberFactor, ValueFactor
 from contextdb.covering.gaps import NearRows, gap_id, widened
 from contextdb.covering.space import Box, Space
-from contextdb.covering.witness import BoxSet
 from contextdb.telemetry.observed import SeenGap
 from contextdb.telemetry.parts import Part
 
@@ -46,11 +45,10 @@ def seen_gaps(space: Space, compiled: CompiledData, part: Part, most: int, known
     scale = part.uncovered / counted if counted else 0.0
     elsewhere = int(part.open_moments[~is_placed].sum())
     moments = part.open_moments[is_placed]
-    rows = BoxSet.of(space.full, space.boxes)
-    near = NearRows(space, compiled, rows)
+    near = NearRows(space, compiled)
     held = [(box, _inside(box, points[is_placed])) for box in dict.fromkeys(known)]
     boxes = [(box, inside) for box, inside in held if inside.any()]
-    boxes += _boxes(space, rows, points[is_placed], moments, most * TRIED, boxes)
+    boxes += _boxes(space, points[is_placed], moments, most * TRIED, boxes)
     ranked = _ranked(space, boxes, points[is_placed], moments)[: most + len(held)]
     gaps, before = [], np.zeros(len(moments), np.bool_)
     for box, inside in ranked:
@@ -68,16 +66,15 @@ def _scaled(moments: int, scale: float, part: Part) -> float:
 
 
 def _boxes(
-    space: Space, rows: BoxSet, points: Points, moments: NDArray[np.int64], most: int, known: Sequence[tuple[Box, Flags]]
+    space: Space, points: Points, moments: NDArray[np.int64], most: int, known: Sequence[tuple[Box, Flags]]
 ) -> list[tuple[Box, Flags]]:
     """Boxes round the contexts of most moments that no known one holds, each with the contexts in it."""
-    order = sorted(range(len(rows.full)), key=lambda f: (rows.restricts[f].bit_count(), -f))
     left = np.lexsort((*points.T[::-1], -moments))
     for _, inside in known:
         left = left[~inside[left]]
     boxes: list[tuple[Box, Flags]] = []
     while len(left) and len(boxes) < most:
-        box = widened(space, rows, tuple(points[left[0]].tolist()), order)
+        box = widened(space, space.numbered, tuple(points[left[0]].tolist()))
         inside = _inside(box, points)
         inside[left[0]] = True
         boxes.append((box, inside))

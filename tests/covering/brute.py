@@ -13,6 +13,7 @@ import oracles
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
+from contextdb.covering.space import Space
 from contextdb.schema.settings import EMPTY, TableSettings
 from contextdb.tables.table import Table
 
@@ -160,3 +161,21 @@ def random_boxes(rng: random.Random, table: Table) -> list[dict[str, str]]:
         {name: rng.choice(CELLS[DOMAINS[name].kind]) for name in rng.sample(names, rng.randint(1, len(names)))}
         for _ in range(rng.randint(1, 2))
     ]
+
+
+def nearest_row(space: Space, gap: Sequence[int]) -> tuple[int, list[int]]:
+    """Of rows of assets that are equally alike the nearest to a gap, as a number of a box, and the conditions that have to change:
+    the fewest, then those that grow least, then the lowest row."""
+
+    def changes(row: Sequence[int]) -> tuple[int, float]:
+        failing = failing_conditions(space, gap, row)
+        more = [(space.factors[f].weights, gap[f] & ~row[f]) for at in failing for f in space.of_condition[at]]
+        growth = sum(float(w) for weights, side in more for k, w in enumerate(weights) if side >> k & 1)
+        return len(failing), round(growth, 9)
+
+    i = min(range(len(space.boxes)), key=lambda i: changes(space.boxes[i]))
+    return i, failing_conditions(space, gap, space.boxes[i])
+
+
+def failing_conditions(space: Space, gap: Sequence[int], row: Sequence[int]) -> list[int]:
+    return [at for at, own in enumerate(space.of_condition) if any(gap[f] & ~row[f] for f in own)]

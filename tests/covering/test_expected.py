@@ -110,6 +110,7 @@ def test_coverage_begins_with_what_is_asked(tmp_path):
     (tmp_path / "asked.csv").write_text("Situation,gait,Weight\nstrolling,Walk,3\nrunning,Run,1\n")
     out = run("coverage", tmp_path).lines
     assert out[2] == "75.00 % of what 2 expected situations ask for has a valid row."
+    assert [run("coverage", tmp_path, "--fail-under-expected", percent).code for percent in ("75", "76")] == [0, 1]
     assert "Of all contexts alike: 66.67 % of the contexts have a valid row (exact)." in out
     assert any("running: nothing plays; idle (line 2) would, with gait Idle Run" in line for line in out)
     (tmp_path / "seen.csv").write_text("gait\nWalk\nWalk\nIdle\n")
@@ -141,6 +142,12 @@ def test_what_cannot_be_read_is_an_error_with_its_place(tmp_path, text, words):
     assert run("check", tmp_path).code == 1
     assert run("coverage", tmp_path).code == 2
     assert json.loads(run("check", tmp_path, "--format", "json").out)["findings"]
+
+
+def test_a_gate_of_what_is_expected_does_not_pass_where_nothing_is(tmp_path):
+    (tmp_path / "moves.csv").write_text("Asset,gait\nidle,Idle\n")
+    result = run("coverage", tmp_path / "moves.csv", "--fail-under-expected", "50")
+    assert (result.code, "no table says what is expected of it" in result.err) == (2, True)
 
 
 def test_a_missing_file_of_expected_contexts_is_an_error(tmp_path):

@@ -8,7 +8,7 @@ from operator import add, or_
 
 import numpy as np
 import pytest
-from brute import random_boxes, random_table
+from brute import nearest_row, random_boxes, random_table
 from hypothesis import given
 from hypothesis import strategies as st
 from strategies import examples
@@ -65,14 +65,34 @@ def test_coverage_of_a_large_table_says_that_the_last_rows_are_not_compared(monk
     assert {f.row for f in cut.findings} == {None, 1}
 
 
-def test_rows_whose_bits_would_not_fit_are_cut_by_a_check_and_refused_by_coverage(monkeypatch: pytest.MonkeyPatch):
+def test_rows_whose_bits_would_not_fit_are_cut_by_a_check_and_refused_where_all_are_compared(monkeypatch: pytest.MonkeyPatch):
     table = table_of([("True", "Any", "False")] * 16)
     monkeypatch.setattr("contextdb.covering.space.MOST_HELD", 24)
     assert comparable_rows(data_of(table.compile())) == 8
     assert "undecided-rows" in {f.rule for f in check_rows(table)}
-    for measure in (coverage, pairs):
-        with pytest.raises(TableError, match="too large for coverage: 16 rows x 3 different cells"):
-            measure(table)
+    with pytest.raises(TableError, match="too large to compare its rows with each other: 16 rows x 3 different cells"):
+        opened(table)
+
+
+@examples(2)
+@given(st.integers(0, 2**32), st.integers(1, 60), st.sampled_from([0, 100_000]))
+def test_rows_whose_bits_would_not_fit_are_sampled_some_at_a_time(seed: int, most_held: int, most_contexts: int):
+    table = random_table(random.Random(seed))
+    exact = coverage(table)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("contextdb.covering.sample.MOST_CONTEXTS", most_contexts)
+        at_once, pairs_at_once = coverage(table, samples=4000), pairs(table, samples=500)
+        patch.setattr("contextdb.covering.space.MOST_HELD", most_held)
+        cut = coverage(table, samples=4000)
+        assert pairs(table, samples=500).to_json() == pairs_at_once.to_json()
+    assert cut.certain[0] - 1e-9 <= exact.covered <= cut.certain[1] + 1e-9
+    assert cut.covered == pytest.approx(exact.covered, abs=0.05)
+    assert (cut.overlap, cut.hits) == (at_once.overlap, at_once.hits)
+    assert not cut.crowded or cut.crowded[0].n_rows == len(cut.overlap.histogram) - 1
+    if most_contexts:
+        assert any(gap.share for gap in cut.gaps) == any(gap.share for gap in exact.gaps)
+    else:
+        assert {gap.id for gap in cut.gaps} <= {gap.id for gap in at_once.gaps}
 
 
 @given(st.sets(st.integers(0, 300)))
@@ -116,20 +136,19 @@ def test_boxes_added_one_by_one_answer_as_those_given_at_once(seed: int):
 
 @examples(2)
 @given(st.integers(0, 2**32))
-def test_the_nearest_row_has_fewest_cells_that_do_not_hold_the_gap(seed: int):
+def test_the_nearest_row_has_fewest_cells_that_do_not_hold_the_gap_and_is_the_first_of_equals(seed: int):
     rng = random.Random(seed)
     table = random_table(rng)
     compiled = data_of(table.compile())
     space = Space.of(compiled, random_boxes(rng, table))
-    near = NearRows(space, compiled, BoxSet.of(space.full, space.boxes))
+    near = NearRows(space, compiled)
     for box in find_gaps(space, (), 20, 1000).boxes:
-        failing = [[at for at, own in enumerate(space.of_condition) if any(box[f] & ~row[f] for f in own)] for row in space.boxes]
         nearest = near.nearest(space.sides_of(box))
-        assert (nearest is None) == (not failing)
+        assert (nearest is None) == (not space.boxes)
         if nearest is not None:
-            own = failing[list(space.rows).index(nearest.row)]
-            assert nearest.n_changes == len(own) == min(map(len, failing))
-            assert nearest.condition in [space.conditions[at].name for at in own]
+            i, failing = nearest_row(space, box)
+            assert (nearest.row, nearest.n_changes) == (space.rows[i], len(failing))
+            assert list(nearest.cells) == [space.conditions[at].name for at in failing]
 
 
 def test_a_table_of_very_many_conditions_is_measured_and_says_how_many_samples_it_drew():

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from c_compilers import PROGRAMS, all_compilers, compiled, ran, sanitizers, variants
+from made_once import make_clip
 from strategies import IS_FULL
 from test_output_ground import slope
 
@@ -19,7 +20,6 @@ import contextdb as cdb
 from contextdb import motion
 from contextdb.commands.motion_bundle import file_of
 from contextdb.compiled.c_header import c_header_of
-from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.selection.chooser import N_DECISION
 from contextdb.motion.storage.bundle import Played, bundle_of

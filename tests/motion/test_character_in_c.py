@@ -82,7 +82,9 @@ def programs(tmp_path_factory):
     """The program, as each compiler makes it with little optimisation, with much, and under sanitizers."""
     folder, first = tmp_path_factory.mktemp("character"), all_compilers()[0]
     (folder / "contextdb_motion.h").write_text(header(), encoding="ascii")
-    commands = variants(("-O0",), ("-O0", "-DCDBM_NARROW"), ("-O3",)) + [(*first, *own) for own in [sanitizers(*first)] if own]
+    commands = variants(("-O0",), ("-O3",) if IS_FULL else ("-O0", "-DCDBM_NARROW")) + [
+        (*first, *own) for own in [sanitizers(*first)] if own
+    ]
     options = ["-std=c99", "-ffp-contract=off", "-Wall", "-Wextra", "-Wconversion", "-Wno-unused-function"]
     return [
         compiled([*command, *options], PROGRAMS / "character.c", folder / f"character{number}", folder, "-lm")

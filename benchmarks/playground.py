@@ -29,7 +29,7 @@ import numpy as np
 from benchmarks import timing
 from benchmarks.live_link import Other
 from benchmarks.sections import print_aligned
-from contextdb.motion import write_game_clips
+from contextdb.motion import write_made_clips
 from contextdb.telemetry.link import doors
 from examples.playground.__main__ import RATE, TABLES
 from examples.playground.game import Game
@@ -109,7 +109,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary) / "tables"
         shutil.copytree(TABLES, folder, ignore=shutil.ignore_patterns("*.bvh", ".contextdb-cache"))
-        write_game_clips(folder / "clips")
+        write_made_clips(folder / "clips", of_game=True)
         report["playground"] = found = measure(folder, 10.0 if options.quick else 60.0)
     print("\nA frame of two characters; milliseconds\n")
     heads = [f"{name}{of}" for of in ("", " CPU") for name in ("median", "99 %", "longest")]

@@ -20,7 +20,7 @@ from png_files import Picture, halved, write_png
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
-from contextdb.motion import write_game_clips
+from contextdb.motion import write_made_clips
 from examples.playground.__main__ import RATE, TABLES, own_tables
 from examples.playground.actor import Actor
 from examples.playground.game import Game
@@ -124,7 +124,7 @@ def drawn(game: Game, words: float = SIZE, size: tuple[int, int] = (1920, 1080))
 
 def main(folder: Path = FOLDER) -> None:
     """Draw all of them."""
-    write_game_clips(TABLES / "clips")
+    write_made_clips(TABLES / "clips", of_game=True)
     for name in MOMENTS:
         write_png(folder / f"{name}.png", moment(name))
     write_png(folder / "playground.png", *film(filmed), per_second=PER_SECOND)

@@ -12,7 +12,7 @@ from pathlib import Path
 import oracles
 
 from contextdb import Project
-from contextdb.motion import MotionProject, write_game_clips
+from contextdb.motion import MotionProject, write_made_clips
 from examples.playground.__main__ import TABLES, played
 from examples.playground.game import Game
 from examples.playground.stick import Sticks, read_sticks
@@ -39,7 +39,7 @@ def clips() -> Path:
     folder = Path(tempfile.mkdtemp(prefix="playground-clips-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     shutil.copytree(TABLES / "clips", folder, ignore=shutil.ignore_patterns("*.bvh"), dirs_exist_ok=True)
-    write_game_clips(folder)
+    write_made_clips(folder, of_game=True)
     return folder
 
 

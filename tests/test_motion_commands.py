@@ -569,3 +569,35 @@ def test_without_its_databases_a_session_says_what_is_missing(here: Path):
     changed = Trace.load("session.parquet").reasked(Project.load("moved"))
     assert changed.changed == {"tired", "all"}
     assert any(each.is_changed for each in changed)
+
+
+# ---- weights learned from choices
+
+
+def test_learned_weights_are_written_once_and_nothing_else_changes(here: Path):
+    assert "there is no choice in session.choices.csv" in refused("learn", "session.parquet")
+    assert "there is no such file" in refused("learn", "nothing.parquet")
+    searched = [each for each in Trace.load("session.parquet").brief() if each.choice is not None]
+    choices = here / "session.choices.csv"
+    choices.write_text(f"tick,asset,choice\n{searched[0].tick},jgo,+\n1000000,jog,-\n", "utf-8")
+    assert 'line 2: no database has an asset "jgo"' in refused("learn", "session.parquet")
+    choices.write_text("tick,asset,choice\n30,walk_tired,maybe\n", "utf-8")
+    assert 'line 2, column "choice": "maybe" is not a choice.' in refused("learn", "session.parquet")
+    chosen = searched[0].choice.hit.asset
+    choices.write_text(f"tick,asset,choice\n{searched[0].tick},{chosen},+\n", "utf-8")
+    assert "no other weights follow more of them" in motion("learn", "session.parquet").out
+    choices.write_text("tick,asset,choice\n120,walk_tired,+\n", "utf-8")
+    schema = here / "game" / "contextdb.toml"
+    was = schema.read_text("utf-8")
+    proposed = motion("learn", "session.parquet", "--json", code=1)
+    assert schema.read_text("utf-8") == was
+    document = proposed.json
+    assert {"format", "choices", "pairs", "held_out", "unusable", "better"} <= document.keys()
+    assert (document["now"]["searches"], document["after"]["searches"], document["written"]) == (0, 1, False)
+    assert {"file", "searches", "other_assets", "before", "after"} <= document["sessions"][0].keys()
+    assert "120    4.00  walk  walk_tired" in motion("learn", "session.parquet", "--write").out
+    motion("build", "game")
+    after = Project.load("game").schema.motion["features"]["loco"]["channels"]
+    assert [each["weight"] for each in after] == [each["learned"] for each in document["weights"]]
+    assert schema.read_text("utf-8").count("\n") == was.count("\n")
+    assert "no other weights follow more of them: with the present ones 1 of 1" in motion("learn", "session.parquet").out

@@ -224,6 +224,9 @@ GAMES = {
     "motion measure": command("motion", "measure", SESSION, finds=OF_GAME),
     "motion replay": command("motion", "replay", SESSION, "--what-if", "continuing=-0.1", finds=OF_GAME),
     "motion debug": Work(debugged, finds=OF_GAME),
+    "motion learn": command(
+        "motion", "learn", SESSION, "--write", writes=("contextdb.toml",), finds=(*OF_GAME, "in/session.choices.csv")
+    ),
 }
 DEMO = {
     "demo": command(
@@ -250,6 +253,7 @@ def sample(work: str) -> Path:
         (clone / "in/stick.csv").write_text(STICK)
         with chdir(clone):
             assert run("motion", "run", ".", "player", "in/stick.csv", "--out", SESSION).code == 0
+        (clone / "in/session.choices.csv").write_text("tick,asset,choice\n120,walk_tired,+\n")
         shutil.rmtree(clone / ".contextdb-cache")
     else:
         for name, text in FILES.items():

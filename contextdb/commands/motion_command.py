@@ -28,5 +28,6 @@ COMMANDS = {
     "probe": "drive a character through the contexts of its tables, without a player, and measure how well it moves",
     "measure": "how good the motion of a session is, compared with its clips",
     "replay": "what was decided in a recorded session, and why",
+    "learn": "weights of channels from what people would have chosen in recorded sessions",
     "debug": "the same in the terminal, moment by moment, with poses and weights to change",
 }

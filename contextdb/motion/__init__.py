@@ -34,8 +34,7 @@ from contextdb.motion.features.live_query import LivePose, PoseHistory, query_fr
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.joint.database import JointDatabase
 from contextdb.motion.joint.searcher import JointSearcher
-from contextdb.motion.made.game import write_game_clips
-from contextdb.motion.made.recipes import write_made_clips
+from contextdb.motion.made.game import write_made_clips
 from contextdb.motion.markup.marks import TagFilter
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.markup.spans import Span
@@ -73,7 +72,7 @@ from contextdb.motion.trace.session import Trace
 
 __all__ = ["ClipError", "MotionError", "QueryError"]
 __all__ += ["Clip", "Skeleton", "Steered", "Trajectory", "load_bvh", "load_clips", "mirrored", "poses_of", "resampled"]
-__all__ += ["retargeted", "root_trajectory", "steady_path", "write_bvh", "write_game_clips", "write_made_clips"]
+__all__ += ["retargeted", "root_trajectory", "steady_path", "write_bvh", "write_made_clips"]
 __all__ += ["Channel", "FeatureSchema", "LivePose", "Markup", "PoseHistory", "Span", "TagFilter", "query_from"]
 __all__ += ["query_from_pose", "with_path"]
 __all__ += ["Action", "Choice", "Controller", "ControllerGroup", "ControllerSettings", "Decision", "Entry", "Hit"]

@@ -10,7 +10,7 @@ import pytest
 from strategies import for_each
 
 from contextdb.errors import MotionError
-from contextdb.motion import load_bvh, poses_of, root_trajectory, write_game_clips, write_made_clips
+from contextdb.motion import load_bvh, poses_of, root_trajectory, write_made_clips
 from contextdb.motion.clips.quaternions import rotate
 from contextdb.motion.made.recipes import ABOUT_TURNS, RECIPES, descriptions, made_clips, make_clip
 from contextdb.motion.walking.cycle import Cycle
@@ -199,7 +199,7 @@ def test_written_clips_read_as_the_same_motion(tmp_path):
 
 
 def test_the_clips_of_a_contest_end_face_to_face(tmp_path):
-    written = {path.stem: path for path in write_game_clips(tmp_path)}
+    written = {path.stem: path for path in write_made_clips(tmp_path, of_game=True)}
     assert {"walk_about_left", "jog_strafe", "walk_back", "vault_run", "catch_high"} < set(written)
     one, other = (root_trajectory(poses_of(load_bvh(written[f"catch_contested.{role}"]))) for role in ("Catcher", "Other"))
     assert other.positions[-1] - one.positions[-1] == pytest.approx((0.0, 0.8), abs=0.05)

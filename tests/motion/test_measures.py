@@ -107,6 +107,29 @@ def test_the_weight_of_a_foot_falls_with_its_height():
     assert found.skate_weighted_cm_s == pytest.approx(expected)
 
 
+@given(st.integers(0, 2**32 - 1))
+def test_a_foot_stands_where_it_was_not_lower_before_and_after_within_half_a_second(seed):
+    rng = np.random.default_rng(seed)
+    rate, n = float(rng.choice([15.0, 30.0, 60.0])), int(rng.integers(1, 50))
+    feet, contacts = rng.uniform(0.0, 0.05, (n, 2, 3)), rng.random((n, 2)) < 0.8
+    stands = formulas.standing(contacts, feet, np.arange(n) / rate)
+    reach = round(0.5 * rate)
+    for i in range(n):
+        for k in range(2):
+            least = max(feet[max(0, i - reach) : i + 1, k, 1].min(), feet[i : i + reach + 1, k, 1].min())
+            assert stands[i, k] == (contacts[i, k] and feet[i, k, 1] <= least + 0.02)
+
+
+@pytest.mark.parametrize("stair_m", [0.0, 0.16, -0.16])
+def test_a_foot_that_steps_to_another_place_does_not_skate_and_one_on_a_stair_does(stair_m):
+    """The last third of a second is on the next stair; while it slides there, it is not in a step."""
+    lifts = [0.05 * math.sin(math.pi * min(i / 10, 1.0)) + (stair_m if i > 10 else 0.0) for i in range(21)]
+    step = [a_pose(playing(time_s=i / RATE), (0.0, 0.03 * min(i, 10), 0.0), lift=lift) for i, lift in enumerate(lifts)]
+    stands = measure(step, BANK, rate=RATE).skate_m_min
+    slides = [a_pose(playing(time_s=i / RATE), (0.0, 0.03 * i, 0.0), lift=lift) for i, lift in enumerate(lifts)]
+    assert measure(slides, BANK, rate=RATE).skate_m_min > 40.0 > 15.0 > stands
+
+
 def test_feet_that_the_clip_has_up_do_not_skate():
     some = a_bank(slide=(61, 0.0, 0.0, True))
     some.contacts[31:], some.contacts[:, 1] = False, False

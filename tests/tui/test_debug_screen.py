@@ -228,6 +228,32 @@ def test_a_turned_weight_searches_the_moment_again(recording: Recording):
     assert f"is chosen: {choice.hit.asset} at cost {cost_text(choice.hit.cost)}." in text
 
 
+def test_assets_are_marked_in_the_bars_and_motion_learn_reads_them(recording: Recording):
+    chosen = recording.trace[FIRST].choice
+    assert chosen is not None
+
+    async def script(screen: DebugScreen, pilot: Pilot[Any]) -> list[str]:
+        texts = []
+        for key in ("minus", "down", "plus", "end", "home"):
+            await press(pilot, key)
+            texts.append(screen.message)
+        return texts
+
+    messages = shown(recording, script)
+    path = Path("session.choices.csv")
+    assert messages[0].startswith(f"{chosen.hit.asset} should not have been chosen · 1 choice in session.choices.csv")
+    assert f"{FIRST},{chosen.hit.asset},-" in path.read_text().splitlines()
+    learned = run("motion", "learn", "session.parquet", "--json")
+    assert learned.code in (0, 1), learned.err
+    assert learned.json["choices"] == len(path.read_text().splitlines()) - 1
+    assert f"▶-{chosen.hit.asset}" in after(recording, "left", "right")
+    after(recording, "minus")
+    assert f",{chosen.hit.asset},-" not in path.read_text()
+    path.write_text("tick,asset\n")
+    assert "session.choices.csv" in after(recording, "minus")
+    assert path.read_text() == "tick,asset\n"
+
+
 def test_the_weight_of_every_channel_is_never_0(recording: Recording):
     keys = [key for _ in range(4) for key in (*["minus"] * 20, "down")]
     text = after(recording, "tab", "tab", "tab", *keys)

@@ -61,6 +61,8 @@ class Bars(CursorLines):
         """Database and frame of what the search chooses."""
         self.playing: tuple[str, int] | None = None
         """And of what would have played on."""
+        self.choices: dict[str, bool] = {}
+        """The assets that the person here would have chosen, and would not."""
         self.note = ""
         """Why there are no bars."""
 
@@ -116,7 +118,8 @@ class Bars(CursorLines):
         plain = self.get_component_rich_style("bars--name" if row.may_play else "bars--out")
         over = self.get_component_rich_style("bars--cursor") if is_here else Style()
         mark = "▶" if is_chosen else "○" if self.is_in(row, self.playing) else " "
-        text = f"{mark} {shortened(row.name, name_width)} {cost_text(row.cost):>{COST}} "
+        sign = {True: "+", False: "-", None: " "}[self.choices.get(row.asset)]
+        text = f"{mark}{sign}{shortened(row.name, name_width)} {cost_text(row.cost):>{COST}} "
         room = max(0, width - len(text))
         return Strip([Segment(text, plain + over), *self._bars(row, room)]).adjust_cell_length(width, self.rich_style)
 

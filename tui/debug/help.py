@@ -1,4 +1,4 @@
-"""The debugger's help: four questions and the way to their answers, what the signs mean, and the keys."""
+"""The debugger's help: questions and the way to their answers, what the signs mean, and the keys."""
 
 from __future__ import annotations
 
@@ -19,6 +19,10 @@ QUESTIONS = (
     (
         "Why does it jump so much?",
         "The line over the panes counts jumps, forced ones, and how little most of them spare. ! is a forced jump.",
+    ),
+    (
+        "Which weights would choose mine?",
+        "+ on an asset in Bars: it should have been chosen; -: it should not. contextdb motion learn learns weights from it.",
     ),
     (
         "What if this weight were different?",
@@ -44,7 +48,7 @@ class DebugHelp(HelpPage):
 
     def sections(self) -> Iterator[tuple[str, Lines]]:
         """The questions, the signs, and the keys by their groups."""
-        yield "Four questions", QUESTIONS
+        yield "Questions", QUESTIONS
         yield "What the signs mean", SIGNS
         for group in dict.fromkeys(key.group for key in KEYS):
             yield group, [(names_of(key.keys), key.about) for key in KEYS if key.group == group]

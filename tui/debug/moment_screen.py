@@ -23,6 +23,7 @@ from contextdb.motion.selection.decision import Action
 from . import reasons
 from .bars import Bars
 from .channels import Channels, Dial
+from .choosing import NO_FILE, Choosing
 from .figures import figure_of
 from .game import Live
 from .key_line import DebugKeyLine
@@ -85,6 +86,7 @@ class MomentScreen(Screen[None]):
         """Whether the newest moment of the game is displayed, and goes on."""
         self.index = 0
         self.turned = Turned()
+        self.choosing = Choosing.of(recording.file) if live is None else Choosing("", problem=NO_FILE)
         self.order = ORDERS[0]
         self.text = ""
         self.message = ""
@@ -256,6 +258,7 @@ class MomentScreen(Screen[None]):
         bars.chosen = None if choice is None or choice.database is None else (choice.database, choice.hit.frame)
         before = None if moment.searched is None else moment.searched.before
         bars.playing = None if before is None else (before.database, before.frame)
+        bars.choices = {} if moment.searched is None else self.choosing.at(moment.searched.tick)
         note = moment.not_repeated
         if not note and not rows:
             note = f"no asset's name holds {self.text!r}" if self.text else "nothing was searched"

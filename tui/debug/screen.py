@@ -243,10 +243,17 @@ class DebugScreen(MomentScreen):
 
     def on_channels_clicked(self, message: Channels.Clicked) -> None:
         """Turn by the mouse."""
-        self.action_turn(1 if message.up else -1)
+        self._turn_dial(1 if message.up else -1)
 
     def action_turn(self, by: int) -> None:
-        """Turn the weight, or threshold, under the cursor."""
+        """Mark the asset under the cursor of the bars; elsewhere turn the weight, or threshold, under the cursor."""
+        if self._pane == "bars":
+            self.say(self.choosing.mark(self.moment, self.bars.row, by > 0))
+            self._show_bars()
+        else:
+            self._turn_dial(by)
+
+    def _turn_dial(self, by: int) -> None:
         dial = self.channels.dial
         if dial is None:
             self.say("There is no weight to change: " + (self.recording.missing or "the session has no database."))
@@ -278,7 +285,7 @@ class DebugScreen(MomentScreen):
     def action_write(self) -> None:
         """Write what is turned into contextdb.toml."""
         if not self.turned:
-            self.say("No weight is changed: + and - change the weight under the cursor.")
+            self.say("No weight is changed: in Weights, + and - change the one under the cursor.")
             return
         config = self.recording.config
         if config is None:
@@ -314,7 +321,7 @@ class DebugScreen(MomentScreen):
     def action_run(self) -> None:
         """Run the whole session again with what is turned."""
         if not self.turned:
-            self.say("No weight is changed: + and - change the weight under the cursor.")
+            self.say("No weight is changed: in Weights, + and - change the one under the cursor.")
         elif self.live is not None:
             self.say("A running game cannot be run again: record a session of it with motion.Trace.")
         elif self.recording.missing or not self.recording.databases:

@@ -13,11 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
-from contextdb.cells.arguments import require_path
+from contextdb.cells.arguments import require_kind, require_path
 from contextdb.disk import make_folder
 from contextdb.motion.clips.clip import CENTIMETRE, Clip, write_bvh
 from contextdb.motion.made.joint import column, half_turned
-from contextdb.motion.made.recipes import ABOUT_TURNS, make_clip, write_made_clips
+from contextdb.motion.made.recipes import ABOUT_TURNS, make_clip, write_recipes
 
 Bump = tuple[str, str, float, float, float]
 """A joint, its channel, from when to when in seconds, and by how much in between, in centimetres or degrees."""
@@ -62,15 +62,18 @@ CONTESTS: dict[str, dict[str, Bent]] = {
 APART_M = 0.8
 
 
-def write_game_clips(folder: str | PathLike[str]) -> list[Path]:
-    """Write all made clips of a small game below a folder, which is made; the paths, in order.
+def write_made_clips(folder: str | PathLike[str], *, of_game: bool = False) -> list[Path]:
+    """Write all made clips into a folder that exists, each as NAME.bvh in centimetres, y up; the paths, in order.
 
-    Raises FileError where they cannot be written.
+    With `of_game` those of a small game too, and the folder is made. Raises FileError where they cannot be written.
     """
     place = require_path(folder, "folder")
+    require_kind(of_game, bool, "of_game", "True or False")
+    if not of_game:
+        return write_recipes(place)
     for each in (place, place / "once", place / "contest"):
         make_folder(each)
-    paths = write_made_clips(place)
+    paths = write_recipes(place)
     for name, clip in _others():
         paths.append(place / f"{name}.bvh")
         write_bvh(clip, paths[-1])

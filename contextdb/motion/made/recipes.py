@@ -194,7 +194,7 @@ def made_clips() -> list[MadeClip]:
     return [make_clip(name) for name in RECIPES]
 
 
-def write_made_clips(folder: str | PathLike[str]) -> list[Path]:
+def write_recipes(folder: str | PathLike[str]) -> list[Path]:
     """Write all made clips into a folder that exists, each as NAME.bvh in centimetres, y up; the paths, in order.
 
     Raises FileError where they cannot be written.

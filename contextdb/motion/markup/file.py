@@ -39,34 +39,34 @@ class Rows:
     faults: list[Fault] = field(default_factory=list)
 
 
-def text_of(raw: bytes, file: str) -> str:
+def text_of(raw: bytes, file: str, accepted: str = _ACCEPTED) -> str:
     """The text of a file's bytes. Raises MotionError for UTF-16, another encoding, or no text at all."""
     nul = raw.find(b"\0")
     if raw.startswith((b"\xff\xfe", b"\xfe\xff")) or looks_utf16(raw):
-        raise MotionError(Fault("the file is UTF-16 text.", _ACCEPTED, "to save it as UTF-8", Place(file)))
+        raise MotionError(Fault("the file is UTF-16 text.", accepted, "to save it as UTF-8", Place(file)))
     if nul >= 0:
-        raise MotionError(Fault("not a text file: it contains a NUL byte.", _ACCEPTED, place=Place(file, line_of(raw, nul))))
+        raise MotionError(Fault("not a text file: it contains a NUL byte.", accepted, place=Place(file, line_of(raw, nul))))
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         problem = f"byte 0x{raw[error.start]:02X} on this line is not UTF-8."
-        raise MotionError(Fault(problem, _ACCEPTED, "to save it as UTF-8", Place(file, line_of(raw, error.start)))) from None
+        raise MotionError(Fault(problem, accepted, "to save it as UTF-8", Place(file, line_of(raw, error.start)))) from None
 
 
-def rows_of(text: str, file: str | None) -> Rows:
+def rows_of(text: str, file: str | None, required: Sequence[str] = REQUIRED, columns: Sequence[str] = COLUMNS) -> Rows:
     """The rows of a text, blank lines left out, and what is wrong with its header and its lines."""
     lines = [(number, line) for number, line in enumerate(_LINE_END.split(text.removeprefix("\ufeff")), 1) if line.strip()]
     rows = Rows()
     if not lines:
         what = "the file holds blank lines only." if text.strip("\ufeff") else "the file is empty."
-        rows.faults.append(Fault(what, "a header line: asset,tag,from,to,value", place=Place(file)))
+        rows.faults.append(Fault(what, f"a header line: {','.join(columns)}", place=Place(file)))
         return rows
     conflicts = [number for number, line in lines if _CONFLICT.match(line)]
     if conflicts:
         mend = 'to keep one side and delete the lines "<<<<<<<", "=======" and ">>>>>>>"'
         rows.faults.append(Fault("an unresolved git conflict starts here.", "plain CSV", mend, Place(file, conflicts[0])))
         return rows
-    names = _header(*lines[0], file, rows.faults)
+    names = _header(lines[0][1], Place(file, lines[0][0]), rows.faults, required, columns)
     if names is not None:
         _read_rows(lines[1:], names, file, rows)
     return rows
@@ -75,9 +75,8 @@ def rows_of(text: str, file: str | None) -> Rows:
 # ---- the header
 
 
-def _header(number: int, line: str, file: str | None, faults: list[Fault]) -> list[str] | None:
+def _header(line: str, place: Place, faults: list[Fault], required: Sequence[str], columns: Sequence[str]) -> list[str] | None:
     """The columns in order, or None when the rows below cannot be read by them."""
-    place = Place(file, number)
     other = _other_delimiter(line)
     if other:
         faults.append(Fault(f"the header has no comma but {other}.", "commas between fields", "to save it with commas", place))
@@ -88,9 +87,9 @@ def _header(number: int, line: str, file: str | None, faults: list[Fault]) -> li
         faults.append(_form_fault(line, error, place))
         return None
     names = [name.casefold() for name in given]
-    missing = [column for column in REQUIRED if column not in names]
-    faults.extend(_name_faults(given, missing, place))
-    faults.extend(_missing_faults(missing, place))
+    missing = [column for column in required if column not in names]
+    faults.extend(_name_faults(given, missing, columns, place))
+    faults.extend(_missing_faults(missing, columns, place))
     return None if missing or len(set(names)) < len(names) else names
 
 
@@ -100,7 +99,7 @@ def _other_delimiter(line: str) -> str:
     return next((plural(line.count(mark), name) for mark, name in _OTHER_DELIMITERS if mark in line), "")
 
 
-def _name_faults(given: Sequence[str], missing: Sequence[str], place: Place) -> Iterator[Fault]:
+def _name_faults(given: Sequence[str], missing: Sequence[str], columns: Sequence[str], place: Place) -> Iterator[Fault]:
     """Columns that are unknown, or appear twice."""
     seen = set[str]()
     for name in given:
@@ -108,17 +107,17 @@ def _name_faults(given: Sequence[str], missing: Sequence[str], place: Place) -> 
         at = Place(place.file, place.line, name or None)
         if folded in seen:
             yield Fault(f"the column {in_quotes(name)} appears twice.", "each column once", place=at)
-        elif folded not in COLUMNS:
-            near = nearest(name, missing) or nearest(name, COLUMNS)
+        elif folded not in columns:
+            near = nearest(name, missing) or nearest(name, columns)
             what = f"there is no column {in_quotes(name)}." if name else "a column has no name."
-            yield Fault(what, some(COLUMNS), in_quotes(near) if near else "", at)
+            yield Fault(what, some(columns), in_quotes(near) if near else "", at)
         seen.add(folded)
 
 
-def _missing_faults(missing: Sequence[str], place: Place) -> Iterator[Fault]:
+def _missing_faults(missing: Sequence[str], columns: Sequence[str], place: Place) -> Iterator[Fault]:
     if missing:
         noun = "column" if len(missing) == 1 else "columns"
-        yield Fault(f"the {noun} {some(missing)} {'is' if len(missing) == 1 else 'are'} missing.", some(COLUMNS), place=place)
+        yield Fault(f"the {noun} {some(missing)} {'is' if len(missing) == 1 else 'are'} missing.", some(columns), place=place)
 
 
 # ---- the rows

@@ -229,7 +229,8 @@ def _accelerations(positions: Floats, times_s: Floats) -> Floats:
 
 def _skate(feet: Floats, it: Displayed) -> Floats:
     assert it.contacts is not None, "was looked at before"
-    slides = formulas.Slides.of(feet, it.times_s, it.contacts, formulas.floor_of(feet))
+    down = formulas.standing(it.contacts, feet, it.times_s)
+    slides = formulas.Slides.of(feet, it.times_s, down, formulas.floor_of(feet))
     speeds = np.full(len(it.times_s), np.nan)
     speeds[len(speeds) - len(slides.seconds) :] = np.where(slides.planted, 100.0 * slides.speeds, 0.0).max(axis=1)
     return speeds

@@ -27,6 +27,8 @@ MEAN_S = 5.0 / 30.0
 """The ratio form compares the mean speed over this time too: 5 frames."""
 WEIGHTED_M, RATIO_M, RATIO_MPS = 0.025, 0.05, 0.5
 """The weighted form counts feet lower than the first; the ratio form those lower than the second and faster than the third."""
+LIFTED_M, LIFTED_S = 0.02, 0.5
+"""A foot that is so much above where it was lowest, both in so long before and after, is in a step."""
 FLOOR_SHARE = 0.01
 """A foot's floor is the height that it is above in all but this share of the moments."""
 STEADY_MPS2 = 0.5
@@ -100,6 +102,15 @@ class Slides:
 def floor_of(feet: Floats) -> Floats:
     """The height of the floor below each foot [K], of places [T, K, 3]."""
     return np.asarray(np.quantile(feet[..., 1], FLOOR_SHARE, axis=0))
+
+
+def standing(contacts: Flags, feet: Floats, times_s: Floats) -> Flags:
+    """Where feet [T, K, 3] are planted [T, K] and not in a step: one that is lifted and put down elsewhere does not slide. Heights
+    alone decide, against the foot's own before and after, so that it is the same on stairs."""
+    n = max(1, round(LIFTED_S / float(np.median(np.diff(times_s))))) if len(times_s) > 1 else 1
+    heights = np.pad(feet[..., 1], ((n, n), (0, 0)), constant_values=np.inf)
+    least = np.lib.stride_tricks.sliding_window_view(heights, n + 1, axis=0).min(axis=-1)
+    return np.asarray(contacts & (feet[..., 1] <= np.maximum(least[:-n], least[n:]) + LIFTED_M))
 
 
 def _means(speeds: Floats, seconds: Floats) -> Floats:

@@ -23,8 +23,8 @@ class Measures:
     jump_mps : float
         The same of velocities: the mean step of a joint's velocity, m/s.
     skate_cm_s, skate_raw_cm_s, skate_played_cm_s : float
-        The mean speed over the ground of feet that are down in the clip that plays; that of all clips as they are; and that of the
-        frames that played, as their clips have them.
+        The mean speed over the ground of feet that are down in the clip that plays and are not lifted to another place; that of
+        all clips as they are; and that of the frames that played, as their clips have them.
     skate_m_min, skate_raw_m_min : float
         How far feet that are down in the clip slide in a minute, both together.
     skate_weighted_cm_s, skate_weighted_raw_cm_s : float

@@ -94,7 +94,7 @@ def skate(it: Displayed, clips: Clips | None) -> dict[str, object]:
         return dict.fromkeys((*planted, *height, played), why)
     places, times_s = it.positions[at][:, it.feet], it.times_s[at]
     contacts = np.zeros(places.shape[:2], np.bool_) if it.contacts is None else it.contacts[at]
-    slides = formulas.Slides.of(places, times_s, contacts, formulas.floor_of(places))
+    slides = formulas.Slides.of(places, times_s, formulas.standing(contacts, places, times_s), formulas.floor_of(places))
     values: dict[str, object] = {"skate_weighted_cm_s": _scaled(slides.weighted_mps(), 100.0), "skate_ratio": slides.ratio()}
     if it.contacts is None:
         return {**values, **dict.fromkeys((*planted, played), NO_CONTACTS)}

@@ -122,7 +122,7 @@ def _worst_seconds(it: Displayed, at: Ints) -> dict[str, object]:
         "skate_worst_cm_s": NEVER_PLANTED,
     }
     if it.contacts is not None:
-        planted = formulas.Slides.of(places, times_s, it.contacts[at], floor)
+        planted = formulas.Slides.of(places, times_s, formulas.standing(it.contacts[at], places, times_s), floor)
         values["skate_worst_cm_s"] = 100.0 * _worst_slide(planted) if planted.planted.any() else NEVER_PLANTED
     step = formulas.step_of(times_s)
     accelerations = formulas.accelerations(it.positions[at], times_s, step)

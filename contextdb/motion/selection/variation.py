@@ -37,7 +37,7 @@ class Variation(Declared, error=MotionError):
         "Frames that cost at most so much more than the best are as good as it.", least=0.0, unit="a cost", such_as=0.05
     )
     memory: int = number(
-        "None of the last so many assets is chosen while another is as good.", 1, 0, 1000, "a whole number", 2, is_whole=True
+        "How many of the last assets are not chosen while another is as good.", 1, 0, 1000, "a whole number", 2, is_whole=True
     )
 
     def choose(self, ties: Sequence[Hit], recent: Collection[str], rng: Rng) -> Hit:

@@ -136,6 +136,18 @@ def test_a_table_with_cells_that_cannot_be_read_fails_with_the_first_of_them(tmp
     assert run.state == "none"
 
 
+def test_what_is_expected_comes_before_the_share_of_all_contexts(tmp_path):
+    (tmp_path / "contextdb.toml").write_text("[conditions.up]\ntype = 'bool'\n[tables.moves]\nexpected = 'asked.csv'\n")
+    (tmp_path / "moves.csv").write_text("Asset,up\na,True\n")
+    (tmp_path / "asked.csv").write_text("Situation,up,Weight\njump,True,3\nfall,False,1\n")
+    moves = cdb.load(tmp_path / "moves.csv")
+    of_all = "50.00 % of the contexts have a valid row (exact)."
+    expected = "75.00 % of what 2 expected situations ask for has a valid row."
+    assert measured(moves, lambda part, share: None, lambda: False).headline == f"{expected} Of all contexts alike: {of_all}"
+    (tmp_path / "asked.csv").unlink()  # a problem of its own
+    assert measured(moves, lambda part, share: None, lambda: False).headline == of_all
+
+
 def test_contexts_that_the_assumptions_rule_out_belong_to_no_share():
     schema = {"up": {"type": "bool"}, "down": {"type": "bool"}, "a": {"type": "number"}, "b": {"type": "number"}}
     settings = TableSettings("table", assume=("not (up and down)", "a < b"))

@@ -48,7 +48,7 @@ def state_text(run: CoverageRun, table: Table) -> str:
         return f"{part or 'Starting'} … {int(100 * share)} %"
     if run.result is None:
         return f"Which contexts have no valid row? R works it out ({size})."
-    headline = run.result.report.headline
+    headline = run.result.headline
     return headline if state == "done" else f"The table has changed since. R measures it again. Before: {headline}"
 
 

@@ -17,9 +17,11 @@ from threading import Event, Lock, Thread
 from typing import Literal
 
 from contextdb.covering import Cancelled, CoverageReport, PairTable, coverage, pairs
+from contextdb.covering.expected import Expectation, expectation
 from contextdb.covering.pairs import left_out
-from contextdb.covering.progress import Stops, Tell
+from contextdb.covering.progress import Progress, Stops, Tell
 from contextdb.errors import ContextDBError, plural, safe_text
+from contextdb.tables.expected_file import expected_path, read_situations
 from contextdb.tables.table import Table, rows_of_file
 
 State = Literal["none", "running", "done", "stale", "failed"]
@@ -37,6 +39,14 @@ class Result:
     report: CoverageReport
     pairs: PairTable | None
     """None where the conditions are too many to compare them."""
+    expected: Expectation | None = None
+    """None where nothing is expected of the table, or its file cannot be read, which is a problem of its own."""
+
+    @property
+    def headline(self) -> str:
+        """The share of what is expected, where anything is, and of all contexts."""
+        of_all = self.report.headline
+        return of_all if self.expected is None else f"{self.expected.headline} Of all contexts alike: {of_all}"
 
     @property
     def left_out(self) -> str:
@@ -51,9 +61,22 @@ def measured(table: Table, tell: Tell, should_stop: Stops) -> Result:
     """The coverage of a table and of its pairs of conditions, in the contexts that its assumptions leave."""
     report = coverage(table, max_gaps=MOST_GAPS, progress=lambda part, share: tell(part, share * PAIRS_AT), should_stop=should_stop)
     if left_out(len(table.flat().conditions)):
-        return Result(with_rows_of_file(report, table), None)
+        return Result(with_rows_of_file(report, table), None, _expected(table, should_stop))
     compared = pairs(table, progress=lambda part, share: tell(part, PAIRS_AT + share * (1.0 - PAIRS_AT)), should_stop=should_stop)
-    return Result(with_rows_of_file(report, table), compared)
+    return Result(with_rows_of_file(report, table), compared, _expected(table, should_stop))
+
+
+def _expected(table: Table, should_stop: Stops) -> Expectation | None:
+    try:
+        flat, path = table.flat(), expected_path(table)
+        if path is None:
+            return None
+        situations = read_situations(path, [column.condition for column in flat.conditions])
+        return expectation(flat, table.settings.expected or "", situations, progress=Progress(should_stop=should_stop))
+    except Cancelled:
+        raise
+    except ContextDBError:
+        return None
 
 
 def with_rows_of_file(report: CoverageReport, table: Table) -> CoverageReport:

@@ -96,6 +96,7 @@ measure: $(VENV)/.bench
 	$(PY) benchmarks/casting.py
 	$(PY) benchmarks/reload.py
 	$(PY) benchmarks/live_link.py
+	$(PY) benchmarks/network.py
 	$(PY) benchmarks/prepare.py
 	$(PY) benchmarks/clip_formats.py
 	$(PY) benchmarks/many_clips.py --clips 500 1000

@@ -45,7 +45,7 @@ COMMANDS = {
     "motion": "motion databases: bones, check, build, search, select, run, replay, describe, prepare",
     "desktop": "open tables with a double click",
     "demo": "a tour of the sample tables",
-    "play": "a small game whose characters obey tables, with the editor beside it",
+    "play": "a small game whose characters obey tables, and the editor of its tables",
 }
 
 
@@ -138,7 +138,7 @@ class Group:
         command.add_arguments(parser)
         limits = parser.add_argument_group("limits")
         limits.add_argument("--max-memory", type=_limit, metavar="MB", help="exit with 2 if it needs more memory (on Linux)")
-        limits.add_argument("--max-time", type=_limit, metavar="S", help="exit with 2 after so many seconds")
+        limits.add_argument("--max-time", type=_limit, metavar="S", help="exit with 2 after S seconds")
         project = parser.add_argument_group("project")
         about = "the folder up to which [project] extends may climb (default: the nearest with a .git)"
         project.add_argument("--root", metavar="FOLDER", help=about)

@@ -29,7 +29,6 @@ class Finding:
 
     @classmethod
     def of(cls, fault: Fault, level: Level = "error", table: str | None = None, asset: str | None = None) -> Finding:
-        """A fault as a finding."""
         place = fault.place
         return cls(fault.rule, level, fault.message, table, place.file, place.row, asset, place.line, place.column)
 

@@ -1,4 +1,4 @@
-"""Write docs/commands.md: the help of every command, out of the parsers that read their arguments.
+"""Write docs/commands.md: the help of every command, out of the parsers that read their arguments; what all share stands once.
 
 python docs/commands.py
 """
@@ -6,6 +6,7 @@ python docs/commands.py
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,32 +19,49 @@ from contextdb.cli import COMMANDS, Group
 PAGE = Path(__file__).parent / "commands.md"
 HEAD = """# Commands
 
-Every command with its help, as `contextdb COMMAND --help` prints it in a terminal of 100 columns.
-[Recipes](recipes.md) show the commands at work, [messages](messages.md) say what they may report, and [ci](ci.md#exit-codes) what
-their exit codes mean. `make docs` writes this page.
+Every command with its arguments and options, as `contextdb COMMAND --help` prints them. [Recipes](recipes.md) show the commands at
+work, [messages](messages.md) explain what they report, and [ci](ci.md#exit-codes) lists their exit codes. `make docs` writes this
+page. Each command also accepts:
+
+```text
+{common}
+```
 """
+HELP = re.compile(r"^  -h, --help .*\n?", re.M)
+COMMON = re.compile(r"\n\n(limits:\n.*?\n\nproject:\n.*?)(?=\n\n|\Z)", re.S)
+USAGE = re.compile(r"\Ausage: .*?(?=\n\n)", re.S)
+OPTION = re.compile(r"\[-[^]|]*\] ?")
+"""An optional argument of the usage that excludes no other one."""
 
 
 def page() -> str:
     """The page as it should be now."""
     with mock.patch.dict(os.environ, {"COLUMNS": "100", "NO_COLOR": "1"}):
-        return "\n".join([HEAD, *_helps(Group((), COMMANDS))])
+        helps = list(_helps(Group((), COMMANDS)))
+    common = next(part[1] for _, text in reversed(helps) if (part := COMMON.search(text)))
+    return "\n".join(
+        [HEAD.format(common=common), *(f"## contextdb {name}\n\n```text\n{_short(text)}\n```\n" for name, text in helps)]
+    )
 
 
-def _helps(group: Group) -> Iterator[str]:
+def _helps(group: Group) -> Iterator[tuple[str, str]]:
+    """The name of each command, and its help."""
     for name in group.commands:
         command = group.command(name)
         words = (*group.words, name)
         if hasattr(command, "COMMANDS"):
             inner = Group(words, command.COMMANDS, command.__doc__)
-            yield _help(words, inner.overview)
+            yield " ".join(words), inner.overview.strip()
             yield from _helps(inner)
         else:
-            yield _help(words, group.parser(name, command).format_help())
+            yield " ".join(words), group.parser(name, command).format_help().strip()
 
 
-def _help(words: tuple[str, ...], text: str) -> str:
-    return f"## contextdb {' '.join(words)}\n\n```text\n{text.strip()}\n```\n"
+def _short(text: str) -> str:
+    """A help without the options of every command, and with its own listed once."""
+    own = COMMON.sub("", HELP.sub("", text))
+    own = re.sub(r"\n\noptions:\n?(?=\n\n|\Z)", "", own).strip()
+    return USAGE.sub(lambda usage: " ".join(OPTION.sub("", f"{usage[0]} ").split()), own)
 
 
 if __name__ == "__main__":

@@ -76,12 +76,14 @@ WORDS = {"↑": "up", "↓": "down", "←": "left", "→": "right", "Enter": "en
 WORDS |= {"Del": "delete"} | {f"F{n}": f"f{n}" for n in range(1, 13)}
 SENT = """## What terminals send
 
-*xterm* is what tmux, screen and most terminals send, too, but for Home and End (`ESC [1~`, `ESC [4~`); *kitty* is kitty's keyboard
-protocol, which the editor turns on where it is understood; *Windows* is Windows Terminal. `^A` is a control character; letters,
-digits and signs are sent as they are. Where a terminal sends the same for two keys, the table says which one the editor reads. A
-terminal may keep keys for itself: kitty most with Ctrl+Shift, Windows Terminal those with words instead of signs, and, once its
-window is split, Alt and Alt+Shift with arrows.
+Keys that some terminal keeps for itself, or sends as another. *xterm* is also what tmux, screen and most terminals send; *kitty*
+is kitty's keyboard protocol, which the editor turns on where it is understood; *Windows* is Windows Terminal. `^A` is a control
+character. Kitty keeps most keys with Ctrl+Shift for itself, Windows Terminal, once its window is split, Alt and Alt+Shift with
+arrows.
 """
+SAME = {"Up", "Down", "Left", "Right", "Page up", "Page down", "First", "Last", "Cancel", "Close", "OK", "Choose"}
+"""What keys do wherever they do anything: said once, with the keys of every list and dialog."""
+EVERYWHERE = ("Every list", "Every dialog")
 
 
 def page() -> str:
@@ -164,12 +166,13 @@ def _of_widgets(title: str, rows: list[tuple[str, str]]) -> str:
     for keys, about in rows:
         shown = ", ".join(dict.fromkeys(terminals.name(key) for key in keys.split(",")))
         merged.setdefault(shown, []).append(about[:1].upper() + about[1:])
-    lines = [f"| {keys} | {'; '.join(dict.fromkeys(abouts))} |" for keys, abouts in merged.items()]
+    own = {keys: [about for about in abouts if title in EVERYWHERE or about not in SAME] for keys, abouts in merged.items()}
+    lines = [f"| {keys} | {'; '.join(dict.fromkeys(abouts))} |" for keys, abouts in own.items() if abouts]
     return "\n".join([f"### {title}", "", "| keys | does |", "| --- | --- |", *lines, ""])
 
 
 def _sent() -> str:
-    lines = [terminals.line(key) for key in all_keys() if not terminals.is_sign(key)]
+    lines = [terminals.line(key) for key in all_keys() if not terminals.is_read_everywhere(key)]
     return "\n".join([SENT, "| key | xterm | kitty | Windows |", "| --- | --- | --- | --- |", *lines, ""])
 
 

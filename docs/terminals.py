@@ -1,4 +1,6 @@
-"""What terminals send for a key, and as which key the editor reads it: the last table of docs/keys.md.
+"""What terminals send for a key, and as which key the editor reads it.
+
+The last table of docs/keys.md has the keys that not every terminal sends.
 
 `xterm` is what xterm sends, and with it tmux, screen, PuTTY and most others. `kitty` is kitty's keyboard protocol with the one
 flag that the editor asks for, as kitty, foot, Ghostty, iTerm2 and WezTerm send it. `windows` is Windows Terminal, or the console,
@@ -73,6 +75,12 @@ def read(sent: str, parser: type[KeyParser] = KeyParser) -> str:
     reader = parser(clock=lambda: 0.0)
     got = [*reader.feed(sent), *(reader._give_up() if reader._begun else ())]
     return next((event.key for event in got if isinstance(event, events.Key)), "")
+
+
+def is_read_everywhere(key: str) -> bool:
+    """Whether every terminal sends the key, and the editor reads it as what it is."""
+    sent = ((xterm(key), KeyParser), (kitty(key), KeyParser), (windows(key), WindowsKeyParser))
+    return key not in TAKEN and all((got := read(text, parser)) and name(got) == name(key) for text, parser in sent)
 
 
 def line(key: str) -> str:

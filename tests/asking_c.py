@@ -87,7 +87,7 @@ Facts = Mapping[str, object]
 def ask_program(folder: Path) -> Path:
     """The program that asks any artefact, built in a folder."""
     (folder / "tables.h").write_text(c_header_of({}), encoding="ascii")
-    return built(PROGRAMS / "ask.c", folder / "ask.exe", C, *sanitizers(compiler_for(C)), "-O1")
+    return built(PROGRAMS / "ask.c", folder / "ask.exe", C, *sanitizers(compiler_for(C)))
 
 
 def packed(*numbers: int) -> bytes:

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import shutil
 import subprocess
 import sys
+import tempfile
+from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
 
 import pytest
+from strategies import IS_FULL
 
 PROGRAMS = Path(__file__).parent / "c_programs"
 BUILT = Path(__file__).parent.parent / ".pytest_cache" / "c_programs"
 STRICT = ["-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Wconversion", "-Wsign-conversion", "-Wcast-qual", "-Werror"]
-SANITIZED = ["-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+SANITIZED = ["-O1" if IS_FULL else "-O0", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
 C = ["-xc", "-std=c99", *STRICT]
 CXX = ["-xc++", "-std=c++11", *STRICT]
 
@@ -50,36 +54,58 @@ def compiler_for(options: list[str]) -> str:
     return found
 
 
-@cache
-def sanitizers(compiler: str) -> tuple[str, ...]:
-    """The options for sanitizers, where a program that was compiled with them runs."""
-    import tempfile
+def variants(*levels: Sequence[str]) -> list[tuple[str, ...]]:
+    """All compilers with all of these options; every day each compiler with one of them."""
+    compilers = all_compilers()
+    if IS_FULL:
+        return [(*compiler, *level) for compiler in compilers for level in levels]
+    return [(*compiler, *levels[number % len(levels)]) for number, compiler in enumerate(compilers)]
 
+
+@cache
+def sanitizers(*compiler: str) -> tuple[str, ...]:
+    """The options for sanitizers, where a program that was compiled with them runs."""
     with tempfile.TemporaryDirectory() as folder:
         source, program = Path(folder, "empty.c"), Path(folder, "empty.exe")
         source.write_text("int main(void) { return 0; }\n", encoding="ascii")
-        done = subprocess.run([compiler, *SANITIZED, str(source), "-o", str(program)], capture_output=True)
+        done = subprocess.run([*compiler, *SANITIZED, str(source), "-o", str(program)], capture_output=True)
         runs = done.returncode == 0 and subprocess.run([str(program)], capture_output=True).returncode == 0
         return tuple(SANITIZED) if runs else ()
 
 
 def built(source: Path, program: Path, options: list[str], *more: str) -> Path:
-    """Compile one source, with the header beside the program; no warning is let pass.
+    """Compile one source, with the header beside the program, by the compiler for its language."""
+    return compiled([compiler_for(options), *options, *more], source, program, program.parent)
+
+
+def compiled(command: Sequence[str], source: Path, program: Path, headers: Path, *libraries: str) -> Path:
+    """Compile one source with the headers of a folder; no warning is let pass.
 
     A program is compiled once: it is kept for the other workers and the next runs, under a hash of all that it is made of.
     """
-    compiler = compiler_for(options)
-    command = [compiler, *options, *more]
-    kept = BUILT / _hash([*command, str(Path(compiler).stat().st_mtime_ns)], [source, *sorted(program.parent.glob("*.h"))])
-    if not kept.exists():
-        _compile([*command, f"-I{program.parent}", str(source), "-o", str(program)])
-        BUILT.mkdir(parents=True, exist_ok=True)
-        beside = kept.with_suffix(f".{os.getpid()}")
-        shutil.copy2(program, beside)
-        os.replace(beside, kept)
-    else:
-        shutil.copy2(kept, program)
+    compiler = shutil.which(command[0]) or command[0]
+    made_of = [*command, *libraries, str(Path(compiler).stat().st_mtime_ns)]
+    kept = BUILT / _hash(made_of, [source, *sorted(headers.glob("*.h"))])
+    with _alone(kept.with_suffix(".lock")):
+        if not kept.exists():
+            _compile([*command, f"-I{headers}", str(source), *libraries, "-o", str(program)])
+            beside = kept.with_suffix(f".{os.getpid()}")
+            shutil.copy2(program, beside)
+            os.replace(beside, kept)
+    shutil.copy2(kept, program)
     return program
+
+
+@contextlib.contextmanager
+def _alone(lock: Path) -> Iterator[None]:
+    """Wait while another worker compiles the same."""
+    BUILT.mkdir(parents=True, exist_ok=True)
+    with lock.open("w") as file:
+        if os.name != "nt":
+            import fcntl
+
+            fcntl.flock(file, fcntl.LOCK_EX)
+        yield
 
 
 def _compile(command: list[str]) -> None:

@@ -366,16 +366,13 @@ class RandomProject:
         return facts
 
     def can_happen(self, facts: Facts) -> bool:
-        """Whether the assumptions hold, and each computed fact of a column has a value in its domain."""
+        """Whether the assumptions hold or are open, an angle at half a turn being -180 or 180 throughout, and each computed fact of
+        a column has a value in its domain."""
         computed = [name for name in self.conditions if name in self.derived]
         known = all(facts[name] is not None and oracles.is_in_domain(facts[name], DOMAINS[name]) for name in computed)
-        return known and all(self._may_hold(term, facts) for term in self.assume)
-
-    def _may_hold(self, term: Term, facts: Facts) -> bool:
-        """Whether an assumption holds or is open; an angle at half a turn is -180 or 180 throughout."""
         turned = [name for name in self.named if DOMAINS[name].kind == "angle" and facts[name] == -180.0]
         ways = (dict.fromkeys(turned, half_turn) for half_turn in HALF_TURNS)
-        return any(term.value({**facts, **way}) is not False for way in ways)
+        return known and any(all(term.value({**facts, **way}) is not False for term in self.assume) for way in ways)
 
     @cached_property
     def valid(self) -> list[frozenset[int]]:

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import datetime
+import inspect
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache, lru_cache
-from typing import TypeVar
+from itertools import product
+from typing import Any, TypeVar
 
 import numpy as np
 import oracles
+import pytest
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 
@@ -50,6 +53,32 @@ IS_FULL = not settings.default.derandomize
 def some(states: Iterable[T], n: int = 2) -> list[T]:
     """Every n-th of the states, and all of them with EXAMPLES=full."""
     return list(states)[:: 1 if IS_FULL else n]
+
+
+in_full_runs = pytest.mark.skipif(not IS_FULL, reason="with EXAMPLES=full: it takes seconds")
+"""For a test that takes long, beside another one every day that would notice most faults of the same place."""
+
+
+def for_each(*cases: Iterable[Any]) -> Callable[[Callable[..., None]], Callable[[], None]]:
+    """One test of all cases, or of each with each of several lists: many that are short cost more as tests than what they check."""
+
+    def over_all(test: Callable[..., None]) -> Callable[[], None]:
+        n_arguments = len(inspect.signature(test).parameters)
+
+        def of_all() -> None:
+            for case in product(*cases):
+                is_spread = len(case) < n_arguments
+                arguments = [part for each in case for part in (each if is_spread and isinstance(each, tuple | list) else [each])]
+                try:
+                    test(*arguments)
+                except Exception as error:
+                    error.add_note(f"of {', '.join(map(repr, arguments))}")
+                    raise
+
+        of_all.__name__, of_all.__doc__ = test.__name__, test.__doc__
+        return of_all
+
+    return over_all
 
 
 def examples(times: float, *unchecked: HealthCheck) -> settings:

@@ -16,6 +16,7 @@ from types import ModuleType
 from typing import get_type_hints
 
 import pytest
+from strategies import for_each
 
 import contextdb as cdb
 from contextdb import motion, telemetry
@@ -134,7 +135,7 @@ def test_the_signatures_on_the_page_are_those_of_the_code():
     assert with_signatures(PAGE) == PAGE, "run: python tests/test_api.py --update"
 
 
-@pytest.mark.parametrize("name", NAMES)
+@for_each(NAMES)
 def test_a_public_name_has_a_docstring_and_a_call_says_what_it_raises(name: str):
     value = value_of(name)
     if not (is_call(value) or isinstance(value, (type, property)) or hasattr(value, "func")):
@@ -175,12 +176,12 @@ def unsaid_names(name: str) -> list[str]:
     return sorted(each for each in own - said if not each.startswith("_"))
 
 
-@pytest.mark.parametrize("name", TYPES)
+@for_each(TYPES)
 def test_a_class_shows_the_names_of_the_page_and_no_others(name: str):
     assert unsaid_names(name) == []
 
 
-@pytest.mark.parametrize("name", OF_MOTION)
+@for_each(OF_MOTION)
 def test_what_else_a_class_of_motion_shows_has_a_docstring(name: str):
     for each in unsaid_names(name):
         value = value_of(f"{name}.{each}")
@@ -201,7 +202,7 @@ def test_a_compiled_table_holds_nothing_else_that_is_public_and_takes_nothing():
             setattr(compiled, name, "another")
 
 
-@pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda page: page.name)
+@for_each(sorted(DOCS.glob("*.md")))
 def test_the_pages_use_public_names_alone(page: Path):
     text = page.read_text(encoding="utf-8")
     found = re.findall(r"(?<![\w.])(?:cdb\.)?(motion\.|telemetry\.|cdb\.)([A-Za-z]\w*)\b", code_of(text))

@@ -20,6 +20,7 @@ import pytest
 import strategies
 from hypothesis import given
 from hypothesis import strategies as st
+from strategies import for_each
 
 from contextdb import bitmask
 from contextdb.cells.domains import Domain
@@ -244,8 +245,7 @@ def test_the_columns_of_these_tests_can_be_asked_with():
     assert [rows.tolist() for rows in TABLE.query_many(COLUMNS_GIVEN).lists()] == [[], [1], [0]]
 
 
-@pytest.mark.parametrize(
-    ("changes", "message"),
+@for_each(
     [
         ({"speed": [1.0, 2.0]}, "the columns are not equally long"),
         (
@@ -277,8 +277,7 @@ def test_the_columns_of_these_tests_can_be_asked_with():
             'row 2, column "steps": float "2.5" is not a fact of type int. Accepted: a whole number. Did you mean 2?',
         ),
         ({"steps": np.array([1.0, 2.0, 2.5])}, 'row 3, column "steps": float "2.5" is not a fact of type int.'),
-    ],
-    ids=str,
+    ]
 )
 def test_contexts_that_cannot_be_asked_with_are_refused_with_the_first_one(changes, message):
     assert message in said_of(changes)
@@ -411,7 +410,7 @@ SERIES: dict[str, tuple[dict[str, object], list[object], list[pl.DataType]]] = {
 }
 
 
-@pytest.mark.parametrize(("name", "at"), [(name, at) for name, (_, _, dtypes) in SERIES.items() for at in range(len(dtypes))])
+@for_each([(name, at) for name, (_, _, dtypes) in SERIES.items() for at in range(len(dtypes))])
 def test_series_in_parts_and_cut_out_of_others_are_read_as_lists_are(name: str, at: int):
     schema, values, dtypes = SERIES[name]
     cells = {

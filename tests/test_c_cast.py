@@ -30,7 +30,7 @@ UNKNOWN: tuple[cdb.Unknown, ...] = ("error", "any", "never")
 def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("cast")
     (folder / "tables.h").write_text(c_header_of({}), encoding="ascii")
-    return built(PROGRAMS / "cast.c", folder / "cast.exe", C, *sanitizers(compiler_for(C)), "-O1")
+    return built(PROGRAMS / "cast.c", folder / "cast.exe", C, *sanitizers(compiler_for(C)))
 
 
 def table(rng: random.Random, n: int) -> cdb.CompiledTable:

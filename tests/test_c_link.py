@@ -49,7 +49,7 @@ def game(tmp_path_factory: pytest.TempPathFactory, game_table: cdb.CompiledTable
     game_table.save(folder / "game.safetensors")
     (folder / "tables.h").write_text(c_header_of({"game": game_table}), encoding="ascii")
     (folder / "cdb_link.h").write_text(c_link_of({"game": game_table}, "tables.h"), encoding="ascii")
-    return built(PROGRAMS / "linked.c", folder / "linked.exe", C, *sanitizers(compiler_for(C)), "-O1")
+    return built(PROGRAMS / "linked.c", folder / "linked.exe", C, *sanitizers(compiler_for(C)))
 
 
 @contextmanager

@@ -12,6 +12,7 @@ import pytest
 import strategies
 from hypothesis import given
 from hypothesis import strategies as st
+from strategies import for_each
 
 from contextdb.cells.domains import ANGLE, BOOL, INT, NUMBER, TAGS, TEXT, Domain
 from contextdb.cells.grammar import format_cell, parse_cell
@@ -82,7 +83,7 @@ def test_no_example_stands_twice():
     assert sorted({key for key in keys if keys.count(key) > 1}) == []
 
 
-@pytest.mark.parametrize(("number", "line"), READABLE, ids=map(line_id, READABLE))
+@for_each(READABLE)
 def test_a_cell_means_what_its_example_says(number: int, line: Line):
     domain = domain_of(line)
     cell = parse_cell(line["cell"], domain)
@@ -91,7 +92,7 @@ def test_a_cell_means_what_its_example_says(number: int, line: Line):
     assert line["same as"] in ("", format_cell(cell, domain))
 
 
-@pytest.mark.parametrize(("number", "line"), REFUSED, ids=map(line_id, REFUSED))
+@for_each(REFUSED)
 def test_a_cell_is_refused_as_its_example_says(number: int, line: Line):
     with pytest.raises(CellError) as caught:
         parse_cell(line["cell"], domain_of(line))
@@ -213,8 +214,7 @@ MANY_VALUES = Domain("enum", tuple(f"value{i}" for i in range(1000)))
 MANY_TAGS = Domain("tags", tuple(f"Tag.{i}" for i in range(1000)))
 
 
-@pytest.mark.parametrize("domain", [BOOL, INT, NUMBER, ANGLE, TEXT, MANY_VALUES, MANY_TAGS], ids=lambda domain: domain.kind)
-@pytest.mark.parametrize("text", HOSTILE.values(), ids=HOSTILE.keys())
+@for_each(HOSTILE.values(), [BOOL, INT, NUMBER, ANGLE, TEXT, MANY_VALUES, MANY_TAGS])
 def test_a_hostile_text_is_read_or_refused_in_a_short_message(text: str, domain: Domain):
     found = read_or_refuse(text, domain)
     assert isinstance(found, Cell) or len(found.message) < 1000

@@ -10,6 +10,7 @@ import pytest
 import strategies
 from hypothesis import given
 from hypothesis import strategies as st
+from strategies import for_each
 
 from contextdb import bitmask
 from contextdb.cells.conditions import Condition
@@ -170,8 +171,7 @@ def test_a_set_of_tag_sets_reckons_with_tags_that_stand_under_others():
 # ---- rows
 
 
-@pytest.mark.parametrize("n_rows", [0, 1, 63, 64, 65, 130])
-@pytest.mark.parametrize("domain", [BOOL, NUMBER, ANGLE, DEPTH, TEXT, TAGS], ids=lambda domain: domain.kind)
+@for_each([BOOL, NUMBER, ANGLE, DEPTH, TEXT, TAGS], [0, 1, 63, 64, 65, 130])
 def test_rows_that_share_a_cell_share_its_bits_at_every_size(domain, n_rows):
     some = {"bool": ("True", True), "enum": ("CB", "CB"), "text": ("left", "left"), "tags": ("+InAir", frozenset(("InAir",)))}
     text, fact = some.get(domain.kind, ("5", 5.0))

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 from running import ROOT, Result, run, run_process
-from strategies import some
+from strategies import for_each, some
 from warm_start import python
 
 import contextdb
@@ -85,7 +85,7 @@ def test_a_folder_that_was_not_installed_has_a_version_too(monkeypatch: pytest.M
     assert [line.split()[0] for line in run("--version").lines] == ["contextdb", "python"]
 
 
-@pytest.mark.parametrize("command", cli.COMMANDS)
+@for_each(cli.COMMANDS)
 def test_each_command_has_a_help_with_its_arguments(command: str):
     result = run(command, "--help")
     assert (result.code, result.err) == (0, "")
@@ -102,7 +102,7 @@ def test_help_fits_the_terminal_but_for_examples(monkeypatch: pytest.MonkeyPatch
     assert [line for line in lines if len(line) > width and not EXAMPLE.match(line)] == []
 
 
-@pytest.mark.parametrize("command", cli.COMMANDS)
+@for_each(cli.COMMANDS)
 def test_the_examples_of_a_help_stand_on_lines_of_their_own(command: str):
     mentions = [line for line in run(command, "--help").lines if "contextdb " in line and not line.startswith("usage")]
     examples = [found[1] for line in mentions if (found := EXAMPLE.match(line))]

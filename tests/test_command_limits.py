@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from running import ROOT, run, run_process
+from strategies import for_each, some
 from telemetry.links import meeting
 
 import contextdb as cdb
@@ -93,7 +94,7 @@ def limited(name: str, *options: str) -> tuple[int, str, str]:
     return done.returncode, done.stdout, done.stderr
 
 
-@pytest.mark.parametrize("name", ["waits", "goes_on_and_on", "computes_without_python", "swallows", "writes"])
+@pytest.mark.parametrize("name", some(["writes", "waits", "goes_on_and_on", "computes_without_python", "swallows"]))
 def test_a_command_ends_when_its_time_is_over_and_leaves_nothing_half_written(name):
     code, out, err = limited(name, "--max-time", "0.5")
     assert (code, out, err) == (2, "", "contextdb: the command needs more time than the 0.5 s of --max-time.\n")
@@ -101,7 +102,7 @@ def test_a_command_ends_when_its_time_is_over_and_leaves_nothing_half_written(na
 
 
 @pytest.mark.skipif(not IS_LINUX, reason="supported on Linux")
-@pytest.mark.parametrize("name", ["grows", "asks_for_too_much", "aborts"])
+@pytest.mark.parametrize("name", some(["grows", "asks_for_too_much", "aborts"], 3))
 def test_a_command_ends_when_it_needs_more_memory(name):
     code, out, err = limited(name, "--max-memory", "300")
     assert (code, out, err) == (2, "", "contextdb: the command needs more memory than the 300 MB of --max-memory.\n")
@@ -140,7 +141,7 @@ def commands(group: Group) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("command", commands(Group((), COMMANDS)))
+@for_each(commands(Group((), COMMANDS)))
 def test_every_command_has_both_limits(command):
     helped = run(*command.split(), "--help").out
     assert "--max-memory MB" in helped

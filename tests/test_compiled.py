@@ -17,6 +17,7 @@ import pytest
 import strategies
 from hypothesis import given
 from hypothesis import strategies as st
+from strategies import for_each
 
 import contextdb as cdb
 from contextdb import bitmask
@@ -126,9 +127,7 @@ def test_a_number_beyond_2_to_the_53_is_found_where_it_is_the_only_condition(fac
     assert found(speed_table("Any", "0..5"), {"speed": fact}) == [0]
 
 
-@pytest.mark.parametrize("other", [{}, {"still": True}], ids=["alone", "among others"])
-@pytest.mark.parametrize(
-    ("text", "fact", "is_held"),
+@for_each(
     [
         ("0", np.float32(0.0), True),
         (">=16777217", np.float32(16777216.0), False),
@@ -144,7 +143,7 @@ def test_a_number_beyond_2_to_the_53_is_found_where_it_is_the_only_condition(fac
         ("0", -0.0, True),
         ("..5", "4.5..5", True),
     ],
-    ids=str,
+    [{}, {"still": True}],
 )
 def test_a_number_of_any_type_is_compared_as_the_double_it_is(text, fact, is_held, other):
     declared = {"speed": ({"type": "number"}, [text])}

@@ -24,7 +24,7 @@ from unittest import mock
 import numpy as np
 import pytest
 from asking_c import CELLS, SCHEMA, UNKNOWN, artefact, random_moment, random_nest, random_table
-from c_compilers import SANITIZED, STRICT, all_compilers, c_compiler, sanitizers
+from c_compilers import SANITIZED, STRICT, c_compiler, compiled, sanitizers, variants
 from damaged_files import header_bytes, mutated, with_header
 from safetensors.numpy import load
 from strategies import IS_FULL
@@ -35,7 +35,7 @@ from contextdb.cells.kinds import KINDS
 from contextdb.compiled.core_table import TYPES, UNUSUAL
 from contextdb.compiled.matches import Answering, Matches
 from contextdb.compiled.table import CompiledTable, data_of
-from contextdb.core import FLAT, VALUE, Answer, Shared
+from contextdb.core import FLAT, VALUE, Answer, Shared, _core
 from contextdb.core import Table as CoreTable
 from contextdb.errors import ArtefactError, ContextError
 from contextdb.files.tensors import digest_of
@@ -77,14 +77,9 @@ print(Questions(boxes, full).are_held(full, (1 << len(boxes)) - 1, 100_000), Que
 """
 
 
-def compiled_core(folder: Path, name: str, *options: str) -> Path:
+def compiled_core(folder: Path, name: str, *command: str) -> Path:
     """The extension, compiled with a compiler and options of its own."""
-    target = folder / f"{name}.so"
-    command = [*options, *OPTIONS, str(CORE / "_core.c"), "-o", str(target)]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    assert done.stderr == ""
-    return target
+    return compiled([*command, *OPTIONS], CORE / "_core.c", folder / f"{name}.so", CORE)
 
 
 def answers_of(extension: Path, seed: int, n_tables: int, **environment: str) -> str:
@@ -102,26 +97,23 @@ needs_stable_abi = pytest.mark.skipif(bool(sysconfig.get_config_var("Py_GIL_DISA
 @needs_unix
 @needs_stable_abi
 def test_all_compilers_give_the_same_bits_at_all_levels_without_a_warning(tmp_path: Path):
-    found = all_compilers()
-    if not found:
-        pytest.skip("no C compiler was found")
-    answers = set()
-    for number, compiler in enumerate(found):
-        for place, options in enumerate([("-O0",), ("-O3",), ("-O3", "-DCDBP_NARROW")]):
-            extension = compiled_core(tmp_path, f"core{number}_{place}", *compiler, *options, *STRICT)
-            answers.add(answers_of(extension, 5, 30 if IS_FULL else 9))
+    narrow = "-DCDBP_NARROW"
+    commands = variants(("-O0",), ("-O0", narrow), ("-O3",), ("-O3", narrow)) or pytest.skip("no C compiler was found")
+    extensions = [compiled_core(tmp_path, f"core{number}", *command, *STRICT) for number, command in enumerate(commands)]
+    answers = {answers_of(extension, 5, 30 if IS_FULL else 9) for extension in [*extensions, Path(_core.__file__)]}
     assert len(answers) == 1
     assert answers.pop().count("0x") > 100
 
 
 @needs_unix
 @needs_stable_abi
-def test_the_names_declared_by_hand_are_those_of_python(tmp_path: Path):
+def test_the_names_declared_by_hand_are_those_of_python():
     if not Path(sysconfig.get_paths()["include"], "Python.h").is_file() or c_compiler() is None:
         pytest.skip("Python.h or a C compiler is missing")
-    include = f"-I{sysconfig.get_paths()['include']}"
-    compiled_core(tmp_path, "limited", str(c_compiler()), "-DCDBP_HEADERS", "-DPy_LIMITED_API=0x030B0000", include)
-    compiled_core(tmp_path, "whole", str(c_compiler()), "-DCDBP_HEADERS", include)
+    command = [str(c_compiler()), "-std=c99", "-fsyntax-only", "-DCDBP_HEADERS", f"-I{sysconfig.get_paths()['include']}"]
+    for more in (["-DPy_LIMITED_API=0x030B0000"], []):
+        done = subprocess.run([*command, *more, str(CORE / "_core.c")], capture_output=True, text=True)
+        assert (done.returncode, done.stderr) == (0, "")
 
 
 @needs_unix
@@ -130,7 +122,7 @@ def test_sanitizers_find_nothing_in_what_random_contexts_do(tmp_path: Path):
     compiler = c_compiler()
     if compiler is None or not sanitizers(compiler):
         pytest.skip("no compiler with sanitizers was found")
-    extension = compiled_core(tmp_path, "sanitized", compiler, "-O1", *SANITIZED)
+    extension = compiled_core(tmp_path, "sanitized", compiler, *SANITIZED)
     library = subprocess.run([compiler, "-print-file-name=libasan.so"], capture_output=True, text=True).stdout.strip()
     environment = {"LD_PRELOAD": library, "ASAN_OPTIONS": "detect_leaks=0", "PYTHONMALLOC": "malloc"}
     assert answers_of(extension, 6, 120 if IS_FULL else 12, **environment).count("0x") > 100

@@ -23,7 +23,7 @@ DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 
 
 @pytest.mark.parametrize(
-    "document", [*sorted(TRANSCRIPTS.glob("*.md")), *some(DOCUMENTS)], ids=lambda p: p.relative_to(ROOT).as_posix()
+    "document", [*sorted(TRANSCRIPTS.glob("*.md")), *some(DOCUMENTS, 4)], ids=lambda p: p.relative_to(ROOT).as_posix()
 )
 def test_a_document_shows_what_its_commands_print(document: Path):
     lines = document.read_text(encoding="utf-8").splitlines()

@@ -9,7 +9,7 @@ import pytest
 from edit_strategies import edits_of, insert_column
 from hypothesis import given
 from hypothesis import strategies as st
-from strategies import examples, tables
+from strategies import examples, for_each, tables
 
 from contextdb.authoring.selectors import set_selector
 from contextdb.cells.conditions import Condition
@@ -326,8 +326,7 @@ def test_a_selector_takes_another_order_and_another_threshold():
         set_selector(table, "s", [("a", None), ("b", None)])
 
 
-@pytest.mark.parametrize(
-    "make",
+@for_each(
     [
         lambda t: edits.delete_columns(t, ["Asset Name"]),
         lambda t: edits.move_column(t, "speed", 0),
@@ -358,7 +357,7 @@ def test_a_selector_takes_another_order_and_another_threshold():
         lambda t: set_selector(t, "s", [("loco", None)]),
         lambda t: edits.insert_columns(t, 1, [edits.NewColumn("a"), edits.NewColumn("a")]).apply(t),
         lambda t: edits.insert_columns(t, 1, [edits.NewColumn("a", declared={"type": "enum"})]).apply(t),
-    ],
+    ]
 )
 def test_an_edit_that_does_not_fit_is_refused_with_what_is_accepted(make):
     with pytest.raises((TableError, SchemaError)) as refused:

@@ -12,6 +12,7 @@ import pytest
 import strategies
 from hypothesis import given
 from hypothesis import strategies as st
+from strategies import for_each
 
 from contextdb import bitmask
 from contextdb.cells.domains import Domain
@@ -163,8 +164,7 @@ def test_a_changed_number_cell_accepts_no_more_than_what_lies_between_the_old_on
 # ---- what to change, by example
 
 
-@pytest.mark.parametrize(
-    ("kind", "text", "fact", "mend"),
+@for_each(
     [
         ("number", "10..30", 5.0, "5..30"),
         ("number", "10..30", 31.5, "10..31.5"),
@@ -195,7 +195,7 @@ def test_a_changed_number_cell_accepts_no_more_than_what_lies_between_the_old_on
         ("tags", "-Move", ["Move.Run"], "Any"),
         ("tags", "+Move.Run -Move", ["Move.Run"], "+Move.Run"),
         ("tags", "not +InAir", ["InAir"], "Any"),
-    ],
+    ]
 )
 def test_the_suggested_cell_is_the_old_one_stretched_to_the_fact(kind: str, text: str, fact: object, mend: str):
     assert mend_of(kind, text, fact) == mend

@@ -13,6 +13,7 @@ import pytest
 import strategies
 from hypothesis import given
 from hypothesis import strategies as st
+from strategies import for_each
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import ANGLE, BOOL, INT, NUMBER, TAGS, TEXT, Domain
@@ -59,8 +60,7 @@ def test_false_may_be_a_nothing(value):
 FIVES = [5, 5.0, np.int16(5), np.float32(5), np.uint64(5), Fraction(5), "5", " =5 ", "5..5", cell("5..5")]
 
 
-@pytest.mark.parametrize("value", FIVES)
-@pytest.mark.parametrize("domain", [INT, NUMBER, ANGLE], ids=lambda domain: domain.kind)
+@for_each(FIVES, [INT, NUMBER, ANGLE])
 def test_a_number_may_be_of_any_number_type_or_a_text(value, domain):
     fact = read(value, domain)
     assert fact == 5.0 or (isinstance(fact, Cell) and fact == parse_cell("5", domain))
@@ -132,8 +132,7 @@ def test_a_tag_with_a_space_stands_in_quotes_in_a_text():
     assert read('"Half Way" InAir', TAGS) == frozenset(("Half Way", "InAir"))
 
 
-@pytest.mark.parametrize("value", [None, math.nan, np.float32("nan"), np.float64("nan")])
-@pytest.mark.parametrize("domain", [BOOL, INT, NUMBER, ANGLE, TEXT, DEPTH, STATE], ids=lambda domain: domain.kind)
+@for_each([None, math.nan, np.float32("nan"), np.float64("nan")], [BOOL, INT, NUMBER, ANGLE, TEXT, DEPTH, STATE])
 def test_nothing_and_nan_are_missing_facts_of_every_type(value, domain):
     assert read(value, domain) is None
 
@@ -177,8 +176,7 @@ def test_a_text_with_signs_is_a_set_of_tag_sets():
 # ---- what is refused, and in which words
 
 
-@pytest.mark.parametrize(
-    ("value", "domain", "message"),
+@for_each(
     [
         ("True", BOOL, 'column "x": str "True" is not a fact of type bool. Accepted: True or False. Did you mean True?'),
         ("off", BOOL, 'str "off" is not a fact of type bool. Accepted: True or False.'),
@@ -223,8 +221,7 @@ def test_a_text_with_signs_is_a_set_of_tag_sets():
         (cell("+Move.Run -Move"), STATE, "Accepted: a set that holds at least one value."),
         (cell("20; 5"), NUMBER, 'Did you mean "20, 5"?'),
         (cell("CB FX"), DEPTH, '"FX" is not a declared value.'),
-    ],
-    ids=short,
+    ]
 )
 def test_a_fact_that_cannot_be_taken_is_refused_by_name_with_what_is_accepted(value, domain, message):
     said = refused(value, domain)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import ast
 import subprocess
 import sys
-from functools import cache
 from graphlib import TopologicalSorter
-from pathlib import Path
 
+import pytest
 from running import ROOT
+
+grimp = pytest.importorskip("grimp")  # of import-linter
 
 HEAVY = {"numba", "textual", "tui", "rich", "scipy", "dask", "safetensors", "python_calamine", "xlsxwriter"}
 
@@ -45,46 +45,22 @@ def test_every_public_name_resolves_without_the_terminal_editor():
     assert not loaded & {"textual", "tui", "dask"}
 
 
-def module_of(path: Path) -> str:
-    """The dotted name of a module's file."""
-    parts = path.relative_to(ROOT).with_suffix("").parts
-    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
-
-
-@cache
-def tree_of(path: Path) -> ast.Module:
-    """What a module says."""
-    return ast.parse(path.read_text(encoding="utf-8"))
-
-
-def imports_of(path: Path, modules: set[str]) -> set[str]:
-    """The modules that a file imports, wherever in the file, for types too."""
-    found = set()
-    for node in ast.walk(tree_of(path)):
-        if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module is not None:
-            names = {f"{node.module}.{alias.name}" for alias in node.names}
-            found |= (names & modules) | ({node.module} if names - modules else set())
-    return (found & modules) - {module_of(path)}
-
-
-def test_no_module_imports_itself_by_way_of_others():
-    files = {module_of(path): path for package in ("contextdb", "tui") for path in (ROOT / package).rglob("*.py")}
-    assert len(files) > 400
-    TopologicalSorter({name: imports_of(path, set(files)) for name, path in files.items()}).prepare()  # raises CycleError
+@pytest.mark.parametrize(("package", "for_types"), [("contextdb", True), ("tui", False)])
+def test_no_module_imports_itself_by_way_of_others(package: str, for_types: bool):
+    graph = grimp.build_graph(package, cache_dir=None, exclude_type_checking_imports=not for_types)
+    assert len(graph.modules) > 100
+    TopologicalSorter(
+        {name: graph.find_modules_directly_imported_by(name) for name in graph.modules}
+    ).prepare()  # raises CycleError
 
 
 def test_of_our_own_what_is_imported_for_types_alone_is_loaded_late():
-    ours: dict[str, set[str]] = {}
-    for package in ("contextdb", "tui"):
-        for path in (ROOT / package).rglob("*.py"):
-            for block in ast.walk(tree_of(path)):
-                if isinstance(block, ast.If) and ast.unparse(block.test) == "TYPE_CHECKING":
-                    named = [node.module or "" for node in block.body if isinstance(node, ast.ImportFrom)]
-                    ours.setdefault(module_of(path), set()).update(n for n in named if n.startswith(("contextdb.", "tui")))
-    del ours["contextdb"]  # whose public names are loaded when they are first used
-    assert {name for names in ours.values() for name in names if not name.startswith(LATE)} == set()
+    every, loaded = (
+        grimp.build_graph("contextdb", "tui", cache_dir=None, exclude_type_checking_imports=is_less) for is_less in (False, True)
+    )
+    for name in every.modules - {"contextdb"}:  # whose public names are loaded when they are first used
+        for_types = every.find_modules_directly_imported_by(name) - loaded.find_modules_directly_imported_by(name)
+        assert [other for other in for_types if other.startswith("contextdb.") and not other.startswith(LATE)] == [], name
 
 
 def test_a_query_of_a_plain_table_loads_nothing_that_only_other_questions_need(tmp_path):

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-import pytest
+from strategies import for_each
 
 import contextdb
 from contextdb.cells.domains import Domain
@@ -89,7 +89,7 @@ def first_column(section: str) -> Iterator[str]:
         yield from (code.replace("\\|", "|") for code in re.findall(r"`([^`]+)`", row))
 
 
-@pytest.mark.parametrize("page", PAGES, ids=named)
+@for_each(PAGES)
 def test_every_link_inside_the_repository_leads_somewhere(page: Path):
     for target in links(page.read_text(encoding="utf-8")):
         path, _, anchor = target.partition("#")
@@ -134,7 +134,7 @@ def results_on_the_format_page() -> Iterator[tuple[str, object]]:
         yield from zip(sources, (ast.literal_eval(text) for text in row[1].split(", ")), strict=True)
 
 
-@pytest.mark.parametrize(("source", "result"), list(results_on_the_format_page()))
+@for_each(list(results_on_the_format_page()))
 def test_an_example_of_an_expression_gives_what_the_page_says(source: str, result: object):
     kinds = {bool: {"type": "bool"}, str: {"type": "enum", "values": ["fast", "slow"]}}
     schema = FACT_TYPES | {"result": {**kinds.get(type(result), {"type": "number"}), "expr": source}}

@@ -57,7 +57,7 @@ def test_every_command_is_here_that_works_without_a_running_game():
     assert {name.split()[0].strip(",") for name in LOADS} - {"--version"} == cli.COMMANDS.keys() - {"live", "play", "desktop"}
 
 
-@pytest.mark.parametrize("name", some(LOADS))
+@pytest.mark.parametrize("name", some(LOADS, 5))
 def test_a_command_loads_what_it_needs_and_no_more(name: str, folder: Path):
     script = EDITOR if name.startswith("edit") else f"from contextdb.cli import main\nmain({list(COMMANDS[name])!r})"
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "TERM": "xterm-256color"}

@@ -77,21 +77,21 @@ def test_a_state_is_one_flat_block_that_a_character_goes_on_from(game: Path):
     one = Character.of(cdb.Project.load(game), "player")
     for _ in range(40):
         one.update(1 / 30, (0.0, 1.2), {"gait": "Walk", "style": "normal"})
-    block = bytes(one.state)
+    block = one.state
     other = Character.of(cdb.Project.load(game), "player")
     other.restore(block)
-    assert bytes(other.state) == block
+    assert other.state == block
     for tick in range(60):
         stick, facts = ((0.0, 2.6), "Run") if tick % 40 < 20 else ((1.0, 0.0), "Walk")
         poses = [each.update(1 / 30, stick, {"gait": facts, "style": "normal"}).pose for each in (one, other)]
         np.testing.assert_array_equal(poses[0].rotations, poses[1].rotations)
-        assert bytes(one.state) == bytes(other.state)
+        assert one.state == other.state
 
 
 @pytest.mark.parametrize("block", [b"", b"\0" * 8, "longer", "elsewhere", "not a number"])
 def test_a_block_that_is_none_of_this_character_is_refused(game: Path, block):
     one = Character.of(cdb.Project.load(game), "player")
-    own = np.frombuffer(bytes(one.state)).copy()
+    own = np.frombuffer(one.state).copy()
     if block == "longer":
         block = bytes(8) + own.tobytes()
     elif block == "elsewhere":
@@ -100,7 +100,7 @@ def test_a_block_that_is_none_of_this_character_is_refused(game: Path, block):
     elif block == "not a number":
         own[13] = np.nan
         block = own.tobytes()
-    before = bytes(one.state)
+    before = one.state
     with pytest.raises(ContextError):
         one.restore(block)
-    assert bytes(one.state) == before
+    assert one.state == before

@@ -174,7 +174,7 @@ def test_the_table_of_captured_clips_checks_and_drives(tmp_path: Path, monkeypat
     monkeypatch.chdir(tmp_path)
     folder = tmp_path / "game" / "clips"
     folder.mkdir(parents=True)
-    clips = some(sorted(MOCAP.rglob("*.bvh"), reverse=True), 8)
+    clips = some(sorted(MOCAP.rglob("*.bvh"), reverse=True), 20)
     for clip in clips:
         shutil.copy(clip, folder / clip.name)
     described = describe("game/clips", "--out", "game/moves.csv")

@@ -291,6 +291,11 @@ def test_what_cannot_be_measured_is_refused_in_one_sentence(arguments: list[str]
     assert message in refused(*arguments)
 
 
+def test_a_report_goes_to_the_file_of_o_with_the_exit_code_of_what_is_printed(here: Path):
+    assert measured("session.parquet", "--format", "html", "-o", "measures.html", "--max-jumps=0", code=1).out == ""
+    assert (here / "measures.html").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+
+
 @pytest.mark.parametrize("text", ["-1", "many", "nan", "inf"])
 def test_a_bar_is_a_number_from_0_up(text: str):
     assert "is not a bar. Accepted: a number from 0 up." in measured("session.parquet", f"--max-skate={text}", code=2).err

@@ -296,7 +296,7 @@ def test_marks_are_quoted_where_they_must_be():
 def test_proposals_for_captured_clips_are_stable(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "clips").mkdir()
-    clips = some(sorted(MOCAP.rglob("*.bvh")), 4)
+    clips = some(sorted(MOCAP.rglob("*.bvh")), 12)
     for clip in clips:
         shutil.copy(clip, tmp_path / "clips" / clip.name)
     told = prepare("clips", "--write")

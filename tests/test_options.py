@@ -6,7 +6,7 @@ import argparse
 import re
 from collections.abc import Iterator
 
-import pytest
+from strategies import for_each
 
 from contextdb.cli import COMMANDS, Group
 
@@ -54,7 +54,7 @@ def wrong(action: argparse.Action, holds: object) -> str:
     return "" if said.replace(",", "") == str(holds) else f"the help says {said}, and {holds} holds"
 
 
-@pytest.mark.parametrize("command", PARSERS)
+@for_each(PARSERS)
 def test_what_holds_when_an_option_is_not_given_is_what_its_help_says(command: str):
     parser = PARSERS[command]
     needed = [a for a in actions(command) if a.required]
@@ -66,7 +66,7 @@ def test_what_holds_when_an_option_is_not_given_is_what_its_help_says(command: s
     assert {dest: text for dest, text in said.items() if text} == {}
 
 
-@pytest.mark.parametrize("command", PARSERS)
+@for_each(PARSERS)
 def test_no_two_options_disagree_about_what_holds_without_them(command: str):
     defaults: dict[str, set[str]] = {}
     for action in actions(command):

@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from running import run
-from strategies import examples
+from strategies import examples, for_each
 
 import contextdb as cdb
 from contextdb.commands.check_command import check_path
@@ -480,8 +480,7 @@ def test_settings_come_back_from_what_the_file_says_of_them(drawn):
     assert settings_with(TableSettings("t"), settings_to_dict(settings)) == settings
 
 
-@pytest.mark.parametrize(
-    ("said", "message"),
+@for_each(
     [
         ('outputs = { a = { type = "itn" } }', 'output "a" type = "itn": there is no such type.*Did you mean type = "int"'),
         ('outputs = { a = { type = "float" } }', 'Did you mean type = "number"'),
@@ -507,7 +506,7 @@ def test_settings_come_back_from_what_the_file_says_of_them(drawn):
         ('fallback = { asset = "i", outputs = { a = 1 } }\noutputs = ["a"]', "fallback a = 1: this is not a text"),
         ('fallback = { asset = "i", outputs = 3 }', "fallback outputs = 3: this is a number, not a table"),
         ("outputs = { ' a' = { type = 'int' } }", "a space is before or after it"),
-    ],
+    ]
 )
 def test_a_wrong_declaration_is_said_with_its_line(said: str, message: str):
     with pytest.raises(cdb.SchemaError, match=message) as error:

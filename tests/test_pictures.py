@@ -10,7 +10,7 @@ from xml.etree import ElementTree as ET
 
 import pytest
 from quick_apps import quick
-from strategies import IS_FULL, some
+from strategies import IS_FULL, for_each, some
 
 DOCS = Path(__file__).parent.parent / "docs"
 sys.path.insert(0, str(DOCS))
@@ -28,14 +28,14 @@ LOOKS = re.compile("-(large|light|without-colour).svg$")
 """One scene in another look: every day half of the scenes are drawn, each in one."""
 
 
-@pytest.mark.parametrize("name", some([name for name in NAMES if IS_FULL or not LOOKS.search(name)]))
+@pytest.mark.parametrize("name", some([name for name in NAMES if IS_FULL or not LOOKS.search(name)], 4))
 def test_a_picture_shows_what_is_shown_now(name: str):
     with quick(paints=True):
         now = pictures.draw(pictures.PICTURES[name])
     assert (pictures.FOLDER / name).read_text(encoding="utf-8") == now, "run: make docs"
 
 
-@pytest.mark.parametrize("name", NAMES)
+@for_each(NAMES)
 def test_a_picture_is_sound_and_loads_nothing(name: str):
     text = (pictures.FOLDER / name).read_text(encoding="utf-8")
     ET.fromstring(text)
@@ -43,7 +43,7 @@ def test_a_picture_is_sound_and_loads_nothing(name: str):
     assert not re.search(r"url\(|@import|@font-face|<script|<image|href", text)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@for_each(NAMES)
 def test_a_picture_holds_no_path_of_the_machine_it_was_drawn_on(name: str):
     text = (pictures.FOLDER / name).read_text(encoding="utf-8")
     assert not re.search(r"/(tmp|home|root|Users|var)\b|[A-Z]:\\", text)

@@ -29,7 +29,7 @@ from examples.playground.stick import REST, Stick, Sticks, read_sticks
 ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT / "docs"))
 png_files = importlib.import_module("png_files")
-SECONDS = 60.0 if IS_FULL else 10.0
+SECONDS = 60.0 if IS_FULL else 6.0
 BARS = {"jumps_per_s": 2.0, "skate_cm_s": 6.0, "path_rms_m": 0.1, "heading_rms_deg": 20.0, "accel_p99": 80.0}
 """What `motion measure` may say of walking, turning, running and strafing."""
 

@@ -12,7 +12,7 @@ from shutil import which
 
 import pytest
 from asking_c import SCHEMA, all_asked, artefact, random_moment, random_nest, random_table
-from c_compilers import PROGRAMS, all_compilers, ran
+from c_compilers import PROGRAMS, all_compilers, compiled, ran, variants
 from made_boxes import bytes_of, made
 from strategies import IS_FULL
 from test_c_rules import moments_of, ruled_table
@@ -43,7 +43,7 @@ def questions(tmp_path_factory: pytest.TempPathFactory) -> Path:
     first = next(iter(all_compilers()), None)
     if first is None:
         pytest.skip("no C compiler was found")
-    program = compiled(folder, "first", *first, "-O1")
+    program = program_of(folder, "first", *first, "-O1")
     rng = random.Random(8)
     for number in range(30 if IS_FULL else 6):
         table, moments = table_and_moments(rng, number)
@@ -67,7 +67,7 @@ def counts(tmp_path_factory: pytest.TempPathFactory) -> Path:
     first = next(iter(all_compilers()), None)
     if first is None:
         pytest.skip("no C compiler was found")
-    program = compiled(folder, "first", *first, "-O1", source="count.c")
+    program = program_of(folder, "first", *first, "-O1", source="count.c")
     for n_boxes, n_factors in [(6, 9), (40, 16), (150, 24), (400, 12)]:
         for seed in range(10 if IS_FULL else 2):
             within = folder / f"{n_boxes}_{seed}"
@@ -77,13 +77,8 @@ def counts(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def compiled(folder: Path, name: str, *command: str, source: str = "ask.c") -> Path:
-    program = folder / name
-    parts = folder / "header" if source == "ask.c" else CORE
-    line = [*command, *EXACT, f"-I{parts}", str(PROGRAMS / source), "-o", str(program)]
-    done = subprocess.run(line, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    return program
+def program_of(folder: Path, name: str, *command: str, source: str = "ask.c") -> Path:
+    return compiled([*command, *EXACT], PROGRAMS / source, folder / name, folder / "header" if source == "ask.c" else CORE)
 
 
 @pytest.mark.parametrize(("asked", "source"), [("questions", "ask.c"), ("counts", "count.c")])
@@ -91,13 +86,12 @@ def test_all_compilers_give_the_same_bits_with_and_without_wide_registers(asked:
     questions: Path = request.getfixturevalue(asked)
     wide = [("-O3", "-mavx2")] if platform.machine() in ("x86_64", "AMD64") and has_avx2() else []
     n_compared = 0
-    for number, compiler in enumerate(all_compilers()):
-        for place, options in enumerate([("-O0",), ("-O3",), *wide]):
-            program = compiled(questions, f"program{number}_{place}", *compiler, *options, source=source)
-            for within in folders_of(questions):
-                ran(program, within / "in", within / "other")
-                assert (within / "other").read_bytes() == (within / "out").read_bytes(), (compiler, options)
-                n_compared += 1
+    for number, command in enumerate(variants(("-O0",), ("-O3",), *wide)):
+        program = program_of(questions, f"program{number}", *command, source=source)
+        for within in folders_of(questions):
+            ran(program, within / "in", within / "other")
+            assert (within / "other").read_bytes() == (within / "out").read_bytes(), command
+            n_compared += 1
     assert n_compared > 10
 
 
@@ -108,7 +102,7 @@ def test_web_assembly_gives_the_same_bits(asked: str, source: str, request: pyte
     node = which("node")
     if not zig or node is None:
         pytest.skip("zig or node is missing")
-    program = compiled(questions, "program.wasm", *zig[0], "-target", "wasm32-wasi", "-Os", source=source)
+    program = program_of(questions, "program.wasm", *zig[0], "-target", "wasm32-wasi", "-Os", source=source)
     (questions / "run.mjs").write_text(RUN_WASM, encoding="ascii")
     for within in folders_of(questions):
         expected = (within / "out").read_bytes()

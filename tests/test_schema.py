@@ -10,6 +10,7 @@ import oracles
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from strategies import for_each
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
@@ -325,8 +326,7 @@ SECTIONS_SAID = (
 )
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
+@for_each(
     [
         (
             "[condition.x]\ntype = 'bool'",
@@ -413,8 +413,8 @@ SECTIONS_SAID = (
             'line 6: [contracts.c] when "p > 1", character 1: True or False is compared with a number. Accepted: two values of one '
             "type.",
         ),
-    ],
-)  # fmt: skip
+    ]
+)
 def test_a_wrong_section_is_said(text: str, message: str):
     assert fault(text) == f"contextdb.toml, {message}"
 

@@ -8,6 +8,7 @@ import re
 
 import numpy as np
 import pytest
+from strategies import for_each
 
 from contextdb.errors import ContextDBError, SchemaError
 from contextdb.files.settings import Section, Setting, settings_of
@@ -22,13 +23,8 @@ from docs.settings import DECLARED, PAGE, page
 
 ANY = ("outputs", "default")
 """What this accepts hangs on the type of the output."""
-EACH = [
-    pytest.param(key, each, id=f"{section} {key}")
-    for section, settings in DECLARED.items()
-    for key, each in settings.items()
-    if (section, key) != ANY
-]
-NUMBERS = [case for case in EACH if re.search(r" from \S+ to \S+", case.values[1].shape.accepted)]
+EACH = [(key, each) for section, settings in DECLARED.items() for key, each in settings.items() if (section, key) != ANY]
+NUMBERS = [case for case in EACH if re.search(r" from \S+ to \S+", case[1].shape.accepted)]
 CLASSES = (
     TableSettings,
     Channel,
@@ -49,7 +45,7 @@ REQUIRED = {
     TableSettings: {"name": "t"},
     Variation: {"within": 0.0},
 }
-OF_CLASSES = [pytest.param(one, key, id=f"{one.__name__} {key}") for one in CLASSES for key in settings_of(one)]
+OF_CLASSES = [(one, key) for one in CLASSES for key in settings_of(one)]
 
 
 class Odd:
@@ -79,16 +75,14 @@ def test_the_tables_of_the_formats_are_the_declarations():
     assert set(re.findall(r"<!-- settings: (\w+) -->", text)) == set(DECLARED)
 
 
-@pytest.mark.parametrize(("key", "each"), EACH)
-@pytest.mark.parametrize("value", [Odd(), math.nan, None], ids=["odd", "nan", "nothing"])
+@for_each(EACH, [Odd(), math.nan, None])
 def test_a_value_that_is_not_accepted_is_reported_with_its_place_its_key_and_what_is_accepted(key, each, value):
     (fault,) = faults_of(key, each, value)
     assert fault.startswith(f"contextdb.toml: [tables.jog] {key} = ")
     assert f"Accepted: {each.shape.accepted}" in fault
 
 
-@pytest.mark.parametrize(("section", "key"), OF_TABLES)
-@pytest.mark.parametrize("value", ["nan", "[[1]]"])
+@for_each(OF_TABLES, ["nan", "[[1]]"])
 def test_a_value_of_a_file_that_is_not_accepted_is_reported_with_its_line(section, key, value):
     header = "[project]" if section == "project" else f"[{section}.x]"
     values = ({"type": "'bool'"} if section == "conditions" else {}) | {key: value}
@@ -99,7 +93,7 @@ def test_a_value_of_a_file_that_is_not_accepted_is_reported_with_its_line(sectio
     assert f"Accepted: {SECTIONS[section][key].shape.accepted}" in str(error.value)
 
 
-@pytest.mark.parametrize(("key", "each"), EACH)
+@for_each(EACH)
 def test_a_misspelt_key_is_reported_with_the_one_that_was_meant(key, each):
     section = Section("[tables.jog]", {f"{key}x": 1}, {key: each}, [], "contextdb.toml")
     assert [str(fault) for fault in section.faults] == [
@@ -107,14 +101,14 @@ def test_a_misspelt_key_is_reported_with_the_one_that_was_meant(key, each):
     ]
 
 
-@pytest.mark.parametrize(("key", "each"), EACH)
+@for_each(EACH)
 def test_a_setting_is_missed_only_where_it_is_required(key, each):
     section = Section("[tables.jog]", {}, {key: each}, [])
     assert section.values({key: each}) == {}
     assert [fault.accepted for fault in section.faults] == [each.shape.accepted] * each.is_required
 
 
-@pytest.mark.parametrize(("key", "each"), NUMBERS)
+@for_each(NUMBERS)
 def test_a_number_is_accepted_from_one_named_bound_to_the_other_and_not_beyond(key, each):
     low, high = bounds_of(each)
     for value in (low, high):
@@ -124,7 +118,7 @@ def test_a_number_is_accepted_from_one_named_bound_to_the_other_and_not_beyond(k
         assert "this is out of range" in faults_of(key, each, value)[0] or "whole" in each.shape.accepted
 
 
-@pytest.mark.parametrize(("key", "each"), EACH)
+@for_each(EACH)
 def test_a_default_and_an_example_are_accepted(key, each):
     if each.default not in (None, (), {}) and not each.is_required:
         assert each.shape.wrong(each.default) is None
@@ -132,8 +126,7 @@ def test_a_default_and_an_example_are_accepted(key, each):
     assert example is None or each.shape.wrong(float(example[1])) is None
 
 
-@pytest.mark.parametrize(("made", "key"), OF_CLASSES)
-@pytest.mark.parametrize("value", [Odd(), math.nan], ids=["odd", "nan"])
+@for_each(OF_CLASSES, [Odd(), math.nan])
 def test_settings_made_in_python_are_checked_as_those_of_a_file(made, key, value):
     with pytest.raises(ContextDBError, match=re.escape(f"{key} = ")) as error:
         made(**REQUIRED.get(made, {}) | {key: value})
@@ -147,7 +140,7 @@ def test_help_lists_every_setting_with_its_default(made):
     assert all(f"    {key}\n        {each.summary}" in made.__doc__ for key, each in settings_of(made).items())
 
 
-@pytest.mark.parametrize(("made", "key"), OF_CLASSES)
+@for_each(OF_CLASSES)
 def test_no_value_of_a_setting_ends_in_another_error(made, key):
     for value in VALUES:
         with contextlib.suppress(ContextDBError):

@@ -17,6 +17,7 @@ from types import ModuleType
 from urllib.parse import unquote
 
 import pytest
+from strategies import for_each
 
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
@@ -86,7 +87,7 @@ def test_the_index_has_each_page_in_one_group():
     assert sorted(listed) == sorted(page.stem for page in DOCS.glob("*.md") if page.stem != "index")
 
 
-@pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda page: page.name)
+@for_each(sorted(DOCS.glob("*.md")))
 def test_a_page_begins_with_what_it_is_for(page: Path):
     title, blank, first = page.read_text(encoding="utf-8").splitlines()[:3]
     assert title.startswith("# ")

@@ -15,6 +15,7 @@ import strategies
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, rule
+from strategies import for_each
 
 import contextdb as cdb
 from contextdb import motion
@@ -421,8 +422,7 @@ def shown(thing: object) -> object:
     return [shown(one) for one in thing] if hasattr(thing, "__getitem__") else str(thing)
 
 
-@pytest.mark.parametrize("way", [again, copy.copy, copy.deepcopy], ids=["pickle", "copy", "deepcopy"])
-@pytest.mark.parametrize("make", THINGS.values(), ids=THINGS.keys())
+@for_each(THINGS.values(), [again, copy.copy, copy.deepcopy])
 def test_everything_that_is_data_is_pickled_and_copied_before_and_after_it_was_asked(make, way):
     thing = make()
     before = way(thing)

@@ -6,6 +6,7 @@ import csv
 from pathlib import Path
 
 import pytest
+from strategies import for_each
 
 from contextdb.cells.grammar import parse_cell
 from contextdb.cells.sets import Cell
@@ -132,7 +133,7 @@ def test_locomotion_has_one_row_for_each_made_clip():
     assert [row["Asset Name"] for row in rows_of("locomotion")] == list(made.RECIPES)
 
 
-@pytest.mark.parametrize("row", rows_of("locomotion"), ids=lambda row: row["Asset Name"])
+@for_each(rows_of("locomotion"))
 def test_a_row_holds_what_its_clip_shows(row: dict[str, str]):
     clip = made.make_clip(row["Asset Name"])
     shown = made.describe(clip.clip, clip.recipe)

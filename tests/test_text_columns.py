@@ -5,6 +5,7 @@ import polars as pl
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from strategies import for_each
 
 import contextdb as cdb
 from contextdb.compiled.batch import _plain
@@ -55,8 +56,7 @@ def test_plain_texts_are_read_without_a_python_text_for_each(form):
     assert codes[0].tolist() == [2, 1, 5, 5, 5]
 
 
-@pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize("kind", ["enum", "text"])
+@for_each(["enum", "text"], FORMS)
 def test_every_form_of_a_column_is_read_as_a_list_of_its_texts(kind, form):
     compiled = table_of(kind)
     texts = [*VALUES, *VALUES[::-1]] + (["", "lef", "leftmost", "x" * 100] if kind == "text" else [])

@@ -62,7 +62,7 @@ def played_by_python(folder: Path) -> str:
         speed = (x * x + z * z) ** 0.5
         facts = {"gait": "Idle" if not speed else "Walk" if speed < 2.1 else "Run", "style": "tired" if tick > 250 else "normal"}
         updated = one.update(DT if tick else 0.0, (x, z), facts)
-        digest.update(bytes(one.state) + updated.pose.rotations.tobytes())
+        digest.update(one.state + updated.pose.rotations.tobytes())
     return digest.hexdigest()
 
 

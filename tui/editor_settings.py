@@ -58,13 +58,8 @@ def settings_path() -> Path:
 
 
 def read_settings(path: Path, themes: Collection[str]) -> EditorSettings:
-    """The settings in a file; none where there is no file.
-
-    Raises
-    ------
-    SettingsError
-        With everything in the file that cannot be taken.
-    """
+    """The settings in a file; none where there is no file. Raises SettingsError with everything in the file that cannot be
+    taken."""
     if not path.is_file():
         return EditorSettings()
     try:

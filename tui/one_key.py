@@ -34,13 +34,8 @@ class OneKeyAtATime(App[None]):
         """Stops long work, while which keys wait."""
 
     def stay(self) -> int:
-        """Show the app until it is left; gives its exit code.
-
-        Raises
-        ------
-        ScreenCrash
-            An error escaped from a screen; the terminal is restored.
-        """
+        """Show the app until it is left; gives its exit code. Raises ScreenCrash where an error escaped from a screen; the terminal
+        is restored."""
         try:
             self.run()
         except (KeyboardInterrupt, SystemExit):

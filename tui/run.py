@@ -28,15 +28,8 @@ class BrowserError(ContextDBError):
 
 def edit(path: str | None, theme: str | None = None, reads_only: bool = False, follow: str = "") -> int:
     """Open a table or a folder of tables, and stay until the editor is left; gives the exit code. A game of the name `follow` is
-    followed as soon as it asks the first table.
-
-    Raises
-    ------
-    ContextDBError
-        There is no such table, it cannot be read, or the settings cannot be taken.
-    ScreenCrash
-        The editor ended by an error of its own.
-    """
+    followed as soon as it asks the first table. Raises ContextDBError where there is no such table, it cannot be read, or the
+    settings cannot be taken; ScreenCrash where the editor ended by an error of its own."""
     if reads_only:
         refuse_writing("the editor was started with --read-only.")
     workspace, settings = _opened(path, theme, reads_only)

@@ -51,12 +51,12 @@ class SavedLooks:
 
     def key(self, looks: Looks, chunk: Sequence[ClipAt]) -> str:
         """What is asked about which clips as they are now."""
-        asked = [VERSION, PREPARING, looks.facts, list(looks.kinds)]
+        questions = [VERSION, PREPARING, looks.facts, list(looks.kinds)]
         clips = [
             [str(at.file), at.take, at.unit, at.up, at.is_by_feet, at.rig.digest if at.rig else "", *_stamp(at.file)]
             for at in chunk
         ]
-        return hashlib.blake2b(json.dumps([asked, clips]).encode(), digest_size=16).hexdigest()
+        return hashlib.blake2b(json.dumps([questions, clips]).encode(), digest_size=16).hexdigest()
 
     def get(self, key: str) -> list[Seen | LeftOut] | None:
         """What was seen of a chunk; None where that is not known."""
@@ -75,7 +75,6 @@ class SavedLooks:
             write_own(self.folder / f"{key}{SUFFIX}", json.dumps([_written(each) for each in seen]).encode(), syncs=False)
 
     def remove(self) -> None:
-        """Forget all of them."""
         with suppress(FileError, OSError):
             if not is_own_folder(self.folder.parent):
                 return

@@ -1,4 +1,4 @@
-"""Columns of facts as they are given, where they are plainly typed: read without a Python step for each fact."""
+"""Columns of facts as they are given: those of plain types without a Python step for each fact, others each distinct fact once."""
 
 from __future__ import annotations
 
@@ -9,7 +9,11 @@ from typing import TYPE_CHECKING, Any, TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 
+from contextdb.cells.conditions import Condition
+from contextdb.cells.facts import Fact, read_fact
 from contextdb.cells.kinds import Kind
+from contextdb.cells.sets import Cell
+from contextdb.errors import ContextError, Fault, Place
 
 if TYPE_CHECKING:
     import polars as pl
@@ -23,6 +27,8 @@ _PLAIN: dict[str, tuple[type, ...]] = {
     "Date": (datetime.date,),
 }
 """The types of which every value is a fact; of others polars takes some that a query refuses, such as an int for a date."""
+_SEVERAL = (list, set, tuple)
+"""What has no hash, or may hold what has none."""
 
 
 def is_series(given: object) -> TypeGuard[pl.Series]:
@@ -88,3 +94,44 @@ def plain_numbers(given: Any, kind: Kind) -> NDArray[np.float64] | None:
     if kind.is_whole and not physical.dtype.is_integer() and not (np.isnan(facts) | (facts == np.trunc(facts))).all():
         return None
     return None if kind.is_circular and np.isinf(facts).any() else facts
+
+
+def read_each(given: Any, condition: Condition) -> tuple[list[Any], NDArray[np.int64]]:
+    """The distinct facts in canonical form, each of them read once, and which of them each context has."""
+    known: dict[object, int] = {}
+    facts: list[Any] = []
+    numbers: list[int] = []
+    for row, value in enumerate(listed(given)):
+        try:
+            key = (type(value), _hashable(value))
+            number = known.get(key)
+            if number is None:
+                facts.append(_read_one(value, condition))
+                number = known[key] = len(known)
+        except (ContextError, TypeError) as error:
+            raise in_context(error, row, condition.name, value) from None
+        numbers.append(number)
+    return facts, np.array(numbers, np.int64)
+
+
+def _hashable(value: Any) -> object:
+    """A fact as a key; what cannot be one, and is no fact, raises TypeError when it is used."""
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        return value[()]
+    return tuple(value) if isinstance(value, _SEVERAL) else value
+
+
+def _read_one(value: object, condition: Condition) -> Fact:
+    fact = read_fact(value, condition)
+    if isinstance(fact, Cell):
+        mend = "to query these contexts one by one: query(facts)"
+        raise ContextError(Fault("a set of values is for one query at a time.", "one value in each context", mend))
+    return fact
+
+
+def in_context(error: Exception, row: int, name: str, value: object) -> ContextError:
+    """The error of a fact with its place: the context, and the condition."""
+    place = Place(row=row, column=name)
+    if isinstance(error, ContextError):
+        return ContextError(*(f.at(place) for f in error.faults))
+    return ContextError(Fault(f"{type(value).__name__} is not a fact.", "one value in each context", place=place))

@@ -71,9 +71,9 @@ def _moved_ends(accepts: NumberSet, domain: Domain, is_wide: bool) -> Iterator[M
         for end, inward, words in ((low, 1.0, "from"), (high, -1.0, "up to")):
             if not math.isfinite(end) or (domain.type.is_circular and end in domain.ends):
                 continue  # -180 and 180 are one angle, where a range goes on
-            shown, is_open = _written(end, inward)
-            name = f"{words} {domain.type.spelling.write(shown)}"
-            for moved in _moves(end, shown, inward, is_open, domain, width):
+            written, is_open = _written(end, inward)
+            name = f"{words} {domain.type.spelling.write(written)}"
+            for moved in _moves(end, written, inward, is_open, domain, width):
                 if lowest <= moved <= highest and moved != end:
                     yield from _with_span(accepts, at, (moved, high) if inward > 0 else (low, moved), name, domain)
 
@@ -94,17 +94,17 @@ def _written(end: float, inward: float) -> tuple[float, bool]:
     return (short if math.isclose(short, end, rel_tol=1e-12) else end), False
 
 
-def _moves(end: float, shown: float, inward: float, is_open: bool, domain: Domain, width: float) -> list[float]:
+def _moves(end: float, written: float, inward: float, is_open: bool, domain: Domain, width: float) -> list[float]:
     """Where an end goes: one step inwards, and one outwards."""
     if domain.type.is_whole:
         return [end + inward, end - inward]
-    digits = _digits(shown)
+    digits = _digits(written)
     step = max(10.0**-digits, width)
-    inside, outside = (round(shown + sign * step, digits + 3) for sign in (inward, -inward))
+    inside, outside = (round(written + sign * step, digits + 3) for sign in (inward, -inward))
     further = math.nextafter(inside, inward * math.inf)
     if width:
         return [further, outside]
-    return [further, shown] if is_open else [math.nextafter(end, inward * math.inf), outside]
+    return [further, written] if is_open else [math.nextafter(end, inward * math.inf), outside]
 
 
 def _digits(number: float) -> int:

@@ -61,11 +61,11 @@ class RowPlay:
     @classmethod
     def of(cls, numbers: Sequence[float]) -> Self | None:
         """That of a row of numbers; None where nothing is said."""
-        said = [None if value != value else value for value in numbers]
-        if all(value is None for value in said):
+        values = [None if value != value else value for value in numbers]
+        if all(value is None for value in values):
             return None
-        blend_s, start_s, min_rate, max_rate = said[:MIRROR]
-        mirror, loop, root, until = (None if value is None else int(value) for value in said[MIRROR:])
+        blend_s, start_s, min_rate, max_rate = values[:MIRROR]
+        mirror, loop, root, until = (None if value is None else int(value) for value in values[MIRROR:])
         return cls(
             blend_s,
             start_s,

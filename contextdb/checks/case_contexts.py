@@ -84,6 +84,11 @@ class _Search:
     is_whole: bool = True
 
     @cached_property
+    def _rows(self) -> NDArray[np.int64]:
+        """The row of each box of the space."""
+        return np.array(self.ready.space.rows, np.int64)
+
+    @cached_property
     def sampler(self) -> Sampler:
         return Sampler(self.ready.space, self.progress, self.ready.drawer)
 
@@ -117,17 +122,17 @@ class _Search:
 
     def _hits(self, codes: NDArray[np.int32]) -> Flags:
         valid = np.zeros((len(codes), self.slips.slipped.n_rows), np.bool_)
-        valid[:, list(self.ready.space.rows)] = self.sampler.held(codes)
+        valid[:, self._rows] = self.sampler.held(codes)
         return self.slips.hits(valid)
 
     def _new(self, hits: Flags) -> Iterator[tuple[int, int]]:
         """Of contexts with some targets, by number, those that reach something else than each known one; and what they reach."""
-        if not len(hits):
-            return
         packed = np.packbits(hits, axis=1, bitorder="little")
-        _, firsts = np.unique(packed, axis=0, return_index=True)
-        for i in sorted(firsts.tolist()):
-            targets = bits_of(hits[i])
+        firsts: dict[bytes, int] = {}
+        for i, row in enumerate(packed):
+            firsts.setdefault(row.tobytes(), i)
+        for raw, i in firsts.items():
+            targets = int.from_bytes(raw, "little")
             if targets and targets not in self.known:
                 yield i, targets
 

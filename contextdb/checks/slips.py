@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contextdb.bitmask import Flags
 from contextdb.cells.grammar import format_cell
@@ -91,26 +92,30 @@ class Slips:
         n = self.n_rows
         own = valid[:, :n]
         is_hidden = self._is_hidden(own)
-        rows = np.array([slip.row for slip in self.slips], np.int64)
-        is_noticed = (valid[:, n:] != own[:, rows]) & ~is_hidden[:, rows]
+        is_noticed = (valid[:, n:] != own[:, self._rows]) & ~is_hidden[:, self._rows]
         return np.concatenate([own, self.choosing.pickable_of(own), own & ~is_hidden, is_noticed], axis=1)
 
     def _is_hidden(self, own: Flags) -> Flags:
         """Whether another row of its asset is valid: bool [N, n]."""
-        counts = np.zeros((len(own), len(set(self.table.assets))), np.int32)
-        for row, asset in enumerate(self._asset_numbers):
-            counts[:, asset] += own[:, row]
-        return np.asarray(counts[:, self._asset_numbers] > own)
+        contexts, rows = np.nonzero(own)
+        n_assets = int(self._asset_numbers.max(initial=0)) + 1
+        counts = np.bincount(contexts * n_assets + self._asset_numbers[rows], minlength=len(own) * n_assets)
+        return np.asarray(counts.reshape(len(own), n_assets)[:, self._asset_numbers] > own)
 
     @cached_property
-    def _asset_numbers(self) -> list[int]:
+    def _rows(self) -> NDArray[np.int64]:
+        """The row of each slip."""
+        return np.array([slip.row for slip in self.slips], np.int64)
+
+    @cached_property
+    def _asset_numbers(self) -> NDArray[np.int64]:
         numbers: dict[str, int] = {}
-        return [numbers.setdefault(asset, len(numbers)) for asset in self.table.assets]
+        return np.array([numbers.setdefault(asset, len(numbers)) for asset in self.table.assets], np.int64)
 
     def rows_of_asset(self, row: int) -> list[int]:
         """The other rows of a row's asset."""
-        number = self._asset_numbers[row]
-        return [other for other, own in enumerate(self._asset_numbers) if own == number and other != row]
+        rows = np.flatnonzero(self._asset_numbers == self._asset_numbers[row]).tolist()
+        return [other for other in rows if other != row]
 
     def asset_of(self, target: int) -> str:
         return self.table.assets[self.row_of(target)]

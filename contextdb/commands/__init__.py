@@ -3,18 +3,37 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 
+from contextdb.console import output, wants_colour
+from contextdb.disk import write_atomic
 from contextdb.errors import ContextError, Fault, QueryError
 
 
 def add_format_arguments(parser: argparse.ArgumentParser, formats: Sequence[str]) -> None:
-    """The format of what is printed: --format, and --json for short."""
+    """The format of a report: --format, --json for short, and -o where it is not printed."""
     parser.add_argument("--format", choices=formats, default="text", metavar="FORMAT", help=f"{', '.join(formats)} (default: text)")
     same = "the same as --format json"
     parser.add_argument("--json", action="store_const", const="json", dest="format", default=argparse.SUPPRESS, help=same)
+    parser.add_argument("-o", "--output", metavar="FILE", help="write the report to a file")
+
+
+def is_coloured(arguments: argparse.Namespace) -> bool:
+    """Whether a report goes to a terminal that shows colours."""
+    return not arguments.output and wants_colour(sys.stdout)
+
+
+def deliver(text: str, arguments: argparse.Namespace) -> None:
+    """Write a report to the file of -o, or print it."""
+    if arguments.output:
+        write_atomic(Path(arguments.output), text.encode("utf-8", "backslashreplace"))
+    else:
+        with output():
+            print(text, end="")
 
 
 def add_page_arguments(parser: argparse.ArgumentParser, formats: Sequence[str]) -> None:

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
@@ -25,10 +24,10 @@ from contextdb.checks.cases import CaseBar, check_cases, read_cases
 from contextdb.checks.contracts import contract_findings, proofs_of, strayed
 from contextdb.checks.rows import check_rows, unused_conditions
 from contextdb.checks.run import check
-from contextdb.commands import add_format_arguments
+from contextdb.commands import add_format_arguments, deliver, is_coloured
 from contextdb.commands.numbers import percent, whole_type
 from contextdb.commands.progress import Bar, has_many_cells, log_of
-from contextdb.console import ExitCode, output, printable, progress, terminal_width, wants_colour
+from contextdb.console import ExitCode, printable, progress, terminal_width
 from contextdb.covering.contracts import Proof
 from contextdb.disk import CASES_SUFFIX, TABLE_SUFFIXES, path_in_quotes, read_bytes
 from contextdb.errors import ContextDBError, Fault, in_quotes, nearest
@@ -110,8 +109,7 @@ def _propose(arguments: argparse.Namespace) -> ExitCode:
         text = as_json({"format": 1, "proposed": [proof.to_json() | {"toml": proposal_toml(proof.contract)} for proof in proofs]})
     else:
         text = "\n".join(proposal_toml(proof.contract) for proof in proofs)
-    with output():
-        print(text or "# no contract holds that is likely meant\n", end="")
+    deliver(text or "# no contract holds that is likely meant\n", arguments)
     return ExitCode.OK
 
 
@@ -121,13 +119,12 @@ def printed(checked: CheckReport, arguments: argparse.Namespace) -> ExitCode:
     text = report.render(
         arguments.format,
         checked,
-        colour=wants_colour(sys.stdout),
+        colour=is_coloured(arguments),
         width=terminal_width(),
         shows_all=arguments.all,
         failing=failing,
     )
-    with output():
-        print(text, end="")
+    deliver(text, arguments)
     return ExitCode.FOUND if any(f.level in failing for f in checked.findings) else ExitCode.OK
 
 

@@ -17,13 +17,12 @@ from __future__ import annotations
 
 import argparse
 import os
-import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from contextdb.commands import add_format_arguments, coverage_telemetry
+from contextdb.commands import add_format_arguments, coverage_telemetry, deliver, is_coloured
 from contextdb.commands.gating import (
     Accepted,
     add_accepting_arguments,
@@ -35,13 +34,12 @@ from contextdb.commands.gating import (
 )
 from contextdb.commands.numbers import percent
 from contextdb.commands.progress import Bar, bar, has_many_cells
-from contextdb.console import ExitCode, output, printable, terminal_width, wants_colour
+from contextdb.console import ExitCode, printable, terminal_width
 from contextdb.covering.baseline import ACCEPTED, Baseline, CaseCounts, read_baseline
 from contextdb.covering.engine import MOST_GAPS, SAMPLES, WORK
 from contextdb.covering.expected import Expectation
 from contextdb.covering.pairs import PairTable
 from contextdb.covering.progress import Tell
-from contextdb.disk import write_atomic
 from contextdb.errors import ContextDBError, ContextError, Fault, FileError, Place, TableError, in_quotes, no_such, plural
 from contextdb.report import formats, render
 from contextdb.report.coverage_results import CoverageResults, Measured
@@ -58,7 +56,6 @@ from contextdb.tables.variants import WholeTable
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("path", metavar="PATH", help="a folder of tables, one table, or the name of a table")
     add_format_arguments(parser, formats("coverage"))
-    parser.add_argument("-o", "--output", metavar="FILE", help="write the report to a file")
     parser.add_argument("--fail-under", type=percent, metavar="PCT", help="fail if the covered percentage of any table is lower")
     parser.add_argument("--baseline", metavar="FILE", help="compare with the JSON of an earlier run")
     parser.add_argument("--max-drop", type=percent, metavar="PCT", help="how many points a table may fall below the baseline")
@@ -90,13 +87,9 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         counts_cases = baseline is not None or arguments.format == "json"
         results = measured_results(arguments, tables, baseline, Accepted.of(arguments), counts_cases)
         code = code_of(results)
-        colour = wants_colour(sys.stdout) and not arguments.output
+        colour = is_coloured(arguments)
         text = render(arguments.format, results, colour=colour, width=terminal_width(), shows_all=arguments.all)
-    if arguments.output:
-        write_atomic(Path(arguments.output), text.encode("utf-8", "backslashreplace"))
-    else:
-        with output():
-            print(text, end="")
+    deliver(text, arguments)
     return code
 
 

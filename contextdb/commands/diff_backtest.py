@@ -37,7 +37,6 @@ class Replayed:
         return document | ({"gates": [gate.to_json() for gate in self.gates]} if self.gates else {})
 
     def text(self, colour: bool, shows_all: bool) -> str:
-        """For a terminal."""
         return "\n" + "\n".join(section_lines(self._section, colour, terminal_width(), shows_all)) + "\n"
 
     @property
@@ -46,7 +45,6 @@ class Replayed:
 
     @property
     def _section(self) -> Section:
-        """The same for people."""
         result = self.result
         moments, parts = plural(result.moments, "recorded moment"), self._parts
         return Section(moments, parts, self._unread, tuple(self._blocks()), self.gates)

@@ -14,17 +14,14 @@ recorded motion are repeated with both.
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from contextdb.checks.effects import Effects
-from contextdb.commands import add_format_arguments
+from contextdb.commands import add_format_arguments, deliver, is_coloured
 from contextdb.commands.diff_views import as_markdown, as_text, effects_json, effects_markdown, effects_text
 from contextdb.commands.numbers import percent
-from contextdb.console import ExitCode, output, wants_colour
-from contextdb.disk import write_atomic
+from contextdb.console import ExitCode
 from contextdb.edits.diffing import Diff, diff
 from contextdb.errors import ContextDBError, ContextError, Fault
 from contextdb.report.render_json import as_json
@@ -46,7 +43,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("before", metavar="A", help="the table as it was: a .csv or .parquet file, or the name of a table")
     parser.add_argument("after", metavar="B", help="the table as it is")
     add_format_arguments(parser, FORMATS)
-    parser.add_argument("-o", "--output", metavar="FILE", help="write the differences to a file")
     parser.add_argument("--no-effects", action="store_false", dest="effects", help="leave out the effects of the change")
     group = parser.add_argument_group("recorded moments")
     group.add_argument("--telemetry", action="append", metavar="GLOB", help="files of recorded contexts; may be repeated")
@@ -75,11 +71,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
 
         replayed = replayed_moments(arguments, before, after, effect)
     text = _rendered(changes, effect, replayed, arguments, _sessions(arguments, before, after))
-    if arguments.output:
-        write_atomic(Path(arguments.output), text.encode("utf-8", "backslashreplace"))
-    else:
-        with output():
-            print(text, end="")
+    deliver(text, arguments)
     if replayed is not None and replayed.gates:
         return ExitCode.OK if all(gate.passed for gate in replayed.gates) else ExitCode.FOUND
     return ExitCode.FOUND if changes else ExitCode.OK
@@ -142,7 +134,7 @@ def _rendered(
         below = "" if replayed is None else replayed.markdown
         below += "".join(f"\n- {escaped(line)}" for line in lines) + "\n" if lines else ""
         return as_markdown(changes, arguments.all, effects_markdown(effect, arguments.all) + below)
-    colour = wants_colour(sys.stdout) and not arguments.output
+    colour = is_coloured(arguments)
     below = "" if replayed is None else replayed.text(colour, arguments.all)
     below += "\nsessions\n" + "".join(f"  {line}\n" for line in lines) if lines else ""
     return as_text(changes, colour, arguments.all) + effects_text(effect, colour, arguments.all) + below

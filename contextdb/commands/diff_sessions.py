@@ -64,7 +64,6 @@ class RepeatedSession:
 
     @property
     def lines(self) -> list[str]:
-        """The same for people."""
         n = sum(each.is_other_asset for each in self.others)
         more = f", {n:,} of them another asset" if self.others else ""
         head = f"{self.file}: {len(self.others):,} of {self.searches:,} searches would choose otherwise{more}"

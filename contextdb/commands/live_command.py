@@ -94,7 +94,6 @@ def _record(path: Path, hearing: Hearing, stack: ExitStack) -> FileListener:
 
 
 def _show(hearing: Hearing, changes: Changes, file: FileListener | None, most: int | None) -> None:
-    """Print lines as they come."""
     note(*changes.versions(hearing.header))
     n_lines, has_ended = 0, False
     for batch in hearing.batches():

@@ -64,9 +64,9 @@ def file_of(name: str, table: CompiledTable) -> TableFile:
         file = Path(scratch, "table.safetensors")
         table.save(file)
         octets = file.read_bytes()
-    asked = table.asked
-    own = {each: each[0] for each, of in FACTS.items() if each in asked and is_asked(each, of, asked[each])}
-    changed = {each.name: _mirror_text(name, each) for each in changed_in_mirror(asked.values()).values()}
+    conditions = table.asked
+    own = {each: each[0] for each, of in FACTS.items() if each in conditions and is_asked(each, of, conditions[each])}
+    changed = {each.name: _mirror_text(name, each) for each in changed_in_mirror(conditions.values()).values()}
     return TableFile(octets, table.leaves, own, changed)
 
 

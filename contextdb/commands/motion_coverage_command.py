@@ -15,12 +15,10 @@ clips any more, is not in the baseline, or has other conditions: --gone, --new a
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 
 from contextdb.authoring.motion_coverage import TableMotion, motion_coverage
-from contextdb.commands import add_format_arguments
+from contextdb.commands import add_format_arguments, deliver, is_coloured
 from contextdb.commands.gating import (
     Accepted,
     add_accepting_arguments,
@@ -32,9 +30,8 @@ from contextdb.commands.gating import (
 from contextdb.commands.motion_build_command import MotionProject
 from contextdb.commands.numbers import number_type, percent
 from contextdb.commands.progress import building_bar
-from contextdb.console import ExitCode, note, output, terminal_width, wants_colour
+from contextdb.console import ExitCode, note, terminal_width
 from contextdb.covering.declared import NOTHING, declared, differences
-from contextdb.disk import write_atomic
 from contextdb.errors import ContextError, Fault, in_quotes, mend_for, some
 from contextdb.motion.measuring.near_clips import NEAR_COST
 from contextdb.motion.measuring.transition_names import PATTERN
@@ -59,7 +56,6 @@ from contextdb.tables.project import Project
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("path", metavar="FOLDER", help="a folder of tables with motion databases")
     add_format_arguments(parser, formats("motion coverage"))
-    parser.add_argument("-o", "--output", metavar="FILE", help="write the report to a file")
     parser.add_argument("--fail-under", type=percent, metavar="PCT", help="fail if the covered percentage of any table is lower")
     parser.add_argument("--baseline", metavar="FILE", help="compare with the JSON of an earlier run; a lost movement fails")
     add_accepting_arguments(parser, ("gone", "new", "redefined"))
@@ -81,16 +77,12 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     require_baseline(arguments, bool(arguments.baseline))
     earlier = earlier_report(arguments.baseline, read_baseline, BASELINE) if arguments.baseline else None
     results = _results(arguments, earlier)
-    colour, width = wants_colour(sys.stdout) and not arguments.output, terminal_width()
+    colour, width = is_coloured(arguments), terminal_width()
     if arguments.context is not None:
         text = _context(results, arguments.context, colour, width)
     else:
         text = render(arguments.format, results, colour=colour, width=width, shows_all=arguments.all)
-    if arguments.output:
-        write_atomic(Path(arguments.output), text.encode("utf-8", "backslashreplace"))
-    else:
-        with output():
-            print(text, end="")
+    deliver(text, arguments)
     return ExitCode.OK if results.passed else ExitCode.FOUND
 
 
@@ -128,7 +120,6 @@ def _measured(
     accepted: Accepted,
     missing: Sequence[str],
 ) -> MotionMeasured:
-    """One table with its gates."""
     table = None if motion.coverage.table is None else tables[motion.coverage.table]
     space = NOTHING if table is None else declared(table, {})
     gates = [] if limit is None else [fail_under(motion, limit)]

@@ -10,25 +10,25 @@ cannot be judged, or the baseline is of other sessions.
   contextdb motion measure session.parquet --max-skate 8 --max-jumps 1.5
   contextdb motion measure session.parquet --json > before.json
   contextdb motion measure session.parquet --baseline before.json
+  contextdb motion measure session.parquet --format html -o measures.html
 """
 
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 from contextdb import report
-from contextdb.commands import add_format_arguments
+from contextdb.commands import add_format_arguments, deliver, is_coloured
 from contextdb.commands.gating import earlier_report
 from contextdb.commands.motion_build_command import MotionProject, warn
 from contextdb.commands.motion_replay_command import project_of
 from contextdb.commands.numbers import number_type
 from contextdb.compiled.table import CompiledTable
-from contextdb.console import ExitCode, output, terminal_width, wants_colour
+from contextdb.console import ExitCode, terminal_width
 from contextdb.errors import ContextDBError, ContextError, Fault, Place, in_quotes, plural
 from contextdb.motion import Measures, MotionDatabase, PoseBank, PoseSettings, measure, open_or_build, open_or_build_poses
 from contextdb.motion.storage.written_poses import NPZ
@@ -70,10 +70,9 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         fault = f"{plural(len(poses), 'file')} of poses for {plural(len(arguments.sessions), 'session')}."
         raise ContextError(Fault(fault, "--poses FILE once for each session, in their order"))
     results = _results(arguments, poses)
-    colour = wants_colour(sys.stdout)
+    colour = is_coloured(arguments)
     text = report.render(arguments.format, results, colour=colour, width=terminal_width(), shows_all=arguments.all)
-    with output():
-        print(text, end="")
+    deliver(text, arguments)
     return ExitCode.OK if results.passed else ExitCode.FOUND
 
 

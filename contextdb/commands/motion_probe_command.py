@@ -111,7 +111,6 @@ def run(arguments: argparse.Namespace) -> ExitCode:
 
 
 def _chosen(plan: Plan) -> Iterator[str]:
-    """What was chosen, in sentences."""
     for scene in plan.scenes:
         speeds = ", ".join(f"{speed:g}" for speed in scene.speeds_mps)
         yield f"drives {scene.name or 'without a context'} at {speeds} m/s"

@@ -184,7 +184,6 @@ def _played(replay: Replay) -> Played:
 
 
 def _parts(replay: Replay, other: Trace | None) -> Iterator[Part]:
-    """The answers about the whole session."""
     options, trace, width = replay.options, replay.trace, terminal_width()
     if options.stats:
         stats = trace.stats()

@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"its tables; a folder that does not exist yet gets a copy. Without it: those of a checkout, else {OWN_FOLDER}/ here",
     )
     parser.add_argument("--clips", metavar="FOLDER", help="BVH clips to play with; their table is made")
-    parser.add_argument("--crowd", type=int, metavar="N", help="so many others, coloured by the row that they play")
+    parser.add_argument("--crowd", type=int, metavar="N", help="this many others, coloured by the row that they play")
     parser.add_argument("--no-editor", action="store_true", help="open the game alone")
 
 

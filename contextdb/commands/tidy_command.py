@@ -10,12 +10,11 @@ Exits with 1 if there is something to tidy and --write is not given, with 0 if t
 from __future__ import annotations
 
 import argparse
-import sys
 
 from contextdb.checks.tidying import tidied
-from contextdb.commands import add_format_arguments
+from contextdb.commands import add_format_arguments, deliver, is_coloured
 from contextdb.commands.diff_views import as_markdown, as_text
-from contextdb.console import ExitCode, note, output, printable, wants_colour
+from contextdb.console import ExitCode, note, printable
 from contextdb.edits.diffing import diff
 from contextdb.errors import plural
 from contextdb.report.render_json import as_json
@@ -43,12 +42,11 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     elif arguments.format == "markdown":
         text = as_markdown(changes, arguments.all)
     else:
-        text = as_text(changes, wants_colour(sys.stdout), arguments.all)
+        text = as_text(changes, is_coloured(arguments), arguments.all)
         text += f"\n{plural(cells['before'], 'cell')} that say something become {cells['after']:,}, with the same answers.\n"
     if arguments.write and changes:
         after.save()
-    with output():
-        print(text, end="")
+    deliver(text, arguments)
     if changes and not arguments.write:
         note("--write writes it.")
     return ExitCode.FOUND if changes and not arguments.write else ExitCode.OK

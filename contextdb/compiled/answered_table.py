@@ -110,16 +110,16 @@ SaidRows = NDArray[np.bool_] | NDArray[np.integer] | Iterable[int] | Iterable[bo
 ACCEPTED = "one bool for each row, row numbers, assets, or an answer of this table"
 
 
-def bits_said(said: object, n_rows: int, of_assets: Callable[[Sequence[str]], int]) -> int:
+def bits_said(rows: object, n_rows: int, of_assets: Callable[[Sequence[str]], int]) -> int:
     """The rows that are said, as bits; `of_assets` gives those of assets. Raises WrongType or ContextError where they are said in
     none of these ways, or there are not as many flags as rows; NoSuchPlace where the table has no row of that number."""
-    if isinstance(said, np.ndarray):
-        if said.dtype == np.bool_:
-            return bits_of_flags(said, n_rows)
-        if said.ndim != 1:
-            raise ContextError(Fault(f"rows has shape {said.shape}.", ACCEPTED))
-        said = said.tolist()
-    items = [said] if isinstance(said, str) else list(require_many(said, "rows", ACCEPTED))
+    if isinstance(rows, np.ndarray):
+        if rows.dtype == np.bool_:
+            return bits_of_flags(rows, n_rows)
+        if rows.ndim != 1:
+            raise ContextError(Fault(f"rows has shape {rows.shape}.", ACCEPTED))
+        rows = rows.tolist()
+    items = [rows] if isinstance(rows, str) else list(require_many(rows, "rows", ACCEPTED))
     if items and all(isinstance(item, (bool, np.bool_)) for item in items):
         return bits_of_flags(np.array(items, np.bool_), n_rows)
     names = [item for item in items if isinstance(item, str)]

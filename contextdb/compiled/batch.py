@@ -19,11 +19,9 @@ from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.bitmask import Rows, Words, read_only
-from contextdb.cells.conditions import Condition
-from contextdb.cells.fact_columns import as_series, is_series, listed
-from contextdb.cells.facts import Fact, Unknown, check_mode, missing_error, misspelt, read_fact
+from contextdb.cells.fact_columns import as_series, is_series, listed, read_each
+from contextdb.cells.facts import Unknown, check_mode, missing_error, misspelt
 from contextdb.cells.mirroring import in_mirror
-from contextdb.cells.sets import Cell
 from contextdb.compiled.batch_columns import Contexts, common_length, facts_of, holds_sets, kept_columns, mirrored_columns
 from contextdb.compiled.batch_costs import CostsOfPairs, costs_of_pairs
 from contextdb.compiled.codes import Codes
@@ -31,7 +29,7 @@ from contextdb.compiled.data import CompiledData
 from contextdb.compiled.many import BLOCK, ManyMatches, one_by_one
 from contextdb.compiled.matches import Matches, with_mirrored, with_penalties, with_widened
 from contextdb.core import read_column
-from contextdb.errors import ContextError, Fault, Place
+from contextdb.errors import ContextError
 from contextdb.expressions.derived import missing_in_contexts
 from contextdb.expressions.rules import ManyRules
 
@@ -43,8 +41,6 @@ THREAD_CONTEXTS = 8192
 """Fewer contexts than this are not worth a second thread."""
 MANY_NUMBERS = 1024
 """From so many numbers on their classes are found by cells."""
-SEVERAL = (list, set, tuple)
-"""What has no hash, or may hold what has none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +74,7 @@ class BatchMatches(ManyMatches):
     """The codes, one slot after the other: int32 [P, N]."""
     rules: ManyRules | None = None
     """The rows' own rules, with their facts; None for a table without."""
-    kept: KeptFacts | None = None
+    retained: KeptFacts | None = None
     """The facts that soft cells cost with, and that are asked in a mirror; None for a table that needs them for neither."""
 
     @property
@@ -87,9 +83,10 @@ class BatchMatches(ManyMatches):
 
     @cached_property
     def _mirrored(self) -> ManyMatches:
-        assert self.kept is not None
+        facts, mirroring = self.retained, self.compiled.mirroring
+        assert facts is not None
         try:
-            return query_many(self.compiled, mirrored_columns(self.kept.columns, self.compiled.mirroring), self.kept.unknown)
+            return query_many(self.compiled, mirrored_columns(facts.columns, mirroring), facts.unknown)
         except ContextError as error:
             raise in_mirror(error) from None
 
@@ -115,22 +112,22 @@ class BatchMatches(ManyMatches):
         return self._matches(context, mask)
 
     def _matches(self, context: int, mask: Words) -> Matches:
-        matches, kept = self.compiled.matches(bitmask.to_int(mask)), self.kept
-        if kept is None:
+        matches, facts = self.compiled.matches(bitmask.to_int(mask)), self.retained
+        if facts is None:
             return matches
         if self.compiled.mirroring:
             with_mirrored(matches, lambda: self.mirrored[context])
         if self.compiled.widening:
-            with_widened(matches, lambda: self.compiled.query_widened(kept.of_context(context), kept.unknown))
+            with_widened(matches, lambda: self.compiled.query_widened(facts.of_context(context), facts.unknown))
         if self.compiled.is_soft:
-            with_penalties(matches, lambda: self.compiled.layered_penalties(kept.of_context(context), kept.unknown))
+            with_penalties(matches, lambda: self.compiled.layered_penalties(facts.of_context(context), facts.unknown))
         return matches
 
     def _costs_of_pairs(self) -> CostsOfPairs:
-        kept = self.kept
-        assert kept is not None, "a table with soft cells keeps its facts"
+        facts = self.retained
+        assert facts is not None, "a table with soft cells keeps its facts"
         return costs_of_pairs(
-            self.compiled, kept.columns, self.n_contexts, lambda table, given: query_many(table, given, kept.unknown).mask
+            self.compiled, facts.columns, self.n_contexts, lambda table, given: query_many(table, given, facts.unknown).mask
         )
 
     @cached_property
@@ -216,7 +213,7 @@ def query_encoded(compiled: CompiledData, contexts: Contexts, unknown: Unknown =
 def kept_facts(many: BatchMatches, given: Mapping[str, Any], unknown: Unknown) -> BatchMatches:
     """Answers with the facts that they need later on."""
     compiled = many.compiled
-    return many if not compiled.is_bound else replace(many, kept=KeptFacts(kept_columns(given, compiled.asked), unknown))
+    return many if not compiled.is_bound else replace(many, retained=KeptFacts(kept_columns(given, compiled.asked), unknown))
 
 
 def query_known(
@@ -260,7 +257,7 @@ def encode_column(compiled: CompiledData, at: int, given: Any, by_slot: Codes, i
     cells = compiled.number_cells[at] if n >= MANY_NUMBERS else None
     n_missing = read_column(compiled.core, at, _plain(given), start, is_ignored, cells, own) if len(slots) else None
     if n_missing is None:
-        facts, numbers = _read_each(given, compiled.conditions[at])
+        facts, numbers = read_each(given, compiled.conditions[at])
         codes = [absent[:, 0] if fact is None else np.add(start, masks.codes(fact)) for fact in facts]
         own[:] = np.array(codes, np.int32).reshape(len(codes), len(slots)).T[:, numbers]
         return np.flatnonzero(np.array([fact is None for fact in facts], np.bool_)[numbers])
@@ -288,43 +285,3 @@ def _missing(compiled: CompiledData, name: str, rows: Rows) -> ContextError:
     if derivation is not None and name in derivation.names:
         return derivation.no_values(name, rows)
     return missing_in_contexts(name, rows)
-
-
-def _read_each(given: Any, condition: Condition) -> tuple[list[Any], NDArray[np.int64]]:
-    """The distinct facts in canonical form, each of them read once, and which of them each context has."""
-    known: dict[object, int] = {}
-    facts: list[Any] = []
-    numbers: list[int] = []
-    for row, value in enumerate(listed(given)):
-        try:
-            key = (type(value), _hashable(value))
-            number = known.get(key)
-            if number is None:
-                facts.append(_read_one(value, condition))
-                number = known[key] = len(known)
-        except (ContextError, TypeError) as error:
-            raise _in_context(error, row, condition.name, value) from None
-        numbers.append(number)
-    return facts, np.array(numbers, np.int64)
-
-
-def _hashable(value: Any) -> object:
-    """A fact as a key; what cannot be one, and is no fact, raises TypeError when it is used."""
-    if isinstance(value, np.ndarray) and value.ndim == 0:
-        return value[()]
-    return tuple(value) if isinstance(value, SEVERAL) else value
-
-
-def _read_one(value: object, condition: Condition) -> Fact:
-    fact = read_fact(value, condition)
-    if isinstance(fact, Cell):
-        mend = "to query these contexts one by one: query(facts)"
-        raise ContextError(Fault("a set of values is for one query at a time.", "one value in each context", mend))
-    return fact
-
-
-def _in_context(error: Exception, row: int, name: str, value: object) -> ContextError:
-    place = Place(row=row, column=name)
-    if isinstance(error, ContextError):
-        return ContextError(*(f.at(place) for f in error.faults))
-    return ContextError(Fault(f"{type(value).__name__} is not a fact.", "one value in each context", place=place))

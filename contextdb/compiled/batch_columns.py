@@ -65,10 +65,10 @@ def holds_sets(given: Any, condition: Condition) -> bool:
 
 def kept_columns(columns: Mapping[str, Any], conditions: Mapping[str, Condition]) -> dict[str, Any]:
     """The columns of some conditions as they are now, whatever the caller writes into them later."""
-    return {name: _kept(given, conditions[name].domain.type.is_tags) for name, given in columns.items() if name in conditions}
+    return {name: _retained(given, conditions[name].domain.type.is_tags) for name, given in columns.items() if name in conditions}
 
 
-def _kept(given: Any, is_tags: bool) -> Any:
+def _retained(given: Any, is_tags: bool) -> Any:
     if isinstance(given, np.ndarray):
         return given.copy()
     if isinstance(given, (list, tuple)) and is_tags:  # of which each fact is a set

@@ -117,6 +117,25 @@ class Choosing:
         pickable = np.logical_and.reduce(weights > 0.0)
         return cls(compiled, taken, _groups(taken), ranks, weights, is_unique, is_cheapest, pickable, _limits(compiled, taken))
 
+    def table_at(self, row: int, depth: int) -> Ranked | None:
+        """The table that the way of a row passes at a depth; None below its end."""
+        ways = self.compiled.ways
+        return ways.table_at(row, depth) if ways is not None else self.compiled
+
+    def chances(self, rows: Rows) -> Floats:
+        """The chance of each of some rows, which ascend, where one of them is drawn depth by depth: float64 [count], 1 in sum."""
+        totals = np.ones(len(rows))
+        for groups, taken, weights in zip(self.groups, self.taken, self.weights, strict=True) if len(rows) else ():
+            is_next = (np.diff(groups[rows]) != 0) | (np.diff(taken[rows]) != 0)
+            firsts = np.append(0, np.flatnonzero(is_next) + 1)
+            starts = np.append(0, np.flatnonzero(np.diff(groups[rows[firsts]])) + 1)
+            sizes = np.diff(starts, append=len(firsts))
+            own = weights[rows[firsts]]
+            own = own / np.repeat(np.maximum.reduceat(own, starts), sizes)
+            own /= np.repeat(np.add.reduceat(own, starts), sizes)
+            totals *= np.repeat(own, np.diff(firsts, append=len(rows)))
+        return totals
+
     @property
     def remembers(self) -> bool:
         """Whether chance decides anywhere, so that assets that were picked lately are left out."""
@@ -209,7 +228,7 @@ class Choosing:
         """The error of rows that a policy refuses, as `Choices.pick` gives them: a context, a depth, and the rows of one table."""
         _, depth, *rows = refusal
         own = [rows[i] for i in np.unique(self.taken[depth, rows], return_index=True)[1].tolist()]
-        table = self.compiled if self.compiled.ways is None else self.compiled.ways.table_at(own[0], depth)
+        table = self.table_at(own[0], depth)
         assert table is not None
         return _not_unique(table, [self.compiled.way(row)[depth].asset for row in own])
 

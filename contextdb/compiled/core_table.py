@@ -71,8 +71,8 @@ def core_table(
     own = () if programs is None else _programs(programs)
     n_rows = len(answering.assets)
     if not all(map(_is_c_text, _texts((conditions, own)))):
-        asked = tuple(c.name for c in (*(c for c, _ in columns), *others) if c.name not in derived)
-        return Table(Matches, answering, UNUSUAL, n_rows, None, asked, None)
+        all_names = tuple(c.name for c in (*(c for c, _ in columns), *others) if c.name not in derived)
+        return Table(Matches, answering, UNUSUAL, n_rows, None, all_names, None)
     return Table(Matches, answering, UNUSUAL, n_rows, _array(enabled, np.uint64), conditions, own or None)
 
 

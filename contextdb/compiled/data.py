@@ -399,8 +399,8 @@ class CompiledData(Unchanging):
         made = self._made
         if make not in made:
             made[make] = make(self)
-        found: Made = made[make]
-        return found
+        known: Made = made[make]
+        return known
 
     @cached_property
     def _made(self) -> dict[Callable[[Self], Any], Any]:

@@ -59,8 +59,8 @@ class Fact:
     @property
     def about(self) -> str:
         condition = self.condition
-        told = (f"{condition.name}, {condition.domain.kind}", condition.unit or "", condition.description or "")
-        return safe_text(": ".join(part for part in (" ".join(filter(None, told[:2])), told[2]) if part), 110)
+        texts = (f"{condition.name}, {condition.domain.kind}", condition.unit or "", condition.description or "")
+        return safe_text(": ".join(part for part in (" ".join(filter(None, texts[:2])), texts[2]) if part), 110)
 
 
 @dataclass(frozen=True)

@@ -135,10 +135,10 @@ class Explanation:
         where no row has it."""
         require_text(asset, "asset")
         names = zip(self.compiled.assets, self.compiled.leaves, strict=True)
-        found = [self.row(r) for r, (path, leaf) in enumerate(names) if asset in (path, leaf)]
-        if not found:
+        rows = [self.row(r) for r, (path, leaf) in enumerate(names) if asset in (path, leaf)]
+        if not rows:
             raise self.compiled.answering.no_asset(asset)
-        return found
+        return rows
 
     def nearest(self, most: int = 5) -> list[RowExplanation]:
         """The nearest rows that are not valid: those with the fewest failing cells first, then the smallest distance.
@@ -282,19 +282,19 @@ def rule_failure(part: RulePart, fact: str) -> Failure:
     return Failure(part.column, part.text, fact, "Any", part.step)
 
 
-def cell_failures(compiled: CompiledData, at: int, row: int, fact: Fact, told: str) -> Iterator[Failure]:
+def cell_failures(compiled: CompiledData, at: int, row: int, fact: Fact, fact_text: str) -> Iterator[Failure]:
     """The cell of a row that does not accept a fact; where tables are in tables, each cell that does not."""
     condition = compiled.conditions[at]
     layers = None if compiled.ways is None else compiled.ways.layers[at]
     if compiled.ways is None or layers is None:
         text = compiled.texts[at][row]
-        yield Failure(condition.name, text, told, mended(text, fact, condition.domain))
+        yield Failure(condition.name, text, fact_text, mended(text, fact, condition.domain))
         return
     steps = compiled.ways.steps(row)
-    said = [(steps[depth], text) for depth, text in layers.said(row)]
-    failing = [(step, text) for step, text in said if not _lets_pass(text, fact, condition.domain)]
-    for step, text in failing or said[1:]:  # where each holds some value of a set-valued fact, all but one must hold the set
-        yield Failure(condition.name, text, told, mended(text, fact, condition.domain), step)
+    pairs = [(steps[depth], text) for depth, text in layers.said(row)]
+    failing = [(step, text) for step, text in pairs if not _lets_pass(text, fact, condition.domain)]
+    for step, text in failing or pairs[1:]:  # where each holds some value of a set-valued fact, all but one must hold the set
+        yield Failure(condition.name, text, fact_text, mended(text, fact, condition.domain), step)
 
 
 def _n_failing(layers: Layers, fact: Fact, domain: Domain) -> NDArray[np.int64]:

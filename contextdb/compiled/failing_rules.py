@@ -45,7 +45,7 @@ def _rule_parts(compiled: CompiledData, row: int) -> list[RulePart]:
     if ways is None or ways.rules is None:
         return [RulePart(when.name, when.texts[row], whole)]
     steps = ways.steps(row)
-    said = [(steps[depth], text) for depth, text in ways.rules.said(row) if not says_any(text)]
-    read = WhenColumn.read(TextColumn.of("", [text for _, text in said]), {c.name: c for c in whole.conditions})
-    rules = (read.rule(at) for at in range(len(said)))
-    return [RulePart(s.when or when.name, t, rule, s) for (s, t), rule in zip(said, rules, strict=True) if rule is not None]
+    pairs = [(steps[depth], text) for depth, text in ways.rules.said(row) if not says_any(text)]
+    read = WhenColumn.read(TextColumn.of("", [text for _, text in pairs]), {c.name: c for c in whole.conditions})
+    rules = (read.rule(at) for at in range(len(pairs)))
+    return [RulePart(s.when or when.name, t, rule, s) for (s, t), rule in zip(pairs, rules, strict=True) if rule is not None]

@@ -47,8 +47,8 @@ class Layers:
 
     def joined(self, name: str, join: Callable[[list[str]], str]) -> TextColumn:
         """One text for each row out of those that its way says, outermost first; texts of blanks alone are not said."""
-        found, which = self.combined
-        told = [join([t for c in codes if (t := self.texts[c]).strip()]) for codes in found.T.tolist()]
+        combinations, which = self.combined
+        texts = [join([t for c in codes if (t := self.texts[c]).strip()]) for codes in combinations.T.tolist()]
         known: dict[str, int] = {}
-        places = np.array([known.setdefault(text, len(known)) for text in told], np.int32)
+        places = np.array([known.setdefault(text, len(known)) for text in texts], np.int32)
         return TextColumn(name, tuple(known), places[which])

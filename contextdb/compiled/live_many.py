@@ -163,7 +163,7 @@ class LiveMany:
         flags = self._missing.get(name, np.zeros(self._n, np.bool_)) if at is not None else np.zeros(self._n, np.bool_)
         flags[slice(None) if at is None else at] = False
         flags[missing if at is None else at[missing]] = True
-        self._missing = {other: kept for other, kept in self._missing.items() if other != name} | (
+        self._missing = {other: own for other, own in self._missing.items() if other != name} | (
             {name: flags} if flags.any() else {}
         )
 

@@ -304,10 +304,10 @@ class FewerMatches(ManyMatches):
 
     def __iter__(self) -> Iterator[Matches]:
         bits = [bitmask.to_int(mask) for mask in self.others]
-        return (one._kept(bits[i if len(bits) > 1 else 0]) for i, one in enumerate(self.whole))
+        return (one._limited_to(bits[i if len(bits) > 1 else 0]) for i, one in enumerate(self.whole))
 
     def _answer(self, context: int) -> Matches:
-        return self.whole[context]._kept(bitmask.to_int(self.others[context if len(self.others) > 1 else 0]))
+        return self.whole[context]._limited_to(bitmask.to_int(self.others[context if len(self.others) > 1 else 0]))
 
     def _masks(self, start: int, stop: int) -> Words:
         return self.whole._masks(start, stop) & (self.others[start:stop] if len(self.others) > 1 else self.others)

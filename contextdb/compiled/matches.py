@@ -44,12 +44,12 @@ class Answering(AnsweredTable):
             return stages[0][1].answer(bits, always, stages, self)
         return Matches(bits, self) if always == bits else SetMatches(bits, self, always)
 
-    def bits_of(self, said: SaidRows | Matches) -> int:
+    def bits_of(self, rows: SaidRows | Matches) -> int:
         """Some rows as bits: those of an answer of this table, or as `Matches.only` takes them."""
-        if isinstance(said, Matches):
-            self.require_own(said)
-            return said.bits
-        return bits_said(said, len(self.assets), self.bits_of_assets)
+        if isinstance(rows, Matches):
+            self.require_own(rows)
+            return rows.bits
+        return bits_said(rows, len(self.assets), self.bits_of_assets)
 
     def __copy__(self) -> Answering:
         return self
@@ -267,17 +267,17 @@ class Matches(Framed, Answer):
         NoSuchPlace, WrongType
             A row that the table does not have; rows are said in another way.
         """
-        return self._kept(self._table.bits_of(rows))
+        return self._limited_to(self._table.bits_of(rows))
 
-    def _kept(self, bits: int) -> Self:
+    def _limited_to(self, bits: int) -> Self:
         """The same answer without the rows that are not among some, given as bits."""
-        found = copy(self)
-        found._keep(bits)
+        answer = copy(self)
+        answer._keep(bits)
         if self._table.is_mirroring:
-            found._mirrored = lambda: self.mirrored._kept(bits)
+            answer._mirrored = lambda: self.mirrored._limited_to(bits)
         if self.is_widening:
-            found._widened = lambda: self.widened._kept(bits)
-        return found
+            answer._widened = lambda: self.widened._limited_to(bits)
+        return answer
 
     def _keep(self, bits: int) -> None:
         self.bits &= bits
@@ -293,7 +293,7 @@ class Matches(Framed, Answer):
     __rand__ = __and__
 
     def __sub__(self, other: SaidRows | Matches) -> Matches:
-        return self._joined(other, minus) if isinstance(other, Matches) else self._kept(~self._table.bits_of(other))
+        return self._joined(other, minus) if isinstance(other, Matches) else self._limited_to(~self._table.bits_of(other))
 
     def __or__(self, other: Matches) -> Matches:
         return self._joined(other, or_)
@@ -403,9 +403,9 @@ def answering_of(answer: Matches) -> Answering:
     return answer._table
 
 
-def with_mirrored(answer: Matches, asked: dict[str, object] | Callable[[], Matches]) -> Matches:
+def with_mirrored(answer: Matches, source: dict[str, object] | Callable[[], Matches]) -> Matches:
     """The same answer, of a table with conditions whose facts change in a mirror: with its facts, kept, or with what asks."""
-    answer._mirrored = asked
+    answer._mirrored = source
     return answer
 
 

@@ -66,7 +66,6 @@ class Memory:
         return known[1] if known is not None and known[0]() is rng else None
 
     def remember(self, rng: Rng, asset: str) -> None:
-        """Keep what this generator picked."""
         key = id(rng)
         known = self._last.get(key)
         if known is not None and known[0]() is rng:

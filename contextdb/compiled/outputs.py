@@ -129,20 +129,20 @@ class Outputs(Unchanging, Mapping[str, Column]):
         return read_only(plays)
 
     @property
-    def said(self) -> tuple[object, ...]:
+    def parts(self) -> tuple[object, ...]:
         """All that the outputs say, for a digest."""
         kinds = [(o.name, o.kind, o.size, o.values) for o in self.declared]
         return (kinds, *self.cells) if kinds else ()
 
     def _values(self, name: str) -> Column:
         """All R + 1 values of an output."""
-        found = self._arrays.get(name) if isinstance(name, str) else None
-        if found is None:
+        column = self._arrays.get(name) if isinstance(name, str) else None
+        if column is None:
             at = self._place(name)
             cells = self.cells[at]
             values = np.array(cells.texts or ("",), object)[cells.codes] if isinstance(cells, TextColumn) else cells
-            found = self._arrays.setdefault(name, read_only(values))
-        return found
+            column = self._arrays.setdefault(name, read_only(values))
+        return column
 
     def _place(self, name: str) -> int:
         if require_text(name, "name") in self.names:
@@ -161,7 +161,7 @@ NO_OUTPUTS = Outputs()
 def outputs_of_cells(declared: Sequence[Output], cells: Sequence[OutputCells], fallback: Mapping[str, OutputValue]) -> Outputs:
     """Outputs from the values of each column's rows and from what the fallback gives."""
     pairs = zip(declared, cells, strict=True)
-    return Outputs(tuple(declared), tuple(_with_last(o, found, fallback.get(o.name, o.nothing)) for o, found in pairs))
+    return Outputs(tuple(declared), tuple(_with_last(o, column, fallback.get(o.name, o.nothing)) for o, column in pairs))
 
 
 def cells_of(output: Output, values: list[OutputValue], codes: NDArray[Any]) -> OutputCells:

@@ -151,12 +151,12 @@ def known_policy(name: Any) -> Policy:
 def ways_to_json(ways: Ways) -> list[dict[str, object]]:
     """What of each table is no array. Of its path only the file's name is kept: the folder is that of one machine."""
     files = [None if t.file is None else t.file.replace("\\", "/").rpartition("/")[2] for t in ways.tables]
-    told: list[dict[str, object]] = []
+    described: list[dict[str, object]] = []
     for table, file in zip(ways.tables, files, strict=True):
-        told.append({"name": table.name, "file": file, **policy_to_json(table.policy)})
+        described.append({"name": table.name, "file": file, **policy_to_json(table.policy)})
         if table.when is not None:
-            told[-1]["when"] = table.when
-    return told
+            described[-1]["when"] = table.when
+    return described
 
 
 def ways_from(about: list[dict[str, Any]], tensors: Tensors, n_conditions: int) -> Ways:

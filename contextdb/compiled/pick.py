@@ -27,7 +27,6 @@ from contextdb.compiled.choosing import Choosing, Ranked
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.matches import Matches, layered_penalties
 from contextdb.compiled.memory import Rng
-from contextdb.compiled.ways import Ways
 from contextdb.errors import ContextError, Fault, PolicyError
 from contextdb.schema.policies import POLICIES, rank_columns
 
@@ -85,58 +84,29 @@ def pick_row(compiled: CompiledData, matches: Matches, rng: Rng | int | None = N
         raise ContextError(Fault(f"last is of type {type(last).__name__}.", "the name of an asset, or None"))
     if not matches:
         return None
-    if compiled.ways is not None:
-        return _through_tables(compiled, compiled.ways, matches, source, last)
-    if POLICIES[compiled.policy].choose == "chance":
-        return _weighted(compiled, matches, source, last)
-    return int(compiled.once(Choosing.of).candidates(matches)[0])
-
-
-def _through_tables(compiled: CompiledData, ways: Ways, matches: Matches, source: Rng, last: str | None) -> int | None:
-    """The row that is picked where tables are in tables."""
-    possible = compiled.once(Choosing.of).candidates(matches)
-    if not len(possible):
-        return None
-    if not any(table.is_weighted for table in ways.tables):
-        return _drawn(ways, possible, 0, source)
-    memory = compiled.memory
+    choosing, memory = compiled.once(Choosing.of), compiled.memory
+    possible = choosing.candidates(matches)
+    if not choosing.remembers or not len(possible):
+        return int(possible[0]) if len(possible) else None
     with memory.lock:
         last = memory.last(source) if last is None else last
         fresh = possible[[compiled.assets[r] != last for r in possible.tolist()]]
-        row = _drawn(ways, fresh if len(fresh) else possible, 0, source)
+        row = _drawn(choosing, fresh if len(fresh) else possible, source)
         memory.remember(source, compiled.assets[row])
     return row
 
 
-def _drawn(ways: Ways, rows: Rows, depth: int, source: Rng) -> int:
+def _drawn(choosing: Choosing, rows: Rows, source: Rng) -> int:
     """One of the rows that may be picked: at each depth by the weights of that table's rows."""
-    table = ways.table_at(int(rows[0]), depth)
-    if table is None:
-        return int(rows[0])
-    parts = ways.parts(rows, depth)
-    if len(parts) == 1 and not table.is_weighted:
-        return _drawn(ways, parts[0], depth + 1, source)
-    weights = table.row_weights[[ways.rows[depth, part[0]] for part in parts]]
-    return _drawn(ways, parts[_by_weight(weights, source)], depth + 1, source)
-
-
-def _by_weight(weights: NDArray[np.float64], source: Rng) -> int:
-    """Which of some weights chance hits."""
-    sums = np.cumsum(weights / weights.max())
-    return min(int(np.searchsorted(sums, source.random() * sums[-1], "right")), len(weights) - 1)
-
-
-def _weighted(compiled: CompiledData, matches: Matches, source: Rng, last: str | None) -> int | None:
-    top = compiled.once(Choosing.of).candidates(matches).tolist()
-    if not top:
-        return None
-    memory = compiled.memory
-    with memory.lock:
-        last = memory.last(source) if last is None else last
-        candidates = [r for r in top if compiled.assets[r] != last] or top
-        row: int = candidates[_by_weight(compiled.row_weights[candidates], source)]
-        memory.remember(source, compiled.assets[row])
-    return row
+    for depth, (taken, weights) in enumerate(zip(choosing.taken, choosing.weights, strict=True)):
+        table = choosing.table_at(int(rows[0]), depth)
+        if table is None or POLICIES[table.policy].choose != "chance":
+            continue
+        first = rows[np.unique(taken[rows], return_index=True)[1]]
+        sums = np.cumsum(weights[first] / weights[first].max())
+        place = min(int(np.searchsorted(sums, source.random() * sums[-1], "right")), len(first) - 1)
+        rows = rows[taken[rows] == taken[first[place]]]
+    return int(rows[0])
 
 
 # ---- what a pick may give, and why not the others
@@ -151,7 +121,7 @@ class Outcome:
     def __init__(self, compiled: CompiledData, matches: Matches) -> None:
         """Raises ContextError where the answer is of another table, or of another version of it."""
         compiled.answering.require_own(matches)
-        self.compiled = compiled
+        self.compiled, self._choosing = compiled, compiled.once(Choosing.of)
         self._matches = matches
         self.rows = matches.indices
         self.refusal: PolicyError | None = None
@@ -159,31 +129,23 @@ class Outcome:
         self.candidates: Rows = self.rows[:0]
         """The rows that may be picked, ascending: int64 [count]."""
         try:
-            self.candidates = compiled.once(Choosing.of).candidates(matches)
+            self.candidates = self._choosing.candidates(matches)
         except PolicyError as error:
             self.refusal = error
 
     @cached_property
     def chances(self) -> dict[int, float]:
         """The chance of each of `candidates`, 0...1."""
-        if self.compiled.ways is not None:
-            numbers: dict[int, float] = {}
-            if len(self.candidates):
-                _share_out(self.compiled.ways, self.candidates, 0, 1.0, numbers)
-            return numbers
-        return dict(zip(self.candidates.tolist(), self._shares_of_candidates.tolist(), strict=True))
+        return dict(zip(self.candidates.tolist(), self._shares.tolist(), strict=True))
 
     @cached_property
-    def _shares_of_candidates(self) -> NDArray[np.float64]:
-        """The chance of each of `candidates` in their order, float64 [count]."""
-        if self.compiled.ways is not None:
-            return np.array([self.chances[row] for row in self.candidates.tolist()])
-        return np.ones(1) if len(self.candidates) == 1 else _shares(self.compiled.row_weights[self.candidates])
+    def _shares(self) -> NDArray[np.float64]:
+        return self._choosing.chances(self.candidates)
 
     @property
     def prefers_some(self) -> bool:
         """Whether the valid rows are not all picked alike."""
-        shares = self._shares_of_candidates
+        shares = self._shares
         return len(self.candidates) < len(self.rows) or bool(len(shares) and shares.min() < shares.max())
 
     def picks_one_of(self, rows: Iterable[int]) -> bool:
@@ -193,7 +155,7 @@ class Outcome:
     def chance(self, rows: Iterable[int]) -> float:
         """The chance that one of some rows is picked, 0...1; 0 for rows that are not valid."""
         places = [place for row in rows if (place := self._place(row)) is not None]
-        return min(sum(float(self._shares_of_candidates[place]) for place in places), 1.0)
+        return min(sum(float(self._shares[place]) for place in places), 1.0)
 
     def _place(self, row: int) -> int | None:
         """Where a row stands among the candidates."""
@@ -212,59 +174,30 @@ class Outcome:
         """Why a valid row is not picked."""
         if self.refusal is not None:
             return f"none is picked: {self.refusal.faults[0].found.rstrip('.')}"
-        if self.compiled.ways is not None:
-            return _why_not_through(self.compiled.ways, self.rows, self.candidates, row, self._costs)
-        compiled = self.compiled
-        if POLICIES[compiled.policy].choose == "chance" and not compiled.row_weights[row] > 0.0:
-            return "weight 0: never picked"
-        first = int(self.candidates[0])
-        costs = None if self._costs is None else self._costs[0]
-        why = preferred(compiled, first, row, first, costs)
-        return _outranked(compiled.assets[first], len(self.candidates), why)
+        choosing, steps = self._choosing, self.compiled.way(row)
+        if not choosing.pickable[row]:
+            lost = steps[int(np.argmin(choosing.weights[:, row] > 0.0))]
+            return f"weight 0{f' of {lost.asset}' if len(steps) > 1 else ''}: never picked"
+        rivals = self.candidates
+        for depth, taken in enumerate(choosing.taken[: len(steps)]):
+            if not (taken[rivals] == taken[row]).any():
+                return self._outranked(row, rivals, depth)
+            rivals = rivals[taken[rivals] == taken[row]]
+        raise AssertionError("the row can be picked")
+
+    def _outranked(self, row: int, rivals: Rows, depth: int) -> str:
+        """Who is preferred to a row where its way parts from theirs."""
+        first, taken = int(rivals[0]), self._choosing.taken[depth]
+        table, n_winners = self._choosing.table_at(row, depth), len(np.unique(taken[rivals]))
+        assert table is not None
+        why = preferred(table, int(taken[first]), int(taken[row]), first, None if self._costs is None else self._costs[depth])
+        more = f" and {n_winners - 1:,} more" if n_winners > 1 else ""
+        return f"outranked by {self.compiled.way(first)[depth].asset}{more} ({why})"
 
     @cached_property
     def _costs(self) -> Costs | None:
         wants_costs = any(POLICIES[policy].by_cost for policy in self.compiled.policies) and self._matches.has_penalties
         return layered_penalties(self._matches) if wants_costs else None
-
-
-def _share_out(ways: Ways, rows: Rows, depth: int, share: float, found: dict[int, float]) -> None:
-    """The chances of rows that may be picked, as `_drawn` draws them."""
-    table = ways.table_at(int(rows[0]), depth)
-    if table is None:
-        found[int(rows[0])] = share
-        return
-    parts = ways.parts(rows, depth)
-    shares = _shares(table.row_weights[[ways.rows[depth, part[0]] for part in parts]]) if len(parts) > 1 else np.ones(1)
-    for part, own in zip(parts, shares.tolist(), strict=True):
-        _share_out(ways, part, depth + 1, share * own, found)
-
-
-def _shares(weights: NDArray[np.float64]) -> NDArray[np.float64]:
-    shares = weights / weights.max() if len(weights) else weights
-    return np.asarray(shares / shares.sum())
-
-
-def _why_not_through(ways: Ways, valid: Rows, candidates: Rows, row: int, costs: Costs | None) -> str:
-    """Why a valid row is not picked where tables are in tables: who outranks it where the ways part."""
-    steps = ways.steps(row)
-    if not ways.pickable[row]:
-        tables = [ways.table_at(row, depth) for depth in range(len(steps))]
-        lost = next(d for d, t in enumerate(tables) if t and t.is_weighted and not t.row_weights[ways.rows[d, row]] > 0.0)
-        where = f" of {steps[lost].asset}" if len(steps) > 1 else ""
-        return f"weight 0{where}: never picked"
-    group = valid[ways.pickable[valid]]
-    for depth in range(len(steps)):
-        table = ways.table_at(row, depth)
-        assert table is not None
-        parts = ways.parts(group, depth)
-        best = [part for part in parts if np.isin(part, candidates).any()]
-        group = next(part for part in parts if row in part)
-        if not any(part[0] == group[0] for part in best):
-            first, taken = int(best[0][0]), ways.rows[depth]
-            why = preferred(table, int(taken[first]), int(taken[row]), first, None if costs is None else costs[depth])
-            return _outranked(ways.steps(first)[depth].asset, len(best), why)
-    raise AssertionError("the row can be picked")
 
 
 def percent(share: float) -> str:
@@ -280,8 +213,3 @@ def preferred(table: Ranked, winner: int, other: int, flat: int, costs: NDArray[
         if values[winner] != values[other]:
             return words
     return f"penalty {0.0 if costs is None else costs[flat]:g}" if POLICIES[table.policy].by_cost else words
-
-
-def _outranked(winner: str, n_winners: int, why: str) -> str:
-    more = f" and {n_winners - 1:,} more" if n_winners > 1 else ""
-    return f"outranked by {winner}{more} ({why})"

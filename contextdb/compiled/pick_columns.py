@@ -73,5 +73,5 @@ def specificities(
         counts[1.0] = counts[1.0] + has_rule
     weights = [Fraction(repr(weight)) for weight in counts]
     combinations, which = np.unique(np.array(list(counts.values())), axis=1, return_inverse=True)
-    sums = [float(sum(w * n for w, n in zip(weights, found, strict=True))) for found in combinations.T.tolist()]
+    sums = [float(sum(w * n for w, n in zip(weights, counted, strict=True))) for counted in combinations.T.tolist()]
     return np.array(sums, np.float64)[which.reshape(-1)]

@@ -87,8 +87,8 @@ class Pick:
 
     def __getstate__(self) -> dict[str, Any]:
         """What is pickled: what it tells, without the answer that it was picked from."""
-        told = {name: getattr(self, name) for name in ("row", "asset", "casting", "outputs", "why")}
-        return told | {"_left": None}
+        state = {name: getattr(self, name) for name in ("row", "asset", "casting", "outputs", "why")}
+        return state | {"_left": None}
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,10 +267,10 @@ class Picker:
     def _compiled_of(self, matches: Matches) -> CompiledData:
         table = answering_of(matches)
         self._require(table.name)
-        found = table.asked_of
-        if not isinstance(found, CompiledData):
+        compiled = table.asked_of
+        if not isinstance(compiled, CompiledData):
             raise ContextError(Fault("the answer comes out of a pickle, without its table.", "an answer of query or live here"))
-        return found
+        return compiled
 
     def _require(self, name: str) -> None:
         if name != self._table:

@@ -107,7 +107,7 @@ def _typed_dict(name: str, table: CompiledTable, lines: Sequence[str]) -> str:
 
 def _output_comment(output: Output) -> str:
     bounds = [format_number(bound) if math.isfinite(bound) else "" for bound in (output.minimum, output.maximum)]
-    return _said("..".join(bounds) if any(bounds) else "", output.unit, output.description)
+    return _comment_of("..".join(bounds) if any(bounds) else "", output.unit, output.description)
 
 
 def _type(condition: Condition, literal: str | None) -> str:
@@ -122,13 +122,13 @@ def _comment(condition: Condition) -> str:
     low, high = condition.domain.minimum, condition.domain.maximum
     bounds = f"{_end(low, condition.domain)}..{_end(high, condition.domain)}" if math.isfinite(low) or math.isfinite(high) else ""
     unit = condition.unit or condition.domain.type.unit
-    return _said(bounds, unit, condition.description)
+    return _comment_of(bounds, unit, condition.description)
 
 
-def _said(bounds: str, unit: str, description: str) -> str:
+def _comment_of(bounds: str, unit: str, description: str) -> str:
     parts = [" ".join(part for part in (bounds, unit) if part), description]
-    said = safe_text(": ".join(part for part in parts if part), 200)
-    return f"  # {said}" if said else ""
+    text = safe_text(": ".join(part for part in parts if part), 200)
+    return f"  # {text}" if text else ""
 
 
 def _end(bound: float, domain: Domain) -> str:

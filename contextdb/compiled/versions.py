@@ -15,9 +15,9 @@ def version_of(parts: Sequence[object]) -> str:
     """A digest of arrays, columns of texts and plain values, in hexadecimal; equal for parts that say the same."""
     digest = hashlib.blake2b(digest_size=16)
     for part in parts:
-        said = _said(part)
-        digest.update(len(said).to_bytes(8, "little"))
-        digest.update(said)
+        raw = _bytes_of(part)
+        digest.update(len(raw).to_bytes(8, "little"))
+        digest.update(raw)
     return digest.hexdigest()
 
 
@@ -33,15 +33,15 @@ def said_by(compiled: Any) -> tuple[object, ...]:
         (compiled.name, compiled.policy, compiled.fallback, assets, conditions, derived),
         *(compiled.enabled, compiled.priorities, compiled.row_weights, *compiled.texts, *(compiled.slots or ())),
         *((compiled.when.texts,) if compiled.when is not None else ()),
-        *compiled.outputs.said,
+        *compiled.outputs.parts,
         *(*ways, *(part for t in inner for part in ((t.name, t.policy), t.priorities, t.row_weights))),
-        *(said for picking in (compiled.picking, *(t.picking for t in inner)) for part in picking.arrays.items() for said in part),
+        *(raw for picking in (compiled.picking, *(t.picking for t in inner)) for part in picking.arrays.items() for raw in part),
     )
 
 
-def _said(part: object) -> bytes:
+def _bytes_of(part: object) -> bytes:
     if isinstance(part, np.ndarray):
         return part.tobytes()
     if isinstance(part, TextColumn):
-        return _said((part.name, part.to_list()))
+        return _bytes_of((part.name, part.to_list()))
     return repr(part).encode("utf-8", "surrogatepass")

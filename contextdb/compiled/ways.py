@@ -105,11 +105,6 @@ class Ways:
         assets = [*(MARK + self.tables[n].name for n, _ in pairs[1:]), self.leaves[row]]
         return tuple(self._step(n, r, asset) for (n, r), asset in zip(pairs, assets, strict=True))
 
-    def parts(self, rows: Rows, depth: int) -> list[Rows]:
-        """Rows whose ways are the same above a depth, grouped by the row that they take there, in the order of the file."""
-        taken = self.rows[depth, rows]
-        return np.split(rows, np.flatnonzero(np.diff(taken)) + 1) if len(rows) else []
-
     def table_at(self, row: int, depth: int) -> WayTable | None:
         """The table that a way passes at a depth; None below its end."""
         number = int(self.numbers[depth, row]) if depth < len(self.numbers) else -1

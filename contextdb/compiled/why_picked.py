@@ -51,16 +51,17 @@ def why(left: Left, row: int | None) -> str:
     if row is None:
         played = left.choosing.compiled.fallback is not None
         return f"{'fallback: ' if played else ''}{_none_left(left)}"
-    said = [*_preferences(left, row)]
+    phrases = [*_preferences(left, row)]
     n_left_out = len(left.may) - len(left.fresh)
     if len(left.fresh) > 1:
-        said.append(f"chance {percent(_chance(left, row))} of {len(left.fresh)}")
+        chance = float(left.choosing.chances(np.array(left.fresh, np.int64))[left.fresh.index(row)])
+        phrases.append(f"chance {percent(chance)} of {len(left.fresh)}")
     elif n_left_out:
-        said.append("picked least lately")
-    if not said:
+        phrases.append("picked least lately")
+    if not phrases:
         rest = " that does not rest" if len(left.awake) == 1 else " that can be picked"
-        said.append(f"only valid row{rest if len(left.matches) > 1 else ''}")
-    return ", ".join(said)
+        phrases.append(f"only valid row{rest if len(left.matches) > 1 else ''}")
+    return ", ".join(phrases)
 
 
 def _none_left(left: Left) -> str:
@@ -74,20 +75,20 @@ def _none_left(left: Left) -> str:
 
 def _preferences(left: Left, row: int) -> list[str]:
     """What the policy of each depth, where it had a choice, went by."""
-    choosing, compiled = left.choosing, left.choosing.compiled
+    choosing = left.choosing
     group = np.array([r for r in left.awake if choosing.pickable[r]], np.int64)
     may = np.array(left.may, np.int64)
-    said = []
+    phrases = []
     for depth, taken in enumerate(choosing.taken):
-        table = compiled if compiled.ways is None else compiled.ways.table_at(row, depth)
+        table = choosing.table_at(row, depth)
         if table is None:
             break
         rows, best = np.unique(taken[group]), np.unique(taken[may])
         if len(best) < len(rows):
             words = _preference(table, int(taken[row]), rows, left, row, depth)
-            said.append(words if depth == 0 else f"{words} of {table.name}")
+            phrases.append(words if depth == 0 else f"{words} of {table.name}")
         group, may = group[taken[group] == taken[row]], may[taken[may] == taken[row]]
-    return said
+    return phrases
 
 
 def _preference(table: Ranked, own: int, rows: np.ndarray[tuple[int], np.dtype[np.int64]], left: Left, row: int, depth: int) -> str:
@@ -99,15 +100,3 @@ def _preference(table: Ranked, own: int, rows: np.ndarray[tuple[int], np.dtype[n
     if POLICIES[table.policy].by_cost and len(rows) > 1 and left.matches.has_penalties:
         return f"least penalty {layered_penalties(left.matches)[depth, row]:g}"
     return words
-
-
-def _chance(left: Left, row: int) -> float:
-    """How likely the row was, among those that were left."""
-    chance, group = 1.0, np.array(left.fresh, np.int64)
-    for depth, taken in enumerate(left.choosing.taken):
-        first = group[np.unique(taken[group], return_index=True)[1]]
-        weights = left.choosing.weights[depth, first]
-        shares = weights / weights.max()
-        chance *= float(shares[taken[first] == taken[row]][0] / shares.sum())
-        group = group[taken[group] == taken[row]]
-    return chance

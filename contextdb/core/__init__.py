@@ -52,8 +52,8 @@ try:
         write_paths,
     )
 except ImportError as error:
-    found = "contextdb's core is not built for this Python"
-    raise ImportError(f"{found}: run `python build_core.py` in the checkout, or install contextdb again ({error})") from None
+    problem = "contextdb's core is not built for this Python"
+    raise ImportError(f"{problem}: run `python build_core.py` in the checkout, or install contextdb again ({error})") from None
 
 __all__ = [
     "FLAT",

@@ -6,7 +6,8 @@ things of which no two are in one set are left that it could only be as good as 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from heapq import heapify, heapreplace
 
 from contextdb import bitmask
 
@@ -47,15 +48,31 @@ def _not_within_others(sets: Sequence[int]) -> list[int]:
 def _largest_first(sets: dict[int, int], wanted: int) -> list[int]:
     """Always the set that holds most of what is left; then without those that the others make needless."""
     chosen: list[int] = []
+    queue = [(-one.bit_count(), i) for i, one in sets.items()]  # at least as many as each still holds: sets only become smaller
+    heapify(queue)
     while wanted:
-        i = max(sets, key=lambda i: ((sets[i] & wanted).bit_count(), -i))
+        _, i = queue[0]
+        now = (-(sets[i] & wanted).bit_count(), i)
+        if now > queue[0]:
+            heapreplace(queue, now)
+            continue
         chosen.append(i)
         wanted &= ~sets[i]
+    twice = _held_twice([sets[i] for i in chosen])
     for i in list(chosen):
-        rest = _union([sets[j] for j in chosen if j != i])
-        if sets[i] & ~rest == 0:
+        if not sets[i] & ~twice:
             chosen.remove(i)
+            twice = _held_twice([sets[j] for j in chosen])
     return chosen
+
+
+def _held_twice(sets: Iterable[int]) -> int:
+    """What more than one set holds."""
+    once = twice = 0
+    for one in sets:
+        twice |= once & one
+        once |= one
+    return twice
 
 
 class _Search:

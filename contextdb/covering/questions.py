@@ -52,11 +52,10 @@ class Questions:
 
     def _inside(self, box: Box) -> NDArray[np.float64]:
         """1 for each class that a box holds, else 0."""
-        inside, edges = np.ones(int(self._edges[-1])), self._edges
-        for f, side in enumerate(box):
-            if side != self.full[f]:
-                inside[edges[f] : edges[f + 1]] = bitmask.flags_of(side, self.full[f].bit_length())
-        return inside
+        bits = 0
+        for side, first in zip(box, self._edges.tolist(), strict=False):
+            bits |= side << first
+        return bitmask.flags_of(bits, int(self._edges[-1])).astype(np.float64)
 
     def holders(self, n: int, progress: Progress = SILENT) -> NDArray[np.int64]:
         """For each of the first n boxes the first of them that holds it whole and is not equal to it; -1: there is none."""

@@ -217,8 +217,6 @@ def finish(folder: Path) -> None:
 
 @dataclass(frozen=True)
 class _Entry:
-    """A file of a record."""
-
     target: Path
     new: Path
     old: Path | None

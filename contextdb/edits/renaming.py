@@ -30,11 +30,12 @@ from contextdb.errors import ContextDBError, Fault, FileError, Place, SchemaErro
 from contextdb.expressions.names import names_in, with_names
 from contextdb.files.texts import AnySource, read_texts, written_over
 from contextdb.schema import toml_edit
-from contextdb.schema.settings import TableSettings, plain_names
+from contextdb.schema.settings import Schema, TableSettings, plain_names
 from contextdb.tables.other_files import CASE_COLUMNS, cases_path
 from contextdb.tables.project import SCHEMA_FILE, read_folder_schema, schema_of, table_files
 from contextdb.tables.table import Table
 
+NO_NAMES: Mapping[str, str] = {}
 _BOM = b"\xef\xbb\xbf"
 
 
@@ -133,6 +134,46 @@ class TableFile:
         return next((c for c in self.columns if c.name == self.settings.when), None)
 
 
+@dataclass(frozen=True)
+class ProjectFiles:
+    """The project of a table as it is on the disk."""
+
+    folder: Path
+    raw: bytes
+    """Its contextdb.toml; empty where there is none."""
+    schema: Schema
+    tables: tuple[tuple[str, Path], ...]
+    own: str
+    """The name of the table."""
+
+    @classmethod
+    def of(cls, table: Table) -> ProjectFiles:
+        folder = folder_of(table)
+        assert table.path is not None
+        raw = read_bytes(folder / SCHEMA_FILE) if (folder / SCHEMA_FILE).is_file() else b""
+        schema = read_folder_schema(folder) if raw else table.schema
+        tables, here = tuple(table_files(folder, schema)), real_path(table.path)
+        own = next((name for name, path in tables if real_path(path) == here), table.name)
+        return cls(folder, raw, schema, tables, own)
+
+    def read(self, only_own: bool = False) -> list[TableFile]:
+        """The tables of the project, or the table alone."""
+        named = [(name, path) for name, path in self.tables if name == self.own or not only_own]
+        return [TableFile.read(name, path, self.schema.tables.get(name, TableSettings(name))) for name, path in named]
+
+    def rewritten_toml(self, change: Callable[[dict[str, Any]], None], moved: Mapping[str, str] = NO_NAMES) -> Iterator[Rewrite]:
+        """contextdb.toml with a change, where there is one; see the function of this name."""
+        if self.raw:
+            yield from rewritten_toml(self.folder / SCHEMA_FILE, self.raw, change, moved)
+
+    def with_conditions(self, names: Mapping[str, str], only_here: bool) -> Iterator[Rewrite]:
+        """contextdb.toml with other names of conditions, in all the project or in the table only."""
+        if only_here:
+            yield from self.rewritten_toml(lambda document: only_here_in(document, names, self.own))
+        else:
+            yield from self.rewritten_toml(lambda document: everywhere_in(document, names), names)
+
+
 def uses_of(table: Table, condition: str) -> Uses:
     """What else speaks of a condition than the column of a table. Of the table its unsaved edits count, of others the files."""
     schema, own = table.schema, table.settings
@@ -167,24 +208,13 @@ def renaming(table: Table, old: str, new: str, only_here: bool = False) -> Renam
     """What is to be written so that a condition of a table has another name, in all the project or in this table only. Raises
     TableError, SchemaError or FileError where the new name is taken or no name; a file cannot be read, or could not say what it
     should."""
-    folder, schema = folder_of(table), table.schema
-    assert table.path is not None
-    raw = read_bytes(folder / SCHEMA_FILE) if (folder / SCHEMA_FILE).is_file() else b""
-    on_disk = read_folder_schema(folder) if raw else schema
-    if not only_here and new in on_disk.conditions:
+    files = ProjectFiles.of(table)
+    if not only_here and new in files.schema.conditions:
         raise SchemaError(Fault(f"the condition {in_quotes(new)} is declared already.", "a name that nothing has yet"))
     if not only_here:
-        require_declared_here([("conditions", old)], on_disk, folder / SCHEMA_FILE)
-    files: list[Rewrite] = []
-    for name, path in table_files(folder, on_disk):
-        is_own = real_path(path) == real_path(table.path)
-        if is_own or not only_here:
-            files += _rewritten_with_actors(TableFile.read(name, path, on_disk.tables.get(name, TableSettings(name))), old, new)
-    own = next((n for n, p in table_files(folder, on_disk) if real_path(p) == real_path(table.path)), table.name)
-    if raw:
-        change = (lambda d: only_here_in(d, {old: new}, own)) if only_here else (lambda d: everywhere_in(d, {old: new}))
-        files += rewritten_toml(folder / SCHEMA_FILE, raw, change, {} if only_here else {old: new})
-    return Renaming(old, new, tuple(files))
+        require_declared_here([("conditions", old)], files.schema, files.folder / SCHEMA_FILE)
+    rewrites = [rewrite for file in files.read(only_here) for rewrite in rewritten_table(file, {old: new})]
+    return Renaming(old, new, (*rewrites, *files.with_conditions({old: new}, only_here)))
 
 
 def folder_of(table: Table) -> Path:
@@ -217,9 +247,13 @@ def _n_cases(table: Path, condition: str) -> int:
 
 
 def rewritten_table(
-    file: TableFile, names: Mapping[str, str], change: Callable[[TextColumn], TextColumn] = lambda column: column
+    file: TableFile,
+    names: Mapping[str, str],
+    roles: Mapping[str, str] = NO_NAMES,
+    change: Callable[[TextColumn], TextColumn] = lambda column: column,
 ) -> Iterator[Rewrite]:
-    """The table and its saved contexts, where they speak of conditions, under other names; `change` is of its other columns."""
+    """The table, its saved contexts, notes and actors, where they speak of conditions and roles, under other names; `change` is of
+    its other columns."""
     columns = [c.renamed(names[c.name]) if c.name in names and file.has_condition(c.name) else change(c) for c in file.columns]
     _require_free(file.path, columns)
     columns = [_with_rules(c, names) if file.rules is not None and c.name == file.rules.name else c for c in columns]
@@ -231,6 +265,7 @@ def rewritten_table(
         _require_free(cases, renamed)
         yield from rewritten(cases, source, texts, renamed)
     yield from rewritten_notes(file.path, "Column", names)
+    yield from rewritten_actors(file.path, names, roles)
 
 
 def rewritten_notes(table: Path, column: str, names: Mapping[str, str]) -> Iterator[Rewrite]:
@@ -248,30 +283,34 @@ def with_texts(column: TextColumn, texts: Mapping[str, str]) -> TextColumn:
     return TextColumn.of(column.name, [texts.get(text, text) for text in column.to_list()])
 
 
-def _rewritten_with_actors(file: TableFile, old: str, new: str) -> Iterator[Rewrite]:
-    yield from rewritten_table(file, {old: new})
-    yield from _rewritten_actors(actors_path(file.path), old, new)
-
-
 def actors_path(table: Path) -> Path:
     """The file of the actors for a table's roles."""
     return table.with_name(table.stem + ACTORS_SUFFIX)
 
 
-def _rewritten_actors(path: Path, old: str, new: str) -> Iterator[Rewrite]:
-    """The actors that are kept next to a table, where they have a fact of the role under its old name."""
-    (role, _, was), (new_role, _, now) = old.partition("."), new.partition(".")
-    if not (was and now and role == new_role and path.is_file()):
+def rewritten_actors(table: Path, names: Mapping[str, str], roles: Mapping[str, str]) -> Iterator[Rewrite]:
+    """The actors that are kept next to a table with other names of roles and of their facts, which actors have with the role before
+    them or without."""
+    path = actors_path(table)
+    if not path.is_file():
         return
+    whole: dict[str, str] = {}
+    short: dict[str, dict[str, str]] = {}
+    for old, new in names.items():
+        (role, _, was), (new_role, _, now) = old.partition("."), new.partition(".")
+        if was and now and roles.get(role, role) == new_role:
+            whole[old] = new
+            short.setdefault(role, {})[was] = now
     raw = read_bytes(path)
     try:
-        teams = json.loads(raw)
-        names = {was: now, old: new}
-        renamed = [{names.get(fact, fact): value for fact, value in actor.items()} for actor in teams.get(role, [])]
+        teams, renamed = json.loads(raw), {}
+        for role, team in teams.items():
+            own = whole | short.get(role, {})
+            renamed[roles.get(role, role)] = [{own.get(fact, fact): value for fact, value in actor.items()} for actor in team]
     except (ValueError, AttributeError, TypeError):  # no file of actors: reported where it is read
         return
-    if renamed != teams.get(role, []):
-        yield Rewrite(path, raw, (json.dumps({**teams, role: renamed}, ensure_ascii=False, indent=2) + "\n").encode())
+    if renamed != teams:
+        yield Rewrite(path, raw, (json.dumps(renamed, ensure_ascii=False, indent=2) + "\n").encode())
 
 
 def _with_rules(column: TextColumn, names: Mapping[str, str]) -> TextColumn:

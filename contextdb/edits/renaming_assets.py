@@ -12,14 +12,14 @@ from pathlib import Path
 from typing import Any
 
 from contextdb.columns import TextColumn
-from contextdb.disk import matching, read_bytes, real_path
-from contextdb.edits.renaming import Renaming, Rewrite, TableFile, folder_of, rewritten, rewritten_notes, rewritten_toml, with_texts
+from contextdb.disk import matching, real_path
+from contextdb.edits.renaming import ProjectFiles, Renaming, Rewrite, TableFile, folder_of, rewritten, rewritten_notes, with_texts
 from contextdb.edits.renaming_values import with_value
 from contextdb.errors import ContextDBError, Fault, TableError, in_quotes, plural
 from contextdb.files.texts import read_texts
 from contextdb.schema.settings import Schema, TableSettings
 from contextdb.tables.other_files import cases_path
-from contextdb.tables.project import SCHEMA_FILE, read_folder_schema, table_files
+from contextdb.tables.project import table_files
 from contextdb.tables.table import Table
 
 EXPECTED = "Expected"
@@ -78,23 +78,12 @@ def asset_renaming(table: Table, old: str, new: str, only_here: bool = False) ->
     """What is to be written so that an asset has another name, in all the project, or in this table and its saved contexts only.
     Raises TableError, SchemaError or FileError where a table names the new asset already; a file cannot be read, or could not say
     what it should."""
-    folder = folder_of(table)
-    assert table.path is not None
-    raw = read_bytes(folder / SCHEMA_FILE) if (folder / SCHEMA_FILE).is_file() else b""
-    schema = read_folder_schema(folder) if raw else table.schema
-    files: list[Rewrite] = []
-    own = table.name
-    for name, path in table_files(folder, schema):
-        is_own = real_path(path) == real_path(table.path)
-        own = name if is_own else own
-        if is_own or not only_here:
-            files += _rewritten_table(TableFile.read(name, path, schema.tables.get(name, TableSettings(name))), old, new)
-    if not only_here:
-        for path in _markup(folder, schema):
-            files += _rewritten_columns(path, "asset", {old: new})
-    if raw:
-        files += rewritten_toml(folder / SCHEMA_FILE, raw, lambda part: _change(part, old, new, own if only_here else None), {})
-    return Renaming(old, new, tuple(files))
+    files = ProjectFiles.of(table)
+    rewrites = [rewrite for file in files.read(only_here) for rewrite in _rewritten_table(file, old, new)]
+    for path in _markup(files.folder, files.schema) if not only_here else ():
+        rewrites += _rewritten_columns(path, "asset", {old: new})
+    only = files.own if only_here else None
+    return Renaming(old, new, (*rewrites, *files.rewritten_toml(lambda document: _change(document, old, new, only))))
 
 
 # ---- parts

@@ -7,20 +7,17 @@ written.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 
 from contextdb.cells.outputs import SLOT_COLUMNS
 from contextdb.columns import TextColumn
-from contextdb.disk import read_bytes, real_path
-from contextdb.edits import renaming
+from contextdb.edits.renaming import ProjectFiles, Renaming, Rewrite, TableFile, rewritten_table, uses_of, with_texts
 from contextdb.edits.renaming_values import with_value
 from contextdb.edits.schema_file import require_declared_here
 from contextdb.errors import Fault, SchemaError, in_quotes, plural
 from contextdb.files.toml_shapes import wrong_name
-from contextdb.schema.settings import Schema, TableSettings
-from contextdb.tables.project import SCHEMA_FILE, read_folder_schema, table_files
+from contextdb.schema.settings import Schema
+from contextdb.tables.project import SCHEMA_FILE
 from contextdb.tables.table import Table
 
 
@@ -32,7 +29,7 @@ def facts_of(table: Table, role: str) -> tuple[str, ...]:
 
 def role_uses(table: Table, role: str) -> tuple[str, tuple[str, ...]]:
     """What speaks of a role, in words, and the other tables that do."""
-    uses = [renaming.uses_of(table, fact) for fact in facts_of(table, role)]
+    uses = [uses_of(table, fact) for fact in facts_of(table, role)]
     tables = tuple(dict.fromkeys(name for one in uses for name in one.tables))
     derived = {name for one in uses for name in one.derived if name.partition(".")[0] != role}
     counts = (
@@ -47,36 +44,21 @@ def role_uses(table: Table, role: str) -> tuple[str, tuple[str, ...]]:
     return ", ".join(plural(n, noun) for n, noun in counts if n), tables
 
 
-def role_renaming(table: Table, old: str, new: str, only_here: bool = False) -> renaming.Renaming:
+def role_renaming(table: Table, old: str, new: str, only_here: bool = False) -> Renaming:
     """What is to be written so that a role has another name, in all the project or in this table only. Raises TableError,
     SchemaError or FileError where there is such a role already, or it is no name; a file cannot be read, or could not say what it
     should."""
-    folder = renaming.folder_of(table)
-    assert table.path is not None
-    raw = read_bytes(folder / SCHEMA_FILE) if (folder / SCHEMA_FILE).is_file() else b""
-    schema = read_folder_schema(folder) if raw else table.schema
-    read = {
-        real_path(path): renaming.TableFile.read(name, path, schema.tables.get(name, TableSettings(name)))
-        for name, path in table_files(folder, schema)
-    }
-    own = read[real_path(table.path)]
-    files = [own] if only_here else list(read.values())
-    names = _names(schema, files, old, new)
+    project = ProjectFiles.of(table)
+    files = project.read(only_here)
+    names = _names(project.schema, files, old, new)
     if not only_here:
-        require_declared_here((("conditions", name) for name in names), schema, folder / SCHEMA_FILE)
-    _require_role(new, {*schema.conditions, *(c.name for file in files for c in file.columns)})
+        require_declared_here((("conditions", name) for name in names), project.schema, project.folder / SCHEMA_FILE)
+    _require_role(new, {*project.schema.conditions, *(c.name for file in files for c in file.columns)})
     rewrites = [rewrite for file in files for rewrite in _rewritten(file, names, old, new)]
-    if raw:
-        change = (
-            (lambda document: renaming.only_here_in(document, names, own.name))
-            if only_here
-            else (lambda document: renaming.everywhere_in(document, names))
-        )
-        rewrites += renaming.rewritten_toml(folder / SCHEMA_FILE, raw, change, {} if only_here else names)
-    return renaming.Renaming(old, new, tuple(rewrites))
+    return Renaming(old, new, (*rewrites, *project.with_conditions(names, only_here)))
 
 
-def _names(schema: Schema, files: list[renaming.TableFile], old: str, new: str) -> dict[str, str]:
+def _names(schema: Schema, files: list[TableFile], old: str, new: str) -> dict[str, str]:
     """The conditions of the role, each with its other name."""
     columns = (c.name for file in files for c in file.columns if file.has_condition(c.name))
     named = (name for name in dict.fromkeys((*schema.conditions, *columns)) if name.startswith(f"{old}."))
@@ -91,27 +73,10 @@ def _require_role(new: str, taken: set[str]) -> None:
         raise SchemaError(Fault(f"there is a role {in_quotes(new)} already.", "a name that no role has yet"))
 
 
-def _rewritten(file: renaming.TableFile, names: Mapping[str, str], old: str, new: str) -> Iterator[renaming.Rewrite]:
+def _rewritten(file: TableFile, names: Mapping[str, str], old: str, new: str) -> Iterator[Rewrite]:
     def slots(column: TextColumn) -> TextColumn:
         if column.name not in SLOT_COLUMNS or column.name not in file.settings.outputs:
             return column
-        return renaming.with_texts(column, {text: with_value(text, old, new) for text in column.texts})
+        return with_texts(column, {text: with_value(text, old, new) for text in column.texts})
 
-    yield from renaming.rewritten_table(file, names, slots)
-    yield from _rewritten_actors(renaming.actors_path(file.path), names, old, new)
-
-
-def _rewritten_actors(path: Path, names: Mapping[str, str], old: str, new: str) -> Iterator[renaming.Rewrite]:
-    if not path.is_file():
-        return
-    raw = read_bytes(path)
-    try:
-        teams = json.loads(raw)
-        renamed = {
-            new if role == old else role: [{names.get(fact, fact): value for fact, value in actor.items()} for actor in team]
-            for role, team in teams.items()
-        }
-    except (ValueError, AttributeError, TypeError):  # no file of actors: reported where it is read
-        return
-    if renamed != teams:
-        yield renaming.Rewrite(path, raw, (json.dumps(renamed, ensure_ascii=False, indent=2) + "\n").encode())
+    yield from rewritten_table(file, names, {old: new}, slots)

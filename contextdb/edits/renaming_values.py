@@ -14,8 +14,8 @@ from typing import Any
 
 from contextdb.cells.words import quoted, says_any
 from contextdb.columns import TextColumn
-from contextdb.disk import read_bytes, real_path
-from contextdb.edits.renaming import Renaming, Rewrite, TableFile, folder_of, rewritten, rewritten_toml, with_texts
+from contextdb.disk import real_path
+from contextdb.edits.renaming import ProjectFiles, Renaming, Rewrite, TableFile, folder_of, rewritten, with_texts
 from contextdb.edits.schema_file import require_declared_here
 from contextdb.errors import ContextDBError, Fault, SchemaError, in_quotes, plural
 from contextdb.expressions.faults import Refusal
@@ -24,7 +24,7 @@ from contextdb.expressions.tokens import tokens_of
 from contextdb.files.texts import read_texts
 from contextdb.schema.settings import Schema, TableSettings
 from contextdb.tables.other_files import CASE_COLUMNS, cases_path
-from contextdb.tables.project import SCHEMA_FILE, read_folder_schema, table_files
+from contextdb.tables.project import SCHEMA_FILE, table_files
 from contextdb.tables.table import Table
 
 _SIGNS = "~+-,;()"
@@ -85,20 +85,13 @@ def value_uses(table: Table, condition: str, value: str) -> ValueUses:
 def value_renaming(table: Table, condition: str, old: str, new: str) -> Renaming:
     """What is to be written so that a declared value has another name in all the project. Raises TableError, SchemaError or
     FileError where there is such a value already, an expression could mean another condition's value, or a file cannot be read."""
-    folder = folder_of(table)
-    raw = read_bytes(folder / SCHEMA_FILE)
-    schema = read_folder_schema(folder)
-    declared = schema.conditions[condition].domain.values or ()
-    if new in declared:
+    files = ProjectFiles.of(table)
+    if new in (files.schema.conditions[condition].domain.values or ()):
         raise SchemaError(Fault(f"{in_quotes(new)} is a value of {condition} already.", "a name that there is not yet"))
-    _require_plain(schema, condition, old)
-    require_declared_here([("conditions", condition)], schema, folder / SCHEMA_FILE)
-    files: list[Rewrite] = []
-    for name, path in table_files(folder, schema):
-        file = TableFile.read(name, path, schema.tables.get(name, TableSettings(name)))
-        files += _rewritten_table(file, condition, old, new)
-    files += rewritten_toml(folder / SCHEMA_FILE, raw, lambda document: _change(document, condition, old, new), {})
-    return Renaming(old, new, tuple(files))
+    _require_plain(files.schema, condition, old)
+    require_declared_here([("conditions", condition)], files.schema, files.folder / SCHEMA_FILE)
+    rewrites = [rewrite for file in files.read() for rewrite in _rewritten_table(file, condition, old, new)]
+    return Renaming(old, new, (*rewrites, *files.rewritten_toml(lambda document: _change(document, condition, old, new))))
 
 
 # ---- expressions

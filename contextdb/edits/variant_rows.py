@@ -59,8 +59,8 @@ def contracted(table: AnyTable) -> tuple[AnyTable, Places]:
     of_base = {column.name for column in base.columns}
     taken = table.with_rows_taken(rows)
     columns = [c for c in taken.columns if c.name in before or c.name not in of_base or _says(c) or c.name == table.asset_column]
-    kept = {column.name for column in columns}
-    conditions = tuple(column for column in taken.conditions if column.condition.name in kept)
+    names = {column.name for column in columns}
+    conditions = tuple(column for column in taken.conditions if column.condition.name in names)
     return replace(taken, columns=tuple(columns), conditions=conditions), rows
 
 

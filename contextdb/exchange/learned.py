@@ -193,7 +193,6 @@ class _Facts:
         return [replace(feature, codes=feature.codes[numbers]) for feature in self.features]
 
     def rows(self, numbers: Ints) -> list[_Row]:
-        """The rows that some pairs make."""
         return [self._row(box) for box in learned_boxes(self._of(numbers), self.labels[numbers])]
 
     def _row(self, box: LearnedBox) -> _Row:

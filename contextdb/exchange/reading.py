@@ -83,7 +83,6 @@ class Reading:
 
     @property
     def n_rows(self) -> int:
-        """How many rows there are."""
         return self.columns[0].n_rows if self.columns else 0
 
     @property
@@ -92,7 +91,6 @@ class Reading:
         return [column.name for column in self.columns]
 
     def column(self, name: str) -> TextColumn:
-        """A column by its name."""
         return self._by_name[name]
 
     @cached_property

@@ -19,7 +19,7 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import BOOL
 from contextdb.cells.sets import NumberSet, ValueSet
 from contextdb.errors import Fault, in_quotes
-from contextdb.expressions.boxes import Box, NoBoxes, Sets, all_of
+from contextdb.expressions.boxes import Box, NoBoxes, Sets, all_of, false_half_turns
 from contextdb.expressions.expression import Expression, read_expression
 from contextdb.expressions.faults import ExpressionError, Refusal
 from contextdb.expressions.parse import parse
@@ -43,7 +43,7 @@ class Assumptions:
 
         A box that also restricts a condition which the table does not have is left out: some context in its shadow can happen.
         """
-        ruled_out = [*self._ruled_out, *(expression.as_boxes(False) for expression in self.derived)]
+        ruled_out = [*self._ruled_out, self._half_turns, *(expression.as_boxes(False) for expression in self.derived)]
         return [box for boxes in ruled_out for box in boxes or () if self._is_of_the_table(box)]
 
     @cached_property
@@ -57,7 +57,17 @@ class Assumptions:
 
     @cached_property
     def _ruled_out(self) -> list[list[Box] | None]:
-        return [expression.ruled_out() for expression in self.expressions]
+        return [expression.as_boxes(False) for expression in self.expressions]
+
+    @property
+    def _half_turns(self) -> list[Box]:
+        """The contexts with an angle at half a turn that are ruled out, be that -180 or 180 throughout all of the assumptions."""
+        boxed = [expression for expression in self.expressions if expression not in self.unboxed]
+        boxes: list[Box] = []
+        for name in dict.fromkeys(c.name for e in boxed for c in e.conditions if c.domain.type.is_circular):
+            about = [e for e in boxed if name in e.names]
+            boxes += false_half_turns(name, [e.plan for e in about], {c.name: c for e in about for c in e.conditions})
+        return boxes
 
     def holds(self, columns: Mapping[str, Any], n_contexts: int) -> NDArray[np.bool_]:
         """Whether each of N contexts can happen: bool [N]. One where facts are missing can, unless those it has rule it out.

@@ -7,7 +7,7 @@ apart, for facts that are known.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain, islice, product
 
@@ -47,22 +47,19 @@ def boxes_of(plan: Part, conditions: Mapping[str, Condition], truth: bool) -> li
     return [{name: Cell(accepts) for name, accepts in box.items()} for box in boxes]
 
 
-def false_half_turns(plan: Part, conditions: Mapping[str, Condition]) -> list[Box]:
-    """The boxes of contexts with an angle at half a turn in which a bool plan is false, be that -180 or 180 throughout.
+def false_half_turns(name: str, plans: Sequence[Part], conditions: Mapping[str, Condition]) -> list[Box]:
+    """The boxes of contexts with an angle at half a turn in which one of some bool plans is false, be that -180 or 180 throughout.
 
     Each comparison alone takes the one of the two for which it holds: `-90 <= a <= 90` is true there. Where that takes too
-    many boxes they are left out.
+    many boxes there are none.
     """
-    half_turns: list[Box] = []
-    for name, condition in conditions.items():
-        if condition.domain.type.is_circular:
-            half_turn = Cell(NumberSet(((-180.0, -180.0),), is_circular=True))
-            try:
-                boxes = all_of(_Boxes(conditions, name, end).of(plan, False) for end in (-180.0, 180.0))
-            except NoBoxes:
-                continue
-            half_turns += [{name: half_turn, **{n: Cell(accepts) for n, accepts in box.items()}} for box in boxes]
-    return half_turns
+    half_turn = Cell(NumberSet(((-180.0, -180.0),), is_circular=True))
+    ends = [_Boxes(conditions, name, end) for end in (-180.0, 180.0)]
+    try:
+        boxes = all_of(any_of(end.of(plan, False) for plan in plans) for end in ends)
+    except NoBoxes:
+        return []
+    return [{name: half_turn, **{n: Cell(accepts) for n, accepts in box.items()}} for box in boxes]
 
 
 def meets(boxes: Iterable[Box], facts: Mapping[str, Fact]) -> bool:

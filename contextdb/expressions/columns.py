@@ -18,11 +18,10 @@ from numpy.typing import NDArray
 
 from contextdb.cells.angles import wrap_angles
 from contextdb.cells.conditions import Condition
-from contextdb.cells.fact_columns import as_series, listed, plain_numbers
+from contextdb.cells.fact_columns import as_series, in_context, plain_numbers, read_each
 from contextdb.cells.facts import read_fact
 from contextdb.cells.kinds import Kind
-from contextdb.cells.sets import Cell
-from contextdb.errors import ContextError, Fault, Place
+from contextdb.errors import ContextError
 
 if TYPE_CHECKING:
     import polars as pl
@@ -62,7 +61,7 @@ def read_column(given: Any, condition: Condition, n_contexts: int) -> Column:
     plain = _plain_numbers(given, kind) if kind.is_numeric else _plain_truths(given) if kind.is_truth else None
     if plain is None and kind.is_named:
         return _texts(given, condition)
-    return plain if plain is not None else _column_of(*_read_each(given, condition), kind)
+    return plain if plain is not None else _column_of(*read_each(given, condition), kind)
 
 
 def _plain_numbers(given: Any, kind: Kind) -> Doubles | None:
@@ -85,7 +84,7 @@ def _texts(given: Any, condition: Condition) -> Coded:
     if series is not None and isinstance(series.dtype, (pl.Categorical, pl.Enum)):
         series = series.cast(pl.String)
     if series is None or series.dtype != pl.String:
-        return _coded(*_read_each(given, condition))
+        return _coded(*read_each(given, condition))
     distinct = series.drop_nulls().unique(maintain_order=True)
     texts = distinct.to_list()
     for value in texts:
@@ -93,54 +92,23 @@ def _texts(given: Any, condition: Condition) -> Coded:
             read_fact(value, condition)
         except ContextError as error:
             row = series.index_of(value)
-            raise _placed(error, row or 0, condition) from None
+            raise in_context(error, row or 0, condition.name, value) from None
     codes = series.cast(pl.Enum(distinct)).to_physical().cast(pl.Int32).fill_null(-1)
     return Coded(codes.to_numpy(), tuple(texts))
 
 
-def _read_each(given: Any, condition: Condition) -> tuple[list[int], list[Any]]:
-    """The distinct facts in canonical form, and which one each context has, -1 where missing."""
-    known: dict[object, int] = {}
-    codes: list[int] = []
-    values: list[Any] = []
-    for row, value in enumerate(listed(given)):
-        key = (type(value), tuple(value) if isinstance(value, (list, set)) else value)
-        try:
-            if key not in known:
-                fact = _one(read_fact(value, condition))
-                known[key] = -1 if fact is None else len(values)
-                values += [] if fact is None else [fact]
-        except (ContextError, TypeError) as error:
-            raise _placed(error, row, condition) from None
-        codes.append(known[key])
-    return codes, values
-
-
-def _one(fact: Any) -> Any:
-    if isinstance(fact, Cell):
-        raise ContextError(Fault("a set of values is for one query at a time.", "one value in each context"))
-    return fact
-
-
-def _placed(error: Exception, row: int, condition: Condition) -> ContextError:
-    place = Place(row=row, column=condition.name)
-    if isinstance(error, ContextError):
-        return ContextError(*(fault.at(place) for fault in error.faults))
-    return ContextError(Fault("this is not a fact.", "one value in each context", place=place))
-
-
-def _column_of(codes: list[int], values: list[Any], kind: Kind) -> Column:
-    coded = _coded(codes, values)
+def _column_of(facts: Sequence[Any], numbers: NDArray[np.int64], kind: Kind) -> Column:
+    coded = _coded(facts, numbers)
     if kind.is_numeric:
         return coded.looked_up(coded.values, np.nan, np.float64)
     return coded.looked_up([YES if v else NO for v in coded.values], UNKNOWN, np.int8) if kind.is_truth else coded
 
 
-def _coded(codes: list[int], values: list[Any]) -> Coded:
-    """Codes of distinct values: two ways to write one fact are one."""
+def _coded(facts: Sequence[Any], numbers: NDArray[np.int64]) -> Coded:
+    """Codes of distinct facts, None where missing: two ways to write one fact are one."""
     distinct: dict[Any, int] = {}
-    table = [distinct.setdefault(v, len(distinct)) for v in values]
-    return Coded(np.array([*table, -1], np.int32)[np.array(codes, np.int64)], tuple(distinct))
+    table = [-1 if fact is None else distinct.setdefault(fact, len(distinct)) for fact in facts]
+    return Coded(np.array(table, np.int32)[numbers], tuple(distinct))
 
 
 def as_array(column: Column) -> NDArray[Any]:

@@ -15,7 +15,7 @@ from contextdb.cells.facts import read_fact
 from contextdb.cells.kinds import Kind
 from contextdb.cells.sets import Cell
 from contextdb.errors import ContextError, Fault, Place, in_quotes, nearest, plural, some
-from contextdb.expressions.boxes import Box, boxes_of, false_half_turns
+from contextdb.expressions.boxes import Box, boxes_of
 from contextdb.expressions.check import Checker
 from contextdb.expressions.columns import UNKNOWN, YES, Column, as_array, read_column
 from contextdb.expressions.faults import ExpressionError, Refusal, fault_of
@@ -86,12 +86,6 @@ class Expression:
         more than `boxes.MOST_BOXES` would be needed.
         """
         return boxes_of(self.plan, {c.name: c for c in self.conditions}, truth) if self.type.kind.is_truth else None
-
-    def ruled_out(self) -> list[Box] | None:
-        """The contexts in which an assumption is false, as `as_boxes(False)` gives them; also those in which it is so for an angle
-        at half a turn, be that -180 or 180 throughout."""
-        boxes = self.as_boxes(False)
-        return boxes and [*boxes, *false_half_turns(self.plan, {c.name: c for c in self.conditions})]
 
     @cached_property
     def run(self) -> Run:

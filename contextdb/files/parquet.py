@@ -260,7 +260,6 @@ def _value(text: str, old: pl.Series) -> object:
 
 
 def _date(text: str) -> object:
-    """The day that a text means."""
     try:
         day = datetime.date.fromisoformat(text)
     except ValueError:

@@ -183,7 +183,6 @@ class Section:
         return values
 
     def add(self, problem: str, accepted: str = "", mend: str = "") -> None:
-        """Keep a fault."""
         self._keep(Fault(problem, accepted, mend))
 
     def wrong(self, key: str, why: str, accepted: str, mend: str = "") -> None:

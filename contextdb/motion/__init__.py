@@ -20,7 +20,7 @@ from contextdb.motion.characters.motion_project import MotionProject
 from contextdb.motion.characters.one_off import OneOff
 from contextdb.motion.characters.readout import Readout
 from contextdb.motion.characters.table_player import TablePlayer
-from contextdb.motion.characters.updates import CharacterState, Updated
+from contextdb.motion.characters.updates import Updated
 from contextdb.motion.clips.clip import Clip, load_bvh, write_bvh
 from contextdb.motion.clips.mirror import mirrored
 from contextdb.motion.clips.poses import poses_of, resampled
@@ -80,4 +80,4 @@ __all__ += ["JointDatabase", "JointSearcher", "MotionDatabase", "RootMotion", "S
 __all__ += ["JointNode", "MatchGate", "MatchNode", "Pose", "PoseBank", "PoseSettings", "PoseStream", "PoseStreams", "Target"]
 __all__ += ["MotionConfig", "best_start", "build", "open_or_build", "open_or_build_poses", "write_poses"]
 __all__ += ["Measures", "Trace", "coverage", "describe", "measure", "prepare"]
-__all__ += ["Character", "CharacterState", "Crowd", "MotionProject", "OneOff", "Readout", "TablePlayer", "Updated"]
+__all__ += ["Character", "Crowd", "MotionProject", "OneOff", "Readout", "TablePlayer", "Updated"]

@@ -41,8 +41,8 @@ def _overview(measured: Measured) -> tuple[str, ...]:
     covered = format_percent(report.covered) if report.method == "exact" else f"at least {format_percent(report.lower)}"
     n_gaps = f"{len(report.gaps):,}{'' if report.gaps_complete else ' or more'}"
     of = measured.asked
-    asked = "" if of.by == "domain" else f"{'' if of.lower == of.upper else 'at least '}{format_percent(of.lower)}"
-    return report.table, asked, covered, report.method, n_gaps, f"{report.n_rows:,}"
+    share_asked = "" if of.by == "domain" else f"{'' if of.lower == of.upper else 'at least '}{format_percent(of.lower)}"
+    return report.table, share_asked, covered, report.method, n_gaps, f"{report.n_rows:,}"
 
 
 def section(
@@ -51,11 +51,11 @@ def section(
     """A table with at most some gaps, changes and moments, pairs of conditions, and rows of a rule; `page_number` is its place in a
     page, where there is room for each finding and row."""
     report, is_page = measured.report, page_number is not None
-    asked = measured.asked
-    sentences: list[str | Bar] = [words.to_do_sentence(measured), asked.headline, Bar(asked.lower, asked.upper, asked.headline)]
-    sentences += [] if asked.by == "domain" else [f"Of all contexts alike: {report.headline}"]
+    own = measured.asked
+    sentences: list[str | Bar] = [words.to_do_sentence(measured), own.headline, Bar(own.lower, own.upper, own.headline)]
+    sentences += [] if own.by == "domain" else [f"Of all contexts alike: {report.headline}"]
     sentences += words.assumed_sentences(report)
-    is_listed = measured.expected is None or asked.by == "telemetry" or is_page or most_gaps == MANY
+    is_listed = measured.expected is None or own.by == "telemetry" or is_page or most_gaps == MANY
     blocks: list[Block] = [*_todo(measured, most_gaps), *([_gaps(measured, most_gaps, is_page)] if is_listed else [])]
     if is_brief:
         counts = ", ".join(f"{len(group)} {rule}" for rule, group in by_rule(report.findings).items())
@@ -107,8 +107,8 @@ def _each_row(measured: Measured) -> Iterator[Block]:
     rows = []
     for row in sorted(order):
         hits = [f"{seen.hits[row]:,}"] if seen else []
-        found = (measured.assets[row], format_percent(report.hits[row]), *hits, ", ".join(rules.get(row, [])))
-        rows.append((f"{measured.lines[row] or row + 1:,}", *found))
+        number = f"{measured.lines[row] or row + 1:,}"
+        rows.append((number, measured.assets[row], format_percent(report.hits[row]), *hits, ", ".join(rules.get(row, []))))
     place = "row" if None in measured.lines else "line"
     if rows:
         yield Table((place, "asset", "valid in", *(["recorded moments"] if seen else []), "findings"), rows, "Rows")

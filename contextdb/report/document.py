@@ -230,7 +230,6 @@ def as_markdown(document: Document, most_bytes: int = MOST_BYTES) -> str:
 
 
 def _gates(gates: Iterable[Gate]) -> str:
-    """Thresholds, and whether each is met."""
     return "\n".join(f"- {'✓' if gate.passed else '✗'} {escaped(gate.name)}: {escaped(gate.message)}" for gate in gates)
 
 

@@ -41,7 +41,8 @@ def _contents(sections: Sequence[Section]) -> str:
         missed = [gate.name for gate in section.gates if not gate.passed]
         first = [sentence for sentence in section.sentences[:2] if isinstance(sentence, str)]
         texts = [section.summary, *first, *([f"missed: {', '.join(missed)}"] if missed else [])]
-        items.append(f'<li><a href="#t{number}">{escaped(section.title)}</a>: {escaped("; ".join(filter(None, texts)))}</li>\n')
+        sentences = " ".join(f"{text.rstrip('.')}." for text in texts if text)
+        items.append(f'<li><a href="#t{number}">{escaped(section.title)}</a>: {escaped(sentences)}</li>\n')
     return f"<ul>\n{''.join(items)}</ul>\n"
 
 
@@ -52,7 +53,6 @@ def _section(section: Section, number: int) -> str:
 
 
 def _gates(gates: Iterable[Gate]) -> str:
-    """Thresholds, and whether each is met."""
     items = []
     for gate in gates:
         word = "passed" if gate.passed else "failed"

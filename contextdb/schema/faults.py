@@ -23,7 +23,7 @@ from contextdb.files.file_names import alike
 from contextdb.files.toml_shapes import key_value, near_key, no_key, wrong_name
 from contextdb.files.toml_text import as_toml, what
 from contextdb.schema import shapes
-from contextdb.schema.contract_faults import contract_expression_faults, contract_faults
+from contextdb.schema.contracts import VERBS, limit_of, row_conditions
 from contextdb.schema.outputs import bound_faults, declared_outputs, outputs_faults
 from contextdb.schema.parts import (
     SECTIONS,
@@ -37,9 +37,8 @@ from contextdb.schema.parts import (
     parts_of,
 )
 from contextdb.schema.shapes import CONDITION, KEY_SYNONYMS
-from contextdb.schema.table_settings import columns_checked, table_files
+from contextdb.schema.table_settings import JOBS, columns_checked, table_files
 from contextdb.schema.toml_lines import Path
-from contextdb.schema.variant_faults import bases_of, variant_faults
 
 PathFault = tuple[Path, Fault]
 
@@ -303,3 +302,69 @@ def _blueprint_faults(path: Path, blueprint: Part, conditions: Set[str]) -> Iter
         if name not in conditions:
             problem = f"{header(path)} names the condition {in_quotes(name)}, which is not declared."
             yield (*path, "conditions"), Fault(problem, some(conditions), mend_for(name, conditions))
+
+
+# ---- contracts
+
+
+def contract_faults(path: Path, part: Part) -> Iterator[tuple[Path, Fault]]:
+    """What is wrong with how the keys of a contract go together."""
+    if "table" not in part:
+        yield path, Fault(f"{header(path)} has no table.", 'table = "NAME"')
+    given = [verb for verb in VERBS if verb in part]
+    if len(given) != 1:
+        problem = f"has {' and '.join(given)}" if given else "demands nothing"
+        accepted = "exactly one of some, every, none, at_most and winner"
+        yield (*path, given[1]) if given else path, Fault(f"{header(path)} {problem}.", accepted)
+
+
+def contract_expression_faults(
+    document: Part, conditions: Mapping[str, Condition], outputs: Mapping[str, Mapping[str, Output]]
+) -> Iterator[tuple[Path, Fault]]:
+    """What is wrong with the expressions of contracts; `outputs` are those of each declared table. Names that only the table can
+    know are left for when it is read."""
+    for name in parts_of(document, "contracts"):
+        path, fitting = ("contracts", name), fitting_of("contracts", parts_of(document, "contracts")[name])
+        if "when" in fitting:
+            yield from _faults(path, "when", fitting["when"], conditions, False)
+        rows = row_conditions(outputs.get(fitting.get("table", ""), {}))
+        for verb in VERBS:
+            kind = limit_of(fitting[verb])[1] if verb == "at_most" and verb in fitting else fitting.get(verb)
+            if isinstance(kind, str):
+                yield from _faults(path, verb, kind, rows, fitting.get("table") in outputs)
+
+
+def _faults(path: Path, key: str, text: str, conditions: Mapping[str, Condition], knows_all: bool) -> Iterator[tuple[Path, Fault]]:
+    from contextdb.expressions import assumption_faults
+
+    for fault in assumption_faults([text], conditions):
+        if knows_all or fault.rule != "unknown-fact":
+            yield (*path, key), replace(fault, found=f"{header(path)} {key} {fault.found}", rule="unreadable")
+
+
+# ---- variants
+
+
+def variant_faults(tables: Mapping[str, Part]) -> Iterator[tuple[Path, Fault]]:
+    """Columns that have another job than in the base, and what only a variant can have. Whether there is a table of the base's name
+    shows when tables are read."""
+    for name, part in tables.items():
+        path = ("tables", name)
+        if "remove" in part and "base" not in part:
+            problem = f"{header(path)} {key_value('remove', part['remove'])} has no place here: the table is no variant."
+            yield (*path, "remove"), Fault(problem, 'base = "TABLE"', "to leave it out")
+        inherited = bases_of(name, tables)[1:]
+        for job in JOBS:
+            of = next((base for base in inherited if job in tables[base] and job != "remove"), None)
+            if job in part and of is not None and part[job] != tables[of][job]:
+                problem = f"{header(path)} {key_value(job, part[job])}: its base has another."
+                mend = key_value(job, tables[of][job])
+                yield (*path, job), Fault(problem, f"the column of {header(('tables', of))}, or none", mend)
+
+
+def bases_of(name: str, tables: Mapping[str, Part]) -> list[str]:
+    """A table and those that it is a variant of, as far as they are declared."""
+    chain = [name]
+    while (base := tables[chain[-1]].get("base")) in tables and base not in chain:
+        chain.append(str(base))
+    return chain

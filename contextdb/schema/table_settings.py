@@ -59,11 +59,11 @@ class TableSettings(Declared, error=SchemaError):
     )  # fmt: skip
     cooldown_s: str | None = _job(
         "Seconds until a row is picked again.", "Numbers from 0 up; empty is 0.", "0", "Cooldown seconds",
-        "A column: for so many seconds after it was picked a row is not picked again.",
+        "A column: the seconds for which a row is not picked again.",
     )  # fmt: skip
     cooldown_turns: str | None = _job(
         "Picks until a row is picked again.", "Whole numbers from 0 up; empty is 0.", "0", "Cooldown picks",
-        "A column: for so many picks after it was picked a row is not picked again.",
+        "A column: the number of picks for which a row is not picked again.",
     )  # fmt: skip
     fallback: str | None = setting(
         FALLBACK, "The asset that plays when no row is valid. Empty: none does.", None,

@@ -9,6 +9,7 @@ which are the headings and links of docs/index.md, pictures for a light screen, 
 from __future__ import annotations
 
 import contextlib
+import importlib.util
 import io
 import re
 import shutil
@@ -23,6 +24,9 @@ from sphinx.cmd.build import main as sphinx
 
 from contextdb import cli
 from contextdb.motion import write_made_clips
+
+sys.path.insert(1, str(Path(__file__).parents[2]))
+from examples.web import __main__ as web
 
 HERE = Path(__file__).parent
 DOCS = HERE.parent
@@ -133,8 +137,9 @@ def _outside(found: re.Match[str]) -> str:
 
 
 def make_live_pages(folder: Path) -> None:
-    """The pages that the commands make of the samples: a session that plays, and the coverage of the tables and of the clips."""
+    """The pages that are made of the samples: a character to steer, a session that plays, and the coverage of the tables."""
     folder.mkdir(parents=True)
+    make_character(folder / "character.html")
     with tempfile.TemporaryDirectory() as made:
         work = Path(made)
         shutil.copytree(ROOT / "tables", work / "tables")
@@ -153,11 +158,23 @@ def make_live_pages(folder: Path) -> None:
             shutil.copy(work / page, folder)
 
 
+def make_character(page: Path) -> None:
+    """The example in a browser as one file; a line in its place where the compiler that makes it is not installed."""
+    if importlib.util.find_spec("ziglang") is None:
+        page.write_text("<p>It was not made with this site: PyPI's ziglang was not installed.</p>", encoding="utf-8")
+        return
+    with tempfile.TemporaryDirectory() as made, contextlib.redirect_stdout(io.StringIO()):
+        web.build(Path(made))
+        shutil.copy(Path(made) / "one_file.html", page)
+
+
 LIVE_PAGES = """\
 # Live pages
 
-Two pages that the commands made of the sample tables when this site was built. Each is one file, and needs no network.
+Three pages that were made of samples when this site was built. Each is one file, and needs no network.
 
+- <a href="live/character.html">A character to steer</a>: the core in C as WebAssembly plays what its table allows. Change a cell of
+  the table and see what plays instead. [Game engines](engines.md#in-a-browser) says more.
 - <a href="live/session.html">A session that plays</a>: eight seconds of a character who follows a stick, as
   `contextdb motion replay --html` writes it. Scrub the timeline, and see the costs of all assets at each change.
   [Sessions](sessions.md) says more.
@@ -167,6 +184,10 @@ Two pages that the commands made of the sample tables when this site was built. 
 
 LIVE = """
 ## See it live
+
+<iframe class="live" src="live/character.html" title="A character to steer, and its table" loading="lazy"></iframe>
+
+Drag to steer, and change a cell: the <a href="live/character.html">character</a> plays what its table allows, here in the browser.
 
 <iframe class="live" src="live/session.html" title="A session that plays: a character follows a stick" loading="lazy"></iframe>
 

@@ -32,7 +32,7 @@ def main(words: list[str] | None = None) -> int:
         "--tables", type=Path, default=TABLES, metavar="FOLDER", help="its tables (default: those beside this file)"
     )
     parser.add_argument("--clips", type=Path, metavar="FOLDER", help="BVH clips to play with; their table is made")
-    parser.add_argument("--crowd", type=int, default=0, metavar="N", help="so many others, coloured by the row that they play")
+    parser.add_argument("--crowd", type=int, default=0, metavar="N", help="this many others, coloured by the row that they play")
     parser.add_argument("--link", metavar="NAME", default="playground", help="what the editor knows the game by")
     parser.add_argument("--headless", type=float, metavar="SECONDS", help="play so long without a window")
     parser.add_argument("--stick", type=Path, metavar="FILE", help="with --headless: time_s, x, z, run, strafe, camera_deg")

@@ -1,6 +1,7 @@
 """Build the page: python -m examples.web FOLDER    (needs PyPI's ziglang)
 
-Writes motion.wasm, game.motion, index.html and page.js into a folder (build/web), which any web server serves as it is:
+Writes motion.wasm, game.motion, index.html and page.js into a folder (build/web), which any web server serves as it is; and all of
+them in one file, one_file.html, which needs no server:
 
     python -m http.server --directory build/web
 """
@@ -8,6 +9,7 @@ Writes motion.wasm, game.motion, index.html and page.js into a folder (build/web
 from __future__ import annotations
 
 import argparse
+import base64
 import shutil
 import subprocess
 import sys
@@ -46,7 +48,16 @@ def build(folder: Path) -> None:
     compile_player(folder, folder / "motion.wasm")
     for name in PAGE:
         shutil.copyfile(HERE / name, folder / name)
+    (folder / "one_file.html").write_text(in_one_file(folder), encoding="utf-8")
     shutil.rmtree(project)
+
+
+def in_one_file(folder: Path) -> str:
+    """The page with its script, the module and the bundle in it."""
+    page, script = ((folder / name).read_text(encoding="utf-8") for name in PAGE)
+    files = [(name, base64.b64encode((folder / name).read_bytes()).decode()) for name in ("motion.wasm", "game.motion")]
+    inside = "".join(f'<script type="text/plain" id="{name}">{data}</script>\n' for name, data in files)
+    return page.replace('<script type="module" src="page.js"></script>\n', f'{inside}<script type="module">\n{script}</script>\n')
 
 
 def compile_player(headers: Path, target: Path) -> None:

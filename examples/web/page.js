@@ -75,11 +75,15 @@ const className = (core, at, k) => text(core, core.class_name(at, k)) || span(co
 
 if (typeof document !== 'undefined') start().catch(error => { document.getElementById('say').textContent = `It cannot start: ${error.message}` })
 
+/** A file beside the page, or in it. */
+async function read(name) {
+  const inside = document.getElementById(name)
+  if (!inside) return (await fetch(name)).arrayBuffer()
+  return Uint8Array.from(atob(inside.textContent), character => character.charCodeAt(0)).buffer
+}
+
 async function start() {
-  const [module, bundle] = await Promise.all([
-    fetch('motion.wasm').then(answer => answer.arrayBuffer()).then(bytes => WebAssembly.compile(bytes)),
-    fetch('game.motion').then(answer => answer.arrayBuffer()),
-  ])
+  const [module, bundle] = await Promise.all([read('motion.wasm').then(bytes => WebAssembly.compile(bytes)), read('game.motion')])
   const core = await opened(module, bundle)
   const page = { core, stick: location.hash === '#walk' ? [0.5, 1.3] : [0, 0], // a test opens it walking
     keys: new Set(), n: 1, isTired: false, ticks: 0, since: performance.now(), spent: 0 }

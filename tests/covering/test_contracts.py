@@ -8,6 +8,7 @@ import random
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import oracles
@@ -20,6 +21,7 @@ from strategies import examples
 import contextdb as cdb
 from contextdb.covering.contracts import Proof, prove
 from contextdb.schema.contracts import VERBS, Contract
+from contextdb.schema.settings import TableSettings
 
 MOST_CONTEXTS = 6000
 PATTERNS = ("A", "*A*", "outer_[024]", "inner*", "nothing", "*", "?")
@@ -149,6 +151,27 @@ def fact(name: str, value: object) -> object:
     if kind == "date":
         return float((datetime.date.fromisoformat(value) - oracles.EPOCH).days)
     return float(value) if kind in ("int", "number", "angle") else value
+
+
+ORDERS = st.builds("d {} {}".format, st.sampled_from(["<", "<=", ">", ">="]), st.sampled_from(range(-180, 181, 90)))
+PREMISES = st.lists(st.one_of(ORDERS, ORDERS.map("(p or {})".format)), min_size=1, max_size=3, unique=True)
+HEADINGS: list[tuple[int, ...]] = [HALF_TURNS, *((angle,) for angle in range(-135, 180, 45))]  # type: ignore[list-item]
+
+
+@examples(50)
+@given(PREMISES, st.integers(0, 3), st.sampled_from([(-90, 90), (0, 180), (-180, 0), (90, 180)]))
+@example(["d > -20", "d < 20"], 0, (-90, 90))
+@example(["d > -20", "d < 20"], 1, (-90, 90))
+def test_half_a_turn_is_one_of_its_two_names_throughout_a_contract(premises: list[str], n_assumed: int, ends: tuple[int, int]):
+    """Python's `eval` knows no circle, so both names of half a turn are tried."""
+    schema = {"d": {"type": "angle"}, "p": {"type": "bool"}}
+    columns = {"Asset": ["a"], "d": [f"{ends[0]}..{ends[1]}"], "p": ["Any"]}
+    table = cdb.Table.from_columns(columns, schema, TableSettings("t", assume=tuple(premises[:n_assumed])))
+    proof = prove(Contract("c", table="t", when=" and ".join(premises[n_assumed:]) or None, some="asset == 'a'"), table)
+    is_valid = {names: any(ends[0] <= d <= ends[1] for d in names) for names in HEADINGS}
+    moments = product(HEADINGS, (False, True))
+    as_said = [names for names, p in moments if any(all(eval(part, {"d": d, "p": p}) for part in premises) for d in names)]
+    assert (proof.holds, proof.is_vacuous) == (all(is_valid[names] for names in as_said), not as_said)
 
 
 MOVES = """

@@ -31,7 +31,8 @@ def test_few_sets_hold_all_and_none_fewer_would(sets):
 
 
 @given(st.lists(st.integers(0, 2**9 - 1), max_size=9))
-def test_a_search_that_is_cut_says_so_and_still_holds_all(sets):
+def test_a_search_that_is_cut_says_so_and_still_holds_all_with_none_too_many(sets):
     numbers, is_fewest = fewest(sets, steps=1)
     assert union([sets[i] for i in numbers]) == union(sets)
+    assert all(union([sets[j] for j in numbers if j != i]) != union(sets) for i in numbers)
     assert not is_fewest or len(numbers) == shortest(sets)

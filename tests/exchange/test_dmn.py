@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from hypothesis import given
-from strategies import tables
+from strategies import for_each, tables
 
 from contextdb.cells.domains import ANGLE, BOOL, NUMBER, TEXT
 from contextdb.cells.grammar import parse_cell
@@ -110,8 +110,7 @@ def test_the_order_of_the_outputs_values_becomes_priorities():
     assert reading.schema.tables["dish"].priority == "Priority"
 
 
-@pytest.mark.parametrize(
-    ("test", "cell"),
+@for_each(
     [
         ("-", "-"),
         ("", "-"),
@@ -145,7 +144,7 @@ def test_the_order_of_the_outputs_values_becomes_priorities():
         ("not(-)", None),
         ("null", None),
         ("[a..b]", None),
-    ],
+    ]
 )
 def test_a_unary_test_becomes_the_cell_that_means_the_same_or_none(test: str, cell: str | None):
     assert cell_of(test) == cell

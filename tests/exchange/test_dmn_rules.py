@@ -6,6 +6,7 @@ from pathlib import Path
 from xml.sax.saxutils import escape
 
 import pytest
+from strategies import for_each
 
 from contextdb.exchange.feel_rules import rule_of
 from contextdb.exchange.formats import read
@@ -41,8 +42,7 @@ def told(reading: Reading) -> str:
     return "\n".join(map(str, reading.remarks))
 
 
-@pytest.mark.parametrize(
-    ("test", "rule"),
+@for_each(
     [
         ("> limit", "speed > limit"),
         ("limit", "speed == limit"),
@@ -72,7 +72,7 @@ def told(reading: Reading) -> str:
         ("not(", None),
         ("limit " * 2_000, None),
         ("not(" * 500 + "limit" + ")" * 500, None),
-    ],
+    ]
 )
 def test_a_test_becomes_the_rule_that_means_the_same(test: str, rule: str | None):
     found = rule_of(test, "speed", KNOWN)
@@ -110,8 +110,10 @@ def test_an_imported_rule_and_the_facts_that_it_names_are_declared(tmp_path: Pat
     assert project["t"].compile().query({"speed": 5.0, "limit": 4.0}).assets == ["a0"]
 
 
-@pytest.mark.parametrize("kind", ["date", "time", "dayTimeDuration", "string", "number", "boolean", "Any", "tUnknown", ""])
-@pytest.mark.parametrize("test", ['time("10:00:00")', "> duration(1)", "every x in y satisfies x", 'list contains(?, "a")'])
+@for_each(
+    ["date", "time", "dayTimeDuration", "string", "number", "boolean", "Any", "tUnknown", ""],
+    ['time("10:00:00")', "> duration(1)", "every x in y satisfies x", 'list contains(?, "a")'],
+)
 def test_a_test_that_nothing_can_say_is_an_unreadable_cell_of_a_condition(kind: str, test: str):
     reading = decision({"fact": kind}, [test], [test], [test])
     column = propose(reading, EMPTY, TableSettings("d"))[1]

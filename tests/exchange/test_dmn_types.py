@@ -8,6 +8,7 @@ from itertools import product
 from xml.sax.saxutils import escape
 
 import pytest
+from strategies import for_each
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import ANGLE, BOOL, INT, NUMBER, TEXT, Domain
@@ -108,7 +109,7 @@ def losses(reading: Reading) -> list[str]:
     return [str(remark) for remark in reading.remarks if remark.is_loss]
 
 
-@pytest.mark.parametrize(("kind", "test", "cell"), [(k, t, c) for k, tests in TESTS.items() for t, c in tests.items()])
+@for_each([(k, t, c) for k, tests in TESTS.items() for t, c in tests.items()])
 def test_a_test_of_each_kind_becomes_its_cell_without_a_loss(kind: str, test: str, cell: str):
     reading = with_input(kind, test)
     assert reading.columns[1].to_list() == [cell]
@@ -134,7 +135,7 @@ POLICIES = {
 }
 
 
-@pytest.mark.parametrize(("said", "namespace"), list(product(POLICIES, NAMESPACES)))
+@for_each(list(product(POLICIES, NAMESPACES)))
 def test_every_hit_policy_of_every_version_is_kept_or_told(said: str, namespace: str):
     raw = document("", "", table=f'hitPolicy="{said}"', namespace=namespace)
     reading = read_dmn(raw, "moves.dmn")

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from xml.sax.saxutils import escape
 
 import pytest
+from strategies import for_each
 
 from contextdb.cells.domains import Domain
 from contextdb.cells.grammar import parse_cell
@@ -104,8 +105,7 @@ TEXTS = {
 }
 
 
-@pytest.mark.parametrize("kind", ["bool", "number", "angle", "text", "tags"])
-@pytest.mark.parametrize("name", TEXTS)
+@for_each(["bool", "number", "angle", "text", "tags"], TEXTS)
 def test_the_work_on_a_hostile_cell_grows_with_its_length(kind: str, name: str):
     small, large = (TEXTS[name](n) for n in (SMALL // 4, SMALL * FACTOR // 4))
     least = max(cost_s(lambda: parse_cell(small, Domain(kind))), LEAST_S)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from strategies import examples, some
+from strategies import examples, for_each, some
 
 from contextdb.cells.grammar import reads
 from contextdb.columns import TextColumn
@@ -40,8 +40,7 @@ def mapped(read: Reading, settings: TableSettings | None = None, **renames: str)
     return {column.source: column for column in propose(read, SCHEMA, settings or TableSettings("t"), renames)}
 
 
-@pytest.mark.parametrize(
-    ("name", "cells", "declared"),
+@for_each(
     [
         ("on", ["True", "no", "Any"], {"type": "bool"}),
         ("n", ["0", "1", "1"], {"type": "int"}),
@@ -73,7 +72,7 @@ def mapped(read: Reading, settings: TableSettings | None = None, **renames: str)
         ("x", ["", "-", "Any"], {"type": "text"}),
         ("note", ["walk, then run!", "stop; sit!"], None),
         ("id", [f"A{i}" for i in range(200)], None),
-    ],
+    ]
 )
 def test_a_type_is_proposed_from_the_cells_and_the_name(name: str, cells: list[str], declared: dict[str, object] | None):
     proposal = propose_type(TextColumn.of(name, cells))

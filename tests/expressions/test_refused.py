@@ -9,6 +9,7 @@ import pytest
 from expression_oracle import CONDITIONS
 from hypothesis import given
 from hypothesis import strategies as st
+from strategies import for_each
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import ANGLE, BOOL, INT, NUMBER, TEXT, Domain
@@ -33,7 +34,7 @@ def fault_of(text: str, conditions: object = NAMED, wants: Condition | None = No
     return fault
 
 
-@pytest.mark.parametrize("entry", REFUSED)
+@for_each(REFUSED)
 def test_a_refusal_points_at_the_place_and_says_what_is_accepted(entry):
     text, marks, message = entry.split("\n")
     fault = fault_of(text)
@@ -81,8 +82,7 @@ def test_a_result_that_fits_its_condition_is_taken(text, wants):
     assert read_expression(text, NAMED, wants).text == text
 
 
-@pytest.mark.parametrize(
-    ("text", "why"),
+@for_each(
     [
         ("(" * 5000, "5,000 characters"),
         ("(" * 500 + "1" + ")" * 500, "nested too deeply"),
@@ -103,7 +103,7 @@ def test_a_result_that_fits_its_condition_is_taken(text, wants):
         ("speed[0]", "no place"),
         ("speed\x00", "not a sign"),
         ("speed > 3\nimport os", "operator is missing"),
-    ],
+    ]
 )
 def test_hostile_texts_are_refused_with_a_reason(text, why):
     limit = sys.getrecursionlimit()
@@ -185,7 +185,7 @@ def test_any_name_of_a_condition_can_be_written(name):
     assert read_expression(f"-{written_name(name)}", [condition]).evaluate({name: 2}) == -2.0
 
 
-@pytest.mark.parametrize("name", [*sorted(RESERVED), *FUNCTIONS, "Defender.DepthChart", "a b", "`", "1st", "a.", ".a", "in.out"])
+@for_each([*sorted(RESERVED), *FUNCTIONS, "Defender.DepthChart", "a b", "`", "1st", "a.", ".a", "in.out"])
 def test_words_of_the_language_can_be_names_too(name):
     assert read_expression(f"{written_name(name)} * 2", [Condition(name, NUMBER)]).evaluate({name: 4}) == 8.0
 

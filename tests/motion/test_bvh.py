@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from strategies import for_each
 
 from contextdb.errors import ClipError, FileError
 from contextdb.motion import Clip, Skeleton, load_bvh, load_clips, write_bvh
@@ -220,7 +221,7 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize(("text", "message"), REFUSED.values(), ids=REFUSED)
+@for_each(REFUSED.values())
 def test_a_broken_text_is_refused_with_its_line_and_what_was_expected(text, message):
     found = fault_of(text)
     assert found.startswith("clip.bvh, line ")

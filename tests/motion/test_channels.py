@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from motion_oracles import SlowBody, slow_channel
-from strategies import examples
+from strategies import examples, some
 from test_mocap import FOLDER, listed, load
 
 from contextdb.errors import MotionError, SchemaError
@@ -261,7 +261,7 @@ def test_a_smoothed_facing_sways_less_and_turns_neither_later_nor_sooner():
 
 @pytest.mark.skipif(not (FOLDER / "assets.csv").is_file(), reason="no captured clips: set CONTEXTDB_MOCAP to their folder")
 def test_every_channel_of_every_captured_clip_is_finite_and_in_its_bounds():
-    for row in listed():
+    for row in some(listed(), 6):
         clip = load(row)
         feet, hips = feet_of(clip.skeleton), clip.skeleton.names[clip.skeleton.hips]
         unit = [Channel("direction", 1.0, feet[0]), Channel("orientation", 1.0, feet[1], relative_to=hips)]

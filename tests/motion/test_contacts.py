@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from strategies import for_each
 
 from contextdb.errors import MotionError
 from contextdb.motion import Clip, FeatureSchema, Markup, MotionDatabase, PoseBank, Skeleton, load_bvh
@@ -25,8 +26,7 @@ STANCES = Path(os.environ.get("CONTEXTDB_STANCES", ""))
 CLIPS = Path(os.environ.get("CONTEXTDB_MOCAP", ""))
 
 
-@pytest.mark.parametrize("rate", [30.0, 60.0, 120.0])
-@pytest.mark.parametrize("name", RECIPES)
+@for_each(RECIPES, [30.0, 60.0, 120.0])
 def test_every_made_clip_gives_the_footfalls_it_was_made_with_at_any_rate(name, rate):
     made = make_clip(name)
     found = footfalls_of(forward_kinematics(resampled(local_poses(made.clip), rate)))

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from strategies import for_each
 
 import contextdb as cdb
 from contextdb import motion
@@ -34,7 +35,7 @@ def table_of(rows: list[Described]) -> cdb.Table:
 # ---- what is measured
 
 
-@pytest.mark.parametrize("made", STEADY, ids=lambda made: made.name)
+@for_each(STEADY)
 def test_a_made_clip_has_the_speed_and_turn_of_its_recipe(made: MadeClip):
     facts = ROWS[made.name].facts
     assert facts.speed_mps.middle == pytest.approx(made.recipe.pace.speed_mps, abs=0.02)
@@ -45,7 +46,7 @@ def test_a_made_clip_has_the_speed_and_turn_of_its_recipe(made: MadeClip):
         assert facts.step_s == pytest.approx(1.0 / made.recipe.pace.cycles_per_s, abs=0.04)
 
 
-@pytest.mark.parametrize("made", MADE, ids=lambda made: made.name)
+@for_each(MADE)
 def test_gait_style_and_duration_come_back(made: MadeClip):
     facts = ROWS[made.name].facts
     assert facts.gait == made.recipe.gait
@@ -53,7 +54,7 @@ def test_gait_style_and_duration_come_back(made: MadeClip):
     assert facts.duration_s == pytest.approx(made.clip.duration_s, abs=1e-3)
 
 
-@pytest.mark.parametrize("made", MADE, ids=lambda made: made.name)
+@for_each(MADE)
 def test_starts_begin_and_stops_end_standing(made: MadeClip):
     facts = ROWS[made.name].facts
     is_idle = made.recipe.gait == "Idle"

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from strategies import some
 
 from contextdb.errors import MotionError
 from contextdb.motion import Clip, MotionConfig, load_bvh, write_bvh
@@ -252,4 +253,4 @@ def test_a_bone_that_all_clips_lack_is_told_once_with_the_bone_that_is_meant(fol
 @pytest.mark.skipif(not MOCAP.is_dir(), reason="no captured clips: set CONTEXTDB_MOCAP to their folder")
 @pytest.mark.parametrize(("pattern", "unit"), [("bandai_namco/*.bvh", 0.01), ("cmu/0*.bvh", 0.01), ("cmu/131*.bvh", 0.056444)])
 def test_nothing_is_doubted_of_captured_clips(pattern, unit):
-    assert doubts_of(load_bvh(path, metres_per_unit=unit) for path in sorted(MOCAP.glob(pattern))) == []
+    assert doubts_of(load_bvh(path, metres_per_unit=unit) for path in some(sorted(MOCAP.glob(pattern)), 4)) == []

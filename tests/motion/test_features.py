@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from strategies import for_each
 
 from contextdb.errors import MotionError, QueryError, SchemaError
 from contextdb.motion import Channel, Clip, FeatureSchema, MotionConfig, Skeleton, poses_of, query_from, steady_path, with_path
@@ -136,7 +137,7 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize(("mapping", "message"), REFUSED.values(), ids=REFUSED)
+@for_each(REFUSED.values())
 def test_a_fault_of_a_schema_is_told_with_what_is_accepted(mapping, message):
     found = faults_of(mapping)
     assert len(found) == 1

@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from strategies import some
 
 import contextdb as cdb
 from contextdb.motion import (
@@ -65,7 +66,7 @@ def samples(tmp_path_factory: pytest.TempPathFactory) -> tuple[Mapping[str, Moti
     return build(config, folder, {"locomotion": table.leaves}, cache=None), table
 
 
-@pytest.mark.parametrize("speed_mps", [0.8, 1.0, 1.3, 1.6, 1.9, 2.2, 2.6, 3.5, 4.5])
+@pytest.mark.parametrize("speed_mps", some([0.8, 1.0, 1.3, 1.6, 1.9, 2.2, 2.6, 3.5, 4.5], 3))
 def test_on_the_samples_a_character_who_goes_straight_on_stays_in_his_clip(samples, speed_mps: float):
     databases, table = samples
     assert databases["loco"].biases == DEFAULTS
@@ -95,7 +96,7 @@ def captured() -> MotionDatabase:
     return MotionDatabase.build(clips, schema, mirror=True, biases=DEFAULTS, end_s=0.3)
 
 
-@pytest.mark.parametrize("speed_mps", [0.9, 1.0, 1.3, 1.5])
+@pytest.mark.parametrize("speed_mps", some([1.3, 0.9, 1.0, 1.5], 4))
 def test_on_captured_clips_a_character_who_walks_straight_on_jumps_less_than_once_a_second(captured, speed_mps: float):
     assert jumps_per_s(captured, speed_mps) < 1.0
 

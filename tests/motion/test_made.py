@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from strategies import for_each
 
 from contextdb.errors import MotionError
 from contextdb.motion import load_bvh, poses_of, root_trajectory, write_made_clips
@@ -65,7 +66,7 @@ def test_a_cycle_begins_with_the_left_foot_down_in_mid_stride_under_the_body(nam
     assert abs(ahead[2]) < 0.02
 
 
-@pytest.mark.parametrize("name", STEADY)
+@for_each(STEADY)
 def test_each_foot_comes_down_once_in_a_cycle_half_a_cycle_after_the_other(name):
     made = MADE[name]
     cycle_s = 1.0 / made.recipe.pace.cycles_per_s
@@ -75,7 +76,7 @@ def test_each_foot_comes_down_once_in_a_cycle_half_a_cycle_after_the_other(name)
     assert np.allclose(right[:, 1] - right[:, 0], cycle_s * made.recipe.pace.duty, atol=2e-3)
 
 
-@pytest.mark.parametrize("name", STEADY)
+@for_each(STEADY)
 def test_a_steady_clip_ends_in_the_pose_it_began_with(name):
     values = MADE[name].clip.values[:, 4:]
     turned = MADE[name].recipe.turn_dps * MADE[name].clip.duration_s
@@ -83,7 +84,7 @@ def test_a_steady_clip_ends_in_the_pose_it_began_with(name):
     assert np.allclose(values[0], values[-1], atol=0.01)  # degrees
 
 
-@pytest.mark.parametrize("name", STEADY)
+@for_each(STEADY)
 def test_a_walk_always_has_a_foot_down_and_a_run_has_moments_without(name):
     falls = MADE[name].footfalls
     times = np.linspace(0.0, falls.duration_s, 1000)
@@ -109,7 +110,7 @@ def test_starts_and_stops_stand_still_with_both_feet_down(change):
         assert all(made.footfalls.is_down(foot, time_s) for foot in FEET)
 
 
-@pytest.mark.parametrize("name", STEADY)
+@for_each(STEADY)
 def test_each_cycle_of_a_steady_clip_ends_as_it_began(name):
     assert Cycle.of(MADE[name].clip, most_m=0.01, most_deg=2.0).speed_mps > 0.0
 

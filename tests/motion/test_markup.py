@@ -7,6 +7,7 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from strategies import for_each
 
 from contextdb.errors import FileError, MotionError
 from contextdb.motion.markup.markup import MOST_FAULTS, Markup
@@ -176,8 +177,7 @@ def test_wrong_quotes_spoil_their_own_line_alone():
     assert "continues after its closing quote" in told[1]
 
 
-@pytest.mark.parametrize(
-    ("line", "column", "said", "mend"),
+@for_each(
     [
         ("jog,Move,abc,,", "from", '"abc" is not a finite number', ""),
         ("jog,Move,nan,,", "from", '"nan" is not a finite number', ""),
@@ -202,7 +202,7 @@ def test_wrong_quotes_spoil_their_own_line_alone():
         ("jog,,1,,", "tag", "there is no tag", ""),
         ("jog,Bad Name,,,", "tag", '"Bad Name" cannot be the name of a tag', 'Did you mean "Bad_Name"?'),
         ("jog,Move..Run,,,", "tag", '"Move..Run" cannot be the name of a tag', 'Did you mean "Move.Run"?'),
-    ],
+    ]
 )
 def test_a_fault_names_its_column_what_was_found_and_the_mend(line, column, said, mend):
     told = fault(line)
@@ -214,8 +214,7 @@ def test_a_first_time_of_zero_may_have_a_sign():
     assert spans("jog,Move,-0,0,") == (Span("jog", "Move", 0.0, 0.0),)
 
 
-@pytest.mark.parametrize(
-    ("name", "meant"),
+@for_each(
     [
         ("Do Not Choose", "DoNotChoose"),
         ("do_not_choose", "DoNotChoose"),
@@ -240,7 +239,7 @@ def test_a_first_time_of_zero_may_have_a_sign():
         ("Loopign", "Looping"),
         ("Exculded", "Excluded"),
         ("Loop", "Looping"),
-    ],
+    ]
 )
 def test_a_misspelt_reserved_tag_does_not_become_a_plain_one(name, meant):
     told = fault(f"jog,{name},,,")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 
 import pytest
+from strategies import for_each
 
 from contextdb.errors import ClipError, MotionError, SchemaError
 from contextdb.motion import MotionConfig, PoseSettings, query_from, steady_path, write_bvh
@@ -227,7 +228,7 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize(("path", "value", "message"), REFUSED.values(), ids=REFUSED)
+@for_each(REFUSED.values())
 def test_a_fault_is_told_with_what_is_accepted(path, value, message):
     with pytest.raises(SchemaError) as error:
         MotionConfig.from_dict(with_change(path, value), tables=["locomotion"], file="contextdb.toml")

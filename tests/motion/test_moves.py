@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from strategies import for_each
 
 from contextdb.motion import poses_of, root_trajectory, steady_path
 from contextdb.motion.clips.mirror import mirrored_path
@@ -74,7 +75,7 @@ def test_a_body_that_stands_is_in_no_bin_of_directions():
     assert bins_of(root_of(0.0), DIRECTION) == {}
 
 
-@pytest.mark.parametrize("name", [name for name, recipe in RECIPES.items() if recipe.change == "steady"])
+@for_each([name for name, recipe in RECIPES.items() if recipe.change == "steady"])
 def test_a_made_clip_is_in_the_bin_of_its_recipe(name: str):
     recipe = RECIPES[name]
     path = root_trajectory(poses_of(make_clip(name).clip, RATE))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from strategies import for_each
 
 from contextdb.motion import FeatureSchema, MotionDatabase, query_from
 from contextdb.motion.features.extraction import features_of
@@ -63,8 +64,7 @@ EVERY_KIND = (
 )
 
 
-@pytest.mark.parametrize("channel", EVERY_KIND, ids=lambda channel: channel.name)
-@pytest.mark.parametrize("times_the_floor", [0.0, 0.5, 0.999, 1.001, 3.0])
+@for_each(EVERY_KIND, [0.0, 0.5, 0.999, 1.001, 3.0])
 def test_a_scale_is_what_the_features_vary_by_and_at_least_the_floor_of_their_kind(channel, times_the_floor):
     schema = FeatureSchema("test", 30.0, (channel,))
     floor, unit = floor_of(channel)

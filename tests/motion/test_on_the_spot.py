@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from running import run
+from strategies import for_each, some
 
 from contextdb import motion
 from contextdb.motion.clips import quaternions
@@ -35,7 +36,7 @@ def taken_out(clip: motion.Clip) -> tuple[motion.Clip, motion.Trajectory]:
     return motion.Clip.from_arrays(body.names, body.parents, offsets, turns, places, clip.rate, name=clip.name), path
 
 
-@pytest.mark.parametrize("name", MOVING)
+@for_each(MOVING)
 def test_feet_give_back_the_motion_that_was_taken_out(name: str):
     clip = make_clip(name).clip
     spot, path = taken_out(clip)
@@ -69,7 +70,7 @@ def test_a_change_of_speed_comes_when_it_came(name: str):
     assert speeds[still].mean() < 0.15 * real.max()
 
 
-@pytest.mark.parametrize("name", RECIPES)
+@for_each(RECIPES)
 def test_clips_that_stand_or_move_along_are_not_on_the_spot(name: str):
     clip = make_clip(name).clip
     assert ground_motion(clip) is None
@@ -121,7 +122,7 @@ def _in_metres(clip: motion.Clip) -> np.ndarray:
 
 @pytest.mark.skipif(not (MOCAP / "assets.csv").is_file(), reason="no captured clips: set CONTEXTDB_MOCAP to their folder")
 def test_captured_clips_give_no_false_alarm():
-    files = sorted(MOCAP.rglob("*.bvh"))
+    files = some(sorted(MOCAP.rglob("*.bvh")), 4)
     units = [0.056444 if "cmu" in str(file) else 0.01 for file in files]
     clips = (motion.load_bvh(file, metres_per_unit=unit) for file, unit in zip(files, units, strict=True))
     assert [clip.name for clip in clips if ground_motion(clip) is not None] == []

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from played import bank
+from strategies import for_each
 
 from contextdb import core
 from contextdb.motion import PoseSettings
@@ -148,8 +149,7 @@ def written(positions, now=0, feature=(0, 0, 3)):
     return query
 
 
-@pytest.mark.parametrize(
-    "wrong",
+@for_each(
     [
         lambda p, w, r: core.place_joints(RIG.parents + 1, p, r, np.zeros(3), p, w),
         lambda p, w, r: core.place_joints(RIG.parents, p, r, np.zeros(2), p, w),
@@ -172,7 +172,7 @@ def written(positions, now=0, feature=(0, 0, 3)):
         lambda p, w, r: core.Poses.__new__(core.Poses).begin(np.zeros(3)),
         lambda p, w, r: frames().sample(99, 0.0, r, p, p, p, np.zeros(6)),
         lambda p, w, r: frames().accelerations(0, *bank().joints, 10**9, np.zeros(3)),
-    ],
+    ]
 )
 def test_parts_by_themselves_refuse_joints_that_are_not_there(wrong):
     positions, world, rotations = np.zeros((RIG.n_joints, 3)), np.zeros((RIG.n_joints, 4)), np.ones((RIG.n_joints, 4))

@@ -6,13 +6,12 @@ import math
 import os
 import platform
 import struct
-import subprocess
 from decimal import Decimal, localcontext
 from pathlib import Path
 
 import numpy as np
 import pytest
-from c_compilers import PROGRAMS, all_compilers, ran
+from c_compilers import PROGRAMS, all_compilers, compiled, ran, sanitizers, variants
 from played import bank, decisions
 from test_output_ground import slope
 from test_same_bits import has_avx2
@@ -22,28 +21,17 @@ from contextdb.motion.output import pipeline as pipelines
 
 CORE = Path(pipelines.__file__).parents[2] / "core"
 WIDE = [("-O3", "-mavx2")] if platform.machine() in ("x86_64", "AMD64") and has_avx2() else []
-OPTIONS = [("-O0",), ("-O3",), *WIDE, ("-O1", "-fsanitize=undefined,address", "-fno-sanitize-recover=all")]
 pytestmark = pytest.mark.skipif(os.name == "nt" or not all_compilers(), reason="no gcc or clang was found")
 
 
-def compiled(folder, cc, options):
-    program = folder / "poses"
-    line = [*cc, "-std=c99", "-ffp-contract=off", *options, f"-I{CORE}", str(PROGRAMS / "poses.c"), "-lm", "-o", str(program)]
-    done = subprocess.run(line, capture_output=True, text=True)
-    if done.returncode and "sanitize" in " ".join(options):
-        return None
-    assert done.returncode == 0, done.stderr
-    return program
-
-
 def results(folder, mode, given):
-    """What each compiler gives, with little optimisation, much, and under its sanitizers."""
+    """What each compiler gives, with little optimisation, much, and under sanitizers."""
     (folder / "in").write_bytes(given)
-    for cc in all_compilers():
-        for options in OPTIONS:
-            if program := compiled(folder, cc, options):
-                ran(program, mode, folder / "in", folder / "out")
-                yield (folder / "out").read_bytes()
+    first = all_compilers()[0]
+    for command in variants(("-O0",), ("-O3",), *WIDE) + [(*first, *own) for own in [sanitizers(*first)] if own]:
+        program = compiled([*command, "-std=c99", "-ffp-contract=off"], PROGRAMS / "poses.c", folder / "poses", CORE, "-lm")
+        ran(program, mode, folder / "in", folder / "out")
+        yield (folder / "out").read_bytes()
 
 
 # ---- functions

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from strategies import for_each
 
 from contextdb.motion import FeatureSchema, PoseBank, poses_of, root_trajectory
 from contextdb.motion.clips.mirror import mirrored
@@ -52,7 +53,7 @@ def frames_of_movement(positions):
     return moving[[0, -1]] if len(moving) else np.zeros(2)
 
 
-@pytest.mark.parametrize("name", STRAIGHT)
+@for_each(STRAIGHT)
 def test_a_straight_path_comes_back_within_a_centimetre_and_a_degree_and_starts_and_stops_within_a_frame(name):
     poses, (places, headings, _, _) = swaying(name), way_of(name)
     path = SMOOTH.path_of(poses)

@@ -169,7 +169,7 @@ def test_how_a_row_plays_is_in_the_state_and_in_the_session(tmp_path):
     driven(one, 30)
     other, state = character(moves(play_rate="0.9..1.1", blend_s="0.4")), pickle.loads(pickle.dumps(one.state))
     other.restore(state)
-    assert state.controller.play == RowPlay(blend_s=0.4, min_rate=0.9, max_rate=1.1)
+    assert other.controller.state.play == RowPlay(blend_s=0.4, min_rate=0.9, max_rate=1.1)
     for left, right in zip(driven(one, 60, 30), driven(other, 60, 30), strict=True):
         np.testing.assert_array_equal(left.pose.positions, right.pose.positions)
     trace.save(tmp_path / "session.parquet")

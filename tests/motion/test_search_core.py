@@ -4,13 +4,12 @@ more work than it needs."""
 from __future__ import annotations
 
 import os
-import subprocess
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from c_compilers import PROGRAMS, SANITIZED, STRICT, all_compilers, c_compiler, ran, sanitizers
+from c_compilers import PROGRAMS, SANITIZED, STRICT, c_compiler, compiled, ran, sanitizers, variants
 from hypothesis import HealthCheck, given, seed, settings
 from hypothesis import strategies as st
 from strategies import IS_FULL
@@ -102,29 +101,16 @@ def cases(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, bytes]:
 
 
 def program(folder: Path, name: str, *command: str) -> Path:
-    target = folder / name
-    line = [
-        *command,
-        "-std=c99",
-        "-ffp-contract=off",
-        *STRICT,
-        "-Wno-unused-function",
-        f"-I{CORE}",
-        str(PROGRAMS / "search.c"),
-        "-lm",
-    ]
-    done = subprocess.run([*line, "-o", str(target)], capture_output=True, text=True)
-    assert (done.returncode, done.stderr) == (0, "")
-    return target
+    options = ["-std=c99", "-ffp-contract=off", *STRICT, "-Wno-unused-function"]
+    return compiled([*command, *options], PROGRAMS / "search.c", folder / name, CORE, "-lm")
 
 
 def test_all_compilers_and_widths_of_registers_give_the_same_costs_and_frames(cases: tuple[Path, bytes], tmp_path: Path):
     file, expected = cases
-    counts = set()
-    for number, compiler in enumerate(all_compilers()):
-        for place, options in enumerate([("-O0",), ("-O3",), ("-O3", "-DCDBM_NARROW"), ("-O0", "-DCDBM_NARROW")]):
-            counts.add(ran(program(tmp_path, f"search{number}_{place}", *compiler, *options), file, tmp_path / "out"))
-            assert (tmp_path / "out").read_bytes() == expected, (compiler, options)
+    counts, narrow = set(), "-DCDBM_NARROW"
+    for number, command in enumerate(variants(("-O0",), ("-O3", narrow), ("-O3",), ("-O0", narrow))):
+        counts.add(ran(program(tmp_path, f"search{number}", *command), file, tmp_path / "out"))
+        assert (tmp_path / "out").read_bytes() == expected, command
     assert len(counts) == 1, "the same boxes are looked at, whatever the compiler"
 
 
@@ -133,7 +119,7 @@ def test_sanitizers_find_no_byte_read_outside_of_an_array(cases: tuple[Path, byt
     if compiler is None or not sanitizers(compiler):
         pytest.skip("no compiler with sanitizers was found")
     for name, options in (("wide", ()), ("narrow", ("-DCDBM_NARROW",))):
-        ran(program(tmp_path, name, compiler, "-O1", *SANITIZED, *options), cases[0], tmp_path / "out")
+        ran(program(tmp_path, name, compiler, *SANITIZED, *options), cases[0], tmp_path / "out")
         assert (tmp_path / "out").read_bytes() == cases[1]
 
 

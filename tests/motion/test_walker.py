@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 from itertools import pairwise, product
 
 import numpy as np
@@ -27,15 +28,18 @@ HIPS = RIG.index("Hips")
 LEGS = [[RIG.index(side + name) for name in ("UpLeg", "Leg", "Foot")] for side in ("Left", "Right")]
 
 
+@cache
 def straight(speed):
     return lambda t: (0.0, speed * t, 0.0)
 
 
+@cache
 def circle(speed, turn):
     radius = speed / turn
     return lambda t: (radius * (1.0 - math.cos(turn * t)), radius * math.sin(turn * t), turn * t)
 
 
+@cache
 def strafe(speed):
     return lambda t: (speed * math.sin(0.5) * t, speed * math.cos(0.5) * t, 0.0)
 
@@ -47,6 +51,7 @@ def ramp(t):
     return 0.0, up + 0.3 * up * up + 4.0 * down - 0.3 * down * down, 0.0
 
 
+@cache
 def walked(way, seconds=3.0, ground=None, adjust=None, gaits=None, dt=DT):
     walker = Walker(gaits or [walk(), run()])
     poses, steps, phases = [], [], []
@@ -112,7 +117,7 @@ def test_on_flat_ground_and_a_straight_way_nothing_is_changed(name, ground):
     own = cycle(name)
     gait = Gait("only", [own])
     dt = own.duration_s / len(own.rotations)  # from moment to moment of the cycle
-    poses, _, phases = walked(straight(own.speed_mps), ground=ground, gaits=[gait], dt=dt)
+    poses, _, phases = walked(straight(own.speed_mps), ground=ground, gaits=(gait,), dt=dt)
     for pose, phase in zip(poses, phases, strict=True):
         rotations, positions = own.at(phase)
         turned = quaternions.rotation_vectors(quaternions.multiply(rotations, quaternions.inverse(pose.rotations)))
@@ -141,7 +146,7 @@ def test_flat_ground_is_no_ground():
         np.testing.assert_array_equal(one.positions, other.positions)
 
 
-@pytest.mark.parametrize("speed", [1.3, 1.55, 1.8, 2.6, 3.2, 4.5])
+@pytest.mark.parametrize("speed", some([1.3, 1.55, 1.8, 2.6, 3.2, 4.5]))
 def test_feet_that_are_down_stand_still(speed):
     poses, _, _ = walked(straight(speed))
     toes = np.array([pose.positions[TOES] for pose in poses])[30:]
@@ -251,7 +256,7 @@ def test_feet_that_are_down_are_on_the_ground(ground, apart):
 
 @pytest.mark.parametrize(
     ("way", "ground"),
-    some(product([straight(1.4), circle(1.4, 0.8), strafe(1.4), straight(3.0), ramp], [None, slope, stairs]), 4),
+    some(product([straight(1.4), circle(1.4, 0.8), strafe(1.4), straight(3.0), ramp], [None, slope, stairs]), 8),
 )
 def test_hips_and_knees_have_no_step_and_bones_keep_their_lengths(way, ground):
     seconds = 2.5

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from strategies import for_each
 
 from contextdb.errors import ContextError
 from contextdb.motion import Clip, MotionError
@@ -50,8 +51,7 @@ def test_a_movement_seen_from_a_place_on_the_body_is_the_same_movement(movement,
 # ---- cycles
 
 
-@pytest.mark.parametrize("name", STEADY)
-@pytest.mark.parametrize("is_given", [True, False])
+@for_each(STEADY, [True, False])
 def test_a_made_clip_gives_its_speed_cadence_and_turn(name, is_given):
     made = make_clip(name)
     cycle = Cycle.of(made.clip, footfalls=made.footfalls if is_given else None)

@@ -10,6 +10,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from strategies import for_each
 
 from contextdb import report
 from contextdb.checks.rules import RULES, TABLE_RULES
@@ -101,7 +102,7 @@ def test_every_rule_of_a_check_carries_its_own_help():
     assert set(TABLE_RULES) < set(RULES)
 
 
-@pytest.mark.parametrize("rule", RULES)
+@for_each(RULES)
 def test_a_rule_is_reported_by_the_modules_that_the_catalogue_names_and_by_no_other(rule: str):
     assert RULES[rule].modules == tuple(module for module, rules in modules().items() if rule in rules)
 
@@ -110,7 +111,7 @@ def test_no_rule_has_two_sections():
     assert len(re.findall(r"^### ", PAGE, re.M)) == len(SECTIONS)
 
 
-@pytest.mark.parametrize("rule", RULES)
+@for_each(RULES)
 def test_a_section_and_the_help_of_a_report_agree(rule: str):
     words = " ".join(SECTIONS[rule].replace("`", "").split())
     assert RULES[rule].summary.rstrip(".").replace("`", "") in words
@@ -119,7 +120,7 @@ def test_a_section_and_the_help_of_a_report_agree(rule: str):
         assert f"*{RULES[rule].level}*" in words
 
 
-@pytest.mark.parametrize("rule", SECTIONS)
+@for_each(SECTIONS)
 def test_every_section_tells_the_fix(rule: str):
     assert re.search(r"^Fix: ", SECTIONS[rule], re.M)
 

@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 import polars as pl
 import pytest
 from running import run
-from strategies import IS_FULL
+from strategies import in_full_runs
 
 from contextdb.disk.engines import EngineError
 from contextdb.tables.table import Table
@@ -60,6 +60,7 @@ def test_a_worker_killed_half_way_changes_no_sum(recorded, cluster):
     assert found.moments == 5000 * N_FILES
 
 
+@in_full_runs
 def test_files_that_kill_every_worker_are_named(recorded, cluster, monkeypatch):
     monkeypatch.setattr("contextdb.disk.engines._run", die)
     with pytest.raises(EngineError, match=r"could not be finished: .*00\.parquet"):
@@ -134,7 +135,7 @@ def test_evaluate_names_the_faults_of_every_file_and_writes_nothing(recorded, cl
     assert not list(recorded.glob("*answers*"))
 
 
-@pytest.mark.skipif(not IS_FULL, reason="with EXAMPLES=full: two workers are started for it")
+@in_full_runs
 def test_evaluate_that_kills_every_worker_names_the_files(recorded, cluster, table_file, monkeypatch):
     monkeypatch.setattr("contextdb.disk.engines._run", die)
     told = ("evaluate", table_file, str(recorded / "00.parquet"), "--out", str(recorded / "answers.csv"))
@@ -145,7 +146,7 @@ def test_evaluate_that_kills_every_worker_names_the_files(recorded, cluster, tab
     assert not list(recorded.glob("*answers*")) + list(recorded.glob(".contextdb-*"))
 
 
-@pytest.mark.skipif(not IS_FULL, reason="with EXAMPLES=full: two workers are started for it")
+@in_full_runs
 def test_an_opened_artefact_is_asked_on_workers_too(recorded, cluster, table_file):
     artefact = str(recorded / "t.safetensors")
     assert run("compile", table_file, "-o", artefact).code == 0

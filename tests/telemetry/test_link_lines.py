@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from strategies import for_each
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
@@ -95,8 +96,7 @@ def test_what_is_no_fact_is_refused(sent: object):
 ASK = {"line": "ask", "t": 1, "who": None, "table": "x", "facts": {}, "rows": "0", "valid": 0}
 
 
-@pytest.mark.parametrize(
-    ("raw", "why"),
+@for_each(
     [
         (b"", "not JSON"),
         (b"{", "not JSON"),
@@ -116,7 +116,7 @@ ASK = {"line": "ask", "t": 1, "who": None, "table": "x", "facts": {}, "rows": "0
         (json.dumps(ASK | {"actors": 3}).encode(), '"actors" is no object of lists of objects'),
         (json.dumps(ASK | {"actors": {"A": 3}}).encode(), '"actors" is no object of lists of objects'),
         (json.dumps(ASK | {"actors": {"A": [3]}}).encode(), '"actors" is no object of lists of objects'),
-    ],
+    ]
 )
 def test_what_is_no_line_is_refused_with_why(raw: bytes, why: str):
     with pytest.raises(ValueError, match=why):

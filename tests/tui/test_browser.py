@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from strategies import in_full_runs
 from warm_start import python
 
 pytest.importorskip("textual_serve")  # of the extra `browser`
@@ -85,6 +86,7 @@ def test_keys_pastes_and_colours_arrive_as_in_a_terminal(folder: Path) -> None:
     in_browser(folder, script)
 
 
+@in_full_runs
 @needs_browser
 def test_a_second_window_follows_the_first_and_has_the_keyboard_when_that_is_closed(folder: Path) -> None:
     async def script(browser: Browser, address: str, process: subprocess.Popen[str]) -> None:
@@ -115,6 +117,7 @@ def test_a_second_window_follows_the_first_and_has_the_keyboard_when_that_is_clo
     in_browser(folder, script)
 
 
+@in_full_runs
 @needs_browser
 def test_with_read_only_nothing_is_edited_or_written(folder: Path) -> None:
     before = {path.name for path in folder.iterdir()}
@@ -133,6 +136,7 @@ def test_with_read_only_nothing_is_edited_or_written(folder: Path) -> None:
     assert {path.name for path in folder.iterdir()} - before == {"profile"}
 
 
+@in_full_runs
 def test_unsaved_edits_are_there_again_after_the_server_is_interrupted(folder: Path) -> None:
     async def edit() -> None:
         async with window(folder) as socket:

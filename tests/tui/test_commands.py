@@ -8,7 +8,7 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
-from strategies import IS_FULL
+from strategies import IS_FULL, for_each
 from terminal import press, screen_text, settled, with_editor
 
 from tui.app import EditorApp
@@ -56,7 +56,7 @@ def test_no_two_commands_have_one_key():
     assert [key for key, n in taken.items() if n > 1] == []
 
 
-@pytest.mark.parametrize("command", COMMANDS, ids=lambda c: c.id)
+@for_each(COMMANDS)
 def test_every_key_is_one_that_there_is(command):
     for key in keys_of(command):
         *modifiers, last = key.split("+")
@@ -64,19 +64,19 @@ def test_every_key_is_one_that_there_is(command):
         assert len(last) == 1 or last in _KEYS
 
 
-@pytest.mark.parametrize("command", COMMANDS, ids=lambda c: c.id)
+@for_each(COMMANDS)
 def test_no_command_has_only_keys_that_terminals_cannot_send(command):
     assert not keys_of(command) or set(keys_of(command)) - UNSENDABLE
 
 
-@pytest.mark.parametrize("command", COMMANDS, ids=lambda c: c.id)
+@for_each(COMMANDS)
 def test_a_command_can_be_found_by_key_palette_or_both_and_says_what_it_does(command):
     assert command.keys or command.is_listed
     assert re.fullmatch(r"[A-Z0-9].*\.", command.about)
     assert len(command.label) <= 16
 
 
-@pytest.mark.parametrize("command", COMMANDS, ids=lambda c: c.id)
+@for_each(COMMANDS)
 def test_the_action_of_a_command_is_there_where_it_runs(command):
     if command.verb is not None:
         assert command.scope == "grid"

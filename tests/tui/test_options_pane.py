@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from strategies import for_each
 from terminal import drive, screen_text
 from textual.app import App, ComposeResult
 from textual.widgets import Input, Select
@@ -257,7 +258,7 @@ def test_names_are_read_with_spaces_commas_and_quotes():
 CONDITIONS = load(TABLES / "locomotion.csv").schema.conditions
 
 
-@pytest.mark.parametrize("name", CONDITIONS)
+@for_each(CONDITIONS)
 def test_a_form_says_again_what_its_condition_says(name: str):
     form = ConditionForm.of(CONDITIONS[name])
     said, wrong = form.declared()

@@ -23,7 +23,7 @@ from tui.model.watched import digest_of
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="SIGKILL and fork are of POSIX systems")
 
-N_KILLS = 100 if IS_FULL else 25
+N_KILLS = 100 if IS_FULL else 8
 HERE = Path(__file__).parent
 
 

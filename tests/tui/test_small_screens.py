@@ -42,7 +42,7 @@ def path(tmp_path: Path) -> Path:
     return Path(shutil.copytree(TABLES, tmp_path / "tables", ignore=shutil.ignore_patterns("clips", ".*"))) / "hit_mid_air.csv"
 
 
-@pytest.mark.parametrize("scene", some(SCENES))
+@pytest.mark.parametrize("scene", some(SCENES, 3))
 def test_a_screen_that_is_made_smaller_and_larger_stays_what_it_is(path, scene):
     async def script(app, pilot):
         await press(pilot, *SCENES[scene])
@@ -107,7 +107,7 @@ def test_a_cell_is_edited_in_a_terminal_of_20_columns_and_8_lines(path):
     assert with_editor(path, script, (20, 8)) == "True"
 
 
-@pytest.mark.parametrize("command", ["contexts", "import", "export", "actors"])
+@pytest.mark.parametrize("command", some(["actors", "contexts", "import", "export"], 4))
 def test_a_dialog_with_few_lines_is_no_higher_than_they_need(path, command):
     async def script(app, pilot):
         await app.main.run_command(command)

@@ -18,6 +18,7 @@ from pathlib import Path
 
 import pytest
 from motion_project import session_folder
+from strategies import in_full_runs, some
 from textual.binding import Binding
 
 from tui.commands import COMMANDS
@@ -166,6 +167,7 @@ def test_quitting_with_unsaved_edits_asks_and_saves(terminal):
     assert (terminal.folder / "t.csv").read_bytes() == RAW.replace(b"clip_00", b"first")
 
 
+@in_full_runs  # tests/tui/test_conflicts.py every day
 def test_two_editors_of_one_table_lose_nothing_of_what_was_saved_and_each_is_told(terminal, other_terminal):
     terminal.start("screen-256color")
     terminal.wait("clip_00", "F2 Edit")
@@ -321,7 +323,7 @@ def test_the_debugger_works_in_a_real_terminal(terminal):
 # ---- a cell that is edited
 
 
-@pytest.mark.parametrize("size", [(80, 24), (120, 36), (160, 48)], ids=lambda size: f"{size[0]}x{size[1]}")
+@pytest.mark.parametrize("size", some([(80, 24), (120, 36), (160, 48)], 3), ids=lambda size: f"{size[0]}x{size[1]}")
 def test_what_is_typed_goes_to_the_tab_or_the_bar_that_was_opened_over_a_cell(terminal, size):
     terminal.start("screen-256color")
     terminal.resize(*size)

@@ -88,7 +88,6 @@ class Desk:
         self._linger: asyncio.TimerHandle | None = None
 
     def app(self) -> web.Application:
-        """What answers at the addresses."""
         app = web.Application()
         at = f"/{self._token}"
         app.add_routes(
@@ -103,13 +102,8 @@ class Desk:
         return app
 
     async def serve(self, host: str, port: int, ready: Callable[[str], None]) -> int:
-        """Answer until the editor is left; gives its exit code. `ready` is called with the address.
-
-        Raises
-        ------
-        PortError
-            Another program listens there, or it is no address of this machine.
-        """
+        """Answer until the editor is left; gives its exit code. `ready` is called with the address. Raises PortError where another
+        program listens there, or it is no address of this machine."""
         runner = web.AppRunner(self.app(), handle_signals=False, access_log=None)
         await runner.setup()
         try:

@@ -68,7 +68,6 @@ class Bars(CursorLines):
 
     @property
     def row(self) -> Row | None:
-        """The asset under the cursor."""
         return self.rows[self.at] if self.rows else None
 
     def show(self, landscape: Landscape, rows: list[Row], note: str) -> None:
@@ -83,11 +82,9 @@ class Bars(CursorLines):
 
     @property
     def n_lines(self) -> int:
-        """A line for each asset."""
         return len(self.rows)
 
     def moved(self) -> None:
-        """Say which asset it is."""
         self.post_message(self.Moved(self.row))
 
     def on_mouse_scroll_up(self) -> None:
@@ -104,7 +101,6 @@ class Bars(CursorLines):
         return min(max(LEAST_NAME, longest), MOST_NAME, max(LEAST_NAME, self.size.width * 2 // 5))
 
     def render_line(self, y: int) -> Strip:
-        """One line of the screen."""
         width = self.size.width
         if y == 0:
             head = f"  {fitted('asset', self._name_width)} {'best':>{COST}} every frame: tall is cheap"

@@ -83,7 +83,6 @@ class Channels(CursorLines):
 
     @property
     def n_lines(self) -> int:
-        """A line for each number."""
         return len(self.dials)
 
     def clicked(self, x: int) -> None:
@@ -105,7 +104,6 @@ class Channels(CursorLines):
         return max(LEAST_NAME, min(longest, room))
 
     def render_line(self, y: int) -> Strip:
-        """One line of the screen."""
         width, name_width = self.size.width, self._name_width
         if y == 0:
             heads = "".join(f" {text:>{COST}}" for text in ("chosen", "plays on", "at cursor")[: self._n_costs])

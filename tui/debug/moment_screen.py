@@ -170,7 +170,6 @@ class MomentScreen(Screen[None]):
         self._show_reasons()
 
     def action_pane(self, by: int) -> None:
-        """Give another pane the focus."""
         self._pane = PANES[(PANES.index(self._pane) + by) % len(PANES)]
         self._arrange()
         self.query_one(f"#{self._pane}").focus()
@@ -187,7 +186,6 @@ class MomentScreen(Screen[None]):
     # ---- display of a moment
 
     def _show(self) -> None:
-        """Show the moment in all panes."""
         moment = self.moment
         if moment is None:
             return
@@ -336,7 +334,6 @@ class MomentScreen(Screen[None]):
         self._show_rest()
 
     def action_order(self) -> None:
-        """Order assets otherwise."""
         self.order = ORDERS[(ORDERS.index(self.order) + 1) % len(ORDERS)]
         self._show_bars()
         self._show_rest()
@@ -373,7 +370,6 @@ class MomentScreen(Screen[None]):
     # ---- messages
 
     def say(self, text: str, is_error: bool = False) -> None:
-        """Say something over the foot."""
         self.message = text
         line = self.query_one("#message", Static)
         line.update(Text(printable(text), style="bold" if is_error else ""))

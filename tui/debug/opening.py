@@ -26,13 +26,8 @@ def measures_of(path: Path) -> tuple[float, Figures]:
 
 
 def opened(path: Path, folder: Path) -> Recording:
-    """A session with the databases of a project.
-
-    Raises
-    ------
-    ContextDBError
-        It is no session, or has no decision. What else is wrong, such as databases that are gone, `Recording.missing` says.
-    """
+    """A session with the databases of a project. Raises ContextDBError where it is no session, or has no decision. What else is
+    wrong, such as databases that are gone, `Recording.missing` says."""
     trace = Trace.load(path)
     if not len(trace):
         raise MotionError(Fault("the session has no decision.", "one with at least an update", place=Place(str(path))))

@@ -154,7 +154,6 @@ class Recording:
 
     @property
     def name(self) -> str:
-        """The file's own name."""
         return os.path.basename(self.file)
 
     def __len__(self) -> int:

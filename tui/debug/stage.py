@@ -81,7 +81,6 @@ class Stage(Widget, can_focus=True):
         self.refresh()
 
     def on_resize(self) -> None:
-        """Draw anew."""
         self._changed()
 
     def action_tilt(self, up: int) -> None:
@@ -148,12 +147,10 @@ class Stage(Widget, can_focus=True):
     # ---- mouse
 
     def on_mouse_down(self, event: events.MouseDown) -> None:
-        """Begin to turn the view."""
         self._drag = (event.x, event.y)
         self.capture_mouse()
 
     def on_mouse_move(self, event: events.MouseMove) -> None:
-        """Turn it with the mouse."""
         if self._drag is not None:
             x, y = self._drag
             self._drag = (event.x, event.y)

@@ -108,7 +108,6 @@ class Timeline(Widget):
         self.refresh()
 
     def add_strips(self, strips: Mapping[str, Floats]) -> None:
-        """More measures."""
         self.strips.update({name: strips[name] for name in TITLES if name in strips})
         self.refresh(layout=True)
 
@@ -177,7 +176,6 @@ class Timeline(Widget):
     # ---- painting
 
     def render_line(self, y: int) -> Strip:
-        """One line of the screen."""
         first, stop = self._window()
         edges = self._edges(0, len(self.recording)) if y == 0 else self._edges(first, stop)
         names = self.visible_strips

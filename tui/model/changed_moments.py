@@ -53,20 +53,15 @@ def recordings_near(folder: Path) -> list[Path]:
 
 
 def changed_moments(before: Table, after: Table, folder: Path) -> Changes:
-    """Ask two versions of a table in its saved contexts and in the recordings near it.
-
-    Raises
-    ------
-    TableError, FileError
-        A version cannot be used, or the saved contexts cannot be read.
-    """
-    asked = _Asked(before, after)
+    """Ask two versions of a table in its saved contexts and in the recordings near it. Raises TableError or FileError where a
+    version cannot be used, or the saved contexts cannot be read."""
+    versions = _Asked(before, after)
     cases = read_cases(cases_file(after)) if after.path is not None else []
-    of_cases = [moment for case in cases if (moment := asked.changed(case.name, case.facts)) is not None]
+    of_cases = [moment for case in cases if (moment := versions.changed(case.name, case.facts)) is not None]
     parts = [f"{len(of_cases):,} of {plural(len(cases), 'saved context')}"]
     of_files: list[ChangedMoment] = []
     if paths := recordings_near(folder):
-        comparison = Comparison(*asked.compiled, n_examples=MOST_LISTED)
+        comparison = Comparison(*versions.compiled, n_examples=MOST_LISTED)
         try:
             result = backtest(comparison, [str(path) for path in paths])
         except ContextDBError as error:
@@ -74,7 +69,7 @@ def changed_moments(before: Table, after: Table, folder: Path) -> Changes:
         else:
             parts.append(f"{result.changed:,} of {plural(result.moments, 'recorded moment')}")
             parts += [f"{plural(len(result.unread), 'recording')} cannot be read"] if result.unread else []
-            of_files = list(_of_examples(result.examples, asked))
+            of_files = list(_of_examples(result.examples, versions))
     return Changes((*of_cases, *of_files), f"{' and '.join(parts[:2])} play something else.{_rest(parts[2:])}")
 
 
@@ -115,10 +110,10 @@ class _Asked:
         return ChangedMoment(where, known, ", ".join(plays[0]), ", ".join(plays[1]))
 
 
-def _of_examples(examples: list[Example], asked: _Asked) -> Iterator[ChangedMoment]:
+def _of_examples(examples: list[Example], versions: _Asked) -> Iterator[ChangedMoment]:
     for example in examples:
         place = f"line {example.line}" if example.line is not None else f"row {example.row + 1}"
-        moment = asked.changed(f"{Path(example.file).name}, {place}", asked.texts(example.context))
+        moment = versions.changed(f"{Path(example.file).name}, {place}", versions.texts(example.context))
         if moment is not None:
             yield moment
 

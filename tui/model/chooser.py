@@ -103,7 +103,6 @@ class Chooser:
         return self.values.matching(text.strip(), (text,)) if text.strip() else ()
 
     def words(self, text: str) -> Words:
-        """The words of a text."""
         return take_apart(
             text, self.has_signs, self.values.known if self.is_fact and self._type is not None and self._type.needs_values else ()
         )

@@ -80,7 +80,6 @@ class Placed:
 
     @property
     def name(self) -> str:
-        """The name of the step."""
         n_rows, n_columns = self.block.shape
         return f"Paste {n_rows} × {n_columns}"
 

@@ -69,7 +69,6 @@ class ColumnRow:
 
     @property
     def name(self) -> str:
-        """The name of the column."""
         return self.texts[NAME].strip()
 
     @property
@@ -111,7 +110,6 @@ class ColumnSheet(RoomySheet):
         super().__init__(Table.from_columns(texts, settings=settings, name="columns"))
 
     def header(self, column: int) -> Header:
-        """What stands over a column."""
         name = self.table.columns[column].name
         return Header(name, HINTS[name])
 
@@ -141,13 +139,7 @@ class ColumnSheet(RoomySheet):
         return rows
 
     def edit(self) -> Edit:
-        """The edit of the table that the sheet was made of.
-
-        Raises
-        ------
-        Wrong
-            With the cell that is to be mended first.
-        """
+        """The edit of the table that the sheet was made of. Raises Wrong with the cell that is to be mended first."""
         return _edit(self.of, [row for row in self._rows if row.before is not None or any(map(str.strip, row.texts.values()))])
 
 
@@ -348,7 +340,6 @@ def _named(rows: Sequence[ColumnRow]) -> set[str]:
 
 
 def _name(rows: Sequence[ColumnRow], table: Table) -> str:
-    """The name of the step."""
     done = {
         "change": [row.name for row in rows if row.before is not None and dict(row.texts) != dict(row.first)],
         "add": [row.name for row in rows if row.before is None and row.job != DECLARED],

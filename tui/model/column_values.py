@@ -88,13 +88,8 @@ def replaced(table: Table, column: str, by: Mapping[str, str], name: str) -> Edi
 
 def renamed_value(sheet: DisplayedTable, column: int, old: str, new: str, keeps_old: bool = False) -> Edit:
     """The edit that renames a value in every cell of a column. A declared value is renamed where it is declared, too; `keeps_old`
-    leaves it there for others, and declares the new one beside it.
-
-    Raises
-    ------
-    TableError
-        A cell could not be read with the new name.
-    """
+    leaves it there for others, and declares the new one beside it. Raises TableError where a cell could not be read with the new
+    name."""
     table, condition, name = sheet.table, sheet.condition(column), sheet.table.columns[column].name
     values = condition.condition.domain.values if condition is not None else None
     what = f"Rename {safe_text(old)} to {safe_text(new)}"

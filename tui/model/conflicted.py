@@ -51,11 +51,6 @@ def sides_in(path: str | Path) -> tuple[str, str]:
 
 
 def write_decided(path: str | Path, decided: Merge[Table]) -> None:
-    """Write the file without marks; what is not decided is as ours has it.
-
-    Raises
-    ------
-    FileError
-        The disk refuses; the file is then as it was.
-    """
+    """Write the file without marks; what is not decided is as ours has it. Raises FileError where the disk refuses; the file is
+    then as it was."""
     write_atomic(path, merged_bytes(decided))

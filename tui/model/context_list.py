@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import reduce
-from operator import or_
 from pathlib import Path
 from typing import Protocol
 
@@ -37,6 +35,7 @@ from contextdb.disk import CASES_SUFFIX
 from contextdb.errors import CellError, ContextDBError, ContextError, Fault, Place, TableError, some
 from contextdb.tables.compiling import compile_table
 from contextdb.tables.other_files import cases_path
+from contextdb.tables.readable import unreadable_rows
 from contextdb.tables.table import Table
 from contextdb.telemetry.recordings import Recording, fact_text, open_recording
 
@@ -56,9 +55,7 @@ class Rows(Protocol):
 
     def __len__(self) -> int: ...
 
-    def name(self, i: int) -> str:
-        """What a context is called."""
-        ...
+    def name(self, i: int) -> str: ...
 
     def facts(self, i: int, conditions: Mapping[str, Condition]) -> dict[str, str]:
         """The facts of a context as texts, without those that are missing."""
@@ -80,11 +77,9 @@ class SavedRows:
         return len(self.cases)
 
     def name(self, i: int) -> str:
-        """The name of a case."""
         return self.cases[i].name
 
     def facts(self, i: int, conditions: Mapping[str, Condition]) -> dict[str, str]:
-        """The facts of a case."""
         facts = self.cases[i].facts
         return {name: facts[name] for name in conditions if name in facts}
 
@@ -111,7 +106,6 @@ class RecordedRows:
         return f"row {i + 1:,}"
 
     def facts(self, i: int, conditions: Mapping[str, Condition]) -> dict[str, str]:
-        """The facts of a row."""
         if not self.recording.facts:
             return {}
         values = zip(self.recording.facts, self._block(i // BLOCK).row(i % BLOCK), strict=True)
@@ -140,13 +134,8 @@ class ContextList:
 
     @classmethod
     def beside(cls, table: Table) -> ContextList:
-        """The cases of a table; none where there is no file of them yet.
-
-        Raises
-        ------
-        TableError, FileError
-            The file of cases cannot be read.
-        """
+        """The cases of a table; none where there is no file of them yet. Raises TableError or FileError where the file of cases
+        cannot be read."""
         return cls(table, SavedRows(cases_file(table)))
 
     @classmethod
@@ -156,13 +145,8 @@ class ContextList:
 
     @classmethod
     def open(cls, path: Path, table: Table) -> ContextList:
-        """The contexts of a file: cases (`*.cases.csv`) or a recording (`.csv`, `.parquet`, `.jsonl`).
-
-        Raises
-        ------
-        TableError, FileError
-            It cannot be read, or has no fact that the table asks for.
-        """
+        """The contexts of a file: cases (`*.cases.csv`) or a recording (`.csv`, `.parquet`, `.jsonl`). Raises TableError or
+        FileError where it cannot be read, or has no fact that the table asks for."""
         if path.name.lower().endswith(CASES_SUFFIX):
             return cls(table, SavedRows(path))
         names = list(wanted_by(table).given)
@@ -211,7 +195,6 @@ class ContextList:
         return "" if self.at is None else f"{self.rows.name(self.at)} ({self.at + 1:,} of {len(self):,})"
 
     def facts(self, i: int) -> dict[str, str]:
-        """The facts of a context as texts."""
         return self.rows.facts(i, self.conditions)
 
     # ---- what is expected
@@ -244,13 +227,8 @@ class ContextList:
 
     @property
     def compiled(self) -> tuple[CompiledData, int]:
-        """The table compiled, with those inside it, and its rows whose cells can all be read.
-
-        Raises
-        ------
-        TableError
-            A table inside it cannot be used.
-        """
+        """The table compiled, with those inside it, and its rows whose cells can all be read. Raises TableError where a table
+        inside it cannot be used."""
         if self._compiled is None:
             flat = self.table.flat()
             readable = readable_rows(self.table) if flat is self.table else (1 << flat.n_rows) - 1
@@ -266,13 +244,8 @@ class ContextList:
             return ()
 
     def valid_assets(self, facts: Mapping[str, str]) -> list[str]:
-        """The assets that are valid now, each once, in the order of the table.
-
-        Raises
-        ------
-        ContextError, TableError
-            A fact cannot be read; a table inside this one cannot be used.
-        """
+        """The assets that are valid now, each once, in the order of the table. Raises ContextError or TableError where a fact
+        cannot be read, or a table inside this one cannot be used."""
         compiled, readable = self.compiled
         known = {name: text for name, text in facts.items() if name in self.conditions}
         verdict = judge(compiled, Case("", known, NONE), readable)
@@ -296,12 +269,8 @@ class ContextList:
     def keep(self, name: str, facts: Mapping[str, str], expected: str, note: str = "") -> None:
         """Save a context, in the place of the one of its name: in the file of cases that this is, else in the table's own.
 
-        In a file of cases it is the current one then; a recording stays where it is.
-
-        Raises
-        ------
-        TableError, FileError, CellError, ContextError
-            The name is empty, what is expected cannot be read, or the file cannot be written.
+        In a file of cases it is the current one then; a recording stays where it is. Raises TableError, FileError, CellError or
+        ContextError where the name is empty, what is expected cannot be read, or the file cannot be written.
         """
         if not name.strip():
             raise TableError(Fault("the context has no name.", "a name, so that messages can say which one fails"))
@@ -350,10 +319,7 @@ def expectation_fault(text: str) -> Fault | None:
 
 def readable_rows(table: Table) -> int:
     """The rows whose cells can all be read, as bits."""
-    read = [(column.texts, column.faults) for column in table.conditions]
-    read += [(table.when.texts, table.when.faults)] if table.when is not None else []
-    broken = [np.isin(texts.codes, list(faults)) for texts, faults in read if faults]
-    return bitmask.to_int(bitmask.pack(~reduce(or_, broken, np.zeros(table.n_rows, np.bool_))))
+    return bitmask.to_int(bitmask.pack(~unreadable_rows(table)))
 
 
 def summary(facts: Mapping[str, str]) -> str:

@@ -133,7 +133,6 @@ class CoverageRun:
         return "" if failed is None else failed[1]
 
     def listen(self, listener: Callable[[], None]) -> None:
-        """Call this whenever something changes."""
         self._listeners.append(listener)
 
     def unlisten(self, listener: Callable[[], None]) -> None:

@@ -93,7 +93,6 @@ class DisplayedTable:
 
     @property
     def table(self) -> Table:
-        """The table as it is now."""
         return self.history.table
 
     @property
@@ -103,7 +102,6 @@ class DisplayedTable:
 
     @property
     def block(self) -> Block:
-        """The cells selected."""
         return self.selection.block(self.shape)
 
     @property
@@ -122,7 +120,6 @@ class DisplayedTable:
         return [self.table.columns[at].name for at in self.columns_of(self.block)]
 
     def text(self, row: int, column: int) -> str:
-        """The text of a cell."""
         return self.table.columns[column][int(self.view.rows[row])]
 
     def inherited(self, row: int, column: int) -> str:
@@ -147,7 +144,6 @@ class DisplayedTable:
         return int(self.view.rows[row]) + 1
 
     def fault(self, row: int, column: int) -> Fault | None:
-        """Why a cell cannot be read."""
         texts = self.table.columns[column]
         condition = self.condition(column)
         if condition is not None:
@@ -332,14 +328,12 @@ class DisplayedTable:
         return " · ".join(parts)
 
     def is_filled(self, row: int, column: int) -> bool:
-        """Whether a cell holds a text."""
         return bool(self.text(row, column).strip())
 
     # ---- which columns are seen
 
     @property
     def hidden(self) -> tuple[bool, ...]:
-        """Whether each column is hidden."""
         names = [c.name for c in self.table.columns]
         return self.visible_columns.are_hidden(names, self.table.asset_column)
 
@@ -369,7 +363,6 @@ class DisplayedTable:
     # ---- where one is
 
     def go(self, row: int, column: int, extend: bool = False) -> None:
-        """Put the cursor on a cell."""
         self._select(self.selection.at(row, column, self.shape, extend))
 
     def go_to(self, file_row: int, column: str | None = None) -> None:
@@ -432,7 +425,6 @@ class DisplayedTable:
         self.refresh()
 
     def set_filter(self, wanted: Filter) -> None:
-        """Show only the rows that pass."""
         self.filter = wanted
         self.refresh()
 
@@ -505,7 +497,6 @@ class DisplayedTable:
 
     @property
     def path(self) -> Path | None:
-        """The file of the table."""
         return self.table.path
 
     def _follow(self, before: Table, step: Step) -> None:

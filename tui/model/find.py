@@ -61,13 +61,7 @@ def _literal(character: str) -> str:
 
 
 def find(table: Table, search: Search, rows: Rows, columns: Sequence[str]) -> Flags:
-    """Which cells match: bool [rows, columns].
-
-    Raises
-    ------
-    PatternError
-        The pattern cannot be read.
-    """
+    """Which cells match: bool [rows, columns]. Raises PatternError where the pattern cannot be read."""
     if not search.text:
         return np.zeros((len(rows), len(columns)), np.bool_)
     return np.stack([_matching_cells(table.text_column(c), search)[rows] for c in columns], axis=1)
@@ -85,13 +79,8 @@ def next_hit(hits: Flags, at: tuple[int, int], is_backwards: bool = False) -> tu
 
 
 def replace_all(table: Table, search: Search, replacement: str, rows: Rows, columns: Sequence[str]) -> Edit:
-    """One edit that replaces the matches in some rows and columns; without changes when nothing matches.
-
-    Raises
-    ------
-    PatternError
-        The pattern cannot be read.
-    """
+    """One edit that replaces the matches in some rows and columns; without changes when nothing matches. Raises PatternError where
+    the pattern cannot be read."""
     changed: dict[str, dict[int, str]] = {}
     for name in with_progress(columns, len(columns), every=1) if search.text else ():
         column = table.text_column(name)

@@ -69,13 +69,8 @@ class Draft:
 
     @classmethod
     def read(cls, table: Table, raw: bytes, name: str, options: ReadOptions, names: str | None = None) -> Draft:
-        """Read a file for a table; `names` is how its texts are read, "whole" or "words", where that is given.
-
-        Raises
-        ------
-        ContextDBError
-            It cannot be read, with every fault.
-        """
+        """Read a file for a table; `names` is how its texts are read, "whole" or "words", where that is given. Raises
+        ContextDBError where it cannot be read, with every fault."""
         whole = has_whole_names(names, Path(name))
         reading = read(raw, name, replace(options, has_whole_names=whole))
         return cls(table, reading, Path(name).name, not names, options.is_decimal_comma is None)
@@ -187,13 +182,8 @@ class Draft:
     # ---- what is done
 
     def edit(self) -> Edit:
-        """The edit that imports the file as it is decided.
-
-        Raises
-        ------
-        ContextDBError
-            No column names the assets; or contextdb.toml could not say what is decided.
-        """
+        """The edit that imports the file as it is decided. Raises ContextDBError where no column names the assets; or
+        contextdb.toml could not say what is decided."""
         taken = self._taken()
         came_from, target = self._rows()
         texts = {self._name(column): (column.cells or self.reading.columns[at], target) for at, column in taken}

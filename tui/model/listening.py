@@ -31,7 +31,6 @@ class Listening:
     """One game. All it knows may be read from any thread."""
 
     def __init__(self, game: str, path: Path, wanted: Wanted) -> None:
-        """Begin to listen, in a thread."""
         self.game, self.path, self.wanted = game, path, wanted
         self.state: State = "opening"
         self.problem = ""
@@ -74,7 +73,6 @@ class Listening:
             self._hearing.close()
 
     def join(self, timeout_s: float) -> None:
-        """Wait until the thread has ended."""
         self._thread.join(timeout_s)
 
     def _listen(self) -> None:

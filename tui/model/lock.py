@@ -93,7 +93,6 @@ class Lock:
 
     @property
     def is_held(self) -> bool:
-        """Whether this editor has the lock."""
         return self._descriptor >= 0
 
     def taken_by(self) -> Holder | None:
@@ -106,7 +105,6 @@ class Lock:
         return None
 
     def release(self) -> None:
-        """Let go of the table."""
         if self.is_held:
             with suppress(OSError):
                 if self.taken_by() is None:

@@ -22,15 +22,8 @@ FAR = 100.0
 
 
 def moment_inside(cells: Mapping[str, str], wanted: Wanted) -> dict[str, str]:
-    """The texts of facts with which every cell of a box holds; facts that nothing restricts are left out.
-
-    Raises
-    ------
-    ContextError
-        There are no facts from which what is computed comes out so.
-    CellError
-        A cell cannot be read.
-    """
+    """The texts of facts with which every cell of a box holds; facts that nothing restricts are left out. Raises ContextError where
+    there are no facts from which what is computed comes out so; CellError where a cell cannot be read."""
     given = facts_inside(cells, list(wanted.given.values()))
     derived = {n: parse_cell(text, wanted.conditions[n].domain) for n, text in cells.items() if n in wanted.computed}
     derived = {name: cell for name, cell in derived.items() if not cell.is_any}

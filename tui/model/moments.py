@@ -105,9 +105,7 @@ class Track(Protocol):
         ...
 
     @property
-    def moments(self) -> list[Moment]:
-        """All moments that are stored."""
-        ...
+    def moments(self) -> list[Moment]: ...
 
 
 class LiveTrack:
@@ -147,7 +145,6 @@ class LiveTrack:
 
     @property
     def moments(self) -> list[Moment]:
-        """All moments that are stored."""
         with self._lock:
             return [moment for moment, _ in self._moments]
 
@@ -214,7 +211,6 @@ class RecordedTrack:
         return [moment for at in range(self.stop) if (moment := self.moment(at)) is not None]
 
     def time(self, at: int) -> float:
-        """When a moment was."""
         return self._times[max(0, min(at, self.stop - 1))] if self._times else 0.0
 
 
@@ -229,13 +225,8 @@ class Session:
 
 
 def open_session(path: Path) -> Session:
-    """Find the moments of a recording. A last line that is not whole yet is left out.
-
-    Raises
-    ------
-    TableError, FileError
-        It cannot be read, or a line of it cannot.
-    """
+    """Find the moments of a recording. A last line that is not whole yet is left out. Raises TableError or FileError where it
+    cannot be read, or a line of it cannot."""
     tables: dict[str, Mapping[str, object]] = {}
     tracks: dict[Key, RecordedTrack] = {}
     start = 0

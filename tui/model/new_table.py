@@ -33,13 +33,7 @@ def name_fault(folder: Path, name: str, taken: Iterable[str]) -> str:
 
 
 def make_table(folder: Path, name: str, conditions: Sequence[str]) -> Path:
-    """Write an empty table with a column of assets and these conditions.
-
-    Raises
-    ------
-    FileError
-        The disk refuses.
-    """
+    """Write an empty table with a column of assets and these conditions. Raises FileError where the disk refuses."""
     path = inside(folder / f"{name.strip()}.csv", folder)
     columns = [TextColumn.of(column, ()) for column in (ASSET, *conditions)]
     write_texts(path, columns, None, np.arange(0))

@@ -65,7 +65,6 @@ class SelectorNow:
 
     @property
     def order(self) -> Order:
-        """The databases and their thresholds."""
         return tuple((one.name, one.threshold) for one in self.databases)
 
     @property
@@ -90,13 +89,7 @@ class Priorities:
 
     @property
     def config(self) -> MotionConfig:
-        """What contextdb.toml says of motion.
-
-        Raises
-        ------
-        SchemaError
-            With every fault of it.
-        """
+        """What contextdb.toml says of motion. Raises SchemaError with every fault of it."""
         schema = self.sheet.table.schema
         return MotionConfig.from_dict(schema.motion, file=schema.file)
 

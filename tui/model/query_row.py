@@ -132,7 +132,6 @@ class QueryRow:
 
     @property
     def is_empty(self) -> bool:
-        """Whether no fact is given."""
         return not self.actors and all(self.facts[name] is None for name in self.wanted.given)
 
     # ---- what the table answers
@@ -345,8 +344,8 @@ class QueryRow:
         if fact is None:
             return ""
         at = self._asked_at(condition.name)
-        said = describe_fact(fact, condition) if at is None else told_fact(self._own.compiled, at, fact)
-        return f"{said} {condition.unit}".rstrip()
+        text = describe_fact(fact, condition) if at is None else told_fact(self._own.compiled, at, fact)
+        return f"{text} {condition.unit}".rstrip()
 
     def failing(self, rows: Sequence[int] | Rows) -> NDArray[np.bool_]:
         """Which cells of some rows fail: bool [rows, conditions], the conditions in the order of the table."""

@@ -17,12 +17,7 @@ from contextdb.tables.table import Table
 
 def under_schema(saved: Table, present: Table, path: Path, folder: Path, schema: Schema) -> Callable[[Table], Table]:
     """What puts a table of the history under a new schema: what it says otherwise than `saved` stays, all else is as the file says.
-
-    Raises
-    ------
-    SchemaError
-        The present table cannot be under it. A past one that cannot stays as it is.
-    """
+    Raises SchemaError where the present table cannot be under it. A past one that cannot stays as it is."""
     settings = schema.settings_for(_below(path, folder))
 
     def renewed(table: Table) -> Table:

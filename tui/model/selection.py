@@ -28,16 +28,13 @@ class Block:
 
     @property
     def shape(self) -> Shape:
-        """Rows and columns."""
         return self.bottom - self.top, self.right - self.left
 
     @property
     def n_cells(self) -> int:
-        """How many cells it has."""
         return (self.bottom - self.top) * (self.right - self.left)
 
     def holds(self, row: int, column: int) -> bool:
-        """Whether a cell is in it."""
         return self.top <= row < self.bottom and self.left <= column < self.right
 
 
@@ -81,11 +78,9 @@ class Selection:
         return self.at(row + down, column + right, shape, extend)
 
     def home(self, shape: Shape, extend: bool = False) -> Selection:
-        """The first cell of the row."""
         return self.at(self._start(extend)[0], 0, shape, extend)
 
     def end(self, shape: Shape, extend: bool = False) -> Selection:
-        """The last cell of the row."""
         return self.at(self._start(extend)[0], shape[1] - 1, shape, extend)
 
     def first(self, shape: Shape, extend: bool = False) -> Selection:

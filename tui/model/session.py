@@ -69,12 +69,8 @@ class Session:
         """Open a table, with the unsaved edits of an editor that was killed.
 
         `takes_over`: take the table from an editor on another machine, which a person says has ended. `reads_only`: the table is
-        shown as it is in the file, whoever has it open, and no edit is taken.
-
-        Raises
-        ------
-        FileError, SchemaError, TableError
-            The file cannot be read at all; cells that cannot be read are no hindrance.
+        shown as it is in the file, whoever has it open, and no edit is taken. Raises FileError, SchemaError or TableError where the
+        file cannot be read at all; cells that cannot be read are no hindrance.
         """
         table = expanded(load_table(Path(path), strict=False))
         assert table.path is not None
@@ -141,12 +137,8 @@ class Session:
     def merge_from_disk(self) -> Merge[Table]:
         """Merge what is on the disk with the sheet. Without conflicts it is taken at once, as one step.
 
-        With conflicts nothing has changed yet: decide them with `Merge.resolved`, and `take` the result.
-
-        Raises
-        ------
-        FileError, SchemaError, TableError
-            What is on the disk is gone, no table, or another one.
+        With conflicts nothing has changed yet: decide them with `Merge.resolved`, and `take` the result. Raises FileError,
+        SchemaError or TableError where what is on the disk is gone, no table, or another one.
         """
         if self._schema_file.state != "same":
             self.reload_schema()
@@ -176,11 +168,7 @@ class Session:
 
     def reload_schema(self) -> None:
         """Read contextdb.toml again. What was edited here of it stays; all other conditions and settings are as the file has them.
-
-        Raises
-        ------
-        FileError, SchemaError
-            The file cannot be read, or says what this table cannot be: then nothing has changed.
+        Raises FileError or SchemaError where the file cannot be read, or says what this table cannot be: then nothing has changed.
         """
         folder, schema = schema_for(self.path)
         change = under_schema(self.saved_table, self.sheet.table, self.path, folder, schema)
@@ -203,17 +191,10 @@ class Session:
     def save(self, path: str | Path | None = None, overwrite: bool = False) -> None:
         """Write the table to its file, or to another one, which is then its file.
 
-        What others wrote since is merged first (`overwrite`: written over). A file that is gone is made again.
-
-        Raises
-        ------
-        FileError
-            The disk refuses, another editor has the table, or what others wrote disagrees with edits here (rule "merge-conflict"):
-            see `merge_from_disk`. The old file is then whole.
-        TableError
-            A text that such a file cannot hold.
-        SchemaError
-            What shall change in contextdb.toml disagrees with what others wrote into it: then nothing is written.
+        What others wrote since is merged first (`overwrite`: written over). A file that is gone is made again. Raises FileError
+        where the disk refuses, another editor has the table, or what others wrote disagrees with edits here (rule
+        "merge-conflict"), see `merge_from_disk`: the old file is then whole. Raises TableError for a text that such a file cannot
+        hold; SchemaError where what shall change in contextdb.toml disagrees with what others wrote: then nothing is written.
         """
         if self.reads_only:
             raise FileError(Fault(f"nothing is written: {self.why_read_only}.", "another way to start it"))

@@ -343,13 +343,7 @@ class Sheet(DisplayedTable):
         return int(hits.sum())
 
     def count(self, search: Search) -> int:
-        """How many displayed cells match.
-
-        Raises
-        ------
-        PatternError
-            The pattern cannot be read.
-        """
+        """How many displayed cells match. Raises PatternError where the pattern cannot be read."""
         return int(find(self.table, search, self.view.rows, [c.name for c in self.table.columns]).sum())
 
     def replace_here(self, search: Search, replacement: str) -> Done:
@@ -397,7 +391,6 @@ class Sheet(DisplayedTable):
     # ---- history
 
     def undo(self) -> Done:
-        """Take back the last step."""
         return self._went(self.history.undo, "Undo")
 
     def redo(self) -> Done:

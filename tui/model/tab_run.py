@@ -11,7 +11,6 @@ class TabRun:
         self._start = 0
 
     def tab(self, row: int, column: int, by: int = 1) -> None:
-        """Tab was pressed in a cell."""
         self._start = column if self._at != (row, column) else self._start
         self._at = row, column + by
 

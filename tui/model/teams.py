@@ -57,7 +57,6 @@ class TeamSheet(RoomySheet):
         return self.facts.get(self.table.columns[column].name)
 
     def header(self, column: int) -> Header:
-        """What stands over a column."""
         condition = self.of_column(column)
         return (
             Header(NAME, "name")
@@ -117,13 +116,7 @@ class Teams:
 
     @classmethod
     def beside(cls, table: Table) -> Teams:
-        """The teams of the file next to a table; empty ones where there is none.
-
-        Raises
-        ------
-        FileError
-            The file cannot be read.
-        """
+        """The teams of the file next to a table; empty ones where there is none. Raises FileError where the file cannot be read."""
         path = teams_path(table)
         return cls(table, _texts_in(path, roles_of(table)) if path is not None and path.exists() else None)
 

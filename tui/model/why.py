@@ -68,7 +68,6 @@ class RowWhy:
 
     @property
     def is_valid(self) -> bool:
-        """Whether the row is valid."""
         return self.n_wrong == 0
 
     @property

@@ -88,7 +88,6 @@ class Window:
         return self.top <= row < self.top + self.n_rows
 
     def row(self, row: int) -> WindowRow:
-        """A row of the view."""
         return self.rows[row - self.top]
 
     def failing(self, row: int) -> list[int]:

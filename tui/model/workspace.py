@@ -47,12 +47,8 @@ class Workspace:
     def __init__(self, path: str | Path | None = None, reads_only: bool = False) -> None:
         """Look at a folder, or at the folder of a table; without a path in tables/ or here. `reads_only`: nothing is edited.
 
-        Where there is no table yet, `first` is empty and `beginning` says what the path may become.
-
-        Raises
-        ------
-        FileError, TableError, SchemaError
-            The folder of the path does not exist, or its contextdb.toml cannot be read.
+        Where there is no table yet, `first` is empty and `beginning` says what the path may become. Raises FileError, TableError or
+        SchemaError where the folder of the path does not exist, or its contextdb.toml cannot be read.
         """
         self.sessions: dict[str, Session] = {}
         self._reads_only = reads_only
@@ -109,13 +105,8 @@ class Workspace:
         return session
 
     def save_as(self, name: str, other: str, suffix: str = ".csv") -> None:
-        """Write a table, its unsaved edits with it, as another table of the folder; the old file stays as it was last saved.
-
-        Raises
-        ------
-        FileError, TableError, SchemaError
-            As of `Session.save`; nothing has changed then.
-        """
+        """Write a table, its unsaved edits with it, as another table of the folder; the old file stays as it was last saved. Raises
+        FileError, TableError or SchemaError as `save` of a session does; nothing has changed then."""
         path = inside(self.folder / f"{other}{suffix}", self.folder)
         session = self.session(name)
         session.save(path)
@@ -127,12 +118,8 @@ class Workspace:
         """Write a rename into the files of the project; gives which were written. `names`: the other names of facts of test rows.
 
         The tables whose files are written are opened again: what was edited before cannot be taken back any more, but for the
-        rename itself.
-
-        Raises
-        ------
-        TableError, FileError
-            A table that is to be written has unsaved edits, or is read-only; else as `Renaming.write`. Nothing has changed then.
+        rename itself. Raises TableError or FileError where a table that is to be written has unsaved edits, or is read-only; else
+        as `Renaming.write`. Nothing has changed then.
         """
         files = self._write_renaming(name, renaming, names)
         self._renames = [*self._renames[: self._n_renamed], (renaming, dict(names))]
@@ -168,7 +155,6 @@ class Workspace:
 
     @property
     def unsaved(self) -> list[str]:
-        """The tables with unsaved edits."""
         return [name for name, session in self.sessions.items() if session.sheet.is_modified]
 
     def look_again(self) -> None:
@@ -183,7 +169,6 @@ class Workspace:
         self.sessions, self._renames, self._n_renamed = {}, [], 0
 
     def close(self, keep_journals: bool = False) -> None:
-        """Let go of every table."""
         for session in self.sessions.values():
             session.close(keep_journals)
 

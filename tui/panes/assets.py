@@ -84,7 +84,6 @@ class AssetsPane(SheetView):
 
     @property
     def why_pane(self) -> WhyPane:
-        """The pane beside the grid."""
         return self.query_one(WhyPane)
 
     @property
@@ -106,7 +105,6 @@ class AssetsPane(SheetView):
         (self.editor or self.grid).focus()
 
     def go_to(self, row: int, column: str | None) -> None:
-        """Show a cell of the file."""
         self.grid.is_in_test_row = False
         self.sheet.go_to(row, column)
         self.show()

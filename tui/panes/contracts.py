@@ -105,12 +105,10 @@ class ContractsPane(Pane):
 
     @property
     def contracts(self) -> list[Contract]:
-        """The contracts of the table."""
         table = self.sheet.table
         return [contract for contract in table.schema.contracts.values() if contract.table == table.name]
 
     def take_focus(self) -> None:
-        """Give the keys to the list."""
         self.query_one(LineList).focus()
 
     # ---- proofs

@@ -403,7 +403,6 @@ class CoveragePane(Pane):
         self.take_focus()
 
     def action_measure(self) -> None:
-        """Work the coverage out again."""
         self.run.start(self.sheet.table)
 
     def action_back(self) -> None:

@@ -91,11 +91,9 @@ class MotionPane(Pane):
             self.look()
 
     def show(self) -> None:
-        """Look for games and sessions."""
         self.look()
 
     def take_focus(self) -> None:
-        """The list has the keys."""
         self.query_one(SessionList).focus()
 
     def action_look(self) -> None:

@@ -74,7 +74,6 @@ class OptionsPane(Pane):
         """The version of the sheet that is displayed."""
 
     def compose(self) -> ComposeResult:
-        """The table's settings, and the condition's."""
         with Vertical(id="options-table", classes="options--part"):
             yield Static(id="options-title", classes="options--title")
             for key, option in OPTIONS.items():

@@ -30,5 +30,4 @@ class Pane(Widget):
         self.focus()
 
     def on_resize(self) -> None:
-        """Use the room there is."""
         self.set_class(self.size.height >= ROOMY, "-roomy")

@@ -169,7 +169,6 @@ class ProblemsPane(Pane):
         return self.problems.grouped(self.level) if self.is_grouped else self.problems.of_level(self.level)
 
     def take_focus(self) -> None:
-        """Give the keys to the list."""
         self.query_one(LineList).focus()
 
     # ---- what can be done

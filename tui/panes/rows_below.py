@@ -68,7 +68,6 @@ class RowsBelow(LineList):
         self.remove_class("-filled")
 
     def on_resize(self) -> None:
-        """Other columns have room."""
         self._lay_out()
 
     def _lay_out(self) -> None:

@@ -48,7 +48,6 @@ class WhyPane(ScrollView, can_focus=False):
         return self.has_class("-open")
 
     def turn(self, sheet: DisplayedTable) -> None:
-        """Open it, or close it."""
         self.toggle_class("-open")
         self.follow(sheet)
 
@@ -64,7 +63,6 @@ class WhyPane(ScrollView, can_focus=False):
             self.follow(waiting)
 
     def follow(self, sheet: DisplayedTable) -> None:
-        """Show the row of the cursor."""
         if not self.is_open:
             return
         if sheet.query.is_empty or not len(sheet.view):

@@ -94,7 +94,6 @@ class ActorsDialog(SheetDialog[Teams]):
         self.show_sheet("Nobody is offered.")
 
     def action_save(self) -> None:
-        """Write the teams to their file."""
         path = teams_path(self.table)
         if path is None:
             return

@@ -202,7 +202,6 @@ class AddColumn(Dialog[Insertion]):
 
 
 def _line(choice: Choice | None, text: str, width: int) -> Content:
-    """A line of the list."""
     if choice is None:
         return Content(f'+ New column "{safe_text(text)}"' if text else "+ New column: type its name")
     name = cut_middle(safe_text(choice.name), width)

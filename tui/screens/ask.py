@@ -88,7 +88,6 @@ class ChooseDialog(Dialog[int]):
             options.highlighted = matching.index(chosen) if chosen in matching else 0
 
     def action_move(self, by: int) -> None:
-        """Up and down, while one types."""
         options = self.query_one(OptionList)
         if options.option_count:
             options.highlighted = max(0, min((options.highlighted or 0) + by, options.option_count - 1))

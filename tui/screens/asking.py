@@ -34,14 +34,10 @@ class Asking(Protocol):
     clipboard: Clipboard
 
     @property
-    def app(self) -> App[Any]:
-        """The app around it."""
-        ...
+    def app(self) -> App[Any]: ...
 
     @property
-    def assets(self) -> Valid:
-        """The pane of assets."""
-        ...
+    def assets(self) -> Valid: ...
 
     def say(self, text: str, level: str = "information") -> None:
         """Say something in a line below."""

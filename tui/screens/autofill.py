@@ -42,13 +42,8 @@ class Autofill:
     updates: bool
 
     def fill(self, sheet: Sheet) -> Done:
-        """Fill the table as it is now, as one step, and mark the cells that say what their clips say.
-
-        Raises
-        ------
-        ContextDBError
-            The conditions are declared so that the cells cannot be read, or another cell of the table cannot be.
-        """
+        """Fill the table as it is now, as one step, and mark the cells that say what their clips say. Raises ContextDBError where
+        the conditions are declared so that the cells cannot be read, or another cell of the table cannot be."""
         fills = filling(sheet.table, self.clips.rows)
         edit = fills.edit(updates=self.updates)
         refused = frozenset((each.asset, each.column, each.cell) for each in fills.differences)
@@ -120,7 +115,6 @@ class AutofillDialog(Dialog[Autofill]):
         self._worker = self._describe()
 
     def action_cancel(self) -> None:
-        """Stop the work, and leave."""
         self._worker.cancel()
         self.dismiss(None)
 

@@ -68,7 +68,6 @@ class ColumnSheetDialog(SheetDialog[Edit]):
         self.dismiss(edit if edit.changes else None)
 
     def action_discard(self) -> None:
-        """Leave all as it was."""
         self.dismiss(None)
 
     def action_cancel(self) -> None:

@@ -95,7 +95,6 @@ class ColumnsDialog(Dialog[ColumnsAnswer]):
         self.query_one(LineList).action_move(1)
 
     def action_fold(self) -> None:
-        """Fold a group, or open it."""
         self._show(self.columns.folded_at(self._here))
 
     def action_freeze(self) -> None:

@@ -95,7 +95,6 @@ class ConflictsDialog(Dialog[Mapping[int, Side]]):
         yield Static(id="conflict-choices")
 
     def on_mount(self) -> None:
-        """Show the list from its start."""
         self._lines.show(len(self.conflicts), self._line)
         self._lines.focus()
         self._show()

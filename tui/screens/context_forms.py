@@ -38,7 +38,6 @@ class Choice(RadioButton):
     """A radio button that says without colour which one is taken."""
 
     def render(self) -> Content:
-        """The button and its label."""
         self.BUTTON_INNER = "●" if self.value else "○"
         return super().render()
 
@@ -82,7 +81,6 @@ class KeepDialog(Dialog[SavedCase]):
             self.taken = set()
 
     def compose_body(self) -> ComposeResult:
-        """Name, what is expected, note."""
         given = summary({name: text for name, text in self.facts.items() if text.strip()}) or "no fact is given"
         yield Static(Content(given), id="keep-facts")
         yield Field(

@@ -150,7 +150,6 @@ class ContextsDialog(Dialog[Loaded]):
 
     @property
     def chosen(self) -> int | None:
-        """Which context the cursor is on."""
         if not self.lines.n_lines:
             return None
         return self.lines.index if self.matching is None else int(self.matching[self.lines.index])
@@ -171,7 +170,6 @@ class ContextsDialog(Dialog[Loaded]):
         self.lines.refresh()
 
     def on_resize(self) -> None:
-        """More columns, or fewer."""
         self.call_after_refresh(self._lay_out)
 
     def _show_lines(self, index: int = 0) -> None:

@@ -68,13 +68,8 @@ class DiskCare:
             self._merge_unasked()
 
     def save(self, path: Path | None = None, overwrite: bool = False, then: Callable[[], None] = lambda: None) -> None:
-        """Save; conflicts with what others wrote are resolved first. `then` is called when the table is saved.
-
-        Raises
-        ------
-        FileError, TableError
-            As of `Session.save`, but for conflicts that can be decided.
-        """
+        """Save; conflicts with what others wrote are resolved first. `then` is called when the table is saved. Raises FileError or
+        TableError as `Session.save` does, but for conflicts that can be decided."""
         try:
             self._session.save(path, overwrite)
         except FileError as error:
@@ -88,13 +83,8 @@ class DiskCare:
         then()
 
     def merge(self, then: Callable[[], None] = lambda: None) -> None:
-        """Merge what is on the disk, and ask about conflicts. `then` is called when it is merged.
-
-        Raises
-        ------
-        FileError, SchemaError, TableError
-            What is on the disk is gone, no table, or another one.
-        """
+        """Merge what is on the disk, and ask about conflicts. `then` is called when it is merged. Raises FileError, SchemaError or
+        TableError where what is on the disk is gone, no table, or another one."""
         merged = self._session.merge_from_disk()
         if merged.conflicts:
             self._ask(merged, then)

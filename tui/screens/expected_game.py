@@ -20,8 +20,8 @@ LOOK_EVERY_S = 0.5
 class ExpectedGame:
     """Looks for a game now and then, and hands over its first character that asks a table."""
 
-    def __init__(self, game: str, table: str, found: Callable[[Followed], None]) -> None:
-        self.game, self.table, self._found = game, table, found
+    def __init__(self, game: str, table: str, begin: Callable[[Followed], None]) -> None:
+        self.game, self.table, self._begin = game, table, begin
         self._listening: Listening | None = None
         self.timer: Timer | None = None
 
@@ -34,7 +34,7 @@ class ExpectedGame:
         if keys and self._listening is not None:
             if self.timer is not None:
                 self.timer.stop()
-            self._found(Followed(min(keys, key=lambda key: key[0] or ""), self._listening))
+            self._begin(Followed(min(keys, key=lambda key: key[0] or ""), self._listening))
 
 
 def _door(game: str) -> Path | None:

@@ -121,7 +121,6 @@ class FindEverywhere(Dialog[FoundCell]):
         return self._read[name]
 
     def action_move(self, by: int) -> None:
-        """Through the list, while one types."""
         self.query_one(LineList).action_move(by)
 
     @on(Input.Submitted)

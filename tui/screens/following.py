@@ -49,14 +49,10 @@ class Follows(Protocol):
     session: TableSession
 
     @property
-    def app(self) -> App[Any]:
-        """The app around it."""
-        ...
+    def app(self) -> App[Any]: ...
 
     @property
-    def assets(self) -> Shows:
-        """The pane of assets."""
-        ...
+    def assets(self) -> Shows: ...
 
     def say(self, text: str, level: str = "information") -> None:
         """Say something in a line below."""
@@ -64,9 +60,7 @@ class Follows(Protocol):
     def show_summary(self) -> None:
         """Say how much of the table is valid."""
 
-    def set_interval(self, interval: float, callback: Callable[[], None]) -> Timer:
-        """Call something again and again."""
-        ...
+    def set_interval(self, interval: float, callback: Callable[[], None]) -> Timer: ...
 
 
 @dataclass(frozen=True)
@@ -120,7 +114,6 @@ class Following:
     # ---- begin and end
 
     def start(self, followed: Followed) -> None:
-        """Follow this from now on."""
         self.stop()
         self.followed, self.is_paused, self.is_typed, self.at, self.moment = followed, False, False, -1, None
         self._begin_playing(0)

@@ -54,7 +54,6 @@ class LiveDialog(Dialog[Followed]):
         self._is_closed = False
 
     def compose_body(self) -> ComposeResult:
-        """What is known, and the list."""
         yield Static(id="live-state")
         columns = [ListColumn("Game", 12, 1), ListColumn("Character", 14, 2, is_name=True), ListColumn("Asked", 8, 0, True)]
         yield LineList([*columns, ListColumn("Plays", 14, 2, is_name=True)], empty="", id="live-lines")
@@ -95,7 +94,6 @@ class LiveDialog(Dialog[Followed]):
     # ---- display
 
     def show(self) -> None:
-        """Show who is there now."""
         lines = self.query_one(LineList)
         chosen = self._lines[lines.index][0] if 0 <= lines.index < len(self._lines) else None
         before, self._lines = self._lines, list(self._characters())

@@ -122,7 +122,6 @@ class MainScreen(TableScreen):
         self.app.open_table(name)
 
     def action_rename_table(self) -> None:
-        """Give the table another name, everywhere."""
         TableFiles(self).rename()
 
     def action_duplicate_table(self) -> None:
@@ -299,7 +298,6 @@ class MainScreen(TableScreen):
     # ---- the test row
 
     def action_contexts(self) -> None:
-        """Look through saved or recorded contexts."""
         self.try_to(self.test_row.contexts)
 
     def action_step(self, by: int) -> None:
@@ -355,7 +353,6 @@ class MainScreen(TableScreen):
         self.following.stop()
 
     def action_actors(self) -> None:
-        """Say who may play each role."""
         self.try_to(self.test_row.actors)
 
     def action_why(self) -> None:

@@ -92,7 +92,6 @@ class NearestDialog(Dialog[CellAnswer]):
         yield Static(id="nearest-keys")
 
     def on_mount(self) -> None:
-        """Show the page that says most."""
         self.lines.focus()
         self._show()
 
@@ -134,7 +133,6 @@ class NearestDialog(Dialog[CellAnswer]):
         self.lines.refresh()
 
     def on_resize(self) -> None:
-        """More columns, or fewer."""
         self._lay_out()
 
     def _line(self, cell: CellWhy) -> Sequence[ListCell]:

@@ -60,5 +60,4 @@ class Palette(CommandPalette):
         box.border_title, box.border_subtitle = self._frame_title, "↑↓ choose · Enter OK · Esc cancel"
 
     def get_line_filters(self) -> Sequence[LineFilter]:
-        """What lies behind stays dim."""
         return without(super().get_line_filters())

@@ -63,7 +63,6 @@ class PathDialog(Dialog[Answer]):
         self._listed.show(len(self.names), lambda at: (self.names[at],))
 
     def action_move(self, down: int) -> None:
-        """Move in the list of names."""
         self.is_chosen = True
         self._listed.action_move(down)
 
@@ -90,7 +89,6 @@ class PathDialog(Dialog[Answer]):
         """Do what Enter does with a path."""
 
     def write(self, text: str) -> None:
-        """Put a path into the entry."""
         self.entry.value = text
         self.entry.cursor_position = len(text)
 

@@ -98,17 +98,14 @@ class TableScreen(Screen[None]):
 
     @property
     def tab(self) -> str:
-        """The tab that is seen."""
         return self.query_one("#panes", ContentSwitcher).current or "assets"
 
     @property
     def tabs(self) -> Sequence[str]:
-        """The tabs that there are."""
         return (*TABS, MOTION) if self._has_sessions or self.tab == MOTION else TABS
 
     @property
     def assets(self) -> AssetsPane:
-        """The tab of the grid."""
         return self.query_one(AssetsPane)
 
     def compose(self) -> ComposeResult:
@@ -275,7 +272,6 @@ class TableScreen(Screen[None]):
         self.app.push_screen(HelpDialog(self.app.settings.keys))
 
     def action_history(self) -> None:
-        """Choose a step to go to."""
         history = self.session.sheet.history
 
         def chosen(position: int | None) -> None:
@@ -325,7 +321,6 @@ class TableScreen(Screen[None]):
 
     @on(GoToCell)
     def go_to_cell(self, event: GoToCell) -> None:
-        """Show a cell in the grid."""
         self._switch_to("assets")
         self.assets.go_to(event.row, event.column)
 

@@ -165,12 +165,10 @@ class CellEditor(Widget):
 
     @property
     def text(self) -> str:
-        """What is in the entry line."""
         return self.entry.text
 
     @property
     def fault(self) -> Fault | None:
-        """Why the text was not taken."""
         return self._refused
 
     @property
@@ -382,7 +380,6 @@ class CellEditor(Widget):
         self.action_commit(0, 0, True)
 
     def action_cancel(self) -> None:
-        """Leave the cell as it was."""
         if not self._is_done:
             self._is_done = True
             if self._refused is not None:
@@ -409,7 +406,6 @@ class CellEditor(Widget):
     # ---- moving
 
     def action_edit_mode(self) -> None:
-        """From Enter mode to Edit mode."""
         self.is_typing = False
         self._close()
         self._update()

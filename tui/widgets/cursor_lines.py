@@ -37,7 +37,6 @@ class CursorLines(Widget, can_focus=True):
 
     @property
     def n_lines(self) -> int:
-        """How many lines there are."""
         raise NotImplementedError
 
     def moved(self) -> None:
@@ -47,7 +46,6 @@ class CursorLines(Widget, can_focus=True):
         """The line of the cursor was clicked so far from the left."""
 
     def go(self, at: int) -> None:
-        """Put the cursor on a line."""
         if self.n_lines:
             self.at = min(max(0, at), self.n_lines - 1)
             self.keep_in_sight()
@@ -72,7 +70,6 @@ class CursorLines(Widget, can_focus=True):
         self.go(self.at + by * max(1, self.room - 1))
 
     def on_resize(self) -> None:
-        """Keep the cursor in sight."""
         self.keep_in_sight()
 
     def on_click(self, event: events.Click) -> None:

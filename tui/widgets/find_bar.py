@@ -103,12 +103,10 @@ class FindBar(SheetBar):
         return Search(text, self._is("whole"), self._is("case"), self._is("pattern"))
 
     def say(self, text: str) -> None:
-        """Say how many cells match."""
         for count in self.query("#find-count").results(Static):
             count.update(text)
 
     def action_next(self, is_backwards: bool) -> None:
-        """Go to the next hit."""
         self.post_message(self.Sought(self.search, is_backwards))
 
     def action_replace(self) -> None:

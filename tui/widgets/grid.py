@@ -144,7 +144,6 @@ class Grid(GridView, can_focus=True):
         self.moving(lambda: self.sheet.select(lambda selection, _: change(selection)))
 
     def action_move(self, down: int, right: int, extend: bool) -> None:
-        """An arrow."""
         if self.is_in_test_row and down:
             if down < 0:
                 self.is_in_test_row = False
@@ -187,7 +186,6 @@ class Grid(GridView, can_focus=True):
         return True
 
     def action_edge(self, down: int, right: int, extend: bool) -> None:
-        """Ctrl and an arrow."""
         if not self.is_in_test_row and len(self.sheet.view) and not (self.is_in_new_row and right):
             self.moving(lambda: self.sheet.move_to_edge(down, right, extend))
         elif right:

@@ -138,7 +138,6 @@ class Painter:
         """The lines of the header that were painted last, and what each was painted from."""
 
     def changed(self) -> None:
-        """Read the sheet again."""
         self._before, self._window = self._window or self._before, None
         self.flashing = self.began = frozenset()
         self._headers.clear()
@@ -157,7 +156,6 @@ class Painter:
         return now.changed_since(before)
 
     def line(self, y: int, look: Look) -> Strip:
-        """Line `y` of the window."""
         if self._read[0] is not self.sheet.table or self._read[1] is not self.sheet.view:
             self.changed()  # painted between a step and word of it
         if y < look.n_headers:

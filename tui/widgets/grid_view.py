@@ -123,7 +123,6 @@ class GridView(ScrollView, inherit_bindings=False):
         """The sizes that the scroll bars are of."""
 
     def open(self, sheet: Sheet) -> None:
-        """Show another table."""
         self.sheet = sheet
         self._painter = Painter(sheet, self._style)
         self._widths.clear()
@@ -269,7 +268,6 @@ class GridView(ScrollView, inherit_bindings=False):
 
     @property
     def look(self) -> Look:
-        """Where the grid is at present."""
         x, y = self.scroll_offset
         height, is_in_test_row = self.window.height, self.is_in_test_row
         made = self.grid_layout

@@ -244,7 +244,6 @@ class HeatMap(ScrollView, can_focus=True):
             self.go(row, column)
 
     def on_resize(self) -> None:
-        """Make room for the labels again."""
         self._resize()
         if self.rows:
             self.go(*self.place)
@@ -252,7 +251,6 @@ class HeatMap(ScrollView, can_focus=True):
     # ---- painting
 
     def render_line(self, y: int) -> Strip:
-        """One line of the screen."""
         width, base = self.scrollable_content_region.width, self.rich_style
         tall = self.square_height
         row, line = divmod(y - 1 + self.scroll_offset.y, tall)

@@ -119,7 +119,6 @@ class LineList(ScrollView, can_focus=True):
             self.refresh()
 
     def go(self, index: int) -> None:
-        """Put the cursor on a line."""
         before, self.index = self.index, max(0, min(index, self.n_lines - 1))
         height = max(1, self.scrollable_content_region.height - 1)
         top = self.scroll_offset.y
@@ -140,7 +139,6 @@ class LineList(ScrollView, can_focus=True):
         self.go(self.index + down * max(1, self.scrollable_content_region.height - 2))
 
     def action_go(self, index: int) -> None:
-        """Move the cursor to a line."""
         self.go(index)
 
     def action_last(self) -> None:
@@ -148,7 +146,6 @@ class LineList(ScrollView, can_focus=True):
         self.go(self.n_lines - 1)
 
     def action_choose(self) -> None:
-        """Choose the line of the cursor."""
         if self.n_lines:
             self.post_message(self.Chosen(self, self.index))
 
@@ -163,14 +160,12 @@ class LineList(ScrollView, can_focus=True):
             self.go(index)
 
     def on_resize(self) -> None:
-        """Keep the cursor in sight."""
         if self.n_lines:
             self.go(self.index)
 
     # ---- painting
 
     def render_line(self, y: int) -> Strip:
-        """One line of the screen."""
         width = self.scrollable_content_region.width
         base = self.rich_style
         if y == 0:

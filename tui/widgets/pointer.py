@@ -28,14 +28,10 @@ class Pointed(Protocol):
     is_in_test_row: bool
 
     @property
-    def look(self) -> Look:
-        """What is painted where."""
-        ...
+    def look(self) -> Look: ...
 
     @property
-    def app(self) -> App[Any]:
-        """The app around it."""
-        ...
+    def app(self) -> App[Any]: ...
 
     def moving(self, move: Callable[[], None], in_new_row: bool = False) -> None:
         """Move the cursor, and show what has changed."""
@@ -76,9 +72,7 @@ class Pointed(Protocol):
     def release_mouse(self) -> None:
         """Take them no more."""
 
-    def set_interval(self, interval: float, callback: Callable[[], None]) -> Timer:
-        """Call something again and again."""
-        ...
+    def set_interval(self, interval: float, callback: Callable[[], None]) -> Timer: ...
 
 
 class Pointer:

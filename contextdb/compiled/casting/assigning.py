@@ -27,18 +27,18 @@ def best(needed: list[Part], wanted: list[Part], holds: Holds | None = None) -> 
     order = [name for name, _ in needed + wanted]
     for most in range(len(wanted), -1, -1):
         parts = [needed + chosen for chosen in _subsets(wanted, most)]
-        found = [c for p in parts if (c := _best_of(p) if holds is None else _best_that_holds(p, order, holds)) is not None]
-        if found:
-            return min(found, key=lambda c: _key(c, order))
+        castings = [c for p in parts if (c := _best_of(p) if holds is None else _best_that_holds(p, order, holds)) is not None]
+        if castings:
+            return min(castings, key=lambda c: _key(c, order))
     return []
 
 
 def every(needed: list[Part], wanted: list[Part], holds: Holds | None = None) -> list[Chosen]:
     """Every assignment of the needed roles with the most others, best first."""
     most = len(best(needed, wanted, holds)) - len(needed)
-    found = [c for chosen in _subsets(wanted, most) for c in assignments(needed + chosen)]
+    castings = [c for chosen in _subsets(wanted, most) for c in assignments(needed + chosen)]
     order = [name for name, _ in needed + wanted]
-    return sorted((c for c in found if holds is None or holds(dict(c))), key=lambda c: _key(c, order))
+    return sorted((c for c in castings if holds is None or holds(dict(c))), key=lambda c: _key(c, order))
 
 
 def assignments(parts: Sequence[Part], taken: frozenset[object] = frozenset()) -> Iterator[Chosen]:
@@ -63,17 +63,17 @@ def _best_of(parts: list[Part]) -> Chosen | None:
 def _best_that_holds(parts: list[Part], order: Sequence[str], holds: Holds) -> Chosen | None:
     """The same of those that hold: branch and bound, the bound being that roles still open go to their cheapest actors."""
     least = {name: (min(o.cost[0] for o in f), min(o.cost[1] for o in f)) for name, f in parts if f}
-    found: Chosen | None = None
+    best_so_far: Chosen | None = None
     limit: Key | None = None
 
     def extend(chosen: Chosen) -> None:
-        nonlocal found, limit
+        nonlocal best_so_far, limit
         key = _key(chosen, order, least)
         if limit is not None and key >= limit:
             return
         if len(chosen) == len(parts):
             if holds(dict(chosen)):
-                found, limit = chosen, key
+                best_so_far, limit = chosen, key
             return
         name, fitting = parts[len(chosen)]
         taken = {offer.key for _, offer in chosen}
@@ -83,7 +83,7 @@ def _best_that_holds(parts: list[Part], order: Sequence[str], holds: Holds) -> C
 
     if len(least) == len(parts):
         extend([])
-    return found
+    return best_so_far
 
 
 def _subsets(parts: Sequence[Part], size: int) -> Iterator[list[Part]]:

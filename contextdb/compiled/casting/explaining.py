@@ -42,8 +42,8 @@ class CastExplanation(Explanation):
 
     def row(self, row: int) -> RowExplanation:
         row = require_row(row, len(self))
-        found = super().row(row)
-        return RowExplanation(found.row, found.asset, found.is_enabled, (*found.failures, *self._role_failures(row)))
+        own = super().row(row)
+        return RowExplanation(own.row, own.asset, own.is_enabled, (*own.failures, *self._role_failures(row)))
 
     def _broken_rules(self, when: WhenRules) -> int:
         """The rows whose rule does not hold: with plain facts, or for no casting though the needed roles can be filled."""

@@ -41,7 +41,7 @@ class Offer:
     """Where among the actors of the role."""
     facts: Mapping[int, Fact]
     """For each condition of the role, by its number, the fact in canonical form."""
-    told: Mapping[str, object]
+    own_facts: Mapping[str, object]
     """What the actor tells, under the names of conditions."""
     some: int
     """The rows whose cells on the role accept the actor."""
@@ -52,8 +52,8 @@ class Offer:
     @property
     def label(self) -> str:
         """Which actor this is, for a listing: its number in the list, with its name or id where it has one."""
-        told = name_of(self.actor, self.place)
-        return f"[{self.place}]" if told == f"actor {self.place}" else f"[{self.place}] {told}"
+        name = name_of(self.actor, self.place)
+        return f"[{self.place}]" if name == f"actor {self.place}" else f"[{self.place}] {name}"
 
     @property
     def name(self) -> str:
@@ -63,8 +63,8 @@ class Offer:
 
 def name_of(actor: Actor, place: int) -> str:
     """What people call an actor: its name or id, else its place in the list."""
-    told = next((actor[k] for k in ("name", "id") if actor.get(k) is not None), None)
-    return f"actor {place}" if told is None else safe_text(str(told))
+    name = next((actor[k] for k in ("name", "id") if actor.get(k) is not None), None)
+    return f"actor {place}" if name is None else safe_text(str(name))
 
 
 def read_offers(
@@ -116,12 +116,10 @@ def _kind(value: object) -> str:
 
 
 class _Reader:
-    """Reads the actors of one moment."""
-
     def __init__(self, compiled: CompiledData, context: Context, ask: Ask) -> None:
         self.compiled, self.context, self.prefer, self.unknown = compiled, context, ask.prefer, ask.unknown
         self.known: dict[object, dict[str, object]] = {}
-        """Every fact that was told of each actor with an id."""
+        """Every known fact of each actor with an id."""
         self.preferred: dict[str, bool] = {}
         """For each fact that actors are preferred by, whether some actor tells it."""
         self.names: set[str] = set()
@@ -141,22 +139,22 @@ class _Reader:
             raise ContextError(Fault(f"{where} is {_kind(actor)}.", "a mapping of facts", rule="wrong-fact"))
         key = self._key(where, actor)
         try:
-            told = _own_facts(role, actor)
-            facts = self._facts(role, places, told)
+            own_facts = _own_facts(role, actor)
+            facts = self._facts(role, places, own_facts)
             cost = self._cost(role, actor, facts)
         except ContextError as error:
             raise ContextError(*(_in_actor(f, where) for f in error.faults)) from None
-        return Offer(actor, key, place, facts, frozen_facts(told), *self._bits(facts), cost)
+        return Offer(actor, key, place, facts, frozen_facts(own_facts), *self._bits(facts), cost)
 
     def mirrored(self, role: str, places: Sequence[int], offer: Offer) -> Offer:
         """An actor that was read, with facts as a mirror shows them."""
         try:
-            told = mirrored_facts(offer.told, self.compiled.mirroring)
-            facts = self._facts(role, places, told)
+            own_facts = mirrored_facts(offer.own_facts, self.compiled.mirroring)
+            facts = self._facts(role, places, own_facts)
         except ContextError as error:
             raise ContextError(*(_in_actor(f, f"{role}[{offer.place}]") for f in error.faults)) from None
         some_bits, every = self._bits(facts)
-        return replace(offer, facts=facts, told=told, some=some_bits, every=every)
+        return replace(offer, facts=facts, own_facts=own_facts, some=some_bits, every=every)
 
     def _bits(self, facts: Mapping[int, Fact]) -> tuple[int, int]:
         """The rows whose cells accept some, and those whose cells accept all values of facts."""
@@ -172,13 +170,13 @@ class _Reader:
         if own is None:
             return "object", id(actor)
         try:
-            told = self.known.setdefault(("id", own), {})
+            known = self.known.setdefault(("id", own), {})
         except TypeError:
             raise ContextError(Fault(f"the id of {where} is {_kind(own)}.", "a text or a number", rule="wrong-fact")) from None
         for name, value in actor.items():
-            if not _is_same(told.setdefault(name, value), value):
-                told_twice = f"{where} says {_text(value)}, another {_text(told[name])}"
-                problem = f"two actors have the id {in_quotes(str(own))}, and {in_quotes(str(name))} differs: {told_twice}."
+            if not _is_same(known.setdefault(name, value), value):
+                difference = f"{where} says {_text(value)}, another {_text(known[name])}"
+                problem = f"two actors have the id {in_quotes(str(own))}, and {in_quotes(str(name))} differs: {difference}."
                 raise ContextError(Fault(problem, "one id for one actor, with the same facts in every role", rule="wrong-fact"))
         return "id", own
 
@@ -203,8 +201,8 @@ class _Reader:
                 faults += error.faults
         if faults:
             raise ContextError(*faults)
-        told = roles_of_table(self.compiled).told_to_rules(role, self.compiled)
-        lacking += [c.name for c in told if read_fact(given.get(c.name), c) is None]
+        ruled = roles_of_table(self.compiled).told_to_rules(role, self.compiled)
+        lacking += [c.name for c in ruled if read_fact(given.get(c.name), c) is None]
         absent = [self.compiled.conditions[at].name for at, fact in facts.items() if fact is None]
         if missing := list(dict.fromkeys([*absent, *lacking])):
             self._refuse_missing(role, missing, given, joint)

@@ -94,10 +94,10 @@ class CastRules:
         own = tuple(cast.get(role) for role in self.roles[number])
         key = number, *map(id, own)
         if key not in self._known:
-            self._known[key] = self._asked(number, cast, None in own)
+            self._known[key] = self._truths_with(number, cast, None in own)
         return self._known[key]
 
-    def _asked(self, number: int, cast: Cast, has_empty: bool) -> Truths:
+    def _truths_with(self, number: int, cast: Cast, has_empty: bool) -> Truths:
         rule, facts = self.when.rules[number], self._facts(number, cast)
         values = values_of(facts, rule.expression.conditions)
         may, always = rule.truths(values, facts)
@@ -113,7 +113,7 @@ class CastRules:
         joint = dict(self.context)
         for role in self.roles[number]:
             if role in cast:
-                joint |= cast[role].told
+                joint |= cast[role].own_facts
         expression = self.when.rules[number].expression
         if self.derivation is not None and not self.derivation.names.isdisjoint(expression.names):
             joint |= self.derivation.only(expression.names).compute(joint)

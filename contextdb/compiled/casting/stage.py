@@ -84,13 +84,13 @@ class CastMatches(SetMatches):
     def casts(self, roles: Sequence[str]) -> list[CastRows]:
         """Every way to give these roles to distinct actors, with the valid rows in which they may play them. Empty where nobody is
         offered for one of the roles."""
-        found: dict[tuple[object, ...], CastRows] = {}
+        casts: dict[tuple[object, ...], CastRows] = {}
         left = self.bits
         for rows, stage in self._stages:
             for key, each in stage.casts(left & rows, roles):
-                found[key] = found[key].joined(each, self.n_rows) if key in found else each
+                casts[key] = casts[key].joined(each, self.n_rows) if key in casts else each
             left &= ~rows
-        return list(found.values())
+        return list(casts.values())
 
     def _stage(self, row: int) -> Stage:
         if not (0 <= require_whole(row, "row") < self.n_rows and self.bits >> row & 1):
@@ -352,13 +352,13 @@ def _ruled_names(compiled: CompiledData, roles: Roles) -> list[str]:
     steps = compiled.derivation.steps if compiled.derivation is not None else ()
     inputs = {step.condition.name: step.expression.names for step in steps}
     waiting = [*compiled.when.names] if compiled.when is not None else []
-    found: dict[str, None] = {}
+    names: dict[str, None] = {}
     for name in waiting:
         if roles_of_table(compiled).needed_by_rules[name].isdisjoint(roles.names):
-            found[name] = None
+            names[name] = None
         else:
             waiting += [n for n in inputs.get(name, ()) if n not in waiting]
-    return list(found)
+    return list(names)
 
 
 def roles_of(compiled: CompiledData, context: Context, actors: Actors) -> Roles:

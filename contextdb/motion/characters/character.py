@@ -24,13 +24,14 @@ from contextdb.cells.arguments import require_callable, require_kind, require_ma
 from contextdb.errors import ContextError, Fault, in_quotes, some
 from contextdb.motion.answers import Answer
 from contextdb.motion.arguments import query_of
+from contextdb.motion.characters import network, walks
 from contextdb.motion.characters import tables as asking
-from contextdb.motion.characters import walks
 from contextdb.motion.characters.facts import FACTS, FactOf, Ground, Moment
 from contextdb.motion.characters.played import Played
 from contextdb.motion.characters.project import HasTables, Parts
 from contextdb.motion.characters.tables import Facts, Tables, Unknown
-from contextdb.motion.characters.updates import UNKNOWN, CharacterState, Options, Paths, Step, Updated
+from contextdb.motion.characters.updates import UNKNOWN, Options, Paths, Step, Updated
+from contextdb.motion.clips.ground_place import place_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.steering import Steered
 from contextdb.motion.clips.trajectory import Trajectory
@@ -42,6 +43,7 @@ from contextdb.motion.output.stream import PoseStream, root_of
 from contextdb.motion.selection.controller import Clock, Controller
 from contextdb.motion.selection.controller import Place as ControllerPlace
 from contextdb.motion.selection.decision import Decision, Playing, plays
+from contextdb.motion.selection.followed import follow
 from contextdb.motion.selection.root_motion import RootMotion
 from contextdb.motion.selection.search_options import OfValid
 from contextdb.motion.selection.variation import Rng
@@ -49,7 +51,7 @@ from contextdb.motion.trace.session import MOST, Trace
 
 AT_REST = Steered()
 N_DISPLAYED = 3
-NO_BLOCK = Fault("the bytes are no state of such a character.", "what bytes(character.state) gives")
+NO_STATE = Fault("this is no state of such a character.", "what its `state` gives")
 PoseOf = Callable[["Character", float], ArrayLike]
 """Gives the pose features of a query, as all features of the schema: of a character and the seconds since its last update."""
 
@@ -242,37 +244,31 @@ class Character:
         return self.controller.playing
 
     @property
-    def state(self) -> CharacterState:
-        """Where the character is, to come back to with `restore`. The facts of live contexts are the game's and not in it."""
-        stream, walk, controller = None if self.stream is None else self.stream.state, self._row.tobytes(), self.controller
+    def state(self) -> bytes:
+        """Where the character is, to come back to with `restore`: all that its next pose depends on beside what it is then given.
+
+        One flat block, which a game in C goes on from (the core's character.h); behind it, where the settings vary what is
+        played, where that stands. Equal states have equal futures. The facts of live contexts are the game's and not in it.
+        """
         displayed = np.array((-1.0, 0.0, 0.0) if self.stream is None else self.stream.displayed, np.float64)
-        row = b"" if stream is None else stream.row.tobytes()
-        return CharacterState(walk, controller.state, stream, walk + controller.row.tobytes() + displayed.tobytes() + row)
+        pose = b"" if self.stream is None else self.stream.state.row.tobytes()
+        return b"".join((self._row.tobytes(), self.controller.row.tobytes(), displayed.tobytes(), pose, self.controller.varied))
 
-    def restore(self, state: CharacterState | bytes) -> None:
-        """Go on from a state of this character, or of another one with the same parts, or from the bytes of one, which do not say
-        where a random generator is; raises ContextError for anything else."""
-        if isinstance(state, bytes):
-            self._restore_block(state)
-            return
-        require_kind(state, CharacterState, "state", "a CharacterState, what `state` gives")
-        if (state.stream is None) != (self.stream is None):
-            raise ContextError(Fault("the state is of a character with other parts.", "a state of this character"))
-        if self.stream is not None and state.stream is not None:
-            self.stream.restore(state.stream)
-        self.controller.restore(state.controller)
-        self._stand(state.row, None)
-
-    def _restore_block(self, block: bytes) -> None:
+    def restore(self, state: bytes) -> None:
+        """Go on from a state of this character, or of another one with the same parts; raises ContextError for anything else."""
         ways, chooser, stream = self.schema.ways, self.controller.chooser, self.stream
         widths = ways.width, chooser.width, N_DISPLAYED, 0 if stream is None else stream.width
-        if len(block) != 8 * sum(widths):
-            raise ContextError(NO_BLOCK)
-        walk, row, displayed, pose = np.split(np.frombuffer(block).copy(), np.cumsum(widths[:3]).tolist())
+        size = 8 * sum(widths)
+        if not isinstance(state, bytes) or len(state) < size:
+            raise ContextError(NO_STATE)
+        walk, row, displayed, pose = np.split(np.frombuffer(state[:size]).copy(), np.cumsum(widths[:3]).tolist())
         is_right = walks.are_walks(ways, walk[None]) and chooser.are_rows(row[None]) and bool(np.isfinite(pose).all())
-        if not is_right or (stream is not None and not stream.stand_on(displayed, pose)):
-            raise ContextError(NO_BLOCK)
-        self.controller.stand_on(row[None])
+        before = self.controller.place
+        if not is_right or not self.controller.stand_on(row[None], state[size:]):
+            raise ContextError(NO_STATE)
+        if stream is not None and not stream.stand_on(displayed, pose):
+            self.controller.put_back(before)
+            raise ContextError(NO_STATE)
         self._stand(walk[None], None)
 
     def update(
@@ -312,21 +308,67 @@ class Character:
         ContextDBError
             Facts that a table refuses, or an argument that cannot be used. The character then stands where it stood.
         """
-        if path is not None:
-            require_kind(path, Trajectory, "path", "a Trajectory over the ground")
         step = self._step(dt, stick, facts, facing, body)
+        paths, query = self._wished(step, path)
+        if "valid" not in options:
+            options["valid"] = self._valid(step.facts)
+        before = self.controller.place
+        decision = self.controller.update(step.dt_s, query, context=step.facts or None, body=step.body, **options)
+        return self._answer(step, paths, decision, before)
+
+    # ---- over a network
+
+    def pack(self) -> bytes:
+        """What plays now, for a copy of this character on another machine: a few bytes, to be sent after each update or, where
+        a late change does no harm, after some. Empty where nothing plays."""
+        return network.packed(self.controller.chooser, self.controller.row[0])
+
+    def unpack(
+        self,
+        data: bytes,
+        dt: float,
+        stick: Ground = (0.0, 0.0),
+        facing: float | None = None,
+        *,
+        body: Steered | None = None,
+        path: Trajectory | None = None,
+    ) -> Updated:
+        """An update of a copy: in place of asking tables and searching it plays what its owner packed after this update.
+
+        With the same databases, and the same `dt`, stick and body as the owner had, poses are the owner's to the bit. Where
+        nothing arrived, give b"": it plays on. The next packet puts it right; where that tells of an entry that is past, the copy
+        is at most a frame off until the next one.
+
+        Parameters
+        ----------
+        data : bytes
+            What `pack` gave. One that comes late must be left out.
+        dt, stick, facing, body, path
+            As for `update`.
+
+        Raises
+        ------
+        ContextError
+            The bytes are none of such a character. It then stands where it stood; so it does after any other error of `update`.
+        """
+        followed = network.followed(self.controller.chooser, data)
+        step = self._step(dt, stick, None, facing, body)
+        paths, query = self._wished(step, path)
+        before = self.controller.place
+        decision = follow(self.controller, step.dt_s, query, followed, place_of(step.body))
+        return self._answer(step, paths, decision, before)
+
+    # ---- the parts of an update, for a crowd
+
+    def _wished(self, step: Step, path: Trajectory | None) -> tuple[Paths, Floats]:
+        """The path that is wished for, of a game that plans it or from the stick, and the query that asks for it."""
         pose = self._features(step)[None]
         if path is None:
             paths, queries = walks.wished(self.schema, step.walk, step.goal, pose)
         else:
+            require_kind(path, Trajectory, "path", "a Trajectory over the ground")
             paths, queries = walks.wished_along(self.schema, step.walk, path, pose)
-        if "valid" not in options:
-            options["valid"] = self._valid(step.facts)
-        before = self.controller.place
-        decision = self.controller.update(step.dt_s, queries[0], context=step.facts or None, body=step.body, **options)
-        return self._answer(step, paths, decision, before)
-
-    # ---- the parts of an update, for a crowd
+        return paths, queries[0]
 
     def _step(self, dt: float, stick: Ground, facts: Facts | None, facing: float | None, body: Steered | None) -> Step:
         dt = require_real(dt, "dt", 0.0)

@@ -20,7 +20,7 @@ from contextdb.motion.characters import tables as asking
 from contextdb.motion.characters import walks
 from contextdb.motion.characters.character import Character
 from contextdb.motion.characters.tables import Facts, Table
-from contextdb.motion.characters.updates import CharacterState, Step, Updated
+from contextdb.motion.characters.updates import Step, Updated
 from contextdb.motion.clips.many_steered import ManySteered
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.output.pose import Pose
@@ -74,13 +74,13 @@ class Crowd(ListSequence[Character]):
         return f"<Crowd: {plural(len(self), 'character')}>"
 
     @property
-    def states(self) -> list[CharacterState]:
+    def states(self) -> list[bytes]:
         """Where each is, to come back to with `restore`."""
         return [character.state for character in self]
 
-    def restore(self, states: Sequence[CharacterState]) -> None:
+    def restore(self, states: Sequence[bytes]) -> None:
         """Go on from the states of as many characters."""
-        states = require_many_of(states, CharacterState, "states", "a list of CharacterState, what `states` gives")
+        states = require_many_of(states, bytes, "states", "a list of bytes, what `states` gives")
         if len(states) != len(self):
             raise MotionError(Fault(f"{plural(len(states), 'state')} for {plural(len(self), 'character')}.", "one for each"))
         for character, state in zip(self, states, strict=True):

@@ -1,4 +1,4 @@
-"""What a character takes for an update, what an update gives, and the state that a character can be put back to."""
+"""What a character takes for an update, and what an update gives."""
 
 from __future__ import annotations
 
@@ -6,18 +6,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypedDict
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from contextdb.motion.characters.tables import Facts
-from contextdb.motion.characters.walks import body_of
 from contextdb.motion.clips.many_paths import ManyTrajectories
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.steering import Steered
 from contextdb.motion.clips.trajectory import Trajectory
-from contextdb.motion.output.stream import Pose, PoseState
+from contextdb.motion.output.stream import Pose
 from contextdb.motion.records import quickly_made
-from contextdb.motion.selection.controller_state import ControllerState
 from contextdb.motion.selection.decision import Decision, plays
 from contextdb.motion.selection.search_options import Among, OfPenalties, OfTags, OfValid
 
@@ -39,41 +36,6 @@ class Options(TypedDict, total=False):
 
 def _at(body: Steered) -> str:
     return f"at x {body.position[0]:.6g}, z {body.position[1]:.6g}"
-
-
-@dataclass(frozen=True, slots=True)
-class CharacterState:
-    """Where a character is: all that its next pose depends on beside what it is then given. Never changed, so it may be stored.
-
-    Attributes
-    ----------
-    walk : bytes
-        Where body and animation are, see the core's walk.h.
-    controller : ControllerState
-    stream : PoseState or None
-    """
-
-    walk: bytes
-    controller: ControllerState
-    stream: PoseState | None
-    block: bytes = b""
-
-    def __bytes__(self) -> bytes:
-        """One flat block, which a game in C goes on from; see the core's character.h."""
-        return self.block
-
-    @property
-    def body(self) -> Steered:
-        """Where the game has the body."""
-        return body_of(self.row)
-
-    @property
-    def row(self) -> Floats:
-        """The walk as the core has it: [1, W]."""
-        return np.frombuffer(self.walk)[None]
-
-    def __repr__(self) -> str:
-        return f"<CharacterState: {plays(self.controller.playing)}, {_at(self.body)}>"
 
 
 @quickly_made

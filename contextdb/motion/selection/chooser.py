@@ -38,7 +38,7 @@ from contextdb.motion.selection.selector import Selector, choice_of
 
 ASK, CHOOSE, DECIDE = 1, 2, 4
 N_STATE, N_PLAYED, N_MOVED, N_DECISION = 19, 4, 16, 39
-PLAYING, N_REMEMBERED, PLAY, ENTERED = slice(5, 9), 9, slice(10, 18), 18
+TIME, PLAYING, N_REMEMBERED, PLAY, ENTERED = 1, slice(5, 9), 9, slice(10, 18), 18
 ACTION, CAUSE, HELD, STANDING, WINNER, IS_UNDER, CHOSEN, CURRENT = 2, 3, 4, 5, 16, 17, slice(18, 22), 29
 """Columns of a row, and of a decision."""
 NEW, WIDENED = (0.0, 2.0), 1.0

@@ -179,10 +179,20 @@ class Controller:
     def _state(self) -> ControllerState:
         return self._chooser.state(self._rows[self._at].tolist(), self.playing, self._recent)
 
-    def stand_on(self, row: Floats) -> None:
-        """Go on from a row [1, W] of this controller, or of another one with the same selector and settings, that is checked."""
+    @property
+    def varied(self) -> bytes:
+        """Where what the settings vary stands, beside the row; empty where they vary nothing."""
+        return b"" if self._rng is None or self.settings.variation is None else variation.packed(self._recent, self._rng)
+
+    def stand_on(self, row: Floats, varied: bytes = b"") -> bool:
+        """Go on from a checked row [1, W] of this controller, or of another one with the same selector and settings, and from what
+        was `varied`; False where that is of none."""
+        recent = variation.unpacked(varied, self._rng)
+        if recent is None:
+            return False
         self._rows, self._at, self._moved = row, 0, None
-        self._playing, self._recent, self._is_decoded = None, (), False
+        self._playing, self._recent, self._is_decoded = None, recent, False
+        return True
 
     @property
     def place(self) -> Place:
@@ -286,7 +296,12 @@ class Controller:
         n_recorded = 0 if self.recorder is None else self.recorder.n_candidates
         return n_recorded if self._watcher is None else max(n_recorded, self._watcher.n_candidates)
 
-    def _hand_over(self, decision: Decision) -> None:
+    def take(self, updates: Updates, at: int, decision: Decision) -> None:
+        """Go on from one of some updates, and hand its decision over."""
+        self._rows, self._at = updates.after, at
+        self._playing, self._is_decoded = decision.playing, True
+        if self.settings.variation is not None and decision.action in (Action.START, Action.JUMP):
+            self._recent = self.settings.variation.remember(self._recent, str(decision.playing and decision.playing.asset))
         if self.recorder is not None:
             self.recorder.record(decision)
         if self._watcher is not None and self._watcher.feed.is_open:
@@ -295,12 +310,6 @@ class Controller:
     def _now_s(self) -> float:
         """What the clock says; 0 without one."""
         return self._clock() if self._clock else 0.0
-
-    def _go_on(self, updates: Updates, at: int, decision: Decision) -> None:
-        self._rows, self._at = updates.after, at
-        self._playing, self._is_decoded = decision.playing, True
-        if self.settings.variation is not None and decision.action in (Action.START, Action.JUMP):
-            self._recent = self.settings.variation.remember(self._recent, str(decision.playing and decision.playing.asset))
 
 
 # ---- many: one is many of length one
@@ -319,7 +328,8 @@ def update_all(
     made = []
     for numbers in _together(controllers, asked):
         own = [controllers[i] for i in numbers]
-        updates, search_us = _updates(own, dt_s, queries if len(own) == len(controllers) else queries[numbers], asked, numbers)
+        updates = prepared(own, dt_s, queries if len(own) == len(controllers) else queries[numbers], asked, numbers)
+        search_us = _run(updates, own)
         made.append((numbers, updates))
         for k, i in enumerate(numbers):
             one = own[k]
@@ -329,8 +339,7 @@ def update_all(
             decisions[i] = decision_of(updates, k, one.playing, told)
     for numbers, updates in made:
         for k, i in enumerate(numbers):
-            controllers[i]._go_on(updates, k, decisions[i])
-            controllers[i]._hand_over(decisions[i])
+            controllers[i].take(updates, k, decisions[i])
     return decisions
 
 
@@ -345,10 +354,8 @@ def _together(controllers: Sequence[Controller], asked: Asked) -> list[list[int]
     return list(groups.values())
 
 
-def _updates(
-    own: Sequence[Controller], dt_s: float, queries: Floats, asked: Asked, numbers: Sequence[int]
-) -> tuple[Updates, float]:
-    """The updates of controllers that go together, whose numbers among all are these; and the microseconds of a search."""
+def prepared(own: Sequence[Controller], dt_s: float, queries: Floats, asked: Asked, numbers: Sequence[int]) -> Updates:
+    """The updates of controllers that go together, whose numbers among all are these, before their first step."""
     chooser, n, first = own[0].chooser, len(own), asked.options(numbers[0])
     rows = rows_of(own)
     moved = _moved_of(own, rows, dt_s)
@@ -367,8 +374,7 @@ def _updates(
     wanted = np.ascontiguousarray(queries[:, : chooser.n_features])
     given = Given(wanted, dt_s, ranges, biases, chooser.shared(first.tags, first.bias), flags, urgent, wide, plays)
     found = np.empty((n, len(chooser.names), 3))
-    updates = Updates(chooser, rows, moved, given, np.empty_like(rows), np.empty((n, N_DECISION)), found)
-    return updates, _run(updates, own)
+    return Updates(chooser, rows, moved, given, np.empty_like(rows), np.empty((n, N_DECISION)), found)
 
 
 def _run(updates: Updates, own: Sequence[Controller]) -> float:

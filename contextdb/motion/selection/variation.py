@@ -8,6 +8,7 @@ Source: "RandomVariation" in the settings of EA's diagnostics; reproducible, bec
 
 from __future__ import annotations
 
+import json
 import random
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -36,7 +37,7 @@ class Variation(Declared, error=MotionError):
         "Frames that cost at most so much more than the best are as good as it.", least=0.0, unit="a cost", such_as=0.05
     )
     memory: int = number(
-        "None of the last so many assets is chosen while another is as good.", 1, 0, 1000, "a whole number", 2, is_whole=True
+        "How many of the last assets are not chosen while another is as good.", 1, 0, 1000, "a whole number", 2, is_whole=True
     )
 
     def choose(self, ties: Sequence[Hit], recent: Collection[str], rng: Rng) -> Hit:
@@ -65,3 +66,22 @@ def restore(rng: Rng | None, state: object) -> None:
         rng.setstate(state)  # type: ignore[arg-type]
     else:
         rng.bit_generator.state = state  # type: ignore[assignment]
+
+
+def packed(recent: tuple[str, ...], rng: Rng) -> bytes:
+    """The assets of the last changes and where a generator is."""
+    return json.dumps([recent, state_of(rng)], default=np.ndarray.tolist).encode()
+
+
+def unpacked(data: bytes, rng: Rng | None) -> tuple[str, ...] | None:
+    """The assets of the last changes out of `packed`, with the generator set to where it was; None for what was not packed so."""
+    if rng is None or not data:
+        return None if data else ()
+    before = state_of(rng)
+    try:
+        recent, state = json.loads(data)
+        restore(rng, (state[0], tuple(state[1]), state[2]) if isinstance(rng, random.Random) else state)
+        return tuple(map(str, recent))
+    except (ValueError, TypeError, KeyError, LookupError, OverflowError, RecursionError):
+        restore(rng, before)
+        return None

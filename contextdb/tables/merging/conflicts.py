@@ -37,7 +37,6 @@ class Conflict:
 
     @property
     def place(self) -> str:
-        """Where it is, in words."""
         return {"cell": f"{self.asset}, {self.column}", "row": self.asset}.get(self.kind, self.column)
 
 

@@ -38,7 +38,6 @@ class Matching:
         return bool((self.of_before >= 0).all() or (self.of_after >= 0).all())
 
     def pair(self, before: Places, after: Places) -> None:
-        """Take rows together."""
         self.of_before[before], self.of_after[after] = after, before
 
     def pair_by(

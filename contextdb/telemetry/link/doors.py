@@ -46,7 +46,6 @@ class Door:
     inode: int
 
     def close(self) -> None:
-        """Listen no more."""
         self.server.close()
         with suppress(OSError), turn(self.path.parent):
             if os.lstat(self.path).st_ino == self.inode:

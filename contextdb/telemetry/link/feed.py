@@ -50,7 +50,6 @@ class Source:
     conditions: Mapping[str, Condition]
 
     def line(self) -> Line:
-        """What the header says of it."""
         conditions = {name: condition.domain.kind for name, condition in self.conditions.items()}
         return {"version": self.version, "rows": self.n_rows, "conditions": conditions}
 
@@ -93,7 +92,6 @@ class Feed:
         return False
 
     def take(self, most: int) -> Iterator[Entry]:
-        """Some of the entries, oldest first."""
         for _ in range(min(most, len(self.entries))):
             yield self.entries.popleft()  # the game only adds
 
@@ -169,7 +167,6 @@ class Moment:
 
     @property
     def table(self) -> str | None:
-        """The name of its table."""
         return None if self.source is None else self.source.name
 
     @property
@@ -178,7 +175,6 @@ class Moment:
         return self._line is not None
 
     def line(self, decisions: Decisions | None) -> bytes:
-        """The line, made once."""
         if self._line is None:
             self._line = dumped(self._content(decisions))
         return self._line
@@ -236,8 +232,8 @@ class Moments:
             if source is None:
                 moment.decision = what
             elif isinstance(what, Picked):
-                asked = self._newest.get((name, source.name, False))
-                question = asked if answer is None else self._questions.get(id(answer))
+                newest = self._newest.get((name, source.name, False))
+                question = newest if answer is None else self._questions.get(id(answer))
                 if question is None and label is _UNNAMED:
                     continue
                 if question is not None and not (question.is_sent or question.pick):

@@ -67,7 +67,6 @@ class Listener:
         raise NotImplementedError
 
     def send(self) -> None:
-        """Send what waits."""
         raise NotImplementedError
 
     def _lost_line(self) -> bytes:
@@ -127,7 +126,6 @@ class SocketListener(Listener):
         self._pending += line
 
     def read(self) -> None:
-        """Take what it sends."""
         try:
             sent = self.connection.recv(MOST_REQUEST)
         except BlockingIOError:
@@ -206,7 +204,6 @@ class FileListener(Listener):
         self._try(partial(self._file.write, self._lost_line() + line))
 
     def send(self) -> None:
-        """Hand what was written to the system."""
         self._try(self._file.flush)
 
     def close(self) -> None:

@@ -76,7 +76,6 @@ class ChoiceList(Widget, can_focus=False):
 
     @property
     def wanted_width(self) -> int:
-        """How wide the first rows are."""
         return max((cell_len(self._text(row)) for row in self.rows[:LABELS_MEASURED]), default=0) + 3
 
     def _text(self, row: Row) -> str:

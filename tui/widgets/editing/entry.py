@@ -48,7 +48,6 @@ class Entry(Input):
 
     @property
     def text(self) -> str:
-        """What the cell would hold."""
         return self.value.translate({ord(sign): chr(code) for code, sign in self._signs.items()})
 
     def begin(self, text: str) -> None:
@@ -65,7 +64,6 @@ class Entry(Input):
         return self
 
     def write(self, text: str, caret: int | None = None) -> None:
-        """Put another text there."""
         self.value = text.translate(self._signs)
         self.selection = Selection.cursor(len(text) if caret is None else caret)
 

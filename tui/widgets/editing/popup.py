@@ -91,7 +91,6 @@ class Popup(Vertical):
 
     @property
     def is_empty(self) -> bool:
-        """Whether there is nothing to show."""
         return not (self._verdict.words or self._verdict.fault or self.choices.rows or self._domain)
 
     @property

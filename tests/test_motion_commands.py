@@ -87,7 +87,21 @@ def test_the_group_lists_its_commands(arguments: list[str]):
 
 @pytest.mark.parametrize(
     "command",
-    "describe prepare bones check build coverage search select run probe measure replay learn".split(),
+    [
+        "describe",
+        "prepare",
+        "bones",
+        "check",
+        "build",
+        "coverage",
+        "search",
+        "select",
+        "run",
+        "probe",
+        "measure",
+        "replay",
+        "learn",
+    ],
 )
 @pytest.mark.parametrize("width", [60, 100])
 def test_each_command_has_a_help_that_fits_with_examples(command: str, width: int, monkeypatch: pytest.MonkeyPatch):

@@ -10,10 +10,10 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from made_once import make_clip
 from running import run
 
 from contextdb.motion import write_bvh
-from contextdb.motion.made.recipes import make_clip
 
 TOML = """
 [tables.moves]

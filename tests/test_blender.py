@@ -13,10 +13,10 @@ from pathlib import Path
 
 import pytest
 from clip_files import Moving, fbx
+from made_once import make_clip
 from running import run
 
 from contextdb import motion
-from contextdb.motion.made.recipes import make_clip
 from examples.blender import contextdb_blender as addon
 
 ROOT = Path(__file__).parent.parent

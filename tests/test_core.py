@@ -97,8 +97,8 @@ needs_stable_abi = pytest.mark.skipif(bool(sysconfig.get_config_var("Py_GIL_DISA
 @needs_unix
 @needs_stable_abi
 def test_all_compilers_give_the_same_bits_at_all_levels_without_a_warning(tmp_path: Path):
-    narrow = "-DCDBP_NARROW"
-    commands = variants(("-O0",), ("-O0", narrow), ("-O3",), ("-O3", narrow)) or pytest.skip("no C compiler was found")
+    narrow = ("-O3" if IS_FULL else "-O0", "-DCDBP_NARROW")
+    commands = variants(("-O0",), narrow, ("-O3",)) or pytest.skip("no C compiler was found")
     extensions = [compiled_core(tmp_path, f"core{number}", *command, *STRICT) for number, command in enumerate(commands)]
     answers = {answers_of(extension, 5, 30 if IS_FULL else 9) for extension in [*extensions, Path(_core.__file__)]}
     assert len(answers) == 1

@@ -16,13 +16,13 @@ from pathlib import Path
 
 import pytest
 from faulty_disk import ERRORS, WRITERS, faulty
+from made_once import make_clip
 from running import ROOT, Result, run
 from strategies import some
 
 from contextdb.edits.edits import set_cells, set_settings
 from contextdb.errors import ContextDBError
 from contextdb.motion import write_bvh
-from contextdb.motion.made.recipes import make_clip
 from contextdb.tables.project import load
 from tui.model.session import Session
 

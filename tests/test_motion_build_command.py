@@ -13,6 +13,7 @@ from pathlib import Path
 from unittest import mock
 
 import pytest
+from made_once import make_clip
 from running import Result, run
 
 from contextdb.cli import main
@@ -21,7 +22,6 @@ from contextdb.commands.motion_build_command import MotionProject
 from contextdb.commands.motion_check_command import check_path
 from contextdb.files.tensors import read_tensors
 from contextdb.motion import write_bvh
-from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.storage import building, extracting
 from contextdb.motion.storage.pose_files import STORED_POSES, open_poses
 from contextdb.motion.storage.stored import inputs_of, open_database

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_once import make_clip
 from running import run
 
 from contextdb.motion import Clip, write_bvh
 from contextdb.motion.clips.clip_measures import measure
-from contextdb.motion.made.recipes import make_clip
 
 TOML = """
 [tables.moves]

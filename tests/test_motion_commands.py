@@ -78,6 +78,7 @@ def test_the_group_lists_its_commands(arguments: list[str]):
         "probe",
         "measure",
         "replay",
+        "learn",
         "debug",
     ]
     assert run("motion") == Result(2, "", result.out)
@@ -86,7 +87,21 @@ def test_the_group_lists_its_commands(arguments: list[str]):
 
 @pytest.mark.parametrize(
     "command",
-    ["describe", "prepare", "bones", "check", "build", "coverage", "search", "select", "run", "probe", "measure", "replay"],
+    [
+        "describe",
+        "prepare",
+        "bones",
+        "check",
+        "build",
+        "coverage",
+        "search",
+        "select",
+        "run",
+        "probe",
+        "measure",
+        "replay",
+        "learn",
+    ],
 )
 @pytest.mark.parametrize("width", [60, 100])
 def test_each_command_has_a_help_that_fits_with_examples(command: str, width: int, monkeypatch: pytest.MonkeyPatch):
@@ -601,3 +616,25 @@ def test_learned_weights_are_written_once_and_nothing_else_changes(here: Path):
     assert [each["weight"] for each in after] == [each["learned"] for each in document["weights"]]
     assert schema.read_text("utf-8").count("\n") == was.count("\n")
     assert "no other weights follow more of them: with the present ones 1 of 1" in motion("learn", "session.parquet").out
+
+
+# ---- what forces jumps
+
+
+def test_measure_names_the_columns_that_replay_names_for_each_forced_jump():
+    expected: dict[tuple[str, ...], list[float]] = {}
+    for decision in Trace.load("session.parquet").brief():
+        if decision.action == "jumps" and decision.continuing_cost is None:
+            why = motion("replay", "session.parquet", "--at", str(decision.tick), "--why", decision.before.asset, "--json").json
+            reasons = [each.split(": ")[2] for each in why["why_not"]["reasons"] if each.startswith("table: ")]
+            if reasons:
+                expected.setdefault(tuple(each.split(" is ")[0] for each in reasons), []).append(decision.cost)
+    assert len(expected) > 1
+    session = motion("measure", "session.parquet", "--json").json["sessions"][0]
+    named = {tuple(each["columns"]): (each["jumps"], each["cost"]) for each in session["forced_by"]}
+    assert named == {columns: (len(costs), pytest.approx(max(costs))) for columns, costs in expected.items()}
+    of, (columns, costs) = session["forced_jumps"], max(expected.items(), key=lambda each: len(each[1]))
+    sentence = f"forced by {' and '.join(columns)}: {len(costs)} of {of} forced jumps, at a cost of up to {max(costs):.3g}"
+    assert sentence in " ".join(motion("measure", "session.parquet").out.split())
+    probed = motion("probe", "game", "player", "--drive", "stops", "--speed", "1", "--json").json["sessions"]
+    assert all("forced_by" in each for each in probed)

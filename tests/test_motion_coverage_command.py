@@ -9,6 +9,7 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import pytest
+from made_once import make_clip
 from motion_project import work_in_copy, write_project
 from running import Result, run
 
@@ -16,7 +17,6 @@ import contextdb as cdb
 from contextdb.files.reports import sealed, with_marks
 from contextdb.motion import write_bvh
 from contextdb.motion.made.joint import make_joint_clip
-from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.measuring.moves import MAPS
 from contextdb.report.render_json import as_json
 

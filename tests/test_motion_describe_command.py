@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_once import make_clip
 from running import Result, run
 from strategies import some
 
 from contextdb.motion import write_bvh
 from contextdb.motion.made.joint import make_joint_clip
-from contextdb.motion.made.recipes import make_clip
 
 NAMES = ("idle", "walk", "walk_turn_left_90", "walk_turn_right_90", "jog", "start_walk", "stop_walk")
 COLUMNS = ["Asset Name", "gait", "speed", "direction", "turn", "style", "duration_s", "start", "end"]

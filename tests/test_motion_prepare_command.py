@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_once import make_clip
 from running import Result, run
 from strategies import some
 
@@ -18,7 +19,6 @@ from contextdb.commands import watched_work
 from contextdb.commands.motion_prepared import line_of, with_marks
 from contextdb.motion import Markup, MotionConfig, write_bvh
 from contextdb.motion.features.extraction import clip_features
-from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.preparing.look import Look
 from contextdb.motion.preparing.proposal import Proposal
 

@@ -118,12 +118,14 @@ def test_a_name_with_blanks_stands_in_backquotes_where_an_expression_names_it(fo
 def test_actors_that_are_kept_have_their_fact_under_the_new_name(tmp_path: Path):
     (tmp_path / "a.csv").write_text("Asset,Defender.near\nrun,True\n")
     (tmp_path / "a.cases.csv").write_text("Case,Expected,Defender.near\none,run,True\n")
-    (tmp_path / "a.actors.json").write_text('{"Defender": [{"name": "Ivy", "near": true}], "Receiver": [{"near": 1}]}')
+    (tmp_path / "a.actors.json").write_text(
+        '{"Defender": [{"name": "Ivy", "near": true}], "Receiver": [{"near": 1, "Defender.near": true}]}'
+    )
     table = load(tmp_path / "a.csv")
     assert uses_of(table, "Defender.near").text == "1 saved context"
     renaming(table, "Defender.near", "Defender.close").write()
     actors = json.loads((tmp_path / "a.actors.json").read_text())
-    assert actors == {"Defender": [{"name": "Ivy", "close": True}], "Receiver": [{"near": 1}]}
+    assert actors == {"Defender": [{"name": "Ivy", "close": True}], "Receiver": [{"near": 1, "Defender.close": True}]}
     assert read_cases(tmp_path / "a.cases.csv")[0].facts == {"Defender.close": "True"}
 
 

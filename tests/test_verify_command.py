@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from made_once import make_clip
 from running import ROOT, run
 
 import contextdb as cdb
@@ -17,7 +18,6 @@ from contextdb.authoring.verify import UNUSABLE, verified
 from contextdb.disk import write_atomic
 from contextdb.files.journal_lines import line_of
 from contextdb.files.reports import document_of, sealed, with_marks
-from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.storage.pose_files import save_poses
 from contextdb.motion.storage.stored import save_database
 from contextdb.report import render

@@ -27,11 +27,13 @@ from contextdb.commands.gating import earlier_report
 from contextdb.commands.motion_build_command import MotionProject, warn
 from contextdb.commands.motion_replay_command import project_of
 from contextdb.commands.numbers import number_type
+from contextdb.compiled.table import CompiledTable
 from contextdb.console import ExitCode, terminal_width
 from contextdb.errors import ContextDBError, ContextError, Fault, Place, in_quotes, plural
 from contextdb.motion import Measures, MotionDatabase, PoseBank, PoseSettings, measure, open_or_build, open_or_build_poses
 from contextdb.motion.storage.written_poses import NPZ
 from contextdb.motion.trace.filter_rows import fingerprint
+from contextdb.motion.trace.forced_by import forced_by
 from contextdb.motion.trace.session import Trace
 from contextdb.report.measure_results import BASELINE, Bar, MeasureResults, SessionMeasures, compared, held_to, read_baseline
 from contextdb.report.results import Gate, as_path
@@ -122,6 +124,12 @@ class Clips:
     def databases(self) -> dict[str, MotionDatabase]:
         return open_or_build(self.project.config, self.project.folder, self.project.assets)
 
+    @cached_property
+    def tables(self) -> dict[str, CompiledTable]:
+        """The compiled table of each database that has one."""
+        compiled = {name: table.compile() for name, table in self.project.tables.items()}
+        return {name: compiled[each.table] for name, each in self.project.config.databases.items() if each.table in compiled}
+
 
 def _measured(
     arguments: argparse.Namespace, file: str, poses: str | None, known: dict[str, Clips], before: Mapping[str, object]
@@ -145,7 +153,8 @@ def _measured(
     if why:
         warn([f"{file}: without clips to compare with: {why}"])
     gates = (*gates_of(arguments, measures, file), *compared(before, measures))
-    return SessionMeasures(file, measures, before, gates)
+    forced = [] if clips is None or trace is None else forced_by(trace.brief(), clips.tables)
+    return SessionMeasures(file, measures, before, gates, tuple(forced))
 
 
 def add_bars(parser: argparse.ArgumentParser) -> None:

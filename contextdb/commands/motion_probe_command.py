@@ -14,7 +14,7 @@ Exits with 1 if a drive is over a bar; with 2 if a bar cannot be judged.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,7 @@ from contextdb.commands.motion_measure_command import add_bars, gates_of
 from contextdb.commands.motion_run_command import character_of, say_where
 from contextdb.commands.motion_stage import Stage, context_text
 from contextdb.commands.numbers import number_type, rate_of
+from contextdb.compiled.table import CompiledTable
 from contextdb.console import ExitCode, aligned, note, output, progress
 from contextdb.disk import make_folder
 from contextdb.disk.boundary import inside
@@ -30,6 +31,7 @@ from contextdb.errors import ContextDBError, Fault, FileError, Place, plural, so
 from contextdb.motion import Character, Measures, Pose, Trace, measure
 from contextdb.motion.characters.drives import Drive, drives, steered
 from contextdb.motion.characters.probing import Plan, Scene, plan_of
+from contextdb.motion.trace.forced_by import ForcedBy, forced_by, together
 from contextdb.report.render_json import as_json
 
 _SPEED = number_type("a speed to drive at. Accepted: 0.1 to 100 m/s, such as 1.3.", 0.1, 100.0)
@@ -70,6 +72,7 @@ class Probe:
     drive: Drive
     file: str
     measures: Measures
+    forced_by: Sequence[ForcedBy]
 
     @property
     def name(self) -> str:
@@ -135,7 +138,9 @@ def _probe(character: Character, scene: Scene, drive: Drive, rate: float, folder
         sticks.append(stick)
     words = f"{scene.name} {drive.name} {drive.speed_mps:g}".replace("=", "-").split()
     file = "" if folder is None else str(inside(folder / f"{'_'.join(words)}.parquet", folder))
-    return Probe(scene, drive, file, _measured(driven, trace, poses, sticks)), trace
+    tables = character.tables if isinstance(character.tables, Mapping) else {}
+    forced = forced_by(trace.brief(), {name: table for name, table in tables.items() if isinstance(table, CompiledTable)})
+    return Probe(scene, drive, file, _measured(driven, trace, poses, sticks), forced), trace
 
 
 def _measured(character: Character, trace: Trace, poses: Sequence[Pose], sticks: Sequence[tuple[float, float]]) -> Measures:
@@ -160,6 +165,7 @@ def _document(plan: Plan, probes: Sequence[Probe]) -> dict[str, Any]:
             "speed_mps": probe.drive.speed_mps,
             "facts": context_text(probe.scene.facts),
             **probe.measures.to_json(),
+            "forced_by": [each.to_json() for each in probe.forced_by],
         }
         for probe in probes
     ]
@@ -174,6 +180,8 @@ def _lines(probes: Sequence[Probe]) -> Iterator[str]:
         header = ("drive", "m/s", *(name for name, _ in COLUMNS.values()))
         rows = [(each.drive.name, f"{each.drive.speed_mps:g}", *_cells(each.measures)) for each in own]
         yield from aligned([header, *rows], right=range(1, len(header)))
+        n_forced = sum(each.measures.forced_jumps for each in own)
+        yield from (each.sentence(n_forced) for each in together(part for probe in own for part in probe.forced_by))
         yield ""
     yield plural(len(probes), "drive")
 

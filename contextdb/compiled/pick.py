@@ -90,22 +90,26 @@ def pick_row(compiled: CompiledData, matches: Matches, rng: Rng | int | None = N
         return int(possible[0]) if len(possible) else None
     with memory.lock:
         last = memory.last(source) if last is None else last
-        fresh = possible[[compiled.assets[r] != last for r in possible.tolist()]]
-        row = _drawn(choosing, fresh if len(fresh) else possible, source)
+        fresh = [r for r in possible.tolist() if compiled.assets[r] != last]
+        row = _drawn(choosing, np.array(fresh) if 0 < len(fresh) < len(possible) else possible, source)
         memory.remember(source, compiled.assets[row])
     return row
 
 
 def _drawn(choosing: Choosing, rows: Rows, source: Rng) -> int:
     """One of the rows that may be picked: at each depth by the weights of that table's rows."""
-    for depth, (taken, weights) in enumerate(zip(choosing.taken, choosing.weights, strict=True)):
+    last = len(choosing.taken) - 1
+    for depth, weights in enumerate(choosing.weights):
         table = choosing.table_at(int(rows[0]), depth)
         if table is None or POLICIES[table.policy].choose != "chance":
             continue
-        first = rows[np.unique(taken[rows], return_index=True)[1]]
-        sums = np.cumsum(weights[first] / weights[first].max())
-        place = min(int(np.searchsorted(sums, source.random() * sums[-1], "right")), len(first) - 1)
-        rows = rows[taken[rows] == taken[first[place]]]
+        firsts = rows if depth == last else rows[np.unique(choosing.taken[depth, rows], return_index=True)[1]]
+        shares = weights[firsts]
+        sums = np.cumsum(shares / shares.max())
+        picked = firsts[min(int(sums.searchsorted(source.random() * sums[-1], "right")), len(sums) - 1)]
+        if depth == last:
+            return int(picked)
+        rows = rows[choosing.taken[depth, rows] == choosing.taken[depth, picked]]
     return int(rows[0])
 
 

@@ -19,7 +19,13 @@ def _section(session: SessionMeasures, shows_all: bool) -> Section:
     used = [i for i in range(len(HEADERS)) if i < 2 or any(row[i] for row in rows)]
     head, *body = [[row[i] for i in used] for row in (HEADERS, *rows)]
     never = [in_quotes(name) for name in session.measures.assets_never_used or ()]
-    blocks: list[Block] = [Table(head, body), *session.not_measured(), *([Listing("never played", never)] if never else [])]
+    forced = [each.sentence(session.measures.forced_jumps) for each in session.forced_by]
+    blocks: list[Block] = [
+        Table(head, body),
+        *forced,
+        *session.not_measured(),
+        *([Listing("never played", never)] if never else []),
+    ]
     return Section(session.file, session.headline, (), blocks, _gates(session, shows_all))
 
 

@@ -16,6 +16,7 @@ from contextdb.files.reports import baseline_of, with_marks
 from contextdb.findings import Finding
 from contextdb.motion.measuring.measures import Measures
 from contextdb.motion.measuring.parts import NO_CHANGE, NO_FORCED, NO_JUMP, NO_REST
+from contextdb.motion.trace.forced_by import ForcedBy
 from contextdb.report.results import CheckReport, Gate, Subject, as_path
 
 NOTHING_TO_EXCEED = (NO_FORCED, NO_JUMP, NO_CHANGE, NO_REST)
@@ -95,12 +96,13 @@ class Bar:
 
 @dataclass(frozen=True)
 class SessionMeasures:
-    """One session: its file, its measures, those of the baseline by name, and its gates."""
+    """One session: its file, its measures, those of the baseline by name, its gates, and which columns forced jumps."""
 
     file: str
     measures: Measures
     before: Mapping[str, object]
     gates: tuple[Gate, ...]
+    forced_by: tuple[ForcedBy, ...] = ()
 
     @property
     def headline(self) -> str:
@@ -124,7 +126,9 @@ class SessionMeasures:
         return (f"not measured, as {why}: {'; '.join(labels)}" for why, labels in of.items())
 
     def to_json(self) -> dict[str, object]:
-        return {"file": as_path(self.file), **self.measures.to_json(), "bars": [gate.to_json() for gate in self.gates]}
+        forced = [each.to_json() for each in self.forced_by]
+        gates = [gate.to_json() for gate in self.gates]
+        return {"file": as_path(self.file), **self.measures.to_json(), "forced_by": forced, "bars": gates}
 
 
 @dataclass(frozen=True)

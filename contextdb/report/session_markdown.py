@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from contextdb.motion.measuring.displayed import is_forced
 from contextdb.motion.selection.decision import Action, Decision
 from contextdb.motion.trace.cost_views import cost_text
 from contextdb.report.measure_results import SessionMeasures
@@ -57,7 +56,7 @@ def _changes(name: str, decisions: Sequence[Decision], room: int) -> str:
 
 
 def _line(decision: Decision) -> str:
-    what = "forced jump" if is_forced(decision) else str(decision.action)
+    what = "forced jump" if decision.is_forced else str(decision.action)
     asset = "" if decision.playing is None else decision.playing.asset
     cost = "" if decision.cost is None else cost_text(decision.cost)
     return f"| {decision.time_s:.2f} s | {what} | {escaped(asset)} | {cost} | {escaped(decision.why)} |\n"

@@ -88,7 +88,7 @@ def _flags(decision: Decision) -> int:
     flags = (
         session_data.SEARCHED * decision.searched
         + session_data.JUMPED * (decision.action in CHANGES)
-        + session_data.FORCED * displayed.is_forced(decision)
+        + session_data.FORCED * decision.is_forced
     )
     return flags + session_data.MIRRORED * (playing is not None and playing.mirrored)
 
@@ -101,7 +101,7 @@ def _costs(decisions: Sequence[Decision]) -> Floats:
 
 
 def _change(decision: Decision) -> session_data.ChangeLine:
-    action = "jumps, forced" if displayed.is_forced(decision) else str(decision.action)
+    action = "jumps, forced" if decision.is_forced else str(decision.action)
     asset = "" if decision.playing is None else _named(decision.playing.asset, decision.playing.mirrored)
     return session_data.ChangeLine(
         decision.time_s, (action, asset, "" if decision.cost is None else cost_text(decision.cost), decision.why)
@@ -126,7 +126,7 @@ def _moments(
         if not decision.searched:
             continue
         is_change = decision.action in CHANGES
-        moment = session_data.Moment(i, decision.why, is_change, displayed.is_forced(decision), _facts(decision), (), (), ())
+        moment = session_data.Moment(i, decision.why, is_change, decision.is_forced, _facts(decision), (), (), ())
         reasked_decision = _reasked_at(trace, reasked, i) if is_change else None
         if reasked_decision is not None and reasked is not None:
             pose, warp = warped[i]

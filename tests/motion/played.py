@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from functools import cache
 
+from made_once import make_clip
+
 from contextdb.motion import Action, Decision, FeatureSchema, MotionDatabase, PoseBank
-from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.selection.decision import Playing
 from contextdb.motion.selection.playhead import Playhead

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from made_once import make_clip
 
 from contextdb.errors import ContextError, FileError, MotionError
 from contextdb.motion.clips.poses import LocalPoses, forward_kinematics
-from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.storage.written_poses import write_arrays
 from contextdb.motion.walking.baked import baked_cycle
 from contextdb.motion.walking.cycle import Cycle

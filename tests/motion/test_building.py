@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from made_once import make_clip
 from strategies import IS_FULL, examples, some
 
 from contextdb.errors import ClipError, FileError, MotionError, SchemaError
 from contextdb.motion import MotionConfig, MotionDatabase, load_bvh, write_bvh
 from contextdb.motion.features.extraction import clip_features
-from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.search.database import build_databases
 from contextdb.motion.search.filters import Biases
 from contextdb.motion.storage import extracting

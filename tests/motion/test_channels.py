@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from made_once import make_clip
 from motion_oracles import SlowBody, slow_channel
 from strategies import examples, some
 from test_mocap import FOLDER, listed, load
@@ -19,7 +20,6 @@ from contextdb.motion.clips.foot_bones import feet_of
 from contextdb.motion.features.channels import AXES, WHATS
 from contextdb.motion.features.extraction import clip_features, features_of
 from contextdb.motion.features.schema import Channel
-from contextdb.motion.made.recipes import make_clip
 
 BONES = ("Hips", "Head", "LeftFoot", "RightHand", "LeftUpLeg")
 WALK = make_clip("walk").clip

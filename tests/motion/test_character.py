@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from made_once import make_clip
 
 import contextdb as cdb
 from contextdb import motion
@@ -22,7 +23,6 @@ from contextdb.motion.characters.facts import FACTS, Moment
 from contextdb.motion.characters.paths import path_from
 from contextdb.motion.characters.probing import plan_of
 from contextdb.motion.clips.steering import steered_path
-from contextdb.motion.made.recipes import make_clip
 
 DT = 1.0 / 30.0
 NAMES = ("idle", "walk", "walk_turn_left_90", "walk_turn_right_90", "jog", "start_walk", "stop_walk")

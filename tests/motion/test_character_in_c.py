@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from c_compilers import PROGRAMS, all_compilers, compiled, ran, sanitizers, variants
+from made_once import make_clip
 from strategies import IS_FULL
 from test_output_ground import slope
 
@@ -19,7 +20,6 @@ import contextdb as cdb
 from contextdb import motion
 from contextdb.commands.motion_bundle import file_of
 from contextdb.compiled.c_header import c_header_of
-from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.selection.chooser import N_DECISION
 from contextdb.motion.storage.bundle import Played, bundle_of
@@ -82,7 +82,9 @@ def programs(tmp_path_factory):
     """The program, as each compiler makes it with little optimisation, with much, and under sanitizers."""
     folder, first = tmp_path_factory.mktemp("character"), all_compilers()[0]
     (folder / "contextdb_motion.h").write_text(header(), encoding="ascii")
-    commands = variants(("-O0",), ("-O0", "-DCDBM_NARROW"), ("-O3",)) + [(*first, *own) for own in [sanitizers(*first)] if own]
+    commands = variants(("-O0",), ("-O3",) if IS_FULL else ("-O0", "-DCDBM_NARROW")) + [
+        (*first, *own) for own in [sanitizers(*first)] if own
+    ]
     options = ["-std=c99", "-ffp-contract=off", "-Wall", "-Wextra", "-Wconversion", "-Wno-unused-function"]
     return [
         compiled([*command, *options], PROGRAMS / "character.c", folder / f"character{number}", folder, "-lm")

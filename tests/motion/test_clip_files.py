@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from clip_files import SMPL_OFFSETS, Moving, amass, fbx, gltf, usda
+from made_once import make_clip
 from strategies import some
 
 from contextdb import motion
@@ -21,7 +22,7 @@ from contextdb.motion.clips.feet import footfalls_of
 from contextdb.motion.clips.parser_process import ParserProcess
 from contextdb.motion.clips.poses import poses_of
 from contextdb.motion.features.extraction import clip_features
-from contextdb.motion.made.recipes import RECIPES, make_clip
+from contextdb.motion.made.recipes import RECIPES
 from contextdb.motion.storage.building import build_all
 from contextdb.motion.storage.written_poses import write_arrays
 

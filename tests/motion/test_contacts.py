@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_once import make_clip
 from strategies import for_each
 
 from contextdb.errors import MotionError
@@ -19,7 +20,7 @@ from contextdb.motion.clips.feet import footfalls, footfalls_of, marked
 from contextdb.motion.clips.foot_bones import FootBones, feet_of
 from contextdb.motion.clips.poses import forward_kinematics, local_poses, resampled
 from contextdb.motion.features.extraction import clip_features
-from contextdb.motion.made.recipes import RECIPES, make_clip
+from contextdb.motion.made.recipes import RECIPES
 
 FRAME_S = 1.01 / 30.0
 STANCES = Path(os.environ.get("CONTEXTDB_STANCES", ""))

@@ -9,11 +9,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from lines import DT, RATE, line
+from made_once import make_clip
 
 from contextdb.errors import MotionError, QueryError
 from contextdb.motion import Entry, FeatureSchema, MotionDatabase, Selector
 from contextdb.motion.answers import NamedAssets
-from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.markup.marks import TagFilter
 from contextdb.motion.search.filters import Biases

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_once import made_clips, make_clip
 from strategies import for_each
 
 import contextdb as cdb
@@ -15,7 +16,7 @@ from contextdb.errors import ContextDBError
 from contextdb.motion.clips.feet import Footfalls
 from contextdb.motion.clips.poses import poses_of
 from contextdb.motion.clips.trajectory import Trajectory, root_trajectory
-from contextdb.motion.made.recipes import MadeClip, made_clips, make_clip
+from contextdb.motion.made.recipes import MadeClip
 from contextdb.motion.preparing.cells_of_clips import cells_of
 from contextdb.motion.preparing.clip_facts import Moments, Spread, common_words, gait_of, is_moving, style_of
 from contextdb.motion.preparing.describing import Described, condition_sections, patterns_of, table_section

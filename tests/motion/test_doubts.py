@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_once import make_clip
 from strategies import some
 
 from contextdb.errors import MotionError
 from contextdb.motion import Clip, MotionConfig, load_bvh, write_bvh
 from contextdb.motion.clips.clip_measures import Measures, measure
 from contextdb.motion.clips.doubts import doubts_of, grouped
-from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.storage.building import build_all
 
 BESIDE = Path(__file__).parents[2].parent / "shared" / "data" / "mocap"

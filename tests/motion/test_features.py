@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from made_once import make_clip
 from strategies import for_each
 
 from contextdb.errors import MotionError, QueryError, SchemaError
 from contextdb.motion import Channel, Clip, FeatureSchema, MotionConfig, Skeleton, poses_of, query_from, steady_path, with_path
 from contextdb.motion.features.extraction import features_of
-from contextdb.motion.made.recipes import make_clip
 
 POINTS = {
     "rate": 30.0,

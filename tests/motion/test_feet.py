@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 import pytest
+from made_once import make_clip
 
 from contextdb.errors import MotionError
 from contextdb.motion import Clip, Skeleton
 from contextdb.motion.clips.feet import Footfalls, footfalls, phases
-from contextdb.motion.made.recipes import make_clip
 
 FALLS = Footfalls(4.0, {"LeftFoot": np.array([[0.0, 1.0], [2.0, 3.0]]), "RightFoot": np.zeros((0, 2))})
 

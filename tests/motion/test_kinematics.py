@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from made_once import make_clip
 from motion_oracles import place_joint, rotation_about
 from test_bvh import SMALL, clips
 
@@ -16,7 +17,6 @@ from contextdb.motion.clips.bone_names import meant_bone, nearest_bones
 from contextdb.motion.clips.clip import parse_bvh
 from contextdb.motion.clips.poses import local_poses
 from contextdb.motion.clips.skeleton import sided_pairs
-from contextdb.motion.made.recipes import make_clip
 
 ANGLES = st.floats(-360.0, 360.0)
 

@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from clip_files import BODY, Moving, fbx, gltf
+from made_once import make_clip
 from running import run
 from strategies import IS_FULL
 
 from contextdb import motion
 from contextdb.motion.clips import source
-from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.storage.building import build_all
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from made_once import make_clip
 from played import bank, decisions
 
 from contextdb.errors import ContextDBError, MotionError, QueryError
@@ -21,7 +22,6 @@ from contextdb.motion import (
     query_from_pose,
 )
 from contextdb.motion.clips import quaternions
-from contextdb.motion.made.recipes import make_clip
 
 RATE = 30.0
 CHANNELS = (

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from made_once import make_clip
 
 from contextdb.motion import FeatureSchema, Markup, MotionDatabase, poses_of, root_trajectory
 from contextdb.motion.clips.looping import three_rounds
 from contextdb.motion.features.extraction import clip_features
-from contextdb.motion.made.recipes import make_clip
 
 SCHEMA = FeatureSchema.from_dict(
     "loco",

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_once import make_clip
 from running import run
 
 from contextdb import motion
@@ -19,7 +20,6 @@ from contextdb.disk import engines
 from contextdb.errors import MotionError
 from contextdb.files import scratch, tensors
 from contextdb.motion.features.normalisation import Normalisation
-from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.preparing.proposal import ClipHead, key_of
 from contextdb.motion.storage import extracting, pose_files
 from contextdb.motion.storage.building import build_all

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from made_once import make_clip
 
 from contextdb.errors import MotionError, QueryError
 from contextdb.motion import MotionDatabase, query_from
 from contextdb.motion.answers import NamedAssets
-from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.nodes.match_gate import MatchGate
 from contextdb.motion.nodes.match_node import MatchNode
 from contextdb.motion.nodes.pose_match import pose_schema

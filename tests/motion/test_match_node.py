@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from made_once import make_clip
 from strategies import examples
 
 from contextdb.errors import MotionError, QueryError
 from contextdb.motion import Clip, MotionDatabase, query_from
 from contextdb.motion.answers import NamedAssets
-from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.markup.marks import Mark, Marks, TagFilter
 from contextdb.motion.markup.markup import Markup

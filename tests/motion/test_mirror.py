@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from made_once import make_clip
 from test_mocap import FOLDER, listed, load
 
 from contextdb.errors import MotionError
@@ -22,7 +23,6 @@ from contextdb.motion.clips.skeleton import sided_pairs
 from contextdb.motion.clips.trajectory import root_trajectory
 from contextdb.motion.features.extraction import clip_features
 from contextdb.motion.features.schema import Channel
-from contextdb.motion.made.recipes import make_clip
 
 MADE = make_clip("walk").clip.skeleton
 SIDES = (("Left*", "Right*"),)

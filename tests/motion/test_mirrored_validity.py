@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from lines import DT
+from made_once import make_clip
 from running import run
 from strategies import contexts, examples
 from test_mirroring import mirroring_tables, plain_in_mirror
@@ -19,7 +20,6 @@ from test_mirroring import mirroring_tables, plain_in_mirror
 import contextdb as cdb
 from contextdb.motion import Entry, FeatureSchema, MotionDatabase, Selector, write_bvh
 from contextdb.motion.answers import NamedAssets
-from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.nodes.pose_match import best_start
 from contextdb.motion.selection.controller import Controller

@@ -5,11 +5,11 @@ from __future__ import annotations
 import copy
 
 import pytest
+from made_once import make_clip
 from strategies import for_each
 
 from contextdb.errors import ClipError, MotionError, SchemaError
 from contextdb.motion import MotionConfig, PoseSettings, query_from, steady_path, write_bvh
-from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.selection.choice import Reason
 from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.storage.building import build

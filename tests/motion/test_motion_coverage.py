@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from made_once import make_clip
 
 from contextdb.errors import ContextError, MotionError
 from contextdb.motion import FeatureSchema, Markup, MotionDatabase, coverage, load_clips
-from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.measuring.coverage import MotionCoverage
 from contextdb.motion.measuring.moves import DIRECTION, LEAST_FRAMES, MAPS, TURN
 from contextdb.motion.measuring.transition_names import transitions_of

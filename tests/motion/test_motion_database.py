@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from made_once import made_clips, make_clip
 from motion_oracles import best_frame
 
 from contextdb.errors import MotionError, QueryError
@@ -17,7 +18,6 @@ from contextdb.motion import Clip, FeatureSchema, Hit, MotionDatabase, query_fro
 from contextdb.motion.answers import NamedAssets
 from contextdb.motion.features.extraction import features_of
 from contextdb.motion.features.normalisation import floor_of
-from contextdb.motion.made.recipes import made_clips, make_clip
 from contextdb.motion.search.database import build_databases
 
 SCHEMA = FeatureSchema.from_dict(

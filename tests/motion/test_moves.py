@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from made_once import make_clip
 from strategies import for_each
 
 from contextdb.motion import poses_of, root_trajectory, steady_path
 from contextdb.motion.clips.mirror import mirrored_path
-from contextdb.motion.made.recipes import RECIPES, make_clip
+from contextdb.motion.made.recipes import RECIPES
 from contextdb.motion.measuring.moves import DIRECTION, MAPS, TURN, Moves
 
 RATE = 30.0

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from made_once import make_clip
 from strategies import for_each
 
 from contextdb.motion import FeatureSchema, MotionDatabase, query_from
 from contextdb.motion.features.extraction import features_of
 from contextdb.motion.features.normalisation import Normalisation, floor_of
 from contextdb.motion.features.schema import Channel
-from contextdb.motion.made.recipes import make_clip
 
 CHANNELS = (
     Channel("velocity", bone="LeftFoot"),

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_once import make_clip
 from running import run
 from strategies import for_each, some
 
@@ -16,7 +17,7 @@ from contextdb.motion.clips import quaternions
 from contextdb.motion.clips.on_the_spot import by_feet, ground_motion
 from contextdb.motion.clips.poses import local_poses, poses_of
 from contextdb.motion.clips.trajectory import root_trajectory
-from contextdb.motion.made.recipes import ABOUT_TURNS, RECIPES, make_clip
+from contextdb.motion.made.recipes import ABOUT_TURNS, RECIPES
 from contextdb.motion.storage.checking import check_motion
 
 MOCAP = Path(os.environ.get("CONTEXTDB_MOCAP", Path(__file__).parents[3] / "shared" / "data" / "mocap"))

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from made_once import make_clip
 from played import RATE, bank, decisions, range_of
 
 from contextdb.motion import FeatureSchema, PoseBank, PoseSettings, PoseStream, Steered
 from contextdb.motion.clips import quaternions
-from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.output.pipeline import spine_of
 
 STEP = 1.0 / RATE

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from made_once import make_clip
 from played import LOOPS, NAMES, RATE, SCHEMA, bank, clips, database
 
 from contextdb.errors import ContextError, MotionError
@@ -18,7 +19,6 @@ from contextdb.motion.clips.clip import parse_bvh
 from contextdb.motion.clips.feet import footfalls
 from contextdb.motion.clips.poses import LocalPoses, forward_kinematics, local_poses
 from contextdb.motion.clips.quaternions import about_axis, multiply, rotate
-from contextdb.motion.made.recipes import make_clip
 
 
 def placed(bank, number, time_s):

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from made_once import make_clip
 from played import LOOPS, RATE, SCHEMA, clips, decisions
 
 from contextdb.errors import ContextError
@@ -22,7 +23,6 @@ from contextdb.motion import (
     Target,
     query_from,
 )
-from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.nodes.pose_match import pose_schema
 
 STEP = 1.0 / RATE

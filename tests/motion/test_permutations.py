@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from made_once import make_clip
 from motion_oracles import SlowBody, slow_channel
 from strategies import examples
 from test_channels import PAIRS, bone_channels, short_clips
@@ -41,7 +42,6 @@ from contextdb.motion.features.extraction import clip_features, clip_permutation
 from contextdb.motion.features.permutations import Permutations
 from contextdb.motion.features.schema_dict import schema_to_dict
 from contextdb.motion.made.joint import make_joint_clip
-from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.measuring.coverage import coverage
 from contextdb.motion.measuring.near_clips import near_clips
 from contextdb.motion.storage.building import build_all

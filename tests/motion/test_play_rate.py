@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from made_once import make_clip
 
 from contextdb.motion import (
     Controller,
@@ -23,7 +24,6 @@ from contextdb.motion import (
     steady_path,
     with_path,
 )
-from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.trace.views import decision_lines
 

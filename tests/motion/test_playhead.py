@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from lines import RATE, line
+from made_once import make_clip
 
 from contextdb.motion import Entry, FeatureSchema, MotionDatabase, Selector
-from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.selection.controller import Controller
 from contextdb.motion.selection.controller_settings import ControllerSettings

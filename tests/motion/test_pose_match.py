@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from made_once import make_clip
 
 from contextdb.errors import ContextDBError, MotionError, QueryError, SchemaError
 from contextdb.motion import Markup, MotionDatabase, Skeleton, query_from
 from contextdb.motion.answers import NamedAssets
-from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.nodes.pose_match import best_start, hands_of, pose_schema
 
 SKELETON = make_clip("walk").clip.skeleton

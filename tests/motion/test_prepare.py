@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_once import made_clips
 
 from contextdb import motion
 from contextdb.errors import ContextDBError
-from contextdb.motion.made.recipes import made_clips
 from contextdb.motion.markup.reserved import ReservedTag
 from contextdb.motion.markup.spans import TOLERANCE_S
 from contextdb.motion.preparing.look import span_of_frames

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_once import make_clip
 from strategies import for_each
 
 from contextdb.motion import FeatureSchema, PoseBank, poses_of, root_trajectory
@@ -13,7 +14,7 @@ from contextdb.motion.clips.mirror import mirrored
 from contextdb.motion.clips.poses import LocalPoses, Poses, forward_kinematics
 from contextdb.motion.clips.quaternions import about_axis, rotate
 from contextdb.motion.clips.trajectory import Trajectory, unbroken
-from contextdb.motion.made.recipes import ABOUT_TURNS, RAMP_S, RECIPES, make_clip
+from contextdb.motion.made.recipes import ABOUT_TURNS, RAMP_S, RECIPES
 from contextdb.motion.made.steps import about_turn, timeline
 
 SMOOTH = FeatureSchema.from_dict(

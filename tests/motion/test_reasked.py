@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_once import make_clip
 
 from contextdb.errors import ContextDBError, MotionError
 from contextdb.motion import Controller, ControllerSettings, Entry, FeatureSchema, Selector, TagFilter, Trace
-from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.search import candidates

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_once import make_clip
 
 from contextdb import motion
 from contextdb.errors import MotionError
@@ -15,7 +16,6 @@ from contextdb.motion.clips import quaternions
 from contextdb.motion.clips.bone_names import side_and_core
 from contextdb.motion.clips.poses import local_poses
 from contextdb.motion.clips.skeleton import sided_pairs
-from contextdb.motion.made.recipes import make_clip
 
 MADE = make_clip("walk")
 CLIP, RIG = MADE.clip, MADE.clip.skeleton

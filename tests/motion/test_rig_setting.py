@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from clip_files import Moving, gltf
+from made_once import make_clip
 from test_retargeting import ARMS_UP, resting, standing
 
 from contextdb import motion
 from contextdb.errors import FileError, MotionError, SchemaError
-from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.storage.building import build_all
 from contextdb.motion.storage.checking import check_motion
 from contextdb.motion.storage.pose_files import open_or_build_poses

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_once import made_clips
 
 from contextdb.motion import Entry, FeatureSchema, MotionConfig, MotionDatabase, PoseSettings, Selector, load_bvh, with_path
 from contextdb.motion.answers import NamedAssets
 from contextdb.motion.clips.steering import Steered, steered_path
-from contextdb.motion.made.recipes import made_clips
 from contextdb.motion.markup.marks import Mark
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.search.filters import Biases

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from made_once import make_clip
 from safetensors import safe_open
 from safetensors.numpy import save as as_safetensors
 from strategies import examples
@@ -19,7 +20,6 @@ from strategies import examples
 from contextdb.errors import ArtefactError, FileError, MotionError
 from contextdb.motion import Channel, FeatureSchema, MotionDatabase
 from contextdb.motion.features.schema_dict import schema_to_dict
-from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.markup.marks import TagFilter
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.markup.spans import Span

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from made_once import make_clip
 
 from contextdb.motion import Clip, Skeleton, Trajectory, poses_of, root_trajectory, steady_path
 from contextdb.motion.clips.trajectory import after_seconds, along_path, heading_vectors, smoothed, to_own_frame
-from contextdb.motion.made.recipes import make_clip
 
 EVERY = np.arange(61.0)
 

@@ -6,10 +6,10 @@ import functools
 
 import numpy as np
 import pytest
+from made_once import make_clip
 
 from contextdb import motion
 from contextdb.errors import ContextDBError, ContextError, MotionError
-from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.walking.blending import Gait
 from contextdb.motion.walking.cycle import Cycle
 from contextdb.motion.walking.walked import walked_clips

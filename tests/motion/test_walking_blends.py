@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from made_once import make_clip
 
 from contextdb.motion import MotionError
-from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.walking.blending import Gait, Mix
 from contextdb.motion.walking.cycle import Cycle
 from contextdb.motion.walking.gaits import GaitState, advanced, wanted_gait

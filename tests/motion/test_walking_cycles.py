@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from made_once import make_clip
 from strategies import for_each
 
 from contextdb.errors import ContextError
 from contextdb.motion import Clip, MotionError
 from contextdb.motion.clips.poses import LocalPoses, forward_kinematics
-from contextdb.motion.made.recipes import RECIPES, make_clip
+from contextdb.motion.made.recipes import RECIPES
 from contextdb.motion.walking.cycle import Cycle
 from contextdb.motion.walking.places import joined, moved, movement_of, movement_to, undone
 from contextdb.motion.walking.stances import Stances, blended_stances

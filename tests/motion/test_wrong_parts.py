@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 import pytest
+from made_once import make_clip
 
 from contextdb.errors import MotionError, SchemaError
 from contextdb.motion import Entry, MotionConfig, MotionDatabase, Selector, Steered
-from contextdb.motion.made.recipes import make_clip
 from contextdb.motion.walking.blending import Gait
 from contextdb.motion.walking.cycle import Cycle
 

@@ -10,13 +10,13 @@ from threading import Event
 from typing import Any
 
 import pytest
+from made_once import make_clip
 from running import run
 from terminal import press, said, screen_text, with_editor
 from textual.pilot import Pilot
 
 from contextdb.authoring.clip_folder import Tell
 from contextdb.motion import write_bvh
-from contextdb.motion.made.recipes import make_clip
 from tui.app import EditorApp
 from tui.screens import autofill
 from tui.screens.autofill import AutofillDialog

@@ -45,7 +45,7 @@ contracts = st.builds(
     st.sampled_from([None, "HasBall and not Down", "max(speed, 2) > 3", "gait == 'Idle'"]),
     st.sampled_from(["some", "every", "none", "at_most", "winner"]),
     kinds,
-    st.integers(0, 4),
+    st.integers(0, 40),
     st.sampled_from(["", "nobody stands still"]),
 )
 
@@ -76,6 +76,9 @@ def test_a_sentence_says_what_its_contract_says(contract: Contract):
             {"table": "t", "when": "max(a, b) > 1", "none": "asset like 'walk*'"},
         ),
         ("At most 3 rows can play", {"table": "t", "at_most": 3}),
+        ("Always at most one row can play", {"table": "t", "at_most": 1}),
+        ("whenever speed > 1 no rows walk* can play", {"table": "t", "when": "speed > 1", "none": "asset like 'walk*'"}),
+        ("every row is run*", {"table": "t", "every": "asset like 'run*'"}),
         ("At most 1 row run* can play", {"table": "t", "at_most": {"n": 1, "of": "asset like 'run*'"}}),
         ("The row that is picked is weight > 2", {"table": "t", "winner": "weight > 2"}),
     ],
@@ -123,6 +126,8 @@ def test_a_contract_is_proved_written_taken_to_the_test_row_undone_and_saved(fol
         await pilot.press("enter")
         await until(pilot, lambda: len(pane.proofs) == 2)
         assert [c.none for c in pane.contracts] == [None, "asset like 'fall'"]
+        await until(pilot, lambda: "does not hold at speed: [0..3)" in screen_text(pilot.app))
+        assert "A sentence" not in screen_text(pilot.app)
         session = screen.session
         session.save()
         assert "none = \"asset like 'fall'\"" in (folder / "contextdb.toml").read_text()
@@ -144,8 +149,11 @@ def test_what_is_no_contract_is_said_while_it_is_typed(folder: Path):
         await pilot.app.screen.run_command("contracts")
         await pilot.pause()
         pane = pilot.app.screen.query_one(ContractsPane)
-        await pilot.press("n", *"rows")
+        await pilot.press("n")
+        await until(pilot, lambda: "A sentence, such as" in screen_text(pilot.app))
+        await pilot.press(*"rows")
         await until(pilot, lambda: "no contract" in screen_text(pilot.app))
+        assert "Whenever rows" in screen_text(pilot.app)
         await pilot.press("enter")
         assert len(pane.contracts) == 1
         pane.query_one(Input).value = "Whenever nobody > 3, some row can play"

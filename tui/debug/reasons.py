@@ -8,7 +8,7 @@ from typing import Any
 
 from contextdb.errors import ContextDBError
 from contextdb.motion.trace.cost_views import cost_text
-from contextdb.motion.trace.other_filters import UNKNOWN
+from contextdb.motion.trace.stock import UNKNOWN
 from contextdb.motion.trace.why_not import why_not
 
 from .landscape import Row

@@ -21,14 +21,14 @@ from contextdb.schema.contracts import Contract
 
 ANY = "asset like '*'"
 _FORMS = (
-    ("some", re.compile(r"some row(?: (?P<kind>.+?))? can play", re.IGNORECASE)),
-    ("every", re.compile(r"every row that can play is (?P<kind>.+)", re.IGNORECASE)),
-    ("none", re.compile(r"no row(?: (?P<kind>.+?))? can play", re.IGNORECASE)),
-    ("at_most", re.compile(r"at most (?P<n>\d+) rows?(?: (?P<kind>.+?))? can play", re.IGNORECASE)),
+    ("some", re.compile(r"some rows?(?: (?P<kind>.+?))? can play", re.IGNORECASE)),
+    ("every", re.compile(r"every row(?: that can play)? is (?P<kind>.+)", re.IGNORECASE)),
+    ("none", re.compile(r"no rows?(?: (?P<kind>.+?))? can play", re.IGNORECASE)),
+    ("at_most", re.compile(r"at most (?P<n>\d+|one) rows?(?: (?P<kind>.+?))? can play", re.IGNORECASE)),
     ("winner", re.compile(r"the row that is picked is (?P<kind>.+)", re.IGNORECASE)),
 )
 _PREMISE = re.compile(
-    r"(?:whenever (?P<when>.+?), ?|always,? )?(?P<demand>(?:some row|every row|no row|at most \d|the row)\b.*)",
+    r"(?:whenever (?P<when>.+?)(?:, ?| )|always,? )?(?P<demand>(?:some rows?|every row|no rows?|at most (?:\d+|one)|the row)\b.*)",
     re.IGNORECASE | re.DOTALL,
 )
 _WHY = re.compile(r",? because (?P<why>.+)$", re.IGNORECASE | re.DOTALL)
@@ -75,7 +75,7 @@ def read_sentence(text: str, table: str) -> Sentence:
         demand = form.fullmatch(match["demand"].strip()) if match is not None else None
         if match is not None and demand is not None:
             kind = _kind(demand["kind"])
-            limit: object = int(demand["n"]) if verb == "at_most" else kind or ANY
+            limit: object = int(demand["n"].replace("one", "1")) if verb == "at_most" else kind or ANY
             limit = {"n": limit, "of": kind} if verb == "at_most" and kind else limit
             part: dict[str, object] = {"table": table} | ({"when": match["when"]} if match["when"] else {}) | {verb: limit}
             return Sentence(part | ({"why": why["why"]} if why else {}))

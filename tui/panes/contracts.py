@@ -34,6 +34,8 @@ from .pane import Pane
 REST_S = 0.15
 """So long after a key the sentence is proved."""
 WORDS = {True: ("holds", "info"), False: ("broken", "error"), None: ("open", "warning")}
+BEGUN = "Whenever "
+"""What a new contract begins with."""
 NEW = ""
 """The name of a contract that is being written."""
 
@@ -60,7 +62,7 @@ class ContractsPane(Pane):
         & > LineList { height: 1fr; }
         & > #contracts-says { height: auto; min-height: 2; max-height: 40%; padding: 0 2; border-top: solid $panel; }
         & > Input { height: 1; border: none; padding: 0 2; background: $panel; }
-        & > Input:focus { background: $primary 30%; }
+        & > Input:focus { border: none; background: $primary 30%; }
     }
     """
 
@@ -87,7 +89,7 @@ class ContractsPane(Pane):
         columns = [ListColumn("", 8), ListColumn("Contract", 30, 1)]
         yield ContractList(columns, empty="No contract. N writes one.", id="contract-list")
         yield Static(id="contracts-says", markup=False)
-        yield Input(placeholder=f"N writes a contract, such as: {EXAMPLE}", id="contract-sentence")
+        yield Input(placeholder=f"N writes a contract, such as: {EXAMPLE}", id="contract-sentence", select_on_focus=False)
 
     def on_mount(self) -> None:
         self.show()
@@ -141,13 +143,15 @@ class ContractsPane(Pane):
 
     # ---- display
 
-    def _fill(self) -> None:
+    def _fill(self, chosen: str = "") -> None:
+        """Show the contracts, with the line of one of them chosen."""
         contracts, proofs = self.contracts, self.proofs
         n_held = sum(proof.holds is True for proof in proofs.values())
         rest = "" if len(proofs) == len(contracts) else " Proving …"
         self.query_one("#contracts-summary", Static).update(f"{n_held} of {plural(len(contracts), 'contract')} proved.{rest}")
         lines = self.query_one(LineList)
-        lines.show(len(contracts), lambda at: _line(contracts[at], proofs.get(contracts[at].name)), max(lines.index, 0))
+        at = next((at for at, contract in enumerate(contracts) if contract.name == chosen), max(lines.index, 0))
+        lines.show(len(contracts), lambda at: _line(contracts[at], proofs.get(contracts[at].name)), at)
         self._say_of_line()
 
     def _say_of_line(self) -> None:
@@ -187,7 +191,7 @@ class ContractsPane(Pane):
             self.post_message(SetContext(facts_of(proof.witness.context), f"breaks: {name}"))
 
     def action_new(self) -> None:
-        self._edit(NEW, "Whenever ")
+        self._edit(NEW, BEGUN)
 
     def action_edit(self) -> None:
         if (contract := self._chosen) is not None:
@@ -214,7 +218,7 @@ class ContractsPane(Pane):
     @on(Input.Changed)
     def _typed(self, event: Input.Changed) -> None:
         event.stop()
-        if self._edited is None and self.query_one(Input).has_focus:
+        if self._edited is None and event.value:
             self._edited = NEW
         if self._edited is not None:
             self.set_timer(REST_S, lambda: self._prove_typed() if self.query_one(Input).value == event.value else None)
@@ -222,7 +226,9 @@ class ContractsPane(Pane):
     def _prove_typed(self) -> None:
         contract, problem = self._of_text()
         self.typed = None
-        if contract is None:
+        if self.query_one(Input).value.strip() in ("", BEGUN.strip()):
+            self._say(None, f"A sentence, such as: {EXAMPLE}")
+        elif contract is None:
             self._say(None, problem)
         else:
             self._say(None, "Proving …")
@@ -251,6 +257,7 @@ class ContractsPane(Pane):
         self._edited = None
         self.query_one(Input).value = ""
         self._change({name: part}, f"Contract {name}")
+        self._fill(name)
         self.take_focus()
 
     def _change(self, parts: Mapping[str, Mapping[str, object] | None], name: str) -> None:

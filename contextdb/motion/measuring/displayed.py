@@ -98,7 +98,7 @@ class Displayed:
 def of_decisions(decisions: Sequence[Decision]) -> Displayed:
     """What decisions say; without poses."""
     bodies = np.array([(np.nan,) * 3 if d.body is None else d.body for d in decisions], np.float64).reshape(-1, 3)
-    forced = [is_forced(decision) for decision in decisions]
+    forced = [decision.is_forced for decision in decisions]
     costs = [d.cost if is_it and d.cost is not None else np.nan for d, is_it in zip(decisions, forced, strict=True)]
     return Displayed(
         np.array([decision.time_s for decision in decisions], np.float64),
@@ -110,11 +110,6 @@ def of_decisions(decisions: Sequence[Decision]) -> Displayed:
         np.array(costs, np.float64),
         None if np.isnan(bodies).any(axis=1).all() else bodies,
     )
-
-
-def is_forced(decision: Decision) -> bool:
-    """Whether a decision is a jump that had to be: nothing could play on."""
-    return decision.action is Action.JUMP and decision.continuing_cost is None
 
 
 def of_poses(poses: Sequence[Pose], rate: float) -> Displayed:

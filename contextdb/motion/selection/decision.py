@@ -171,6 +171,11 @@ class Decision:
     inputs: Inputs | None = field(default=None, compare=False, repr=False)
     together: Together | None = None
 
+    @property
+    def is_forced(self) -> bool:
+        """Whether it is a jump that had to be: nothing could play on."""
+        return self.action is Action.JUMP and self.continuing_cost is None
+
 
 class Feed(Protocol):
     """Where a watcher puts decisions."""

@@ -65,8 +65,7 @@ def _events(decision: Decision) -> Iterator[Event]:
         dur = max(1, round(decision.search_us))
         yield {"ph": "X", "name": "search", "cat": "search", **at, "dur": dur, **_on(SEARCHES), "args": {"why": decision.why}}
     if decision.action in (Action.START, Action.JUMP):
-        is_forced = decision.action is Action.JUMP and decision.continuing_cost is None
-        name = "forced jump" if is_forced else "jump" if decision.action is Action.JUMP else "start"
+        name = "forced jump" if decision.is_forced else "jump" if decision.action is Action.JUMP else "start"
         yield {
             "ph": "i",
             "name": name,

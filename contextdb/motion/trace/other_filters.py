@@ -19,10 +19,8 @@ from contextdb.motion.markup.tag_filter import TagFilter
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.filters import Biases, Filter
 from contextdb.motion.selection.selector import with_tags
-from contextdb.motion.trace.stock import Queryable
+from contextdb.motion.trace.stock import UNKNOWN, Queryable
 
-UNKNOWN = "any"
-"""How a table is asked where the recorded facts leave one out: the condition is ignored."""
 Key = tuple[str, bool, int]
 
 

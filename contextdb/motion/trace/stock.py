@@ -12,10 +12,14 @@ from typing import Any, Protocol, runtime_checkable
 
 from contextdb.cells.arguments import require_kind, require_mapping
 from contextdb.cells.conditions import Condition
-from contextdb.errors import Fault, MotionError, in_quotes, mend_for, some
+from contextdb.cells.mirroring import changed_in_mirror, mirrored_facts
+from contextdb.errors import ContextDBError, Fault, MotionError, in_quotes, mend_for, some
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.storage.building import open_or_build
 from contextdb.motion.storage.config import MotionConfig
+
+UNKNOWN = "any"
+"""How a table is asked where the recorded facts leave one out: the condition is ignored."""
 
 
 class Failing(Protocol):
@@ -103,6 +107,15 @@ class Stock:
 
     def table(self, database: str) -> Edited | None:
         return self.tables.get(self.table_of.get(database, ""))
+
+
+def failing_rows(table: Queryable, asset: str, context: Mapping[str, Any], is_mirrored: bool) -> list[Row]:
+    """The rows of an asset that are not valid, with the facts mirrored for one that plays so; none where these cannot be asked."""
+    try:
+        facts = mirrored_facts(context, changed_in_mirror(table.asked.values())) if is_mirrored else dict(context)
+        return [row for row in table.explain(facts, unknown=UNKNOWN).asset(asset) if not row.is_valid]
+    except ContextDBError:
+        return []
 
 
 def require_name(name: object, what: str, known: Iterable[str]) -> None:

@@ -17,15 +17,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contextdb.cells.mirroring import changed_in_mirror, mirrored_facts
 from contextdb.errors import ContextDBError, Fault, MotionError, in_quotes, row_name
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.search.filters import Filter
 from contextdb.motion.selection.choice import Choice
-from contextdb.motion.trace.other_filters import UNKNOWN, filter_by_table
+from contextdb.motion.trace.other_filters import filter_by_table
 from contextdb.motion.trace.reasked_decision import ReaskedDecision
 from contextdb.motion.trace.reasked_search import ReaskedSearch
-from contextdb.motion.trace.stock import Edited, Row
+from contextdb.motion.trace.stock import Edited, Row, failing_rows
 
 DIGITS = 4
 """So many digits of a number are proposed, rounded so that the asset is before the tie."""
@@ -350,15 +349,7 @@ def place_of(decision: ReaskedDecision, asset: str) -> Place:
 def rows_of(decision: ReaskedDecision, at: Place) -> list[Row]:
     """The asset's rows in its table that are not valid, the nearest first; none where there is no table, or no facts."""
     table, context = decision.stock.table(at.name), decision.decision.context
-    if table is None or context is None:
-        return []
-    try:
-        compiled = table.compile()
-        facts = mirrored_facts(context, changed_in_mirror(compiled.asked.values())) if is_mirrored(at) else dict(context)
-        explained = compiled.explain(facts, unknown=UNKNOWN)
-        return [row for row in explained.asset(at.asset) if not row.is_valid]
-    except ContextDBError:
-        return []
+    return [] if table is None or context is None else failing_rows(table.compile(), at.asset, context, is_mirrored(at))
 
 
 def is_mirrored(at: Place) -> bool:

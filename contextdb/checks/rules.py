@@ -373,7 +373,8 @@ RULES: dict[str, Rule] = {
     ),
     "space-changed": Rule(
         "error",
-        "Since the baseline, the conditions of a table, their bounds or values, its `assume`, its rules or its policy changed.",
+        "Since the baseline, the conditions of a table, their bounds or values, its `assume`, its rules or its policy changed, or "
+        "fewer situations are expected of it.",
         "Look at what the message names; if the change is intended, name the table with `--redefined`, or make a new baseline.",
         ("report.coverage_results",),
     ),

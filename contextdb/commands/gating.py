@@ -16,7 +16,16 @@ from contextdb.covering.baseline import Baseline, CaseCounts, Change, Earlier, c
 from contextdb.covering.declared import differences
 from contextdb.disk import read_bytes
 from contextdb.errors import ContextError, Fault, Place, in_quotes, mend_for, some
-from contextdb.report.coverage_results import Measured, fewer_cases, max_drop, space_changed, table_emptied, table_gone, table_new
+from contextdb.report.coverage_results import (
+    Measured,
+    fewer_cases,
+    fewer_expected,
+    max_drop,
+    space_changed,
+    table_emptied,
+    table_gone,
+    table_new,
+)
 from contextdb.report.results import Gate
 from contextdb.tables.table import EitherTable
 
@@ -98,6 +107,9 @@ def with_gates(
         return replace(measured, gates=(*measured.gates, table_new(name, accepted.holds("new", name), missing)))
     changes = differences(earlier.space, measured.space)
     gates = space_gates(name, changes, accepted)
+    n_expected = 0 if measured.expected is None else len(measured.expected.situations)
+    if n_expected < earlier.n_expected:
+        gates.append(fewer_expected(n_expected, earlier.n_expected, name, accepted.holds("redefined", name)))
     change = _change(measured, table, earlier, changes)
     if earlier.n_rows and not table.n_rows:
         gates.append(table_emptied(name, earlier.n_rows, accepted.holds("gone", name)))

@@ -59,6 +59,8 @@ class Earlier:
     n_rows: int
     space: Declared
     """What its shares are shares of."""
+    n_expected: int = 0
+    """How many situations were expected of it."""
 
 
 @dataclass(frozen=True)
@@ -134,7 +136,8 @@ def _earlier(entry: Mapping[str, Any]) -> Earlier:
     findings = entry.get("findings", [])
     dead = Counter((_text(f["rule"]), str(f.get("asset"))) for f in findings if f["rule"] in DEAD_RULES)
     lower, n_rows = _share(entry["covered"]["lower"]), _count(entry["rows"])
-    return Earlier(lower, tuple(items), gaps["complete"] is True, dead, n_rows, require_declared(entry["space"]))
+    n_expected = len((entry.get("expected") or {"situations": ()})["situations"])
+    return Earlier(lower, tuple(items), gaps["complete"] is True, dead, n_rows, require_declared(entry["space"]), n_expected)
 
 
 def _case_counts(counts: Mapping[str, Any]) -> CaseCounts:

@@ -227,6 +227,14 @@ def space_changed(name: str, changes: Sequence[str], is_accepted: bool) -> Gate:
     return _accepted_by("redefined", name, sentence, is_accepted, rule="space-changed")
 
 
+def fewer_expected(now: int, before: int, name: str, is_accepted: bool) -> Gate:
+    """Require that no fewer situations are expected of a table than before."""
+    sentence = (
+        f"{plural(now, 'situation')} of the table {in_quotes(name)} {'is' if now == 1 else 'are'} expected, before {before:,}"
+    )
+    return _accepted_by("redefined", name, sentence, is_accepted, rule="space-changed")
+
+
 def fewer_cases(name: str, before: CaseCounts, now: CaseCounts, is_accepted: bool) -> list[Gate]:
     """Require that the saved contexts of a table expect no less than before; no gate where there were none. Rows that were deleted
     need not be reached."""

@@ -150,6 +150,25 @@ def test_a_gate_of_what_is_expected_does_not_pass_where_nothing_is(tmp_path):
     assert (result.code, "no table says what is expected of it" in result.err) == (2, True)
 
 
+@pytest.mark.parametrize("how", ["the setting", "a row"])
+def test_to_expect_less_than_the_baseline_is_told_and_must_be_accepted(tmp_path, how):
+    toml, asked = tmp_path / "contextdb.toml", tmp_path / "asked.csv"
+    toml.write_text('[conditions.gait]\ntype = "enum"\nvalues = ["Idle", "Walk"]\n[tables.moves]\nexpected = "asked.csv"\n')
+    (tmp_path / "moves.csv").write_text("Asset,gait\nidle,Idle\n")
+    asked.write_text("Situation,gait\na,Idle\nb,Walk\n")
+    run("coverage", tmp_path, "--format", "json", "-o", tmp_path / "before.json")
+    assert run("coverage", tmp_path, "--baseline", tmp_path / "before.json").code == 0
+    if how == "a row":
+        asked.write_text("Situation,gait\na,Idle\n")
+    else:
+        toml.write_text(toml.read_text().replace('expected = "asked.csv"\n', ""))
+        asked.unlink()  # which would be a table of its own
+    result = run("coverage", tmp_path, "--baseline", tmp_path / "before.json")
+    said = " ".join(result.out.split())
+    assert (result.code, "expected, before 2. Where that is intended: --redefined=moves." in said) == (1, True)
+    assert run("coverage", tmp_path, "--baseline", tmp_path / "before.json", "--redefined", "moves").code == 0
+
+
 def test_a_missing_file_of_expected_contexts_is_an_error(tmp_path):
     (tmp_path / "contextdb.toml").write_text('[tables.moves]\nexpected = "asked.csv"\n')
     (tmp_path / "moves.csv").write_text("Asset,gait\nidle,Idle\n")

@@ -370,7 +370,13 @@ def folder_behind_link(path: Path, home: Path) -> None:
 
 
 KINDS = (link_to_file, link_to_folder, dangling_link, relative_link, loop, folder, pipe, folder_behind_link)
-TYPED = {("compile into a folder", "out/"), ("motion bones", "clip"), ("ci", "repo"), ("motion probe", "prob")}
+TYPED = {
+    ("compile into a folder", "out/"),
+    ("motion bones", "clip"),
+    ("ci", "repo"),
+    ("motion probe", "prob"),
+    ("motion learn", "in/s"),
+}
 """Folders that are named on the command line, so that a link there is followed."""
 OWN = (".contextdb-journal", ".contextdb-cache")
 

@@ -23,6 +23,7 @@ from contextdb.commands.motion_build_command import MotionProject
 from contextdb.commands.motion_replay_command import project_of
 from contextdb.commands.progress import building_bar
 from contextdb.console import ExitCode, note, output, printable, terminal_width
+from contextdb.disk.boundary import real_path
 from contextdb.errors import Fault, MotionError, Place, QueryError, plural
 from contextdb.motion import open_or_build
 from contextdb.motion.trace.answer_views import what_if_lines
@@ -73,7 +74,7 @@ def _sessions(files: list[str], project: str | None) -> tuple[str, list[ChoiceSe
         folders[file], why = project_of(trace, project, file)
         if why:
             raise MotionError(Fault(f"the session cannot be searched again: {why}", place=Place(file)))
-    if len({Path(folder).resolve() for folder in folders.values()}) > 1:
+    if len({real_path(folder) for folder in folders.values()}) > 1:
         raise QueryError(Fault("the sessions are of different projects.", "sessions of one project, or --project FOLDER"))
     preferences = {file: read_choices(file) for file in traces}
     if not any(preferences.values()):

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 from terminal import EditorApp, press, screen_text, settled, with_editor
+from textual.pilot import Pilot
 
 from tui.commands import BY_ID
 from tui.model.finding import Findable
@@ -33,6 +35,14 @@ WANTED = {
     "ascending": "sort", "reload": "refresh",
 }  # fmt: skip
 """What somebody types, and the command that is meant."""
+
+
+async def shown(app: EditorApp, pilot: Pilot[Any], text: str) -> None:
+    """Go on once the screen shows a text: Textual looks commands up in the background."""
+    for _ in range(500):
+        await pilot.pause(0.02)
+        if text in screen_text(app):
+            return
 
 
 def test_the_palette_finds_what_users_of_excel_type(tmp_path: Path) -> None:
@@ -81,11 +91,13 @@ def test_the_palette_shows_first_what_was_used_last_and_runs_what_was_typed(tmp_
     (tmp_path / "t.csv").write_text("Asset,speed\nwalk,1\nrun,2\nwalk,1\n")
 
     async def script(app: EditorApp, pilot) -> tuple[str, int, dict[str, int]]:
-        await press(pilot, "ctrl+p", *"dedupe", "enter")
+        await press(pilot, "ctrl+p", *"dedupe")
+        await shown(app, pilot, "Drop duplicates")
+        await press(pilot, "enter")
         await settled(pilot)
         n_rows = app.main.session.sheet.table.n_rows
         await press(pilot, "ctrl+p")
-        await settled(pilot)
+        await shown(app, pilot, "Drop duplicates")
         return screen_text(app), n_rows, {name: at for name, at in app.likely_commands().items() if at == 0}
 
     text, n_rows, first = with_editor(tmp_path / "t.csv", script)

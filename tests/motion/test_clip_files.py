@@ -6,14 +6,18 @@ import base64
 import io
 import json
 import signal
+import tomllib
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
 from clip_files import BODY, SMPL_OFFSETS, Moving, amass, binary_fbx, fbx, gltf, usda, usdc
 from made_once import make_clip
+from packaging.requirements import Requirement
+from running import ROOT
 from strategies import some
 
 from contextdb import motion
@@ -21,7 +25,7 @@ from contextdb.errors import ContextDBError
 from contextdb.motion.clips import parser_process
 from contextdb.motion.clips.feet import footfalls_of
 from contextdb.motion.clips.joint_worlds import unique_names
-from contextdb.motion.clips.parser_process import ParserProcess
+from contextdb.motion.clips.parser_process import ParserProcess, has_wheel
 from contextdb.motion.clips.poses import poses_of
 from contextdb.motion.features.extraction import clip_features
 from contextdb.motion.made.recipes import RECIPES
@@ -391,6 +395,22 @@ def test_a_child_that_answers_out_of_turn_is_ended(odd_library: Path, child: Par
 def test_without_the_library_a_message_names_the_extra(odd_library: Path, child: ParserProcess):
     odd_library.write_text("raise ImportError", encoding="utf-8")
     with pytest.raises(motion.ClipError, match=r"ufbx is not installed.*contextdb\[fbx\]"):
+        child.worlds(b"live", 0, "walk.fbx")
+
+
+def test_the_extra_installs_ufbx_where_it_has_wheels_and_a_message_says_where_not(
+    odd_library: Path, child: ParserProcess, monkeypatch: pytest.MonkeyPatch
+):
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["optional-dependencies"]
+    marker = Requirement(extras["fbx"][0]).marker
+    assert marker is not None
+    for system, machine in product(("linux", "darwin", "win32"), ("x86_64", "AMD64", "ARM64")):
+        for minor in range(11, 17):
+            where = {"sys_platform": system, "platform_machine": machine, "python_version": f"3.{minor}"}
+            assert marker.evaluate(where) == has_wheel(system, machine, (3, minor))
+    odd_library.write_text("raise ImportError", encoding="utf-8")
+    monkeypatch.setattr(parser_process, "has_wheel", lambda *_: False)
+    with pytest.raises(motion.ClipError, match=r"wheels for Python 3\.11 to 3\.14, and none for 3\.14 on Windows"):
         child.worlds(b"live", 0, "walk.fbx")
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import atexit
 import json
 import os
+import platform
 import queue
 import signal
 import subprocess
@@ -34,6 +35,7 @@ BYTES_PER_S = 2e6
 WORK_S, BYTES_PER_WORK_S = 4.0, 5e4
 """So long it may work on a file, in seconds of CPU, and so many bytes more give it another one: a clip of a minute takes one."""
 MOST_LINE = 1 << 24
+NO_WHEEL = "and none for 3.14 on Windows with x86-64"
 Answer = tuple[dict[str, Any], bytes] | None
 
 
@@ -60,6 +62,8 @@ class ParserProcess:
         if about.get("missing"):
             problem = f"{self.kind.upper()} files cannot be read: {self.library} is not installed."
             mend = f'to install it: pip install "contextdb[{self.extra}]"'
+            if self.kind == "fbx" and not has_wheel(sys.platform, platform.machine(), sys.version_info[:2]):
+                mend = f"ufbx has wheels for Python 3.11 to 3.14, {NO_WHEEL}: another Python, or the file as .glb"
             raise ClipError(Fault(problem, ".bvh, .glb and .npz, which need nothing more", mend, Place(file)))
         if "fault" in about:
             raise self._refused(str(about["fault"]), file)
@@ -161,6 +165,11 @@ def _worlds(about: Mapping[str, Any], data: bytes) -> JointWorlds:
     assert len(depth_first(parents)) == n, "the child sends trees"
     names = [str(name) for name in about["names"]]
     return JointWorlds(names, parents, numbers[0], numbers[1:], np.array(about["deforms"], bool), float(about["rate"]))
+
+
+def has_wheel(system: str, machine: str, version: tuple[int, int]) -> bool:
+    """Whether the extra fbx installs ufbx there: PyPI has it ready for a Python of such a version."""
+    return version < ((3, 14) if (system, machine) == ("win32", "AMD64") else (3, 15))
 
 
 def parser(kind: str) -> ParserProcess:

@@ -62,47 +62,21 @@ def rows_of(result: Result) -> list[list[str]]:
 # ---- the group
 
 
+COMMANDS = "describe prepare bones check build coverage search select run probe measure replay learn".split()
+
+
 @pytest.mark.parametrize("arguments", [["--help"], ["-h"], ["help"]])
 def test_the_group_lists_its_commands(arguments: list[str]):
     result = motion(*arguments)
     assert [line.split()[0] for line in result.lines[result.lines.index("commands:") + 1 :] if line[2:3].strip()] == [
-        "describe",
-        "prepare",
-        "bones",
-        "check",
-        "build",
-        "coverage",
-        "search",
-        "select",
-        "run",
-        "probe",
-        "measure",
-        "replay",
-        "learn",
+        *COMMANDS,
         "debug",
     ]
     assert run("motion") == Result(2, "", result.out)
     assert run("help", "motion") == result
 
 
-@pytest.mark.parametrize(
-    "command",
-    [
-        "describe",
-        "prepare",
-        "bones",
-        "check",
-        "build",
-        "coverage",
-        "search",
-        "select",
-        "run",
-        "probe",
-        "measure",
-        "replay",
-        "learn",
-    ],
-)
+@pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize("width", [60, 100])
 def test_each_command_has_a_help_that_fits_with_examples(command: str, width: int, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("COLUMNS", str(width))

@@ -83,6 +83,7 @@ WORDS: Mapping[str, str] = {
     "next-context": "next test, next scenario",
     "previous-context": "previous test, previous scenario",
     "changes": "what would this change, impact, effect, before saving, compare with saved, diff, what if, regression, backtest",
+    "next-picks": "simulate, chance, random, roll dice, histogram, probability, weights, cooldown, once, pick",
     "live": "play, running game, connect, debug game, watch, real time",
     "live-pause": "stop game, freeze game, hold",
     "live-back": "rewind, time",

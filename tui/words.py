@@ -91,6 +91,7 @@ WORDS: Mapping[str, str] = {
     "live-keep": "bookmark, save moment, capture",
     "live-stop": "disconnect",
     "actors": "characters, roles, who, casting",
+    "clip": "preview, thumbnail, figure, skeleton, play animation, watch, viewport, pose, see the clip",
     "why": "explain, reason, trace, evaluate formula, not valid, does not play, conditions",
     "nearest": "closest, almost valid, near miss, compare rows, why not, suggestions",
     "assets": "table, sheet, grid",

@@ -377,6 +377,8 @@ class MainScreen(TableScreen):
         self.try_to(self.workspace.look_again)
         self.care.look()
         self._look_for_sessions()
+        if self._clips is not None:
+            self._clips.forget()
         self.assets.refresh_view()
         self.show()
 

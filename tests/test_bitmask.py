@@ -1,7 +1,5 @@
 """Sets of rows as bits: the words, the integer and the list of rows say the same."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

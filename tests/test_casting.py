@@ -1,7 +1,5 @@
 """Actors cast for roles: against every assignment tried by hand, and what is refused."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import product
 

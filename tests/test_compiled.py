@@ -1,7 +1,5 @@
 """A compiled table: what a query finds is what reading every cell finds, however the facts are given."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor

@@ -1,7 +1,5 @@
 """Derived facts: computed from the others wherever a table is asked, never given."""
 
-from __future__ import annotations
-
 import json
 import math
 import pickle

@@ -1,7 +1,5 @@
 """Explanations: which cells of which rows fail, what is nearest, and what to change; held to reading every cell."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 from unittest import mock

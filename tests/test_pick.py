@@ -1,7 +1,5 @@
 """Picks: one asset of the valid ones, by policy, priority and row weight, and not the one picked last."""
 
-from __future__ import annotations
-
 import gc
 import pickle
 import random

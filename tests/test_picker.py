@@ -1,7 +1,5 @@
 """The picker: picks of one character and of many, remembered, held to an oracle turn by turn."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 import random

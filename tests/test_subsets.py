@@ -1,7 +1,5 @@
 """Answers combined as sets of rows: against Python's own sets, with what belongs to the rows."""
 
-from __future__ import annotations
-
 import copy
 import operator
 import pickle

@@ -1,7 +1,5 @@
 """A row's own rule: how it is written and refused, asked, explained, checked, measured and kept. See also test_rules_asked."""
 
-from __future__ import annotations
-
 import pickle
 from itertools import product
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A coverage report against an earlier one: gaps are compared by the contexts that they hold."""
 
-from __future__ import annotations
-
 import json
 from contextlib import suppress
 

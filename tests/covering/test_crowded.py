@@ -1,7 +1,5 @@
 """Crowded contexts: the rows named are those valid there, and no context of a small table has more."""
 
-from __future__ import annotations
-
 import random
 
 import pytest

@@ -1,7 +1,5 @@
 """Coverage where it is easily wrong: ends that touch, numbers that nearly round, domains without bounds, input that cannot be."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import replace

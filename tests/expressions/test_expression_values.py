@@ -1,7 +1,5 @@
 """Expressions: one context and a frame of them give the values that an evaluator too simple to be wrong gives, bit by bit."""
 
-from __future__ import annotations
-
 import math
 import struct
 from fractions import Fraction

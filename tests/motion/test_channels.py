@@ -1,7 +1,5 @@
 """What each type of channel holds, against an oracle of matrices and loops; custom channels; mirrored features."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

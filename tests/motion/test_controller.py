@@ -1,7 +1,5 @@
 """One character: each rule as a scenario."""
 
-from __future__ import annotations
-
 import math
 import random
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """The scale of costs: a weighted mean of squared differences, whatever the schema; the oracle is one line of numpy."""
 
-from __future__ import annotations
-
 from functools import reduce
 from operator import add
 

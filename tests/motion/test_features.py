@@ -1,7 +1,5 @@
 """Feature schemas: what is read from contextdb.toml, and the numbers that come of a clip."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What lets an asset play on that is no longer valid: each guard as a scenario, and how it is told."""
 
-from __future__ import annotations
-
 import math
 import pickle
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Several characters at once: clip, frame and cast against trying all of them, and what was found played so that bodies meet."""
 
-from __future__ import annotations
-
 import math
 import tomllib
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Many clips: the same bytes here, on all cores and on Dask; a run that was killed goes on where it stopped."""
 
-from __future__ import annotations
-
 import os
 import pickle
 import signal

@@ -1,7 +1,5 @@
 """Markup on frames: spans become kinds of frames, and filters choose among them. The oracle asks every span about every frame."""
 
-from __future__ import annotations
-
 import math
 import pickle
 

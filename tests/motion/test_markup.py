@@ -1,7 +1,5 @@
 """Markup files: what is read, what is refused and how, and what does nothing with the assets there are."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """A match gate: when it opens and closes, what it tells, and the entry animation that it gives."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

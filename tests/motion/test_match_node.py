@@ -1,7 +1,5 @@
 """A match node: which frame it enters, where the body is on the way, and that it arrives. Scenarios read like the talks."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from itertools import pairwise

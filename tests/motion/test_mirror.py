@@ -1,7 +1,5 @@
 """Mirroring poses, paths and clips by declared bone pairs."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

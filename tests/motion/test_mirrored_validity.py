@@ -1,7 +1,5 @@
 """Ranges that are played mirrored are valid by the answer with mirrored facts: in searches, choices, reasons and commands."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """What the motion is to be with everything on: a character of default settings, measured beside the clips that it plays."""
 
-from __future__ import annotations
-
 import os
 from functools import cache
 

@@ -1,7 +1,5 @@
 """The search is exact: held to a scan of every frame in float64, for any ranges, masks, tags, ties, biases and current frames."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

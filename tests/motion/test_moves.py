@@ -1,7 +1,5 @@
 """How clips move, in bins: paths and made clips of known speed, turn and direction are in the bins that they were made for."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

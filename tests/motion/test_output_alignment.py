@@ -1,7 +1,5 @@
 """Path alignment: legs go where the game goes, the chest faces where it did, and planted feet stand."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Pose banks of captured clips, whose rigs have axes of their own; see `test_mocap`."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

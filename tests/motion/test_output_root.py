@@ -1,7 +1,5 @@
 """Where a pose stream puts the body: by the animation, by the game, or by both."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

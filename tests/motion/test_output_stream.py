@@ -1,7 +1,5 @@
 """Pose streams: the clip where nothing is done to it, and no step in pose or velocity where it jumps."""
 
-from __future__ import annotations
-
 import pickle
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Permutations of clips: what their features are, what a search finds among them, and that playing on in another is no jump."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pose matching: where an animation is started, which part of it counts, and which of several is the best."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Markup proposed for clips: what is known of made clips comes back, and nothing is proposed beside its own result."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

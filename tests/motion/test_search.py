@@ -1,7 +1,5 @@
 """The search and the candidates against an oracle that looks at one frame after another."""
 
-from __future__ import annotations
-
 import math
 import pickle
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Searches for many characters at once: each is answered as when it asks alone, to the last bit, whatever the masks come as."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Priority databases: the rule of the talk as scenarios, and chains against a plain recursion."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

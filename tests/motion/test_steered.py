@@ -1,7 +1,5 @@
 """A character steered along a recorded stick for a minute: it is never stuck, enters no barred frame, and does it all again."""
 
-from __future__ import annotations
-
 import csv
 import math
 import os

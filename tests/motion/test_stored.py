@@ -1,7 +1,5 @@
 """Saved databases: opened from its file, a database answers every search exactly as the one saved; any other file is refused."""
 
-from __future__ import annotations
-
 import json
 import mmap
 import os

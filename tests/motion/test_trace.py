@@ -1,7 +1,5 @@
 """A recorded session comes back as it was, the same session gives the same bytes, and no broken file is read."""
 
-from __future__ import annotations
-
 import io
 import json
 import math

@@ -1,7 +1,5 @@
 """The path of a body over the ground."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """A walker: the body stays the game's, feet stand on their footsteps, and on flat ground nothing is changed."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 from itertools import pairwise, product

@@ -1,7 +1,5 @@
 """Blends of cycles and changes of gait: weights that sum to one, feet that stand, a change while a foot is in the air."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import replace
 from functools import cache

@@ -1,7 +1,5 @@
 """A warp reaches its target whatever the path, follows the animation's movement, and is held to a slow step-by-step oracle."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Rows that stand for other tables in the editor's test row, against the flat table that a game asks."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

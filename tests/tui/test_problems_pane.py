@@ -1,7 +1,5 @@
 """The Problems tab: findings of the table as it is, errors first, a filter, and the way to the cell."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Awaitable, Callable
 from pathlib import Path

@@ -3,8 +3,6 @@
 Nothing sleeps to be safe: each step waits until the screen shows what it is to show.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

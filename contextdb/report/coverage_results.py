@@ -60,6 +60,8 @@ class Measured:
     """The coverage of the contexts that a designer expects."""
     owner: str = ""
     """Who answers for the table."""
+    fallback: str = ""
+    """What plays where no row is valid."""
 
     @property
     def summary(self) -> TableSummary:

@@ -252,6 +252,13 @@ class QueryRow:
         return f"may be valid: its rule needs {named}" if named else "may be valid: its rule has no value"
 
     @property
+    def pickable(self) -> list[str]:
+        """The assets that may be picked, in the order of the table; else the fallback."""
+        rows = self.outcome.candidates[:MOST_PLAYED].tolist() if self.answer is not None else []
+        assets = list(dict.fromkeys(self.outcome.compiled.assets[row] for row in rows))
+        return assets or [name for name in (self._table.settings.fallback,) if name]
+
+    @property
     def headline(self) -> str:
         """What plays for these facts, how many rows are valid, and how many of those the policy passes over."""
         rows = self.outcome.candidates

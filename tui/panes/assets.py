@@ -11,7 +11,7 @@ import numpy as np
 from textual import on
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
-from textual.containers import Container
+from textual.containers import Container, Vertical
 from textual.geometry import Size
 
 from contextdb.cells.words import MARK
@@ -56,6 +56,7 @@ class AssetsPane(SheetView):
     AssetsPane {
         layout: vertical;
         & Grid { height: 1fr; } & #chips { display: none; } & #live { display: none; } & #over { height: 0; }
+        & > #side { dock: right; width: auto; height: 1fr; }
     }
     """
     BLANK = True
@@ -70,7 +71,8 @@ class AssetsPane(SheetView):
 
     def compose(self) -> ComposeResult:
         yield CellLine()
-        yield WhyPane()
+        with Vertical(id="side"):
+            yield WhyPane()
         yield LiveLine()
         yield Bar(id="live")
         yield Bar(id="chips")
@@ -85,6 +87,15 @@ class AssetsPane(SheetView):
     @property
     def why_pane(self) -> WhyPane:
         return self.query_one(WhyPane)
+
+    @property
+    def assets_here(self) -> Sequence[str]:
+        """The asset of the row of the cursor; in the test row those that may be picked."""
+        sheet, row = self.sheet, self.sheet.cursor[0]
+        if self.grid.is_in_test_row:
+            return () if sheet.query.is_empty else sheet.query.pickable
+        is_a_row = len(sheet.view) and not self.grid.is_in_new_row
+        return [sheet.text(row, sheet.asset_at) or sheet.inherited(row, sheet.asset_at)] if is_a_row else ()
 
     @property
     def editor(self) -> CellEditor | None:
@@ -142,6 +153,7 @@ class AssetsPane(SheetView):
     @on(Grid.Moved)
     def _show_cell(self) -> None:
         self.why_pane.follow(self.sheet)
+        self.follow_clip()
         self._show_place()
 
     def _show_place(self) -> None:

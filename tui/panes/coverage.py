@@ -10,7 +10,7 @@ from typing import ClassVar
 from textual import on, work
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
-from textual.containers import VerticalScroll
+from textual.containers import Vertical, VerticalScroll
 from textual.content import Content
 from textual.message import Message
 from textual.widget import Widget
@@ -84,6 +84,7 @@ class CoveragePane(Pane):
         & > #coverage-sections { margin: 1 0 0 0; }
         & > ContentSwitcher { height: 1fr; }
         & LineList, & HeatMap { height: 1fr; }
+        & > #side { dock: right; width: auto; height: 1fr; }
         & HeatMap { padding: 0 2; }
         & #about { padding: 1 2; }
         & > #coverage-detail {
@@ -116,6 +117,7 @@ class CoveragePane(Pane):
         self._detail = ""
 
     def compose(self) -> ComposeResult:
+        yield Vertical(id="side")
         yield Static(id="coverage-state", markup=False)
         yield Static(id="coverage-bar", markup=False)
         yield ChoiceLine(self._labels(), id="coverage-sections")
@@ -303,8 +305,33 @@ class CoveragePane(Pane):
         self._details["pairs"] = event.text
         self._show_section()
 
+    @property
+    def assets_here(self) -> Sequence[str]:
+        """The asset of the row nearest to a gap; of rows that crowd, or that something is about, their own."""
+        at, section, play, result = self._at_or_none, SECTIONS[self.section], self.played.result, self.run.result
+        table, rows = self.run.table or self.sheet.table, []
+        if at is None:
+            return ()
+        if section in OF_PLAY and play is not None:
+            table = play.table
+            rows = [play.unused[at]] if section == "unused" else _row_of(play.gaps[at].nearest)
+        elif section == "gaps" and result is not None:
+            rows = _row_of(result.report.gaps[at].nearest)
+        elif section == "crowded" and result is not None:
+            rows = list(result.report.crowded[at].rows)
+        elif section == "rows" and result is not None:
+            rows = [row for row in (result.report.findings[at].row,) if row is not None]
+        return [table.text(row, table.asset_column) for row in rows if row < table.n_rows]
+
+    @property
+    def _at_or_none(self) -> int | None:
+        """The line of the cursor in the list that is seen."""
+        current = self._current
+        return current.index if isinstance(current, LineList) and current.n_lines else None
+
     def _show_rows(self) -> None:
-        """The rows of the table that the line of the cursor is about, where there is room for them."""
+        """The rows of the table that the line of the cursor is about, where there is room for them; and the clip of one."""
+        self.follow_clip()
         below, section, table = self.query_one(RowsBelow), SECTIONS[self.section], self.sheet.table
         result, play = self.run.result, self.played.result
         below.show_none()
@@ -514,3 +541,7 @@ def _finding_line(report: CoverageReport, at: int) -> Sequence[ListCell]:
     finding = report.findings[at]
     row = "" if finding.row is None else str(finding.row + 1)
     return [row, finding.asset or "", (lines.TITLES.get(finding.rule, finding.rule), finding.level)]
+
+
+def _row_of(nearest: Nearest | None) -> list[int]:
+    return [] if nearest is None else [nearest.row]

@@ -17,12 +17,6 @@ def test_a_mask_has_a_word_for_every_64_rows(n_rows, n_words):
     assert bitmask.full(n_rows).shape == (n_words,)
 
 
-def test_row_r_is_bit_r_modulo_64_of_word_r_div_64():
-    words = bitmask.from_rows(np.array([0, 1, 63, 64, 129]), 130)
-    assert words.dtype == np.uint64
-    assert words.tolist() == [1 | 2 | 1 << 63, 1, 2]
-
-
 @given(FLAGS)
 def test_every_form_of_a_mask_holds_the_same_rows(flags):
     words, expected, n_rows = bitmask.pack(flags), np.flatnonzero(flags), len(flags)

@@ -173,16 +173,6 @@ def test_a_row_of_an_answer_without_actors_has_no_casting():
         (both - [0]).casting(0)
 
 
-def test_what_a_row_costs_is_that_of_the_first_answer_that_holds_it():
-    table = Table.from_columns({"Asset": ["a", "b"], "x": ["0..1 ~2", "0..9 ~3"], "y": ["0", "1"]}, {"x": {"type": "number"}})
-    compiled = table.compile()
-    one, other = compiled.query({"x": 5.0, "y": 0}), compiled.query({"x": 10.0, "y": 1})
-    assert (one | other).penalties.tolist() == [2.0, 3.0]
-    assert (other | one).penalties.tolist() == [2.0, 3.0]
-    assert (one | compiled.query({"x": 0.5, "y": 0})).penalties[0] == 2.0
-    assert (compiled.query({"x": 0.5, "y": 0}) & one).penalties[0] == 0.0
-
-
 # ---- places, and what is refused
 
 

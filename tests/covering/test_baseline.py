@@ -69,12 +69,6 @@ def test_a_gap_is_closed_when_every_context_of_it_has_a_row():
     assert found.opened == ()
 
 
-def test_single_points_count():
-    found = change(table_of(("a", "..5", "Any"), ("b", "5..", "Any")), table_of(("a", "..5)", "Any"), ("b", "(5..", "Any")))
-    assert [(gap.cells, gap.share) for gap in found.opened] == [({"speed": "5"}, 0.0)]
-    assert found.drop == 0.0
-
-
 def test_rows_that_died_since_are_told_and_those_dead_before_are_not():
     before = table_of(("all", "0..4", "Any"), ("slow", "0..3", "Any"), ("fast", "4..9", "Any"), policy="first")
     after = table_of(("all", "0..9", "Any"), ("slow", "0..3", "Any"), ("fast", "4..9", "Any"), policy="first")

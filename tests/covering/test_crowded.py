@@ -52,11 +52,6 @@ def test_crowds_are_found_in_a_table_too_large_to_go_through():
     assert crowd.cells == {f"b{i}": "True" for i in range(20)}
 
 
-def test_ends_that_touch_are_no_crowd():
-    schema = {"speed": {"type": "number", "min": 0, "max": 10}}
-    assert coverage(cdb.Table.from_columns({"Asset": ["A", "B"], "speed": ["..5", "5.."]}, schema)).crowded == ()
-
-
 def test_contexts_are_climbed_from_as_far_as_their_work_goes(monkeypatch: pytest.MonkeyPatch):
     names = [f"b{i}" for i in range(30)]
     columns = {name: ["True" if i == r else "Any" for r in range(20)] for i, name in enumerate(names)}

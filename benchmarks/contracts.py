@@ -57,7 +57,7 @@ def main() -> None:
     options = parser.parse_args()
     print(f"machine: {timing.machine()}\nversions: {timing.versions()}")
     prove(Contract("first", table="t", some="asset like '*'"), made_table("few", 50, 8))
-    lines, every = [HEADER], list[Timed]()
+    lines, every = list[tuple[str, ...]]([HEADER]), list[Timed]()
     report: dict[str, object] = {"format": 1, "machine": timing.machine(), "versions": timing.versions()}
     for shape in SHAPES:
         table = made_table(shape, options.rows, options.conditions)

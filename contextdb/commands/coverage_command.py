@@ -176,7 +176,7 @@ def _measured(arguments: argparse.Namespace, table: EitherTable) -> Measured:
 
     measured = measure(arguments, table)
     gates = [] if arguments.fail_under is None else [fail_under(measured.report, arguments.fail_under)]
-    if measured.expected is not None and arguments.fail_under_expected is not None:
+    if arguments.fail_under_expected is not None:
         gates.append(fail_under_expected(measured.expected, arguments.fail_under_expected))
     if measured.telemetry is not None and arguments.fail_under_telemetry is not None:
         gates.append(fail_under_telemetry(measured.telemetry, arguments.fail_under_telemetry))

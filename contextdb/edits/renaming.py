@@ -31,6 +31,7 @@ from contextdb.expressions.names import names_in, with_names
 from contextdb.files.texts import AnySource, read_texts, written_over
 from contextdb.schema import toml_edit
 from contextdb.schema.settings import Schema, TableSettings, plain_names
+from contextdb.tables.gap_work import FIELDS, gaps_path
 from contextdb.tables.other_files import CASE_COLUMNS, cases_path
 from contextdb.tables.project import SCHEMA_FILE, read_folder_schema, schema_of, table_files
 from contextdb.tables.table import Table
@@ -264,6 +265,12 @@ def rewritten_table(
         renamed = [c.renamed(of_cases[c.name]) if c.name in of_cases else c for c in texts]
         _require_free(cases, renamed)
         yield from rewritten(cases, source, texts, renamed)
+    gaps = gaps_path(file.path)
+    if gaps.is_file():
+        source, texts = read_texts(gaps)
+        renamed = [c.renamed(names.get(c.name, c.name)) if at >= len(FIELDS) else c for at, c in enumerate(texts)]
+        _require_free(gaps, renamed)
+        yield from rewritten(gaps, source, texts, renamed)
     yield from rewritten_notes(file.path, "Column", names)
     yield from rewritten_actors(file.path, names, roles)
 

@@ -23,6 +23,7 @@ from contextdb.expressions.names import names_in
 from contextdb.expressions.tokens import tokens_of
 from contextdb.files.texts import read_texts
 from contextdb.schema.settings import Schema, TableSettings
+from contextdb.tables.gap_work import FIELDS, gaps_path
 from contextdb.tables.other_files import CASE_COLUMNS, cases_path
 from contextdb.tables.project import SCHEMA_FILE, table_files
 from contextdb.tables.table import Table
@@ -160,11 +161,13 @@ def _rewritten_table(file: TableFile, condition: str, old: str, new: str) -> Ite
         else:
             columns.append(column)
     yield from rewritten(file.path, file.source, file.columns, columns)
-    cases = cases_path(file.path)
-    if cases.is_file() and condition not in CASE_COLUMNS:
-        source, texts = read_texts(cases)
-        after = [with_texts(c, {text: with_value(text, old, new) for text in c.texts}) if c.name == condition else c for c in texts]
-        yield from rewritten(cases, source, texts, after)
+    for beside, own in ((cases_path(file.path), CASE_COLUMNS), (gaps_path(file.path), FIELDS)):
+        if beside.is_file() and condition not in own:
+            source, texts = read_texts(beside)
+            after = [
+                with_texts(c, {text: with_value(text, old, new) for text in c.texts}) if c.name == condition else c for c in texts
+            ]
+            yield from rewritten(beside, source, texts, after)
 
 
 def _change(document: dict[str, Any], condition: str, old: str, new: str) -> None:

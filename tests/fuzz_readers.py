@@ -359,7 +359,13 @@ def read_expressions(path: Path) -> None:
 
 
 def read_clips(path: Path) -> None:
-    motion.load_clips([path])
+    """Each refusal names the file."""
+    try:
+        motion.load_clips([path])
+    except ContextDBError as error:
+        if not str(error).startswith(str(path)):
+            raise RuntimeError(f"the file is not named: {error}") from None
+        raise
 
 
 READERS: dict[str, Reader] = {
@@ -381,7 +387,9 @@ READERS: dict[str, Reader] = {
     "npz": Reader(".npz", lambda: [clip_files.amass(clip_files.SMPL_OFFSETS), clip_files.joints()], read_clips),
     "glb": Reader(".glb", lambda: [clip_files.gltf(clip_files.BODY)], read_clips),
     "fbx": Reader(".fbx", lambda: [clip_files.fbx(clip_files.BODY)], read_clips),
+    "fbx-binary": Reader(".fbx", lambda: [clip_files.binary_fbx(clip_files.fbx(clip_files.BODY))], read_clips),
     "usd": Reader(".usda", lambda: [clip_files.usda(clip_files.BODY)], read_clips),
+    "usdc": Reader(".usdc", lambda: [clip_files.usdc(clip_files.usda(clip_files.BODY))], read_clips),
     "gltf": Reader(".gltf", lambda: [clip_files.gltf(clip_files.BODY, binary=False)], read_clips),
     "marks": Reader(".csv", lambda: [MARKS], lambda path: Markup.load(path)),
     "notes": Reader(".csv", lambda: [NOTES], read_notes),

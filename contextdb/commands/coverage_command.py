@@ -218,9 +218,9 @@ def measure(arguments: argparse.Namespace, table: EitherTable) -> Measured:
     file = str(table.path) if table.path else None
     space = declared(table, report.assumed)
     inside = _inside(table)
-    return Measured(
-        report, file, tuple(table.assets), lines, compared, None, seen, (), inside, space, expected, table.settings.owner
-    )
+    owner, fallback = table.settings.owner, table.settings.fallback or ""
+    assets = tuple(table.assets)
+    return Measured(report, file, assets, lines, compared, None, seen, (), inside, space, expected, owner, fallback)
 
 
 def _expected(arguments: argparse.Namespace, table: EitherTable) -> Expectation | None:

@@ -107,6 +107,16 @@ def work_tree(folder: Path) -> Path:
     return next((each for each in (real, *real.parents) if os.path.lexists(each / ".git")), project_folder(real))
 
 
+def project_folders(root: Path) -> list[Path]:
+    """The folders with a contextdb.toml, of this one and those below it, in the order of their paths; hidden folders and links are
+    passed over."""
+    folders = []
+    for at, below, names in os.walk(root):
+        below[:] = sorted(name for name in below if not name.startswith("."))
+        folders += [Path(at)] if SCHEMA_FILE in names else []
+    return folders
+
+
 def _is_plain(path: Path) -> bool:
     try:
         return stat.S_ISREG(os.lstat(path).st_mode)

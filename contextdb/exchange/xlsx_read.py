@@ -46,7 +46,9 @@ def read_workbook(raw: bytes, file: str, sheet: str | None = None) -> Reading:
     columns, more = (
         (_own_columns(grid, own), [])
         if own
-        else columns_of(grid, f"{file}, sheet {in_quotes(name)}", block, "sheet row", name, wide)
+        else columns_of(
+            grid, f"{file}, sheet {in_quotes(name)}", block, "sheet row", name, wide, block is not None and not block.is_open
+        )
     )
     sheet_remarks += [Remark(f"the sheet {in_quotes(name)} of {len(names)}.")] if len(names) > 1 else []
     sheet_remarks = [*sheet_remarks, *remarks, *more]

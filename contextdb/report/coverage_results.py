@@ -62,6 +62,8 @@ class Measured:
     """The coverage of the contexts that a designer expects."""
     owner: str = ""
     """Who answers for the table."""
+    fallback: str = ""
+    """What plays where no row is valid."""
     work: Mapping[str, Work] = field(default_factory=dict)
     """Who works on a gap and how far it is, by the id of the gap."""
     closed: tuple[tuple[Mapping[str, str], Work], ...] = ()

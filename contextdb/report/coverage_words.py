@@ -104,7 +104,7 @@ def named_asset(measured: Measured, row: int) -> str:
 
 def gap_sentence(measured: Measured, gap: Gap, most: int = MOST_TOLD) -> str:
     """What to do about a gap."""
-    return f"{cells_text(gap.cells, most)}: nothing plays; {nearest_sentence(measured, gap)}{work_words(measured, gap)}"
+    return f"{cells_text(gap.cells, most)}: {_playing(measured)}; {nearest_sentence(measured, gap)}{work_words(measured, gap)}"
 
 
 def work_words(measured: Measured, gap: Gap) -> str:
@@ -124,7 +124,12 @@ def todo_sentence(measured: Measured, todo: Todo) -> str:
     own = todo.situation.cells
     more = {name: text for name, text in todo.gap.cells.items() if own.get(name) != text}
     where = f"{todo.situation.text}, where {cells_text(more)}" if more else todo.situation.text
-    return f"{where}: nothing plays; {nearest_sentence(measured, todo.gap)}{work_words(measured, todo.gap)}"
+    return f"{where}: {_playing(measured)}; {nearest_sentence(measured, todo.gap)}{work_words(measured, todo.gap)}"
+
+
+def _playing(measured: Measured) -> str:
+    """What the game sees in a gap."""
+    return f"only the fallback {measured.fallback} plays" if measured.fallback else "nothing plays"
 
 
 def overlap_sentence(report: CoverageReport) -> str:

@@ -1,4 +1,4 @@
-"""Characters in C are those of Python to the bit: what they decide, how they stand, and where they are."""
+"""Characters in C are those of Python to the bit: what they decide, how they stand, where they are, and what they pack."""
 
 from __future__ import annotations
 
@@ -131,14 +131,15 @@ def session(rng, n_ticks):
         states = b"".join(one.state for one in crowd)
         poses = [updated.pose for updated in updates]
         numbers = [(np.array(pose.root), pose.rotations, pose.translations, pose.positions) for pose in poses]
-        expected.append((states, [b"".join(np.ascontiguousarray(each).tobytes() for each in own) for own in numbers]))
+        packets = b"".join(bytes([len(packet)]) + packet for packet in (one.pack() for one in crowd))
+        expected.append((states, [b"".join(np.ascontiguousarray(each).tobytes() for each in own) for own in numbers], packets))
     return bundle, b"".join(given), expected
 
 
 def same(out, expected):
     """Compare what C wrote with what Python did, update by update."""
     at = 0
-    for tick, (states, poses) in enumerate(expected):
+    for tick, (states, poses, packets) in enumerate(expected):
         own = out[at : at + len(states)]
         assert own == states, f"tick {tick}: {np.flatnonzero(np.frombuffer(own) != np.frombuffer(states))[:20]}"
         at += len(states)
@@ -146,6 +147,8 @@ def same(out, expected):
             at += N_DECISION * 8  # the decision, of which all that counts is in the states
             assert out[at : at + len(pose)] == pose, f"tick {tick}"
             at += len(pose)
+        assert out[at : at + len(packets)] == packets, f"tick {tick}"
+        at += len(packets)
     assert at == len(out)
 
 

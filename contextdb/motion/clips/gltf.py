@@ -25,8 +25,8 @@ from contextdb.disk.boundary import inside
 from contextdb.errors import ClipError, ContextDBError, Fault, Place, in_quotes
 from contextdb.motion.clips import quaternions
 from contextdb.motion.clips.clip import Clip
-from contextdb.motion.clips.joint_arrays import MOST_JOINTS, depth_first
-from contextdb.motion.clips.joint_worlds import JointWorlds
+from contextdb.motion.clips.joint_arrays import MOST_FRAME_JOINTS, MOST_JOINTS, depth_first, most_frame_joints
+from contextdb.motion.clips.joint_worlds import JointWorlds, numbered
 from contextdb.motion.clips.quaternions import Floats
 
 MAGIC = b"glTF"
@@ -37,7 +37,6 @@ PATHS = {"translation": 3, "rotation": 4, "scale": 3}
 RATE = 30.0
 """Frames a second of an animation whose keys have no rate of a recording."""
 LEAST_RATE, LARGEST_RATE = 10.0, 480.0
-MOST_FRAME_JOINTS = 20_000_000
 MOST_DEPTH = 200
 """Braces within each other; a plain list of numbers and names needs ten."""
 
@@ -82,7 +81,7 @@ def takes(content: bytes, file: str) -> tuple[str, ...]:
         raise ClipError(*(fault.at(Place(file)) for fault in error.faults)) from None
     names = [each.get("name") if isinstance(each, dict) else None for each in animations]
     listed = [name if isinstance(name, str) and name else f"take {i}" for i, name in enumerate(names, start=1)]
-    return tuple(name if listed.count(name) == 1 else f"{name} {i}" for i, name in enumerate(listed, start=1))
+    return numbered(listed)
 
 
 def read(content: bytes, take: int, name: str, file: str) -> Clip:
@@ -187,8 +186,9 @@ class _File:
         start, stop = (times[0], times[-1]) if times else (0.0, 0.0)
         n_frames = round((stop - start) * rate) + 1
         parents = self.parents()
-        if n_frames * len(self.nodes) > MOST_FRAME_JOINTS:
-            raise _refused(f"{n_frames:,} frames of {len(self.nodes):,} nodes are too many.", f"{MOST_FRAME_JOINTS:,} in all")
+        most = most_frame_joints(sum(map(len, self.buffers)))
+        if n_frames * len(self.nodes) > most:
+            raise _refused(f"{n_frames:,} frames of {len(self.nodes):,} nodes are too many for its size.", f"{most:,} in all")
         at = np.minimum(start + np.arange(n_frames) / rate, stop)
         rest_local = np.array([_local(node) for node in self.nodes]).reshape(-1, 4, 4)
         local = np.repeat(rest_local[None], n_frames, axis=0)
@@ -235,21 +235,15 @@ class _File:
             if any(joint >= len(parents) for joint in joints):
                 raise _refused("a skin has a joint that is no node.")
             deforms[joints] = True
-        wanted = set(np.flatnonzero(deforms).tolist()) or moved
+        below = deforms.copy()
         if not deforms.any():
-            top = {joint for joint in wanted if parents[joint] < 0 or not wanted & set(_above(parents, joint))}
-            wanted = {node for node in range(len(parents)) if node in top or top & set(_above(parents, node))}
-        else:
-            tops = {joint for joint in wanted if not wanted & set(_above(parents, joint))}
-            wanted |= {node for joint in wanted - tops for node in _above(parents, joint) if tops & set(_above(parents, node))}
-        return np.array(sorted(wanted), np.int64), deforms
-
-
-def _above(parents: NDArray[np.int64], node: int) -> list[int]:
-    above = []
-    while (node := int(parents[node])) >= 0:
-        above.append(node)
-    return above
+            below[list(moved)] = True
+        above, order = below.copy(), depth_first(parents).tolist()
+        for node in order:
+            below[node] |= parents[node] >= 0 and below[parents[node]]
+        for node in reversed(order):
+            above[parents[node]] |= parents[node] >= 0 and above[node]
+        return np.flatnonzero(below & above if deforms.any() else below), deforms
 
 
 def _local(node: Any) -> Floats:

@@ -7,6 +7,7 @@ import re
 
 from contextdb.errors import ClipError, ContextDBError, Fault, Place
 from contextdb.motion.clips.clip import Clip
+from contextdb.motion.clips.joint_worlds import numbered
 from contextdb.motion.clips.parser_process import parser
 
 BINARY_FBX = b"Kaydara FBX Binary"
@@ -26,7 +27,7 @@ def fbx_takes(content: bytes, file: str) -> tuple[str, ...]:
     pattern = _BINARY_TAKE if content.startswith(BINARY_FBX) else _ASCII_TAKE
     matches = pattern.findall(content) or _OLD_TAKE.findall(content)
     names = [" ".join(html.unescape(match.decode("utf-8", "replace")).split()) or "take" for match in matches]
-    return tuple(name if names.count(name) == 1 else f"{name} {i}" for i, name in enumerate(names, start=1))
+    return numbered(names)
 
 
 def is_usd(content: bytes) -> bool:

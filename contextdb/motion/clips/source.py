@@ -16,6 +16,8 @@ from functools import lru_cache, partial
 from os import PathLike
 from pathlib import Path
 
+import numpy as np
+
 from contextdb.cells.arguments import require_many, require_path
 from contextdb.console import announced_while
 from contextdb.disk import read_bytes
@@ -104,7 +106,7 @@ class ClipSource:
             problem = f"the file has {len(takes)} takes, and none is named {in_quotes(take)}."
             raise ClipError(Fault(problem, some(takes), mend_for(take, takes), Place(self.file)))
         plain = CENTIMETRE if metres_per_unit == BY_SIZE else metres_per_unit
-        with announced_while(self.file, len(self.content)):
+        with announced_while(self.file, len(self.content)), np.errstate(all="ignore"):  # readers refuse what is not finite
             clip = self.format.read(self, clip_name(self.path, take) if name is None else name, take, plain, up)
         if metres_per_unit != BY_SIZE or self.format.states_unit:
             return clip

@@ -1,7 +1,5 @@
 """Every option of every command: what holds when it is not given is what its help says, and no two options disagree about it."""
 
-from __future__ import annotations
-
 import argparse
 import re
 from collections.abc import Iterator

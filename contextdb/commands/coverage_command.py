@@ -42,6 +42,7 @@ from contextdb.report import formats, render
 from contextdb.report.coverage_results import CoverageResults, Measured
 from contextdb.report.results import Gate, as_path
 from contextdb.tables.expected_file import expected_path, read_situations
+from contextdb.tables.gap_work import GapWork
 from contextdb.tables.nesting.flat import FlatTable
 from contextdb.tables.other_files import cases_path
 from contextdb.tables.places import table_path
@@ -167,8 +168,15 @@ def measured_results(
         measured = [replace(m, gates=(*m.gates, *of_cases.pop(m.report.table, ()))) for m in measured]
         others += [(name, gate) for name, gates in sorted(of_cases.items()) for gate in gates]
         accepted.require_needed()
-    ranked = (coverage_telemetry.ranked(arguments, m, table) for m, table in zip(measured, flat, strict=True))
+    ranked = (_ranked(arguments, m, table) for m, table in zip(measured, flat, strict=True))
     return CoverageResults(tuple(ranked), tuple(others), cases)
+
+
+def _ranked(arguments: argparse.Namespace, measured: Measured, table: EitherTable) -> Measured:
+    """With the gaps in their order, and the work on them. Raises FileError where the file of that cannot be read."""
+    ranked = coverage_telemetry.ranked(arguments, measured, table)
+    work = GapWork({}) if table.path is None else GapWork.beside(table.path)
+    return ranked.with_work(work, [column.condition for column in table.conditions]) if work.lines else ranked
 
 
 def _measured(arguments: argparse.Namespace, table: EitherTable) -> Measured:
@@ -176,7 +184,7 @@ def _measured(arguments: argparse.Namespace, table: EitherTable) -> Measured:
 
     measured = measure(arguments, table)
     gates = [] if arguments.fail_under is None else [fail_under(measured.report, arguments.fail_under)]
-    if measured.expected is not None and arguments.fail_under_expected is not None:
+    if arguments.fail_under_expected is not None:
         gates.append(fail_under_expected(measured.expected, arguments.fail_under_expected))
     if measured.telemetry is not None and arguments.fail_under_telemetry is not None:
         gates.append(fail_under_telemetry(measured.telemetry, arguments.fail_under_telemetry))
@@ -271,7 +279,7 @@ def _details(arguments: argparse.Namespace, table: EitherTable) -> str:
     if arguments.explain is not None:
         row = _row(arguments.explain, table)
         return row_details(measure(arguments, table), row, width)
-    measured = coverage_telemetry.ranked(arguments, measure(arguments, table), table)
+    measured = _ranked(arguments, measure(arguments, table), table)
     gaps = measured.report.gaps
     text = arguments.gap
     matching = [g for i, g in enumerate(gaps, 1) if text in (str(i), g.id)]

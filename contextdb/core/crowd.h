@@ -5,6 +5,7 @@
  *   cdbm_crowd_size      how many there are of something
  *   cdbm_crowd_table, cdbm_crowd_live   a table of the bundle, and a character's facts for it: set them by cdb_set_number and the others
  *   cdbm_place_one, cdbm_steer_one      put one somewhere, with nothing played yet; and what its stick asks for
+ *   cdbm_restore_one     put one where it stood
  *   cdbm_update_crowd    all of them
  *   cdbm_crowd_numbers, cdbm_crowd_text what came of it
  *
@@ -135,6 +136,14 @@ CDB_API int cdbm_place_one(cdbm_crowd *crowd, size_t i, double x, double z, doub
     return 1;
 }
 
+/* Let a character go on from a state, as its CDBM_STATE_NUMBERS were once, here or elsewhere. 0 where it is none of such a character. */
+CDB_API int cdbm_restore_one(cdbm_crowd *crowd, size_t i, const double *state)
+{
+    if (i >= crowd->n || !cdbm_is_state(&crowd->player, state)) return 0;
+    memcpy(crowd->states + i * cdbm_state_width(&crowd->player), state, cdbm_state_size(&crowd->player));
+    return 1;
+}
+
 /* The velocity that a stick asks for, m/s, and the heading, NaN: where the body goes. 0 where there is no character of that number. */
 CDB_API int cdbm_steer_one(cdbm_crowd *crowd, size_t i, double x, double z, double facing)
 {
@@ -154,8 +163,8 @@ CDB_API const char *cdbm_update_crowd(cdbm_crowd *crowd, double dt_s, cdb_fault 
     return is_done == -2 ? crowd->fault.reason : "a time or what is asked for is no finite number";
 }
 
-/* The numbers of a character: those of its pose, as in cdbm_pose, or its state, which may be written too. NULL for none. */
-CDB_API double *cdbm_crowd_numbers(cdbm_crowd *crowd, size_t i, int what)
+/* The numbers of a character: those of its pose, as in cdbm_pose, or its state. NULL for none. */
+CDB_API const double *cdbm_crowd_numbers(const cdbm_crowd *crowd, size_t i, int what)
 {
     if (i >= crowd->n) return NULL;
     switch (what) {

@@ -335,9 +335,10 @@ class Character:
     ) -> Updated:
         """An update of a copy: in place of asking tables and searching it plays what its owner packed after this update.
 
-        With the same databases, and the same `dt`, stick and body as the owner had, poses are the owner's to the bit. Where
-        nothing arrived, give b"": it plays on. The next packet puts it right; where that tells of an entry that is past, the copy
-        is at most a frame off until the next one.
+        With the same databases, and the same `dt`, stick and body as the owner had, poses are the owner's to the bit; so they
+        are without a body where the clip alone moves it (`root = "animation"`). Where nothing arrived, give b"": it plays on.
+        The next packet puts it right; where that tells of an entry that is past, the copy is at most a frame off until the next
+        one.
 
         Parameters
         ----------

@@ -46,7 +46,7 @@ EXPORT("open") const char *open_player(const void *bytes, size_t size, int n)
         cdbm_lay_out(&player, &poses[i], memory);
         lists[i][0] = facts[i], inputs[i].facts = lists[i], inputs[i].goal.facing = NAN, inputs[i].fault = &fault;
         inputs[i].unknown = CDB_UNKNOWN_ANY;
-        for (size_t k = 0; k < table()->schema.n_conditions; k++) facts[i][k] = cdbm_missing_fact(&table()->schema.conditions[k]);
+        for (size_t k = 0; k < table()->schema.n_conditions; k++) facts[i][k] = cdbi_missing(&table()->schema.conditions[k]);
     }
     return NULL;
 }

@@ -16,7 +16,7 @@ COMPUTED = {
     "contextdb, or the Python that runs now", "as recorded", "whole, except in our own workbooks", "from the settings",
     "200,000, fewer above 500 conditions", "as the project says, else by size", "as the project says, else in which bodies stand",
     "as the project says, else that",
-    "the first that decides", "the nearest with a .git",
+    "joined", "the first that decides", "the nearest with a .git",
 }  # fmt: skip
 """What is worked out by the command: the parsed value is then None."""
 

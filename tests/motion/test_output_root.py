@@ -5,7 +5,7 @@ import math
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
-from played import RATE, bank, decisions, playing_at
+from played import RATE, bank, decisions, playing_at, range_of
 
 from contextdb.motion import Action, Decision, PoseSettings, PoseStream, Steered
 

@@ -17,12 +17,14 @@ from textual.geometry import Size
 from contextdb.cells.words import MARK
 from contextdb.columns import TextColumn
 from contextdb.errors import ContextDBError, Fault, plural
+from contextdb.tables.data import known_conditions
 
 from ..clipboard import Clipboard
 from ..messages import Edited, Notice, RenameWanted
 from ..model.column_values import selection_summary
 from ..model.find import PatternError, Search
 from ..model.notes import COLOURS, Notes
+from ..model.rule_builder import RuleBuilder
 from ..model.selection import Block
 from ..model.sheet import READS_ONLY, Done, Sheet
 from ..model.table_answer import Offered, fact_fault
@@ -205,9 +207,16 @@ class AssetsPane(SheetView):
             is_fact=self._edited.is_fact,
             is_typing=event.is_typing,
             open_list=event.opens_list,
+            rule=self._rule_builder(column),
         )
         if editor.parent is None:
             over.mount(editor)
+
+    def _rule_builder(self, column: int) -> RuleBuilder | None:
+        """What a rule may name, with the facts of the test row, where the cell is one."""
+        if self._edited.is_fact or self.sheet.header(column).kind != "rule":
+            return None
+        return RuleBuilder(known_conditions(self.sheet.table), self.sheet.query.facts)
 
     def _known(self, texts: TextColumn) -> list[str]:
         """What a cell may be completed to: an asset first to the clips that no row names yet, an output to what it may say."""

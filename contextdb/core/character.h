@@ -350,25 +350,13 @@ static inline const char *cdbm_said_of(const cdbm_player *player, uint32_t kind,
     return NULL;
 }
 
-/* A fact that is not known; of a condition that is computed it is not looked at. */
-static inline cdb_fact cdbm_missing_fact(const cdb_condition *condition)
-{
-    cdb_fact fact;
-    memset(&fact, 0, sizeof fact);
-    if (condition->type == CDB_NUMBER || condition->type == CDB_ANGLE) fact.number = cdb_missing_number();
-    else if (condition->type == CDB_INT || condition->type == CDB_DATE) fact.whole = CDB_MISSING_INT;
-    else if (condition->type == CDB_BOOL || condition->type == CDB_ENUM) fact.whole = CDB_MISSING;
-    else if (condition->type == CDB_TAGS && condition->n_values == 0) fact.texts.count = CDB_MISSING;
-    return fact;
-}
-
 /* A fact that a game does not give and that the character knows itself. */
 static inline void cdbm_add_own(const cdbm_player *player, size_t table, size_t at, const cdbm_walk *walk, const cdbo_goal *goal, cdb_fact *fact)
 {
     const cdb_condition *condition = &player->opened[table]->schema.conditions[at];
     char letter = 0;
     if (condition->expr || !cdbi_is_missing(condition, fact)) return;
-    if (condition->type != CDB_NUMBER && condition->type != CDB_ANGLE) return;
+    if (!cdbi_is_double(condition->type)) return;
     if (!cdbm_said_of(player, CDBM_P_OWN_FACTS, table, condition->name, &letter)) return;
     if (letter == 's') fact->number = cdbo_flat_length(walk->body.velocity[0], walk->body.velocity[1]);
     if (letter == 'd') fact->number = cdbm_direction(goal->velocity, walk->body.heading);
@@ -416,7 +404,7 @@ static inline int cdbm_ask_table(const cdbm_player *player, size_t table, const 
     cdb_fact own[CDB_MOST_FACTS], mirrored[CDB_MOST_FACTS], *facts = own;
     size_t n_words = any->table.n_words, n_rows = any->table.n_rows, i, side;
     for (i = 0; i < schema->n_conditions; i++) {
-        own[i] = input->facts && input->facts[table] ? input->facts[table][i] : cdbm_missing_fact(&schema->conditions[i]);
+        own[i] = input->facts && input->facts[table] ? input->facts[table][i] : cdbi_missing(&schema->conditions[i]);
         cdbm_add_own(player, table, i, walk, &input->goal, &own[i]);
     }
     for (side = 0; side < 2; side++) {

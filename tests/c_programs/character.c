@@ -89,7 +89,7 @@ static void update(const cdbm_player *player, size_t n, const memory *own, const
         memset(&inputs[i], 0, sizeof inputs[i]);
         memcpy(&inputs[i].goal, take(8, 3), sizeof inputs[i].goal);
         if (numbers[0]) inputs[i].ground = slope;
-        for (k = 0; schema && k < schema->n_conditions; k++) facts[8 * i + k] = cdbm_missing_fact(&schema->conditions[k]);
+        for (k = 0; schema && k < schema->n_conditions; k++) facts[8 * i + k] = cdbi_missing(&schema->conditions[k]);
         memcpy(&numbers[1], take(8, 1), 8);
         if (gait >= 0) facts[8 * i + (size_t)gait].whole = numbers[1];
         lists[i] = facts + 8 * i;

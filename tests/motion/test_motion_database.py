@@ -308,3 +308,9 @@ def test_the_features_of_many_frames_are_those_of_each_and_none_between_ranges()
     assert database.raw_many([4, 0, 1]).tolist() == [database.raw(frame).tolist() for frame in (4, 0, 1)]
     with pytest.raises(QueryError, match="frame 2 is in no range"):
         database.raw_many([0, 2])
+
+
+def test_a_hit_in_a_database_of_many_blocks_is_the_lowest_of_equal_frames():
+    database = MotionDatabase.from_features(np.ones((40_000, 3), np.float32), [10], [40_000], ["a"])
+    assert database.search([0, 0, 0]) == Hit("a", 0, 10, 3.0)
+    assert database.search([0, 0, 0], current=39_999) == Hit("a", 0, 39_999, 3.0)

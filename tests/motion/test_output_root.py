@@ -5,7 +5,7 @@ import math
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
-from played import RATE, bank, decisions, playing_at
+from played import RATE, bank, decisions, playing_at, range_of
 
 from contextdb.motion import Action, Decision, PoseSettings, PoseStream, Steered
 
@@ -54,3 +54,14 @@ def test_the_velocity_of_the_root_has_no_step_where_a_run_becomes_an_idle():
     assert abs(steps[1][600] - steps[1][598]) > 2.0
     assert abs(steps[0][600] - steps[0][598]) < 0.3
     np.testing.assert_allclose(smooth[-1], cut[-1], atol=0.02)
+
+
+def test_in_the_mode_animation_the_clip_moves_the_body_from_where_it_was():
+    settings = PoseSettings(root="animation")
+    at_home, elsewhere = (roots([("walk", 0.0, 50)], settings, lambda t, b=b: b) for b in ((0.0, 0.0, 0.0), (5.0, -2.0, 1.0)))
+    clip = bank().root[bank().starts[range_of("walk")] :][:50].astype(float)
+    way = clip - clip[0]
+    np.testing.assert_allclose(elsewhere[:, 2] - 1.0, at_home[:, 2], atol=1e-9)
+    np.testing.assert_allclose(
+        np.linalg.norm(elsewhere[:, :2] - [5.0, -2.0], axis=1), np.linalg.norm(way[:, :2], axis=1), atol=1e-6
+    )

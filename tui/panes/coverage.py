@@ -120,7 +120,7 @@ class CoveragePane(Pane):
         yield Static(id="coverage-bar", markup=False)
         yield ChoiceLine(self._labels(), id="coverage-sections")
         with ContentSwitcher(initial="gaps"):
-            columns = [ListColumn("Share", 8, 0, True), ListColumn("New", 8, 0, True)]
+            columns = [ListColumn("Share", 8, 0, True), ListColumn("Adds", 8, 0, True)]
             yield GapList(
                 [*columns, ListColumn("Contexts without a valid row", 27, 3), ListColumn("Nearest row", 13, 2)],
                 empty=EMPTY["gaps"],
@@ -495,12 +495,12 @@ class CoveragePane(Pane):
 def _gap_line(report: CoverageReport, at: int) -> Sequence[ListCell]:
     gap = report.gaps[at]
     share = (f"{'' if gap.is_exact else '~'}{format_percent(gap.share)}", "strong") if gap.share else ("points", "muted")
-    new: ListCell = ("same", "muted") if gap.new_share == gap.share else format_percent(gap.new_share)
+    new: ListCell = ("all", "muted") if gap.new_share == gap.share else format_percent(gap.new_share)
     return [share, new, partial(lines.cells_within, gap.cells), lines.nearest_text(gap.nearest)]
 
 
 def _played_line(gap: SeenGap) -> Sequence[ListCell]:
-    new: ListCell = ("same", "muted") if gap.new_share == gap.share else format_percent(gap.new_share)
+    new: ListCell = ("all", "muted") if gap.new_share == gap.share else format_percent(gap.new_share)
     share = f"{'' if gap.is_exact else '~'}{format_percent(gap.share)}"
     return [(share, "strong"), new, partial(lines.cells_within, gap.cells), lines.nearest_text(gap.nearest)]
 

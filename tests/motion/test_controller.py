@@ -50,7 +50,7 @@ def test_the_first_update_starts_the_best_frame():
     assert (decision.action, decision.searched, at(decision)) == (Action.START, True, ("walk", 0.4))
     assert (decision.tick, decision.before) == (0, None)
     assert decision.cost == pytest.approx(0.04)
-    assert decision.why == "Nothing played: walk at 0.40 s costs 0.04."
+    assert decision.why == "Nothing was playing: walk at 0.40 s costs 0.04."
 
 
 def test_playing_on_moves_as_fast_as_time_passes_whatever_the_size_of_the_steps():
@@ -227,7 +227,7 @@ def test_with_nothing_valid_nothing_plays_and_the_next_update_tries_again():
     one = controller(line(walk=range(10)), search_every_s=60.0)
     decision = one.update(DT, [0.0], valid("swim"))
     assert (decision.action, decision.playing, decision.cost) == (Action.NOTHING, None, None)
-    assert decision.why == "Nothing played, and nothing may play."
+    assert decision.why == "Nothing was playing, and nothing may play."
     assert one.update(DT, [0.0]).action is Action.START
 
 

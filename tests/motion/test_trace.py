@@ -131,7 +131,7 @@ def test_the_brief_decisions_lack_queries_and_candidates_alone(decision):
 
 
 def still(tick):
-    return Decision(tick, tick / 30.0, Action.NOTHING, "Nothing played, and nothing may play.", True, None, None)
+    return Decision(tick, tick / 30.0, Action.NOTHING, "Nothing was playing, and nothing may play.", True, None, None)
 
 
 @pytest.mark.parametrize("n", [0, 1, CHUNK - 1, CHUNK, CHUNK + 1, 3 * CHUNK + 5])

@@ -112,7 +112,7 @@ def test_three_lines_of_headers_say_name_type_unit_and_how_many_rows_the_fact_le
     assert lines(sheet)[:3] == [
         "#    Asset   ↕│ speed   ↕│ hit     ↕│ gait    ↕│ Enabled ↕│",
         "     asset    │ m/s      │ bool     │ enum     │ enabled  │",
-        "              │          │ leaves 2 │          │          │",
+        "              │          │ 2 left   │          │          │",
     ]
 
 
@@ -121,7 +121,7 @@ def test_in_a_low_window_one_line_of_headers_says_the_type_or_what_the_fact_leav
     sheet.set_fact("hit", "True")
     assert lines(sheet, height=20)[:2] == [
         "#    Asset   ↕│ speed   ↕│ hit     ↕│ gait    ↕│ Enabled ↕│",
-        "     asset    │ m/s      │ leaves 2 │ enum     │ enabled  │",
+        "     asset    │ m/s      │ 2 left   │ enum     │ enabled  │",
     ]
 
 

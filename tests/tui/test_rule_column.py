@@ -65,7 +65,7 @@ def test_why_tells_the_rule_that_does_not_hold(path):
         return screen_text(app)
 
     screen = with_editor(path, script, (100, 24))
-    assert "1 cell keeps it from that" in screen
+    assert "not valid because of 1 cell" in screen
     assert 'The row\'s own rule says "speed > 3"' in screen
 
 

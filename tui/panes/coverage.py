@@ -585,12 +585,12 @@ def _gap_columns(section: str, has_work: bool = False) -> tuple[ListColumn, ...]
     what = "Moments" if section == "played" else "Contexts"
     work = [ListColumn("Work", 9, 1)] if has_work else []
     cells = ListColumn(f"{what} without a valid row", 24 if has_work else 27, 3)
-    return ListColumn("Share", 8, 0, True), ListColumn("New", 8, 0, True), cells, *work, ListColumn("Nearest row", 13, 2)
+    return ListColumn("Share", 8, 0, True), ListColumn("Adds", 8, 0, True), cells, *work, ListColumn("Nearest row", 13, 2)
 
 
 def _gap_line(gap: Gap | SeenGap, work: Work | None, has_work: bool) -> Sequence[ListCell]:
     share = (f"{'' if gap.is_exact else '~'}{format_percent(gap.share)}", "strong") if gap.share else ("points", "muted")
-    new: ListCell = ("same", "muted") if gap.new_share == gap.share else format_percent(gap.new_share)
+    new: ListCell = ("all", "muted") if gap.new_share == gap.share else format_percent(gap.new_share)
     state: ListCell = "" if work is None else (work.text, TONES[work.state])
     works = [state] if has_work else []
     return [share, new, partial(lines.cells_within, gap.cells), *works, lines.nearest_text(gap.nearest)]

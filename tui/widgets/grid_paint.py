@@ -243,8 +243,8 @@ class Painter:
         if header.fault is not None:
             yield Segment("!" + cut("cannot be read", width - 1), self.style(ground, "fault"))
             return
-        text = "" if header.leaves is None else f"leaves {header.leaves:,}"
-        text = text if len(text) < width else text.replace("leaves ", "→ ")
+        text = "" if header.leaves is None else f"{header.leaves:,} left"
+        text = text if len(text) < width else text.removesuffix(" left")
         text = plural(header.n_actors, "actor") if header.n_actors else "no column" if header.is_extra else text
         yield Segment(" " + cut(text, width - 1), self.style(ground, "muted"))
 

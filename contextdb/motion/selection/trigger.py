@@ -11,7 +11,7 @@ from contextdb.motion.selection.decision import Playing
 class Trigger(StrEnum):
     """Why a controller searches, told of the asset or database that played. Where several hold, the first."""
 
-    NOTHING_PLAYS = "Nothing played"
+    NOTHING_PLAYS = "Nothing was playing"
     LOST = "{asset} is no longer loaded"
     ENDED = "{asset} has ended"
     NOT_AMONG = "{database} is not among the databases of the moment"

@@ -296,7 +296,8 @@ class Painter:
         seen, block, ground = window.row(row), self._block(look), self._ground(row, window)
         asset, cursor = self.sheet.asset_at, self._cursor(row, look)
         is_far = seen.n_failing > 1
-        chance, outranked = (seen.standing, "") if seen.standing.endswith("%") else ("", seen.standing)
+        is_chance = seen.standing.endswith("%") and look.layout.chance > 0
+        chance, outranked = (seen.standing, "") if is_chance else ("", "" if seen.standing == "100 %" else seen.standing)
 
         n_columns = len(self.sheet.table.columns)
         noted, colours, names = self.sheet.marks.texts, self.sheet.marks.colours, [c.name for c in self.sheet.table.columns]

@@ -35,6 +35,8 @@ GROUNDS = (
 MEANT = ("text", "any", "muted", "name", "failing", "fault", "disabled", "valid", "line", "on-cursor")
 STEP, WIDEST_BY_KEYS = 2, 200
 """A key makes a column wider by so many cells; no wider than the second."""
+ROOM_FOR_CHANCES = 100
+"""In a narrower window chances stand beside the assets, where there is room."""
 FLASH_S = 0.4
 """So long a cell is lit that has just begun to fail."""
 
@@ -265,7 +267,13 @@ class GridView(ScrollView, inherit_bindings=False):
 
         def made(is_wrapped: bool) -> Layout:
             widths = [0 if at < len(hidden) and hidden[at] else self._width(at, name, is_wrapped) for at, name in enumerate(names)]
-            return layout(widths, n_frozen, self.sheet.table.n_rows, self.window.width, self._has_chances)
+            return layout(
+                widths,
+                n_frozen,
+                self.sheet.table.n_rows,
+                self.window.width,
+                self.window.width >= ROOM_FOR_CHANCES and self._has_chances,
+            )
 
         plain = made(False)
         if plain.total <= self.window.width:

@@ -254,10 +254,10 @@ _OF_SCREEN = (
         "next_picks",
     ),
     Command("live", "alt+u", "Follow a game", "Let the test row follow a running game, or a recording.", "Test row", "live"),
-    Command("live-pause", "alt+6", "Pause the game", "Pause the game that is followed, or go on.", "Test row", "live_pause"),
+    Command("live-pause", "shift+f7", "Pause the game", "Pause the game that is followed, or go on.", "Test row", "live_pause"),
     Command("live-back", "alt+8", "A second back", "Go back one second in the game.", "Test row", "live_by(-1)"),
     Command("live-ahead", "alt+9", "A second ahead", "Go ahead one second in the game.", "Test row", "live_by(1)"),
-    Command("live-keep", "alt+7", "Keep the moment", "Save this moment as a context.", "Test row", "live_keep"),
+    Command("live-keep", "shift+f8", "Keep the moment", "Save this moment as a context.", "Test row", "live_keep"),
     Command("live-stop", "", "Stop following", "Stop following the game; its last facts stay.", "Test row", "live_stop"),
     Command("actors", "alt+p", "Actors", "The actors for each role, for the test row.", "Test row", "actors"),
     Command(
@@ -280,8 +280,8 @@ _OF_SCREEN = (
     Command("priorities", "alt+3", "Priorities", "Which database comes first.", "Tabs", "tab('priorities')"),
     Command("coverage", "alt+4", "Coverage", "Which contexts have no asset.", "Tabs", "tab('coverage')"),
     Command("problems", "alt+5", "Problems", "What is wrong with the table.", "Tabs", "tab('problems')"),
-    Command("contracts", "", "Contracts", "What must hold of the table, proved as you type.", "Tabs", "tab('contracts')"),
-    Command("motion", "", "Motion", "The recorded sessions of the project, to debug.", "Tabs", "tab('motion')"),
+    Command("contracts", "alt+6", "Contracts", "What must hold of the table, proved as you type.", "Tabs", "tab('contracts')"),
+    Command("motion", "alt+7", "Motion", "The recorded sessions of the project, to debug.", "Tabs", "tab('motion')"),
     Command("quit", "ctrl+q", "Quit", "Quit; asks about unsaved edits.", "File", "quit"),
 )
 

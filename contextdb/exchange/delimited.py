@@ -59,10 +59,10 @@ def read_delimited(
     dialect = dialect_of(text, wanted)
     grid, notes = _records(text[dialect.first :], dialect.delimiter, file, has_titles=block is None)
     all_cells = Block(0, 0, len(grid), len(grid[0]) if grid else 0)
-    columns, more = columns_of(grid, file, block or all_cells, "line", takes_all=block is not None and not block.is_open)
-    columns, decimals = with_points(columns, dialect.delimiter, is_decimal_comma)
+    read = columns_of(grid, file, block or all_cells, "line", takes_all=block is not None and not block.is_open)
+    columns, decimals = with_points(read.columns, dialect.delimiter, is_decimal_comma)
     name = "tsv" if dialect.delimiter == "\t" else "csv"
-    return Reading(tuple(columns), name, (*dialect.remarks, *notes, *more, *decimals), has_whole_names=True)
+    return Reading(tuple(columns), name, (*dialect.remarks, *notes, *read.remarks, *decimals), has_whole_names=True)
 
 
 def records(text: str, file: str, wanted: str | None = None) -> list[list[str]]:

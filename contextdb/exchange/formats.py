@@ -8,6 +8,7 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 from contextdb.columns import TextColumn
+from contextdb.edits.notes import NO_NOTES, Notes
 from contextdb.errors import Fault, FileError, Place, TableError, in_quotes, nearest, no_such
 from contextdb.exchange.formulas import Formulas
 from contextdb.exchange.reading import Reading, Remark
@@ -216,17 +217,19 @@ def _read_text(kind: str, raw: bytes, name: str, options: ReadOptions, block: Bl
     return replace(reading, remarks=(*remarks, *reading.remarks))
 
 
-def write(table: Table, kind: Format, formulas: Formulas = "tell") -> tuple[bytes, tuple[Remark, ...]]:
+def write(table: Table, kind: Format, formulas: Formulas = "tell", notes: Notes = NO_NOTES) -> tuple[bytes, tuple[Remark, ...]]:
     """The bytes of a table in a format, and what could not be kept. `formulas` is "tell", "keep" or "quote": what becomes of texts
-    of CSV and TSV that a spreadsheet may compute, see `contextdb.exchange.formulas`. Raises TableError where the table has what the
+    of CSV and TSV that a spreadsheet may compute, see `contextdb.exchange.formulas`; `notes` are kept by a workbook.
+
+    Raises TableError where the table has what the
     format cannot hold, with its place."""
     try:
-        return _written(table, kind.name, formulas)
+        return _written(table, kind.name, formulas, notes)
     except UnicodeEncodeError:
         raise TableError(Fault("a text has half a surrogate pair.", "text in UTF-8")) from None
 
 
-def _written(table: Table, kind: str, formulas: Formulas) -> tuple[bytes, tuple[Remark, ...]]:
+def _written(table: Table, kind: str, formulas: Formulas, notes: Notes) -> tuple[bytes, tuple[Remark, ...]]:
     columns: Sequence[TextColumn] = table.columns
     remarks: tuple[Remark, ...] = ()
     if kind in ("csv", "tsv"):
@@ -237,7 +240,7 @@ def _written(table: Table, kind: str, formulas: Formulas) -> tuple[bytes, tuple[
     if kind == "xlsx":
         from contextdb.exchange.xlsx_write import write_xlsx
 
-        return write_xlsx(table), ()
+        return write_xlsx(table, notes), ()
     if kind in ("csv", "parquet"):
         from contextdb.files.texts import written_over
 

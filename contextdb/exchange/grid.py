@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,6 +66,17 @@ class Block:
         return first if first == last else f"{first}:{last}"
 
 
+class Columns(NamedTuple):
+    """The columns of a table in a grid."""
+
+    columns: list[TextColumn]
+    remarks: list[Remark]
+    rows: Sequence[int]
+    """The row of the grid, from 0, of each row."""
+    places: Sequence[int]
+    """The column of the grid, from 0, of each column."""
+
+
 def column_letters(column: int) -> str:
     """The name of a column in a spreadsheet: A, B, …, Z, AA for 0, 1, …, 25, 26."""
     letters = ""
@@ -101,7 +113,7 @@ def columns_of(
     sheet: str | None = None,
     wide: Collection[int] = (),
     takes_all: bool = False,
-) -> tuple[list[TextColumn], list[Remark]]:
+) -> Columns:
     """The columns of the table in a grid, or in a block of it whose first row is the names; None: it is looked for, also below a
     title.
 
@@ -138,9 +150,9 @@ def columns_of(
         remarks.append(Remark("names have their group in front: {} is now {}.".format(*map(in_quotes, renamed))))
     _require_names(names, filled, block, Place(file, block.top + 1), _mend(rows, block, sheet))
     columns = [TextColumn.of(n, t) for n, t in zip(names, zip(*filled, strict=True) if filled else [()] * len(names), strict=True)]
-    columns = [column for column in columns if column.name]
     _require_short(columns, file)
-    return columns, remarks
+    named = [(at, column) for at, column in enumerate(columns, block.left) if column.name]
+    return Columns([column for _, column in named], remarks, [at - 1 for at in body], [at for at, _ in named])
 
 
 def _taken_out(body: dict[int, Sequence[str]], blank: Sequence[int], wide: Collection[int]) -> list[tuple[int, str]]:

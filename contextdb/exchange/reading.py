@@ -90,6 +90,9 @@ class Reading:
     sets: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
     """Of a column the rows in which the format has a set of names: there the text is a cell of ours all the same."""
 
+    spots: Mapping[tuple[int, str], tuple[str, str]] = field(default_factory=dict)
+    """Notes on cells and colours of rows, by row and column; a colour stands at the column ""."""
+
     @property
     def n_rows(self) -> int:
         return self.columns[0].n_rows if self.columns else 0

@@ -5,7 +5,7 @@ Knows no Textual. A file is read by `contextdb.exchange`; what it proposes can b
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -16,10 +16,11 @@ from contextdb.cells.kinds import KINDS
 from contextdb.cells.words import quoted
 from contextdb.columns import TextColumn
 from contextdb.edits.edits import edit_between
+from contextdb.edits.notes import Notes
 from contextdb.errors import ContextDBError, Fault, TableError, nearest, plural, safe_text
 from contextdb.exchange.decimal_commas import PAIR, as_pair
 from contextdb.exchange.formats import FORMATS, ReadOptions, read
-from contextdb.exchange.importing import NAMES, decimal_commas_reported, has_whole_names, whole_names_sentence
+from contextdb.exchange.importing import NAMES, decimal_commas_reported, has_whole_names, notes_of, whole_names_sentence
 from contextdb.exchange.mapping import COLUMN_JOBS, Mapped, as_condition, as_job, as_type, propose
 from contextdb.exchange.pairs import with_intervals
 from contextdb.exchange.proposals import names_of
@@ -50,6 +51,8 @@ class Import:
 
     edit: Edit
     notes: tuple[str, ...] = ()
+    with_marks: Callable[[Notes], Notes] | None = None
+    """Adds the notes and colours of the file to those of the table, where it has some."""
 
 
 @dataclass(frozen=True)
@@ -262,7 +265,12 @@ class Draft:
 
     def answer(self) -> Import:
         """What the dialog gives back."""
-        return Import(self.edit(), tuple(note[:1].upper() + note[1:] for note in self.notes))
+        notes = tuple(note[:1].upper() + note[1:] for note in self.notes)
+        return Import(self.edit(), notes, self._with_marks if self.reading.spots else None)
+
+    def _with_marks(self, notes: Notes) -> Notes:
+        assets = next(self.reading.columns[at].to_list() for at, column in enumerate(self.columns) if column.job == "asset")
+        return notes_of(self.reading.spots, self.columns, assets, self.table.asset_column, notes)
 
     def _name(self, column: Mapped) -> str:
         return self.table.asset_column if column.job == "asset" else column.name

@@ -232,13 +232,13 @@ class QueryRow:
         return self.answer.valid_rows(row) if self.answer is not None else []
 
     def brief(self, row: int) -> str:
-        """How a valid row stands, in the fewest words: "40 %", "outranked by B"; nothing for one that is picked in any case."""
+        """How a valid row stands, in the fewest words: "40 %", "outranked by B"."""
         if not self.bits >> row & 1 or self.outcome.refusal is not None:
             return ""
         own = self._valid_rows(row)
         if self.outcome.picks_one_of(own):
             chance = self.outcome.chance(own)
-            return percent(chance) if chance < 1.0 else ""
+            return percent(chance) if chance < 1.0 else "100 %"
         return self.outcome.why_not(own[0]).partition(" (")[0] if own else ""
 
     def doubt(self, row: int) -> str:

@@ -16,6 +16,7 @@ from textual.geometry import Size
 
 from contextdb.cells.words import MARK
 from contextdb.columns import TextColumn
+from contextdb.edits.notes import COLOURS, Notes
 from contextdb.errors import ContextDBError, Fault, plural
 from contextdb.tables.data import known_conditions
 
@@ -23,7 +24,6 @@ from ..clipboard import Clipboard
 from ..messages import Edited, Notice, RenameWanted
 from ..model.column_values import selection_summary
 from ..model.find import PatternError, Search
-from ..model.notes import COLOURS, Notes
 from ..model.rule_builder import RuleBuilder
 from ..model.selection import Block
 from ..model.sheet import READS_ONLY, Done, Sheet
@@ -464,7 +464,7 @@ class AssetsPane(SheetView):
 
         def noted(text: str | None) -> None:
             if text is not None and text.strip() != before:
-                self._mark(lambda marks: marks.with_note(asset, name, text), "Note saved." if text.strip() else "Note removed.")
+                self.mark(lambda marks: marks.with_note(asset, name, text), "Note saved." if text.strip() else "Note removed.")
 
         question = f"A note on {name} of {asset}, for people; empty takes it away"
         self.app.push_screen(AskDialog("Note", question, before, lambda _: ""), noted)
@@ -479,13 +479,13 @@ class AssetsPane(SheetView):
             if at is not None:
                 colour = "" if words[at] == "none" else words[at]
                 message = f"{plural(len(assets), 'row')} {f'marked {colour}' if colour else 'without a colour'}."
-                self._mark(lambda marks: marks.with_colour(assets, colour), message)
+                self.mark(lambda marks: marks.with_colour(assets, colour), message)
 
         if assets:
             now = sheet.marks.colours.get(assets[0], "none")
             self.app.push_screen(ChooseDialog("Colour of the rows", words, words.index(now)), chosen)
 
-    def _mark(self, change: Callable[[Notes], Notes], message: str) -> None:
+    def mark(self, change: Callable[[Notes], Notes], message: str) -> None:
         """Change the notes as they are on the disk now, so that nobody else's are lost."""
         sheet = self.sheet
         if sheet.path is None:
@@ -498,7 +498,8 @@ class AssetsPane(SheetView):
             return
         sheet.marks = marks
         self.show()
-        self.post_message(Notice(message))
+        if message:
+            self.post_message(Notice(message))
 
     def action_go_to(self) -> None:
         """Ask for a row, by its number or its asset, or for a column."""

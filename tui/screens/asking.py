@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any, Protocol
 
 from textual.app import App
 
 from contextdb.edits.edits import set_cells
+from contextdb.errors import ContextDBError
 from contextdb.tables.changes import Edit
 from contextdb.tables.table import Table
 
@@ -93,6 +95,15 @@ class TestRow:
             self._load()
         else:
             self.screen.say("There is no other context. F9 opens a file of contexts, or saves the test row.")
+
+    def begin(self) -> None:
+        """Load the first saved context into a test row that says nothing yet, where there is one that can be read."""
+        if not self.session.sheet.query.is_empty:
+            return
+        with suppress(ContextDBError):
+            self.list = ContextList.beside(self.session.sheet.table)
+            if self.list.next():
+                self._load()
 
     def _load(self) -> None:
         if self.list is not None:

@@ -37,7 +37,7 @@ class RowsDialog(Dialog[str]):
     """Which rows of a sheet are the table: gives its cells as A5:F20, or A5:F to the last row."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("l,L", "last_row", "The last row is here"),
+        Binding("l", "last_row", "The last row is here"),
         Binding("f6,ctrl+j", "accept", "Read these"),
     ]
     DEFAULT_CSS = """

@@ -172,6 +172,8 @@ class MainScreen(TableScreen):
     def take_import(self, answer: Import) -> None:
         """Put the rows of another file into the table, and fit the columns to them."""
         is_short = len(answer.notes) < 2
+        if answer.with_marks is not None:
+            self.assets.mark(answer.with_marks, "")
         self.apply(answer.edit, answer.notes if is_short else (f"{len(answer.notes)} remarks.",))
         self.assets.grid.forget_widths()
         if not is_short:
@@ -207,7 +209,7 @@ class MainScreen(TableScreen):
             if answer is not None:
                 self.try_to(lambda: self._export(answer))
 
-        self.app.push_screen(ExportDialog(self.session.sheet.table, self.workspace.folder), chosen)
+        self.app.push_screen(ExportDialog(self.session.sheet.table, self.workspace.folder, self.session.sheet.marks), chosen)
 
     def _export(self, answer: Export) -> None:
         write_atomic(answer.path, answer.raw)

@@ -335,6 +335,7 @@ class TableScreen(Screen[None]):
             self.assets.grid.test_name = self.came_from if not session.sheet.query.is_empty else ""
         elif why := session.why_read_only:
             self.say(f"This table is read-only: {why}.", "warning")
+        self.test_row.begin()
         self._show_bars()
 
     @property

@@ -95,7 +95,7 @@ def _helps(group: Group) -> Iterator[tuple[str, str]]:
         words = (*group.words, name)
         if hasattr(command, "COMMANDS"):
             inner = Group(words, command.COMMANDS, command.__doc__)
-            yield " ".join(words), inner.overview.strip()
+            yield " ".join(words), inner.overview.partition("\ncommands:\n")[0].strip()
             yield from _helps(inner)
         else:
             yield " ".join(words), group.parser(name, command).format_help().strip()

@@ -8,8 +8,6 @@ every run tries it. EXAMPLES=thorough draws 2,000 of each.
 Files of the tests are in memory where the machine has such a folder with room; TMPDIR=... says another place.
 """
 
-from __future__ import annotations
-
 import atexit
 import gc
 import os

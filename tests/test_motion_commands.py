@@ -1,7 +1,5 @@
 """`contextdb motion search | select | run | replay` on a project of made clips; every argument wrongly too."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import sys

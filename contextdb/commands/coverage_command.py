@@ -1,14 +1,10 @@
 """Measure which contexts have a valid row, and which have none.
 
-Exits with 1 if a threshold is missed: --fail-under, --fail-under-expected, --fail-under-telemetry, or --max-drop (by default 0
-with a --baseline).
-With a --baseline also if a table is gone or has lost all its rows, if one is not in it, if one has other conditions, bounds, values
-or assumptions, and if saved contexts expect less: --gone, --new, --redefined and --fewer-cases accept that for a table.
-Thresholds are compared with the lower bound of the covered share, so that a lucky sample does not pass.
+Exits with 1 if a threshold is missed, compared with the lower bound of the covered share; with a --baseline also if a table is
+gone, new or redefined, or if saved contexts expect less, unless an option accepts that (--max-drop is then 0 by default).
 
   contextdb coverage tables/
   contextdb coverage locomotion --gap 1
-  contextdb coverage tables/ --format json -o coverage.json
   contextdb coverage tables/ --baseline coverage.json --max-drop 0.5
   contextdb coverage tables/ --format html -o coverage.html
   contextdb coverage locomotion --telemetry "recorded/*.parquet" --fail-under-telemetry 99.5
@@ -188,7 +184,7 @@ def _measured(arguments: argparse.Namespace, table: EitherTable) -> Measured:
 
     measured = measure(arguments, table)
     gates = [] if arguments.fail_under is None else [fail_under(measured.report, arguments.fail_under)]
-    if measured.expected is not None and arguments.fail_under_expected is not None:
+    if arguments.fail_under_expected is not None:
         gates.append(fail_under_expected(measured.expected, arguments.fail_under_expected))
     if measured.telemetry is not None and arguments.fail_under_telemetry is not None:
         gates.append(fail_under_telemetry(measured.telemetry, arguments.fail_under_telemetry))

@@ -1,24 +1,16 @@
 """Merge two versions of a table, cell by cell, with rows and columns that were added, removed and moved. A git merge driver.
 
 A contextdb.toml is merged key by key, notes (NAME.notes.csv) place by place, work on gaps (NAME.gaps.csv) gap by gap. The result is
-written to OURS, or to FILE. Conflicts are written between git's marks, row by row, for a person or the editor to decide; a
-Parquet file then stays as it was. If one of the three files is not a table, its lines are merged as git does.
+written to OURS, or to FILE. Conflicts are written between git's marks, row by row, for a person or the editor to decide; a Parquet
+file then stays as it was. If one of the three files is not a table, its lines are merged as git does. A row that one side deleted
+is gone; cells that the other side filled in it are named.
 
-A row that one side deleted is gone, even if the other side filled a new column in it; these cells are named on standard error.
-
-Exits with 0 if everything merged, with 1 if something is left to decide or lines were merged, with 2 if a file is missing or
-cannot be written.
-
-After a clean merge the meaning is checked: gaps, overlaps under the policy "unique" and rows that can no longer be chosen, if
-neither side had them, are reported on standard error; with --strict the command then exits with 1.
+Exits with 1 if something is left to decide or lines were merged, with 2 if a file is missing or cannot be written. Gaps, overlaps
+under the policy "unique" and rows that can no longer be chosen, if neither side had them, are reported; with --strict they exit
+with 1. `git install` sets it up as a merge driver.
 
   contextdb merge base.csv ours.csv theirs.csv --out merged.csv
   contextdb merge base.csv ours.csv theirs.csv --take theirs
-
-As a merge driver of git, with the lines "*.csv merge=contextdb" and "contextdb.toml merge=contextdb" in .gitattributes (what
-`git install` sets merges lines if the driver itself cannot run):
-
-  git config merge.contextdb.driver "contextdb merge %O %A %B --path=%P"
 """
 
 from __future__ import annotations

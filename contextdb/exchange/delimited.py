@@ -65,6 +65,12 @@ def read_delimited(
     return Reading(tuple(columns), name, (*dialect.remarks, *notes, *more, *decimals), has_whole_names=True)
 
 
+def records(text: str, file: str, wanted: str | None = None) -> list[list[str]]:
+    """All records of a text, as wide as the longest. Raises TableError where quotes do not close."""
+    dialect = dialect_of(text, wanted)
+    return _records(text[dialect.first :], dialect.delimiter, file, has_titles=False)[0]
+
+
 def dialect_of(text: str, wanted: str | None = None) -> Dialect:
     """The dialect of a text; the remarks say how it was inferred."""
     if wanted is not None:

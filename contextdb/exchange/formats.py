@@ -127,6 +127,22 @@ def sheet_names(raw: bytes, name: str) -> list[str]:
     return sheets_of(raw, name)
 
 
+def grid_of(raw: bytes, name: str, options: ReadOptions) -> tuple[str, Sequence[Sequence[str]]]:
+    """The sheet of a workbook, with its name, or a text with delimiters as it stands: rows of texts, all equally wide. Raises
+    ContextDBError as `read` does; TableError for a file without such rows."""
+    kind = format_of(name, options.format, raw).name
+    if kind == "xlsx":
+        from contextdb.exchange.xlsx_read import grid_of_workbook
+
+        return grid_of_workbook(raw, name, options.sheet)
+    if kind not in ("csv", "tsv"):
+        raise TableError(Fault(f"{FORMATS[kind].about} has no rows to choose from.", "a workbook or CSV", place=Place(name)))
+    from contextdb.exchange.delimited import records
+    from contextdb.exchange.encodings import decoded
+
+    return "", records(decoded(raw, name, options.encoding)[0], name, options.delimiter or ("\t" if kind == "tsv" else None))
+
+
 def _read(kind: str, raw: bytes, name: str, options: ReadOptions) -> Reading:
     if kind == "xlsx":
         from contextdb.exchange.xlsx_read import read_workbook

@@ -113,7 +113,7 @@ def columns_of(
     long.
     """
     if block is None:
-        block, remarks = _table_block(grid, file, wide)
+        block, remarks = _table_block(grid, file, wide, sheet)
     else:
         remarks = list[Remark]()
         block = Block(block.top, block.left, min(block.bottom, len(grid)), min(block.right, len(grid[0]) if grid else 0))
@@ -279,7 +279,7 @@ def _require_short(columns: Sequence[TextColumn], file: str) -> None:
 # ---- where the table is
 
 
-def _table_block(grid: Grid, file: str, wide: Collection[int]) -> tuple[Block, list[Remark]]:
+def _table_block(grid: Grid, file: str, wide: Collection[int], sheet: str | None) -> tuple[Block, list[Remark]]:
     try:
         blocks = blocks_of(grid)
     except TableError as error:
@@ -296,7 +296,9 @@ def _table_block(grid: Grid, file: str, wide: Collection[int]) -> tuple[Block, l
         more = f" and {len(tables) - MOST_BLOCKS} more" if len(tables) > MOST_BLOCKS else ""
         problem = f"the sheet holds {len(tables)} tables: {places}{more}."
         mend = f'to name its cells, as in --sheet "SHEET!{tables[0]}"'
-        raise TableWanted(Fault(problem, "one of them", mend, Place(file)), blocks=[str(each) for each in tables])
+        raise TableWanted(
+            Fault(problem, "one of them", mend, Place(file)), blocks=[f"{sheet}!{each}" if sheet else str(each) for each in tables]
+        )
     left = [block for block in blocks if block is not tables[0]]
     notes = [
         Remark(f"left out because it is not a table: {in_quotes(_first_text(grid, block))}.", f"cells {block}") for block in left

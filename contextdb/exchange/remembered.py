@@ -59,6 +59,9 @@ class Choices:
         return mapped
 
 
+NOTHING_CHOSEN = Choices()
+
+
 def chosen_columns(mapped: Sequence[Mapped]) -> dict[str, Sequence[str]]:
     """What to keep of columns that somebody decided."""
     chosen = (column for column in mapped if column.why.startswith("chosen"))

@@ -55,6 +55,20 @@ def read_workbook(raw: bytes, file: str, sheet: str | None = None) -> Reading:
     return Reading(tuple(columns), "xlsx", tuple(sheet_remarks), types or EMPTY, sheets=tuple(names), has_whole_names=types is None)
 
 
+def grid_of_workbook(raw: bytes, file: str, sheet: str | None = None) -> tuple[str, list[list[str]]]:
+    """A sheet with its name, the one that is named or the only one with cells, as it stands. Raises as `read_workbook` does."""
+    require_workbook(raw, file)
+    book = _opened(raw, file)
+    names = [name for name in book.sheet_names if name.casefold() != TYPES_SHEET]
+    wanted = _wanted(sheet, names, file)[0]
+    sheets = {each: _Sheet.read(book, each, file) for each in ([wanted] if wanted else names)}
+    name = wanted or _only(sheets, _hidden_sheets(book), file)[0]
+    grid = [[text_of_value(value) for value in row] for row in sheets[name].values]
+    _fill_errors(grid, marks_of(raw, name), is_old(raw))
+    _fill_merged(grid, sheets[name].merged, file)
+    return name, grid
+
+
 def sheets_of(raw: bytes, file: str) -> list[str]:
     """The sheets of a workbook that may hold a table. Raises TableError as `read_workbook` does."""
     require_workbook(raw, file)

@@ -170,7 +170,9 @@ class CoverageResults:
         n_failed = sum(not gate.passed for gate in gates)
         if n_failed:
             return f"{n_failed} of {plural(len(gates), 'threshold')} missed."
-        return f"{plural(len(gates), 'threshold')} met." if gates else ""
+        n_skipped = sum(gate.word == "skipped" for gate in gates)
+        more = f", {n_skipped:,} not measured" if n_skipped else ""
+        return f"{plural(len(gates) - n_skipped, 'threshold')} met{more}." if gates else ""
 
     def to_json(self) -> dict[str, object]:
         return with_marks(
@@ -278,8 +280,12 @@ def _accepted_by(option: str, name: str, sentence: str, is_accepted: bool, more:
     return Gate(option, 0.0, 1.0, is_accepted, message, rule=rule, is_accepted=is_accepted)
 
 
-def fail_under_expected(expected: Expectation, limit: float) -> Gate:
-    """The gate of a least covered share of what is expected; an estimate counts with its lower bound."""
+def fail_under_expected(expected: Expectation | None, limit: float) -> Gate:
+    """The gate of a least covered share of what is expected; an estimate counts with its lower bound. Where nothing is expected of
+    a table, it passes, and says so."""
+    if expected is None:
+        message = "not measured: nothing is expected of this table. A --baseline notices when that is new."
+        return Gate("fail-under-expected", limit, None, True, message, rule="expected-below", is_accepted=True)
     at_least = "" if expected.covered.method == "exact" else "at least "
     sentence = f"{at_least}{{}} of what is expected is covered"
     return bar("fail-under-expected", expected.covered.lower, limit, sentence, rule="expected-below")

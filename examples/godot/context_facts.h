@@ -10,15 +10,13 @@ static void drop_facts(facts *own)
     size_t i;
     for (i = 0; own->held && i < own->live->schema->n_conditions; i++) free(own->held[i]);
     free(own->held);
-    free(own->live);
     memset(own, 0, sizeof *own);
 }
 
-static int begin_facts(facts *own, const cdb_any *any, cdb_unknown unknown)
+static int begin_facts(facts *own, cdb_live *live)
 {
-    own->live = (cdb_live *)malloc(cdb_live_bytes(&any->schema));
-    own->held = own->live ? (char **)calloc(any->schema.n_conditions + 1, sizeof(char *)) : NULL;
-    if (own->live) cdb_live_of(any, unknown, own->live);
+    own->live = live;
+    own->held = (char **)calloc(live->schema->n_conditions + 1, sizeof(char *));
     return own->held != NULL;
 }
 

@@ -20,6 +20,7 @@
 typedef struct context_table {
     void *bytes;
     cdb_any *any;
+    cdb_live *live;
     facts facts;
     uint64_t *rows;
     cdb_picker picker;
@@ -30,6 +31,7 @@ typedef struct context_table {
 static void drop_table(context_table *own)
 {
     drop_facts(&own->facts);
+    free(own->live);
     free(own->rows);
     free(own->rests);
     cdb_close_any(own->any);
@@ -55,7 +57,8 @@ METHOD(open_table)
     }
     own->rows = (uint64_t *)calloc(own->any->table.n_words + 1, sizeof(uint64_t));
     own->rests = (cdb_rest *)calloc(own->any->table.n_limited + 1, sizeof(cdb_rest));
-    if (!own->rows || !own->rests || !begin_facts(&own->facts, own->any, CDB_UNKNOWN_ERROR)) {
+    own->live = (cdb_live *)malloc(cdb_live_bytes(&own->any->schema));
+    if (!own->rows || !own->rests || !own->live || !begin_facts(&own->facts, cdb_live_of(own->any, CDB_UNKNOWN_ERROR, own->live))) {
         drop_table(own);
         return of_text("there is not enough memory");
     }
@@ -74,7 +77,7 @@ METHOD(query)
     array_new(&array);
     if (!own->any) say(own->problem, "", "no table is open");
     else if (!own->problem[0] && set_all(&own->facts, arguments[0], own->problem)) {
-        if (cdb_live_query(own->facts.live, own->rows, own->any->table.n_words, &fault) != CDB_OK) say(own->problem, fault.name, fault.reason);
+        if (cdb_live_query(own->live, own->rows, own->any->table.n_words, &fault) != CDB_OK) say(own->problem, fault.name, fault.reason);
         for (row = -1; (row = cdb_next_row(own->rows, own->any->table.n_words, row)) >= 0;) append(&array, of_int(row));
     }
     return of_array(&array);
@@ -87,7 +90,7 @@ METHOD(pick)
     BEGIN(context_table, 1);
     if (!own->any) say(own->problem, "", "no table is open");
     else if (!own->problem[0]
-        && cdb_live_pick(own->facts.live, own->rows, own->any->table.n_words, as_real(arguments[0]), &own->picker, &row, &fault) != CDB_OK)
+        && cdb_live_pick(own->live, own->rows, own->any->table.n_words, as_real(arguments[0]), &own->picker, &row, &fault) != CDB_OK)
         say(own->problem, fault.name, fault.reason);
     return of_int(row);
 }

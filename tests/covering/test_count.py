@@ -1,7 +1,5 @@
 """The core counts what going through every context counts, in as many steps as ever, and can be stopped; bad parts are refused."""
 
-from __future__ import annotations
-
 import _thread
 import itertools
 import math

@@ -248,7 +248,7 @@ def test_a_gltf_reads_the_buffers_beside_it_and_none_elsewhere(walk: motion.Clip
         document["buffers"][0]["uri"] = place.replace(" ", "%20")
         (tmp_path / "clips/walk.gltf").write_text(json.dumps(document), encoding="utf-8")
         if ".." in place:
-            with pytest.raises(ContextDBError):
+            with pytest.raises(ContextDBError, match=r'walk\.gltf: the buffer "\.\./outside\.bin": a link leads to'):
                 motion.load_clips([tmp_path / "clips/walk.gltf"])
         else:
             same_joints(walk, motion.load_clips([tmp_path / "clips/walk.gltf"])[0])
@@ -344,7 +344,9 @@ def odd_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_takes_of_an_fbx_are_clips_and_helpers_are_left_out(walk: motion.Clip, tmp_path: Path):
-    (tmp_path / "all.fbx").write_bytes(fbx(Moving.of(walk), takes=("Walk", "Run &amp; jump"), helper="LeftFootCtrl"))
+    comment = b'; AnimationStack: 1, "AnimStack::None", ""'
+    whole = fbx(Moving.of(walk), takes=("Walk", "Run &amp; jump"), helper="LeftFootCtrl")
+    (tmp_path / "all.fbx").write_bytes(whole.replace(b"Objects:", comment + b"\nObjects:"))
     clips = motion.load_clips([tmp_path / "all.fbx"])
     assert [clip.name for clip in clips] == ["all:Walk", "all:Run & jump"]
     assert clips[0].notes == ('1 node beside the body left out: "LeftFootCtrl".',)
@@ -372,10 +374,14 @@ def test_a_child_that_dies_is_one_fault_of_that_file_and_the_next_is_read(odd_li
 def test_a_silent_child_is_given_up(odd_library: Path, child: ParserProcess, monkeypatch: pytest.MonkeyPatch):
     with pytest.raises(motion.ClipError):
         child.worlds(b"live", 0, "walk.fbx")
+    assert child.folder is not None
+    folder = Path(child.folder.name)
+    assert folder.is_dir()
     monkeypatch.setattr(parser_process, "SILENCE_S", 0.5)
     with pytest.raises(motion.ClipError, match=r"walk\.fbx: the file was read for too long"):
         child.worlds(b"sleep", 0, "walk.fbx")
     assert child.child is None
+    assert not folder.exists()
 
 
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="what a process works is not limited here")

@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,16 +36,6 @@ MOST_PLAYED = 50
 """So many rows that may be picked are looked at, to name the asset where it is one."""
 MOST_EXPLAINED = 50
 """So many rows behind one row are looked through for the cells of it that keep actors from a role."""
-
-
-class Counts(NamedTuple):
-    """The rows of a table, those behind its rows counted instead of them."""
-
-    n_rows: int
-    n_valid: int
-    """Of these the valid ones."""
-    n_decided: int
-    """Of those the ones that are valid whatever is not known."""
 
 
 class QueryRow:
@@ -157,14 +146,6 @@ class QueryRow:
             return self.answer
         names = None if self.actors else frozenset(name for name in self._places if self.facts[name] is not None)
         return TableAnswer(queried, queried.compiled(names), self.given, actors)
-
-    @property
-    def counts(self) -> Counts:
-        """The rows of the table, those behind its rows counted instead of them."""
-        if self.answer is None:
-            return Counts(self._queried.flat.n_rows, 0, 0)
-        n_valid = len(self.answer.matches)
-        return Counts(self._queried.flat.n_rows, n_valid, n_valid - self.answer.explained.undecided.bit_count())
 
     def answers(self) -> Iterator[tuple[str, bool]]:
         """The assets of the table, those behind its rows instead of these, and whether each is valid."""

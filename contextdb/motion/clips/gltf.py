@@ -12,6 +12,7 @@ import base64
 import binascii
 import json
 import struct
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -47,8 +48,7 @@ def is_gltf(content: bytes) -> bool:
 
 
 def packed(content: bytes, path: Path) -> bytes:
-    """The bytes of a file with those of the buffers that it names, which are in its folder or below. Raises ClipError and
-    FileError."""
+    """The bytes of a file with those of the buffers that it names, which are in its folder or below. Raises ClipError."""
     if content.startswith(MAGIC):
         return content
     try:
@@ -63,7 +63,11 @@ def packed(content: bytes, path: Path) -> bytes:
             if not name or "\0" in name or "://" in name:
                 fault = Fault(f"the buffer {in_quotes(uri)} is no file of this folder.", "a file beside it", place=Place(str(path)))
                 raise ClipError(fault)
-            parts.append(read_bytes(inside(path.parent / name, path.parent)))
+            try:
+                parts.append(read_bytes(inside(path.parent / name, path.parent)))
+            except ContextDBError as error:
+                named = (replace(each, found=f"the buffer {in_quotes(uri)}: {each.found}") for each in error.faults)
+                raise ClipError(*(replace(each, place=Place(str(path))) for each in named)) from None
     if len(parts) == 1:
         return content
     head = b"".join(struct.pack("<Q", len(part)) for part in parts)
@@ -76,7 +80,7 @@ _PACKED = MAGIC + b"+files\0"
 def takes(content: bytes, file: str) -> tuple[str, ...]:
     """The names of the animations, one after another; those without a name by their number."""
     try:
-        animations = _list(_File.of(content).document, "animations")
+        animations = _list(_json(_split(content)[0]), "animations")
     except ContextDBError as error:
         raise ClipError(*(fault.at(Place(file)) for fault in error.faults)) from None
     names = [each.get("name") if isinstance(each, dict) else None for each in animations]
@@ -105,20 +109,8 @@ class _File:
 
     @classmethod
     def of(cls, content: bytes) -> _File:
-        if content.startswith(_PACKED):
-            start = len(_PACKED) + 4
-            (count,) = struct.unpack_from("<I", content, len(_PACKED))
-            sizes = struct.unpack_from(f"<{count}Q", content, start)
-            ends = np.cumsum([start + 8 * count, *sizes]).tolist()
-            raw, *outer = (content[a:b] for a, b in pairwise(ends))
-            return cls._with(_json(raw), outer, b"")
-        if content.startswith(MAGIC):
-            return cls._with(*_chunks(content))
-        return cls._with(_json(content), [], b"")
-
-    @classmethod
-    def _with(cls, document: dict[str, Any], outer: list[bytes], binary: bytes) -> _File:
-        buffers, files = [], iter(outer)
+        raw, outer, binary = _split(content)
+        document, buffers, files = _json(raw), [], iter(outer)
         for buffer in _list(document, "buffers"):
             uri = buffer.get("uri") if isinstance(buffer, dict) else None
             if uri is None:
@@ -305,7 +297,19 @@ def _rate(tracks: list[Floats]) -> float:
     return float(round(rate)) if abs(rate - round(rate)) < 1e-3 * rate else rate
 
 
-def _chunks(content: bytes) -> tuple[dict[str, Any], list[bytes], bytes]:
+def _split(content: bytes) -> tuple[bytes, list[bytes], bytes]:
+    """The document of a file, the buffers beside it and that in it."""
+    if content.startswith(_PACKED):
+        start = len(_PACKED) + 4
+        (count,) = struct.unpack_from("<I", content, len(_PACKED))
+        sizes = struct.unpack_from(f"<{count}Q", content, start)
+        ends = np.cumsum([start + 8 * count, *sizes]).tolist()
+        raw, *outer = (content[a:b] for a, b in pairwise(ends))
+        return raw, outer, b""
+    return _chunks(content) if content.startswith(MAGIC) else (content, [], b"")
+
+
+def _chunks(content: bytes) -> tuple[bytes, list[bytes], bytes]:
     """The document and the buffer of a .glb file."""
     if len(content) < 20:
         raise _refused(f"the file ends after {len(content)} bytes.")
@@ -319,7 +323,7 @@ def _chunks(content: bytes) -> tuple[dict[str, Any], list[bytes], bytes]:
         if len(chunk) < size:
             raise _refused(f"a part of {size:,} bytes has {len(chunk):,}.", "a whole file")
         if kind == JSON_CHUNK and document is None:
-            document = _json(chunk)
+            document = chunk
         elif kind == BINARY_CHUNK and not binary:
             binary = chunk
         at += 8 + size

@@ -1,6 +1,6 @@
 """The child process that reads FBX or USD: one file after another, of which it hands back arrays. It imports nothing of ours.
 
-    python parser_child.py fbx       (or usd)
+    python parser_child.py fbx FOLDER      (or usd; the folder is for its files, and goes with it)
 
 A request on standard input is a line of JSON, `{"size", "take", "joints", "frame_joints", "seconds"}`, the last three the most that
 may be, and the bytes of the file. An answer on standard output is one line of
@@ -14,9 +14,9 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import signal
 import sys
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from typing import Any
@@ -176,22 +176,24 @@ def usd(content: bytes, take: int, most: int, tell: Tell) -> Joints:
     is_crate = content.startswith(b"PXR-USDC")
     if not is_crate:
         require_utf8(content)
-    with tempfile.TemporaryDirectory() as folder:
-        path = os.path.join(folder, "clip.usdc" if is_crate else "clip.usda")
+    path = os.path.join(sys.argv[2], "clip.usdc" if is_crate else "clip.usda")
+    try:
         with open(path, "wb") as file:
             file.write(content)
-        try:
-            layer = Sdf.Layer.FindOrOpen(path)
-        except Tf.ErrorException as error:
-            lines = re.findall(r"clip\.usda:(\d+):", text_of(error))
-            raise Refusal(f"the file is damaged{f' in line {lines[-1]}' if lines else ''}.") from None
-        if layer is None:
-            raise Refusal("the file is damaged, or no USD.")
-        others = [name for name in layer.GetCompositionAssetDependencies() if name]
-        if others:
-            raise Refusal(f"the file refers to other files, such as {others[0]!r}: flatten it, by usdcat --flatten")
-        stage = Usd.Stage.Open(layer)
-        return usd_joints(stage, most, tell, Usd, UsdGeom, UsdSkel)
+        layer = Sdf.Layer.FindOrOpen(path)
+    except Tf.ErrorException as error:
+        lines = re.findall(r"clip\.usda:(\d+):", text_of(error))
+        raise Refusal(f"the file is damaged{f' in line {lines[-1]}' if lines else ''}.") from None
+    finally:
+        with suppress(OSError):  # a file that is mapped, on Windows
+            os.remove(path)
+    if layer is None:
+        raise Refusal("the file is damaged, or no USD.")
+    others = [name for name in layer.GetCompositionAssetDependencies() if name]
+    if others:
+        raise Refusal(f"the file refers to other files, such as {others[0]!r}: flatten it, by usdcat --flatten")
+    stage = Usd.Stage.Open(layer)
+    return usd_joints(stage, most, tell, Usd, UsdGeom, UsdSkel)
 
 
 def require_utf8(content: bytes) -> None:
@@ -370,4 +372,7 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    finally:
+        shutil.rmtree(sys.argv[2], ignore_errors=True)

@@ -19,6 +19,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import IO, Any
 
 import numpy as np
@@ -45,6 +46,7 @@ class ParserProcess:
     def __init__(self, kind: str, library: str, extra: str) -> None:
         self.kind, self.library, self.extra = kind, library, extra
         self.child: subprocess.Popen[bytes] | None = None
+        self.folder: TemporaryDirectory[str] | None = None
         self.answers: queue.SimpleQueue[Answer] = queue.SimpleQueue()
         self.turn = threading.Lock()
 
@@ -75,13 +77,15 @@ class ParserProcess:
     def close(self) -> None:
         """End the child; the next file starts another."""
         child, self.child = self.child, None
-        if child is not None:
+        if child is not None and self.folder is not None:
             child.kill()
-            child.wait()
+            with suppress(KeyboardInterrupt):  # whoever ends it for one raises it; at the end of the program it is no news
+                child.wait()
             for stream in (child.stdin, child.stdout):
                 if stream is not None:
                     with suppress(OSError):
                         stream.close()
+            self.folder.cleanup()
 
     def _asked(self, content: bytes, take: int) -> tuple[dict[str, Any], bytes]:
         child = self._running()
@@ -100,7 +104,8 @@ class ParserProcess:
     def _running(self) -> subprocess.Popen[bytes]:
         if self.child is None or self.child.poll() is not None:
             self.close()
-            command = [sys.executable, "-P", str(CHILD), self.kind]
+            self.folder = TemporaryDirectory(prefix="contextdb-", ignore_cleanup_errors=True)
+            command = [sys.executable, "-P", str(CHILD), self.kind, self.folder.name]
             alone = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
             pipe, nowhere = subprocess.PIPE, subprocess.DEVNULL
             self.child = subprocess.Popen(command, env=alone, stdin=pipe, stdout=pipe, stderr=nowhere)

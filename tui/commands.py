@@ -279,7 +279,7 @@ _OF_SCREEN = (
     ),
     Command("nearest", "shift+f12", "Nearest rows", "Which rows are nearest to valid; correct cells.", "Test row", "nearest"),
     Command(
-        "clip", "shift+f6", "Animation", "Play the clip of the row, of the gap's nearest row, or of what is picked.", "View", "clip"
+        "clip", "shift+f7", "Animation", "Play the clip of the row, of the gap's nearest row, or of what is picked.", "View", "clip"
     ),
     Command("next-tab", "ctrl+pagedown,alt+right", "Next tab", "Go to the next tab.", "Tabs", "next_tab(1)"),
     Command("previous-tab", "ctrl+pageup,alt+left", "Previous tab", "Go to the previous tab.", "Tabs", "next_tab(-1)"),

@@ -55,6 +55,7 @@ SECTIONS = {
     "Find in all tables": ("FindEverywhere",),
     "What changes": ("ChangesDialog",),
     "Next picks": ("NextPicksDialog",),
+    "Git history": ("RowHistoryDialog",),
     "Why, and nearest rows": ("NearestDialog",),
     "Actors": ("ActorsDialog",),
     "Contexts": ("ContextsDialog",),

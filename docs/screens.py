@@ -113,6 +113,11 @@ _SCENES = {
         "hit_mid_air",
         ("f8", "down", "f12"),
     ),
+    "next-picks": Scene(
+        "The next 50 picks for the test row: a strip for each valid row, and why at the pick of the cursor.",
+        "locomotion",
+        ("f8", "shift+f9", *["right"] * 6),
+    ),
     "actors": Scene(
         "Actors for the role Defender, one a row: two who may be cast.",
         "contested_catch",

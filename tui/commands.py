@@ -227,6 +227,14 @@ _OF_SCREEN = (
     Command("import", "", "Import", "Read rows from Excel, CSV, Parquet or JSON.", "File", "import"),
     Command("export", "", "Export", "Write the table for Excel or other tools.", "File", "export"),
     Command("history", "alt+z", "Undo history", "Every step; go back to any of them.", "Edit", "history"),
+    Command(
+        "git-history",
+        "shift+f8",
+        "Git history",
+        "Who changed this cell and row, when and why; the row then and now.",
+        "Edit",
+        "git_history",
+    ),
     Command("autofill", "shift+f4", "Autofill", "Fill columns from the clips.", "Columns", "autofill"),
     Command("add-column", "alt+c", "Add column", "Add a condition or another column.", "Columns", "add_column"),
     Command("rename-role", "", "Rename role", "Give the role of the column another name, everywhere.", "Columns", "rename_role"),
@@ -271,7 +279,7 @@ _OF_SCREEN = (
     ),
     Command("nearest", "shift+f12", "Nearest rows", "Which rows are nearest to valid; correct cells.", "Test row", "nearest"),
     Command(
-        "clip", "shift+f6", "Animation", "Play the clip of the row, of the gap's nearest row, or of what is picked.", "View", "clip"
+        "clip", "shift+f7", "Animation", "Play the clip of the row, of the gap's nearest row, or of what is picked.", "View", "clip"
     ),
     Command("next-tab", "ctrl+pagedown,alt+right", "Next tab", "Go to the next tab.", "Tabs", "next_tab(1)"),
     Command("previous-tab", "ctrl+pageup,alt+left", "Previous tab", "Go to the previous tab.", "Tabs", "next_tab(-1)"),

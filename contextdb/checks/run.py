@@ -108,7 +108,7 @@ def _cells(table: TableData) -> Iterator[Finding]:
     for column in table.conditions:
         texts: dict[int, tuple[str, Level, str]] = {}
         for i, cell in enumerate(column.cells):
-            verdict = _verdict(cell, column.condition.domain)
+            verdict = verdict_of(cell, column.condition.domain)
             if verdict and i not in column.faults:
                 texts[i] = verdict
         rows = np.flatnonzero(np.isin(column.texts.codes, list(texts))).tolist() if texts else []
@@ -117,7 +117,7 @@ def _cells(table: TableData) -> Iterator[Finding]:
             yield finding_at(table, row, rule, level, f"{in_quotes(column.texts[row])} {why}", column.condition.name)
 
 
-def _verdict(cell: Cell, domain: Domain) -> tuple[str, Level, str] | None:
+def verdict_of(cell: Cell, domain: Domain) -> tuple[str, Level, str] | None:
     """The rule that a cell breaks, its level and why."""
     if cell.is_empty:
         so = "its penalty always counts" if cell.is_soft else "the row never matches"

@@ -9,12 +9,12 @@ folder.
 from __future__ import annotations
 
 import os
-import subprocess
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from contextdb.disk import TABLE_SUFFIXES, make_folder, read_bytes, real_path, write_atomic
+from contextdb.disk import TABLE_SUFFIXES, make_folder, read_bytes, write_atomic
+from contextdb.disk.git import LFS_POINTER, is_in_a_repository, run_git
 from contextdb.errors import ContextDBError, ContextError, Fault, FileError, Place, in_quotes, safe_text
 from contextdb.files.file_names import alike
 from contextdb.schema.settings import extends_of
@@ -23,7 +23,7 @@ from contextdb.tables.project import SCHEMA_FILE, read_folder_schema
 
 MOST_EXTENDED = 16
 """So many projects extend each other in a row."""
-_POINTER = b"version https://git-lfs.github.com/spec/"
+
 _PLAIN_FILES = ("100644", "100755")
 
 
@@ -104,22 +104,12 @@ class Commit:
             start = at + len(head) + 1
             raw = out[start : start + int(parts[2])]
             at = start + len(raw) + 1
-            if raw.startswith(_POINTER):
+            if raw.startswith(LFS_POINTER):
                 sentence = "the file is a pointer of Git LFS: its contents are not in git."
                 raise ContextDBError(Fault(sentence, "--baseline FILE, a report of that commit", place=Place(f"{self.ref}:{name}")))
             path = target.joinpath(*PurePosixPath(name).parts)
             make_folder(path.parent)
             write_atomic(path, raw, syncs=False)
-
-
-def is_in_a_repository(folder: Path) -> bool:
-    """Whether a folder is in the work tree of a repository that is not itself made of files of that tree."""
-    code, out = run_git(folder, "rev-parse", "--is-inside-work-tree", "--show-toplevel", "--absolute-git-dir")
-    is_inside, *paths = os.fsdecode(out).splitlines() or [""]
-    if code != 0 or is_inside != "true" or len(paths) != 2:
-        return False
-    top, own = (real_path(path) for path in paths)
-    return not own.is_relative_to(top) or own.is_relative_to(top / ".git")
 
 
 def _lookup(ref: str) -> tuple[str, ...]:
@@ -145,18 +135,3 @@ def _plain_files(listed: bytes) -> Iterator[tuple[str, str]]:
 
 def _is_tabular(name: str) -> bool:
     return name.lower().endswith(TABLE_SUFFIXES)
-
-
-def run_git(folder: Path, *arguments: str, given: bytes = b"") -> tuple[int, bytes]:
-    """The exit code of git and its standard output. Raises FileError where it cannot be run."""
-    command = ["git", "-c", "safe.bareRepository=explicit", "--no-replace-objects", "--literal-pathspecs", *arguments]
-    environment = os.environ | {"LC_ALL": "C", "GIT_TERMINAL_PROMPT": "0"}
-    try:
-        done = subprocess.run(command, cwd=folder, input=given, capture_output=True, check=False, env=environment)
-    except OSError as error:
-        fault = Fault(f"git cannot be run: {error.strerror}.", "git on the search path", "to install git, or --baseline FILE")
-        raise FileError(fault, errno=error.errno) from None
-    if done.returncode and b"dubious ownership" in done.stderr:
-        accepted = "a repository of this user, or one that git's safe.directory names"
-        raise FileError(Fault("git refuses the repository: another user owns it.", accepted, place=Place(str(folder))))
-    return done.returncode, done.stdout

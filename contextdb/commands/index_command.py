@@ -18,10 +18,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from contextdb.commands.git_tree import is_in_a_repository, run_git
 from contextdb.commands.projects_below import extend_up_to, project_folders
 from contextdb.console import ExitCode, note, output, printable, progress
 from contextdb.disk import write_atomic
+from contextdb.disk.git import is_in_a_repository, run_git
 from contextdb.errors import ContextDBError, Fault, FileError, Place, plural
 from contextdb.tables.project import Project
 from contextdb.tables.table import Table

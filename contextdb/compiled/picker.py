@@ -74,11 +74,6 @@ class Pick:
         outputs = self._left.choosing.compiled.outputs
         return outputs.fallback if self.row is None else outputs.of_row(self.row)
 
-    @property
-    def left(self) -> Left | None:
-        """What was left of the valid rows, step by step; None out of a pickle."""
-        return self._left
-
     @cached_property
     def why(self) -> str:
         """Why this row, in a few words."""
@@ -94,6 +89,11 @@ class Pick:
         """What is pickled: what it tells, without the answer that it was picked from."""
         state = {name: getattr(self, name) for name in ("row", "asset", "casting", "outputs", "why")}
         return state | {"_left": None}
+
+
+def left_of(pick: Pick) -> Left | None:
+    """What was left of the valid rows when a row was picked, step by step; None of one out of a pickle."""
+    return pick._left
 
 
 @dataclass(frozen=True, eq=False)

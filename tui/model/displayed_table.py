@@ -29,6 +29,7 @@ from contextdb.tables.table import Table
 
 from .alignment import indent_of, shared_end
 from .clip_cells import ClipCells
+from .doubts import DOUBTFUL, Doubts
 from .fact_steps import FactSteps
 from .query_row import QueryRow
 from .selection import Block, Selection, Shape
@@ -81,6 +82,7 @@ class DisplayedTable:
         """What Autofill knows of the clips."""
         self.played: int | None = None
         """The row of the file that a game which is followed has picked."""
+        self._doubts = Doubts()
         self._places: dict[str, tuple[TextColumn, int]] = {}
         """For columns of numbers how far they are indented, for the assets how long their shared end is, and of which texts."""
         self._conditions: tuple[Table | None, list[ConditionColumn | None]] = (None, [])
@@ -307,10 +309,26 @@ class DisplayedTable:
         asset, texts = self.table.columns[self.asset_at][row], self.table.columns[column]
         note, clip = self.marks.texts.get((asset, texts.name), ""), self.clips.mark_text(asset, texts.name, texts[row])
         colour = self.marks.colours.get(asset, "")
-        return " · ".join(filter(None, (f"note: {note}" if note else "", clip, f"marked {colour}" if colour else "")))
+        parts = (self.doubt(row, column), f"note: {note}" if note else "", clip, f"marked {colour}" if colour else "")
+        return " · ".join(filter(None, parts))
+
+    def doubt(self, file_row: int, column: int) -> str:
+        """What is odd about a cell that can be read; "" where nothing is."""
+        condition = self.condition(column)
+        if condition is not None:
+            return self._doubts.of_cell(condition, file_row)
+        texts = self.table.columns[column]
+        return self._doubts.of_name(texts, file_row) if texts.name == self.table.asset_column else ""
+
+    def doubtful(self, row: int, columns: Sequence[int]) -> tuple[int, ...]:
+        """Which cells of a row that is displayed are odd."""
+        file_row = int(self.view.rows[row])
+        return tuple(column for column in columns if self.doubt(file_row, column))
 
     def clip_mark(self, row: int, column: int) -> str:
-        """What stands before the text of a cell as its clip has it: a space where the clip says nothing of it."""
+        """What stands before the text of a cell: that it is odd, or what its clip says; a space where there is nothing to say."""
+        if self.doubt(int(self.view.rows[row]), column):
+            return DOUBTFUL
         if not self.clips.cells:
             return " "
         return self.clips.mark(self.text(row, self.asset_at), self.table.columns[column].name, self.text(row, column)) or " "

@@ -13,7 +13,7 @@ from enum import IntEnum
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.matches import Matches
 from contextdb.compiled.pick import Outcome
-from contextdb.compiled.picker import Pick, Picker
+from contextdb.compiled.picker import Pick, Picker, left_of
 
 N_PICKS = 50
 
@@ -90,7 +90,7 @@ def next_picks(compiled: CompiledData, matches: Matches, way: Way, n_picks: int 
 
 def _turns(pick: Pick) -> dict[int, Turn]:
     """What each valid row was at a pick."""
-    left = pick.left
+    left = left_of(pick)
     if left is None:
         return {}
     awake = set(left.awake)

@@ -373,6 +373,17 @@ class MainScreen(TableScreen):
         """The row of the cursor cell by cell, and which rows are nearest, in a dialog."""
         self.test_row.why()
 
+    def action_git_history(self) -> None:
+        """What git knows of the cell and the row of the cursor."""
+        from .row_history import RowHistoryDialog
+
+        sheet = self.session.sheet
+        if not len(sheet.view) or self.assets.grid.is_in_new_row or self.assets.grid.is_in_test_row:
+            self.say("Git knows of rows of the table: go to one.")
+            return
+        row, column = int(sheet.view.rows[sheet.cursor[0]]), sheet.table.columns[sheet.cursor[1]].name
+        self.app.push_screen(RowHistoryDialog(sheet.table, row, column))
+
     def action_refresh(self) -> None:
         """Take in what changed on the disk; sort and filter again."""
         self.say("Refreshed.")

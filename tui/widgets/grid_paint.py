@@ -284,7 +284,8 @@ class Painter:
         asset = sheet.text(row, sheet.asset_at) if sheet.marks.texts or sheet.marks.colours or sheet.clips.cells else ""
         flashing = [column for at, column in self.flashing if at == row]
         failing = window.failing(row) if seen.n_failing else []
-        return seen, cells, window.notes(row), self._cursor(row, look), look.has_focus, selected, asset, flashing, failing
+        doubts = sheet.doubtful(row, columns)
+        return seen, cells, window.notes(row), self._cursor(row, look), look.has_focus, selected, asset, flashing, failing, doubts
 
     def _cursor(self, row: int, look: Look) -> int | None:
         """The column of the cursor, where it is in a row."""

@@ -245,11 +245,19 @@ _OF_SCREEN = (
         "Test row",
         "changes",
     ),
+    Command(
+        "next-picks",
+        "shift+f9",
+        "Next picks",
+        "Simulate the next 50 picks for the test row: chance seen.",
+        "Test row",
+        "next_picks",
+    ),
     Command("live", "alt+u", "Follow a game", "Let the test row follow a running game, or a recording.", "Test row", "live"),
-    Command("live-pause", "alt+6", "Pause the game", "Pause the game that is followed, or go on.", "Test row", "live_pause"),
+    Command("live-pause", "shift+f7", "Pause the game", "Pause the game that is followed, or go on.", "Test row", "live_pause"),
     Command("live-back", "alt+8", "A second back", "Go back one second in the game.", "Test row", "live_by(-1)"),
     Command("live-ahead", "alt+9", "A second ahead", "Go ahead one second in the game.", "Test row", "live_by(1)"),
-    Command("live-keep", "alt+7", "Keep the moment", "Save this moment as a context.", "Test row", "live_keep"),
+    Command("live-keep", "shift+f8", "Keep the moment", "Save this moment as a context.", "Test row", "live_keep"),
     Command("live-stop", "", "Stop following", "Stop following the game; its last facts stay.", "Test row", "live_stop"),
     Command("actors", "alt+p", "Actors", "The actors for each role, for the test row.", "Test row", "actors"),
     Command(
@@ -262,6 +270,9 @@ _OF_SCREEN = (
         in_footer=True,
     ),
     Command("nearest", "shift+f12", "Nearest rows", "Which rows are nearest to valid; correct cells.", "Test row", "nearest"),
+    Command(
+        "clip", "shift+f6", "Animation", "Play the clip of the row, of the gap's nearest row, or of what is picked.", "View", "clip"
+    ),
     Command("next-tab", "ctrl+pagedown,alt+right", "Next tab", "Go to the next tab.", "Tabs", "next_tab(1)"),
     Command("previous-tab", "ctrl+pageup,alt+left", "Previous tab", "Go to the previous tab.", "Tabs", "next_tab(-1)"),
     Command("assets", "alt+1", "Assets", "The table.", "Tabs", "tab('assets')"),
@@ -269,8 +280,8 @@ _OF_SCREEN = (
     Command("priorities", "alt+3", "Priorities", "Which database comes first.", "Tabs", "tab('priorities')"),
     Command("coverage", "alt+4", "Coverage", "Which contexts have no asset.", "Tabs", "tab('coverage')"),
     Command("problems", "alt+5", "Problems", "What is wrong with the table.", "Tabs", "tab('problems')"),
-    Command("contracts", "", "Contracts", "What must hold of the table, proved as you type.", "Tabs", "tab('contracts')"),
-    Command("motion", "", "Motion", "The recorded sessions of the project, to debug.", "Tabs", "tab('motion')"),
+    Command("contracts", "alt+6", "Contracts", "What must hold of the table, proved as you type.", "Tabs", "tab('contracts')"),
+    Command("motion", "alt+7", "Motion", "The recorded sessions of the project, to debug.", "Tabs", "tab('motion')"),
     Command("quit", "ctrl+q", "Quit", "Quit; asks about unsaved edits.", "File", "quit"),
 )
 

@@ -17,6 +17,7 @@ from pathlib import Path
 
 from contextdb.console import ExitCode, output, printable
 from contextdb.disk import is_stream, write_atomic
+from contextdb.edits.notes import NO_NOTES, Notes
 from contextdb.errors import Fault, FileError, Place, plural
 from contextdb.exchange.formats import FORMATS, format_of, write
 from contextdb.tables.places import table_path
@@ -44,7 +45,8 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     if not is_standard and os.path.exists(arguments.target) and not (arguments.force or is_stream(Path(arguments.target))):
         raise FileError(Fault("the file already exists.", "a new name, or --force to write over it", place=Place(arguments.target)))
     table = load_table(table_path(arguments.source), strict=False)
-    raw, remarks = write(table, kind, arguments.formulas)
+    notes = Notes.beside(table.path) if table.path is not None else NO_NOTES
+    raw, remarks = write(table, kind, arguments.formulas, notes)
     for remark in remarks:
         print(printable(f"{table.name}: {remark}"), file=sys.stderr)
     if is_standard:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from contextdb.cells.words import quoted
 from contextdb.columns import TextColumn
 from contextdb.disk import TABLE_SUFFIXES, real_path, write_atomic
 from contextdb.disk.together import NewFile, write_together
+from contextdb.edits.notes import Notes
 from contextdb.edits.schema_file import SchemaChange, schema_change
 from contextdb.errors import ContextDBError, Fault, FileError, Place, TableError, in_quotes
 from contextdb.exchange.decimal_commas import commas_in_numbers
@@ -84,6 +85,8 @@ class Plan:
     """What contextdb.toml becomes; None where it says all of it already."""
     field_of: tuple[int, ...]
     """The column of the reading that each column of the table came from."""
+    spots: Mapping[tuple[int, str], tuple[str, str]] = field(default_factory=dict)
+    """As those of the reading."""
 
     @property
     def new_conditions(self) -> list[str]:
@@ -101,6 +104,27 @@ class Plan:
             write_atomic(new.path, new.data)
         elif not write_together(change.path.parent, [new, change.new_file]):
             raise FileError(change.fault)
+        if self.spots:
+            notes = Notes.read(self.path, or_more=True)
+            notes_of(self.spots, self.columns, table.assets, table.asset_column, notes).write(self.path)
+
+
+def notes_of(
+    spots: Mapping[tuple[int, str], tuple[str, str]],
+    columns: Sequence[Mapped],
+    assets: Sequence[str],
+    asset_column: str,
+    notes: Notes,
+) -> Notes:
+    """Notes with those of a reading whose columns became others; a note on a column that is left out stands at the asset. `assets`
+    are those of the rows of the reading."""
+    names = {one.source: asset_column if one.job in ("asset", "left out") else one.name for one in columns}
+    for (row, source), (text, colour) in spots.items():
+        if colour:
+            notes = notes.with_colour([assets[row]], colour)
+        if text:
+            notes = notes.with_note(assets[row], names.get(source, asset_column), text)
+    return notes
 
 
 def plan_import(
@@ -113,7 +137,7 @@ def plan_import(
     columns = tuple(mapped) if mapped is not None else propose(reading, schema, settings, renames)
     table, field_of = table_of(reading, columns, schema, settings, path)
     before = replace(table, schema=schema, settings=settings)
-    return Plan(path, columns, table, schema_change(before, table), field_of)
+    return Plan(path, columns, table, schema_change(before, table), field_of, reading.spots)
 
 
 def project_of(path: Path) -> tuple[Schema, TableSettings]:

@@ -7,6 +7,7 @@ told. A workbook that contextdb wrote gives back its texts and its types.
 from __future__ import annotations
 
 import io
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -16,8 +17,9 @@ import python_calamine as calamine
 from contextdb.columns import TextColumn
 from contextdb.errors import ContextDBError, Fault, Place, TableError, in_quotes, mend_for, plural, safe_text, some
 from contextdb.exchange.described import FIRST_LINE, TYPES_SHEET
-from contextdb.exchange.grid import Block, column_letters, columns_of, parse_block
+from contextdb.exchange.grid import Block, Columns, column_letters, columns_of, parse_block
 from contextdb.exchange.reading import DATES, ERRORS, Reading, Remark, SheetWanted, capped, listed, text_of_value
+from contextdb.exchange.xlsx_people import comments_and_fills
 from contextdb.exchange.xlsx_scan import Marks, is_old, marks_of, require_workbook
 from contextdb.schema.settings import EMPTY, Schema, read_schema
 
@@ -43,14 +45,34 @@ def read_workbook(raw: bytes, file: str, sheet: str | None = None) -> Reading:
     remarks += _hidden(grid, marks)
     wide = {top for (top, left), (bottom, right) in sheets[name].merged if left < right and top == bottom}
     own = _own_block(grid) if types is not None and block is None else None
-    columns, more = (
-        (_own_columns(grid, own), [])
-        if own
-        else columns_of(grid, f"{file}, sheet {in_quotes(name)}", block, "sheet row", name, wide)
-    )
+    place = f"{file}, sheet {in_quotes(name)}"
+    takes_all = block is not None and not block.is_open
+    one = _own_columns(grid, own) if own else columns_of(grid, place, block, "sheet row", name, wide, takes_all)
     sheet_remarks += [Remark(f"the sheet {in_quotes(name)} of {len(names)}.")] if len(names) > 1 else []
-    sheet_remarks = [*sheet_remarks, *remarks, *more]
-    return Reading(tuple(columns), "xlsx", tuple(sheet_remarks), types or EMPTY, sheets=tuple(names), has_whole_names=types is None)
+    sheet_remarks = [*sheet_remarks, *remarks, *one.remarks]
+    return Reading(
+        tuple(one.columns),
+        "xlsx",
+        tuple(sheet_remarks),
+        types or EMPTY,
+        sheets=tuple(names),
+        has_whole_names=types is None,
+        spots=_spots(raw, name, one),
+    )
+
+
+def grid_of_workbook(raw: bytes, file: str, sheet: str | None = None) -> tuple[str, list[list[str]]]:
+    """A sheet with its name, the one that is named or the only one with cells, as it stands. Raises as `read_workbook` does."""
+    require_workbook(raw, file)
+    book = _opened(raw, file)
+    names = [name for name in book.sheet_names if name.casefold() != TYPES_SHEET]
+    wanted = _wanted(sheet, names, file)[0]
+    sheets = {each: _Sheet.read(book, each, file) for each in ([wanted] if wanted else names)}
+    name = wanted or _only(sheets, _hidden_sheets(book), file)[0]
+    grid = [[text_of_value(value) for value in row] for row in sheets[name].values]
+    _fill_errors(grid, marks_of(raw, name), is_old(raw))
+    _fill_merged(grid, sheets[name].merged, file)
+    return name, grid
 
 
 def sheets_of(raw: bytes, file: str) -> list[str]:
@@ -159,10 +181,27 @@ def _own_block(grid: Sequence[Sequence[str]]) -> Block | None:
     return Block(0, 0, len(grid), width) if width and is_alone and len(set(grid[0][:width])) == width else None
 
 
-def _own_columns(grid: Sequence[Sequence[str]], block: Block) -> list[TextColumn]:
+def _own_columns(grid: Sequence[Sequence[str]], block: Block) -> Columns:
     """Every row and every text as it is, blank ones too."""
     columns = zip(*(row[: block.right] for row in grid), strict=True)
-    return [TextColumn.of(name, texts) for name, *texts in columns]
+    return Columns([TextColumn.of(name, texts) for name, *texts in columns], [], range(1, len(grid)), range(block.right))
+
+
+def _spots(raw: bytes, sheet: str, read: Columns) -> dict[tuple[int, str], tuple[str, str]]:
+    """Comments on the cells of a table, and the colours of its rows: those that most of a row's cells have."""
+    comments, fills = comments_and_fills(raw, sheet)
+    if not comments and not fills:
+        return {}
+    spots = dict[tuple[int, str], tuple[str, str]]()
+    for at, row in enumerate(read.rows):
+        colours = Counter(fills.get((row, place), "") for place in read.places)
+        colour = colours.most_common(1)[0][0]
+        if colour:
+            spots[at, ""] = ("", colour)
+        for column, place in zip(read.columns, read.places, strict=True):
+            if (row, place) in comments:
+                spots[at, column.name] = (comments[row, place], "")
+    return spots
 
 
 # ---- what a person should know

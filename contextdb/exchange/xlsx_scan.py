@@ -26,7 +26,7 @@ MOST_SEARCHED = 50_000_000
 MOST_RATIO = 1_000
 """No sheet packs better than this; a bomb does."""
 
-_BROKEN = (zipfile.BadZipFile, zlib.error, struct.error, ValueError, KeyError, OSError, EOFError, NotImplementedError, RuntimeError)
+BROKEN = (zipfile.BadZipFile, zlib.error, struct.error, ValueError, KeyError, OSError, EOFError, NotImplementedError, RuntimeError)
 """What zipfile raises, depending on where an archive is damaged."""
 
 _OLE = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
@@ -71,7 +71,7 @@ def _fault(raw: bytes) -> Fault | None:
     try:
         with zipfile.ZipFile(io.BytesIO(raw)) as archive:
             return _other_kind(archive) or _bomb(archive) or _unreadable_part(archive)
-    except _BROKEN:
+    except BROKEN:
         return Fault("the workbook is broken: its archive cannot be read.", accepted, "to open it in Excel and save it again")
 
 
@@ -163,9 +163,9 @@ def marks_of(raw: bytes, sheet: str) -> Marks:
         return Marks()
     try:
         with zipfile.ZipFile(io.BytesIO(raw)) as archive:
-            path = _path_of(archive, sheet)
+            path = path_of(archive, sheet)
             xml = archive.read(path) if path else b""
-    except _BROKEN:
+    except BROKEN:
         return Marks()
     formulas = list(_formulas(xml)) if _HAS_FORMULA.search(xml) else []
     errors = list(_errors(xml)) if _IS_ERROR.search(xml) else []
@@ -197,19 +197,20 @@ def _hidden(tag: re.Pattern[bytes], xml: bytes) -> Iterator[dict[bytes, int]]:
             yield {name: int(number) for name, number in _NUMBER.findall(match[1])}
 
 
-def _path_of(archive: zipfile.ZipFile, sheet: str) -> str | None:
+def path_of(archive: zipfile.ZipFile, sheet: str) -> str | None:
     """The part that holds a sheet, as the workbook's list of sheets and its relations say."""
     from html import unescape
 
     listed = archive.read("xl/workbook.xml").decode("utf-8", "replace")
     relations = archive.read("xl/_rels/workbook.xml.rels").decode("utf-8", "replace")
-    targets = {attributes.get("Id"): attributes.get("Target", "") for attributes in map(_attributes, _RELATION.findall(relations))}
-    for attributes in map(_attributes, _SHEET.findall(listed)):
-        if unescape(attributes.get("name", "")) == sheet:
-            target = next((targets[value] for key, value in attributes.items() if key.endswith(":id") and value in targets), None)
+    targets = {each.get("Id"): each.get("Target", "") for each in map(attributes, _RELATION.findall(relations))}
+    for each in map(attributes, _SHEET.findall(listed)):
+        if unescape(each.get("name", "")) == sheet:
+            target = next((targets[value] for key, value in each.items() if key.endswith(":id") and value in targets), None)
             return None if target is None else target.lstrip("/") if target.startswith("/") else normpath(join("xl", target))
     return None
 
 
-def _attributes(text: str) -> dict[str, str]:
+def attributes(text: str) -> dict[str, str]:
+    """What a tag says."""
     return dict(_ATTRIBUTE.findall(text))

@@ -1,15 +1,17 @@
 """A table as an XLSX workbook that Excel leaves as it is, written by XlsxWriter.
 
-Every cell is text, formatted as text, so that `5..10`, `1-2`, `007` and `True` stay what they are, and what is typed later stays
-text too. The header and the asset stand frozen, columns are as wide as their texts, bools and enums have a drop-down that
-suggests without forbidding. A second sheet keeps what contextdb.toml says. The same table gives the same bytes.
+Every cell is formatted as text, so that `5..10`, `1-2`, `007` and `True` stay what they are, and what is typed later stays text
+too; plain numbers in columns of numbers are numbers, which can be summed. Notes are comments, and colours of rows fills. The header
+and the asset stand frozen, columns are as wide as their texts, bools and enums have a drop-down that suggests without forbidding. A
+second sheet keeps what contextdb.toml says. The same table gives the same bytes.
 """
 
 from __future__ import annotations
 
 import io
+import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from datetime import datetime
 from typing import Any
 from xml.sax.saxutils import escape
@@ -17,12 +19,14 @@ from xml.sax.saxutils import escape
 import numpy as np
 import xlsxwriter
 
-from contextdb.cells.words import quoted
+from contextdb.cells.words import format_number, quoted
 from contextdb.columns import TextColumn
 from contextdb.console import width_of
+from contextdb.edits.notes import NO_NOTES, Notes
 from contextdb.errors import Fault, Place, TableError, in_quotes, plural
 from contextdb.exchange.described import TYPES_SHEET, described
 from contextdb.exchange.grid import column_letters
+from contextdb.exchange.xlsx_people import FILLS
 from contextdb.tables.table import Table
 
 MOST_ROWS, MOST_COLUMNS, MOST_CHARACTERS, MOST_OF_NAME = 1_048_576, 16_384, 32_767, 31
@@ -49,20 +53,29 @@ Lists = dict[str, tuple[str, ...]]
 """What the drop-down of each column suggests, by the column's name."""
 
 
-def write_xlsx(table: Table) -> bytes:
-    """The workbook of a table. Raises TableError for more rows or columns than a sheet has, or texts longer than Excel takes."""
+def write_xlsx(table: Table, notes: Notes = NO_NOTES) -> bytes:
+    """The workbook of a table and its notes. Raises TableError for more rows or columns than a sheet has, or too long texts."""
     lines, lists = described(table), _lists(table)
     _require_room(table, lines)
     out = io.BytesIO()
     with xlsxwriter.Workbook(out, _OPTIONS) as book:
         book.set_properties({"created": _CREATED})
         text, bold, header = map(book.add_format, (_TEXT, _BOLD, _HEADER))
+        fills = {
+            word: tuple(book.add_format({**one, "bg_color": colour}) for one in (_TEXT, _BOLD)) for word, colour in FILLS.items()
+        }
+        of_rows = [fills.get(notes.colours.get(asset, ""), (text, bold)) for asset in table.assets]
+        numeric = _numeric(table)
         sheet = book.add_worksheet(sheet_name(table.name))
         _set_up(sheet, table, text)
         for at, column in enumerate(table.columns):
             is_asset = column.name == table.asset_column
             _put(sheet, 0, at, column.name, header)
-            _write_column(sheet, at, column, bold if is_asset else text, keeps_empty=is_asset)
+            styles = [one[is_asset] for one in of_rows]
+            _write_column(sheet, at, column, styles, is_asset, column.name in numeric)
+            for row, asset in enumerate(table.assets, 1):
+                if note := notes.texts.get((asset, column.name)) if notes.texts else None:
+                    sheet.write_comment(row, at, note, {"author": "contextdb"})
         _suggest(sheet, table, lists)
         _write_types(book.add_worksheet(TYPES_SHEET), lines, lists, text, header)
     return out.getvalue()
@@ -132,13 +145,34 @@ def _spelt(text: str) -> str:
     return f'<r><t xml:space="preserve">{escape(_FALSE_MARK.sub("_x005F_", text)).replace("_", "&#95;")}</t></r>'
 
 
-def _write_column(sheet: Any, at: int, column: TextColumn, style: Any, keeps_empty: bool) -> None:
+def _numeric(table: Table) -> frozenset[str]:
+    """The columns whose plain numbers are written as numbers."""
+    settings = table.settings
+    jobs = (settings.priority, settings.weight, settings.cooldown_s, settings.cooldown_turns)
+    return frozenset(
+        {*filter(None, jobs), *(one.condition.name for one in table.conditions if one.condition.domain.type.is_numeric)}
+    )
+
+
+def _number(text: str) -> float | None:
+    """A text as the number that a reader gives back as this text; None for every other."""
+    try:
+        number = float(text)
+    except ValueError:
+        return None
+    return number if math.isfinite(number) and format_number(float(f"{number:.16G}")) == text else None
+
+
+def _write_column(sheet: Any, at: int, column: TextColumn, styles: Sequence[Any], keeps_empty: bool, is_numeric: bool) -> None:
     """The cells of a column. An empty one is blank, unless it `keeps_empty` texts: a row without any text is a row all the same."""
     write, blank = sheet.write_string, sheet.write_blank
     texts = [_spelt(text) for text in column.texts]
-    for row, code in enumerate(column.codes.tolist(), 1):
-        text = texts[code]
-        if text or keeps_empty:
+    numbers = [_number(text) if is_numeric else None for text in column.texts]
+    for (row, code), style in zip(enumerate(column.codes.tolist(), 1), styles, strict=True):
+        text, number = texts[code], numbers[code]
+        if number is not None:
+            sheet.write_number(row, at, number, style)
+        elif text or keeps_empty:
             write(row, at, text, style)
         else:
             blank(row, at, None, style)

@@ -1,7 +1,5 @@
 """Workbooks: what we write a second reader understands; what others write is read with all that a person should know."""
 
-from __future__ import annotations
-
 import io
 import re
 import zipfile
@@ -12,10 +10,13 @@ import openpyxl
 import pytest
 from openpyxl.worksheet.worksheet import Worksheet
 
+import contextdb as cdb
 from contextdb.columns import TextColumn
+from contextdb.edits.notes import Notes
 from contextdb.errors import FileError, TableError
 from contextdb.exchange import xlsx_scan
 from contextdb.exchange.formats import FORMATS, ReadOptions, read, write
+from contextdb.exchange.importing import plan_import
 from contextdb.exchange.reading import Reading
 from contextdb.schema.settings import TableSettings
 from contextdb.tables.project import Project
@@ -353,3 +354,22 @@ def test_a_workbook_named_csv_is_known_by_its_first_bytes():
     reading = read(raw_of(book(moves=[["Asset"], ["jog"]])), "x.csv")
     assert texts(reading) == {"Asset": ["jog"]}
     assert "by its first bytes this is an Excel workbook, though its name ends in .csv." in told(reading)
+
+
+def test_notes_colours_and_numbers_go_to_excel_and_come_back(tmp_path: Path):
+    (tmp_path / "contextdb.toml").write_text('[conditions.speed]\ntype = "number"\n[tables.t]\nweight = "Weight"\n')
+    path = tmp_path / "t.csv"
+    path.write_text("Asset,speed,Weight\njog,1..2,0.5\nrun,3,2\nhop,007,1e3\n")
+    Notes({("jog", "speed"): "ask Ana < 3 &"}, {("run", ""): "amber"}).write(path)
+    raw = write(cdb.load(path), FORMATS["xlsx"], notes=Notes.beside(path))[0]
+    sheet = openpyxl.load_workbook(io.BytesIO(raw))["t"]
+    assert [[cell.value for cell in row] for row in sheet.iter_rows(min_row=2)] == [
+        ["jog", "1..2", 0.5],
+        ["run", 3, 2],
+        ["hop", "007", "1e3"],
+    ]
+    assert sheet["B2"].comment.text == "ask Ana < 3 &"
+    plan_import(read(raw, "x.xlsx"), tmp_path / "back.csv").write()
+    back = tmp_path / "back.csv"
+    assert back.read_text().splitlines() == path.read_text().splitlines()
+    assert (Notes.read(back).texts, Notes.read(back).colours) == (Notes.read(path).texts, {"run": "amber"})

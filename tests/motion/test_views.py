@@ -1,7 +1,5 @@
 """What people read of a session and of one decision: whole texts of small ones, and what holds for all of them."""
 
-from __future__ import annotations
-
 import math
 import textwrap
 from dataclasses import replace
@@ -193,7 +191,7 @@ def test_of_a_decision_without_a_search_only_the_status_is_told():
 
 
 def test_nothing_that_plays_is_told_as_nothing():
-    nothing = Decision(0, 0.0, Action.NOTHING, "Nothing played, and nothing may play.", True, None, None)
+    nothing = Decision(0, 0.0, Action.NOTHING, "Nothing was playing, and nothing may play.", True, None, None)
     assert list(decision_lines(nothing))[-1] == "plays       nothing"
 
 
@@ -207,9 +205,9 @@ def decision(tick, action, why, asset=None, frame=0, cost=None, on=None, before=
 
 WALK = playing("loco", "walk", 39)
 SESSION = [
-    decision(0, Action.NOTHING, "Nothing played, and nothing may play."),
-    decision(1, Action.NOTHING, "Nothing played, and nothing may play."),
-    decision(2, Action.START, "Nothing played: walk at 0.40 s costs 0.04.", "walk", 12, 0.04),
+    decision(0, Action.NOTHING, "Nothing was playing, and nothing may play."),
+    decision(1, Action.NOTHING, "Nothing was playing, and nothing may play."),
+    decision(2, Action.START, "Nothing was playing: walk at 0.40 s costs 0.04.", "walk", 12, 0.04),
     decision(3, Action.CONTINUE, "The next search is due in 0.1 s.", "walk", 15, searched=False),
     decision(4, Action.CONTINUE, "A search was due: playing on costs 0.03, the least.", "walk", 18, 0.03, 0.03),
     decision(5, Action.LOOP, "The next search is due in 0.1 s.", "walk", 1, searched=False),

@@ -1,7 +1,5 @@
 """The test row follows a game: a link in this process and in another, a recording, and games that end, stop and flood."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import os
@@ -160,18 +158,18 @@ def test_pause_step_back_go_on_and_keep(path):
                     ),
                 )
             following, seen = app.main.following, []
-            await press(pilot, "alt+6")
+            await press(pilot, "shift+f7")
             held = following.at
             while shows(app, speed="3"):
                 await press(pilot, "f7")
             seen.append(app.main.session.sheet.query.texts["speed"])
             assert following.at < held
             compiled.query({"speed": 7.0, "gait": "Walk", "tags": []})
-            await press(pilot, "alt+7")
+            await press(pilot, "shift+f8")
             await press(pilot, *"slow", "enter")
             seen.append(said(app))
             seen.append(screen_text(app))
-            await press(pilot, "alt+6")
+            await press(pilot, "shift+f7")
             await until(pilot, lambda: compiled.query({"speed": 7.0, "gait": "Walk", "tags": []}) and shows(app, speed="7"))
             return seen
 
@@ -199,7 +197,7 @@ def test_a_typed_fact_holds_the_game(path):
             app.main.following.tick()
             await pilot.pause()
             held = app.main.session.sheet.query.texts["gait"], screen_text(app)
-            await press(pilot, "alt+6")
+            await press(pilot, "shift+f7")
             await until(pilot, lambda: ask() or shows(app, gait="Walk"))
             return held
 
@@ -337,7 +335,7 @@ def test_a_recording_is_opened_played_and_scrubbed(path):
         await until(pilot, lambda: dialog.show() or dialog._lines)
         await press(pilot, "enter")
         following = app.main.following
-        await press(pilot, "alt+6")
+        await press(pilot, "shift+f7")
         following.step(-10)
         seen = [app.main.session.sheet.query.texts["speed"]]
         for _ in range(3):
@@ -454,7 +452,7 @@ def test_the_command_line_and_the_grid_agree_on_a_streamed_moment(path, capsys):
 def test_the_keys_reach_their_commands_without_a_game(path):
     async def script(app, pilot):
         seen = []
-        for key in ("alt+6", "alt+7", "alt+8", "alt+9"):
+        for key in ("shift+f7", "shift+f8", "alt+8", "alt+9"):
             app.main.say("")
             await press(pilot, key)
             seen.append(said(app))

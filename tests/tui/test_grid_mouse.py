@@ -1,7 +1,5 @@
 """The mouse in the grid: what a click, a drag and a double click do, wherever they go."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -25,11 +23,11 @@ def path(tmp_path: Path) -> Path:
 
 
 def at(app: EditorApp, row: int, column: int) -> tuple[int, int]:
-    """Where a cell of the window stands on the screen: row -2 and -1 are the headers, -4 is the test row."""
+    """Where a cell of the window stands on the screen: row -3 and -2 are the headers, -1 is the test row."""
     grid = app.main.assets.grid
     look = grid.look
-    y = look.height - 1 if row == -4 else row + look.n_headers
-    return grid.content_region.x + look.layout.place(column, look.left) + 1, grid.content_region.y + y
+    place = look.layout.place(column, look.left) + 1
+    return grid.content_region.x + place, grid.content_region.y + row + look.n_headers
 
 
 async def drag(pilot, start: tuple[int, int], *places: tuple[int, int]) -> None:
@@ -153,9 +151,9 @@ def test_moving_the_mouse_without_a_button_selects_nothing(path):
 
 def test_a_click_on_a_header_selects_the_column_and_shift_more_of_them(path):
     async def script(app, pilot):
-        await click(pilot, at(app, -2, 1))
+        await click(pilot, at(app, -3, 1))
         one = block(app)
-        await click(pilot, at(app, -2, 2), shift=True)
+        await click(pilot, at(app, -3, 2), shift=True)
         return one, block(app)
 
     assert with_editor(path, script) == (Block(0, 1, 40, 2), Block(0, 1, 40, 3))
@@ -163,7 +161,7 @@ def test_a_click_on_a_header_selects_the_column_and_shift_more_of_them(path):
 
 def test_a_drag_over_headers_selects_whole_columns(path):
     async def script(app, pilot):
-        await drag(pilot, at(app, -2, 1), at(app, -2, 2))
+        await drag(pilot, at(app, -3, 1), at(app, -3, 2))
         return block(app)
 
     assert with_editor(path, script) == Block(0, 1, 40, 3)
@@ -185,7 +183,7 @@ def test_the_sign_of_a_header_sorts_up_then_down_then_as_in_the_file(path):
         grid = app.main.assets.grid
         sorts = []
         for _ in range(3):
-            place = at(app, -2, 1)
+            place = at(app, -3, 1)
             await click(pilot, (place[0] + width_of(grid, 1) - 2, place[1]))
             sort = app.main.session.sheet.sort
             sorts.append(sort and (sort.column, sort.is_descending))
@@ -198,7 +196,7 @@ def test_dragging_the_line_behind_a_header_changes_the_width_of_its_column(path)
     async def script(app, pilot):
         grid = app.main.assets.grid
         before = width_of(grid, 1)
-        x, y = at(app, -2, 1)
+        x, y = at(app, -3, 1)
         line = x - 1 + before
         await drag(pilot, (line, y), (line + 5, y), (line + 9, y))
         wider = width_of(grid, 1) - before
@@ -214,7 +212,7 @@ def test_the_width_of_a_narrowed_frozen_column_follows_the_mouse(tmp_path):
 
     async def script(app, pilot):
         grid = app.main.assets.grid
-        x, y = at(app, -2, 0)
+        x, y = at(app, -3, 0)
         line = x - 1 + width_of(grid, 0)
         await drag(pilot, (line, y), (line - 4, y))
         return line - 4 - (x - 1), width_of(grid, 0)
@@ -227,7 +225,7 @@ def test_a_double_click_on_the_line_fits_the_column_to_its_texts(path):
     async def script(app, pilot):
         grid = app.main.assets.grid
         before = width_of(grid, 1)
-        x, y = at(app, -2, 1)
+        x, y = at(app, -3, 1)
         await drag(pilot, (x - 1 + before, y), (x + 30, y))
         await pilot.click(offset=(x - 1 + width_of(grid, 1), y), times=2)
         await settled(pilot)
@@ -260,7 +258,7 @@ def test_a_double_click_below_the_last_row_edits_nothing(tmp_path):
 
 def test_a_click_in_the_test_row_goes_there_and_one_in_the_rows_comes_back(path):
     async def script(app, pilot):
-        await click(pilot, at(app, -4, 1))
+        await click(pilot, at(app, -1, 1))
         there = app.main.assets.grid.is_in_test_row
         await click(pilot, at(app, 0, 2))
         return there, app.main.assets.grid.is_in_test_row
@@ -301,7 +299,7 @@ def test_clicks_on_an_empty_table_change_nothing(tmp_path):
     file.write_text("Asset,hit\n")
 
     async def script(app, pilot):
-        for place in [at(app, -2, 0), at(app, 0, 1), at(app, 5, 1), at(app, -4, 1), (0, at(app, 0, 0)[1])]:
+        for place in [at(app, -3, 0), at(app, 0, 1), at(app, 5, 1), at(app, -1, 1), (0, at(app, 0, 0)[1])]:
             await click(pilot, place)
             await drag(pilot, place, (place[0] + 3, place[1] + 2))
         return screen_text(app), app.main.session.sheet.is_modified

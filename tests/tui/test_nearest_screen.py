@@ -1,7 +1,5 @@
 """The dialog that says why a row is not valid, and which rows are nearest."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest
@@ -46,7 +44,7 @@ def pressed(app: Stage, *keys: str, size: tuple[int, int] = (80, 24)) -> str:
 @pytest.mark.parametrize("size", [(80, 24), (160, 48)])
 def test_the_row_of_the_cursor_is_told_cell_by_cell(size: tuple[int, int]):
     text = pressed(Stage(0, speed="3", gait="Walk"), size=size)
-    assert "✗ Row 1, walk: not valid, 1 cell keeps it from that" in text
+    assert "✗ Row 1, walk: not valid because of 1 cell" in text
     lines = [" ".join(line.strip("│ ").split()) for line in text.splitlines()]
     assert any("✗ fails speed 3 m/s 0..2 0..3" in line for line in lines)
     assert any("✓ holds gait Walk Walk" in line for line in lines)

@@ -1,7 +1,5 @@
 """The empty row below the last one: it takes what is typed and pasted, and no other row is changed from there."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -79,15 +77,15 @@ def test_rows_that_are_pasted_there_are_seen(tmp_path):
     assert row == 40
 
 
-def test_down_goes_through_it_to_the_test_row_and_up_comes_back(path):
+def test_down_goes_to_it_and_up_comes_back(path):
     async def script(app, pilot):
         grid, seen = app.main.assets.grid, []
-        for key in ("down", "down", "down", "up", "down", "up"):
+        for key in ("down", "down", "down", "up", "up", "up"):
             await press(pilot, key)
             seen.append("test" if grid.is_in_test_row else "new" if grid.is_in_new_row else grid.sheet.cursor[0])
         return seen
 
-    assert with_editor(path, script) == [1, "new", "test", 1, "new", 1]
+    assert with_editor(path, script) == [1, "new", "new", 1, 0, "test"]
 
 
 def test_it_is_seen_and_named(path):

@@ -1,16 +1,14 @@
 """Notes on cells and colours of rows, texts found in all tables, copied cells inserted, and what the mouse drags elsewhere."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
 from terminal import press, said, screen_text, with_editor
 
+from contextdb.edits.notes import Notes
 from contextdb.edits.renaming_assets import asset_renaming
 from contextdb.tables.other_files import notes_path
 from contextdb.tables.project import load_table, table_files
-from tui.model.notes import Notes
 from tui.model.sheet import Sheet
 
 TOML = '[conditions.gait]\ntype = "enum"\nvalues = ["Walk", "Run"]\n[tables.t]\noutputs = ["take"]\n'

@@ -1,7 +1,5 @@
 """The tab Options: settings become edits, and what cannot be meant stays in its field with the reason."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -64,13 +62,28 @@ def test_every_setting_is_shown_with_its_value_and_what_it_means():
         return screen_text(app)
 
     text = drive(app, script, (160, 42))
-    for word in ("Policy", "collect", "Asset Name", "[x] Mandatory_Slots", "Enabled column", "Weight column", "Assumptions"):
+    for word in ("Policy", "collect", "Asset Name", "[x] Mandatory_Slots", "Add a setting", "Add to the condition"):
         assert word in text
-    assert "A row that says False here never matches." in text
+    for word in ("Enabled column", "Weight column", "Assumptions"):
+        assert word not in text
     assert "Condition MidAir_Catch_Direction" in text
     assert "Going_Up Top Going_Down" in text
     assert app.told == []
     assert not app.sheet.is_modified
+
+
+def test_a_setting_that_is_added_has_the_keys_and_stays_while_it_is_empty():
+    app = PaneApp(small())
+
+    async def script(pilot):
+        add = app.query_one("#add-table", Select)
+        add.value = "fallback"
+        await pilot.pause()
+        focused = app.focused
+        await pilot.press("tab", "shift+tab")
+        return focused is not None and focused.id, "Fallback" in screen_text(app)
+
+    assert drive(app, script, (160, 42)) == ("option-fallback", True)
 
 
 def test_unticking_an_output_keeps_the_types_of_the_others():

@@ -1,7 +1,5 @@
 """What the sheet says is what the game does: marks, F12, saved contexts and `contextdb query` agree, row by row."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import tempfile
@@ -217,7 +215,7 @@ def test_the_sheet_says_what_the_command_prints_in_the_shell(tmp_path, facts):
 
 def marks_on(screen: str) -> list[str]:
     """The marks in the gutter of a screen."""
-    return [line[2:3] for line in screen.splitlines() if line[:1].isdigit()]
+    return [line[2:4].strip() for line in screen.splitlines() if line[:1].isdigit()]
 
 
 def test_the_screen_marks_what_is_picked_outranked_undecided_and_excluded_by_a_computed_fact(tmp_path):
@@ -233,7 +231,7 @@ def test_the_screen_marks_what_is_picked_outranked_undecided_and_excluded_by_a_c
         return first, why, screen_text(app)
 
     first, why, second = with_editor(tmp_path / "outer.csv", script, (140, 24))
-    assert marks_on(first) == ["●", "1", "◐", "◉"]
+    assert marks_on(first) == ["●", "×1", "◐", "◉"]
     assert "=2.5" in first
     assert "● Row 1, A: valid; outranked by D (priority 5)" in why
     assert "closing is 2.5" in second or "2.5" in second

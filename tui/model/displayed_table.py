@@ -18,6 +18,7 @@ from contextdb.cells.outputs import Output
 from contextdb.columns import TextColumn
 from contextdb.edits import edits
 from contextdb.edits.history import History, Step, where_now
+from contextdb.edits.notes import Notes
 from contextdb.errors import Fault, plural
 from contextdb.findings import Finding
 from contextdb.schema.settings import TableSettings
@@ -29,7 +30,6 @@ from contextdb.tables.table import Table
 from .alignment import indent_of, shared_end
 from .clip_cells import ClipCells
 from .fact_steps import FactSteps
-from .notes import Notes
 from .query_row import QueryRow
 from .selection import Block, Selection, Shape
 from .table_answer import Offered

@@ -1,7 +1,7 @@
 """Where the columns of a grid stand, in terminal cells, and how a text is cut to its column.
 
-From the left: the gutter (row number and mark), the frozen columns, which never scroll, and the others. Behind each column stands
-a separator of one cell. `x` counts from the end of the gutter; a column's first cell is its mark.
+From the left: the gutter (row number, mark and chance, each in a column), the frozen columns, which never scroll, and the others.
+Behind each column stands a separator of one cell. `x` counts from the end of the gutter; a column's first cell is its mark.
 """
 
 from __future__ import annotations
@@ -26,6 +26,8 @@ LEAST_FROZEN = 24
 MOST_TEXTS = 2000
 """So many distinct texts of a column are measured."""
 
+CHANCE = len(">99 %")
+"""The width of a chance."""
 N_NAME_LINES = 3
 """So many lines a name over a column may take."""
 _JOINT = re.compile(r"(?<=[_.\-/ ])|(?<=[a-z0-9])(?=[A-Z])")
@@ -42,8 +44,20 @@ class Layout:
 
     widths: tuple[int, ...]
     n_frozen: int
-    gutter: int
+    n_digits: int
+    """How wide the numbers of the rows are."""
+    chance: int
+    """How wide the chances are; 0 where no row has one."""
     width: int
+
+    @property
+    def gutter(self) -> int:
+        """How many cells stand before the first column: a number, a sign for what plays, a mark of two, a chance."""
+        return self.n_digits + 3 + self.chance
+
+    def gutter_text(self, number: str, chance: str = "") -> str:
+        """A gutter with these texts where the numbers and the chances are."""
+        return f"{number:>{self.n_digits}}   {chance[: self.chance].rjust(self.chance)}"
 
     @cached_property
     def starts(self) -> tuple[int, ...]:
@@ -109,10 +123,11 @@ class Layout:
         return self.starts[min(bisect_left(self.starts, self.frozen + right), column)] - self.frozen
 
 
-def layout(widths: Sequence[int], n_frozen: int, n_rows: int, width: int) -> Layout:
+def layout(widths: Sequence[int], n_frozen: int, n_rows: int, width: int, has_chance: bool = False) -> Layout:
     """The layout of columns of these widths. Frozen ones take at most half of the window, and a single one about a third where not
     all columns are seen: the widest are narrowed, or all scroll too."""
-    gutter = len(str(n_rows)) + 3
+    n_digits, chance = len(str(n_rows)), CHANCE * has_chance
+    gutter = Layout((), 0, n_digits, chance, width).gutter
     room = (width - gutter) // 2
     if room < (NARROWEST + 1) * n_frozen:
         n_frozen = 0
@@ -123,7 +138,7 @@ def layout(widths: Sequence[int], n_frozen: int, n_rows: int, width: int) -> Lay
     for _ in range(excess if frozen else 0):
         widest = max(range(n_frozen), key=frozen.__getitem__)
         frozen[widest] = max(frozen[widest] - 1, NARROWEST)
-    return Layout((*frozen, *widths[n_frozen:]), n_frozen, gutter, width)
+    return Layout((*frozen, *widths[n_frozen:]), n_frozen, n_digits, chance, width)
 
 
 def fitted_width(column: TextColumn, heads: Sequence[str], widest: int = WIDEST) -> int:

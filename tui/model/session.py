@@ -20,6 +20,7 @@ from contextdb.disk.own_files import NOT_OURS
 from contextdb.disk.together import NewFile, write_together
 from contextdb.edits.diffing import diff
 from contextdb.edits.history import History
+from contextdb.edits.notes import Notes
 from contextdb.edits.schema_file import schema_change
 from contextdb.edits.variant_rows import contracted, expanded
 from contextdb.errors import ContextDBError, Fault, FileError, Place, plural
@@ -31,7 +32,6 @@ from contextdb.tables.table import Table
 
 from .journal import Journal, finish_save, journal_path, recover, salt_of, set_aside
 from .lock import Holder, Lock
-from .notes import Notes
 from .schemas import under_schema, with_settings
 from .sheet import Done, Sheet
 from .teams import Teams

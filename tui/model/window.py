@@ -44,7 +44,7 @@ class WindowRow:
     is_played: bool = False
     """A game that is followed has picked it."""
     standing: str = ""
-    """The chance that it is picked, or what outranks it; empty where that goes without saying."""
+    """The chance that it is picked, or what outranks it; empty where it is not valid."""
 
     @property
     def mark(self) -> str:

@@ -24,6 +24,7 @@ from textual.widgets.selection_list import Selection
 from contextdb.cells.kinds import KINDS
 from contextdb.edits import edits
 from contextdb.errors import ContextDBError
+from contextdb.files.settings import Settings
 from contextdb.schema.policies import POLICIES
 from contextdb.schema.sections import has_place
 from contextdb.schema.table_settings import JOBS
@@ -72,16 +73,20 @@ class OptionsPane(Pane):
         """The condition that is displayed."""
         self._displayed_version = -1
         """The version of the sheet that is displayed."""
+        self._added: set[tuple[str, str]] = {("table", "policy"), ("table", "asset"), ("condition", "type")}
+        """Fields that are seen also where nothing is set: their part, and what they set."""
 
     def compose(self) -> ComposeResult:
         with Vertical(id="options-table", classes="options--part"):
             yield Static(id="options-title", classes="options--title")
             for key, option in OPTIONS.items():
                 yield Field(option.label, self._control(key), option.meaning, key)
+            yield Pick[str]([], compact=True, prompt="Add a setting", id="add-table")
         with Vertical(id="options-condition", classes="options--part"):
             yield Static(id="condition-title", classes="options--title")
             for key, option in CONDITION_OPTIONS.items():
                 yield Field(option.label, self._condition_control(key), option.meaning, key)
+            yield Pick[str]([], compact=True, prompt="Add to the condition", id="add-condition")
 
     def _condition_control(self, key: str) -> Widget:
         if key == "type":
@@ -153,6 +158,42 @@ class OptionsPane(Pane):
         meaning = OPTIONS["fallback"].meaning
         self._field("fallback").say(meaning=meaning if is_row else f"{meaning} No row of this table has it.")
         self._show_assumptions([*settings.assume, ""])
+        self._show_set("table", OPTIONS, lambda key: getattr(settings, key))
+
+    def _show_set(self, part: str, options: Settings, value: Callable[[str], object]) -> None:
+        """Show the fields in which something is set, and offer the others; one that was seen stays, to be filled again."""
+        self._added |= {(part, key) for key in options if value(key)}
+        missing = [key for key in options if (part, key) not in self._added and self._has_place(part, key)]
+        for key in options:
+            self._field(key, part).display = (part, key) in self._added and self._has_place(part, key)
+        add = self.query_one(f"#add-{part}", Select)
+        add.set_options([(Content(f"{options[key].label}: {options[key].meaning}"), key) for key in missing])
+        add.display = bool(missing)
+
+    def _has_place(self, part: str, key: str) -> bool:
+        return part == "table" or key == "type" or has_place(key, str(self.query_one("#condition-type", Select).value))
+
+    @on(Select.Changed, "#add-table")
+    @on(Select.Changed, "#add-condition")
+    def _add(self, event: Select.Changed) -> None:
+        """Show one more field, and go into it."""
+        event.stop()
+        part = (event.select.id or "").partition("-")[2]
+        if event.select.is_blank():
+            return
+        key = str(event.value)
+        self._added.add((part, key))
+        with self.prevent(Select.Changed):
+            self._show_sets()
+        field = self._field(key, part)
+        next(one for one in field.query(Widget) if one.focusable).focus()
+
+    def _show_sets(self) -> None:
+        self._show_set("table", OPTIONS, lambda key: getattr(self.sheet.table.settings, key))
+        column = self._column()
+        if column is not None:
+            form = ConditionForm.of(column.condition)
+            self._show_set("condition", CONDITION_OPTIONS, lambda key: getattr(form, key) if key in TYPED else True)
 
     def _outputs_meaning(self, n_columns: int) -> str:
         meaning = OPTIONS["outputs"].meaning
@@ -177,6 +218,8 @@ class OptionsPane(Pane):
         part.display = column is not None
         if column is None:
             return
+        if self._condition != column.condition.name:
+            self._added = {one for one in self._added if one[0] == "table" or one[1] == "type"}
         self._condition = column.condition.name
         note = "" if column.condition.is_declared else "  not declared: the type is a guess from its cells"
         self.query_one("#condition-title", Static).update(
@@ -187,9 +230,9 @@ class OptionsPane(Pane):
         self.query_one("#condition-mirror", Input).placeholder = "negate" if KINDS[form.kind].is_circular else "none"
         for key in TYPED:
             self.query_one(f"#condition-{key}", Input).value = getattr(form, key)
-            self._field(key, "condition").display = has_place(key, form.kind)
             self._field(key, "condition").say()
         self._field("type", "condition").say()
+        self._show_set("condition", CONDITION_OPTIONS, lambda key: getattr(form, key) if key in TYPED else True)
 
     def _column(self) -> ConditionColumn | None:
         """The condition under the cursor, else the one displayed last, else the first."""
@@ -214,7 +257,7 @@ class OptionsPane(Pane):
         value = None if event.select.is_blank() else event.select.value
         if event.select.id == "condition-type":
             self._set_condition("type")
-        elif key:
+        elif (event.select.id or "").startswith("option-"):
             self._set_setting(key, value)
 
     @on(TickList.SelectedChanged)
@@ -273,8 +316,8 @@ class OptionsPane(Pane):
         before, form = ConditionForm.of(column.condition), self._form()
         if key == "type":
             form = form.of_kind(form.kind)
-        for other in TYPED:
-            self._field(other, "condition").display = has_place(other, form.kind)
+        self._added.add(("condition", key))
+        self._show_sets()
         declared, wrong = form.declared()
         for field in ("type", *TYPED):
             self._field(field, "condition").say(wrong.get(field, ""))

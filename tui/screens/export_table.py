@@ -17,6 +17,7 @@ from textual.widgets import Select, Static
 from textual.worker import get_current_worker
 
 from contextdb.disk import real_path
+from contextdb.edits.notes import NO_NOTES, Notes
 from contextdb.errors import ContextDBError, in_quotes
 from contextdb.exchange.formats import FORMATS, format_of, write
 from contextdb.tables.table import Table
@@ -61,11 +62,11 @@ class ExportDialog(PathDialog[Export]):
     takes_first = False
     keys_text = "Enter export · Tab complete · ↑↓ choose · Esc cancel"
 
-    def __init__(self, table: Table, folder: Path) -> None:
-        """`folder` is where paths start."""
+    def __init__(self, table: Table, folder: Path, notes: Notes = NO_NOTES) -> None:
+        """`folder` is where paths start; `notes` are those of the table."""
         super().__init__(folder, suffixes_written())
         self.title_text = f"Export {table.name}"
-        self.table = table
+        self.table, self.notes = table, notes
 
     def compose_body(self) -> ComposeResult:
         """The path, the format, and what lies in the folder."""
@@ -135,7 +136,7 @@ class ExportDialog(PathDialog[Export]):
         """Make the bytes in the background."""
         result: Export | ContextDBError
         try:
-            raw, remarks = write(self.table, format_of(str(path), wanted, for_writing=True))
+            raw, remarks = write(self.table, format_of(str(path), wanted, for_writing=True), notes=self.notes)
             result = Export(path, raw, tuple(map(str, remarks)))
         except ContextDBError as error:
             result = error

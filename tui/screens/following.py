@@ -28,8 +28,8 @@ from .context_forms import KeepDialog, SavedCase
 RATE = 10
 """So many moments a second are displayed at most, the newest: nobody reads a table faster. All of them can be stepped through."""
 ITEMS = (
-    ("live-pause", "Pause Alt+6"), ("previous-context", "◂ F7"), ("next-context", "F8 ▸"), ("live-back", "−1 s"),
-    ("live-ahead", "+1 s"), ("live-keep", "Keep Alt+7"), ("live", "Who Alt+U"), ("live-stop", "Stop"),
+    ("live-pause", "Pause ⇧F7"), ("previous-context", "◂ F7"), ("next-context", "F8 ▸"), ("live-back", "−1 s"),
+    ("live-ahead", "+1 s"), ("live-keep", "Keep ⇧F8"), ("live", "Who Alt+U"), ("live-stop", "Stop"),
 )  # fmt: skip
 
 
@@ -288,7 +288,7 @@ class Following:
         return LiveState(sign, followed.name, f"{when} · {answer.summary}", " · ".join(filter(None, notes)))
 
     def _items(self) -> list[Item]:
-        return [Item(name, "Go on Alt+6" if name == "live-pause" and self.is_paused else label) for name, label in ITEMS]
+        return [Item(name, "Go on ⇧F7" if name == "live-pause" and self.is_paused else label) for name, label in ITEMS]
 
     @property
     def _is_own_version(self) -> bool | None:

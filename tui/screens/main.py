@@ -172,6 +172,8 @@ class MainScreen(TableScreen):
     def take_import(self, answer: Import) -> None:
         """Put the rows of another file into the table, and fit the columns to them."""
         is_short = len(answer.notes) < 2
+        if answer.with_marks is not None:
+            self.assets.mark(answer.with_marks, "")
         self.apply(answer.edit, answer.notes if is_short else (f"{len(answer.notes)} remarks.",))
         self.assets.grid.forget_widths()
         if not is_short:
@@ -207,7 +209,7 @@ class MainScreen(TableScreen):
             if answer is not None:
                 self.try_to(lambda: self._export(answer))
 
-        self.app.push_screen(ExportDialog(self.session.sheet.table, self.workspace.folder), chosen)
+        self.app.push_screen(ExportDialog(self.session.sheet.table, self.workspace.folder, self.session.sheet.marks), chosen)
 
     def _export(self, answer: Export) -> None:
         write_atomic(answer.path, answer.raw)
@@ -355,6 +357,10 @@ class MainScreen(TableScreen):
     def action_actors(self) -> None:
         self.try_to(self.test_row.actors)
 
+    def action_next_picks(self) -> None:
+        """What would be picked in turn for the test row."""
+        self.try_to(self.test_row.picks)
+
     def action_why(self) -> None:
         """Why the row of the cursor is not valid: beside the table where there is room, else as `action_nearest`."""
         pane = self.assets.why_pane
@@ -373,6 +379,8 @@ class MainScreen(TableScreen):
         self.try_to(self.workspace.look_again)
         self.care.look()
         self._look_for_sessions()
+        if self._clips is not None:
+            self._clips.forget()
         self.assets.refresh_view()
         self.show()
 

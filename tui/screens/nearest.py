@@ -190,7 +190,7 @@ def row_state(why: RowWhy) -> str:
         cast = ", ".join(dict.fromkeys(f"{c.column.partition('.')[0]} is {c.fact}" for c in why.cells if c.is_cast))
         sign = MAY_BE if why.doubt else PICKED if why.is_picked else VALID
         return f"{sign} {row}: {'; '.join(filter(None, (why.doubt or 'valid', why.standing, cast)))}"
-    return f"✗ {row}: not valid, {plural(why.n_wrong, 'cell')} {'keeps' if why.n_wrong == 1 else 'keep'} it from that"
+    return f"✗ {row}: not valid because of {plural(why.n_wrong, 'cell')}"
 
 
 def cell_state(cell: CellWhy) -> str:

@@ -150,6 +150,10 @@ class StatusLine(Widget):
         return Strip([Segment(cut(f" {left}", room), style), Segment(f" {right} ", style)]).adjust_cell_length(width, style)
 
 
+LEAST_TO_ANSWER = 40
+"""In a narrower window the line says where the cursor is, and nothing of what plays."""
+
+
 class CellLine(Widget):
     """The line over the grid: which cell the cursor is in, all of its text, and what is wrong with it; at its right what plays."""
 
@@ -189,7 +193,7 @@ class CellLine(Widget):
 
     def render_line(self, y: int) -> Strip:
         text, plays = self._answer
-        if not text:
+        if not text or self.size.width < LEAST_TO_ANSWER:
             return self._cell(self.size.width)
         answer = f" {cut(text, min(cell_len(text), self.size.width * 3 // 5))} "
         segment = Segment(answer, self._of("plays" if plays else "nothing"))

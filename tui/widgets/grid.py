@@ -145,8 +145,11 @@ class Grid(GridView, can_focus=True):
 
     def action_move(self, down: int, right: int, extend: bool) -> None:
         if self.is_in_test_row and down:
-            if down < 0:
-                self.is_in_test_row = False
+            if down > 0:
+                self._go_into_rows()
+            return
+        if down < 0 and not extend and self.has_test_row and not self.is_in_new_row and self.sheet.selection.row == 0:
+            self.is_in_test_row = True
             return
         is_last = self.sheet.selection.row >= len(self.sheet.view) - 1
         if down > 0 and is_last and not extend and self._go_below():
@@ -167,12 +170,17 @@ class Grid(GridView, can_focus=True):
         self.action_move(0, by, False)
 
     def _go_below(self) -> bool:
-        """From the last row to the empty one, and from there to the test row; gives whether there is one to go to."""
+        """From the last row to the empty one; gives whether there is one to go to."""
         if self.has_new_row and not self.is_in_new_row:
             self.moving(lambda: self.sheet.move(0, 0), in_new_row=True)
-        elif self.has_test_row:
-            self.is_in_test_row = True
-        return self.has_new_row or self.has_test_row
+        return self.has_new_row
+
+    def _go_into_rows(self) -> None:
+        """From the test row to the first row that is seen below it."""
+        column, top = min(self.field, self.sheet.shape[1] - 1), self.look.top
+        self.is_in_test_row = False
+        if len(self.sheet.view):
+            self.moving(lambda: self.sheet.go(top, column))
 
     def _move_fields(self, right: int) -> bool:
         """Move the cursor of the test row among the facts behind the last column, or onto the first of them; gives whether it

@@ -1,4 +1,4 @@
-"""Paint the lines of a grid: lines of headers (fewer in a low window), the rows on the screen, and the test row at the foot.
+"""Paint the lines of a grid: lines of headers (fewer in a low window), the test row under them, and the rows on the screen.
 
 Only what is seen is read and painted, so that a line costs the same in a table of ten rows and of a hundred thousand.
 """
@@ -86,14 +86,14 @@ class Look:
     """The column of the test row that the cursor is in, where that is not the sheet's: fields behind its last column count on."""
 
     @property
-    def foot(self) -> int:
-        """The line of the test row; past the last one where there is none."""
-        return self.height - 1 if self.has_test_row else self.height
+    def test_line(self) -> int:
+        """The line of the test row, right under the names; -1 where there is none."""
+        return len(self.header_lines) if self.has_test_row else -1
 
     @property
     def n_headers(self) -> int:
-        """How many lines stand over the rows."""
-        return len(self.header_lines)
+        """How many lines stand over the rows, the test row with them."""
+        return len(self.header_lines) + self.has_test_row
 
     @property
     def header_lines(self) -> tuple[str, ...]:
@@ -103,7 +103,7 @@ class Look:
     @property
     def sort_line(self) -> int:
         """The line of the header with the signs to sort by."""
-        return self.n_name_lines if self.is_wrapped and self.n_headers > 1 else 0
+        return self.n_name_lines if self.is_wrapped and len(self.header_lines) > 1 else 0
 
     @property
     def n_name_lines(self) -> int:
@@ -113,7 +113,7 @@ class Look:
     @property
     def n_body(self) -> int:
         """How many lines there are for rows."""
-        return max(self.foot - self.n_headers, 0)
+        return max(self.height - self.n_headers, 0)
 
 
 class Painter:
@@ -158,12 +158,12 @@ class Painter:
     def line(self, y: int, look: Look) -> Strip:
         if self._read[0] is not self.sheet.table or self._read[1] is not self.sheet.view:
             self.changed()  # painted between a step and word of it
+        if y == look.test_line:
+            return self._test_line(look)
         if y < look.n_headers:
             return self._header_line(y, look)
         if y >= look.height:  # under the scroll bar, where nothing is seen; the window of the rows stays as it is
             return Strip.blank(look.layout.width)
-        if y == look.foot:
-            return self._test_line(look)
         row = look.top + y - look.n_headers
         if row == len(self.sheet.view) and look.has_new_row:
             return self._new_line(look)
@@ -189,7 +189,7 @@ class Painter:
         ground = "header" if says == "name" and len(lines) > 1 else "header-leaves" if is_last else "header-kind"
         ground = "header" if len(lines) == 1 else ground
         block = self.sheet.block
-        gutter = ("#".rjust(look.layout.gutter - 3) + "   ") if y == 0 else " " * look.layout.gutter
+        gutter = look.layout.gutter_text("#", "%") if y == 0 else " " * look.layout.gutter
 
         def cell(column: int) -> Iterator[Segment]:
             is_chosen = (
@@ -243,8 +243,8 @@ class Painter:
         if header.fault is not None:
             yield Segment("!" + cut("cannot be read", width - 1), self.style(ground, "fault"))
             return
-        text = "" if header.leaves is None else f"leaves {header.leaves:,}"
-        text = text if len(text) < width else text.replace("leaves ", "→ ")
+        text = "" if header.leaves is None else f"{header.leaves:,} left"
+        text = text if len(text) < width else text.removesuffix(" left")
         text = plural(header.n_actors, "actor") if header.n_actors else "no column" if header.is_extra else text
         yield Segment(" " + cut(text, width - 1), self.style(ground, "muted"))
 
@@ -296,6 +296,8 @@ class Painter:
         seen, block, ground = window.row(row), self._block(look), self._ground(row, window)
         asset, cursor = self.sheet.asset_at, self._cursor(row, look)
         is_far = seen.n_failing > 1
+        is_chance = seen.standing.endswith("%") and look.layout.chance > 0
+        chance, outranked = (seen.standing, "") if is_chance else ("", "" if seen.standing == "100 %" else seen.standing)
 
         n_columns = len(self.sheet.table.columns)
         noted, colours, names = self.sheet.marks.texts, self.sheet.marks.colours, [c.name for c in self.sheet.table.columns]
@@ -324,22 +326,24 @@ class Painter:
             if note and room >= min(cell_len(text), LEAST_BESIDE):
                 yield Segment(mark + _shortened(text, room, n_shared), self.style(under, meant))
                 yield Segment(f" {note}", self.style(under, meant if column == cursor else "valid" if seen.is_valid else "muted"))
-            elif not note and column == asset and seen.standing and cell_len(text) + cell_len(seen.standing) < width:
-                yield Segment(mark + cut(text, width - cell_len(seen.standing)), self.style(under, meant))
-                yield Segment(seen.standing, self.style(under, meant if column == cursor else "muted"))
+            elif not note and column == asset and outranked and cell_len(text) + cell_len(outranked) < width:
+                yield Segment(mark + cut(text, width - cell_len(outranked)), self.style(under, meant))
+                yield Segment(outranked, self.style(under, meant if column == cursor else "muted"))
             else:
                 yield Segment(mark + _shortened(text, width, n_shared), self.style(under, meant))
 
         corner = block.right - 1 if block is not None and row == block.bottom - 1 and self.sheet.selection.kind == "cells" else None
-        number = f"{seen.number:>{look.layout.gutter - 3}}"
         tint = f"tint-{colours[name]}" if name in colours else "gutter"
         style = self.style(tint, "valid" if seen.is_valid else "name" if tint != "gutter" or cursor is not None else "muted")
-        plays = Segment(PLAYS if seen.is_played else " ", self.style(tint, "name"))
-        if seen.mark != " " or not seen.n_failing:
-            return self._joined([Segment(number, style), plays, Segment(f"{seen.mark} ", style)], cell, look, ground, (), corner)
-        count = MARKS["failing"] + (str(seen.n_failing) if seen.n_failing < 10 else "+")
+        is_near = seen.mark == " " and seen.n_failing > 0
+        sign = MARKS["failing"] + (str(seen.n_failing) if seen.n_failing < 10 else "+") if is_near else f"{seen.mark} "
         miss = "muted" if is_far else "failing"
-        gutter = [Segment(number, style), Segment(count, self.style(tint, miss)), plays]
+        gutter = [
+            Segment(f"{seen.number:>{look.layout.n_digits}}", style),
+            Segment(PLAYS if seen.is_played else " ", self.style(tint, "name")),
+            Segment(sign, self.style(tint, miss) if is_near else style),
+            *([Segment(chance.rjust(look.layout.chance), style)] if look.layout.chance else []),
+        ]
         return self._joined(gutter, cell, look, ground, window.failing(row), corner, miss)
 
     def _window_at(self, row: int, look: Look) -> Window:
@@ -369,7 +373,7 @@ class Painter:
             tone = "on-cursor" if is_cursor and look.has_focus else "muted"
             yield Segment(" " + cut(text, look.layout.widths[column] - 1), self.style(ground, tone))
 
-        gutter = "+".rjust(look.layout.gutter - 3) + "   "
+        gutter = look.layout.gutter_text("+")
         return self._joined([Segment(gutter, self.style("gutter", "muted"))], cell, look, "row")
 
     def _empty_line(self, row: int, look: Look) -> Strip:
@@ -401,7 +405,7 @@ class Painter:
             meant = "fault" if is_wrong else "muted" if is_cast or is_computed else "text"
             yield Segment(mark + cut(text, width - 1), self.style(ground, "on-cursor" if is_lit else meant))
 
-        gutter = "?".rjust(look.layout.gutter - 3) + "   "
+        gutter = look.layout.gutter_text("?")
         return self._joined([Segment(gutter, self.style("test", "name"))], cell, look, "test")
 
     def _adding(self, width: int) -> str:

@@ -35,6 +35,8 @@ GROUNDS = (
 MEANT = ("text", "any", "muted", "name", "failing", "fault", "disabled", "valid", "line", "on-cursor")
 STEP, WIDEST_BY_KEYS = 2, 200
 """A key makes a column wider by so many cells; no wider than the second."""
+ROOM_FOR_CHANCES = 100
+"""In a narrower window chances stand beside the assets, where there is room."""
 FLASH_S = 0.4
 """So long a cell is lit that has just begun to fail."""
 
@@ -113,6 +115,7 @@ class GridView(ScrollView, inherit_bindings=False):
         self._fields: tuple[str, ...] = ()
         """The fields of the test row behind the columns, that the layout is of."""
         self._extra: int | None = None
+        self._had_chances = False
         self._painted: dict[int, Strip] = {}
         """The lines that were painted last, where the grid was then."""
         self._painted_at: tuple[object, ...] = ()
@@ -179,7 +182,7 @@ class GridView(ScrollView, inherit_bindings=False):
             return
         self._paint_rows(rows)
         look = self.look
-        self.refresh(Region(0, look.n_headers - 1, look.layout.width, 1), Region(0, look.foot, look.layout.width, 1))
+        self.refresh(Region(0, max(look.test_line - 1, 0), look.layout.width, 2))
         if self._painter.began:
             self.set_timer(FLASH_S, partial(self._flashed, self._painter.began))
 
@@ -249,6 +252,13 @@ class GridView(ScrollView, inherit_bindings=False):
             self._names = is_wrapped, n_names
         return self._layout
 
+    @property
+    def _has_chances(self) -> bool:
+        """Whether rows may have a chance; once they had, their column stays, so that nothing moves while one types facts."""
+        settings, query = self.sheet.table.settings, self.sheet.query
+        self._had_chances = self._had_chances or (self.has_test_row and not query.is_empty and lets_choose([settings.policy]))
+        return self._had_chances
+
     def _laid(self, fields: Sequence[str]) -> tuple[Layout, bool, int]:
         """Where the columns stand; whether names are wrapped, since not all were seen else; how many lines the longest takes."""
         names = [*(c.name for c in self.sheet.table.columns), *fields]
@@ -257,7 +267,13 @@ class GridView(ScrollView, inherit_bindings=False):
 
         def made(is_wrapped: bool) -> Layout:
             widths = [0 if at < len(hidden) and hidden[at] else self._width(at, name, is_wrapped) for at, name in enumerate(names)]
-            return layout(widths, n_frozen, self.sheet.table.n_rows, self.window.width)
+            return layout(
+                widths,
+                n_frozen,
+                self.sheet.table.n_rows,
+                self.window.width,
+                self.window.width >= ROOM_FOR_CHANCES and self._has_chances,
+            )
 
         plain = made(False)
         if plain.total <= self.window.width:
@@ -288,7 +304,7 @@ class GridView(ScrollView, inherit_bindings=False):
     def cell_region(self) -> Region:
         """Where the cell of the cursor is on the screen, without its mark."""
         look, row, column = self.look, self._cursor_row, self.field
-        y = look.foot if self.is_in_test_row else look.n_headers + row - look.top
+        y = look.test_line if self.is_in_test_row else look.n_headers + row - look.top
         x = look.layout.place(column, look.left)
         return Region(self.content_region.x + x + 1, self.content_region.y + y, look.layout.widths[column] - 1, 1)
 
@@ -356,9 +372,7 @@ class GridView(ScrollView, inherit_bindings=False):
         role = query.role_of(column.name)
         is_opener = query.is_nested and at == self.sheet.asset_at
         if role is None and not is_opener:
-            is_weighed = at == self.sheet.asset_at and not query.is_empty and lets_choose([self.sheet.table.settings.policy])
-            longest = max((cell_len(text) for text in column.texts[:MOST_TEXTS]), default=0) if is_weighed else 0
-            return longest + len(">99 %") + 2 if is_weighed else 0
+            return 0
         longest = max((cell_len(text) for text in column.texts[:MOST_TEXTS]), default=0)
         if role is None:
             return longest + len(" 000 of 000 rows") + 1
@@ -400,7 +414,7 @@ class GridView(ScrollView, inherit_bindings=False):
         rows, total = len(self.sheet.view), self.grid_layout.extent
         if self._said_shape != (rows, total, self.look.n_headers):
             self._said_shape = (rows, total, self.look.n_headers)
-            self.virtual_size = Size(total, rows + self.has_new_row + self.look.n_headers + self.has_test_row)
+            self.virtual_size = Size(total, rows + self.has_new_row + self.look.n_headers)
 
     def on_resize(self) -> None:
         self._layout = None
@@ -448,7 +462,7 @@ class GridView(ScrollView, inherit_bindings=False):
         if is_all and self.is_mounted and self.has_focus != self._had_focus:
             self._had_focus = self.has_focus
             look = self.look
-            y = look.foot if self.is_in_test_row else look.n_headers + self._cursor_row - look.top
+            y = look.test_line if self.is_in_test_row else look.n_headers + self._cursor_row - look.top
             regions = (Region(0, y, look.layout.width, 1),)
         return super().refresh(*regions, repaint=repaint, layout=layout, recompose=recompose)
 

@@ -94,12 +94,12 @@ class Pointer:
         grid, look = self.grid, self.grid.look
         grid.focus()
         row, column = self._place_at(event.x, event.y)
-        if event.y < look.n_headers:
-            self._press_header(event, column, look)
-        elif event.y == look.foot:
+        if event.y == look.test_line:
             grid.is_in_test_row = True
             grid.moving(lambda: grid.go_to_field(column))
             grid.refresh()
+        elif event.y < look.n_headers:
+            self._press_header(event, column, look)
         elif look.has_new_row and look.top + event.y - look.n_headers == len(grid.sheet.view):
             grid.is_in_test_row = False
             grid.moving(lambda: grid.sheet.go(grid.sheet.cursor[0], column), in_new_row=True)
@@ -121,9 +121,9 @@ class Pointer:
         grid, look = self.grid, self.grid.look
         grid.focus()
         row, column = self._place_at(event.x, event.y)
-        is_header = event.y < look.n_headers
+        is_header = event.y < look.n_headers and event.y != look.test_line
         n_columns, block = grid.sheet.shape[1], grid.sheet.block
-        if column < n_columns and (is_header or self._is_cell_line(event.y, look)) and event.y != look.foot:
+        if column < n_columns and (is_header or self._is_cell_line(event.y, look)) and event.y != look.test_line:
             grid.is_in_test_row = False
             if not (block.holds(row, column) or (is_header and block.left <= column < block.right)):
                 grid.moving(lambda: grid.sheet.go(grid.sheet.cursor[0] if is_header else row, column))
@@ -182,7 +182,7 @@ class Pointer:
         """A double click: edit the cell, or fit the column left of a line."""
         look = self.grid.look
         separator = look.layout.separator_at(event.x, look.left)
-        if event.y < look.n_headers and separator is not None:
+        if event.y < look.n_headers and event.y != look.test_line and separator is not None:
             self.grid.set_width(separator, None)
         elif event.x >= look.layout.gutter and self._is_cell_line(event.y, look):
             self.grid.action_edit()
@@ -226,7 +226,7 @@ class Pointer:
     def _edge(self) -> tuple[int, int]:
         """At which edges of the cells the mouse is: down 1, up -1; right 1, left -1. At the right it cannot leave the screen."""
         (x, y), look = self._at, self.grid.look
-        down = 0 if self._dragged == "columns" else (y >= look.foot) - (y < look.n_headers)
+        down = 0 if self._dragged == "columns" else (y >= look.height) - (y < look.n_headers)
         first = look.layout.gutter + (look.layout.frozen if look.left else 0)
         is_frozen = self.grid.sheet.selection.far[1] < look.layout.n_frozen
         right = 0 if self._dragged == "rows" else (x >= look.layout.width - 1) - (x < first and look.left > 0 and not is_frozen)
@@ -262,4 +262,4 @@ class Pointer:
     def _is_cell_line(self, y: int, look: Look) -> bool:
         """Whether cells are on a line of the window: those of a row, or of the test row."""
         n_rows = len(self.grid.sheet.view) + look.has_new_row
-        return y == look.foot or (y >= look.n_headers and look.top + y - look.n_headers < n_rows)
+        return y == look.test_line or (y >= look.n_headers and look.top + y - look.n_headers < n_rows)

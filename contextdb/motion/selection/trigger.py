@@ -11,7 +11,7 @@ from contextdb.motion.selection.decision import Playing
 class Trigger(StrEnum):
     """Why a controller searches, told of the asset or database that played. Where several hold, the first."""
 
-    NOTHING_PLAYS = "Nothing played"
+    NOTHING_PLAYS = "Nothing was playing"
     LOST = "{asset} is no longer loaded"
     ENDED = "{asset} has ended"
     NOT_AMONG = "{database} is not among the databases of the moment"
@@ -19,11 +19,6 @@ class Trigger(StrEnum):
     NOT_VALID = "{asset} is not valid any more"
     FORCED = "A search was forced"
     DUE = "A search was due"
-
-    @property
-    def may_continue(self) -> bool:
-        """Whether playing on takes part in the search."""
-        return self in (Trigger.FORCED, Trigger.DUE)
 
     def sentence(self, before: Playing | None) -> str:
         """The trigger in words, of what played."""

@@ -106,7 +106,7 @@ class Status:
                 yield name, compared.text
         if self.frames_evaluated is not None:
             yield "frames evaluated", f"{self.frames_evaluated:,}"
-        yield "time scale", f"{self.time_scale:.2f}"
+        yield "play rate", f"{self.time_scale:.2f}"
         if self.stride is not None and self.warp_deg is not None:
             yield "stride", f"{self.stride:.2f}"
             yield "warp", f"{_rounded(self.warp_deg):.0f}°"

@@ -78,3 +78,6 @@ class Notes:
         """Write the file; raises FileError where the disk refuses."""
         spots = {**self.texts, **self.words}
         write_atomic(notes_path(table), written({spot: (self.texts.get(spot, ""), self.words.get(spot, "")) for spot in spots}))
+
+
+NO_NOTES = Notes()

@@ -3,9 +3,9 @@
     python benchmarks/many_clips.py                   1,500, 3,000 and 6,000 made clips
     python benchmarks/many_clips.py --clips 500 1000
 
-Each build begins without a cache. Memory is what a process must have, without pages of files that the system may drop: of this
-process over what it had before, and of the largest worker. At the largest size a worker is killed when a third is done; the
-database has the same digest as one that is built here from the cache.
+Each build begins without a cache. CPU is that of all processes together. Memory is what a process must have, without pages of
+files that the system may drop: of this process over what it had before, and of the largest worker. At the largest size a worker is
+killed when a third is done; the database has the same digest as one that is built here from the cache.
 """
 
 from __future__ import annotations
@@ -17,8 +17,9 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +49,7 @@ def main() -> None:
     local_cluster: Any = LocalCluster
 
     print(f"{timing.machine()}\n{timing.versions()}")
-    print(f"{'clips':>7}{'frames':>11}{'s':>8}{'ms a clip':>11}{'here, MB':>10}{'worker, MB':>12}  killed")
+    print(f"{'clips':>7}{'frames':>11}{'s':>8}{'ms a clip':>11}{'CPU, s':>9}{'here, MB':>10}{'worker, MB':>12}  killed")
     with tempfile.TemporaryDirectory() as folder:
         config = make(Path(folder), sizes[-1])
         for size in sizes:
@@ -76,22 +77,24 @@ def make(folder: Path, n: int) -> motion.MotionConfig:
 def measure(config: motion.MotionConfig, folder: Path, n: int, cluster: Any, *, kills: bool) -> None:
     """Build a database of so many clips on the workers, and print what it took."""
     assets = {"t": [f"{i:06}" for i in range(n)]}
-    pids = [worker.pid for worker in cluster.workers.values()]
     killed: list[int] = []
+
+    def pids() -> list[int]:
+        return [worker.pid for worker in list(cluster.workers.values()) if worker.pid]
 
     def progress(done: int, total: int, name: str) -> None:
         if kills and not killed and done > total / 3:
-            killed.append(pids[0])
-            os.kill(pids[0], signal.SIGKILL)
+            killed.append(pids()[0])
+            os.kill(killed[0], signal.SIGKILL)
 
-    with peaks(pids) as memory:
+    with used(pids) as use:
         start = time.perf_counter()
         on_workers = engines.dask(cluster.scheduler_address, "to run again")
         built = build_all(config, folder, assets, progress, cache=f"cache-{n}", engines=on_workers)["all"]
         took = time.perf_counter() - start
-    here, there = memory
-    frames = built.database.n_frames
-    print(f"{n:7,}{frames:11,}{took:8.1f}{1000 * took / n:11.1f}{here:10.0f}{there:12.0f}  {len(killed)}", flush=True)
+    frames, cpu_s = built.database.n_frames, sum(use.cpu_s.values())
+    counts = f"{n:7,}{frames:11,}{took:8.1f}{1000 * took / n:11.1f}{cpu_s:9.1f}"
+    print(f"{counts}{use.here_mb:10.0f}{use.worker_mb:12.0f}  {len(killed)}", flush=True)
     if kills:
         check(built, build_all(config, folder, assets, cache=f"cache-{n}")["all"])
 
@@ -103,24 +106,49 @@ def check(there: Built, here: Built) -> None:
     assert there.database.layout.blocks.tobytes() == here.database.layout.blocks.tobytes()
 
 
+@dataclass
+class Use:
+    """The most memory, in MB, of this process over what it had before and of the largest worker; what each process worked."""
+
+    here_mb: float = 0.0
+    worker_mb: float = 0.0
+    cpu_s: dict[int, float] = field(default_factory=dict)
+
+
 @contextmanager
-def peaks(pids: list[int]) -> Iterator[list[float]]:
-    """The most memory, in MB, of this process over what it has now, and of the largest of some others."""
-    result, done = [0.0, 0.0], threading.Event()
-    before = own_mb(os.getpid())
+def used(pids: Callable[[], list[int]]) -> Iterator[Use]:
+    """What this process and some others use meanwhile; one that was killed counts up to its last fifth of a second."""
+    use, done, own = Use(), threading.Event(), os.getpid()
+    mb, cpu_s = own_mb(own), {pid: worked_s(pid) for pid in (own, *pids())}
+
+    def look() -> None:
+        others = pids()
+        use.here_mb = max(use.here_mb, own_mb(own) - mb)
+        use.worker_mb = max([use.worker_mb, *map(own_mb, others)])
+        for pid in (own, *others):
+            use.cpu_s[pid] = max(worked_s(pid) - cpu_s.get(pid, 0.0), use.cpu_s.get(pid, 0.0))
 
     def watch() -> None:
         while not done.wait(0.2):
-            result[0] = max(result[0], own_mb(os.getpid()) - before)
-            result[1] = max([result[1], *map(own_mb, pids)])
+            look()
 
     thread = threading.Thread(target=watch)
     thread.start()
     try:
-        yield result
+        yield use
     finally:
         done.set()
         thread.join()
+        look()
+
+
+def worked_s(pid: int) -> float:
+    """How long a process has worked, in seconds of CPU; 0 where the system does not say it."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text("ascii").rpartition(")")[2].split()
+    except OSError:
+        return 0.0
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def own_mb(pid: int) -> float:

@@ -153,6 +153,12 @@ def test_a_body_of_other_proportions_than_the_other_clips_is_told():
     assert "odd-proportions" in rules(replace(WALK, skeleton=replace(WALK.skeleton, offsets=offsets)))
 
 
+def test_bodies_with_other_names_of_bones_are_compared_or_not_doubted():
+    prefixed = replace(WALK.skeleton, names=tuple(f"mixamorig:{name}" for name in WALK.skeleton.names))
+    foreign = replace(WALK.skeleton, names=tuple(f"knochen{i}" for i in range(WALK.skeleton.n_joints)))
+    assert "odd-proportions" not in rules(replace(WALK, skeleton=prefixed)) + rules(replace(WALK, skeleton=foreign))
+
+
 def test_a_body_of_another_size_with_the_same_proportions_is_not():
     assert rules(replace(WALK, metres_per_unit=WALK.metres_per_unit * 0.7)) == []
 

@@ -9,15 +9,16 @@ is refused where clips are read and built. Lengths are in metres, y up, as the s
 from __future__ import annotations
 
 import math
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from contextdb.cells.arguments import require_many_of
 from contextdb.errors import plural
+from contextdb.motion.clips.bone_names import cores_of
 from contextdb.motion.clips.clip import Clip
 from contextdb.motion.clips.clip_measures import UNITS, USUAL_BODY_M, Measures, measure
 from contextdb.motion.clips.trajectory import FASTEST_MPS
@@ -72,7 +73,7 @@ class ClipFinding:
 def doubts(clips: Iterable[tuple[str, str | None, Measures]]) -> list[ClipFinding]:
     """What is doubtful about all clips of one database, (asset, file, Measures) each, in their order: the shape of a body is
     compared with that of the others. Of a clip whose unit is doubtful nothing else is reported that is a length."""
-    listed = list(clips)
+    listed = [(asset, file, replace(measures, bones=_by_core(measures.bones or {}))) for asset, file, measures in clips]
     usual = _usual_shape([measures for _, _, measures in listed])
     lengths = _usual_lengths([measures.bones for _, _, measures in listed if measures.bones], usual or {})
     return [
@@ -136,8 +137,8 @@ def _rules(of: Measures, usual: Shape | None, times: float) -> Iterator[tuple[st
         yield "no-footfalls", _no_footfalls(of)
     if of.on_the_spot_mps:
         yield "on-the-spot", _on_the_spot(of)
-    difference = None if usual is None else _difference(_shape(of.bones or {}, usual), usual)
-    if difference is not None and difference > OTHER_SHAPE:
+    difference = _difference(of.bones or {}, usual or {})
+    if difference > OTHER_SHAPE:
         problem = f"{100.0 * difference:.0f} % of the body's length is distributed differently from the other clips."
         mend = 'rig = "a clip of the usual body" in [databases.NAME], which puts the others on it, or metres_per_unit'
         yield (
@@ -283,6 +284,16 @@ def _metres(length_m: float) -> str:
 # ---- the bodies of the other clips
 
 
+def _by_core(bones: Mapping[str, float]) -> dict[str, float]:
+    """Bones by their side and core, so that rigs with other namespaces and spellings are compared; by their name where that is the
+    same for two."""
+    cores = cores_of(list(bones))
+    counts = Counter(cores)
+    return {
+        " ".join(core) if counts[core] == 1 else name: length for core, (name, length) in zip(cores, bones.items(), strict=True)
+    }
+
+
 def _shape(bones: Mapping[str, float], of: Mapping[str, float]) -> Shape:
     """The share of each bone in the length of those that are looked at."""
     total = math.fsum(length for bone, length in bones.items() if bone in of)
@@ -313,6 +324,9 @@ def _times(bones: Mapping[str, float], usual: Mapping[str, float]) -> float:
     return float(np.median(ratios)) if ratios else 1.0
 
 
-def _difference(shape: Shape, usual: Shape) -> float:
-    """Half the sum of the differences of all bones: 0 for the same shape, 1 where nothing is shared."""
+def _difference(bones: Mapping[str, float], usual: Shape) -> float:
+    """Half the sum of the differences of the shares of all bones: 0 for the same shape, and for a rig that has few of the bones."""
+    shape = _shape(bones, usual)
+    if 2 * len(shape) < len(usual):
+        return 0.0
     return 0.5 * math.fsum(abs(shape.get(bone, 0.0) - share) for bone, share in usual.items())

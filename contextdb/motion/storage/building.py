@@ -14,7 +14,7 @@ from os import PathLike
 from pathlib import Path
 
 from contextdb.cells.arguments import require_kind, require_many, require_mapping, require_path, require_text
-from contextdb.disk import matching, real_path
+from contextdb.disk import real_path
 from contextdb.disk.boundary import inside
 from contextdb.disk.engines import Engines, here
 from contextdb.errors import ArtefactError, Fault, FileError, MotionError, Place, in_quotes, plural, some
@@ -26,7 +26,7 @@ from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.filters import Biases
 from contextdb.motion.storage import stored
 from contextdb.motion.storage.build_inputs import Assets, Faults, Inputs, Tolerates
-from contextdb.motion.storage.clip_files import Extracted
+from contextdb.motion.storage.clip_files import Extracted, named_takes
 from contextdb.motion.storage.config import MotionConfig
 from contextdb.motion.storage.database_settings import DatabaseSettings
 from contextdb.motion.storage.extracting import Progress, extract_all
@@ -284,7 +284,7 @@ def _scale_faults(schema: str, normalisation: Normalisation) -> Iterator[Fault]:
 def _markup_faults(inputs: Inputs, markup: Markup, settings: DatabaseSettings, database: MotionDatabase) -> list[Fault]:
     """What of a markup does nothing: for no clip of the databases that share it, or for no frame of this one's."""
     sharing = [each for each in inputs.config.databases.values() if each.markup == settings.markup]
-    known = {path.stem for each in sharing for path in matching(inputs.root, each.clips)}
+    known = {name for each in sharing for name, _, _ in named_takes(each, inputs.root, inputs.config.file)}
     rate = inputs.config.features[settings.features].rate
     lengths = (database.stops - database.starts).tolist()
     durations_s = {asset: max(0, length - 1) / rate for asset, length in zip(database.assets, lengths, strict=True)}

@@ -1,4 +1,5 @@
-"""Draw the pictures of the documents: terminal sessions and screens of the editor, as SVG that loads nothing from the network.
+"""Draw the pictures of the documents: terminal sessions, screens of the editor and strips of poses, as SVG that loads nothing from
+the network.
 
     python docs/pictures.py [NAME...]
 
@@ -25,6 +26,7 @@ from drawing import Look, Run, Sheet, svg
 from screens import SCENES, Scene, draw_scene  # isort: skip - it says where tui is
 from debug_screens import DEBUG_SCENES, DebugScene, draw_debug_scene
 from slips import Slip, make
+from strips import STRIPS, Strip, draw_strip
 
 ROOT = Path(__file__).parent.parent
 FOLDER = Path(__file__).parent / "pictures"
@@ -52,7 +54,7 @@ class Picture:
     steps: tuple[str | Slip, ...]
 
 
-PICTURES: dict[str, Picture | Scene | DebugScene] = {
+PICTURES: dict[str, Picture | Scene | DebugScene | Strip] = {
     "session.svg": Picture(
         "A terminal: contextdb query lists the valid assets for a context and why the nearest others are not valid; "
         "contextdb check finds a misspelt cell and names its line and what was meant.",
@@ -64,11 +66,14 @@ PICTURES: dict[str, Picture | Scene | DebugScene] = {
     ),
     **SCENES,
     **DEBUG_SCENES,
+    **STRIPS,
 }
 
 
-def draw(picture: Picture | Scene | DebugScene) -> str:
+def draw(picture: Picture | Scene | DebugScene | Strip) -> str:
     """The picture as SVG."""
+    if isinstance(picture, Strip):
+        return draw_strip(picture, PAPER)
     with tempfile.TemporaryDirectory() as folder:
         shutil.copytree(ROOT / "tables", Path(folder) / "tables")
         if isinstance(picture, DebugScene):

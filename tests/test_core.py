@@ -1,8 +1,6 @@
 """The core in C, as Python has it: it compiles everywhere without a word, holds what it needs and no more, and refuses parts that
 do not go together."""
 
-from __future__ import annotations
-
 import gc
 import inspect
 import json
@@ -32,6 +30,7 @@ from test_c_rules import moments_of, ruled_table
 
 from contextdb.cells.facts import cell
 from contextdb.cells.kinds import KINDS
+from contextdb.cells.output_types import OUTPUT_TYPES
 from contextdb.compiled.core_table import TYPES, UNUSUAL
 from contextdb.compiled.matches import Answering, Matches
 from contextdb.compiled.table import CompiledTable, data_of
@@ -638,6 +637,10 @@ def test_a_damaged_file_with_a_right_digest_is_refused_or_answers_and_nothing_el
 
 
 def test_the_types_of_conditions_have_one_order_in_python_and_in_c():
-    enum = re.search(r"typedef enum cdb_type \{ (.*?) \}", (ROOT / "contextdb" / "core" / "types.h").read_text(encoding="utf-8"))
+    text = (ROOT / "contextdb" / "core" / "types.h").read_text(encoding="utf-8")
+    enum = re.search(r"typedef enum cdb_type \{ (.*?) \}", text)
+    names, of_outputs = re.findall(r"names\[\] = \{(.*?)\};", text)
     assert enum is not None
-    assert [f"CDB_{name.upper()}" for name in KINDS] == enum[1].split(", ")
+    assert enum[1].split(", ") == [f"CDB_{name.upper()}" for name in KINDS]
+    assert names.split(", ") == [f'"{name}"' for name in KINDS]
+    assert of_outputs.split(", ") == [f'"{name}"' for name in OUTPUT_TYPES]

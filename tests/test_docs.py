@@ -3,8 +3,6 @@
 `python tests/test_docs.py --update [FILES]` writes into them what the commands print now.
 """
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys
@@ -72,7 +70,7 @@ def test_the_settings_that_the_editors_page_shows_are_taken(tmp_path: Path):
     path.write_text("\n".join(lines[block.first : block.stop]), encoding="utf-8")
     settings = read_settings(path, EditorApp.theme_names())
     assert settings.theme == LIGHT
-    assert settings.keys == {"duplicate": "ctrl+w", "sort": "shift+f6,f10"}
+    assert settings.keys == {"duplicate": "ctrl+w", "sort": "f10"}
 
 
 if __name__ == "__main__" and sys.argv[1:2] == ["--update"]:

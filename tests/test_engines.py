@@ -9,15 +9,19 @@ import subprocess
 from datetime import date, timedelta
 from pathlib import Path
 
+import numpy as np
 import pytest
 from c_compilers import CXX, C, built, compiler_for, ran, sanitizers
 
 import contextdb as cdb
+from contextdb import motion
+from contextdb.cli import main as run_contextdb
 from contextdb.compiled.c_header import c_header_of
 from contextdb.compiled.engine_facts import csharp_of, godot_of, unreal_of
+from contextdb.motion.storage.c_header import c_motion_header
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
-LIBRARY = ["-fPIC", "-shared", "-fvisibility=hidden", "-O1"]
+LIBRARY = ["-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off", "-O0"]
 SCHEMA: dict[str, dict[str, object]] = {
     "gait": {"type": "enum", "values": ["Idle", "Walk", "Run"]},
     "speed": {"type": "number"},
@@ -94,8 +98,28 @@ def answers(compiled: cdb.CompiledTable, asked: list[dict[str, object]]) -> list
 def project(tmp_path: Path, request: pytest.FixtureRequest) -> Path:
     """The files of an example, with the header that it includes."""
     shutil.copytree(EXAMPLES / request.param, tmp_path, dirs_exist_ok=True)
-    (tmp_path / "tables.h").write_text(c_header_of({}), encoding="ascii")
+    (tmp_path / "contextdb_motion.h").write_text(c_motion_header(c_header_of({}, "CDB_MOTION_READER_H")), encoding="ascii")
     return tmp_path
+
+
+@pytest.fixture(scope="module")
+def square(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[str], bytes]:
+    """A bundle, and what a character of it plays in Python on a square, with all its poses."""
+    folder = tmp_path_factory.mktemp("square")
+    shutil.copytree(EXAMPLES / "web" / "tables", folder / "tables")
+    (folder / "tables" / "clips").mkdir()
+    motion.write_made_clips(folder / "tables" / "clips")
+    assert run_contextdb(["motion", "build", str(folder / "tables"), "--bundle", str(folder / "game.motion")]) == 0
+    character = motion.Character.of(cdb.Project.load(folder / "tables"), "player")
+    poses, played = [], []
+    for stick in [(0.0, 1.4), (1.4, 0.0), (0.0, -1.4), (-1.4, 0.0), (0.0, 0.0)]:
+        for _ in range(90):
+            updated = character.update(1.0 / 60.0, stick, {"gait": "Walk" if any(stick) else "Idle", "style": "normal"})
+            assert updated.pose is not None
+            assert updated.decision.playing is not None
+            poses.append(np.concatenate([*map(np.ravel, (updated.pose.root, updated.pose.rotations, updated.pose.positions))]))
+            played.append(updated.decision.playing.asset)
+    return folder / "game.motion", played, np.array(poses).tobytes()
 
 
 def needed(program: str, reason: str) -> str:
@@ -151,6 +175,19 @@ def test_godot_says_what_is_wrong(project: Path, contents: bytes | None, facts: 
     assert why in done.stderr + (project / "answers.jsonl").read_text(encoding="utf-8")
 
 
+@pytest.mark.parametrize("project", ["godot"], indirect=True)
+def test_in_godot_a_character_walks_a_square_as_in_python(project: Path, square: tuple[Path, list[str], bytes]):
+    godot = needed("godot3-server", "Debian's package of that name runs scripts without a screen")
+    built(project / "contextdb_godot.c", project / "libcontextdb.so", C, *LIBRARY)
+    bundle, played, poses = square
+    shutil.copyfile(bundle, project / "game.motion")
+    done = run(godot, "--path", ".", "-s", "walk.gd", cwd=project)
+    assert [line.split("|")[0] for line in (project / "poses.txt").read_text().splitlines()] == played, done.stderr
+    assert (project / "poses.bin").read_bytes() == poses
+    (project / "game.motion").write_bytes(b"CDBMOTN0")
+    assert "it is no bundle of motion" in run(godot, "--path", ".", "-s", "walk.gd", cwd=project).stderr
+
+
 @pytest.mark.parametrize("project", ["unity"], indirect=True)
 def test_mono_gives_the_rows_and_picks_of_python(project: Path):
     mono, compiler = needed("mono", "it runs C# as Unity does"), needed("mcs", "mono's compiler of C#")
@@ -180,6 +217,22 @@ def test_mono_gives_the_rows_and_picks_of_python(project: Path):
     done = run("env", f"LD_LIBRARY_PATH={project}", mono, "Play.exe", "moves.safetensors", "bad.txt", cwd=project)
     assert (done.returncode, done.stdout) == (1, "")
     assert "header" in done.stderr
+
+
+@pytest.mark.parametrize("project", ["unity"], indirect=True)
+def test_in_mono_a_character_walks_a_square_as_in_python(project: Path, square: tuple[Path, list[str], bytes]):
+    mono, compiler = needed("mono", "it runs C# as Unity does"), needed("mcs", "mono's compiler of C#")
+    built(project / "contextdb.c", project / "libcontextdb.so", C, *LIBRARY)
+    sources = "ContextTable.cs", "ContextCharacters.cs", "Walk.cs"
+    done = run(compiler, "-warnaserror", *sources, "-out:Walk.exe", cwd=project)
+    assert done.returncode == 0, done.stdout + done.stderr
+    bundle, played, poses = square
+    done = run("env", f"LD_LIBRARY_PATH={project}", mono, "Walk.exe", bundle, "poses.bin", cwd=project)
+    assert [line.split("|")[0] for line in done.stdout.splitlines()] == played, done.stderr
+    assert (project / "poses.bin").read_bytes() == poses
+    (project / "bad.motion").write_bytes(b"CDBMOTN0")
+    done = run("env", f"LD_LIBRARY_PATH={project}", mono, "Walk.exe", "bad.motion", "poses.bin", cwd=project)
+    assert (done.returncode, done.stderr) == (1, "it is no bundle of motion\n")
 
 
 # ---- facts as types of the engines

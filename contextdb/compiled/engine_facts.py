@@ -127,11 +127,11 @@ def _csharp_class(face: Face, values: Mapping[str, tuple[tuple[str, str], ...]])
     yield f"    /// <summary>The facts of the table {_xml(face.table)}: set them, then query the table.</summary>"
     yield f"    public sealed class {face.name}"
     yield "    {"
-    yield "        readonly ContextTable table;"
+    yield "        readonly ContextFacts table;"
     for fact in face.facts:
         yield f"        readonly int at{fact.name};"
     yield ""
-    yield f"        public {face.name}(ContextTable table)"
+    yield f"        public {face.name}(ContextFacts table)"
     yield "        {"
     yield "            this.table = table;"
     yield from (f"            at{fact.name} = table[{fact.text}];" for fact in face.facts)

@@ -27,22 +27,27 @@ static const cdbo_setting_record cdbo_alignment_settings[] = {
     {CDBO_MAX_STRIDE, "max_stride", CDBO_AS_IT_IS},
 };
 
-/* The turn and the stride that the game's velocity asks for; 0 and 1 where either body stands. */
+/* The turn and the stride that the game's velocity asks for; 0 and 1 where the clip stands. Where the game's body stands and the clip
+ * does not, as none that stands is valid, steps become steps on the spot: hips stay over the feet. */
 static inline void cdbo_warp_goal(const cdbo_posed *one, double *turn, double *stride)
 {
-    double left = one->given->rate * one->travel[0], ahead = one->given->rate * one->travel[1], own, game, x, z, limit, angle;
+    double left = one->given->rate * one->travel[0], ahead = one->given->rate * one->travel[1], own, game, x, z, limit, angle, least;
     double sway = one->travel[2] * cdbo_rotation_share(one);
     *turn = 0.0, *stride = 1.0;
     if (one->mode == CDBO_BY_ANIMATION) return;
     cdbo_velocity(one, &x, &z);
     own = cdbo_flat_length(left, ahead), game = cdbo_flat_length(x, z);
-    if (own < CDBO_LEAST_MPS || game < CDBO_LEAST_MPS) return;
-    angle = cdbo_remainder(cdbo_atan2(x, z) - (one->root[2] - sway) - cdbo_atan2(left, ahead));
-    if (cdbo_size(angle) > 0.5 * CDBO_PI) return;
-    limit = cdbo_set(one, CDBO_PATH_ALIGNMENT) != 0.0 ? cdbo_set(one, CDBO_ALIGNMENT_LIMIT) : 0.0;
-    *turn = cdbo_within(angle, -limit, limit);
-    if (one->mode != CDBO_BY_PATH)
-        *stride = cdbo_within(game / own, cdbo_set(one, CDBO_MIN_STRIDE), cdbo_set(one, CDBO_MAX_STRIDE));
+    if (own < CDBO_LEAST_MPS || *cdbo_column(one, CDBO_HAS_VELOCITY) == 0.0) return;
+    if (game >= CDBO_LEAST_MPS) {
+        angle = cdbo_remainder(cdbo_atan2(x, z) - (one->root[2] - sway) - cdbo_atan2(left, ahead));
+        if (cdbo_size(angle) > 0.5 * CDBO_PI) return;
+        limit = cdbo_set(one, CDBO_PATH_ALIGNMENT) != 0.0 ? cdbo_set(one, CDBO_ALIGNMENT_LIMIT) : 0.0;
+        *turn = cdbo_within(angle, -limit, limit);
+    }
+    if (one->mode == CDBO_BY_PATH) return;
+    least = cdbo_set(one, CDBO_MIN_STRIDE);
+    if (least < 1.0) least *= cdbo_least(game / CDBO_LEAST_MPS, 1.0);
+    *stride = cdbo_within(game / own, least, cdbo_set(one, CDBO_MAX_STRIDE));
 }
 
 /* Turn the joints that hang on the root about the vertical, and joint by joint of the spine, which hang on each other, a part of

@@ -143,7 +143,7 @@ static inline int cdbi_kind(const cdbi_json *about)
 static inline const char *cdbi_column(cdbi_opening *opening, cdb_column *column, size_t at, const cdbi_json *about)
 {
     cdb_type type = opening->schema->conditions[at].type;
-    int kind = cdbi_kind(about), is_number = type == CDB_INT || type == CDB_NUMBER || type == CDB_ANGLE || type == CDB_DATE;
+    int kind = cdbi_kind(about), is_number = cdbi_is_numeric(type);
     cdbi_json one = {NULL, NULL, NULL}, other = {NULL, NULL, NULL};
     column->kind = kind;
     if (kind == 0 || is_number != (kind == CDBI_FLAT || kind == CDBI_WIDE) || (type == CDB_TAGS) != (kind == CDBI_SLOTS))
@@ -168,12 +168,6 @@ static inline const char *cdbi_column(cdbi_opening *opening, cdb_column *column,
         cdbi_negated(opening, column, at, &other);
     }
     return one.why ? one.why : other.why;
-}
-
-static inline const char *cdbi_type_name(cdb_type type)
-{
-    static const char *const types[] = {"bool", "int", "number", "angle", "date", "enum", "text", "tags"};
-    return types[type];
 }
 
 /* Which condition of the schema this one of the file is, its type the same; n_conditions where it is none. */

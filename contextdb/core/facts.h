@@ -45,9 +45,9 @@ static inline cdb_fact cdbi_missing(const cdb_condition *condition)
 {
     cdb_fact fact;
     memset(&fact, 0, sizeof fact);
-    if (condition->type == CDB_NUMBER || condition->type == CDB_ANGLE || (condition->type == CDB_INT && condition->expr))
+    if (cdbi_is_double(condition->type) || (condition->type == CDB_INT && condition->expr))
         fact.number = cdb_missing_number();
-    else if (condition->type == CDB_INT || condition->type == CDB_DATE) fact.whole = CDB_MISSING_INT;
+    else if (cdbi_is_numeric(condition->type)) fact.whole = CDB_MISSING_INT;
     else if (condition->type == CDB_TAGS && condition->n_values == 0) fact.texts.count = CDB_MISSING;
     else if (condition->type == CDB_BOOL || condition->type == CDB_ENUM) fact.whole = CDB_MISSING;
     return fact;

@@ -183,7 +183,7 @@ static inline double cdbo_move_feet(cdbo_posed *one)
             cdbo_free(to, 0, toe);
         }
         down = cdbo_too_high(one->positions, leg, cdbo_get3(to + CDBO_DISPLAYED, 0), footing[1], footing[2], raised);
-        most = cdbo_most(most, cdbo_least(down, CDBO_MOST_LOWER_M));
+        most = cdbo_most(most, cdbo_least(down, to[CDBO_LOCKED] != 0.0 ? CDBO_MOST_LOWER_M : CDBO_REACH_M));
     }
     return most;
 }

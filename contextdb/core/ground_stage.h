@@ -20,10 +20,15 @@ static inline int cdbo_is_all_zero(const double *numbers, size_t n)
 static inline void cdbo_free_feet(cdbo_posed *one)
 {
     const cdbo_rig *rig = &one->poses->rig;
-    double more = *cdbo_column(one, CDBO_STRIDE) - 1.0, x, z, size;
+    double more = *cdbo_column(one, CDBO_STRIDE) - 1.0, x, z, size, sine, cosine;
     size_t foot;
     cdbo_velocity(one, &x, &z);
     size = cdbo_flat_length(x, z);
+    if (size < 1e-6) {
+        cdbo_sin_cos(one->root[2], &sine, &cosine);
+        x = cosine * one->travel[0] + sine * one->travel[1], z = cosine * one->travel[1] - sine * one->travel[0];
+        size = cdbo_flat_length(x, z);
+    }
     for (foot = 0; foot < rig->n_feet; foot++) {
         const int64_t *leg = rig->legs + 4 * foot;
         double *to = one->free + 3 * foot;
@@ -31,8 +36,8 @@ static inline void cdbo_free_feet(cdbo_posed *one)
         cdbo_set3(to, 0, cdbo_get3(one->positions, (size_t)leg[3]));
         if (more != 0.0 && size >= 1e-6) {
             double way_x = x / size, way_z = z / size, along;
-            cdbo_vector apart = cdbo_from(cdbo_get3(one->positions, (size_t)leg[0]), cdbo_get3(one->positions, (size_t)leg[2]));
-            along = more * (way_x * apart.x + way_z * apart.z);
+            cdbo_vector hip = cdbo_get3(one->positions, (size_t)leg[0]), ankle = cdbo_get3(one->positions, (size_t)leg[2]);
+            along = more * (way_x * (0.5 * (ankle.x + to[0]) - hip.x) + way_z * (0.5 * (ankle.z + to[2]) - hip.z));
             to[0] += along * way_x, to[2] += along * way_z;
         }
     }

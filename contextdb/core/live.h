@@ -89,7 +89,7 @@ CDB_API cdb_status cdb_set_whole(cdb_live *live, int at, int64_t value)
     if (!cdbi_is_given(live, at)) return CDB_WRONG_FACT;
     type = live->schema->conditions[at].type;
     memset(&fact, 0, sizeof fact);
-    if (type == CDB_NUMBER || type == CDB_ANGLE) fact.number = (double)value;
+    if (cdbi_is_double(type)) fact.number = (double)value;
     else fact.whole = value;
     if (type == CDB_TEXT || type == CDB_TAGS) return CDB_WRONG_FACT;
     if (!cdbi_is_missing(&live->schema->conditions[at], &fact) && cdbi_is_wrong(&live->schema->conditions[at], &fact)) return CDB_WRONG_FACT;
@@ -105,7 +105,7 @@ CDB_API cdb_status cdb_set_number(cdb_live *live, int at, double value)
     if (!cdbi_is_given(live, at)) return CDB_WRONG_FACT;
     if (cdbi_is_nan(value)) return cdb_set_missing(live, at);
     type = live->schema->conditions[at].type;
-    if (type != CDB_NUMBER && type != CDB_ANGLE) {
+    if (!cdbi_is_double(type)) {
         if (!cdbi_is_less(-9007199254740993.0, value) || !cdbi_is_less(value, 9007199254740993.0)) return CDB_WRONG_FACT;
         return cdbi_place((double)(int64_t)value) == cdbi_place(cdbi_sum(value, 0.0)) ? cdb_set_whole(live, at, (int64_t)value) : CDB_WRONG_FACT;
     }

@@ -82,7 +82,6 @@ static inline void cdbi_plays(cdbi_opening *opening, const cdbi_json *header)
 /* Find the outputs that the header reads among those that the file declares. */
 static inline void cdbi_outputs(cdbi_opening *opening, const cdbi_json *header)
 {
-    static const char *const types[] = {"bool", "int", "number", "enum", "text", "numbers"};
     const cdb_schema *schema = opening->schema;
     cdb_table *table = opening->table;
     size_t i, n;
@@ -102,7 +101,7 @@ static inline void cdbi_outputs(cdbi_opening *opening, const cdbi_json *header)
             cdbi_json name = cdbi_member(&json, "name"), type = cdbi_member(&json, "type"), size = cdbi_member(&json, "size");
             if (!cdbi_is(&name, wanted->name)) continue;
             why = "an output has another type, or another size, than this header reads";
-            if (!cdbi_is(&type, types[wanted->type])) break;
+            if (!cdbi_is(&type, cdbi_output_type_name(wanted->type))) break;
             if (wanted->type == CDB_OUT_NUMBERS && cdbi_whole(&size) != wanted->size) break;
             why = cdbi_take_output(opening, header, n - 1, wanted, &table->outputs[i]);
             status = CDB_BAD_FILE;

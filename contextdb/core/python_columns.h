@@ -73,7 +73,7 @@ static int cdbp_put_values(cdbp_coding *to, const int32_t *numbers, size_t start
 static int cdbp_put_facts(cdbp_coding *to, const cdbi_facts *facts, size_t start)
 {
     cdb_type type = to->own->conditions[to->at].type;
-    int is_number = type == CDB_INT || type == CDB_NUMBER || type == CDB_ANGLE || type == CDB_DATE, how = CDBP_READ;
+    int is_number = cdbi_is_numeric(type), how = CDBP_READ;
     int is_truth = facts->type == '?' || facts->type == 'b';
     double numbers[CDBI_CONTEXTS];
     int32_t values[CDBI_CONTEXTS];
@@ -146,7 +146,7 @@ static int32_t cdbp_value(const cdbp_coding *to, cdbp_seen *seen, PyObject *valu
 static int cdbp_put_items(cdbp_coding *to, PyObject *items, cdbp_frame *frame)
 {
     cdb_type type = to->own->conditions[to->at].type;
-    int is_number = type == CDB_INT || type == CDB_NUMBER || type == CDB_ANGLE || type == CDB_DATE, how = CDBP_READ;
+    int is_number = cdbi_is_numeric(type), how = CDBP_READ;
     cdbp_seen seen[CDBP_SEEN];
     double numbers[CDBI_CONTEXTS];
     int32_t values[CDBI_CONTEXTS];
@@ -164,8 +164,7 @@ static int cdbp_put_items(cdbp_coding *to, PyObject *items, cdbp_frame *frame)
             else {
                 how = cdbp_read_fact(frame, &to->own->schema, to->own->readers, to->at, value, to->own->unusual);
                 if (how == CDBP_MISSING) numbers[k] = cdb_missing_number();
-                else if (type == CDB_INT || type == CDB_DATE) numbers[k] = (double)frame->facts[to->at].whole;
-                else numbers[k] = frame->facts[to->at].number;
+                else numbers[k] = cdbi_is_double(type) ? frame->facts[to->at].number : (double)frame->facts[to->at].whole;
                 if (how == CDBP_MISSING) how = CDBP_READ;
             }
         }
@@ -263,7 +262,7 @@ static int cdbp_put_dictionary(cdbp_coding *to, const cdbi_facts *facts, const c
 static int cdbp_put_stream(cdbp_coding *to, cdbp_arrow_stream *stream)
 {
     cdb_type type = to->own->conditions[to->at].type;
-    int is_number = type == CDB_INT || type == CDB_NUMBER || type == CDB_ANGLE || type == CDB_DATE, how = CDBP_READ;
+    int is_number = cdbi_is_numeric(type), how = CDBP_READ;
     cdbp_arrow_schema schema;
     cdbp_arrow_array array;
     const char *format;

@@ -150,8 +150,7 @@ static int cdbp_column(cdbp_making *making, const cdb_condition *condition, PyOb
 {
     PyObject *arrays, *texts, *negated, *one, *two = NULL, *three = NULL, *four = NULL;
     const Py_ssize_t *shape, *other;
-    int kind, shift, is_number = condition->type == CDB_INT || condition->type == CDB_NUMBER || condition->type == CDB_ANGLE
-        || condition->type == CDB_DATE;
+    int kind, shift, is_number = cdbi_is_numeric(condition->type);
     if (cdbp_length(about) < 0 || !PyArg_ParseTuple(about, "iiOOO", &kind, &shift, &arrays, &texts, &negated)) return -1;
     if (cdbp_length(arrays) < 0 || !PyArg_ParseTuple(arrays, "O|OOO", &one, &two, &three, &four)) return -1;
     if (is_number != (kind == CDBI_FLAT || kind == CDBI_WIDE) || (condition->type == CDB_TAGS) != (kind == CDBI_SLOTS) || shift < 0

@@ -66,7 +66,6 @@ static inline const char *cdbi_add_condition(cdbi_opening *opening, cdb_schema *
 /* The outputs that the file declares. */
 static inline const char *cdbi_add_outputs(cdbi_opening *opening, cdb_schema *schema, const cdbi_json *header)
 {
-    static const char *const types[] = {"bool", "int", "number", "enum", "text", "numbers"};
     cdbi_json entry = cdbi_member(header, "outputs.declared"), json;
     cdbi_array array;
     cdb_output_wanted *outputs;
@@ -85,7 +84,7 @@ static inline const char *cdbi_add_outputs(cdbi_opening *opening, cdb_schema *sc
         cdbi_json name = cdbi_member(&json, "name"), size = cdbi_member(&json, "size"), values = cdbi_member(&json, "values"), kind;
         for (type = 0; type < 6; type++) {
             kind = cdbi_member(&json, "type");
-            if (cdbi_is(&kind, types[type])) break;
+            if (cdbi_is(&kind, cdbi_output_type_name((cdb_output_type)type))) break;
         }
         if (name.why || type == 6) return "an output has a type that is none";
         output->name = cdbi_kept_text(opening, &name);

@@ -70,6 +70,18 @@ typedef char cdbi_doubles_have_8_bytes[sizeof(double) == 8 ? 1 : -1];
 
 typedef enum cdb_type { CDB_BOOL, CDB_INT, CDB_NUMBER, CDB_ANGLE, CDB_DATE, CDB_ENUM, CDB_TEXT, CDB_TAGS } cdb_type;
 
+static inline const char *cdbi_type_name(cdb_type type)
+{
+    static const char *const names[] = {"bool", "int", "number", "angle", "date", "enum", "text", "tags"};
+    return names[type];
+}
+
+/* Whether facts of a type that are given are doubles. */
+static inline int cdbi_is_double(cdb_type type) { return type == CDB_NUMBER || type == CDB_ANGLE; }
+
+/* Whether the cells of a type are sets of numbers. */
+static inline int cdbi_is_numeric(cdb_type type) { return cdbi_is_double(type) || type == CDB_INT || type == CDB_DATE; }
+
 typedef enum cdb_unknown {          /* what a missing fact does */
     CDB_UNKNOWN_ERROR,              /* the query fails and names it */
     CDB_UNKNOWN_ANY,                /* its condition is passed over */
@@ -136,6 +148,12 @@ typedef struct cdb_condition {
 } cdb_condition;
 
 typedef enum cdb_output_type { CDB_OUT_BOOL, CDB_OUT_INT, CDB_OUT_NUMBER, CDB_OUT_ENUM, CDB_OUT_TEXT, CDB_OUT_NUMBERS } cdb_output_type;
+
+static inline const char *cdbi_output_type_name(cdb_output_type type)
+{
+    static const char *const names[] = {"bool", "int", "number", "enum", "text", "numbers"};
+    return names[type];
+}
 
 typedef struct cdb_output_wanted {  /* an output that the header reads */
     const char *name;

@@ -23,9 +23,11 @@ CASES_SUFFIX = ".cases.csv"
 """What the file of a table's saved contexts ends in: no table itself."""
 NOTES_SUFFIX = ".notes.csv"
 """What the file of the notes on a table ends in: no table itself, either."""
+GAPS_SUFFIX = ".gaps.csv"
+"""What the file of the work on a table's gaps ends in: no table."""
 ACTORS_SUFFIX = ".actors.json"
 """What the file of the actors for a table's roles ends in."""
-COMPANIONS = (SCHEMA_FILE, CASES_SUFFIX, NOTES_SUFFIX, ACTORS_SUFFIX)
+COMPANIONS = (SCHEMA_FILE, CASES_SUFFIX, NOTES_SUFFIX, GAPS_SUFFIX, ACTORS_SUFFIX)
 """The ends of the names of files that are found next to a table. Nobody types them, so they are always `inside`."""
 
 

@@ -31,6 +31,7 @@ from contextdb.edits.schema_file import require_declared_here
 from contextdb.errors import ContextDBError, Fault, FileError, Place, SchemaError, TableError, in_quotes, plural
 from contextdb.expressions.names import names_in, with_names
 from contextdb.files.texts import AnySource, read_texts, written_over
+from contextdb.tables.gap_work import GapWork, gaps_path, key_of
 from contextdb.tables.other_files import CASE_COLUMNS, cases_path
 from contextdb.tables.project import SCHEMA_FILE
 from contextdb.tables.table import Table
@@ -211,6 +212,7 @@ def rewritten_table(
     yield from rewritten(file.path, file.source, file.columns, columns)
     of_cases = {old: new for old, new in names.items() if old not in CASE_COLUMNS}
     yield from rewritten_contexts(file, lambda column: column.renamed(of_cases.get(column.name, column.name)))
+    yield from rewritten_gaps(file.path, lambda name, cell: (names.get(name, name), cell))
     yield from rewritten_notes(file.path, "Column", names)
     yield from rewritten_actors(file.path, names, roles)
 
@@ -223,6 +225,17 @@ def rewritten_contexts(file: TableFile, change: Callable[[TextColumn], TextColum
             after = [c if (changed := change(c)).name == c.name and changed.texts == c.texts else changed for c in columns]
             _require_free(path, after)
             yield from rewritten(path, source, columns, after)
+
+
+def rewritten_gaps(table: Path, change: Callable[[str, str], tuple[str, str]]) -> Iterator[Rewrite]:
+    """The work on a table's gaps with other conditions, or other cells of them."""
+    path = gaps_path(table)
+    if path.is_file():
+        raw = read_bytes(path)
+        lines = GapWork.of(raw, str(path)).lines
+        after = GapWork({key_of(dict(change(*cell) for cell in key)): work for key, work in lines.items()}).to_bytes()
+        if after != raw:
+            yield Rewrite(path, raw, after)
 
 
 def rewritten_notes(table: Path, column: str, names: Mapping[str, str]) -> Iterator[Rewrite]:

@@ -17,7 +17,7 @@ from contextdb.cells.words import quoted, says_any
 from contextdb.columns import TextColumn
 from contextdb.disk import real_path
 from contextdb.edits.project_files import ProjectFiles, Rewrite, TableFile
-from contextdb.edits.renaming import Renaming, extending, rewritten, rewritten_contexts, with_texts
+from contextdb.edits.renaming import Renaming, extending, rewritten, rewritten_contexts, rewritten_gaps, with_texts
 from contextdb.edits.schema_file import require_declared_here
 from contextdb.errors import ContextDBError, Fault, SchemaError, in_quotes, plural
 from contextdb.expressions.faults import Refusal
@@ -178,6 +178,7 @@ def _rewritten_table(file: TableFile, condition: str, old: str, new: str) -> Ite
         yield from rewritten_contexts(
             file, lambda c: with_texts(c, {text: with_value(text, old, new) for text in c.texts}) if c.name == condition else c
         )
+    yield from rewritten_gaps(file.path, lambda name, cell: (name, with_value(cell, old, new) if name == condition else cell))
 
 
 def _change(document: dict[str, Any], condition: str, old: str, new: str) -> None:

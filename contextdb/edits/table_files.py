@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from contextdb.cells.words import MARK
-from contextdb.disk import ACTORS_SUFFIX, CASES_SUFFIX, NOTES_SUFFIX, read_bytes, real_path, remove
+from contextdb.disk import ACTORS_SUFFIX, CASES_SUFFIX, GAPS_SUFFIX, NOTES_SUFFIX, read_bytes, real_path, remove
 from contextdb.disk.boundary import inside
 from contextdb.disk.together import NewFile, write_together
 from contextdb.edits.project_files import ProjectFiles, Rewrite, TableFile
@@ -21,7 +21,7 @@ from contextdb.errors import Fault, TableError, in_quotes, some
 from contextdb.schema.settings import EMPTY
 from contextdb.tables.project import read_folder_schema, table_files
 
-COMPANIONS = (CASES_SUFFIX, NOTES_SUFFIX, ACTORS_SUFFIX)
+COMPANIONS = (CASES_SUFFIX, NOTES_SUFFIX, GAPS_SUFFIX, ACTORS_SUFFIX)
 
 
 def copy_table(folder: Path, old: str, new: str) -> Path:

@@ -18,7 +18,6 @@ from contextdb.schema.shapes import BASE, COLUMN, EXPRESSIONS, FALLBACK, FILE, O
 
 AN_OUTPUT = "Columns that are data for the game. They are not conditions: they exclude no row."
 ASSUMED = "What is always so, such as: not (IsRunning and IsIdle). Coverage leaves out all other contexts."
-_POLICIES = " ".join(f'`"{name}"`: {kind.words}.' for name, kind in POLICIES.items())
 ANOTHER_TABLE = "[another table](designers.md#a-row-that-refers-to-a-table)"
 
 
@@ -72,7 +71,7 @@ class TableSettings(Declared, error=SchemaError):
     )  # fmt: skip
     policy: Policy = word(
         tuple(POLICIES), "What the game does when several rows are valid at once.", "collect", "policy", POLICY_SYNONYMS,
-        more=f"{_POLICIES} See [designers](designers.md#columns-that-are-not-conditions).", label="Policy",
+        more="See [designers](designers.md#columns-that-are-not-conditions).", label="Policy",
     )  # fmt: skip
     assume: tuple[str, ...] = setting(
         EXPRESSIONS, ASSUMED, (), more="A list of [expressions](#expressions).", without="none", label="Assumptions"

@@ -17,13 +17,14 @@ namespace ContextDB
         public ContextException(string message) : base(message) { }
     }
 
-    public sealed class ContextTable : IDisposable
+    /// <summary>The facts that a table is asked with: those of a ContextTable, or of one of ContextCharacters.</summary>
+    public class ContextFacts
     {
-        const string Library = "contextdb";
-        const int NameBytes = 96, Missing = -1;
+        internal const string Library = "contextdb";
+        const int NameBytes = 96;
 
         [StructLayout(LayoutKind.Sequential)]
-        struct Fault
+        internal struct Fault
         {
             public int Status;
             public IntPtr Reason;
@@ -31,45 +32,22 @@ namespace ContextDB
             [MarshalAs(UnmanagedType.ByValArray, SizeConst = NameBytes)] public byte[] Name;
         }
 
-        [DllImport(Library)] static extern IntPtr cdb_open_any(IntPtr bytes, UIntPtr size, out Fault fault);
-        [DllImport(Library)] static extern void cdb_close_any(IntPtr any);
-        [DllImport(Library)] static extern UIntPtr cdb_any_size(IntPtr any, int what);
         [DllImport(Library)] static extern IntPtr cdb_any_condition(IntPtr any, int at, out int type);
-        [DllImport(Library)] static extern IntPtr cdb_live_of(IntPtr any, int unknown, IntPtr memory);
         [DllImport(Library)] static extern int cdb_set_missing(IntPtr live, int at);
         [DllImport(Library)] static extern int cdb_set_whole(IntPtr live, int at, long value);
         [DllImport(Library)] static extern int cdb_set_number(IntPtr live, int at, double value);
         [DllImport(Library)] static extern int cdb_set_text(IntPtr live, int at, IntPtr value);
         [DllImport(Library)] static extern int cdb_set_tags(IntPtr live, int at, IntPtr tags, UIntPtr n);
-        [DllImport(Library)] static extern int cdb_live_query(IntPtr live, [Out] ulong[] rows, UIntPtr room, IntPtr fault);
-        [DllImport(Library)] static extern int cdb_live_query(IntPtr live, [Out] ulong[] rows, UIntPtr room, out Fault fault);
-        [DllImport(Library)] static extern int cdb_live_pick(IntPtr live, ulong[] rows, UIntPtr room, double time, IntPtr picker, out long row, out Fault fault);
-        [DllImport(Library)] static extern void cdb_start_picker(IntPtr picker, ulong seed, long who, UIntPtr memory, IntPtr rests, UIntPtr n);
-        [DllImport(Library)] static extern IntPtr cdb_asset_of(IntPtr table, long row);
-        [DllImport(Library)] static extern int cdb_asset_number(IntPtr table, long row);
-        [DllImport(Library)] static extern ulong cdb_digest(IntPtr picker);
 
-        readonly List<IntPtr> blocks = new List<IntPtr>();
         readonly Dictionary<string, int> places = new Dictionary<string, int>();
         readonly Dictionary<string, FactType> types = new Dictionary<string, FactType>();
-        readonly IntPtr[] held;
-        readonly string[] assets;
-        readonly ulong[] words;
-        IntPtr any, live, picker;
+        internal IntPtr live;
+        IntPtr[] held;
 
-        /// <summary>Opens a compiled file. Throws ContextException, with the reason, where it is refused.</summary>
-        public ContextTable(byte[] file, ulong seed = 0, long who = 0, int memory = 1)
+        internal void Take(IntPtr any, IntPtr facts, int n)
         {
-            Fault fault;
-            IntPtr bytes = Block(file.Length);
-            Marshal.Copy(file, 0, bytes, file.Length);
-            any = cdb_open_any(bytes, (UIntPtr)(uint)file.Length, out fault);
-            if (any == IntPtr.Zero)
-            {
-                Dispose();
-                throw new ContextException(Text(fault));
-            }
-            int n = Size(0);
+            live = facts;
+            held = new IntPtr[n];
             for (int at = 0; at < n; at++)
             {
                 int type;
@@ -78,25 +56,10 @@ namespace ContextDB
                 places[name] = at;
                 types[name] = (FactType)type;
             }
-            held = new IntPtr[n];
-            words = new ulong[Size(2)];
-            assets = new string[Size(1)];
-            for (int row = 0; row < assets.Length; row++) assets[row] = FromUtf8(cdb_asset_of(any, row));
-            live = cdb_live_of(any, 0, Block(Size(3)));
-            picker = Block(Size(4));
-            cdb_start_picker(picker, seed, who, (UIntPtr)(uint)memory, Block(Size(5) * 24), (UIntPtr)(uint)Size(5));
-        }
-
-        public static ContextTable Open(string path, ulong seed = 0)
-        {
-            return new ContextTable(File.ReadAllBytes(path), seed);
         }
 
         /// <summary>The facts that the table asks for, with their types.</summary>
         public IReadOnlyDictionary<string, FactType> Facts { get { return types; } }
-
-        /// <summary>The valid rows of the last query, one bit a row: bit r % 64 of word r / 64.</summary>
-        public ulong[] Words { get { return words; } }
 
         /// <summary>The number of a fact, to set it by: look it up once.</summary>
         public int this[string name]
@@ -136,6 +99,106 @@ namespace ContextDB
             }
             Hold(fact, cdb_set_tags(live, fact, block, (UIntPtr)(uint)tags.Count), block);
         }
+
+        void Hold(int fact, int status, IntPtr block)
+        {
+            if (status != 0)
+            {
+                Marshal.FreeHGlobal(block);
+                Require(fact, status);
+            }
+            if (held[fact] != IntPtr.Zero) Marshal.FreeHGlobal(held[fact]);
+            held[fact] = block;
+        }
+
+        void Require(int fact, int status)
+        {
+            if (status == 0) return;
+            foreach (var place in places)
+                if (place.Value == fact) throw new ContextException(place.Key + ": the fact is not one that the condition can have");
+            throw new ContextException("there is no fact number " + fact);
+        }
+
+        internal void Free()
+        {
+            for (int i = 0; held != null && i < held.Length; i++)
+            {
+                if (held[i] != IntPtr.Zero) Marshal.FreeHGlobal(held[i]);
+                held[i] = IntPtr.Zero;
+            }
+        }
+
+        internal static IntPtr ToUtf8(string text)
+        {
+            byte[] octets = Encoding.UTF8.GetBytes(text + "\0");
+            IntPtr block = Marshal.AllocHGlobal(octets.Length);
+            Marshal.Copy(octets, 0, block, octets.Length);
+            return block;
+        }
+
+        internal static string FromUtf8(IntPtr text)
+        {
+            if (text == IntPtr.Zero) return null;
+            int length = 0;
+            while (Marshal.ReadByte(text, length) != 0) length++;
+            byte[] octets = new byte[length];
+            Marshal.Copy(text, octets, 0, length);
+            return Encoding.UTF8.GetString(octets);
+        }
+
+        internal static string Text(Fault fault)
+        {
+            string name = Encoding.UTF8.GetString(fault.Name, 0, Math.Max(0, Array.IndexOf(fault.Name, (byte)0)));
+            return (name == "" ? "" : name + ": ") + FromUtf8(fault.Reason);
+        }
+    }
+
+    public sealed class ContextTable : ContextFacts, IDisposable
+    {
+        [DllImport(Library)] static extern IntPtr cdb_open_any(IntPtr bytes, UIntPtr size, out Fault fault);
+        [DllImport(Library)] static extern void cdb_close_any(IntPtr any);
+        [DllImport(Library)] static extern UIntPtr cdb_any_size(IntPtr any, int what);
+        [DllImport(Library)] static extern IntPtr cdb_live_of(IntPtr any, int unknown, IntPtr memory);
+        [DllImport(Library)] static extern int cdb_live_query(IntPtr live, [Out] ulong[] rows, UIntPtr room, IntPtr fault);
+        [DllImport(Library)] static extern int cdb_live_query(IntPtr live, [Out] ulong[] rows, UIntPtr room, out Fault fault);
+        [DllImport(Library)] static extern int cdb_live_pick(IntPtr live, ulong[] rows, UIntPtr room, double time, IntPtr picker, out long row, out Fault fault);
+        [DllImport(Library)] static extern void cdb_start_picker(IntPtr picker, ulong seed, long who, UIntPtr memory, IntPtr rests, UIntPtr n);
+        [DllImport(Library)] static extern IntPtr cdb_asset_of(IntPtr table, long row);
+        [DllImport(Library)] static extern int cdb_asset_number(IntPtr table, long row);
+        [DllImport(Library)] static extern ulong cdb_digest(IntPtr picker);
+
+        readonly List<IntPtr> blocks = new List<IntPtr>();
+        readonly string[] assets;
+        readonly ulong[] words;
+        IntPtr any, picker;
+
+        /// <summary>Opens a compiled file. Throws ContextException, with the reason, where it is refused.</summary>
+        public ContextTable(byte[] file, ulong seed = 0, long who = 0, int memory = 1)
+        {
+            Fault fault;
+            IntPtr bytes = Block(file.Length);
+            Marshal.Copy(file, 0, bytes, file.Length);
+            any = cdb_open_any(bytes, (UIntPtr)(uint)file.Length, out fault);
+            if (any == IntPtr.Zero)
+            {
+                Dispose();
+                throw new ContextException(Text(fault));
+            }
+            words = new ulong[Size(2)];
+            assets = new string[Size(1)];
+            for (int row = 0; row < assets.Length; row++) assets[row] = FromUtf8(cdb_asset_of(any, row));
+            Take(any, cdb_live_of(any, 0, Block(Size(3))), Size(0));
+            picker = Block(Size(4));
+            cdb_start_picker(picker, seed, who, (UIntPtr)(uint)memory, Block(Size(5) * 24), (UIntPtr)(uint)Size(5));
+        }
+
+        public static ContextTable Open(string path, ulong seed = 0)
+        {
+            return new ContextTable(File.ReadAllBytes(path), seed);
+        }
+
+        /// <summary>The valid rows of the last query, one bit a row: bit r % 64 of word r / 64.</summary>
+        public ulong[] Words { get { return words; } }
 
         /// <summary>Finds the valid rows for the facts as they are: see Words, IsValid and Rows.</summary>
         public void Query()
@@ -182,11 +245,7 @@ namespace ContextDB
             any = IntPtr.Zero;
             foreach (IntPtr block in blocks) Marshal.FreeHGlobal(block);
             blocks.Clear();
-            for (int i = 0; held != null && i < held.Length; i++)
-            {
-                if (held[i] != IntPtr.Zero) Marshal.FreeHGlobal(held[i]);
-                held[i] = IntPtr.Zero;
-            }
+            Free();
         }
 
         int Size(int what) { return (int)cdb_any_size(any, what); }
@@ -200,47 +259,5 @@ namespace ContextDB
             return block;
         }
 
-        void Hold(int fact, int status, IntPtr block)
-        {
-            if (status != 0)
-            {
-                Marshal.FreeHGlobal(block);
-                Require(fact, status);
-            }
-            if (held[fact] != IntPtr.Zero) Marshal.FreeHGlobal(held[fact]);
-            held[fact] = block;
-        }
-
-        void Require(int fact, int status)
-        {
-            if (status == 0) return;
-            foreach (var place in places)
-                if (place.Value == fact) throw new ContextException(place.Key + ": the fact is not one that the condition can have");
-            throw new ContextException("there is no fact number " + fact);
-        }
-
-        static IntPtr ToUtf8(string text)
-        {
-            byte[] octets = Encoding.UTF8.GetBytes(text + "\0");
-            IntPtr block = Marshal.AllocHGlobal(octets.Length);
-            Marshal.Copy(octets, 0, block, octets.Length);
-            return block;
-        }
-
-        static string FromUtf8(IntPtr text)
-        {
-            if (text == IntPtr.Zero) return null;
-            int length = 0;
-            while (Marshal.ReadByte(text, length) != 0) length++;
-            byte[] octets = new byte[length];
-            Marshal.Copy(text, octets, 0, length);
-            return Encoding.UTF8.GetString(octets);
-        }
-
-        static string Text(Fault fault)
-        {
-            string name = Encoding.UTF8.GetString(fault.Name, 0, Math.Max(0, Array.IndexOf(fault.Name, (byte)0)));
-            return (name == "" ? "" : name + ": ") + FromUtf8(fault.Reason);
-        }
     }
 }

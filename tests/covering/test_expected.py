@@ -1,7 +1,5 @@
 """Expected contexts: the share of them that has a valid row, and what to do for the rest."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

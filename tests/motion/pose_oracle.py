@@ -3,8 +3,6 @@
 What an update is given is taken as the pipeline hands it to the core. Velocities at seams are differences of poses a moment apart.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field, replace
 
@@ -221,15 +219,16 @@ def aligned(bank, settings, state, now, moment, given, root, dt, rotations, tran
     travel = (0.0, 0.0, 0.0) if moment is None else moment.travel
     velocity = np.zeros(2) if now.velocity is None else now.velocity
     own, game = given[5] * math.hypot(*travel[:2]), float(np.linalg.norm(velocity))
-    if abs(own) >= 0.2 and game >= 0.2:
+    if abs(own) >= 0.2 and now.velocity is not None:
         sign = math.copysign(1.0, given[5])
         share = {"mixed": given[9] * settings.rotation_weight, "animation": 1.0}.get(settings.root, 0.0)
         heading = root[2] - share * travel[2]
-        turn = remainder(math.atan2(*velocity) - heading - math.atan2(sign * travel[0], sign * travel[1]))
+        turn = remainder(math.atan2(*velocity) - heading - math.atan2(sign * travel[0], sign * travel[1])) if game >= 0.2 else 0.0
         if abs(turn) <= math.pi / 2.0:
             limit = math.radians(settings.alignment_limit_deg) if settings.path_alignment else 0.0
             turn = min(max(turn, -limit), limit)
-            stride = 1.0 if settings.root == "path" else min(max(game / abs(own), settings.min_stride), settings.max_stride)
+            least = settings.min_stride if settings.min_stride == 1.0 else settings.min_stride * min(game / 0.2, 1.0)
+            stride = 1.0 if settings.root == "path" else min(max(game / abs(own), least), settings.max_stride)
         else:
             turn = 0.0
     turn, stride = (
@@ -263,7 +262,7 @@ def stood(banks, settings, state, now, playing, contacts, root, ground, dt, rota
     if is_flat and now.stride[0] == 1.0 and state.lower == (0.0, 0.0) and not settings.foot_lock:
         return now
     positions, facings = world(rig, rotations, translations, root)
-    free = [free_place(leg, positions, now) for leg in legs]
+    free = [free_place(leg, positions, now, root[2], playing[1]) for leg in legs]
     if not is_flat:
         now = grounded(state, now, playing, contacts, root, ground, dt, free)
     clip = world(rig, state.rotations, bank.translations(state.positions), (0.0, 0.0, 0.0))[0]
@@ -277,7 +276,9 @@ def stood(banks, settings, state, now, playing, contacts, root, ground, dt, rota
         )
         foot = held(settings, state.feet[i], over, clip[leg[3], 1] + height, bool(contacts[i]), goes, most_accel, dt)
         feet.append(foot)
-        need = max(need, min(too_high(positions, leg, foot.displayed, slope, now.hips[0]), MOST_LOWER))
+        need = max(
+            need, min(too_high(positions, leg, foot.displayed, slope, now.hips[0]), REACH_M if foot.lock is None else MOST_LOWER)
+        )
     lower = come(state.lower, need, HIPS_HALFLIFE_S, dt)
     lower = (need, max(lower[1], 0.0)) if lower[0] < need else lower
     for top in tops_of(rig):
@@ -289,13 +290,15 @@ def stood(banks, settings, state, now, playing, contacts, root, ground, dt, rota
     return replace(now, feet=tuple(feet), lower=lower)
 
 
-def free_place(leg, positions, now):
-    """Where a toe is without a lock, moved along the way for steps of another length."""
-    speed = 0.0 if now.velocity is None else np.linalg.norm(now.velocity)
+def free_place(leg, positions, now, heading, moment):
+    """Where a toe is without a lock, moved along the way for steps of another length: that of a body that stands is its clip's."""
+    way = np.zeros(2) if now.velocity is None else np.asarray(now.velocity)
+    if np.linalg.norm(way) < 1e-6 and moment is not None:
+        way = np.array(turned(heading, moment.travel[:2]))
     toe = positions[leg[3]].copy()
-    if speed >= 1e-6:
-        way = now.velocity / speed
-        toe[[0, 2]] += (now.stride[0] - 1.0) * ((positions[leg[2]] - positions[leg[0]])[[0, 2]] @ way) * way
+    if np.linalg.norm(way) >= 1e-6:
+        way = way / np.linalg.norm(way)
+        toe[[0, 2]] += (now.stride[0] - 1.0) * (((positions[leg[2]] + toe) / 2.0 - positions[leg[0]])[[0, 2]] @ way) * way
     return toe
 
 

@@ -1,7 +1,5 @@
 """Feet that are down stay where they came down, and legs bend to them without growing."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 
@@ -247,3 +245,13 @@ def test_toes_that_stand_in_the_clip_slide_no_more_than_half_as_much_as_there():
 def test_legs_pull_the_hips_down_no_more_than_they_may():
     found = measure(streamed([("walk", 0.0, 120)], lambda t: (0.0, 0.4 * t, 0.0), root="code"), bank(), rate=RATE)
     assert found.hip_dip_cm < 12.0
+
+
+@pytest.mark.parametrize("root", ["mixed", "code"])
+def test_a_body_that_stands_while_its_clip_walks_steps_on_the_spot_with_its_hips_over_its_feet(root):
+    poses = streamed([("walk", 0.0, 210)], lambda t: (0.0, 1.3 * min(t, 1.0), 0.0), root=root)
+    legs = legs_of(RIG, bank().feet)
+    ways = [pose.positions[RIG.hips] - pose.positions[legs[:, 2:].ravel()].mean(axis=0) for pose in poses[120:]]
+    assert np.abs(np.array(ways)[:, [0, 2]]).mean(axis=0).max() < 0.03
+    assert math.dist(poses[-1].root[:2], (0.0, 1.3)) < 0.1
+    assert slides(poses[120:])[0].max() < 1e-6

@@ -1,7 +1,5 @@
 """The core's poses are those of an oracle that works one character out, one update after the other."""
 
-from __future__ import annotations
-
 import math
 import random
 from copy import copy
@@ -54,7 +52,8 @@ def play_of(rng, step):
     ticks = list(decisions(segments, step))
     cut = rng.randint(1, len(ticks) - 1)
     ticks = [*ticks[:cut], *[NOTHING] * rng.randint(0, 1), *ticks[cut + rng.randint(0, 5) :]]
-    weight, speed, turn, rate = rng.choice([1.0, 0.3]), rng.uniform(0.0, 3.0), rng.uniform(-3.0, 3.0), rng.uniform(-0.01, 0.02)
+    weight, speed, turn = rng.choice([1.0, 0.3]), rng.choice([0.0, 1.0, 2.0, 3.0]) * rng.random(), rng.uniform(-3.0, 3.0)
+    rate = rng.uniform(-0.01, 0.02)
     for i, decision in enumerate(ticks):
         place = (speed * math.sin(turn) * i * step, speed * i * step, turn * i * step)
         yield replace(decision, root_weight=weight, play_rate=1.0 + rate * i), place

@@ -44,7 +44,7 @@ class Measures:
         How much lower than in the source frame hips are at most.
     hips_off_feet_cm, lean_deg, lean_raw_deg : float
         From two seconds after each stop on: how far hips are at most, over the ground, from where the source frame has them over
-        its feet; how far the spine leans; and in the source frames.
+        its feet, on the mean of a second; how far the spine leans at most; and in the source frames.
     accel_p99, accel_raw_p99, accel_worst : float
         99 % of the accelerations of joints are lower, m/s², over steps of 1/30 s; those of all clips, and in the worst second.
     snap_share : float

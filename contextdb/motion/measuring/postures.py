@@ -160,8 +160,8 @@ def _shapes(it: Displayed, sources: list[int]) -> dict[str, object]:
 
 
 def _rest(it: Displayed, at: Ints, wanted: Floats | None) -> dict[str, object]:
-    """From two seconds after each stop on, the most that hips are from where their clips have them over the feet, and that the
-    spine leans."""
+    """From two seconds after each stop on, the most that hips are from where their clips have them over the feet, on the mean of a
+    second, as they swing over feet that step on the spot; and that the spine leans."""
     assert it.positions is not None
     assert it.roots is not None
     assert it.sources is not None
@@ -176,9 +176,19 @@ def _rest(it: Displayed, at: Ints, wanted: Floats | None) -> dict[str, object]:
     moments = [i for i, _ in pairs]
     displayed, raw = it.positions[moments], np.stack([clips.in_body[frame] for _, (clips, frame) in pairs])
     own = to_own_frame(body.over_feet(displayed), it.roots[moments, 2])
-    off = np.linalg.norm(own - body.over_feet(raw), axis=-1)
-    figures = 100.0 * off.max(), body.leans_deg(displayed).max(), body.leans_deg(raw).max()
+    off = _most_off(own - body.over_feet(raw), it.times_s[moments])
+    figures = 100.0 * off, body.leans_deg(displayed).max(), body.leans_deg(raw).max()
     return {name: float(value) for name, value in zip(REST, figures, strict=True)}
+
+
+def _most_off(offsets: Floats, times_s: Floats) -> float:
+    """The longest mean of offsets [T, 2] over a second of moments that follow each other, or over all of a shorter run."""
+    step = float(np.median(np.diff(times_s))) if len(times_s) > 1 else SECOND_S
+    runs = np.split(offsets, np.flatnonzero(np.diff(times_s) > 1.5 * step) + 1)
+    sums = [np.cumsum(np.vstack([np.zeros(2), run]), axis=0) for run in runs]
+    widths = [min(max(1, round(SECOND_S / step)), len(run)) for run in runs]
+    means = [(total[n:] - total[:-n]) / n for total, n in zip(sums, widths, strict=True)]
+    return float(np.linalg.norm(np.concatenate(means), axis=-1).max())
 
 
 def _standing(target: Floats, times_s: Floats) -> NDArray[np.bool_]:

@@ -23,8 +23,8 @@ def _halflife(about: str, default: float) -> Any:
     return number(about, default, LEAST_HALFLIFE_S, 60.0, "seconds")
 
 
-def _pull(about: str) -> Any:
-    return number(f"{about} A body that stands is not pulled.", 0.1, 0.0, 60.0, "seconds", note="0 is no pull")
+def _pull(about: str, default: float) -> Any:
+    return number(f"{about} A body that stands is not pulled.", default, 0.0, 60.0, "seconds", note="0 is no pull")
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,8 +52,8 @@ class PoseSettings(Declared, error=MotionError):
         "a share",
     )
     rotation_weight: float = number("Mixed: the share of the turning that comes from the animation.", 1.0, 0.0, 1.0, "a share")
-    position_pull_s: float = _pull("Mixed and path: the time in which half of the distance to the game's body is made up.")
-    rotation_pull_s: float = _pull("Mixed and path: the time in which half of the turn to the game's body is made up.")
+    position_pull_s: float = _pull("Mixed and path: the time in which half of the distance to the game's body is made up.", 0.1)
+    rotation_pull_s: float = _pull("Mixed and path: the time in which half of the turn to the game's body is made up.", 0.08)
     position_clamp_m: float = number(
         "Mixed and path: how far from the game's body the character may be.", 0.1, 0.0, 1000.0, "metres"
     )

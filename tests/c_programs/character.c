@@ -58,7 +58,7 @@ static void follow(const cdbm_player *player, size_t n, double dt_s, const memor
         uint8_t *packet = packets + i * CDBM_MOST_PACKET, n_bytes = (uint8_t)cdbm_pack(player, own->states + i * width, packet);
         copies->inputs[i] = own->inputs[i];
         copies->inputs[i].facts = NULL, copies->inputs[i].is_copy = 1, copies->inputs[i].packet = packet, copies->inputs[i].n_packet = n_bytes;
-        if (player->poses.settings[CDBO_ROOT] != CDBO_BY_ANIMATION)
+        if (player->poses.settings[CDBO_ROOT] != (double)CDBO_BY_ANIMATION)
             copies->inputs[i].body = (const cdbo_body *)(const void *)(own->states + i * width);
         write_all(out, &n_bytes, 1, 1);
         write_all(out, packet, 1, n_bytes);

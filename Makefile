@@ -94,6 +94,7 @@ bench:
 measure: $(VENV)/.bench
 	$(PY) benchmarks/query.py
 	$(PY) benchmarks/casting.py
+	$(PY) benchmarks/contracts.py
 	$(PY) benchmarks/reload.py
 	$(PY) benchmarks/live_link.py
 	$(PY) benchmarks/network.py

@@ -148,15 +148,19 @@ def announce_file(file: str, n_bytes: int) -> None:
         READING.info("reading %s, %.1f MB", printable(file), n_bytes / 1e6)
 
 
+def announce_very_large(file: str, n_bytes: int) -> None:
+    """Say the same where it is very large: clips of the usual size are read without a word."""
+    if n_bytes >= VERY_MANY_BYTES:
+        announce_file(file, n_bytes)
+
+
 @contextmanager
-def announced_while(file: str, n_bytes: int) -> Iterator[None]:
-    """Say that a file is read, where it is very large, and every few seconds for how long it has been."""
+def announced_while(file: str, start: float) -> Iterator[None]:
+    """Say every few seconds that a file is still read, and for how long since it was opened."""
     if not READING.isEnabledFor(logging.INFO):
         yield
         return
-    if n_bytes >= VERY_MANY_BYTES:
-        announce_file(file, n_bytes)
-    done, start = Event(), monotonic()
+    done = Event()
 
     def tell() -> None:
         while not done.wait(TELL_S):

@@ -54,6 +54,7 @@ SECTIONS = {
     "Autofill": ("AutofillDialog",),
     "Find in all tables": ("FindEverywhere",),
     "What changes": ("ChangesDialog",),
+    "Next picks": ("NextPicksDialog",),
     "Why, and nearest rows": ("NearestDialog",),
     "Actors": ("ActorsDialog",),
     "Contexts": ("ContextsDialog",),

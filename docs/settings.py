@@ -48,21 +48,23 @@ def page(text: str) -> str:
     """The page as it should be now."""
     return re.sub(
         r"(<!-- settings: (\w+) -->\n).*?(<!-- end -->)",
-        lambda part: f"{part[1]}{table(DECLARED[part[2]])}{part[3]}",
+        lambda part: f"{part[1]}{table(DECLARED[part[2]], part[2] != 'channels')}{part[3]}",
         text,
         flags=re.S,
     )
 
 
-def table(settings: Settings) -> str:
-    rows = "".join(f"| `{key}` | {_value(each)} | {_usual(each)} |\n" for key, each in settings.items())
+def table(settings: Settings, has_types: bool = True) -> str:
+    """The table of some settings; `has_types` where it says to which types a key belongs, and not another page."""
+    rows = "".join(f"| `{key}` | {_value(each, has_types)} | {_usual(each)} |\n" for key, each in settings.items())
     return f"\n| key | value | without it |\n| --- | --- | --- |\n{rows}\n"
 
 
-def _value(each: Setting) -> str:
+def _value(each: Setting, has_types: bool) -> str:
     words, bounds = each.shape.words, each.shape.bounds
     sentences = [each.about, words and f"One of {_listed(words)}.", bounds and f"{bounds[0].upper()}{bounds[1:]}.", each.more]
-    return " ".join(sentence for sentence in (*sentences, each.types and f"Of type {_listed(each.types)}.") if sentence)
+    types = has_types and each.types and f"Of type {_listed(each.types)}."
+    return " ".join(sentence for sentence in (*sentences, types) if sentence)
 
 
 def _usual(each: Setting) -> str:

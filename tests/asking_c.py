@@ -1,7 +1,5 @@
 """Asks artefacts through the C header and in Python: random tables and facts of every type, and the program `ask.c`."""
 
-from __future__ import annotations
-
 import math
 import os
 import random

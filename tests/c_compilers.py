@@ -1,7 +1,5 @@
 """Compiles the C programs of the tests with every compiler that is there, under its sanitizers where it has them."""
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import os

@@ -1,4 +1,4 @@
-"""Clips as files of other tools, written here as those tools write them: GLB, glTF, USDA and arrays; ASCII FBX is in an example.
+"""Clips as files of other tools, written here as those tools write them: GLB, glTF, USD and arrays; ASCII FBX is in an example.
 
 A `Moving` is a body as arrays, in metres with y up; each writer puts it into the unit and axis of its file.
 """
@@ -6,9 +6,15 @@ A `Moving` is a body as arrays, in metres with y up; each writer puts it into th
 from __future__ import annotations
 
 import base64
+import csv
 import json
 import struct
+import zlib
+from collections.abc import Iterator
+from contextlib import suppress
 from io import BytesIO
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -55,6 +61,56 @@ def amass(offsets: Floats | None = None) -> bytes:
     whole = BytesIO()
     np.savez(whole, **arrays, **({} if offsets is None else {"offsets": offsets}))
     return whole.getvalue()
+
+
+# ---- binary FBX
+
+ARRAYS = {"KeyTime": ("l", "<i8"), "KeyValueFloat": ("f", "<f4"), "KeyAttrFlags": ("i", "<i4"), "KeyAttrRefCount": ("i", "<i4")}
+"""Letter and type of the numbers of an array, by its name; the others are of floats."""
+
+
+def binary_fbx(text: bytes) -> bytes:
+    """Binary FBX 7.4 of an ASCII one of ours: its nodes, one after another, each with where it ends."""
+    out = bytearray(b"Kaydara FBX Binary  \0\x1a\0" + struct.pack("<I", 7400))
+    _binary_nodes((line.strip() for line in text.decode().split("\n")), out)
+    return bytes(out + bytes(13))
+
+
+def _binary_nodes(lines: Iterator[str], out: bytearray) -> None:
+    """The nodes up to the brace that closes them."""
+    for line in lines:
+        if line == "}":
+            return
+        if not line or line.startswith(";"):
+            continue
+        name, rest = line.split(":", 1)
+        opens = rest.endswith("{")
+        values = rest.removesuffix("{").strip()
+        if is_array := values.startswith("*"):
+            letter, dtype = ARRAYS.get(name, ("f", "<f4"))
+            raw = np.array(next(lines).removeprefix("a: ").split(","), np.float64).astype(dtype).tobytes()
+            packed = zlib.compress(raw)
+            parts = [letter.encode() + struct.pack("<III", int(values[1:]), 1, len(packed)) + packed]
+            assert next(lines) == "}"
+        else:
+            parts = [_binary_value(text) for text in next(csv.reader([values], skipinitialspace=True), [])]
+        start, properties = len(out), b"".join(parts)
+        out += struct.pack("<IIIB", 0, len(parts), len(properties), len(name)) + name.encode() + properties
+        if opens and not is_array:
+            _binary_nodes(lines, out)
+            out += bytes(13)
+        struct.pack_into("<I", out, start, len(out))
+
+
+def _binary_value(text: str) -> bytes:
+    try:
+        return b"L" + struct.pack("<q", int(text))
+    except ValueError:
+        with suppress(ValueError):
+            return b"D" + struct.pack("<d", float(text))
+    kind, _, name = text.rpartition("::")
+    raw = (f"{name}\0\1{kind}" if kind else text).encode()
+    return b"S" + struct.pack("<I", len(raw)) + raw
 
 
 # ---- glTF
@@ -153,6 +209,17 @@ def usda(body: Moving, *, metres_per_unit: float = 0.01, up: str = "y", referenc
         "    }\n}",
     ]
     return "\n".join([*lines, ""]).encode()
+
+
+def usdc(text: bytes) -> bytes:
+    """The same stage as a crate."""
+    from pxr import Sdf
+
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    layer.ImportFromString(text.decode())
+    with TemporaryDirectory() as folder:
+        layer.Export(f"{folder}/clip.usdc")
+        return Path(folder, "clip.usdc").read_bytes()
 
 
 def _tuple(numbers: Floats) -> str:

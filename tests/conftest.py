@@ -8,13 +8,12 @@ every run tries it. EXAMPLES=thorough draws 2,000 of each.
 Files of the tests are in memory where the machine has such a folder with room; TMPDIR=... says another place.
 """
 
-from __future__ import annotations
-
 import atexit
 import gc
 import os
 import random
 import shutil
+import signal
 import sys
 import tempfile
 from collections import Counter
@@ -49,6 +48,10 @@ def has_room(folder: Path) -> bool:
     disk = os.statvfs(folder)
     return disk.f_bavail * disk.f_frsize >= ROOM and not disk.f_flag & os.ST_NOEXEC
 
+
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    # A shell starts what runs behind it so, and the processes that a test starts and interrupts would inherit it.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 if "TMPDIR" not in os.environ and has_room(MEMORY):
     # Each save waits for the disk, for some milliseconds, and there are thousands of saves. The workers and all commands do so too.

@@ -1,7 +1,5 @@
 """CSV files for property tests, and a reader of them that is too simple to be wrong."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 

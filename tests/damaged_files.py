@@ -1,7 +1,5 @@
 """Compiled files, damaged in the ways in which files are damaged or made to harm."""
 
-from __future__ import annotations
-
 import json
 import random
 

@@ -14,8 +14,6 @@ a command, such as `COLUMNS=60`; and behind it `| grep TEXT`, `| head -3` and `|
 brackets under the output, with an `o` where 2 comes with standard output, and an `e` where another code comes with standard error.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import itertools

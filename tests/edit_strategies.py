@@ -1,7 +1,5 @@
 """Examples for property tests of edits: any edit that a person could make to a table."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from hypothesis import strategies as st

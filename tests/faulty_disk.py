@@ -1,7 +1,5 @@
 """A disk that fails at a call: every module that writes sees this in place of `os`. It counts the calls, and one of them fails."""
 
-from __future__ import annotations
-
 import errno
 import os
 from collections.abc import Callable, Iterator

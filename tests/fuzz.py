@@ -4,8 +4,6 @@ Each input is read in a process of its own kind, so that one that ends the proce
 written to tests/corpus/READER/, where `make test` reads it from then on. The same seed tries the same inputs in the same order.
 """
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import os

@@ -37,6 +37,7 @@ from contextdb.expressions import read_expression
 from contextdb.files.journal_lines import line_of
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.storage.stored import open_database, save_database
+from contextdb.tables.gap_work import gaps_path
 from contextdb.tables.other_files import notes_path
 from contextdb.telemetry.link.hearing import Hearing, Wanted
 from contextdb.telemetry.link.listeners import SocketListener
@@ -69,6 +70,7 @@ MARKS = (ROOT / "tables/clips/marks.csv").read_bytes()
 
 
 NOTES = b'Asset,Column,Note,Colour\njog,speed,"too, fast",red\nrun,,hm,#ff0000\n'
+GAP_WORK = b'State,Owner,hit,speed\nanimating,Ana,True,"(3..5]"\nopen,,,9..\n'
 UNFINISHED_RECORD = b'{"format":1,"files":[{"file":"t.csv","new":".contextdb-00000000-aa.tmp","is":"00","old":null,"was":"11"}]}'
 LINK = (
     b'{"line":"header","format":1,"game":"g","pid":1,"tables":{"t":{"version":"0"}}}\n'
@@ -243,6 +245,14 @@ def read_notes(path: Path) -> None:
     opened(path.parent / "t.csv")
 
 
+def read_gap_work(path: Path) -> None:
+    (path.parent / "t.csv").write_bytes(csv_table())
+    gaps = path.rename(gaps_path(path.parent / "t.csv"))
+    commanded("check", path.parent)
+    commanded("merge", gaps, gaps, gaps, "--path", "t.gaps.csv", "--out", path.parent / "merged")
+    commanded("coverage", path.parent / "t.csv")
+
+
 def read_unfinished(path: Path) -> None:
     (path.parent / "t.csv").write_bytes(csv_table())
     path.rename(path.parent / UNFINISHED)
@@ -278,6 +288,7 @@ ODD = ("a file", "empty", "folder", "link to nothing", "link to itself", "link t
 PROJECT = (
     "t.csv", "u.csv", "contextdb.toml", "t.cases.csv", "t.notes.csv", "t.actors.json", "t.safetensors", UNFINISHED,
     ".contextdb-journal", ".contextdb-journal/t.csv.journal", ".contextdb-journal/t.csv.lock", ".contextdb-cache", "clips",
+    "t.gaps.csv",
 )  # fmt: skip
 FOLDER_COMMANDS = (
     "", "check {0}", "coverage {0} --work 1000 --samples 100", "compile {0}", "query {0}/t.csv speed=1 --unknown any",
@@ -348,7 +359,13 @@ def read_expressions(path: Path) -> None:
 
 
 def read_clips(path: Path) -> None:
-    motion.load_clips([path])
+    """Each refusal names the file."""
+    try:
+        motion.load_clips([path])
+    except ContextDBError as error:
+        if not str(error).startswith(str(path)):
+            raise RuntimeError(f"the file is not named: {error}") from None
+        raise
 
 
 READERS: dict[str, Reader] = {
@@ -370,10 +387,13 @@ READERS: dict[str, Reader] = {
     "npz": Reader(".npz", lambda: [clip_files.amass(clip_files.SMPL_OFFSETS), clip_files.joints()], read_clips),
     "glb": Reader(".glb", lambda: [clip_files.gltf(clip_files.BODY)], read_clips),
     "fbx": Reader(".fbx", lambda: [clip_files.fbx(clip_files.BODY)], read_clips),
+    "fbx-binary": Reader(".fbx", lambda: [clip_files.binary_fbx(clip_files.fbx(clip_files.BODY))], read_clips),
     "usd": Reader(".usda", lambda: [clip_files.usda(clip_files.BODY)], read_clips),
+    "usdc": Reader(".usdc", lambda: [clip_files.usdc(clip_files.usda(clip_files.BODY))], read_clips),
     "gltf": Reader(".gltf", lambda: [clip_files.gltf(clip_files.BODY, binary=False)], read_clips),
     "marks": Reader(".csv", lambda: [MARKS], lambda path: Markup.load(path)),
     "notes": Reader(".csv", lambda: [NOTES], read_notes),
+    "gap-work": Reader(".csv", lambda: [GAP_WORK], read_gap_work),
     "unfinished": Reader(".json", lambda: [UNFINISHED_RECORD], read_unfinished),
     "merge-toml": Reader(".toml", lambda: [TOML.encode()], read_merged_toml),
     "link": Reader(".jsonl", lambda: [LINK, b'{"format":1,"every":true,"who":["a"],"tables":["t"],"trace":true}\n'], read_link),

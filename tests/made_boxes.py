@@ -1,7 +1,5 @@
 """Random boxes to count, and files of them for c_programs/count.c."""
 
-from __future__ import annotations
-
 import random
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The made clips, each computed once for all tests of a process; nobody can write into them."""
 
-from __future__ import annotations
-
 from functools import cache
 
 from contextdb.motion.made import recipes

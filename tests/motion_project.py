@@ -1,7 +1,5 @@
 """A project of made clips and a recorded session of it, made once in a process for tests of the commands and of the debugger."""
 
-from __future__ import annotations
-
 import atexit
 import shutil
 import tempfile

@@ -5,8 +5,6 @@ engine run until the first fails; the same seed draws the same mutations. Those 
 test is missing, the line is not needed, or the change means the same.
 """
 
-from __future__ import annotations
-
 import argparse
 import io
 import os

@@ -1,7 +1,5 @@
 """A folder of tables of which one stands in another, for tests."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 TOML = """

@@ -1,7 +1,5 @@
 """Tables inside tables for property tests, and what they answer, worked out row by row."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 

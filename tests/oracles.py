@@ -7,8 +7,6 @@ A fact is here as `contextdb.cells.facts` would have it: bool, float, str or fro
 values of a set-valued fact.
 """
 
-from __future__ import annotations
-
 import datetime
 import itertools
 import math

@@ -4,8 +4,6 @@ Tables are lists of rows with the meaning of their cells written out here; nothi
 is used, nor its chance.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction

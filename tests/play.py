@@ -1,7 +1,5 @@
 """The playground for tests: a copy of its tables with their clips, sticks, and an oracle of what may play."""
 
-from __future__ import annotations
-
 import atexit
 import shutil
 import tempfile

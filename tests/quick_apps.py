@@ -9,8 +9,6 @@ Every day they also paint only what a test looks at, and make styles and strips 
 Textual makes them.
 """
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import threading

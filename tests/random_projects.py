@@ -9,8 +9,6 @@ Python function of the same meaning. A context is one value of each condition; n
 that a text names and between each two, and only compared with constants, so that the contexts stand for all others.
 """
 
-from __future__ import annotations
-
 import csv
 import datetime
 import io

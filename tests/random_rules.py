@@ -1,7 +1,5 @@
 """Random rules and derived facts over conditions of every type, drawn from a `random.Random`: what expressions can say."""
 
-from __future__ import annotations
-
 import random
 from collections.abc import Callable, Mapping
 

@@ -1,7 +1,5 @@
 """Runs commands as a shell would, inside this process or in one of their own."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json

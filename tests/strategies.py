@@ -1,7 +1,5 @@
 """Examples for property tests: conditions, cells as people write them, tables, and facts close to where the answers change."""
 
-from __future__ import annotations
-
 import datetime
 import inspect
 import math

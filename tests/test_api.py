@@ -3,8 +3,6 @@
 `python tests/test_api.py --update` writes the signatures of the code into the first columns.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import inspect
 import re

@@ -1,7 +1,5 @@
 """Wrong arguments: no public call ends in an error that does not say what was wrong."""
 
-from __future__ import annotations
-
 import contextlib
 import operator
 import random

@@ -1,7 +1,5 @@
 """Artefacts: a table opened from its file answers as the table that was saved; any other file is refused with a reason."""
 
-from __future__ import annotations
-
 import errno
 import json
 import mmap

@@ -1,7 +1,5 @@
 """What is asked for and cannot be: each is refused with the place, what is accepted, and no traceback."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

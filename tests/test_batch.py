@@ -1,7 +1,5 @@
 """Many contexts at once: counts, hits and masks are those of one query after another, in every form that columns come in."""
 
-from __future__ import annotations
-
 import enum
 import math
 from bisect import bisect_right

@@ -1,7 +1,5 @@
 """Sets of rows as bits: the words, the integer and the list of rows say the same."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -17,12 +15,6 @@ def test_a_mask_has_a_word_for_every_64_rows(n_rows, n_words):
     assert bitmask.n_words(n_rows) == n_words
     assert bitmask.pack(np.ones(n_rows, np.bool_)).shape == (n_words,)
     assert bitmask.full(n_rows).shape == (n_words,)
-
-
-def test_row_r_is_bit_r_modulo_64_of_word_r_div_64():
-    words = bitmask.from_rows(np.array([0, 1, 63, 64, 129]), 130)
-    assert words.dtype == np.uint64
-    assert words.tolist() == [1 | 2 | 1 << 63, 1, 2]
 
 
 @given(FLAGS)

@@ -3,8 +3,6 @@
 `CONTEXTDB_BLENDER` names a Python that has `bpy` from PyPI; without it this one is tried.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """The core is built with any C compiler, with none, and without Python.h; a build that fails says what is missing."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

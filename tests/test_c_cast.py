@@ -1,7 +1,5 @@
 """The C header casts actors as Python does: the same rows, and the same actor in every role of every row."""
 
-from __future__ import annotations
-
 import random
 from pathlib import Path
 from typing import Any

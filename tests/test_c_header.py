@@ -1,7 +1,5 @@
 """The C header: its answers are Python's, no artefact makes it crash, and no name breaks it."""
 
-from __future__ import annotations
-
 import datetime
 import json
 import math

@@ -1,7 +1,5 @@
 """The live link in C: the same lines, by a program that never waits for who reads them."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """The C header reads the outputs of rows, and watches a compiled file that is replaced while the game runs."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

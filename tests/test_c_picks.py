@@ -1,7 +1,5 @@
 """The C header says what soft cells cost, why a row is not valid, which rows an asset has, and picks as Python does."""
 
-from __future__ import annotations
-
 import random
 from pathlib import Path
 

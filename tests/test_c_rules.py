@@ -1,7 +1,5 @@
 """The C header computes rules and derived facts as Python does, to the last bit that an answer depends on."""
 
-from __future__ import annotations
-
 import math
 import random
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Saved contexts and what is expected of them: read, kept, checked."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Actors cast for roles: against every assignment tried by hand, and what is refused."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import product
 
@@ -141,45 +139,6 @@ def test_every_valid_row_has_a_casting_and_every_other_a_reason(moment):
 
 def actor(kind, **more):
     return {"kind": kind, **more}
-
-
-def test_one_actor_offered_for_two_roles_plays_one():
-    compiled = table_of([{"Defender.kind": "a", "Receiver.kind": "a"}])
-    one = actor("a")
-    assert not compiled.query({"is_wet": True}, actors={"Defender": [one], "Receiver": [one]})
-    other = actor("a")
-    assert compiled.query({"is_wet": True}, actors={"Defender": [one], "Receiver": [other]})
-    same = actor("a", id=7)
-    assert not compiled.query({"is_wet": True}, actors={"Defender": [same], "Receiver": [dict(same)]})
-
-
-def test_the_better_actor_is_left_to_the_role_that_only_he_can_play():
-    compiled = table_of([{"Defender.kind": "a b", "Receiver.kind": "a"}])
-    near, far = actor("a", id="near", distance=1), actor("b", id="far", distance=9)
-    both = [near, far]
-    cast = compiled.query({"is_wet": True}, actors={"Defender": both, "Receiver": both}, prefer="distance").casting(0)
-    assert cast == {"Defender": far, "Receiver": near}
-
-
-def test_a_minus_prefers_the_highest_and_an_actor_without_the_fact_comes_last():
-    compiled = table_of([{"Defender.kind": "a"}])
-    offered = [actor("a", id=0), actor("a", id=1, speed=3), actor("a", id=2, speed=5)]
-    matches = compiled.query({"is_wet": True}, actors={"Defender": offered}, prefer="-speed")
-    assert [c["Defender"]["id"] for c in matches.castings(0)] == [2, 1, 0]
-    matches = compiled.query({"is_wet": True}, actors={"Defender": offered}, prefer=lambda role, a: abs(a["id"] - 1))
-    assert matches.casting(0)["Defender"]["id"] == 1
-
-
-def test_an_optional_role_that_nobody_fits_stays_empty_and_excludes_nothing():
-    compiled = table_of([{"Optional_Slots": "Judge", "Judge.kind": "c"}])
-    assert compiled.query({"is_wet": True}, actors={"Judge": [actor("a")]}).casting(0) == {}
-    assert set(compiled.query({"is_wet": True}, actors={"Judge": [actor("c")]}).casting(0)) == {"Judge"}
-
-
-def test_a_mandatory_role_must_be_filled_even_without_a_cell():
-    compiled = table_of([{"Mandatory_Slots": "Embed, Judge"}])
-    assert not compiled.query({"is_wet": True}, actors={})
-    assert compiled.query({"is_wet": True}, actors={"Judge": [actor("a")]})
 
 
 def test_a_role_whose_facts_are_given_as_plain_facts_is_not_cast():

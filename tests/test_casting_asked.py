@@ -1,7 +1,5 @@
 """Casting wherever a table is asked: live, many contexts, explained, with derived facts, soft cells, and from the command line."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

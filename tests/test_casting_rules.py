@@ -1,7 +1,5 @@
 """Rules over the facts of roles: against every casting tried one by one, each with the rule computed anew."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The grammar of a cell: every line of cells.csv, and what holds for any text and any cell."""
 
-from __future__ import annotations
-
 import csv
 import math
 import shlex

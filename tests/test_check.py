@@ -1,7 +1,5 @@
 """Checks: what a table alone shows to be wrong, each with its rule, level, row, asset, line, column and the rows that cause it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

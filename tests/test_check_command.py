@@ -1,7 +1,5 @@
 """`contextdb check`: findings in each format, and exit codes for CI."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from xml.etree import ElementTree

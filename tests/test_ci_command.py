@@ -1,7 +1,5 @@
 """`contextdb ci`: what it compares with what, its files, what it refuses; and that no change walks round its gates."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """Columns as masks: as few classes as the cells tell apart, and the same rows in either form of a number column."""
 
-from __future__ import annotations
-
 from unittest import mock
 
 import numpy as np

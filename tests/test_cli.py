@@ -1,7 +1,5 @@
 """The command line as a whole: help, misspellings, exit codes, and what goes to which stream."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

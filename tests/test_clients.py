@@ -1,7 +1,5 @@
 """Three small games, written from the pages: type checkers pass them at their strictest, and they run."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import os

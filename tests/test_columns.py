@@ -1,7 +1,5 @@
 """A column of texts: whatever is done to it, it reads like a list of texts, and the column before it stays as it was."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st

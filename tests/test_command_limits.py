@@ -1,7 +1,5 @@
 """`--max-memory` and `--max-time`: exit code 2 and one sentence, and nothing half-written."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """`contextdb compile`: an artefact for each table, where it was asked for, that answers as the table does."""
 
-from __future__ import annotations
-
 import errno
 import os
 from pathlib import Path

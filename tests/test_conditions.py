@@ -1,7 +1,5 @@
 """Conditions: what a column is taken for when nobody declared it, and the role that a name belongs to."""
 
-from __future__ import annotations
-
 import pytest
 
 from contextdb.cells.conditions import Condition

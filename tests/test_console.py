@@ -1,7 +1,5 @@
 """Text for a terminal: widths, columns, colour, and progress that never touches the data."""
 
-from __future__ import annotations
-
 import io
 import os
 import sys

@@ -1,8 +1,6 @@
 """The core in C, as Python has it: it compiles everywhere without a word, holds what it needs and no more, and refuses parts that
 do not go together."""
 
-from __future__ import annotations
-
 import gc
 import inspect
 import json

@@ -1,7 +1,5 @@
 """What `make fuzz` once found stays mended: every file of the corpus is read, or refused in words."""
 
-from __future__ import annotations
-
 import signal
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`contextdb coverage`: its JSON contract, its exit codes for every bar, its baseline, and what it says of bad use."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """An error of contextdb's own: exit code 70, and a report that says what and where, and nothing of the user's files."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """Conditions of type date, from contextdb.toml to each way to ask: one fact, columns, expressions, files and the editor."""
 
-from __future__ import annotations
-
 import datetime
 from datetime import date
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`contextdb demo`: what it prints is shown by the documents; here is what it keeps."""
 
-from __future__ import annotations
-
 import errno
 import re
 

@@ -1,7 +1,5 @@
 """Derived facts: computed from the others wherever a table is asked, never given."""
 
-from __future__ import annotations
-
 import json
 import math
 import pickle
@@ -152,14 +150,6 @@ WHOLE = {"speed": 6.0, "target_speed": 2.0, "heading": 88.0, "is_hurt": False}
 def test_a_table_asks_for_what_derived_facts_are_computed_from_and_not_for_them():
     assert list(compiled().asked) == ["is_hurt", "speed", "target_speed", "heading"]
     assert list(given_like_any_other().asked) == ["closing_speed", "steps", "turn", "gait", "is_hurt"]
-
-
-def test_facts_derived_from_derived_facts_are_computed_in_order_whatever_the_order_they_are_declared_in():
-    chain = {f"c{i}": Condition(f"c{i}", NUMBER, expr=f"c{i + 1} + 1") for i in range(500)}
-    derivation = derive({**chain, "c500": Condition("c500", NUMBER)})
-    assert derivation.complete({"c500": 1.0})["c0"] == 501.0
-    assert derivation.complete_frame({"c500": [1.0]}, 1)["c0"].tolist() == [501.0]
-    assert [c.name for c in derivation.only(["c499"]).conditions] == ["c500", "c499"]
 
 
 @pytest.mark.parametrize("ask", ["query", "explain", "pick", "penalties"])

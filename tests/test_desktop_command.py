@@ -1,7 +1,5 @@
 """`contextdb desktop`: a file for the desktop of this user, and nothing else."""
 
-from __future__ import annotations
-
 import configparser
 import shlex
 import sys

@@ -1,7 +1,5 @@
 """What changed between two tables: rows by asset, cells by meaning, and an edit that does it all."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from time import process_time
 

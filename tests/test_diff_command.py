@@ -1,7 +1,5 @@
 """`contextdb diff`: what changed between two tables, in words, as Markdown and as JSON, with an exit code for scripts."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

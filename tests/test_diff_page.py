@@ -1,7 +1,5 @@
 """The page of `contextdb diff`: cells, meaning, contracts and recorded moments, with nothing that a table could make markup of."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

@@ -1,7 +1,5 @@
 """Searches of a recorded session repeated with both versions of a table."""
 
-from __future__ import annotations
-
 import pytest
 from motion_project import session_folder, work_in_copy
 from running import run

@@ -3,8 +3,6 @@
 `python tests/test_docs.py --update [FILES]` writes into them what the commands print now.
 """
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

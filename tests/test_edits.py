@@ -1,7 +1,5 @@
 """Edits as data and their history: undo and redo give the same bytes, also past a save."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

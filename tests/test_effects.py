@@ -1,7 +1,5 @@
 """What a change does to contexts: by asset, in gaps and in rows, held against trying every context."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import pytest

@@ -9,15 +9,19 @@ import subprocess
 from datetime import date, timedelta
 from pathlib import Path
 
+import numpy as np
 import pytest
 from c_compilers import CXX, C, built, compiler_for, ran, sanitizers
 
 import contextdb as cdb
+from contextdb import motion
+from contextdb.cli import main as run_contextdb
 from contextdb.compiled.c_header import c_header_of
 from contextdb.compiled.engine_facts import csharp_of, godot_of, unreal_of
+from contextdb.motion.storage.c_header import c_motion_header
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
-LIBRARY = ["-fPIC", "-shared", "-fvisibility=hidden", "-O1"]
+LIBRARY = ["-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off", "-O0"]
 SCHEMA: dict[str, dict[str, object]] = {
     "gait": {"type": "enum", "values": ["Idle", "Walk", "Run"]},
     "speed": {"type": "number"},
@@ -94,7 +98,10 @@ def answers(compiled: cdb.CompiledTable, asked: list[dict[str, object]]) -> list
 def project(tmp_path: Path, request: pytest.FixtureRequest) -> Path:
     """The files of an example, with the header that it includes."""
     shutil.copytree(EXAMPLES / request.param, tmp_path, dirs_exist_ok=True)
-    (tmp_path / "tables.h").write_text(c_header_of({}), encoding="ascii")
+    if request.param == "godot":
+        (tmp_path / "contextdb_motion.h").write_text(c_motion_header(c_header_of({}, "CDB_MOTION_READER_H")), encoding="ascii")
+    else:
+        (tmp_path / "tables.h").write_text(c_header_of({}), encoding="ascii")
     return tmp_path
 
 
@@ -149,6 +156,28 @@ def test_godot_says_what_is_wrong(project: Path, contents: bytes | None, facts: 
     (project / "moments.jsonl").write_text(json.dumps(facts) + "\n", encoding="utf-8")
     done = run(godot, "--path", ".", "-s", "main.gd", cwd=project)
     assert why in done.stderr + (project / "answers.jsonl").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("project", ["godot"], indirect=True)
+def test_in_godot_a_character_walks_a_square_as_in_python(project: Path):
+    godot = needed("godot3-server", "Debian's package of that name runs scripts without a screen")
+    built(project / "contextdb_godot.c", project / "libcontextdb.so", C, *LIBRARY)
+    shutil.copytree(EXAMPLES / "web" / "tables", project / "tables")
+    (project / "tables" / "clips").mkdir()
+    motion.write_made_clips(project / "tables" / "clips")
+    assert run_contextdb(["motion", "build", str(project / "tables"), "--bundle", str(project / "game.motion")]) == 0
+    done = run(godot, "--path", ".", "-s", "walk.gd", cwd=project)
+    character = motion.Character.of(cdb.Project.load(project / "tables"), "player")
+    poses, played = [], []
+    for stick in [(0.0, 1.4), (1.4, 0.0), (0.0, -1.4), (-1.4, 0.0), (0.0, 0.0)]:
+        for _ in range(90):
+            updated = character.update(1.0 / 60.0, stick, {"gait": "Walk" if any(stick) else "Idle", "style": "normal"})
+            poses.append(np.concatenate([*map(np.ravel, (updated.pose.root, updated.pose.rotations, updated.pose.positions))]))
+            played.append(updated.decision.playing.asset)
+    assert [line.split("|")[0] for line in (project / "poses.txt").read_text().splitlines()] == played, done.stderr
+    assert (project / "poses.bin").read_bytes() == np.array(poses).tobytes()
+    (project / "game.motion").write_bytes(b"CDBMOTN0")
+    assert "it is no bundle of motion" in run(godot, "--path", ".", "-s", "walk.gd", cwd=project).stderr
 
 
 @pytest.mark.parametrize("project", ["unity"], indirect=True)

@@ -1,7 +1,5 @@
 """Errors: what built-in ones they are, that their text is ours, and that they travel between processes."""
 
-from __future__ import annotations
-
 import copy
 import errno
 import pickle

@@ -1,7 +1,5 @@
 """`contextdb evaluate`: every context of a file or a glob, with the sums that asking one context at a time gives."""
 
-from __future__ import annotations
-
 import os
 import stat
 import subprocess

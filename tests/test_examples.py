@@ -1,7 +1,5 @@
 """What property tests draw: the same examples from one seed, others from another, and what failed once first."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Explanations: which cells of which rows fail, what is nearest, and what to change; held to reading every cell."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 from unittest import mock
@@ -292,14 +290,6 @@ def test_for_an_empty_answer_the_nearest_rows_tell_the_one_or_two_cells_to_chang
         (0, [("speed", "3..7")]),
         (2, [("state", "Ground Air")]),
     ]
-
-
-def test_the_nearest_rows_leave_out_valid_ones_and_are_as_many_as_there_are():
-    explanation = PLAYS.explain({"state": "Air", "speed": 2})
-    assert [(r.row, r.is_valid) for r in explanation] == [(1, True), (2, True), (3, False), (0, False)]
-    assert [r.row for r in explanation.nearest()] == [3, 0]
-    assert [r.row for r in explanation.nearest(1)] == [3]
-    assert explanation.nearest(0) == []
 
 
 def test_rows_are_asked_for_by_number_and_by_asset():

@@ -1,7 +1,5 @@
 """`contextdb export`: the suffix says the format, a file that is there stays, standard output gets the bytes alone."""
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
 

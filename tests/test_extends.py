@@ -1,7 +1,5 @@
 """`[project] extends`: the conditions and blueprints of another project, found inside the repository, through no link."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 

@@ -1,7 +1,5 @@
 """The names of `contextdb` itself: the same for the interpreter, for type checkers and in `dir`."""
 
-from __future__ import annotations
-
 import ast
 import importlib
 

@@ -1,7 +1,5 @@
 """Facts: what a game may give, what it is taken for, and what is said of what cannot be taken."""
 
-from __future__ import annotations
-
 import enum
 import math
 from decimal import Decimal

@@ -3,8 +3,6 @@
 Each command runs once to count its calls, then once for each of them on a disk where that call fails.
 """
 
-from __future__ import annotations
-
 import ast
 import os
 import re

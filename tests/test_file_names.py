@@ -1,7 +1,5 @@
 """Files whose names differ in Unicode form or capitals alone, and names that Windows keeps for itself."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

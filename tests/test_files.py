@@ -1,7 +1,5 @@
 """The disk: whole files or a message that says what to do, also when the disk is full or the process is killed."""
 
-from __future__ import annotations
-
 import errno
 import os
 import signal

@@ -1,7 +1,5 @@
 """Answers, tables and gaps as DataFrames."""
 
-from __future__ import annotations
-
 import polars as pl
 
 import contextdb as cdb

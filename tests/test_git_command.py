@@ -1,7 +1,5 @@
 """`contextdb git`: a real repository whose merges, rebases and diffs go cell by cell once one command has been run."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import sys

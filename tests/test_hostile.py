@@ -1,7 +1,5 @@
 """Hostile input at the command line: each gives a message that says where and what, an exit code, and never a traceback."""
 
-from __future__ import annotations
-
 import errno
 import os
 import random

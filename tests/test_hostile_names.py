@@ -1,7 +1,5 @@
 """Hostile names and arguments at the command line: they are printed without harm, kept in the data, and never a traceback."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Answers for what plays already: each holds the rows whose cells, widened, accept the facts; every other answer is exact."""
 
-from __future__ import annotations
-
 import math
 import pickle
 from dataclasses import replace

@@ -91,8 +91,23 @@ def test_numbers_with_a_comma_in_a_workbook_are_told_by_column_and_become_decima
     assert '"name": ' not in result.err
     again = run("import", "m.xlsx", "game/m.csv", "--force", "--decimal", "comma")
     assert "read as centre and tolerance" not in again.err
-    assert 'decimal commas became points: "0,5" is now "0.5".' in again.err
+    assert 'column "Speed": decimal commas became points: "0,5" is 0.5 in rows 1, 3, "1,8" is 1.8 in row 2.' in again.err
     assert Project.load(here / "game")["m"].text_column("speed").to_list() == ["0.5", "1.8", "0.5"]
+
+
+def test_the_next_file_of_that_name_is_imported_as_the_last_one_when_asked(here: Path):
+    rows = (["Clip", "Speed", "Level min", "Level max"], ["jog", "0,5", "1", "2"], ["run", "1,8", "2", "3"])
+    workbook(here / "moves_W12.xlsx", *rows)
+    workbook(here / "moves_W13.xlsx", *rows, ["hop", "2,5", "3", "4"])
+    assert "nothing was chosen for" in refused("moves_W12.xlsx", "game/m.csv", "--again")
+    assert run("import", "moves_W12.xlsx", "game/m.csv", "--sheet", "A1:D2", "--decimal", "comma", "--map", "Level max=").code == 0
+    assert run("import", "moves_W13.xlsx", "game/m.csv", "--force", "--again").code == 0
+    table = Project.load(here / "game")["m"]
+    assert [(c.name, c.to_list()) for c in table.columns] == [
+        ("Clip", ["jog", "run", "hop"]),
+        ("speed", ["0.5", "1.8", "2.5"]),
+        ("Level min", ["1", "2", "3"]),
+    ]
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes as POSIX has them")

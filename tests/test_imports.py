@@ -1,7 +1,5 @@
 """What `import contextdb` loads: a game's tools start it often, so it stays light."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from graphlib import TopologicalSorter

@@ -1,7 +1,5 @@
 """Ctrl+C in the middle of long work, as a shell sends it to a process: the command ends soon, and says no more than that."""
 
-from __future__ import annotations
-
 import os
 import random
 import signal

@@ -1,7 +1,5 @@
 """Unions of intervals: every operation against what it does to single numbers, at the bounds and the doubles beside them."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

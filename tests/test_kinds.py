@@ -1,7 +1,5 @@
 """The table of condition types: that code asks it, and that every type has an entry in every table about types."""
 
-from __future__ import annotations
-
 import ast
 import pickle
 import re

@@ -1,7 +1,5 @@
 """The pages of docs/ and README.md: links lead somewhere, and what a page lists is what there is."""
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """A live context: after any sequence of changes it answers what a fresh query of the same facts does."""
 
-from __future__ import annotations
-
 import math
 import random
 from collections.abc import Callable

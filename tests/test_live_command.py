@@ -1,7 +1,5 @@
 """`contextdb live`: what a game in another process asks and picks."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

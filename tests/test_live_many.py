@@ -1,7 +1,5 @@
 """The facts of a crowd: after any changes the answers are those of `query_many` for the columns as they are."""
 
-from __future__ import annotations
-
 import random
 from functools import partial
 from typing import Any

@@ -1,7 +1,5 @@
 """Which packages of others each command loads: what only the editor or only workbooks need is loaded for them alone."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The answer to a query: numbers, assets and bits of the same rows."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

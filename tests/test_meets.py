@@ -1,7 +1,5 @@
 """What two sets have in common, against asking both of every value there is."""
 
-from __future__ import annotations
-
 from itertools import chain, combinations, product
 
 import pytest

@@ -1,7 +1,5 @@
 """Two sides of one table made one: cell by cell, rows and columns where both put them, and what they disagree about as data."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`contextdb merge`: three files made one, conflicts between git's marks, and a real repository with the driver installed."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Answers in a mirror: each is the answer to the facts as a mirror shows them, mirrored here one by one."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 import random

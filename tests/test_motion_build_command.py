@@ -1,7 +1,5 @@
 """`contextdb motion build`: saves a database for each section, computes only what changed, and tells what it passed over."""
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import io

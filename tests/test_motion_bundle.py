@@ -1,7 +1,5 @@
 """`contextdb motion build --bundle` and `contextdb compile --c-motion`: what a game in C takes, and what is refused."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`contextdb motion check` tells all that is wrong with clips, markup and settings, once; `contextdb motion bones` shows rigs."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`contextdb motion coverage` on made clips: its formats tell the same numbers, its bars hold, wrong use is refused."""
 
-from __future__ import annotations
-
 import json
 import re
 from html.parser import HTMLParser

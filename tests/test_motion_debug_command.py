@@ -1,7 +1,5 @@
 """`contextdb motion debug`: what it refuses, each with a sentence; the screen itself is tested in tests/tui."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable
 from pathlib import Path

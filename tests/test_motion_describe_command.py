@@ -1,7 +1,5 @@
 """`contextdb motion describe` writes a table that checks, builds and drives; fills one that is there; tells where clips differ."""
 
-from __future__ import annotations
-
 import csv
 import os
 import shutil

@@ -1,7 +1,5 @@
 """`contextdb motion measure` on a recorded session: its JSON, its bars, a baseline, and what it cannot measure."""
 
-from __future__ import annotations
-
 import json
 import math
 import shutil

@@ -1,7 +1,5 @@
 """`contextdb motion prepare` shows a diff that applies and is taken back, writes only when asked, and keeps what is there."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

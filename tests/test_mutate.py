@@ -1,7 +1,5 @@
 """`make mutate` draws changes of the engines that read, the same for a seed."""
 
-from __future__ import annotations
-
 import ast
 import random
 

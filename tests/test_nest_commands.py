@@ -1,7 +1,5 @@
 """Tables inside tables: what commands print of them, and edits, hot reload and motion searches."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Tables inside tables in a folder: how their rows are named and picked, what is refused and where, and what a check finds."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Tables inside tables: what is asked of the outer table is what its rows and the rows inside them answer, one by one."""
 
-from __future__ import annotations
-
 import math
 import random
 from itertools import combinations, pairwise

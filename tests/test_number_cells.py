@@ -1,7 +1,5 @@
 """Number cells read all at once: the same doubles, cells, types and masks as one by one."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 from unittest import mock

@@ -1,7 +1,5 @@
 """Every option of every command: what holds when it is not given is what its help says, and no two options disagree about it."""
 
-from __future__ import annotations
-
 import argparse
 import re
 from collections.abc import Iterator
@@ -18,7 +16,7 @@ COMPUTED = {
     "contextdb, or the Python that runs now", "as recorded", "whole, except in our own workbooks", "from the settings",
     "200,000, fewer above 500 conditions", "as the project says, else by size", "as the project says, else in which bodies stand",
     "as the project says, else that",
-    "the first that decides", "the nearest with a .git",
+    "joined", "the first that decides", "the nearest with a .git",
 }  # fmt: skip
 """What is worked out by the command: the parsed value is then None."""
 

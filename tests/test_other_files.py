@@ -1,7 +1,5 @@
 """Files beside the tables that are no tables break no command, and a declared table is always a table."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Outputs are read by row as they were written: in memory, out of a compiled file, pickled, for many contexts, through tables."""
 
-from __future__ import annotations
-
 import json
 import math
 import pickle

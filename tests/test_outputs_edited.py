@@ -1,7 +1,5 @@
 """Outputs through edits: contextdb.toml says what the table says, in whichever form it is written, and types follow columns."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Parquet: values to texts that mean the same, and back to the types they had."""
 
-from __future__ import annotations
-
 import io
 from datetime import date, datetime, time
 from decimal import Decimal

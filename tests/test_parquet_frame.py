@@ -1,7 +1,5 @@
 """Parquet files that are damaged: refused before polars decodes them, and every altered bit of our own found."""
 
-from __future__ import annotations
-
 import io
 import subprocess
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """Picks: one asset of the valid ones, by policy, priority and row weight, and not the one picked last."""
 
-from __future__ import annotations
-
 import gc
 import pickle
 import random
@@ -46,17 +44,6 @@ ABC = table_of("collect", ("a", "True"), ("b", "Any"), ("c", "True"), ("d", "Fal
 # ---- policies
 
 
-def test_first_picks_the_first_valid_row_of_the_file():
-    table = table_of("first", ("a", "False"), ("b", "True", "0", "0"), ("c", "Any", "9", "9"))
-    assert set(picks(table, 5)) == {"b"}
-    assert table.pick({"x": False}) == "a"
-
-
-def test_unique_picks_the_only_valid_row():
-    table = table_of("unique", ("a", "True"), ("b", "False"))
-    assert (table.pick({"x": True}), table.pick({"x": False})) == ("a", "b")
-
-
 def test_unique_refuses_two_valid_rows_and_names_them():
     table = table_of("unique", ("a", "True"), ("b", "Any"), ("c", "False"), fallback="z")
     with pytest.raises(PolicyError) as caught:
@@ -64,13 +51,6 @@ def test_unique_refuses_two_valid_rows_and_names_them():
     (fault,) = caught.value.faults
     assert str(fault) == '2 rows of "t" are valid at once: "a", "b". Accepted: one: the table\'s policy is "unique".'
     assert fault.rule == "not-unique"
-
-
-@pytest.mark.parametrize("policy", ["collect", "priority"])
-def test_the_highest_priority_is_picked_whatever_the_weights(policy: Policy):
-    table = table_of(policy, ("low", "Any", "-1", "1000"), ("high", "True", "2", "0.001"), ("also", "True", "2", "0.001"))
-    assert set(picks(table, 50)) == {"high", "also"}
-    assert table.pick({"x": False}, rng=1) == "low"
 
 
 @pytest.mark.parametrize("policy", ["collect", "priority", "first", "unique"])
@@ -108,12 +88,6 @@ def test_after_a_row_the_others_are_picked_in_proportion_to_their_weights():
     assert abs(seen["b"] - 1000) < 120  # four standard deviations
 
 
-def test_a_row_of_weight_0_is_never_picked_and_holds_no_other_back():
-    table = table_of("collect", ("never", "True", "9", "0"), ("a", "True", "", "1"), ("b", "True", "", "1"), fallback="idle")
-    assert set(picks(table, 50)) == {"a", "b"}
-    assert table_of("collect", ("never", "True", "", "0"), fallback="idle").pick({"x": True}) == "idle"
-
-
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("weight", ["1e308", "5e-324"])
 def test_weights_at_the_ends_of_the_doubles_are_shared_evenly(weight: str):
@@ -128,19 +102,6 @@ def test_no_asset_is_picked_twice_in_a_row():
     seen = picks(ABC, 300)
     assert set(seen) == {"a", "b", "c"}
     assert all(one != next_one for one, next_one in pairwise(seen))
-
-
-def test_two_rows_of_one_asset_are_one_asset_for_repeats():
-    table = table_of("collect", ("a", "True"), ("a", "True"), ("b", "True"))
-    assert set(zip(picks(table, 40)[::2], picks(table, 40)[1::2], strict=True)) <= {("a", "b"), ("b", "a")}
-
-
-def test_the_only_valid_asset_is_repeated():
-    assert picks(table_of("collect", ("a", "True"), ("b", "False")), 3) == ["a", "a", "a"]
-
-
-def test_an_asset_of_higher_priority_is_repeated_before_a_lower_one_is_taken():
-    assert picks(table_of("priority", ("a", "True", "1"), ("b", "True", "0")), 3) == ["a", "a", "a"]
 
 
 def test_the_asset_not_to_repeat_can_be_given():
@@ -313,12 +274,6 @@ def test_missing_facts_are_treated_as_said():
     assert ABC.pick({}, rng=1, unknown="never") == "b"
     with pytest.raises(ContextError, match='the fact "x" is missing'):
         ABC.pick({}, rng=1)
-
-
-def test_disabled_rows_are_never_picked():
-    columns = {"Asset": ["a", "b"], "On": ["False", "True"], "x": ["Any", "Any"]}
-    table = Table.from_columns(columns, {"x": {"type": "bool"}}, TableSettings("t", enabled="On")).compile()
-    assert {table.pick({"x": True}, rng=seed) for seed in range(10)} == {"b"}
 
 
 # ---- what a pick may give

@@ -1,7 +1,5 @@
 """Columns and policies that say how rows are picked: how they are declared, checked, merged, exported and told."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

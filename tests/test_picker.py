@@ -1,7 +1,5 @@
 """The picker: picks of one character and of many, remembered, held to an oracle turn by turn."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 import random
@@ -253,38 +251,6 @@ def test_runs_of_very_different_length_are_drawn_a_part_at_a_time(monkeypatch):
 # ---- memory
 
 
-@pytest.mark.parametrize("memory", [1, 2, 3])
-def test_no_asset_of_the_last_picks_is_picked_while_there_is_another_choice(memory: int):
-    table = table_of(x=["Any"] * 5)
-    picker, matches = table.picker(1, memory), table.query({"x": True})
-    assets = [picker.pick(matches).asset for _ in range(100)]
-    for at in range(memory, len(assets)):
-        assert assets[at] not in assets[at - memory : at]
-    assert set(assets) == set("abcde")
-
-
-def test_where_all_were_picked_lately_the_one_of_longest_ago_is_picked():
-    table = table_of(x=["Any"] * 3)
-    picker, matches = table.picker(1, 50), table.query({"x": True})
-    assets = [picker.pick(matches).asset for _ in range(12)]
-    assert assets == assets[:3] * 4
-    assert sorted(assets[:3]) == ["a", "b", "c"]
-
-
-def test_without_memory_assets_are_repeated():
-    table = table_of(x=["Any"] * 2)
-    picker, matches = table.picker(1, memory=0), table.query({"x": True})
-    assets = [picker.pick(matches).asset for _ in range(50)]
-    assert any(one == other for one, other in pairwise(assets))
-
-
-def test_ten_thousand_characters_never_repeat_themselves():
-    table = table_of(x=["Any"] * 4)
-    picker, many = table.picker(), table.query_many({"x": [True] * 10_000})
-    turns = [picker.pick_many(many) for _ in range(4)]
-    assert all((one != other).all() for one, other in pairwise(turns))
-
-
 def test_a_reload_does_not_make_a_character_repeat_itself():
     older, newer = table_of(asset=["a", "b"], x=["Any"] * 2), table_of(asset=["new", "b", "a"], x=["Any"] * 3)
     for seed in range(20):
@@ -295,36 +261,6 @@ def test_a_reload_does_not_make_a_character_repeat_itself():
 
 
 # ---- rows that rest
-
-
-def test_a_row_that_is_said_once_is_picked_once():
-    table = table_of("first", fallback="silence", asset=["hello", "hm"], once=["True", ""], cooldown_turns=["", "1"])
-    picker, matches = table.picker(), table.query({"x": True})
-    assert [picker.pick(matches).asset for _ in range(5)] == ["hello", "hm", "silence", "hm", "silence"]
-    picker.forget()
-    assert picker.pick(matches).asset == "hello"
-
-
-def test_a_row_rests_for_seconds():
-    table = table_of(fallback="silence", asset=["hello"], cooldown_s=["2.5"])
-    picker, matches = table.picker(), table.query({"x": True})
-    times = [0.0, 1.0, 2.4999, 2.5, 4.0, 5.0]
-    assert [picker.pick(matches, time_s=t).row for t in times] == [0, None, None, 0, None, 0]
-
-
-def test_a_row_that_rests_for_turns_alone_does_not_look_at_the_time():
-    table = table_of(fallback="silence", asset=["hello"], cooldown_turns=["1"])
-    picker, matches = table.picker(), table.query({"x": True})
-    assert [picker.pick(matches, time_s=t).row for t in (5.0, 6.0, None, 1.0, 0.0)] == [0, None, 0, None, 0]
-
-
-def test_each_character_rests_on_its_own():
-    table = table_of(fallback="silence", asset=["hello"], once=["yes"])
-    picker = table.picker()
-    assert picker.pick(table.query({"x": True}), who=1).asset == "hello"
-    assert picker.pick_many(table.query_many({"x": [True] * 3})).tolist() == [0, -1, 0]
-    picker.forget([2, 77])
-    assert picker.pick_many(table.query_many({"x": [True] * 3})).tolist() == [-1, -1, 0]
 
 
 def test_resting_rows_are_not_valid_for_the_policy():
@@ -371,15 +307,6 @@ def test_a_table_inside_rests_as_a_row_and_its_rows_rest_wherever_they_are_picke
 # ---- policies
 
 
-def test_the_most_specific_row_is_picked():
-    table = table_of("specific", x=["Any", "True", "True"], y=["Any", "Any", "True"], z=["Any", "True ~2", "Any"])
-    facts = {"x": True, "y": True, "z": True}
-    assert table.picker().pick(table.query(facts)).asset == "c"
-    assert table.pick(facts) == "c"
-    assert table.pick(facts | {"y": False}) == "b"
-    assert table.pick(facts | {"x": False}) == "a"
-
-
 def test_conditions_count_by_their_weight_and_equal_sums_are_equal():
     conditions = {"x": {"type": "bool", "weight": 0.1}, "y": {"type": "bool", "weight": 0.2}, "z": {"type": "bool", "weight": 0.3}}
     columns = {"asset": ["xy", "z", "x"], "x": ["True", "", "True"], "y": ["True", "", ""], "z": ["", "True", ""]}
@@ -388,13 +315,6 @@ def test_conditions_count_by_their_weight_and_equal_sums_are_equal():
     assert Outcome(data_of(table), table.query(facts)).candidates.tolist() == [0, 1]
     assert data_of(table).picking.specificities is not None
     assert data_of(table).picking.specificities.tolist() == [0.3, 0.3, 0.1]
-
-
-def test_the_cheapest_row_is_picked_and_weight_decides_between_equals():
-    table = table_of("cheapest", y=["True ~2", "False ~1", "Any ~9", "Any"], weight=["1", "1", "1", "0"])
-    assert [table.pick({"x": True, "y": y}, rng=n) for y in (True, False) for n in range(1)]
-    may = {y: Outcome(data_of(table), table.query({"x": True, "y": y})).candidates.tolist() for y in (True, False)}
-    assert may == {True: [0, 2], False: [1, 2]}
 
 
 def test_outcomes_say_what_the_policies_went_by():

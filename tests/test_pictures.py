@@ -1,7 +1,5 @@
 """docs/pictures.py: the pictures show what the commands and the editor show now, and load nothing."""
 
-from __future__ import annotations
-
 import importlib
 import re
 import sys

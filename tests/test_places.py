@@ -1,7 +1,5 @@
 """What TABLE means on the command line: a path, a name, a folder of one table, an artefact."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """`contextdb play`: which tables it plays with, what it refuses, and how it starts the game and the editor."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

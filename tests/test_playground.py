@@ -1,7 +1,5 @@
 """examples/playground: it plays without a window, no row is wrong, a save changes it at once, and it can be looked at."""
 
-from __future__ import annotations
-
 import importlib
 import math
 import shutil

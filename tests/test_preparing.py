@@ -1,7 +1,5 @@
 """A table that was made ready loads nothing more when it is asked."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

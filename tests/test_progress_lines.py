@@ -1,7 +1,5 @@
 """What long commands say on standard error where that is no terminal, as in a log of continuous integration."""
 
-from __future__ import annotations
-
 import json
 from importlib import import_module
 from pathlib import Path

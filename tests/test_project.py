@@ -1,7 +1,5 @@
 """Projects: a folder of tables under one contextdb.toml, and which schema a table alone belongs to."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """All projects below a folder: which of them fail, and their rows in one file."""
 
-from __future__ import annotations
-
 import subprocess
 from datetime import UTC, datetime
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`contextdb query`: the valid assets on standard output, why others are not, and an exit code that a script can rely on."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """What saved contexts reach: as each slip made by hand says, and by as few contexts as there can be."""
 
-from __future__ import annotations
-
 import random
 from itertools import combinations, product
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Recorded contexts, looked at a few rows at a time."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What is quickly made is what `dataclass` makes: the same fields, defaults, errors and frozenness."""
 
-from __future__ import annotations
-
 import copy
 import gc
 import inspect

@@ -14,6 +14,8 @@ from running import run
 from contextdb.checks.cases import check_cases, read_cases
 from contextdb.checks.run import check
 from contextdb.edits.renaming import renaming, uses_of
+from contextdb.edits.renaming_assets import asset_renaming
+from contextdb.edits.renaming_values import value_renaming
 from contextdb.errors import ContextDBError, FileError
 from contextdb.expressions.names import names_in
 from contextdb.tables.project import Project, load
@@ -176,3 +178,122 @@ def test_a_renamed_condition_answers_as_before(only_here: bool, old: str, new: s
             assert table.compile().query(known, unknown="any").assets == before[n]
             assert not check_cases(table, read_cases(folder / f"{n}.cases.csv"))
         assert {f.level for f in check(now.tables["a"])} <= {"info", "warning"}
+
+
+FAMILY = {
+    "studio/contextdb.toml": '[conditions.speed]\ntype = "number"\nmin = 0\nmax = 9\n[conditions.gait]\ntype = "enum"\n'
+    'values = ["slow", "quick"]\n[conditions.fast]\ntype = "bool"\nexpr = "speed > 5"\n[tables.human]\nwhen = "Rule"\n'
+    'expected = "seen.csv"\n[tables.orc]\nbase = "human"\nremove = "Gone"\n[tables.boss]\nbase = "orc"\n'
+    "[contracts.walks]\ntable = \"orc\"\nnone = \"asset == 'walk' or asset == 'wal'\"\n",
+    "studio/human.csv": "Asset,speed,gait,Rule\nwalk,..4,slow,speed < 3\nrun,4..,quick,\nwalk,..1,,gait == 'slow'\n",
+    "studio/orc.csv": "Asset,Gone,speed,Rule\nwalk,,..3,\nwalk,True,,\nstomp,,5..,speed > 6\n",
+    "studio/boss.csv": "Asset,gait\nrun,slow\nwalk,quick\n",
+    "studio/seen.csv": "what,speed,gait\nslow ones,..2,slow\n",
+    "game/contextdb.toml": '[project]\nextends = "../studio/contextdb.toml"\n[conditions.calm]\ntype = "bool"\n'
+    'expr = "speed < 1 and gait == \'slow\'"\n[tables.moves]\nassume = ["speed < 9"]\n',
+    "game/moves.csv": "Asset,speed,gait,calm\nidle,..1,slow,\nrun,1..,,False\n",
+    "far/contextdb.toml": '[project]\nextends = "../game/contextdb.toml"\n',
+    "far/all.csv": "Asset,speed\nany,2..\n",
+    "other/contextdb.toml": '[project]\nextends = "../studio/contextdb.toml"\n[conditions.speed]\ntype = "number"\n',
+    "other/own.csv": "Asset,speed,gait\nwalk,1,slow\n",
+    "loose/contextdb.toml": '[conditions.speed]\ntype = "number"\n',
+    "loose/own.csv": "Asset,speed\nwalk,1\n",
+}
+
+
+def family(folder: Path) -> Path:
+    (folder / ".git").mkdir()
+    for name, text in FAMILY.items():
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).write_text(text)
+    return folder
+
+
+def family_now(folder: Path) -> dict[str, str]:
+    return {name: (folder / name).read_text() for name in FAMILY}
+
+
+def answers(folder: Path, names: dict[str, str]) -> dict[str, list[list[str]]]:
+    """What every table of every project answers, with the new names of facts, values and assets read as the old ones."""
+    lists = {}
+    for project in ("studio", "game", "far", "other", "loose"):
+        tables = Project.load(folder / project)
+        for table in tables.values():
+            compiled = table.compile()
+            of = {names.get(name, name): name for name in compiled.asked}
+            values = (
+                dict(zip(("slow", "quick"), table.schema.conditions[of["gait"]].domain.values, strict=True)) if "gait" in of else {}
+            )
+            lists[f"{project}/{table.name}"] = [
+                [names.get(asset, asset) for asset in compiled.query(dict(facts), unknown="any").assets]
+                for speed in (0.5, 2.5, 3.5, 5.5, 8.0)
+                for gait in ("slow", "quick")
+                if (facts := {of[n]: v for n, v in {"speed": speed, "gait": values.get(gait)}.items() if n in of}) is not None
+            ]
+    return lists
+
+
+@pytest.mark.parametrize(
+    ("table", "rename", "old", "new"),
+    [
+        ("human", renaming, "speed", "v"),
+        ("boss", renaming, "gait", "Hero.gait"),
+        ("human", asset_renaming, "walk", "stroll"),
+        ("boss", asset_renaming, "stomp", "crush"),
+        ("human", lambda table, old, new: value_renaming(table, "gait", old, new), "slow", "very slow"),
+    ],
+)
+def test_a_rename_carries_variants_and_the_projects_that_extend_this_one(tmp_path: Path, table, rename, old, new):
+    before = answers(family(tmp_path), {})
+    change = rename(load(tmp_path / "studio" / f"{table}.csv"), old, new)
+    change.write()
+    assert answers(tmp_path, {new: old}) == before
+    assert not [
+        f
+        for p in ("studio", "game", "far", "other")
+        for t in Project.load(tmp_path / p).values()
+        for f in check(t)
+        if f.level == "error"
+    ]
+    changed = {name for name, text in family_now(tmp_path).items() if text != FAMILY[name]}
+    assert {str(file.path.relative_to(tmp_path)) for file in change.files} == changed
+    assert not changed & {"loose/own.csv", "loose/contextdb.toml", "other/contextdb.toml"}
+    change.reversed.write()
+    assert family_now(tmp_path) == FAMILY
+
+
+def test_only_here_is_the_table_with_its_variants(tmp_path: Path):
+    studio = family(tmp_path) / "studio"
+    asset_renaming(load(studio / "human.csv"), "walk", "stroll", only_here=True).write()
+    renaming(load(studio / "human.csv"), "speed", "pace", only_here=True).write()
+    for name in ("human", "orc", "boss"):
+        assert "walk" not in (text := (studio / f"{name}.csv").read_text()), name
+        assert "speed" not in text
+    assert load(studio / "human.csv").schema.contracts["walks"].none == "asset == 'stroll' or asset == 'wal'"
+    assert (tmp_path / "game" / "moves.csv").read_text() == FAMILY["game/moves.csv"]
+
+
+@pytest.mark.parametrize(
+    ("table", "rename", "old", "new", "words"),
+    [
+        ("boss", asset_renaming, "walk", "stroll", "of which boss is a variant"),
+        ("orc", renaming, "speed", "pace", "of which orc is a variant"),
+        ("human", asset_renaming, "walk", "stomp", "already: the two would be one"),
+        ("boss", asset_renaming, "stomp", "run", "already: the two would be one"),
+    ],
+)
+@pytest.mark.parametrize("only_here", [True, False])
+def test_a_name_that_would_part_a_variant_from_its_base_is_refused(tmp_path: Path, table, rename, old, new, words, only_here):
+    file = family(tmp_path) / "studio" / f"{table}.csv"
+    if only_here or "already" in words:
+        with pytest.raises(ContextDBError, match=words):
+            rename(load(file), old, new, only_here)
+    assert family_now(tmp_path) == FAMILY
+
+
+def test_a_condition_that_a_project_declares_already_stops_a_rename_above_it(tmp_path: Path):
+    with pytest.raises(ContextDBError, match=r"game.contextdb\.toml: the condition \"calm\" is declared already"):
+        renaming(load(family(tmp_path) / "studio" / "human.csv"), "speed", "calm")
+    with pytest.raises(ContextDBError, match=r"not declared in this file"):
+        renaming(load(tmp_path / "game" / "moves.csv"), "speed", "pace")
+    assert len(uses_of(load(tmp_path / "studio" / "human.csv"), "speed").projects) == 2

@@ -1,7 +1,5 @@
 """The tree itself: what it ships, and that it runs on other machines than the one it was written on."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from collections import Counter

@@ -1,7 +1,5 @@
 """Writing CSV: what nobody changed keeps its bytes, whatever freedom the file took with the format."""
 
-from __future__ import annotations
-
 import codecs
 import csv
 import io

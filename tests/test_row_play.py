@@ -1,7 +1,5 @@
 """Outputs with a reserved name say how a row plays: read from cells, out of a compiled file, and in C."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

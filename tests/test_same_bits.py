@@ -1,8 +1,6 @@
 """The core gives the same bits whatever compiled it: answers, costs, picks, and shares of coverage, by all compilers that are
 there, with little and much optimisation, with and without wide registers, and as WebAssembly."""
 
-from __future__ import annotations
-
 import os
 import platform
 import random

@@ -1,7 +1,5 @@
 """`Table.save` beside others who write the same file: merged cell by cell, or refused with the cells that disagree."""
 
-from __future__ import annotations
-
 import subprocess
 from pathlib import Path
 

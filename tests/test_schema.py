@@ -335,6 +335,15 @@ SECTIONS_SAID = (
         ("[tabels.x]", f'line 1: "tabels" is not a section. Accepted: {SECTIONS_SAID}. Did you mean [tables.x]?'),
         ("[Project]\nname = ''", f'line 1: "Project" is not a section. Accepted: {SECTIONS_SAID}. Did you mean [project]?'),
         ("[qqq]", f'line 1: "qqq" is not a section. Accepted: {SECTIONS_SAID}.'),
+        (
+            "[roles.Prey]",
+            f'line 1: "roles" is not a section. Accepted: {SECTIONS_SAID}. Did you mean [conditions."Defender.speed"]?',
+        ),
+        (
+            "[conditions.x]\ntype = 'int'\nbounds = [0, 9]",
+            'line 3: [conditions.x] has no key "bounds". Accepted: "type", "min", "max", "values", "unit", "description", "expr", '
+            '"mirror", "weight", "hysteresis", "owner". Did you mean min = 0 and max = 9?',
+        ),
         ("\nname = 'x'", f'line 2: "name" is not a section. Accepted: {SECTIONS_SAID}.'),
         (
             "[project]\nnmae = 'x'",

@@ -1,7 +1,5 @@
 """contextdb.toml written from edits: it says what the table says, and every byte that no edit is about stays."""
 
-from __future__ import annotations
-
 import os
 import tomllib
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """`contextdb motion replay --html` and `--markdown`: what is in the page, and, in a headless Chromium, that it plays and scrubs."""
 
-from __future__ import annotations
-
 import base64
 import html
 import json

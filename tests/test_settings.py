@@ -1,7 +1,5 @@
 """Every declared setting: what is accepted is said where something else stands, and docs/format.md has it."""
 
-from __future__ import annotations
-
 import contextlib
 import math
 import re

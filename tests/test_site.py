@@ -1,7 +1,5 @@
 """The site: its pages are those of docs/; where `make site` has made it, links lead somewhere and nothing comes from elsewhere."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import os

@@ -1,7 +1,5 @@
 """The search of the site: what a newcomer asks is answered in the first three hits, exact titles first, guides before reference."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import shutil

@@ -1,7 +1,5 @@
 """Soft cells whose cost grows with the distance: what they cost in known cases, in every way of asking, and out of a file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Reading CSV: the same texts as Python's csv module, and every fault with its place, what is accepted and the nearest mend."""
 
-from __future__ import annotations
-
 import csv
 import io
 import zipfile

@@ -1,7 +1,5 @@
 """State that is kept: answers and their versions, copies, pickles, mappings. It answers the same, or says why it cannot."""
 
-from __future__ import annotations
-
 import copy
 import multiprocessing
 import pickle

@@ -58,6 +58,7 @@ FILES = {
     "below/other.csv": TABLE,
     "t.cases.csv": "Case,Expected,speed\nslow,walk,1\n",
     "t.notes.csv": "Asset,Column,Note,Colour\nwalk,speed,why,\n",
+    "t.gaps.csv": "State,Owner,speed\nopen,Ana,>9\n",
     "in/f.csv": "Name;pace\njog;1,5\nrun;2,5\n",
     "in/base.csv": TABLE,
     "in/theirs.csv": TABLE.replace("5..9", "6..9"),

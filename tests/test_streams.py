@@ -1,7 +1,5 @@
 """Commands that write a file write into pipes and devices too, or refuse in a sentence; and paths that begin with a dash."""
 
-from __future__ import annotations
-
 import os
 import stat
 from concurrent.futures import ThreadPoolExecutor

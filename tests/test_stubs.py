@@ -1,7 +1,5 @@
 """Facts as Python types: what a type checker says of a context is what a query would say."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

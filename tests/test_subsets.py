@@ -1,7 +1,5 @@
 """Answers combined as sets of rows: against Python's own sets, with what belongs to the rows."""
 
-from __future__ import annotations
-
 import copy
 import operator
 import pickle
@@ -173,16 +171,6 @@ def test_a_row_of_an_answer_without_actors_has_no_casting():
         plain.casting(1)
     with pytest.raises(cdb.ContextError, match="row 0 is not valid"):
         (both - [0]).casting(0)
-
-
-def test_what_a_row_costs_is_that_of_the_first_answer_that_holds_it():
-    table = Table.from_columns({"Asset": ["a", "b"], "x": ["0..1 ~2", "0..9 ~3"], "y": ["0", "1"]}, {"x": {"type": "number"}})
-    compiled = table.compile()
-    one, other = compiled.query({"x": 5.0, "y": 0}), compiled.query({"x": 10.0, "y": 1})
-    assert (one | other).penalties.tolist() == [2.0, 3.0]
-    assert (other | one).penalties.tolist() == [2.0, 3.0]
-    assert (one | compiled.query({"x": 0.5, "y": 0})).penalties[0] == 2.0
-    assert (compiled.query({"x": 0.5, "y": 0}) & one).penalties[0] == 0.0
 
 
 # ---- places, and what is refused

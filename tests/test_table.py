@@ -1,7 +1,5 @@
 """Tables: edits give new ones that share what did not change, and every cell that cannot be read is kept and told."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A table is renamed, copied or deleted with the files beside it, and with what refers to it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

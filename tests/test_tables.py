@@ -1,7 +1,5 @@
 """The sample tables: what the talk shows stands in them, and contextdb.toml declares what they use."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

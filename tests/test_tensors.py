@@ -1,7 +1,5 @@
 """Arrays in .safetensors files: what is written is read as views of the file, and a file that cannot be used is refused."""
 
-from __future__ import annotations
-
 import json
 import mmap
 import os

@@ -1,7 +1,5 @@
 """Tidying: fewer cells, and in every context that can happen the same assets as often, and the same that may be picked."""
 
-from __future__ import annotations
-
 import random
 from itertools import product
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Files that are replaced together, killed at any call; what killed saves leave; and what a record from a stranger cannot do."""
 
-from __future__ import annotations
-
 import errno
 import json
 import os

@@ -1,7 +1,5 @@
 """Two versions of contextdb.toml made one, key by key, with the comments of ours."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 

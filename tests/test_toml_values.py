@@ -1,7 +1,5 @@
 """Values written as TOML, and keys of inline tables set and dropped: held to what tomllib reads and to a plain dict."""
 
-from __future__ import annotations
-
 import datetime
 import tomllib
 from typing import Any

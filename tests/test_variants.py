@@ -1,7 +1,5 @@
 """Variants: a table whose file holds what differs from its base is that base, edited."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`contextdb verify`: a flipped bit in any file of ours is found, and files that hold no digest are said to hold none."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -1,7 +1,5 @@
 """Hot reload: what is at hand is always one whole good version, and the newest one soon after the files have come to rest."""
 
-from __future__ import annotations
-
 import json
 import logging
 import os

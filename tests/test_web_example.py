@@ -1,7 +1,5 @@
 """The example in a browser: it plays what Python plays to the bit, and shows what it plays and why, with no request elsewhere."""
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import http.server

@@ -1,7 +1,5 @@
 """A row's own rule: how it is written and refused, asked, explained, checked, measured and kept. See also test_rules_asked."""
 
-from __future__ import annotations
-
 import pickle
 from itertools import product
 from pathlib import Path
@@ -19,7 +17,7 @@ from contextdb.checks.rows import check_rows, unused_conditions
 from contextdb.checks.run import check
 from contextdb.compiled.casting.roles import role_of
 from contextdb.compiled.stubs import stubs_of
-from contextdb.compiled.table import CompiledTable, data_of
+from contextdb.compiled.table import data_of
 from contextdb.edits.diffing import diff
 from contextdb.edits.edits import check_cell
 from contextdb.errors import ContextError, SchemaError, TableError
@@ -48,14 +46,6 @@ def refusal(rule: str) -> str:
 
 
 # ---- written
-
-
-@pytest.mark.parametrize("nothing", ["", "-", "Any", " any "])
-def test_a_row_without_a_rule_is_asked_by_its_cells_alone(nothing):
-    compiled = table_of(nothing, gait=["Run"]).compile()
-    assert data_of(compiled).when is None
-    assert list(compiled.asked) == ["gait"]
-    assert compiled.query({"gait": "Run"}).assets == ["a0"]
 
 
 def test_what_a_rule_cannot_mean_is_told_with_its_place_its_character_and_a_mend():
@@ -168,12 +158,6 @@ def test_many_different_rules_are_found_by_the_rows_that_are_left(n_rules):
         assert compiled.query({"speed": speed, "gait": gait}).indices.tolist() == expected
 
 
-def test_a_disabled_row_never_matches_whatever_its_rule_says():
-    columns = {"Asset": ["a", "b"], "On": ["False", "True"], "When": ["speed > 1"] * 2}
-    compiled = cdb.Table.from_columns(columns, SCHEMA, TableSettings("t", enabled="On", when="When")).compile()
-    assert compiled.query({"speed": 3}).assets == ["b"]
-
-
 def test_pick_soft_cells_saved_contexts_and_stubs_know_rules():
     compiled = table_of("speed > target", "", gait=["Run~3", "Any"]).compile()
     facts = {"speed": 2, "target": 1, "gait": "Walk"}
@@ -195,15 +179,6 @@ def test_a_set_valued_fact_is_told_exactly_where_a_rule_is_a_box():
 
 
 # ---- live
-
-
-def test_an_artefact_with_rules_answers_as_the_table_does(tmp_path: Path):
-    compiled = table_of("closing > 1").compile()
-    compiled.save(path := tmp_path / "rules.safetensors")
-    opened = CompiledTable.open(path)
-    assert list(opened.asked) == list(compiled.asked)
-    assert opened.query({"speed": 3, "target": 1}).assets == ["a0"]
-    assert opened.explain({"speed": 1, "target": 1}).row(0).failures[0].cell == "closing > 1"
 
 
 def test_a_compiled_table_with_rules_goes_to_another_process():

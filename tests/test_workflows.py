@@ -1,7 +1,5 @@
 """What is published beside the code: the workflow for other repositories, run step by step in a checkout; forms; citation."""
 
-from __future__ import annotations
-
 import os
 import re
 import shlex

@@ -4,8 +4,6 @@
 `said.json` holds what that version itself read in them. The costs of databases are on another scale today, so these are refused.
 """
 
-from __future__ import annotations
-
 import json
 import shutil
 from collections.abc import Callable

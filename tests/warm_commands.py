@@ -1,7 +1,5 @@
 """A program for others to start, git for one, whose commands run in the process of the tests: nothing is loaded anew for each."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

@@ -6,8 +6,6 @@ and what a terminal controls differ: tests of those start `sys.executable` thems
 there is no fork, and where lines are counted.
 """
 
-from __future__ import annotations
-
 import atexit
 import contextlib
 import gc

@@ -1,7 +1,5 @@
 """What Python's own calls touch on the disk while a test looks: by an audit hook, which a process keeps once it has it."""
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Iterator

@@ -245,6 +245,14 @@ _OF_SCREEN = (
         "Test row",
         "changes",
     ),
+    Command(
+        "next-picks",
+        "shift+f9",
+        "Next picks",
+        "Simulate the next 50 picks for the test row: chance seen.",
+        "Test row",
+        "next_picks",
+    ),
     Command("live", "alt+u", "Follow a game", "Let the test row follow a running game, or a recording.", "Test row", "live"),
     Command("live-pause", "alt+6", "Pause the game", "Pause the game that is followed, or go on.", "Test row", "live_pause"),
     Command("live-back", "alt+8", "A second back", "Go back one second in the game.", "Test row", "live_by(-1)"),
@@ -262,6 +270,9 @@ _OF_SCREEN = (
         in_footer=True,
     ),
     Command("nearest", "shift+f12", "Nearest rows", "Which rows are nearest to valid; correct cells.", "Test row", "nearest"),
+    Command(
+        "clip", "shift+f6", "Animation", "Play the clip of the row, of the gap's nearest row, or of what is picked.", "View", "clip"
+    ),
     Command("next-tab", "ctrl+pagedown,alt+right", "Next tab", "Go to the next tab.", "Tabs", "next_tab(1)"),
     Command("previous-tab", "ctrl+pageup,alt+left", "Previous tab", "Go to the previous tab.", "Tabs", "next_tab(-1)"),
     Command("assets", "alt+1", "Assets", "The table.", "Tabs", "tab('assets')"),

@@ -39,6 +39,7 @@ from contextdb.schema.settings import Schema
 from contextdb.schema.toml_lines import key_lines
 from contextdb.tables import project
 from contextdb.tables.expected_file import expected_path, read_situations
+from contextdb.tables.gap_work import GapWork
 from contextdb.tables.other_files import cases_path, notes_path
 from contextdb.tables.places import table_path
 from contextdb.tables.table import Table
@@ -230,10 +231,12 @@ def _check_expected(table: Table) -> list[Finding]:
 
 
 def _check_notes(table: Table, path: Path) -> list[Finding]:
-    """A finding for notes that cannot be read, such as those between git's marks: the editor would show none of them."""
+    """A finding for notes, or work on gaps, that cannot be read, such as between git's marks: nobody would see any of it."""
     try:
         if path.is_file():
             read_texts(path)
+        if table.path is not None:
+            GapWork.beside(table.path)
     except ContextDBError as error:
         return _as_findings(error, table.name)
     return []

@@ -1,10 +1,8 @@
 """Check a folder of tables as a build does: findings, coverage and saved contexts, against a commit or a report; with report files.
 
-The first line says what was compared with what. --against reads the folder as it is in a commit of git and measures it in the same
-way; --baseline takes the coverage.json of an earlier run. Exits with 1 if anything fails: a finding at the level of --fail-on, a
-threshold, or a gate that no option accepts; with 2 if the commit, the report or an option cannot be used.
+The first line says what was compared with what. Exits with 1 if anything fails: a finding at the level of --fail-on, a threshold,
+or a gate that no option accepts; with 2 if the commit, the report or an option cannot be used.
 
-  contextdb ci tables/ --against origin/main
   contextdb ci tables/ --against origin/main --max-drop 0.5 --out report/
   contextdb ci tables/ --against origin/main --new dive --gone roll
   contextdb ci tables/ --baseline coverage.json --format github

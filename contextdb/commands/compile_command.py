@@ -1,19 +1,11 @@
 """Write the compiled file for the game: a .safetensors file, which the game maps into memory.
 
-Prints the path of each written file. --stubs also writes the facts of these tables as Python types, for completion in editors and
-for type checkers. --c-header also writes one header for games in C or C++, which opens and queries the compiled files, and
---c-link a second one, by which such a game shows live what it asks. --c-motion writes the header by which it plays the
-characters of the bundle that "motion build --bundle" writes. --csharp, --godot and --unreal write the facts and the values of
-these tables as types of those languages.
+Prints the path of each written file.
 
   contextdb compile tables/                  one compiled file next to each table
   contextdb compile tables/ -o build/        all of them into a folder
-  contextdb compile tables/hit_mid_air.csv -o hit_mid_air.safetensors
   contextdb compile tables/ -o build/ --stubs game/facts.py
-  contextdb compile tables/ -o build/ --c-header game/tables.h
   contextdb compile tables/ -o build/ --c-header game/tables.h --c-link game/cdb_link.h
-  contextdb compile tables/ -o build/ --c-motion game/contextdb_motion.h
-  contextdb compile tables/ -o build/ --csharp Assets/Facts.cs
 """
 
 from __future__ import annotations

@@ -1,14 +1,10 @@
 """Measure which contexts have a valid row, and which have none.
 
-Exits with 1 if a threshold is missed: --fail-under, --fail-under-expected, --fail-under-telemetry, or --max-drop (by default 0
-with a --baseline).
-With a --baseline also if a table is gone or has lost all its rows, if one is not in it, if one has other conditions, bounds, values
-or assumptions, and if saved contexts expect less: --gone, --new, --redefined and --fewer-cases accept that for a table.
-Thresholds are compared with the lower bound of the covered share, so that a lucky sample does not pass.
+Exits with 1 if a threshold is missed, compared with the lower bound of the covered share; with a --baseline also if a table is
+gone, new or redefined, or if saved contexts expect less, unless an option accepts that (--max-drop is then 0 by default).
 
   contextdb coverage tables/
   contextdb coverage locomotion --gap 1
-  contextdb coverage tables/ --format json -o coverage.json
   contextdb coverage tables/ --baseline coverage.json --max-drop 0.5
   contextdb coverage tables/ --format html -o coverage.html
   contextdb coverage locomotion --telemetry "recorded/*.parquet" --fail-under-telemetry 99.5
@@ -46,6 +42,7 @@ from contextdb.report import formats, render
 from contextdb.report.coverage_results import CoverageResults, Measured
 from contextdb.report.results import Gate, as_path
 from contextdb.tables.expected_file import expected_path, read_situations
+from contextdb.tables.gap_work import GapWork
 from contextdb.tables.nesting.flat import FlatTable
 from contextdb.tables.other_files import cases_path
 from contextdb.tables.places import table_path
@@ -171,8 +168,15 @@ def measured_results(
         measured = [replace(m, gates=(*m.gates, *of_cases.pop(m.report.table, ()))) for m in measured]
         others += [(name, gate) for name, gates in sorted(of_cases.items()) for gate in gates]
         accepted.require_needed()
-    ranked = (coverage_telemetry.ranked(arguments, m, table) for m, table in zip(measured, flat, strict=True))
+    ranked = (_ranked(arguments, m, table) for m, table in zip(measured, flat, strict=True))
     return CoverageResults(tuple(ranked), tuple(others), cases)
+
+
+def _ranked(arguments: argparse.Namespace, measured: Measured, table: EitherTable) -> Measured:
+    """With the gaps in their order, and the work on them. Raises FileError where the file of that cannot be read."""
+    ranked = coverage_telemetry.ranked(arguments, measured, table)
+    work = GapWork({}) if table.path is None else GapWork.beside(table.path)
+    return ranked.with_work(work, [column.condition for column in table.conditions]) if work.lines else ranked
 
 
 def _measured(arguments: argparse.Namespace, table: EitherTable) -> Measured:
@@ -180,7 +184,7 @@ def _measured(arguments: argparse.Namespace, table: EitherTable) -> Measured:
 
     measured = measure(arguments, table)
     gates = [] if arguments.fail_under is None else [fail_under(measured.report, arguments.fail_under)]
-    if measured.expected is not None and arguments.fail_under_expected is not None:
+    if arguments.fail_under_expected is not None:
         gates.append(fail_under_expected(measured.expected, arguments.fail_under_expected))
     if measured.telemetry is not None and arguments.fail_under_telemetry is not None:
         gates.append(fail_under_telemetry(measured.telemetry, arguments.fail_under_telemetry))
@@ -210,9 +214,9 @@ def measure(arguments: argparse.Namespace, table: EitherTable) -> Measured:
     file = str(table.path) if table.path else None
     space = declared(table, report.assumed)
     inside = _inside(table)
-    return Measured(
-        report, file, tuple(table.assets), lines, compared, None, seen, (), inside, space, expected, table.settings.owner
-    )
+    owner, fallback = table.settings.owner, table.settings.fallback or ""
+    assets = tuple(table.assets)
+    return Measured(report, file, assets, lines, compared, None, seen, (), inside, space, expected, owner, fallback)
 
 
 def _expected(arguments: argparse.Namespace, table: EitherTable) -> Expectation | None:
@@ -275,7 +279,7 @@ def _details(arguments: argparse.Namespace, table: EitherTable) -> str:
     if arguments.explain is not None:
         row = _row(arguments.explain, table)
         return row_details(measure(arguments, table), row, width)
-    measured = coverage_telemetry.ranked(arguments, measure(arguments, table), table)
+    measured = _ranked(arguments, measure(arguments, table), table)
     gaps = measured.report.gaps
     text = arguments.gap
     matching = [g for i, g in enumerate(gaps, 1) if text in (str(i), g.id)]

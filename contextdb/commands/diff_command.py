@@ -1,14 +1,11 @@
 """Show what changed between two versions of a table: rows by asset, columns, and cells, with changes of text alone listed apart.
 
-Exits with 0 if nothing changed, with 1 if something did, with 2 if a table cannot be read. With --telemetry both versions are asked
-in every recorded moment; with --max-changed or --max-emptied only these decide between 0 and 1. With --session the searches of
-recorded motion are repeated with both.
+Exits with 0 if nothing changed, with 1 if something did, with 2 if a table cannot be read. With --telemetry both versions are
+asked in every recorded moment; with --max-changed or --max-emptied only these decide between 0 and 1.
 
   contextdb diff old/hit_mid_air.csv tables/hit_mid_air.csv
-  contextdb diff a.csv b.csv --format markdown
   contextdb diff a.csv b.csv --format html -o review.html
   contextdb diff a.csv b.csv --telemetry "play/*.parquet" --max-emptied 0.1
-  contextdb diff a.csv b.csv --session "sessions/*.parquet"
 """
 
 from __future__ import annotations

@@ -1,13 +1,11 @@
 """Evaluate every context of a CSV or Parquet file, or of all files of a glob: how often each asset is valid, how often none.
 
-A file of contexts has a column for each fact and a row for each moment, or is a recording of a live link (.jsonl).
-
   contextdb evaluate tables/hit_mid_air.csv moments.csv
   contextdb evaluate hit_mid_air "telemetry/*.parquet" --unknown any --out answers.parquet
   contextdb evaluate hit_mid_air "telemetry/*.parquet" --engine dask --scheduler tcp://10.0.0.5:8786
 
-Files are streamed. FILE is written when all answers are complete: a run that fails or is interrupted leaves FILE as it was. With
---engine dask the workers read the files, and write next to FILE, under the same paths as here.
+Files are streamed. A run that fails or is interrupted leaves FILE as it was. With --engine dask the workers read the files, and
+write next to FILE, under the same paths as here.
 """
 
 from __future__ import annotations

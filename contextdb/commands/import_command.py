@@ -1,7 +1,8 @@
 """Import a table from another program into a folder of tables: CSV in any dialect, TSV, Excel, Parquet, JSON, DMN, Unreal.
 
 Columns are matched with the conditions that contextdb.toml declares. For others the command infers a type from their cells, and
-declares it there with the new table. It prints its decisions and their reasons; --dry-run writes nothing else.
+declares it there with the new table. It prints its decisions and their reasons; --dry-run writes nothing else. What the options
+say is remembered in the folder for the next file of that name, numbers in it apart: --again imports that one alike.
 
 --learn takes a recording, a row for each moment, and makes the fewest rows that say in each the asset of --asset. Without DST the
 table is printed. It exits with 1 if the facts do not tell the asset.
@@ -9,6 +10,7 @@ table is printed. It exits with 1 if the facts do not tell the asset.
   contextdb import moves.xlsx tables/moves.csv --dry-run
   contextdb import moves.xlsx tables/moves.csv --sheet Moves --map Sped=speed --map Notes=
   contextdb import german.csv tables/jog.csv --decimal comma --type heading=angle
+  contextdb import takedowns_W13.xlsx tables/takedowns.csv --again --force
   pbpaste | contextdb import - tables/pasted.csv --as tsv
   contextdb import machine_log.parquet tables/moves.csv --learn --asset played --map time=
 """
@@ -19,6 +21,7 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from contextdb.cells.kinds import KINDS
@@ -29,7 +32,9 @@ from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes,
 from contextdb.exchange import importing
 from contextdb.exchange.formats import FORMATS, ReadOptions, read
 from contextdb.exchange.mapping import JOBS, Mapped, as_job, as_type, propose
+from contextdb.exchange.pairs import with_intervals
 from contextdb.exchange.reading import Reading, listed
+from contextdb.exchange.remembered import Choices, choices_of, chosen_columns, remember
 from contextdb.files.file_names import require_new_table_name
 from contextdb.schema.shapes import KIND_SYNONYMS
 from contextdb.tables.project import SCHEMA_FILE
@@ -45,7 +50,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     names = [name for name, one in FORMATS.items() if one.is_read]
     parser.add_argument("--as", dest="format", metavar="FORMAT", choices=names, help=f"the format of SRC: {', '.join(names)}")
     parser.add_argument(
-        "--sheet", metavar="NAME", help="a sheet of a workbook, or cells of it (Moves!A1:F20); a decision of a DMN file"
+        "--sheet",
+        metavar="NAME",
+        help="a sheet of a workbook, or cells (Moves!A1:F20, A5:F to the last row); a decision of a DMN file",
     )
     parser.add_argument(
         "--map", metavar="COLUMN=NAME", action="append", default=[], help="the name of a column in the table; COLUMN= leaves it out"
@@ -61,6 +68,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     whole = "whether Mid Air is one name (whole) or two (words), in new columns (default: whole, except in our own workbooks)"
     parser.add_argument("--names", choices=importing.NAMES, help=whole)
+    pairs = "whether Speed min and Speed max become one interval (joined) or stay two columns (apart) (default: joined)"
+    parser.add_argument("--pairs", choices=("joined", "apart"), help=pairs)
+    parser.add_argument(
+        "--again", action="store_true", help="as a file of this name was last imported here; other options go first"
+    )
     parser.add_argument("--dry-run", action="store_true", help="write nothing")
     parser.add_argument("--force", action="store_true", help="overwrite an existing table")
     group = parser.add_argument_group("learning")
@@ -72,6 +84,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     """Read, decide, say what was decided, write."""
     require_learning(arguments)
     target = None if arguments.target is None else _target(arguments.target, arguments.force or arguments.dry_run)
+    before = _before(arguments, target)
     raw, name = _bytes(arguments.source)
     if len(raw) >= LARGE_BYTES:
         _say(name, f"reading {len(raw) / 1e6:,.0f} MB …")
@@ -84,7 +97,12 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         print(printable(f"{name}: {remark}"), file=sys.stderr)
     if arguments.learn or target is None:
         return learn(reading, _pairs(arguments.map, "--map", "COLUMN=NAME"), arguments, name)
-    plan = _plan(reading, target, arguments)
+    if arguments.pairs != "apart":
+        apart = {*importing.project_of(target)[0].conditions, *_pairs(arguments.map, "--map", "COLUMN=NAME"), *before.columns}
+        n_remarks, reading = len(reading.remarks), with_intervals(reading, apart)
+        for remark in reading.remarks[n_remarks:]:
+            print(printable(f"{name}: {remark}"), file=sys.stderr)
+    plan = _plan(reading, target, arguments, before)
     if arguments.names is None and (note := importing.whole_names_sentence(plan.columns, reading, "--names words")):
         print(printable(f"{name}: {note}"), file=sys.stderr)
     if arguments.decimal is None:
@@ -94,6 +112,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         if is_large:
             _say(name, f"writing {plan.path} …")
         plan.write()
+        _remember(plan, arguments, before)
     with output():
         print(*_lines(plan, reading, name, arguments.dry_run), sep="\n")
     return ExitCode.OK
@@ -125,6 +144,32 @@ def _bytes(source: str) -> tuple[bytes, str]:
     return (sys.stdin.buffer.read(), "standard input") if source == "-" else (read_bytes(source), source)
 
 
+def _before(arguments: argparse.Namespace, target: Path | None) -> Choices:
+    """What was chosen for such a file before, where that counts; what the options do not say is taken over. Raises ContextDBError
+    where nothing is known of it."""
+    if not arguments.again:
+        return Choices()
+    known = choices_of(target.parent, arguments.source) if target is not None else None
+    if known is None:
+        problem = f"--again: nothing was chosen for {in_quotes(Path(arguments.source).name)} in this folder."
+        raise ContextDBError(Fault(problem, "a file of a name that was imported with choices"))
+    for key in ("sheet", "decimal", "names", "pairs"):
+        if getattr(arguments, key) is None:
+            setattr(arguments, key, getattr(known, key) or None)
+    return known
+
+
+def _remember(plan: importing.Plan, arguments: argparse.Namespace, before: Choices) -> None:
+    """Keep what was chosen for the next file of this name."""
+    if arguments.source == "-":
+        return
+    named = {*_pairs(arguments.map, "--map", "COLUMN=NAME"), *_pairs(arguments.type, "--type", "NAME=TYPE")}
+    columns = [replace(one, why="chosen") for one in plan.columns if named & {one.name, one.source}]
+    said = {key: getattr(arguments, key) or "" for key in ("sheet", "decimal", "names", "pairs")}
+    choices = replace(before, **said, columns={**before.columns, **chosen_columns(columns)})
+    remember(plan.path.parent, arguments.source, choices)
+
+
 def _options(arguments: argparse.Namespace) -> ReadOptions:
     is_comma = None if arguments.decimal is None else arguments.decimal == "comma"
     delimiter = None if arguments.delimiter is None else DELIMITERS[arguments.delimiter]
@@ -132,9 +177,11 @@ def _options(arguments: argparse.Namespace) -> ReadOptions:
     return ReadOptions(arguments.format, arguments.sheet, arguments.encoding, delimiter, is_comma, is_whole)
 
 
-def _plan(reading: Reading, target: Path, arguments: argparse.Namespace) -> importing.Plan:
+def _plan(reading: Reading, target: Path, arguments: argparse.Namespace, before: Choices) -> importing.Plan:
     schema, settings = importing.project_of(target)
-    mapped = propose(reading, schema, settings, _pairs(arguments.map, "--map", "COLUMN=NAME"))
+    renames = _pairs(arguments.map, "--map", "COLUMN=NAME")
+    known = replace(before, columns={source: one for source, one in before.columns.items() if source not in renames})
+    mapped = known.applied(propose(reading, schema, settings, renames), reading, schema)
     for name in importing.declared_differently(reading, schema):
         message = f"the file declares {in_quotes(name)} differently from contextdb.toml, which takes precedence."
         print(printable(message), file=sys.stderr)

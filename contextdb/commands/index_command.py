@@ -1,9 +1,8 @@
 """Write one Parquet file of the rows of all projects below a folder, for polars, DuckDB or pandas.
 
-Its columns are project, table, owner, file, row (from 0), line, asset, cells (those that are not Any), outputs, last_change and
-moments. last_change is the time of the last commit that changed the row's line, else of the file. moments counts the recorded
-moments in which the row is valid, with --telemetry; without, and where rows refer to tables, it is null. Links and hidden folders
-are passed over. A project that cannot be read is named and left out; the command then exits with 1.
+Its columns are project, table, owner, file, row (from 0), line, asset, cells (those that are not Any), outputs, last_change (of
+the row's line in git, else of the file) and moments (the recorded ones in which the row is valid; null without --telemetry, and
+where rows refer to tables). A project that cannot be read is named and left out; the command then exits with 1.
 
   contextdb index games/ --out rows.parquet
   contextdb index games/ --out rows.parquet --telemetry "play/*.parquet"

@@ -1,17 +1,14 @@
 """Show what a running game asks its tables and what it picks, one line per change.
 
-The game has opened a link under NAME. Without NAME, the command shows the only running game, or lists them if there are
-several. A line has the seconds since the link was opened, who asks, the table, what was picked, how many rows are valid, and the
-facts that changed, written as for the command `query`. Ctrl+C ends it.
+Without NAME, the command shows the only running game, or lists them if there are several. A line has the seconds since the link
+was opened, who asks, the table, what was picked, how many rows are valid, and the facts that changed. Ctrl+C ends it.
 
-  contextdb live game
   contextdb live game --who player --table locomotion
   contextdb live game --tables tables/ --explain
   contextdb live game --record session.jsonl
 
-With --tables the command also asks the tables of a folder: it reports where their answers differ from the game's, and with
---explain which rows were nearest, and which of their cells fail. With --record FILE every question is saved, not only the
-newest; the commands `evaluate` and `coverage --telemetry` read FILE, even while it grows.
+With --record FILE every question is saved, not only the newest; `evaluate` and `coverage --telemetry` read FILE, even while it
+grows.
 """
 
 from __future__ import annotations

@@ -1,24 +1,16 @@
 """Merge two versions of a table, cell by cell, with rows and columns that were added, removed and moved. A git merge driver.
 
-A contextdb.toml is merged key by key, notes (NAME.notes.csv) place by place. The result is written to OURS, or to FILE. Conflicts
-are written between git's marks, row by row, for a person or the editor to decide; a Parquet file then stays as it was. If one of
-the three files is not a table, its lines are merged as git does.
+A contextdb.toml is merged key by key, notes (NAME.notes.csv) place by place, work on gaps (NAME.gaps.csv) gap by gap. The result is
+written to OURS, or to FILE. Conflicts are written between git's marks, row by row, for a person or the editor to decide; a Parquet
+file then stays as it was. If one of the three files is not a table, its lines are merged as git does. A row that one side deleted
+is gone; cells that the other side filled in it are named.
 
-A row that one side deleted is gone, even if the other side filled a new column in it; these cells are named on standard error.
-
-Exits with 0 if everything merged, with 1 if something is left to decide or lines were merged, with 2 if a file is missing or
-cannot be written.
-
-After a clean merge the meaning is checked: gaps, overlaps under the policy "unique" and rows that can no longer be chosen, if
-neither side had them, are reported on standard error; with --strict the command then exits with 1.
+Exits with 1 if something is left to decide or lines were merged, with 2 if a file is missing or cannot be written. Gaps, overlaps
+under the policy "unique" and rows that can no longer be chosen, if neither side had them, are reported; with --strict they exit
+with 1. `git install` sets it up as a merge driver.
 
   contextdb merge base.csv ours.csv theirs.csv --out merged.csv
   contextdb merge base.csv ours.csv theirs.csv --take theirs
-
-As a merge driver of git, with the lines "*.csv merge=contextdb" and "contextdb.toml merge=contextdb" in .gitattributes (what
-`git install` sets merges lines if the driver itself cannot run):
-
-  git config merge.contextdb.driver "contextdb merge %O %A %B --path=%P"
 """
 
 from __future__ import annotations
@@ -29,7 +21,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from contextdb.console import ExitCode, note
-from contextdb.disk import NOTES_SUFFIX, names_a_table, read_bytes, write_atomic
+from contextdb.disk import GAPS_SUFFIX, NOTES_SUFFIX, names_a_table, read_bytes, write_atomic
 from contextdb.edits.diffing import diff
 from contextdb.edits.diffing.lines import merged_lines
 from contextdb.edits.diffing.markers import with_markers
@@ -39,6 +31,7 @@ from contextdb.errors import ContextDBError, Fault, Place, SchemaError, TableErr
 from contextdb.files.parquet import ParquetSource
 from contextdb.files.texts import is_parquet
 from contextdb.schema.settings import EMPTY, Schema, TableSettings
+from contextdb.tables.gap_work import merge_gap_work
 from contextdb.tables.merging.conflicts import Side
 from contextdb.tables.merging.merging import Merge, merge
 from contextdb.tables.merging.reading import merged_bytes, table_of
@@ -69,7 +62,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     path = Path(arguments.path or arguments.ours)
     raws = [read_bytes(file) for file in (arguments.base, arguments.ours, arguments.theirs)]
     merged = _merged_toml if path.suffix.lower() == ".toml" else _merged_tables
-    merged = _merged_notes if path.name.lower().endswith(NOTES_SUFFIX) else merged
+    merged = next((own for suffix, own in _COMPANIONS if path.name.lower().endswith(suffix)), merged)
     try:
         raw, tell = merged(path, raws, arguments)
     except Exception as error:  # whatever it is: git would go on with ours alone
@@ -143,6 +136,13 @@ def _merged_toml(path: Path, raws: Raws, arguments: argparse.Namespace) -> Merge
 
 def _merged_notes(path: Path, raws: Raws, arguments: argparse.Namespace) -> Merged:
     return merge_notes(raws, _names(path, arguments), arguments.take), lambda: ExitCode.OK
+
+
+def _merged_gaps(path: Path, raws: Raws, arguments: argparse.Namespace) -> Merged:
+    return merge_gap_work(raws, _names(path, arguments), arguments.take), lambda: ExitCode.OK
+
+
+_COMPANIONS = ((NOTES_SUFFIX, _merged_notes), (GAPS_SUFFIX, _merged_gaps))
 
 
 def _merge_lines(path: Path, raws: Raws, arguments: argparse.Namespace, error: Exception) -> ExitCode:

@@ -1,21 +1,17 @@
 """Build the motion databases that contextdb.toml declares from their clips, and save them.
 
 Each becomes a memory-mapped file NAME.motion.safetensors; with --poses its clips' poses become NAME.poses.safetensors next to it.
-The features of each clip are cached in .contextdb-cache, so the next build computes only changed clips.
+The features of each clip are cached in .contextdb-cache: the next build, also after one that was killed, computes only the
+others.
 
   contextdb motion build tables/                       all databases, next to contextdb.toml
   contextdb motion build tables/ --out build/ --database jog
-  contextdb motion build tables/ --keep-going            without faulty clips and databases
-  contextdb motion build tables/ --poses                 and their poses, for what plays them
-  contextdb motion build tables/ --watch                 and again whenever a clip is saved
   contextdb motion build tables/ --bundle game.motion    and one file with all that a game in C needs
   contextdb motion build tables/ --engine dask --scheduler tcp://10.0.0.5:8786
 
-More than 64 clips are computed on all cores; with --engine dask on workers, which see the files under the same paths. The databases
-are the same, byte for byte. After a build that was killed, the next one computes only clips that are not in the cache yet.
-
-If a clip cannot be read, nothing is saved, all faults are reported, and the exit code is 2. With --keep-going such clips are left
-out and reported, and the exit code is 1. Clips that only look wrong, such as a body of 170 m, give warnings.
+More than 64 clips are computed on all cores; with --engine dask on workers, which see the files under the same paths. The
+databases are the same, byte for byte. If a clip cannot be read, nothing is saved, all faults are reported, and the exit code is
+2.
 """
 
 from __future__ import annotations

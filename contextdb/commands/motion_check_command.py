@@ -1,12 +1,9 @@
 """Find what is wrong with clips, markup and motion settings: missing bones, other units and axes, jumps, markup without effect.
 
-Every clip is read as a build reads it. Where no motion database is declared, all clips below the folder are checked. Exits
-with 1 if there are findings at the level of --fail-on, with 2 if there is no such folder. What looks wrong but may be right, such
-as a body of 170 m, is a warning.
+Every clip is read as a build reads it. Where no motion database is declared, all clips below the folder are checked. Exits with 1
+if there are findings at the level of --fail-on, with 2 if there is no such folder.
 
   contextdb motion check game/
-  contextdb motion check clips/          clips that no project names yet
-  contextdb motion check game/ --json
   contextdb motion check game/ --fail-on error --format github
 """
 

@@ -1,13 +1,10 @@
 """Measure where in speed, turn and direction the clips have nothing, for each set of clips that a table lets play at once.
 
-Mirrored clips count, by mirrored facts. Also: which clip to capture next, clips that never play, and near-duplicates.
-
-Exits with 1 if --fail-under is missed, or if clips fill a movement in fewer contexts than in the --baseline; also if a table has no
-clips any more, is not in the baseline, or has other conditions: --gone, --new and --redefined accept that. With 2 for bad use.
+Also: which clip to capture next, clips that never play, and near-duplicates. Exits with 1 if --fail-under is missed, if clips
+fill a movement in fewer contexts than in the --baseline, or if a table is gone, new or redefined and no option accepts that.
 
   contextdb motion coverage game/
   contextdb motion coverage game/ --format html -o motion.html
-  contextdb motion coverage game/ --format json -o motion.json
   contextdb motion coverage game/ --baseline motion.json --fail-under 80
   contextdb motion coverage game/ --axis speed=wanted_speed --axis direction=move_direction
 """

@@ -1,16 +1,13 @@
 """See why in the terminal: a recorded session, moment by moment.
 
-A timeline of what plays, the cost of every frame of every asset, why an asset was not chosen, the poses, and weights that you can
-change: all searches run again at once. F1 says what the screen shows and which keys there are.
+What plays, the cost of every frame of every asset, why an asset was not chosen, the poses, and weights that you can change. F1
+says what the screen shows and which keys there are. Exits with 2 without a terminal; "contextdb motion replay" answers the same
+questions in scripts.
 
-The databases are those of the project that the session was recorded with, or of FOLDER. Exits with 2 without a terminal; "contextdb
-motion replay" answers the same questions in scripts.
-
-With --live the screen follows a running game whose link watches its controllers: what plays now, and the last minute. SESSION is
-then the name of the game, which may be left out if only one game runs; FOLDER is its project, by default the current folder.
+With --live the screen follows a running game whose link watches its controllers. SESSION is then the name of the game, which may
+be left out if only one game runs; FOLDER is its project, by default the current folder.
 
   contextdb motion debug session.parquet
-  contextdb motion debug session.parquet game/
   contextdb motion debug --live game/
 """
 

@@ -1,17 +1,12 @@
 """Make a table of clips: for each one a row with its gait, speed, direction, turn, style, duration, and how it begins and ends.
 
-Cells are ranges from the clips' own movement; neighbours overlap a little, so that some clip is valid in each context. --out writes
-the table with the contextdb.toml that it needs: conditions, outputs, features, databases, a selector and a controller. --into adds
-missing columns and rows to a table, fills its empty cells, and reports each cell that does not accept what its clip shows.
+Cells are ranges from the clips' own movement; neighbours overlap a little, so that some clip is valid in each context.
 
-More than 64 clips are read on all cores, or with --engine dask on workers; the table is the same.
-
-Exits with 1 if a cell disagrees with its clip, a clip could not be read, or the clips are not in the folder of
-contextdb.toml or below it.
+Exits with 1 if a cell disagrees with its clip, a clip could not be read, or the clips are not in the folder of contextdb.toml or
+below it.
 
   contextdb motion describe game/clips
   contextdb motion describe game/clips --out game/moves.csv
-  contextdb motion describe game --into game/moves.csv
   contextdb motion describe game --into game/moves.csv --update
 """
 

@@ -1,12 +1,10 @@
 """Learn the weights of channels from what people would have chosen in recorded sessions.
 
 In "contextdb motion debug", + marks an asset that should have been chosen, - one that should not. The choices are in a CSV file
-beside the session, session.choices.csv, with the columns tick, asset and choice. Weights that follow as many of them as possible
-are learned for the features of the databases, none below 0, and the sessions are run again with them: how many searches would
-choose otherwise, and the jumps before and after. With --write they are written into contextdb.toml, where nothing else changes;
-build the databases again afterwards.
+beside the session, session.choices.csv, with the columns tick, asset and choice. The sessions are run again with the learned
+weights: how many searches would choose otherwise, and the jumps before and after.
 
-Exits with 1 if better weights were learned and --write is not given, with 0 if there are none, or they were written.
+Exits with 1 if better weights were learned and --write is not given.
 
   contextdb motion learn session.parquet
   contextdb motion learn monday.parquet tuesday.parquet --write

@@ -1,16 +1,14 @@
 """Measure how good the motion of recorded sessions is: jumps, sliding feet, accelerations, path errors, and what is never played.
 
-The poses of a session are made again from the clips of its project, whose raw clips are measured too. A SESSION may also be a .npz
-file of poses, with --project for the clips.
+The poses of a session are made again from the clips of its project, whose raw clips are measured too. A SESSION may also be a
+.npz file of poses, with --project for the clips.
 
 Exits with 1 if a measure is over its bar, more than 1 % worse than in the baseline, or not measured any more; with 2 if a bar
 cannot be judged, or the baseline is of other sessions.
 
-  contextdb motion measure session.parquet
   contextdb motion measure session.parquet --max-skate 8 --max-jumps 1.5
   contextdb motion measure session.parquet --json > before.json
   contextdb motion measure session.parquet --baseline before.json
-  contextdb motion measure session.parquet --format html -o measures.html
 """
 
 from __future__ import annotations

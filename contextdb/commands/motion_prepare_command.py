@@ -1,18 +1,13 @@
 """Propose markup for clips, as a diff that you can review, edit, apply and revert: each mark with its reason and measure.
 
-The command proposes contacts of the feet, loops and the cuts that would make one, standing ends not to enter, noise to leave out,
-starts and turns to play as a whole, and near-duplicates. If hips sway, it also proposes root_smooth_s for the features of the
-databases: a build then computes the body's path from the hips (forward) and the feet (sideways). No clip file changes. Existing
-marks stay, and nothing is proposed where there is one. In the folder, `patch -p1` applies the diff, and `patch -p1 -R` reverts it.
-With --write the results are cached in .contextdb-cache: the next run reads only changed clips, and replaces the marks that were
-written for their earlier versions, except those that were edited. More than 64 clips are read on all cores, or with --engine dask
-on workers; the marks are the same.
+If hips sway, root_smooth_s for the features of the databases is proposed too. No clip file changes. Nothing is proposed where
+there is a mark. In the folder, `patch -p1` applies the diff, and `patch -p1 -R` reverts it. With --write the next run reads only
+changed clips, and replaces the marks that were written for their earlier versions, except those that were edited.
 
 Exits with 1 if a proposal is not written, or a clip could not be read.
 
   contextdb motion prepare game/
   contextdb motion prepare game/ --only loops --only starts
-  contextdb motion prepare game/ --write
   contextdb motion prepare game/ --write --watch
 """
 

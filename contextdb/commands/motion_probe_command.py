@@ -1,12 +1,8 @@
 """Drive a character by itself over the contexts of its tables, and measure how well it moves.
 
-From standing it goes straight, turns by 90 and by 180 degrees, runs circles and figures of eight, changes its speed, starts and
-stops: at speeds and in contexts that are chosen from what the tables ask and allow, and reported. Each drive is measured as by
-`contextdb motion measure`.
+Speeds and contexts are chosen from what the tables ask and allow, and reported. Each drive is measured as by `contextdb motion
+measure`. Exits with 1 if a drive is over a bar; with 2 if a bar cannot be judged.
 
-Exits with 1 if a drive is over a bar; with 2 if a bar cannot be judged.
-
-  contextdb motion probe game/ player
   contextdb motion probe game/ player --drive straight --drive circle --speed 1.3
   contextdb motion probe game/ player --out probed/ --max-skate 6 --max-jumps 1.5
 """

@@ -1,20 +1,12 @@
 """Show the decisions of a recorded session: what changed, when, and why; with --at, one decision in full.
 
-Without --at each change has a row, with the cost of playing on and how long the new animation played. --at accepts the tick of an
-update, the first column, or a time such as 2.5s.
-
-A session keeps the query of each search. With --at, candidates and the costs of all assets with a --name are computed again from
-the databases: those of the project that the session was recorded with, or of --project. --why says what it would have taken for an
-asset to be chosen, --what-if what other weights, biases and thresholds would have made of the session: "LeftFoot velocity=2",
-"continuing=-0.1" (or base, looping), "threshold jog_tired=3".
+Candidates and costs are computed again from the databases: those of the project that the session was recorded with, or of
+--project. --what-if takes weights, biases and thresholds: "LeftFoot velocity=2", "continuing=-0.1" (or base, looping), "threshold
+jog_tired=3".
 
   contextdb motion replay session.parquet
-  contextdb motion replay session.parquet --at 2.5s --view pose
   contextdb motion replay session.parquet --at 2.5s --why jog           why was mine not chosen?
-  contextdb motion replay session.parquet --stats
   contextdb motion replay session.parquet --what-if "LeftFoot velocity=2"
-  contextdb motion replay session.parquet --diff other.parquet
-  contextdb motion replay session.parquet --trace session.json          for Perfetto
   contextdb motion replay session.parquet --format html -o session.html plays in any browser
   contextdb motion replay new.parquet --diff old.parquet --html both.html --markdown
 """

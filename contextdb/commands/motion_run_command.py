@@ -1,15 +1,10 @@
 """Steer a character along a recorded stick, and record every decision: the same files give the same session.
 
 STICK is a CSV or Parquet file with a row for each moment, which lasts until the next. Its columns are time_s; speed_mps, turn_dps
-and strafe_deg as for `motion search`, or x_mps and z_mps, a velocity over the ground, and facing_deg. All other columns are facts.
-The facts speed, direction and turn are the character's own where the file does not give them. Paths begin where the poses are.
+and strafe_deg as for `motion search`, or x_mps and z_mps, a velocity over the ground, and facing_deg. All other columns are
+facts. The facts speed, direction and turn are the character's own where the file does not give them. [output.CONTROLLER] says how
+poses are made. Exits with 1 if nothing ever plays.
 
-With --poses the poses of the character are written too, as BVH, as arrays of numpy or as glTF; [output.CONTROLLER] says how they
-are made.
-
-Exits with 1 if nothing ever plays.
-
-  contextdb motion run game/ player stick.csv --out session.parquet
   contextdb motion run game/ player stick.csv --out session.parquet --poses session.bvh
   contextdb motion replay session.parquet
 """

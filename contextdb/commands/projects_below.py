@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from contextdb.console import printable
-from contextdb.disk import path_in_quotes
+from contextdb.disk import boundary, path_in_quotes
 from contextdb.disk.boundary import SCHEMA_FILE, TYPED_ROOT, work_tree
 from contextdb.errors import Fault, FileError, Place, plural
 from contextdb.findings import Level
@@ -20,11 +20,7 @@ def project_folders(text: str) -> list[Path]:
     """The folders below a root that have a contextdb.toml, in the order of their paths; hidden folders and links are passed over.
     Raises FileError where there is no such folder, or no project in it."""
     root = folder_of(Path(text), "a folder with projects below it")
-    folders = []
-    for at, below, names in os.walk(root):
-        below[:] = sorted(name for name in below if not name.startswith("."))
-        if SCHEMA_FILE in names:
-            folders.append(Path(at))
+    folders = boundary.project_folders(root)
     if not folders:
         place = Place(str(root))
         raise FileError(

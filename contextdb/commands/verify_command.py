@@ -1,14 +1,12 @@
 """Check that files are as they were written.
 
 Compiled tables, motion databases, recorded sessions, Parquet tables, reports (coverage, motion coverage, motion measure) and the
-editor's journals contain a digest or checksums of their contents, which detect a single altered bit. In a folder every such file
-below it is checked. Tables in CSV and contextdb.toml have no digest: they are read, and reported as readable. A file of an older or
-newer version that this one does not read is reported as such.
+editor's journals contain a digest or checksums of their contents. In a folder every such file below it is checked. Tables in CSV
+and contextdb.toml have none: they are read, and reported as readable.
 
 Exits with 1 if a file is damaged, or of a version that this one does not read.
 
   contextdb verify hit_mid_air.safetensors
-  contextdb verify coverage.json recorded/session.parquet
   contextdb verify tables/ --json
 """
 

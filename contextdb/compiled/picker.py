@@ -74,6 +74,11 @@ class Pick:
         outputs = self._left.choosing.compiled.outputs
         return outputs.fallback if self.row is None else outputs.of_row(self.row)
 
+    @property
+    def left(self) -> Left | None:
+        """What was left of the valid rows, step by step; None out of a pickle."""
+        return self._left
+
     @cached_property
     def why(self) -> str:
         """Why this row, in a few words."""

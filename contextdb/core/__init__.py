@@ -126,4 +126,10 @@ def _parts_of(name: str) -> str:
             text += folder.joinpath(part[1]).read_text(encoding="ascii")
         elif not (is_begun and line.isspace()):
             text += line
-    return text
+    return _with_bodies_apart(text)
+
+
+def _with_bodies_apart(text: str) -> str:
+    """The text, in which a public function is only declared where another file has it."""
+    function = re.compile(r"^(CDB_API [^{;]*?\))\n(\{\n.*?^\})$", re.M | re.S)
+    return function.sub(r"\1\n#if CDBI_HAS_BODIES\n\2\n#else\n;\n#endif", text)

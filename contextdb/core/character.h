@@ -58,6 +58,9 @@ typedef struct cdbm_input {
     cdbm_ground ground;             /* or NULL, where all is flat */
     void *user;                     /* what the ground is asked with */
     int force, interrupt;           /* search now; and leave what plays */
+    int is_copy;                    /* it plays what its owner does, on another machine: it neither asks tables nor searches */
+    const uint8_t *packet;          /* what cdbm_pack of the owner gave; of no bytes where nothing arrived */
+    size_t n_packet;
 } cdbm_input;
 
 typedef struct cdbm_pose {          /* where an update writes; cdbm_lay_out gives it its places */
@@ -266,9 +269,10 @@ static inline size_t cdbm_room_size(const cdbm_player *player, size_t n)
     size_t n_features = player->controller.n_features, n_frames = cdbm_most_frames(&player->ways);
     size_t each = cdbm_rounded(cdbm_state_size(player)) + cdbm_rounded(n_features * sizeof(double)) + cdbm_rounded(sizeof(cdbm_moved))
         + cdbm_rounded(player->n_ranges) + 2 * cdbm_rounded(player->n_ranges * sizeof(double)) + 2 * cdbm_rounded(cdbm_width(&player->controller) * sizeof(double)) + 64
-        + cdbm_rounded(player->controller.n_databases * sizeof(cdbm_found)) + cdbm_rounded(sizeof(cdbm_decision));
+        + cdbm_rounded(player->controller.n_databases * (sizeof(cdbm_found) + 1)) + cdbm_rounded(sizeof(cdbm_decision))
+        + cdbm_rounded(sizeof(cdbm_followed));
     return n * each + cdbm_rounded((4 * n_frames + 3 * n_features) * sizeof(double)) + cdbm_choice_room(&player->controller, n)
-        + cdbm_rounded((player->has_poses ? cdbo_pose_room(&player->poses) : 0) * sizeof(double)) + cdbm_rounded(CDBM_MOST_DATABASES) + cdbm_answer_room(player) + 256;
+        + cdbm_rounded((player->has_poses ? cdbo_pose_room(&player->poses) : 0) * sizeof(double)) + cdbm_answer_room(player) + 256;
 }
 
 /* A character that stands at a place and has not done anything yet. */
@@ -308,6 +312,7 @@ typedef struct cdbm_many {          /* a crowd in an update, in room */
     cdbm_moved *moved;
     cdbm_found *found;
     cdbm_decision *decisions;
+    cdbm_followed *followed;
     uint8_t *ranges, *among, *urgent;
 } cdbm_many;
 
@@ -322,8 +327,9 @@ static inline int cdbm_take_many(const cdbm_player *player, size_t n, cdbm_many 
     many->biases = (double *)cdbm_part(room, n * player->n_ranges * sizeof(double));
     many->play_of = (int64_t *)cdbm_part(room, n * player->n_ranges * sizeof(int64_t));
     if (!many->biases || !many->play_of) return 0;
-    many->among = (uint8_t *)cdbm_part(room, player->controller.n_databases);
-    return many->states && many->queries && many->moved && many->found && many->decisions && many->ranges && many->urgent && many->among;
+    many->among = (uint8_t *)cdbm_part(room, n * player->controller.n_databases);
+    many->followed = (cdbm_followed *)cdbm_part(room, n * sizeof *many->followed);
+    return many->followed && many->states && many->queries && many->moved && many->found && many->decisions && many->ranges && many->urgent && many->among;
 }
 
 /* ---- what the tables say */
@@ -461,6 +467,21 @@ static inline int cdbm_let_play(const cdbm_player *player, const cdbm_input *inp
     return 1;
 }
 
+/* The same for a copy: all may play, and what its owner plays does as that has it. -3 for what is no packet. */
+static inline int cdbm_let_follow(const cdbm_player *player, const cdbm_input *input, cdbm_many *many, size_t i)
+{
+    cdbm_followed *followed = &many->followed[i];
+    int64_t *play_of = many->play_of + i * player->n_ranges;
+    size_t r;
+    if (!cdbm_read_packet(&player->controller, input->packet, input->n_packet, &many->moved[i], followed)) return -3;
+    memset(many->ranges + i * player->n_ranges, 1, player->n_ranges);
+    memcpy(many->biases + i * player->n_ranges, player->range_biases, player->n_ranges * sizeof(double));
+    for (r = 0; r < player->n_ranges; r++) play_of[r] = -1;
+    if (followed->enters != 0.0) play_of[player->clips[(size_t)followed->database].range_at + (size_t)followed->range] = 0;
+    many->urgent[i] = followed->enters != 0.0 ? CDBM_FORCE : 0;
+    return 1;
+}
+
 /* Write the query of one: it is some time later, and wishes to take a path. 0 for a path without a frame. */
 static inline int cdbm_query_of(const cdbm_player *player, const cdbm_input *input, double dt_s, const double *before, double *state,
     cdbm_moved *moved, double *query, cdbm_room room)
@@ -549,7 +570,7 @@ static inline int cdbm_moves_body(const cdbm_player *player, const cdbm_decision
 }
 
 /* Update characters: `states` are their blocks, one after another. 1; 0 with too little room, or a path that is none; -1 where what is
- * asked for is no finite number; -2 for a fact that a table refuses. Where it is not 1 all stand where they stood. */
+ * asked for is no finite number; -2 for a fact that a table refuses; -3 for a packet that is none. Where it is not 1 all stand where they stood. */
 static inline int cdbm_update_all(const cdbm_player *player, size_t n, double *states, double dt_s, const cdbm_input *inputs,
     cdbm_pose *poses, cdbm_room room)
 {
@@ -562,16 +583,17 @@ static inline int cdbm_update_all(const cdbm_player *player, size_t n, double *s
     int is_done = 1;
     if (!(dt_s >= 0.0 && dt_s <= 1e6) || !cdbm_take_many(player, n, &many, &room)) return dt_s >= 0.0 && dt_s <= 1e6 ? 0 : -1;
     memset(&given, 0, sizeof given);
-    memset(many.among, 1, controller->n_databases);
+    memset(many.among, 1, n * controller->n_databases);
     given.n = n, given.dt_s = dt_s, given.queries = many.queries, given.ranges = many.ranges, given.ranges_step = player->n_ranges;
     given.range_biases = many.biases, given.biases_step = given.plays_step = player->n_ranges;
     given.plays = player->plays, given.play_of = many.play_of, given.allowed = player->allowed, given.playable = player->playable;
     given.kind_biases = player->kind_biases, given.among = many.among, given.urgent = many.urgent;
+    given.among_step = controller->n_databases;
     for (i = 0; i < n; i++) {
         many.urgent[i] = (uint8_t)((inputs[i].force ? CDBM_FORCE : 0) | (inputs[i].interrupt ? CDBM_INTERRUPT : 0));
         if (!cdbm_query_of(player, &inputs[i], dt_s, states + i * width, many.states + i * width, &many.moved[i],
                 many.queries + i * n_features, room)) return 0;
-        is_done = cdbm_let_play(player, &inputs[i], many.states + i * width, many.ranges + i * player->n_ranges,
+        is_done = inputs[i].is_copy ? cdbm_let_follow(player, &inputs[i], &many, i) : cdbm_let_play(player, &inputs[i], many.states + i * width, many.ranges + i * player->n_ranges,
             many.biases + i * player->n_ranges, many.play_of + i * player->n_ranges, room);
         if (is_done != 1) return is_done;
     }
@@ -580,14 +602,21 @@ static inline int cdbm_update_all(const cdbm_player *player, size_t n, double *s
     numbers = (double *)cdbm_part(&left, n_features * sizeof(double));
     if (!before || !after || !numbers) return 0;
     for (i = 0; i < n; i++) {
+        cdbm_given own = given;
         memcpy(before + i * played, cdbm_played_part(player, states + i * width), played * sizeof(double));
-        cdbm_ask(controller, &given, i, before + i * played, &many.moved[i], after + i * played, &many.decisions[i], numbers);
+        if (inputs[i].is_copy) own.plays = &many.followed[i].play;
+        cdbm_ask(controller, &own, i, before + i * played, &many.moved[i], after + i * played, &many.decisions[i], numbers);
+        if (!inputs[i].is_copy) continue;
+        cdbm_take_followed(&many.followed[i], &many.decisions[i]);
+        memset(many.among + i * controller->n_databases, 0, controller->n_databases); /* it searches none */
     }
     is_done = cdbm_choose(controller, &given, 0, n, after, many.moved, many.decisions, many.found, left);
     if (is_done != 1) return is_done;
     for (i = 0; i < n; i++) {
-        cdbm_compare(controller, &given, i, &many.moved[i], &many.decisions[i], numbers);
-        cdbm_decide(controller, &given, i, before + i * played, &many.moved[i], after + i * played, &many.decisions[i]);
+        cdbm_given own = given;
+        if (inputs[i].is_copy) own.plays = &many.followed[i].play;
+        else cdbm_compare(controller, &given, i, &many.moved[i], &many.decisions[i], numbers);
+        cdbm_decide(controller, &own, i, before + i * played, &many.moved[i], after + i * played, &many.decisions[i]);
         memcpy(cdbm_played_part(player, many.states + i * width), after + i * played, played * sizeof(double));
         poses[i].decision = many.decisions[i];
     }
@@ -608,6 +637,13 @@ static inline int cdbm_update_all(const cdbm_player *player, size_t n, double *s
 static inline int cdbm_update(const cdbm_player *player, double *state, double dt_s, const cdbm_input *input, cdbm_pose *pose, cdbm_room room)
 {
     return cdbm_update_all(player, 1, state, dt_s, input, pose, room);
+}
+
+/* What a copy on another machine must be told after an update: bytes, into room for CDBM_MOST_PACKET, and how many; none where nothing
+ * plays. */
+static inline size_t cdbm_pack(const cdbm_player *player, const double *state, uint8_t *packet)
+{
+    return cdbm_pack_row(&player->controller, state + cdbm_walk_width(&player->ways), packet);
 }
 
 /* ---- what is to be told */

@@ -6,4 +6,5 @@
 #include "search.h"
 #include "joint.h"
 #include "controller.h"
+#include "follow.h"
 #include "walk.h"

@@ -1,3 +1,4 @@
 /* The parts of the core for motion in games, behind those of motion.h. */
 #include "bundle.h"
 #include "character.h"
+#include "crowd.h"

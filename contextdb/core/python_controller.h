@@ -293,6 +293,46 @@ static PyObject *cdbp_controller_skips(PyObject *self, PyObject *const *in, Py_s
     return NULL;
 }
 
+/* controllers.pack(row): the packet that says what plays; see follow.h. */
+static PyObject *cdbp_controller_pack(PyObject *self, PyObject *const *in, Py_ssize_t n)
+{
+    const cdbp_controller *own = (const cdbp_controller *)self;
+    uint8_t packet[CDBM_MOST_PACKET];
+    cdbp_arrays a;
+    const double *row;
+    size_t s[3], n_bytes = 0;
+    int is_done = 0;
+    a.n = 0;
+    if (own->is_made && n == 1 && (row = cdbp_numbers(&a, in[0], s, 2, 1, cdbm_width(&own->controller), 0))
+        && cdbp_are_rows(&own->controller, row, 1)) n_bytes = cdbm_pack_row(&own->controller, row, packet), is_done = 1;
+    cdbp_release(&a);
+    if (is_done) return PyBytes_FromStringAndSize((const char *)packet, (Py_ssize_t)n_bytes);
+    if (!PyErr_Occurred()) PyErr_SetString(PyExc_ValueError, "pack takes a row of these controllers");
+    return NULL;
+}
+
+/* controllers.read_packet(packet, moved, followed): what a packet says, to one who would play on as it has moved; whether it is one. */
+static PyObject *cdbp_controller_read_packet(PyObject *self, PyObject *const *in, Py_ssize_t n)
+{
+    const cdbp_controller *own = (const cdbp_controller *)self;
+    cdbp_arrays a;
+    char *packet;
+    const cdbm_moved *moved;
+    cdbm_followed *to;
+    Py_ssize_t n_bytes;
+    size_t s[3];
+    int is_read = -1;
+    a.n = 0;
+    if (own->is_made && n == 3 && PyBytes_AsStringAndSize(in[0], &packet, &n_bytes) == 0
+        && (moved = (const cdbm_moved *)cdbp_numbers(&a, in[1], s, 2, 1, sizeof *moved / sizeof(double), 0))
+        && (to = (cdbm_followed *)cdbp_to_numbers(&a, in[2], s, 1, sizeof *to / sizeof(double), 0, 0)))
+        is_read = cdbm_read_packet(&own->controller, (const uint8_t *)packet, (size_t)n_bytes, moved, to);
+    cdbp_release(&a);
+    if (is_read >= 0) return cdbp_new_ref(is_read ? Py_True : Py_False);
+    if (!PyErr_Occurred()) PyErr_SetString(PyExc_ValueError, "read_packet takes bytes, what has moved, and an array");
+    return NULL;
+}
+
 static PyObject *cdbp_controller_width(PyObject *self, void *unused)
 {
     (void)unused;
@@ -302,6 +342,8 @@ static PyObject *cdbp_controller_width(PyObject *self, void *unused)
 static PyMethodDef cdbp_controller_methods[] = {
     {"move", CDBP_CALL(cdbp_controller_move), METH_FASTCALL, "Write what plays some time later."},
     {"update", CDBP_CALL(cdbp_controller_update), METH_FASTCALL, "Update characters: ask, choose and decide."},
+    {"pack", CDBP_CALL(cdbp_controller_pack), METH_FASTCALL, "The packet that says what plays."},
+    {"read_packet", CDBP_CALL(cdbp_controller_read_packet), METH_FASTCALL, "Write what a packet says."},
     {"skips", CDBP_CALL(cdbp_controller_skips), METH_FASTCALL, "Write what a search leaves out."},
     {NULL, NULL, 0, NULL},
 };

@@ -94,9 +94,6 @@ class Demand:
             return np.asarray((valid & ~is_kind).any(axis=1))
         if verb == "at_most":
             return np.asarray(of_kind.sum(axis=1) > self.contract.most)
-        broken = np.asarray(~valid.any(axis=1))
-        for i in bitmask.rows_of(self.finder.rows & ~self.kind & self.picks.pickable):
-            preferred = bitmask.flags_of(self.picks.to(i), len(self.space.boxes))
-            here = np.flatnonzero(valid[:, i] & ~broken)
-            broken[here] = ~(valid[here] & preferred).any(axis=1)
-        return broken
+        others = bitmask.flags_of(self.finder.rows & ~self.kind & self.picks.pickable, len(self.space.boxes))
+        won_by_others = (valid & others & ~self.picks.beaten(valid)).any(axis=1)
+        return np.asarray(~valid.any(axis=1) | won_by_others)

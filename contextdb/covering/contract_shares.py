@@ -25,6 +25,9 @@ from contextdb.covering.witness import OutOfSteps, Point
 MOST_SHARED = 2_000
 """So many boxes that too many rows share are counted."""
 
+MOST_RUN_BOXES = 10_000
+"""So many boxes, those of all runs of rows that alternate in kind together, are counted."""
+
 Drawn = tuple[Point, Moment]
 """A context that was drawn: its classes, and its facts."""
 
@@ -95,6 +98,8 @@ class Shares:
         counted = pickable & (~is_kind | self.demand.picks.always[rows])
         order = sorted(np.flatnonzero(counted).tolist(), key=lambda i: (-ranks[i], is_kind[i]))
         n_runs = 2 + 2 * sum(not is_kind[i] for i, j in zip_longest(order, order[1:]) if j is None or is_kind[j])
+        if n_runs * len(order) > MOST_RUN_BOXES:
+            return None
         left = self._open(self._impossible | self.demand.finder.rows, n_runs)  # no row is valid
         low, high, before, own = left.lower, left.upper, self._impossible, 0
         for i in [*order, None]:

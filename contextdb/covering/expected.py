@@ -79,7 +79,10 @@ class Expectation:
     @property
     def headline(self) -> str:
         """The covered share in one sentence."""
-        covered, of = self.covered, f"what {plural(len(self.situations), 'expected situation')} ask for"
+        covered, of = (
+            self.covered,
+            f"what {plural(n := len(self.situations), 'expected situation')} {'asks' if n == 1 else 'ask'} for",
+        )
         if covered.method == "exact":
             return f"{format_percent(covered.value)} of {of} has a valid row."
         ends = " and ".join(distinct_percents(covered.lower, covered.upper))

@@ -52,5 +52,21 @@ class Preferred:
             self._above[key] = self._bits(above & self.always)
         return self._above[key]
 
+    def beaten(self, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Which boxes are kept from being picked by others that hold a context, bool [N, boxes], where these hold it, bool [N,
+        boxes]: those that meet one of `to`."""
+        rows, beaten = np.array(self.rows, np.int64), np.zeros(valid.shape, np.bool_)
+        counted = valid & self.always[rows]
+        for groups, ranks in zip(self.choosing.groups[:, rows], self.choosing.ranks[:, rows], strict=True):
+            names, of_box = np.unique(groups, return_inverse=True)
+            best = np.full((len(valid), len(names)), -np.inf)
+            for at in range(len(names)):
+                own = np.flatnonzero(of_box == at)
+                own = own[np.argsort(-ranks[own], kind="stable")]
+                here = counted[:, own]
+                best[:, at] = np.where(here.any(axis=1), ranks[own[here.argmax(axis=1)]], -np.inf)
+            beaten |= ranks < (best[:, of_box] if len(names) > 1 else best)
+        return beaten
+
     def _bits(self, flags: NDArray[np.bool_]) -> int:
         return bitmask.int_of([i for i, row in enumerate(self.rows) if flags[row]])

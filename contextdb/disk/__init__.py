@@ -22,6 +22,7 @@ from typing import Literal
 
 from contextdb.disk.boundary import ACTORS_SUFFIX as ACTORS_SUFFIX
 from contextdb.disk.boundary import CASES_SUFFIX as CASES_SUFFIX
+from contextdb.disk.boundary import GAPS_SUFFIX as GAPS_SUFFIX
 from contextdb.disk.boundary import NOTES_SUFFIX as NOTES_SUFFIX
 from contextdb.disk.boundary import inside, require_companion_inside
 from contextdb.disk.boundary import real_path as real_path
@@ -65,10 +66,11 @@ def refuse_writing(why: str) -> None:
 
 
 def names_a_table(name: str) -> bool:
-    """Whether a file of this name in a folder of tables is a table: no saved contexts, no notes, and nothing hidden, as macOS and
-    editors put next to a file."""
+    """Whether a file of this name in a folder of tables is a table: no saved contexts, notes or gaps, and nothing hidden, as macOS
+    and editors put next to a file."""
     folded = name.lower()
-    return folded.endswith(TABLE_SUFFIXES) and not folded.endswith((CASES_SUFFIX, NOTES_SUFFIX)) and not folded.startswith(".")
+    is_companion = folded.endswith((CASES_SUFFIX, NOTES_SUFFIX, GAPS_SUFFIX))
+    return folded.endswith(TABLE_SUFFIXES) and not is_companion and not folded.startswith(".")
 
 
 def write_atomic(path: str | Path, data: Data, was: Was = "any", syncs: bool = True) -> bool:

@@ -23,9 +23,11 @@ CASES_SUFFIX = ".cases.csv"
 """What the file of a table's saved contexts ends in: no table itself."""
 NOTES_SUFFIX = ".notes.csv"
 """What the file of the notes on a table ends in: no table itself, either."""
+GAPS_SUFFIX = ".gaps.csv"
+"""What the file of the work on a table's gaps ends in: no table."""
 ACTORS_SUFFIX = ".actors.json"
 """What the file of the actors for a table's roles ends in."""
-COMPANIONS = (SCHEMA_FILE, CASES_SUFFIX, NOTES_SUFFIX, ACTORS_SUFFIX)
+COMPANIONS = (SCHEMA_FILE, CASES_SUFFIX, NOTES_SUFFIX, GAPS_SUFFIX, ACTORS_SUFFIX)
 """The ends of the names of files that are found next to a table. Nobody types them, so they are always `inside`."""
 
 
@@ -103,6 +105,16 @@ def work_tree(folder: Path) -> Path:
     """The nearest folder, from this one upwards, that has a .git; else that of its project. It has no links on its way."""
     real = Path(os.path.realpath(folder))
     return next((each for each in (real, *real.parents) if os.path.lexists(each / ".git")), project_folder(real))
+
+
+def project_folders(root: Path) -> list[Path]:
+    """The folders with a contextdb.toml, of this one and those below it, in the order of their paths; hidden folders and links are
+    passed over."""
+    folders = []
+    for at, below, names in os.walk(root):
+        below[:] = sorted(name for name in below if not name.startswith("."))
+        folders += [Path(at)] if SCHEMA_FILE in names else []
+    return folders
 
 
 def _is_plain(path: Path) -> bool:

@@ -16,6 +16,8 @@ from pathlib import Path
 from contextdb.disk import Data, make_folder, write_atomic
 from contextdb.errors import Fault, FileError, Place
 
+FOLDER = ".contextdb-journal"
+"""The folder beside tables, of what an editor and an import keep."""
 NOT_OURS = "not-ours"
 """The rule of what is said of a file that is refused."""
 _IGNORE = ".gitignore"

@@ -1,9 +1,10 @@
 """Give a condition another name in a whole project, or in one table of it, so that what speaks of it still does.
 
-    everywhere        the headers of all tables, rules of rows, saved contexts and actors, and in contextdb.toml the declaration,
-                      derived facts, assumptions and blueprints
-    in one table      its header, its rules, its saved contexts and actors, its assumptions; the new name is declared as the old
-                      one is, which stays for all others
+    everywhere        the headers of all tables, rules of rows, saved and expected contexts and actors, and in contextdb.toml the
+                      declaration, derived facts, assumptions and blueprints; all that in the projects, too, that have the condition
+                      because they extend this one
+    in one table      its header and those of its variants, their rules, their saved contexts and actors, their assumptions; the new
+                      name is declared as the old one is, which stays for all others
 
 An edge: it reads the files of a folder, and writes them. All are worked out and read again before the first is written; when the
 disk refuses one, those that were written are put back.
@@ -12,10 +13,10 @@ disk refuses one, those that were written are put back.
 from __future__ import annotations
 
 import json
-import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,20 +24,17 @@ import numpy as np
 
 from contextdb.cells.words import says_any
 from contextdb.columns import TextColumn
-from contextdb.disk import ACTORS_SUFFIX, NOTES_SUFFIX, read_bytes, real_path, write_atomic
+from contextdb.disk import ACTORS_SUFFIX, NOTES_SUFFIX, read_bytes, write_atomic
 from contextdb.disk.together import putting_back
-from contextdb.edits.schema_file import require_declared_here, schema_path
+from contextdb.edits.project_files import NO_NAMES, ProjectFiles, Rewrite, TableFile
+from contextdb.edits.schema_file import require_declared_here
 from contextdb.errors import ContextDBError, Fault, FileError, Place, SchemaError, TableError, in_quotes, plural
 from contextdb.expressions.names import names_in, with_names
 from contextdb.files.texts import AnySource, read_texts, written_over
-from contextdb.schema import toml_edit
-from contextdb.schema.settings import Schema, TableSettings, plain_names
+from contextdb.tables.gap_work import GapWork, gaps_path, key_of
 from contextdb.tables.other_files import CASE_COLUMNS, cases_path
-from contextdb.tables.project import SCHEMA_FILE, read_folder_schema, schema_of, table_files
+from contextdb.tables.project import SCHEMA_FILE
 from contextdb.tables.table import Table
-
-NO_NAMES: Mapping[str, str] = {}
-_BOM = b"\xef\xbb\xbf"
 
 
 @dataclass(frozen=True)
@@ -50,6 +48,8 @@ class Uses:
     n_assumptions: int = 0
     n_contracts: int = 0
     blueprints: tuple[str, ...] = ()
+    projects: tuple[str, ...] = ()
+    """Projects that have it because they extend this one."""
     n_rules: int = 0
     """Rows, of any table, whose own rule names it."""
     n_cases: int = 0
@@ -66,19 +66,11 @@ class Uses:
             (self.n_assumptions, "assumption"),
             (self.n_contracts, "contract"),
             (len(self.blueprints), "blueprint"),
+            (len(self.projects), "extending project"),
             (self.n_rules, "rule"),
             (self.n_cases, "saved context"),
         )
         return ", ".join(plural(n, noun) for n, noun in counts if n)
-
-
-@dataclass(frozen=True)
-class Rewrite:
-    """A file as it is to be written."""
-
-    path: Path
-    before: bytes
-    after: bytes
 
 
 @dataclass(frozen=True)
@@ -110,70 +102,6 @@ class Renaming:
                 raise
 
 
-@dataclass(frozen=True)
-class TableFile:
-    """A table's file and what is in it."""
-
-    name: str
-    path: Path
-    settings: TableSettings
-    source: AnySource
-    columns: tuple[TextColumn, ...]
-
-    @classmethod
-    def read(cls, name: str, path: Path, settings: TableSettings) -> TableFile:
-        source, columns = read_texts(path)
-        return cls(name, path, settings, source, tuple(columns))
-
-    def has_condition(self, condition: str) -> bool:
-        """Whether the table has a column that is this condition."""
-        return condition not in plain_names(self.settings, self.columns) and any(c.name == condition for c in self.columns)
-
-    @property
-    def rules(self) -> TextColumn | None:
-        return next((c for c in self.columns if c.name == self.settings.when), None)
-
-
-@dataclass(frozen=True)
-class ProjectFiles:
-    """The project of a table as it is on the disk."""
-
-    folder: Path
-    raw: bytes
-    """Its contextdb.toml; empty where there is none."""
-    schema: Schema
-    tables: tuple[tuple[str, Path], ...]
-    own: str
-    """The name of the table."""
-
-    @classmethod
-    def of(cls, table: Table) -> ProjectFiles:
-        folder = folder_of(table)
-        assert table.path is not None
-        raw = read_bytes(folder / SCHEMA_FILE) if (folder / SCHEMA_FILE).is_file() else b""
-        schema = read_folder_schema(folder) if raw else table.schema
-        tables, here = tuple(table_files(folder, schema)), real_path(table.path)
-        own = next((name for name, path in tables if real_path(path) == here), table.name)
-        return cls(folder, raw, schema, tables, own)
-
-    def read(self, only_own: bool = False) -> list[TableFile]:
-        """The tables of the project, or the table alone."""
-        named = [(name, path) for name, path in self.tables if name == self.own or not only_own]
-        return [TableFile.read(name, path, self.schema.tables.get(name, TableSettings(name))) for name, path in named]
-
-    def rewritten_toml(self, change: Callable[[dict[str, Any]], None], moved: Mapping[str, str] = NO_NAMES) -> Iterator[Rewrite]:
-        """contextdb.toml with a change, where there is one; see the function of this name."""
-        if self.raw:
-            yield from rewritten_toml(self.folder / SCHEMA_FILE, self.raw, change, moved)
-
-    def with_conditions(self, names: Mapping[str, str], only_here: bool) -> Iterator[Rewrite]:
-        """contextdb.toml with other names of conditions, in all the project or in the table only."""
-        if only_here:
-            yield from self.rewritten_toml(lambda document: only_here_in(document, names, self.own))
-        else:
-            yield from self.rewritten_toml(lambda document: everywhere_in(document, names), names)
-
-
 def uses_of(table: Table, condition: str) -> Uses:
     """What else speaks of a condition than the column of a table. Of the table its unsaved edits count, of others the files."""
     schema, own = table.schema, table.settings
@@ -182,11 +110,12 @@ def uses_of(table: Table, condition: str) -> Uses:
     if table.when is not None:
         n_own_rules = _n_rules(table.text_column(table.when.name), condition)
     n_cases = n_own_cases = _n_cases(table.path, condition) if table.path is not None else 0
-    for name, path in table_files(folder_of(table), schema) if table.path is not None else ():
-        if table.path is not None and real_path(path) == real_path(table.path):
+    project = ProjectFiles.of(table) if table.path is not None else None
+    for name, path in project.tables if project is not None else ():
+        if project is None or name == project.own:
             continue
         try:
-            file = TableFile.read(name, path, schema.tables.get(name, TableSettings(name)))
+            file = project.table_file(name, path)
         except ContextDBError:  # what it holds is not known
             others.append(name)
             continue
@@ -199,27 +128,50 @@ def uses_of(table: Table, condition: str) -> Uses:
     n_own_premises, n_premises = (_n_naming(premises[is_own], condition) for is_own in (True, False))
     elsewhere = [text for s in schema.tables.values() if s.name != own.name for text in s.assume]
     n_own_assumed, n_assumed = _n_naming(own.assume, condition), _n_naming(elsewhere, condition)
-    is_elsewhere = bool(others or derived or blueprints or n_rules or n_cases > n_own_cases or n_assumed or n_premises)
+    projects = extending(project, condition) if project is not None else ()
+    is_elsewhere = bool(others or derived or blueprints or projects or n_rules or n_cases > n_own_cases or n_assumed or n_premises)
     counts = n_own_assumed + n_assumed, n_own_premises + n_premises
-    return Uses(tuple(others), derived, *counts, blueprints, n_rules + n_own_rules, n_cases, is_elsewhere)
+    return Uses(tuple(others), derived, *counts, blueprints, projects, n_rules + n_own_rules, n_cases, is_elsewhere)
+
+
+def extending(project: ProjectFiles, condition: str) -> tuple[str, ...]:
+    """The folders of the projects that have a condition because they extend this one."""
+    return tuple(str(other.folder) for other, _ in project.carrying([condition])[1:])
 
 
 def renaming(table: Table, old: str, new: str, only_here: bool = False) -> Renaming:
     """What is to be written so that a condition of a table has another name, in all the project or in this table only. Raises
     TableError, SchemaError or FileError where the new name is taken or no name; a file cannot be read, or could not say what it
     should."""
-    files = ProjectFiles.of(table)
-    if not only_here and new in files.schema.conditions:
-        raise SchemaError(Fault(f"the condition {in_quotes(new)} is declared already.", "a name that nothing has yet"))
+    project = ProjectFiles.of(table)
+    return Renaming(old, new, rewritten_projects(project, {old: new}, only_here, lambda file, names: rewritten_table(file, names)))
+
+
+def rewritten_projects(
+    project: ProjectFiles,
+    names: Mapping[str, str],
+    only_here: bool,
+    rewritten_file: Callable[[TableFile, Mapping[str, str]], Iterator[Rewrite]],
+) -> tuple[Rewrite, ...]:
+    """All files that speak of conditions under their other names: of a project and those that extend it, or of a table and its
+    variants only. Raises errors as `renaming` does."""
     if not only_here:
-        require_declared_here([("conditions", old)], files.schema, files.folder / SCHEMA_FILE)
-    rewrites = [rewrite for file in files.read(only_here) for rewrite in rewritten_table(file, {old: new})]
-    return Renaming(old, new, (*rewrites, *files.with_conditions({old: new}, only_here)))
-
-
-def folder_of(table: Table) -> Path:
-    """The folder of the project that a table is in."""
-    return schema_path(table).parent
+        require_declared_here((("conditions", name) for name in names), project.schema, project.folder / SCHEMA_FILE)
+    rewrites: list[Rewrite] = []
+    for each, carried in [(project, frozenset(names))] if only_here else project.carrying(names):
+        own = {old: new for old, new in names.items() if old in carried}
+        files = each.read(only_here)
+        for old, new in own.items():
+            if not only_here and new in each.schema.conditions:
+                fault = Fault(f"the condition {in_quotes(new)} is declared already.", "a name that nothing has yet")
+                raise SchemaError(fault.at(Place(str(each.folder / SCHEMA_FILE))))
+            each.require_free(files, old, new, TableFile.has_condition, "a condition")
+        rewrites += [rewrite for file in files for rewrite in rewritten_file(file, own)]
+        if only_here:
+            rewrites += each.rewritten_toml(partial(only_here_in, names=own, tables=each.family))
+        else:
+            rewrites += each.rewritten_toml(partial(everywhere_in, names=own), own, rewrites)
+    return tuple(rewrites)
 
 
 # ---- what speaks of a condition
@@ -258,14 +210,32 @@ def rewritten_table(
     _require_free(file.path, columns)
     columns = [_with_rules(c, names) if file.rules is not None and c.name == file.rules.name else c for c in columns]
     yield from rewritten(file.path, file.source, file.columns, columns)
-    cases, of_cases = cases_path(file.path), {old: new for old, new in names.items() if old not in CASE_COLUMNS}
-    if cases.is_file() and of_cases:
-        source, texts = read_texts(cases)
-        renamed = [c.renamed(of_cases[c.name]) if c.name in of_cases else c for c in texts]
-        _require_free(cases, renamed)
-        yield from rewritten(cases, source, texts, renamed)
+    of_cases = {old: new for old, new in names.items() if old not in CASE_COLUMNS}
+    yield from rewritten_contexts(file, lambda column: column.renamed(of_cases.get(column.name, column.name)))
+    yield from rewritten_gaps(file.path, lambda name, cell: (names.get(name, name), cell))
     yield from rewritten_notes(file.path, "Column", names)
     yield from rewritten_actors(file.path, names, roles)
+
+
+def rewritten_contexts(file: TableFile, change: Callable[[TextColumn], TextColumn]) -> Iterator[Rewrite]:
+    """The saved contexts of a table and those that are expected, with other columns."""
+    for path in (cases_path(file.path), file.expected):
+        if path is not None and path.is_file():
+            source, columns = read_texts(path)
+            after = [c if (changed := change(c)).name == c.name and changed.texts == c.texts else changed for c in columns]
+            _require_free(path, after)
+            yield from rewritten(path, source, columns, after)
+
+
+def rewritten_gaps(table: Path, change: Callable[[str, str], tuple[str, str]]) -> Iterator[Rewrite]:
+    """The work on a table's gaps with other conditions, or other cells of them."""
+    path = gaps_path(table)
+    if path.is_file():
+        raw = read_bytes(path)
+        lines = GapWork.of(raw, str(path)).lines
+        after = GapWork({key_of(dict(change(*cell) for cell in key)): work for key, work in lines.items()}).to_bytes()
+        if after != raw:
+            yield Rewrite(path, raw, after)
 
 
 def rewritten_notes(table: Path, column: str, names: Mapping[str, str]) -> Iterator[Rewrite]:
@@ -351,15 +321,16 @@ def everywhere_in(document: dict[str, Any], names: Mapping[str, str]) -> None:
         part["conditions"] = [names.get(name, name) for name in part.get("conditions", [])]
 
 
-def only_here_in(document: dict[str, Any], names: Mapping[str, str], table: str) -> None:
-    """Change what the file says of one table; new names are declared as the old ones are."""
+def only_here_in(document: dict[str, Any], names: Mapping[str, str], tables: Collection[str]) -> None:
+    """Change what the file says of some tables; new names are declared as the old ones are."""
     conditions = document.get("conditions", {})
     for old, new in names.items():
         if old in conditions and new not in conditions:
             conditions[new] = deepcopy(conditions[old])
-    _assume(document.get("tables", {}).get(table, {}), names)
+    for table in tables:
+        _assume(document.get("tables", {}).get(table, {}), names)
     for part in document.get("contracts", {}).values():
-        if part.get("table") == table:
+        if part.get("table") in tables:
             _premise(part, names)
 
 
@@ -371,37 +342,3 @@ def _assume(part: dict[str, Any], names: Mapping[str, str]) -> None:
 def _premise(part: dict[str, Any], names: Mapping[str, str]) -> None:
     if isinstance(part.get("when"), str):
         part["when"] = with_names(part["when"], names)
-
-
-def rewritten_toml(
-    path: Path, raw: bytes, change: Callable[[dict[str, Any]], None], moved: Mapping[str, str], kind: str = "conditions"
-) -> Iterator[Rewrite]:
-    """contextdb.toml with a change; only the keys that say something else are written, and a section of `kind` that moves keeps its
-    lines."""
-    bom = _BOM if raw.startswith(_BOM) else b""
-    text = raw.removeprefix(_BOM).decode()
-    before, wanted = tomllib.loads(text), tomllib.loads(text)
-    change(wanted)
-    if wanted == before:
-        return
-    for old, new in moved.items():
-        text = toml_edit.rename_section(text, (kind, old), (kind, new)) or text
-    for section in ("conditions", "tables", "blueprints", "contracts"):
-        text = _with_section(text, section, tomllib.loads(text).get(section, {}), wanted.get(section, {}))
-    if tomllib.loads(text) != wanted:
-        problem = "this cannot be renamed without changing more of the file."
-        raise SchemaError(Fault(problem, "sections such as [conditions.NAME]", "to rename it in a text editor", Place(str(path))))
-    schema_of(text.encode(), path)  # refuses what no project can be
-    yield Rewrite(path, raw, bom + text.encode())
-
-
-def _with_section(text: str, section: str, now: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
-    for name, part in wanted.items():
-        for key, value in part.items():
-            if now.get(name, {}).get(key) != value:
-                behind = [(section, one) for one in now]
-                text = toml_edit.set_key(text, (section, name, key), value, behind)
-    for name in now:
-        if name not in wanted:
-            text = toml_edit.drop_key(text, (section, name))
-    return text

@@ -11,13 +11,12 @@ from collections.abc import Iterator, Mapping
 
 from contextdb.cells.outputs import SLOT_COLUMNS
 from contextdb.columns import TextColumn
-from contextdb.edits.renaming import ProjectFiles, Renaming, Rewrite, TableFile, rewritten_table, uses_of, with_texts
+from contextdb.edits.project_files import ProjectFiles, Rewrite, TableFile
+from contextdb.edits.renaming import Renaming, rewritten_projects, rewritten_table, uses_of, with_texts
 from contextdb.edits.renaming_values import with_value
-from contextdb.edits.schema_file import require_declared_here
 from contextdb.errors import Fault, SchemaError, in_quotes, plural
 from contextdb.files.toml_shapes import wrong_name
 from contextdb.schema.settings import Schema
-from contextdb.tables.project import SCHEMA_FILE
 from contextdb.tables.table import Table
 
 
@@ -38,6 +37,7 @@ def role_uses(table: Table, role: str) -> tuple[str, tuple[str, ...]]:
         (len(derived), "derived fact"),
         (max((one.n_assumptions for one in uses), default=0), "assumption"),
         (max((one.n_contracts for one in uses), default=0), "contract"),
+        (len({project for one in uses for project in one.projects}), "extending project"),
         (max((one.n_rules for one in uses), default=0), "rule"),
         (max((one.n_cases for one in uses), default=0), "saved context"),
     )
@@ -51,11 +51,8 @@ def role_renaming(table: Table, old: str, new: str, only_here: bool = False) -> 
     project = ProjectFiles.of(table)
     files = project.read(only_here)
     names = _names(project.schema, files, old, new)
-    if not only_here:
-        require_declared_here((("conditions", name) for name in names), project.schema, project.folder / SCHEMA_FILE)
     _require_role(new, {*project.schema.conditions, *(c.name for file in files for c in file.columns)})
-    rewrites = [rewrite for file in files for rewrite in _rewritten(file, names, old, new)]
-    return Renaming(old, new, (*rewrites, *project.with_conditions(names, only_here)))
+    return Renaming(old, new, rewritten_projects(project, names, only_here, lambda file, own: _rewritten(file, own, old, new)))
 
 
 def _names(schema: Schema, files: list[TableFile], old: str, new: str) -> dict[str, str]:

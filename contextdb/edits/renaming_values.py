@@ -1,7 +1,8 @@
 """Give a declared value of a condition another name in a whole project, so that what speaks of it still does.
 
-The cells and saved contexts of all tables, rules of rows, and in contextdb.toml the declared values, mirrors, derived facts and
-assumptions. An edge, as `contextdb.edits.renaming`: it reads the files of a folder, and works out how they are to be written.
+The cells, saved and expected contexts of all tables, rules of rows, and in contextdb.toml the declared values, mirrors, derived
+facts and assumptions; all that in the projects, too, that extend this one. An edge, as `contextdb.edits.renaming`: it reads the
+files of a folder, and works out how they are to be written.
 """
 
 from __future__ import annotations
@@ -15,16 +16,17 @@ from typing import Any
 from contextdb.cells.words import quoted, says_any
 from contextdb.columns import TextColumn
 from contextdb.disk import real_path
-from contextdb.edits.renaming import ProjectFiles, Renaming, Rewrite, TableFile, folder_of, rewritten, with_texts
+from contextdb.edits.project_files import ProjectFiles, Rewrite, TableFile
+from contextdb.edits.renaming import Renaming, extending, rewritten, rewritten_contexts, rewritten_gaps, with_texts
 from contextdb.edits.schema_file import require_declared_here
 from contextdb.errors import ContextDBError, Fault, SchemaError, in_quotes, plural
 from contextdb.expressions.faults import Refusal
 from contextdb.expressions.names import names_in
 from contextdb.expressions.tokens import tokens_of
 from contextdb.files.texts import read_texts
-from contextdb.schema.settings import Schema, TableSettings
+from contextdb.schema.settings import Schema
 from contextdb.tables.other_files import CASE_COLUMNS, cases_path
-from contextdb.tables.project import SCHEMA_FILE, table_files
+from contextdb.tables.project import SCHEMA_FILE
 from contextdb.tables.table import Table
 
 _SIGNS = "~+-,;()"
@@ -40,11 +42,18 @@ class ValueUses:
     n_cases: int = 0
     n_expressions: int = 0
     """Rules of rows, derived facts and assumptions."""
+    projects: tuple[str, ...] = ()
+    """Projects that have it because they extend this one."""
 
     @property
     def text(self) -> str:
         """How many there are of each; nothing for none."""
-        counts = ((len(self.tables), "other table"), (self.n_cases, "saved context"), (self.n_expressions, "expression"))
+        counts = (
+            (len(self.tables), "other table"),
+            (self.n_cases, "saved context"),
+            (self.n_expressions, "expression"),
+            (len(self.projects), "extending project"),
+        )
         return ", ".join(plural(n, noun) for n, noun in counts if n)
 
 
@@ -65,10 +74,11 @@ def value_uses(table: Table, condition: str, value: str) -> ValueUses:
     if table.path is None:
         return ValueUses()
     schema, others, n_cases, n_rules = table.schema, [], 0, 0
-    for name, path in table_files(folder_of(table), schema):
+    project = ProjectFiles.of(table)
+    for name, path in project.tables:
         is_own = real_path(path) == real_path(table.path)
         try:
-            file = TableFile.read(name, path, schema.tables.get(name, TableSettings(name)))
+            file = project.table_file(name, path)
         except ContextDBError:
             others += [] if is_own else [name]
             continue
@@ -79,19 +89,22 @@ def value_uses(table: Table, condition: str, value: str) -> ValueUses:
     expressions = [(c.name, c.expr) for c in schema.conditions.values() if c.expr is not None]
     n_derived = sum(_speaks(text, condition, value, is_own=name == condition) for name, text in expressions)
     n_assumed = sum(_speaks(text, condition, value) for settings in schema.tables.values() for text in settings.assume)
-    return ValueUses(tuple(others), n_cases, n_rules + n_derived + n_assumed)
+    return ValueUses(tuple(others), n_cases, n_rules + n_derived + n_assumed, extending(project, condition))
 
 
 def value_renaming(table: Table, condition: str, old: str, new: str) -> Renaming:
     """What is to be written so that a declared value has another name in all the project. Raises TableError, SchemaError or
     FileError where there is such a value already, an expression could mean another condition's value, or a file cannot be read."""
-    files = ProjectFiles.of(table)
-    if new in (files.schema.conditions[condition].domain.values or ()):
+    own = ProjectFiles.of(table)
+    if new in (own.schema.conditions[condition].domain.values or ()):
         raise SchemaError(Fault(f"{in_quotes(new)} is a value of {condition} already.", "a name that there is not yet"))
-    _require_plain(files.schema, condition, old)
-    require_declared_here([("conditions", condition)], files.schema, files.folder / SCHEMA_FILE)
-    rewrites = [rewrite for file in files.read() for rewrite in _rewritten_table(file, condition, old, new)]
-    return Renaming(old, new, (*rewrites, *files.rewritten_toml(lambda document: _change(document, condition, old, new))))
+    require_declared_here([("conditions", condition)], own.schema, own.folder / SCHEMA_FILE)
+    rewrites: list[Rewrite] = []
+    for project, _ in own.carrying([condition]):
+        _require_plain(project.schema, condition, old)
+        rewrites += [rewrite for file in project.read() for rewrite in _rewritten_table(file, condition, old, new)]
+        rewrites += project.rewritten_toml(lambda document: _change(document, condition, old, new), before=rewrites)
+    return Renaming(old, new, tuple(rewrites))
 
 
 # ---- expressions
@@ -111,7 +124,8 @@ def _speaks(text: str, condition: str, value: str, is_own: bool = False) -> bool
     return not says_any(text) and bool(_texts(text, condition, value, is_own))
 
 
-def _with_text(text: str, condition: str, old: str, new: str, is_own: bool = False) -> str:
+def with_text(text: str, condition: str, old: str, new: str, is_own: bool = False) -> str:
+    """An expression that names a condition with a value in quotes under another name."""
     for start, stop in reversed(_texts(text, condition, old, is_own)):
         sign = text[start]
         text = text[:start] + sign + new + sign + text[stop:]
@@ -156,15 +170,15 @@ def _rewritten_table(file: TableFile, condition: str, old: str, new: str) -> Ite
         if column.name == condition and file.has_condition(condition):
             columns.append(with_texts(column, {text: with_value(text, old, new) for text in column.texts}))
         elif rules is not None and column.name == rules.name:
-            columns.append(with_texts(column, {text: _with_text(text, condition, old, new) for text in column.texts}))
+            columns.append(with_texts(column, {text: with_text(text, condition, old, new) for text in column.texts}))
         else:
             columns.append(column)
     yield from rewritten(file.path, file.source, file.columns, columns)
-    cases = cases_path(file.path)
-    if cases.is_file() and condition not in CASE_COLUMNS:
-        source, texts = read_texts(cases)
-        after = [with_texts(c, {text: with_value(text, old, new) for text in c.texts}) if c.name == condition else c for c in texts]
-        yield from rewritten(cases, source, texts, after)
+    if condition not in CASE_COLUMNS:
+        yield from rewritten_contexts(
+            file, lambda c: with_texts(c, {text: with_value(text, old, new) for text in c.texts}) if c.name == condition else c
+        )
+    yield from rewritten_gaps(file.path, lambda name, cell: (name, with_value(cell, old, new) if name == condition else cell))
 
 
 def _change(document: dict[str, Any], condition: str, old: str, new: str) -> None:
@@ -177,10 +191,10 @@ def _change(document: dict[str, Any], condition: str, old: str, new: str) -> Non
         part["mirror"] = {names.get(a, a): names.get(b, b) for a, b in part["mirror"].items()}
     for name, other in document.get("conditions", {}).items():
         if isinstance(other.get("expr"), str):
-            other["expr"] = _with_text(other["expr"], condition, old, new, is_own=name == condition)
+            other["expr"] = with_text(other["expr"], condition, old, new, is_own=name == condition)
     for table in document.get("tables", {}).values():
         if "assume" in table:
-            table["assume"] = [_with_text(text, condition, old, new) for text in table["assume"]]
+            table["assume"] = [with_text(text, condition, old, new) for text in table["assume"]]
     for contract in document.get("contracts", {}).values():
         if isinstance(contract.get("when"), str):
-            contract["when"] = _with_text(contract["when"], condition, old, new)
+            contract["when"] = with_text(contract["when"], condition, old, new)

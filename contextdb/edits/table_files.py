@@ -12,15 +12,16 @@ from pathlib import Path
 from typing import Any
 
 from contextdb.cells.words import MARK
-from contextdb.disk import ACTORS_SUFFIX, CASES_SUFFIX, NOTES_SUFFIX, read_bytes, real_path, remove
+from contextdb.disk import ACTORS_SUFFIX, CASES_SUFFIX, GAPS_SUFFIX, NOTES_SUFFIX, read_bytes, real_path, remove
 from contextdb.disk.boundary import inside
 from contextdb.disk.together import NewFile, write_together
-from contextdb.edits.renaming import Rewrite, TableFile, rewritten, rewritten_toml, with_texts
+from contextdb.edits.project_files import ProjectFiles, Rewrite, TableFile
+from contextdb.edits.renaming import rewritten, with_texts
 from contextdb.errors import Fault, TableError, in_quotes, some
-from contextdb.schema.settings import TableSettings
-from contextdb.tables.project import SCHEMA_FILE, read_folder_schema, table_files
+from contextdb.schema.settings import EMPTY
+from contextdb.tables.project import read_folder_schema, table_files
 
-COMPANIONS = (CASES_SUFFIX, NOTES_SUFFIX, ACTORS_SUFFIX)
+COMPANIONS = (CASES_SUFFIX, NOTES_SUFFIX, GAPS_SUFFIX, ACTORS_SUFFIX)
 
 
 def copy_table(folder: Path, old: str, new: str) -> Path:
@@ -98,16 +99,13 @@ def _section(document: dict[str, Any], folder: Path, old: str, new: str, keeps: 
 
 
 def _toml(folder: Path, change: Any, moved: dict[str, str]) -> list[Rewrite]:
-    path = folder / SCHEMA_FILE
-    return list(rewritten_toml(path, read_bytes(path), change, moved, "tables")) if path.is_file() else []
+    return list(ProjectFiles.read_in(folder, EMPTY).rewritten_toml(change, moved, kind="tables"))
 
 
 def _others(folder: Path, name: str) -> Iterator[TableFile]:
     """The other tables that can be read; one that cannot refers to nothing."""
-    schema = read_folder_schema(folder)
-    for other, path in _paths(folder).items():
-        if other != name:
-            yield TableFile.read(other, path, schema.tables.get(other, TableSettings(other)))
+    project = ProjectFiles.read_in(folder, EMPTY)
+    return (project.table_file(other, path) for other, path in _paths(folder).items() if other != name)
 
 
 def _inner(text: str) -> str:
@@ -116,9 +114,8 @@ def _inner(text: str) -> str:
 
 def _referring(folder: Path, old: str, new: str) -> Iterator[Rewrite]:
     for file in _others(folder, old):
-        asset = file.settings.asset or file.columns[0].name if file.columns else ""
         columns = [
-            with_texts(c, {text: MARK + new for text in c.texts if _inner(text) == old}) if c.name == asset else c
+            with_texts(c, {text: MARK + new for text in c.texts if _inner(text) == old}) if c is file.assets else c
             for c in file.columns
         ]
         yield from rewritten(file.path, file.source, file.columns, columns)

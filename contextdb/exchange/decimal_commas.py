@@ -10,13 +10,15 @@ from dataclasses import replace
 from contextdb.cells.kinds import KINDS
 from contextdb.columns import TextColumn
 from contextdb.errors import in_quotes, plural
-from contextdb.exchange.reading import Remark, listed
+from contextdb.exchange.reading import Remark
 
 PAIR = re.compile(r"\s*[+-]?[\d.]+,\d+\s*")
 """A cell that another program may mean as one number."""
 DECIMAL_COMMA = re.compile(r"(?<=\d),(?=\d)")
 _DECIMAL_POINT = re.compile(r"(?<!\.)\.(?!\.)\d")
 _NUMERIC = re.compile(r"(?:not\b|[\d\s.,+\-±<>=()\[\]|~])+", re.IGNORECASE)
+MOST_TOLD = 20
+"""Changed texts of a column that are listed."""
 MOST_LISTED = 6
 """Texts of a column that are listed, and rows of a text."""
 
@@ -37,14 +39,23 @@ def with_points(
     has_comma = [any(DECIMAL_COMMA.search(text) for text in texts) for texts in numeric]
     if not any(has_comma):
         return columns, []
-    example = next(text for texts in numeric for text in texts if DECIMAL_COMMA.search(text))
     is_pointed = any(_DECIMAL_POINT.search(text) for texts in numeric for text in texts)
     if is_decimal_comma is None and (is_pointed or delimiter not in (";", "|")):
         return columns, []
-    where = listed([c.name for c, has in zip(columns, has_comma, strict=True) if has])
     changed = [_pointed(column, texts) if has else column for column, texts, has in zip(columns, numeric, has_comma, strict=True)]
-    became = f"decimal commas became points: {in_quotes(example)} is now {in_quotes(DECIMAL_COMMA.sub('.', example))}."
-    return changed, [Remark(became, f"column {where}")]
+    messages = [_changes(*pair) for pair, has in zip(zip(columns, changed, strict=True), has_comma, strict=True) if has]
+    return changed, [Remark(f"decimal commas became points: {text}.", f"column {in_quotes(name)}") for name, text in messages]
+
+
+def _changes(before: TextColumn, after: TextColumn) -> tuple[str, str]:
+    """The name of a column, and what became of its cells: each text with its rows, from 1."""
+    rows: dict[tuple[str, str], list[int]] = {}
+    for at, pair in enumerate(zip(before.to_list(), after.to_list(), strict=True), 1):
+        if pair[0] != pair[1]:
+            rows.setdefault(pair, []).append(at)
+    each = [f"{in_quotes(old)} is {new} in {_rows(at)}" for (old, new), at in list(rows.items())[:MOST_TOLD]]
+    more = f" and {plural(len(rows) - MOST_TOLD, 'other text')}" if len(rows) > MOST_TOLD else ""
+    return before.name, f"{', '.join(each)}{more}"
 
 
 def _pointed(column: TextColumn, numeric: Sequence[str]) -> TextColumn:

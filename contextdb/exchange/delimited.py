@@ -51,15 +51,24 @@ def read_delimited(
     text: str, file: str, wanted: str | None = None, block: Block | None = None, is_decimal_comma: bool | None = None
 ) -> Reading:
     """Read a text with delimiters: those that are `wanted`, else those that fit best. `is_decimal_comma` says whether 3,5 is a
-    number with a decimal comma; None: the cells tell. Raises TableError, with the line, for an unresolved git conflict, quotes that
+    number with a decimal comma; None: the cells tell. `block` is cells that were chosen, by record and field.
+
+    Raises TableError, with the line, for an unresolved git conflict, quotes that
     do not close, rows of different length, or no table."""
     require_no_conflicts(text, file)
     dialect = dialect_of(text, wanted)
-    grid, notes = _records(text[dialect.first :], dialect.delimiter, file)
-    columns, more = columns_of(grid, file, block or Block(0, 0, len(grid), len(grid[0]) if grid else 0), "line")
+    grid, notes = _records(text[dialect.first :], dialect.delimiter, file, has_titles=block is None)
+    all_cells = Block(0, 0, len(grid), len(grid[0]) if grid else 0)
+    columns, more = columns_of(grid, file, block or all_cells, "line", takes_all=block is not None and not block.is_open)
     columns, decimals = with_points(columns, dialect.delimiter, is_decimal_comma)
     name = "tsv" if dialect.delimiter == "\t" else "csv"
     return Reading(tuple(columns), name, (*dialect.remarks, *notes, *more, *decimals), has_whole_names=True)
+
+
+def records(text: str, file: str, wanted: str | None = None) -> list[list[str]]:
+    """All records of a text, as wide as the longest. Raises TableError where quotes do not close."""
+    dialect = dialect_of(text, wanted)
+    return _records(text[dialect.first :], dialect.delimiter, file, has_titles=False)[0]
 
 
 def dialect_of(text: str, wanted: str | None = None) -> Dialect:
@@ -107,8 +116,8 @@ def _fitness(counts: Sequence[int]) -> tuple[float, int]:
     return (1 + agreeing) / (1 + total), header
 
 
-def _records(text: str, delimiter: str, file: str) -> tuple[list[list[str]], list[Remark]]:
-    """The records of a text, all as wide as its header."""
+def _records(text: str, delimiter: str, file: str, has_titles: bool = True) -> tuple[list[list[str]], list[Remark]]:
+    """The records of a text, all as wide as its header; of one in which cells were chosen, as wide as the longest."""
     csv.field_size_limit(max(csv.field_size_limit(), 2 * MOST_CHARACTERS))
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
     grid, lines, line = list[list[str]](), list[int](), 1
@@ -122,6 +131,9 @@ def _records(text: str, delimiter: str, file: str) -> tuple[list[list[str]], lis
         raise TableError(_broken(str(error), text, line, file)) from None
     while grid and not any(grid[-1]):
         grid.pop()
+    if not has_titles:
+        width = max(map(len, grid), default=0)
+        return [record + [""] * (width - len(record)) for record in grid], []
     titles = _titles(grid)
     titles_above = [(at, next(filter(None, grid[at]), "")) for at in titles]
     remarks = [Remark(f"left out above the header: {in_quotes(text)}.", f"line {lines[at]}") for at, text in titles_above if text]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import PurePath
+from typing import TYPE_CHECKING
 
 from contextdb.columns import TextColumn
 from contextdb.errors import Fault, FileError, Place, TableError, in_quotes, nearest, no_such
@@ -12,6 +13,9 @@ from contextdb.exchange.formulas import Formulas
 from contextdb.exchange.reading import Reading, Remark
 from contextdb.files.strangers import page, pointer, seems_to_be
 from contextdb.tables.table import Table
+
+if TYPE_CHECKING:
+    from contextdb.exchange.grid import Block
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,6 +127,22 @@ def sheet_names(raw: bytes, name: str) -> list[str]:
     return sheets_of(raw, name)
 
 
+def grid_of(raw: bytes, name: str, options: ReadOptions) -> tuple[str, Sequence[Sequence[str]]]:
+    """The sheet of a workbook, with its name, or a text with delimiters as it stands: rows of texts, all equally wide. Raises
+    ContextDBError as `read` does; TableError for a file without such rows."""
+    kind = format_of(name, options.format, raw).name
+    if kind == "xlsx":
+        from contextdb.exchange.xlsx_read import grid_of_workbook
+
+        return grid_of_workbook(raw, name, options.sheet)
+    if kind not in ("csv", "tsv"):
+        raise TableError(Fault(f"{FORMATS[kind].about} has no rows to choose from.", "a workbook or CSV", place=Place(name)))
+    from contextdb.exchange.delimited import records
+    from contextdb.exchange.encodings import decoded
+
+    return "", records(decoded(raw, name, options.encoding)[0], name, options.delimiter or ("\t" if kind == "tsv" else None))
+
+
 def _read(kind: str, raw: bytes, name: str, options: ReadOptions) -> Reading:
     if kind == "xlsx":
         from contextdb.exchange.xlsx_read import read_workbook
@@ -132,13 +152,17 @@ def _read(kind: str, raw: bytes, name: str, options: ReadOptions) -> Reading:
         from contextdb.exchange.dmn_read import read_dmn
 
         return read_dmn(raw, name, options.sheet)
-    if options.sheet is not None:
-        raise TableError(Fault(f"{FORMATS[kind].about} has no sheets.", "no --sheet", place=Place(name)))
+    from contextdb.exchange.grid import parse_block
+
+    block = parse_block(options.sheet or "") if kind in _GRIDS else None
+    if options.sheet is not None and block is None:
+        accepted = "its cells, such as A1:F20" if kind in _GRIDS else "no --sheet"
+        raise TableError(Fault(f"{FORMATS[kind].about} has no sheets.", accepted, place=Place(name)))
     if kind == "parquet":
         return _read_parquet(raw, name)
-    if kind == "csv" and not options.says_how and (ours := _own_csv(raw, name)):
+    if kind == "csv" and not options.says_how and not block and (ours := _own_csv(raw, name, options.has_whole_names is False)):
         return ours
-    return _read_text(kind, raw, name, options)
+    return _read_text(kind, raw, name, options, block)
 
 
 def _read_parquet(raw: bytes, name: str) -> Reading:
@@ -148,9 +172,10 @@ def _read_parquet(raw: bytes, name: str) -> Reading:
     return Reading(tuple(columns), "parquet", source=source)
 
 
-def _own_csv(raw: bytes, name: str) -> Reading | None:
-    """A CSV that contextdb reads as it is, so that it is written as it is; None for every other."""
+def _own_csv(raw: bytes, name: str, is_ours: bool) -> Reading | None:
+    """A CSV that contextdb reads as it is, so that it is written as it is; None for every other, as one with a total below it."""
     from contextdb.exchange.conflicts import begins_like_a_mark
+    from contextdb.exchange.everyday import is_sum
     from contextdb.exchange.unreal import is_unreal_header
     from contextdb.files.csv_source import read_csv
 
@@ -158,7 +183,8 @@ def _own_csv(raw: bytes, name: str) -> Reading | None:
         source, columns = read_csv(raw, name)
     except TableError:
         return None
-    if any(map(begins_like_a_mark, columns[0].texts)):
+    last = columns[0][columns[0].n_rows - 1] if columns[0].n_rows else ""
+    if any(map(begins_like_a_mark, columns[0].texts)) or (is_sum(last) and not is_ours):
         return None
     if is_unreal_header([c.name for c in columns]) or (len(columns) == 1 and _is_parted_otherwise(columns[0])):
         return None
@@ -171,7 +197,7 @@ def _is_parted_otherwise(column: TextColumn) -> bool:
     return any(mark in column.name for mark in ";\t|") or any(len(n) == 1 and min(n) > 1 for n in counts)
 
 
-def _read_text(kind: str, raw: bytes, name: str, options: ReadOptions) -> Reading:
+def _read_text(kind: str, raw: bytes, name: str, options: ReadOptions, block: Block | None) -> Reading:
     from contextdb.exchange import unreal
     from contextdb.exchange.delimited import read_delimited
     from contextdb.exchange.encodings import decoded
@@ -184,7 +210,7 @@ def _read_text(kind: str, raw: bytes, name: str, options: ReadOptions) -> Readin
             reading = unreal.from_json(reading)
     else:
         delimiter = options.delimiter or ("\t" if kind == "tsv" else "," if kind == "unreal-csv" else None)
-        reading = read_delimited(text, name, delimiter, is_decimal_comma=options.is_decimal_comma)
+        reading = read_delimited(text, name, delimiter, block, options.is_decimal_comma)
         if kind == "unreal-csv" or (kind == "csv" and unreal.is_unreal_header(reading.names)):
             reading = unreal.from_csv(reading)
     return replace(reading, remarks=(*remarks, *reading.remarks))

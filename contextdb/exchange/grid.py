@@ -19,21 +19,23 @@ from contextdb.cells.domains import NUMBER
 from contextdb.cells.grammar import reads
 from contextdb.columns import TextColumn
 from contextdb.errors import Fault, Place, TableError, in_quotes, plural
-from contextdb.exchange.reading import Remark, capped
+from contextdb.exchange.everyday import HIGHS, LOWS, is_sum
+from contextdb.exchange.reading import Remark, TableWanted, capped
 from contextdb.files.csv_faults import MOST_CHARACTERS
 from contextdb.files.csv_source import name_faults
 
 Grid = Sequence[Sequence[str]]
 """Rows of texts; all rows are equally wide."""
 
-_RANGE = re.compile(r"\$?([A-Za-z]{1,3})\$?(\d{1,7}):\$?([A-Za-z]{1,3})\$?(\d{1,7})")
+_RANGE = re.compile(r"\$?([A-Za-z]{1,3})\$?(\d{1,7}):\$?([A-Za-z]{1,3})\$?(\d{1,7})?")
+LAST_ROW = 10_000_000
+"""The end of a range that names no last row."""
 MOST_BLOCKS = 8
 MOST_ABOVE = 10
 """Rows in which the header is looked for."""
 MOST_NAMELESS = 3
 """Columns without a name that are reported one by one."""
 _VALUES = frozenset(("true", "false", "any"))
-_SUMS = frozenset(("total", "totals", "grand total", "sum", "average", "summe", "gesamt", "somme"))
 MOST_LOOKED_AT = 1_000
 """Blocks of cells that are compared with each other; a sheet with more is not a list of assets."""
 
@@ -52,8 +54,14 @@ class Block:
         """How many rows it has, the header counted."""
         return self.bottom - self.top
 
+    @property
+    def is_open(self) -> bool:
+        """Whether it goes to the last row, whichever that is."""
+        return self.bottom >= LAST_ROW
+
     def __str__(self) -> str:
-        first, last = f"{column_letters(self.left)}{self.top + 1}", f"{column_letters(self.right - 1)}{self.bottom}"
+        last_row = "" if self.is_open else self.bottom
+        first, last = f"{column_letters(self.left)}{self.top + 1}", f"{column_letters(self.right - 1)}{last_row}"
         return first if first == last else f"{first}:{last}"
 
 
@@ -76,12 +84,12 @@ def column_number(letters: str) -> int:
 
 
 def parse_block(text: str) -> Block | None:
-    """A range as a spreadsheet writes it, such as A10:F20; None for another text."""
+    """A range as a spreadsheet writes it, such as A10:F20, or A10:F to the last row; None for another text."""
     match = _RANGE.fullmatch(text.strip())
     if not match:
         return None
     columns = [column_number(match[i]) - 1 for i in (1, 3)]
-    rows = [int(match[i]) for i in (2, 4)]
+    rows = [int(match[2]), int(match[4] or LAST_ROW)]
     return Block(max(min(rows), 1) - 1, min(columns), max(rows), max(columns) + 1)
 
 
@@ -92,17 +100,20 @@ def columns_of(
     row_noun: str = "row",
     sheet: str | None = None,
     wide: Collection[int] = (),
+    takes_all: bool = False,
 ) -> tuple[list[TextColumn], list[Remark]]:
     """The columns of the table in a grid, or in a block of it whose first row is the names; None: it is looked for, also below a
     title.
 
     `row_noun` is what messages call a row of the grid, "sheet row" of a workbook or "line" of a text, and `sheet` its name. `wide`
     are rows, from 0, with a cell that is merged over several columns: no row of names has one, and one right above the names groups
-    the columns: names that appear twice have their group and a point in front. Raises TableError where there is no table, more than
-    one, columns without a name or with one name twice, or a text that is too long.
+    the columns. `takes_all`: every row is an asset, also a total, as somebody chose them.
+
+    Raises TableError where there is no table, more than one, columns without a name or with one name twice, or a text that is too
+    long.
     """
     if block is None:
-        block, remarks = _table_block(grid, file, wide)
+        block, remarks = _table_block(grid, file, wide, sheet)
     else:
         remarks = list[Remark]()
         block = Block(block.top, block.left, min(block.bottom, len(grid)), min(block.right, len(grid[0]) if grid else 0))
@@ -111,23 +122,47 @@ def columns_of(
         raise TableError(
             Fault("there is nothing to read.", "a row with the names of the columns, then one for each asset", place=Place(file))
         )
-    filled = [row for row in rows[1:] if any(row)]
-    if len(filled) < len(rows) - 1:
-        first = next(at for at, row in enumerate(rows[1:], block.top + 2) if not any(row))
-        remarks.append(Remark(f"{plural(len(rows) - 1 - len(filled), f'blank {row_noun}')} left out.", f"{row_noun} {first}"))
-    above = grid[block.top - 1][block.left : block.right] if block.top - 1 in wide else ()
-    names = _with_groups(above, rows[0])
-    renamed = next(((old.strip(), new) for old, new in zip(rows[0], names, strict=True) if old.strip() != new), None)
+    blank = [at for at, row in enumerate(rows[1:], block.top + 2) if not any(row)]
+    body = {at: row for at, row in enumerate(rows[1:], block.top + 2) if any(row)}
+    if blank:
+        remarks.append(Remark(f"{plural(len(blank), f'blank {row_noun}')} left out.", f"{row_noun} {blank[0]}"))
+    if not takes_all:
+        remarks += [
+            Remark(f"left out, as it is no asset: {in_quotes(text)}.", f"{row_noun} {at}", is_loss=True)
+            for at, text in _taken_out(body, blank, wide)
+        ]
+    filled = list(body.values())
+    names = _with_groups(_groups_above(grid, block, wide), rows[0])
+    renamed = next(((old.strip(), new) for old, new in zip(rows[0], names, strict=True) if " ".join(old.split()) != new), None)
     if renamed:
-        remarks.append(Remark("names that appear twice have their group in front: {} is now {}.".format(*map(in_quotes, renamed))))
+        remarks.append(Remark("names have their group in front: {} is now {}.".format(*map(in_quotes, renamed))))
     _require_names(names, filled, block, Place(file, block.top + 1), _mend(rows, block, sheet))
     columns = [TextColumn.of(n, t) for n, t in zip(names, zip(*filled, strict=True) if filled else [()] * len(names), strict=True)]
+    columns = [column for column in columns if column.name]
     _require_short(columns, file)
     return columns, remarks
 
 
+def _taken_out(body: dict[int, Sequence[str]], blank: Sequence[int], wide: Collection[int]) -> list[tuple[int, str]]:
+    """Take out the rows below a header that are no assets, and give their places and texts: headings merged over all columns,
+    totals at the end, and a remark below a blank row."""
+    out = [at for at, row in body.items() if at - 1 in wide and is_title(row) and all(row)]
+    for at in reversed(body):
+        texts = [text for text in body[at] if text.strip()]
+        is_remark = len(texts) == 1 < len(body[at]) - 1 and at - 1 in blank and not _is_value(texts[0])
+        if at in out or is_remark or (is_sum(texts[0]) and all(map(_is_number, texts[1:]))):
+            out.append(at)
+        else:
+            break
+    return [(at, next(filter(None, body.pop(at)))) for at in sorted(set(out)) if len(body) > 1]
+
+
+def _is_number(text: str) -> bool:
+    return reads(text.replace(",", "."), NUMBER) or text.startswith("#")  # or an error of Excel
+
+
 def _require_names(names: Sequence[str], rows: Grid, block: Block, place: Place, mend: str) -> None:
-    nameless = [at for at, name in enumerate(names) if not name]
+    nameless = [at for at, name in enumerate(names) if not name and any(row[at] for row in rows)]
     if len(nameless) > MOST_NAMELESS:
         letters = ", ".join(column_letters(block.left + at) for at in nameless[:MOST_NAMELESS])
         problem = f"{len(nameless):,} of {plural(len(names), 'column')} have no name: {letters}, …"
@@ -139,7 +174,7 @@ def _require_names(names: Sequence[str], rows: Grid, block: Block, place: Place,
         faults.append(
             Fault(f"column {column_letters(block.left + at)} has no name{of}.", "a name in the first row of each column", mend)
         )
-    faults = faults or list(name_faults(names))
+    faults = faults or list(name_faults([name for name in names if name]))
     if mend and len(faults) > 1:  # the row is no header: which of its cells are wrong is no help
         faults = [replace(faults[0], mend=mend)]
     if faults:
@@ -176,33 +211,58 @@ def is_title(row: Sequence[str]) -> bool:
     return len(row) > 1 and len({text.strip() for text in row if text.strip()}) == 1
 
 
-def _is_groups(rows: Grid) -> bool:
-    """Whether the first of two rows groups the columns of the second: its first cell is blank, or merged with the next one."""
+def _is_groups(rows: Grid, is_wide: bool) -> bool:
+    """Whether the first of two rows groups the columns of the second: its first cell is blank, or merged with the next one, and a
+    group that is not merged has blank cells behind it."""
     first, *_ = rows
-    return len(rows) > 1 and len(first) > 1 and first[0] in ("", first[1], rows[-1][0])
+    if len(rows) < 2 or len(first) < 2:
+        return False
+    if is_wide:
+        return first[0] in ("", first[1], rows[-1][0])
+    texts = [text for text in first if text]
+    return first[0] == "" and 0 < len(set(texts)) == len(texts) and len(texts) <= len(first) // 2 and all(rows[-1])
+
+
+def _groups_above(grid: Grid, block: Block, wide: Collection[int]) -> Sequence[str]:
+    """The group of each column of a block by the row above its header; empty where that has none."""
+    at = block.top - 1
+    if at < 0:
+        return ()
+    row = grid[at][block.left : block.right]
+    if at in wide:
+        return row
+    if not _is_groups([row, grid[block.top][block.left : block.right]], is_wide=False):
+        return ()
+    groups, group = list[str](), ""
+    for text in row:
+        group = text.strip() or group
+        groups.append(group)
+    return groups
 
 
 def _with_groups(groups: Sequence[str], row: Sequence[str]) -> list[str]:
-    """The names of a row; those that appear twice with the text above them in front."""
-    names = [name.strip() for name in row]
+    """The names of a row under their groups. Groups with a column of one name are roles, as Attacker.Stance and Victim.Stance are,
+    and stand before the names of all their columns; one over "min" and "max" is what these are of."""
+    names = [" ".join(name.split()) for name in row]
     n_times = Counter(names)
-    return [
-        f"{group}.{name}" if group and name and n_times[name] > 1 else name
-        for group, name in zip_longest(groups, names, fillvalue="")
-    ]
+    pairs = list(zip_longest(groups, names, fillvalue=""))
+    roles = {group for group, name in pairs if group and name and n_times[name] > 1 and name.casefold() not in LOWS | HIGHS}
+    return [_in_group(group, name, group in roles) if group and group != name else name for group, name in pairs]
+
+
+def _in_group(group: str, name: str, is_role: bool) -> str:
+    if name.casefold() in LOWS | HIGHS:
+        return f"{group} {name}"
+    return f"{group}.{name}" if name and is_role else name
 
 
 def doubts(columns: Sequence[TextColumn]) -> list[Remark]:
-    """What a person should look at: names that look like values, as where a header is missing; a last row that sums up others."""
+    """What a person should look at: names that look like values, as where a header is missing."""
     remarks = []
     odd = next((c for c in columns if _is_value(c.name) or (c.name and c.name in c.texts)), None)
     if odd is not None:
         why = "is also one of its cells" if odd.name in odd.texts else "looks like a value"
         remarks.append(Remark(f"is the header missing? The name {in_quotes(odd.name)} {why}. The first row is read as names."))
-    last = columns[0].n_rows - 1 if columns else -1
-    first = next((c[last] for c in columns if c[last].strip()), "") if last > 0 else ""
-    if first.strip().rstrip(":").casefold() in _SUMS:
-        remarks.append(Remark(f"a row that begins with {in_quotes(first)} is read as an asset like others.", "the last row"))
     return remarks
 
 
@@ -219,7 +279,7 @@ def _require_short(columns: Sequence[TextColumn], file: str) -> None:
 # ---- where the table is
 
 
-def _table_block(grid: Grid, file: str, wide: Collection[int]) -> tuple[Block, list[Remark]]:
+def _table_block(grid: Grid, file: str, wide: Collection[int], sheet: str | None) -> tuple[Block, list[Remark]]:
     try:
         blocks = blocks_of(grid)
     except TableError as error:
@@ -235,7 +295,10 @@ def _table_block(grid: Grid, file: str, wide: Collection[int]) -> tuple[Block, l
         places = ", ".join(map(str, tables[:MOST_BLOCKS]))
         more = f" and {len(tables) - MOST_BLOCKS} more" if len(tables) > MOST_BLOCKS else ""
         problem = f"the sheet holds {len(tables)} tables: {places}{more}."
-        raise TableError(Fault(problem, "one of them", f'to name its cells, as in --sheet "SHEET!{tables[0]}"', Place(file)))
+        mend = f'to name its cells, as in --sheet "SHEET!{tables[0]}"'
+        raise TableWanted(
+            Fault(problem, "one of them", mend, Place(file)), blocks=[f"{sheet}!{each}" if sheet else str(each) for each in tables]
+        )
     left = [block for block in blocks if block is not tables[0]]
     notes = [
         Remark(f"left out because it is not a table: {in_quotes(_first_text(grid, block))}.", f"cells {block}") for block in left
@@ -249,12 +312,14 @@ def _without_titles(blocks: Sequence[Block], grid: Grid, wide: Collection[int]) 
     for block in blocks:
         rows = [row[block.left : block.right] for row in grid[block.top : block.bottom]]
         above = [not any(row) or is_title(row) for row in rows[:MOST_ABOVE]]
-        above = [one or (at + block.top in wide and _is_groups(rows[at : at + 2])) for at, one in enumerate(above)]
+        above = [one or _is_groups(rows[at : at + 2], at + block.top in wide) for at, one in enumerate(above)]
         n_titles = above.index(False) if False in above else len(above)
         if n_titles == len(rows):  # a title of several lines
             first = next(at for at, row in enumerate(rows, block.top) if any(row))
             without.append(Block(first, block.left, first + 1, block.right))
-        elif n_titles and is_header(_with_groups(rows[n_titles - 1] if block.top + n_titles - 1 in wide else (), rows[n_titles])):
+        elif n_titles and is_header(
+            _with_groups(_groups_above(grid, replace(block, top=block.top + n_titles), wide), rows[n_titles])
+        ):
             without.append(Block(block.top + n_titles, block.left, block.bottom, block.right))
         else:
             without.append(block)

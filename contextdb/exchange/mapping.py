@@ -15,8 +15,9 @@ from contextdb.cells.kinds import KINDS
 from contextdb.columns import TextColumn
 from contextdb.edits.edits import check_cell
 from contextdb.errors import ContextDBError, Fault, in_quotes, mend_for, nearest, plural, some
-from contextdb.exchange.decimal_commas import pair_in
-from contextdb.exchange.proposals import as_lists, as_numbers, n_unreadable, names_of, propose_type, rewritten
+from contextdb.exchange.decimal_commas import DECIMAL_COMMA, pair_in
+from contextdb.exchange.everyday import JOB_WORDS, as_truths, counts_rows
+from contextdb.exchange.proposals import as_cells, n_unreadable, names_of, propose_type, rewritten
 from contextdb.exchange.reading import Reading
 from contextdb.schema.sections import condition_to_dict
 from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict, settings_renamed
@@ -27,6 +28,9 @@ COLUMN_JOBS = (*(job for job in PLAIN_JOBS if job != "remove"), "when")
 JOBS = ("asset", "condition", "output", *COLUMN_JOBS, "left out")
 _NEVER_GUESSED = ("when",)
 """Jobs whose word is too common a name to go by."""
+
+_TRUTHS = ("enabled", "once")
+_NUMBERS = ("priority", "weight", "cooldown_s", "cooldown_turns")
 
 MOST_COMPARED = 100_000
 """Pairs of a column and a declared condition whose names are compared; each costs some 20 µs."""
@@ -103,7 +107,7 @@ def as_type(mapped: Mapped, column: TextColumn, kind: str) -> Mapped:
     """The same column as a new condition of another type; an enum then has the names that its cells have. Raises ContextDBError
     where an enum is wanted, and no cell holds a name."""
     declared: dict[str, object] = {"type": kind}
-    cells = as_lists(column) or mapped.names if KINDS[kind].is_named else as_numbers(column) if KINDS[kind].is_numeric else None
+    cells = as_cells(column, Domain(kind)) or (mapped.names if KINDS[kind].is_named else None)
     column = cells or column
     if KINDS[kind].needs_values:
         declared["values"] = names_of(column)
@@ -183,7 +187,8 @@ def _merged(settings: TableSettings, known: TableSettings | None, renames: Mappi
 
 def _asset(reading: Reading, settings: TableSettings, renames: Mapping[str, str]) -> str:
     """The column of the file that names the assets."""
-    names = [name for name in reading.names if renames.get(name) != ""]
+    names = [name for name in reading.names if renames.get(name) != "" and not counts_rows(name, reading.column(name).to_list())]
+    names = names or reading.names
     if settings.asset:
         for name in names:
             if renames.get(name, name) == settings.asset or _folded(name) == _folded(settings.asset):
@@ -204,7 +209,11 @@ def _mapped(
         return Mapped(source, wanted, "asset", "the first column" if is_first else "names the assets")
     if job := _plain_job(name, column, settings):
         declared = getattr(settings, job) if job in COLUMN_JOBS else None
-        return Mapped(source, declared or name, job, "by its name")
+        cells = _plain_cells(column, job)
+        why = "by its name" if cells is None else f"by its name{rewritten(column, cells)}"
+        return Mapped(source, declared or name, job, why, cells=cells)
+    if name == source and name not in known.conditions and counts_rows(name, column.to_list()):
+        return Mapped(source, name, "left out", "counts the rows")
     return _condition(column, name, reading, known)
 
 
@@ -216,8 +225,20 @@ def _plain_job(name: str, column: TextColumn, settings: TableSettings) -> str | 
         declared = getattr(settings, job)
         if declared is not None and (name == declared or _folded(name) == _folded(declared)):
             return job
-        if declared is None and _folded(name) == job and job not in _NEVER_GUESSED and _fits(column, job):
+        is_named = declared is None and JOB_WORDS.get(_folded(name), _folded(name)) == job and job not in _NEVER_GUESSED
+        if is_named and _fits(_plain_cells(column, job) or column, job):
             return job
+    return None
+
+
+def _plain_cells(column: TextColumn, job: str) -> TextColumn | None:
+    """The cells of a job as people write them otherwise: truths that are ticked, numbers with a decimal comma, which can be no
+    tolerance here."""
+    if job in _TRUTHS:
+        return as_truths(column)
+    texts = [DECIMAL_COMMA.sub(".", text) for text in column.texts]
+    if job in _NUMBERS and texts != list(column.texts):
+        return TextColumn.of(column.name, (texts[code] for code in column.codes.tolist()))
     return None
 
 
@@ -253,9 +274,11 @@ def _condition(column: TextColumn, name: str, reading: Reading, known: _Known) -
 
 
 def _as_declared(column: TextColumn, condition: Condition, why: str, names: TextColumn | None) -> Mapped:
-    whole = (as_lists(column) or names) if condition.domain.type.is_named else None
-    cells = _fitting(column, whole, condition.domain) if whole else None
-    if condition.domain.type.is_numeric and (cells := as_numbers(column)) is not None:
+    domain = condition.domain
+    cells = as_cells(column, domain)
+    if domain.type.is_named:
+        cells = _fitting(column, whole, domain) if (whole := cells or names) else None
+    elif cells is not None:
         why += rewritten(column, cells)
     n_wrong, example = n_unreadable(cells or column, condition.domain)
     if n_wrong:

@@ -18,6 +18,7 @@ from contextdb.cells.words import quoted, says_any
 from contextdb.columns import TextColumn
 from contextdb.errors import CellError, in_quotes, plural
 from contextdb.exchange.decimal_commas import DECIMAL_COMMA, pair_in
+from contextdb.exchange.everyday import as_truths, compared, with_any, without_unit
 from contextdb.exchange.reading import ERRORS, listed
 from contextdb.files.toml_shapes import wrong_name
 from contextdb.tables.condition_column import READABLE_SHARE
@@ -39,14 +40,13 @@ _MEASURE = re.compile(
     "met(?:er|re)s?|mm|mph|ms|mps|percent|pitch|radius|ratio|roll|rotation|scale|sec|seconds|share|speed|time|velocity|weight|width|yaw",
     re.IGNORECASE,
 )
-_RANGE = re.compile(r"\s*([+-]?\d+(?:\.\d+)?)(\s*)(?:[-–—]|to)\2([+-]?\d+(?:\.\d+)?)\s*")
+_RANGE = re.compile(r"\s*([+-]?\d+(?:\.\d+)?)(\s*)(?:[-–—]|to|bis|à|hasta|até|tot|do)\2([+-]?\d+(?:\.\d+)?)\s*")
 """Two ends as people write them: "20 - 60", "20 to 60"; a cell of ours has ".." between them."""
 _DEGREES = re.compile(r"(?<=\d)\s*°(?!\s*[CF])")
 _NUMBER = r"[+-]?\d+(?:[.,]\d+)?"
 _SURE = re.compile(rf"\s*(?:(?:[<>]=?|[≤≥])\s*{_NUMBER}|{_NUMBER}\s*(?:\.\.|[-–—]|to)\s*{_NUMBER})\s*")
 """A comparison or a range: a comma in one of its numbers can only be a decimal one."""
-_TICKS = {"x": "True", "✓": "True", "✔": "True"}
-_BETWEEN_NAMES = re.compile(r"\s*[,;/|]\s*")
+_BETWEEN_NAMES = re.compile(r"\s*[,;/|\n]\s*")
 _AROUND = re.compile(r"^\s*±\s*(?=[\d.])")
 _FRACTION = re.compile(r"\d\.\d|(?<!\.)\.\d|\de-?\d", re.IGNORECASE)
 
@@ -121,6 +121,13 @@ class _CountedTexts:
 def propose_type(column: TextColumn, names: TextColumn | None = None) -> Proposal:
     """The type that a column's cells most likely have. `names` is the same column with each text as one whole name: what its cells
     become when they are names."""
+    if (said := with_any(column)) is not None and not all(map(says_any, said.texts)):
+        proposal = propose_type(said, names and with_any(names))
+        cells = said if proposal.cells is None else proposal.cells
+        if proposal.declared is None:
+            return proposal
+        why = proposal.why if proposal.cells is not None else proposal.why + rewritten(column, cells)
+        return replace(proposal, why=why, cells=cells)
     if (numbers := as_numbers(column, _is_measure(column.name))) is not None:
         has_degrees = any(map(_DEGREES.search, column.texts))
         proposal = propose_type(replace(numbers, name=f"{column.name} (°)") if has_degrees else numbers)
@@ -133,7 +140,7 @@ def propose_type(column: TextColumn, names: TextColumn | None = None) -> Proposa
         if _is_measure(column.name):
             return _number(column.name, counted)
         return _with_unread("the cells are 0 and 1; bool, if they mean False and True", counted, INT)
-    if (truths := _as_truths(column)) is not None:
+    if (truths := as_truths(column)) is not None:
         why = f"{plural(counted.n_rows, 'cell')} of True and False{rewritten(column, truths)}"
         return replace(_with_unread(why, _CountedTexts.by(truths), BOOL), cells=truths)
     if counted.mostly(BOOL):
@@ -157,7 +164,7 @@ def as_numbers(column: TextColumn, is_measure: bool = True) -> TextColumn | None
     """A column of numbers as cells of ours: "20 - 60" as 20..60, "±30" as 0 ± 30, "30°" as 30, beside "> 1,5" also "0,5" as 0.5.
     None where every text stays as it is. `is_measure`: the column surely has numbers, then "20-60" without blanks is a range too,
     and no name."""
-    plain = [_AROUND.sub("0 ± ", _DEGREES.sub("", text)) for text in column.texts]
+    plain = [_AROUND.sub("0 ± ", compared(_DEGREES.sub("", text))) for text in without_unit(column.texts)]
     if any("," in text and _SURE.fullmatch(text) for text in plain):
         plain = [DECIMAL_COMMA.sub(".", text) for text in plain]
     matches = [_RANGE.fullmatch(text) for text in plain]
@@ -166,14 +173,6 @@ def as_numbers(column: TextColumn, is_measure: bool = True) -> TextColumn | None
         return None
     texts = [f"{one[1]}..{one[3]}" if one else text for one, text in zip(matches, plain, strict=True)]
     return None if texts == list(column.texts) else TextColumn.of(column.name, (texts[code] for code in column.codes.tolist()))
-
-
-def _as_truths(column: TextColumn) -> TextColumn | None:
-    """A column of True and False in which people tick: "x" as True. None where nobody ticks, or it holds something else."""
-    texts = [_TICKS.get(text.strip().casefold(), text) for text in column.texts]
-    if texts == list(column.texts) or not all(says_any(text) or reads(text, BOOL) for text in texts):
-        return None
-    return TextColumn.of(column.name, (texts[code] for code in column.codes.tolist()))
 
 
 def as_lists(column: TextColumn) -> TextColumn | None:
@@ -188,6 +187,16 @@ def as_lists(column: TextColumn) -> TextColumn | None:
         return None
     texts = [" ".join(map(quoted, parts[text])) if text in parts else text for text in column.texts]
     return TextColumn.of(column.name, (texts[code] for code in column.codes.tolist()))
+
+
+def as_cells(column: TextColumn, domain: Domain) -> TextColumn | None:
+    """A column as cells of a domain, of which people write some otherwise; None where every text stays as it is."""
+    said = with_any(column)
+    one = column if said is None else said
+    form = (
+        as_lists if domain.type.is_named else as_numbers if domain.type.is_numeric else as_truths if domain.type.is_truth else None
+    )
+    return (form and form(one)) or said
 
 
 def rewritten(column: TextColumn, cells: TextColumn) -> str:

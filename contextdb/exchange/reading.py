@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from contextdb.cells.words import format_number, quoted, says_any
 from contextdb.columns import TextColumn
-from contextdb.errors import TableError, safe_text
+from contextdb.errors import Fault, TableError, safe_text
 from contextdb.files.texts import AnySource
 from contextdb.schema.settings import EMPTY, Schema
 
@@ -41,6 +41,15 @@ MOST_REMARKS = 20
 
 class SheetWanted(TableError):
     """Several sheets of a workbook hold cells, and none of them is named."""
+
+
+class TableWanted(TableError):
+    """A sheet holds several tables, and none of them is named."""
+
+    def __init__(self, *faults: Fault, blocks: Sequence[str]) -> None:
+        super().__init__(*faults)
+        self.blocks = blocks
+        """Their cells, as in A1:F20."""
 
 
 @dataclass(frozen=True, slots=True)

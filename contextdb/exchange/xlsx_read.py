@@ -46,11 +46,27 @@ def read_workbook(raw: bytes, file: str, sheet: str | None = None) -> Reading:
     columns, more = (
         (_own_columns(grid, own), [])
         if own
-        else columns_of(grid, f"{file}, sheet {in_quotes(name)}", block, "sheet row", name, wide)
+        else columns_of(
+            grid, f"{file}, sheet {in_quotes(name)}", block, "sheet row", name, wide, block is not None and not block.is_open
+        )
     )
     sheet_remarks += [Remark(f"the sheet {in_quotes(name)} of {len(names)}.")] if len(names) > 1 else []
     sheet_remarks = [*sheet_remarks, *remarks, *more]
     return Reading(tuple(columns), "xlsx", tuple(sheet_remarks), types or EMPTY, sheets=tuple(names), has_whole_names=types is None)
+
+
+def grid_of_workbook(raw: bytes, file: str, sheet: str | None = None) -> tuple[str, list[list[str]]]:
+    """A sheet with its name, the one that is named or the only one with cells, as it stands. Raises as `read_workbook` does."""
+    require_workbook(raw, file)
+    book = _opened(raw, file)
+    names = [name for name in book.sheet_names if name.casefold() != TYPES_SHEET]
+    wanted = _wanted(sheet, names, file)[0]
+    sheets = {each: _Sheet.read(book, each, file) for each in ([wanted] if wanted else names)}
+    name = wanted or _only(sheets, _hidden_sheets(book), file)[0]
+    grid = [[text_of_value(value) for value in row] for row in sheets[name].values]
+    _fill_errors(grid, marks_of(raw, name), is_old(raw))
+    _fill_merged(grid, sheets[name].merged, file)
+    return name, grid
 
 
 def sheets_of(raw: bytes, file: str) -> list[str]:

@@ -119,9 +119,9 @@ class _Parser:
             return self._logic(left, binding, depth)
         if binding == _COMPARE:
             return self._comparison(left, depth) if self.token.kind == "sign" else self._chosen(left, depth)
-        sign = self.take()
+        sign = self.take().text
         right = self.expression(_SIGNED if binding == _POWER else binding + 1, depth + 1)
-        return Arithmetic(left.start, right.stop, sign.text, sign.start, left, right)
+        return Arithmetic(left.start, right.stop, sign, left, right)
 
     def _conditional(self, then: Node, depth: int) -> Node:
         self.take()

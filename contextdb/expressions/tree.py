@@ -67,10 +67,9 @@ class Unary(Node):
 
 @dataclass(frozen=True)
 class Arithmetic(Node):
-    """`left sign right`; the sign is at `sign_start`."""
+    """`left sign right`."""
 
     sign: str
-    sign_start: int
     left: Node
     right: Node
 

@@ -57,6 +57,7 @@ def section(
     sentences += words.assumed_sentences(report)
     is_listed = measured.expected is None or own.by == "telemetry" or is_page or most_gaps == MANY
     blocks: list[Block] = [*_todo(measured, most_gaps), *([_gaps(measured, most_gaps, is_page)] if is_listed else [])]
+    blocks += [closed] if (closed := words.closed_sentence(measured)) else []
     if is_brief:
         counts = ", ".join(f"{len(group)} {rule}" for rule, group in by_rule(report.findings).items())
         blocks += [f"findings: {counts}"] if counts else []

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import ClassVar, Literal
 
+from contextdb.cells.conditions import Condition
 from contextdb.covering import CoverageReport, Gap, PairTable, Slice, format_percent
 from contextdb.covering.baseline import CaseCounts, Change
 from contextdb.covering.declared import Declared
@@ -18,6 +19,7 @@ from contextdb.errors import in_quotes, plural, row_name, some
 from contextdb.files.reports import with_marks
 from contextdb.findings import Finding
 from contextdb.report.results import CheckReport, Gate, Subject, TableSummary
+from contextdb.tables.gap_work import GapWork, Work
 from contextdb.telemetry.observed import Observed, SeenGap
 
 ROUNDING = 1e-12
@@ -60,6 +62,12 @@ class Measured:
     """The coverage of the contexts that a designer expects."""
     owner: str = ""
     """Who answers for the table."""
+    fallback: str = ""
+    """What plays where no row is valid."""
+    work: Mapping[str, Work] = field(default_factory=dict)
+    """Who works on a gap and how far it is, by the id of the gap."""
+    closed: tuple[tuple[Mapping[str, str], Work], ...] = ()
+    """The work on what is no gap any more."""
 
     @property
     def summary(self) -> TableSummary:
@@ -77,6 +85,15 @@ class Measured:
         """The gaps of the recording that are not in the list of gaps."""
         listed = {gap.id for gap in self.report.gaps}
         return () if self.telemetry is None else tuple(gap for gap in self.telemetry.gaps if gap.id not in listed)
+
+    def with_work(self, work: GapWork, conditions: Sequence[Condition]) -> Measured:
+        """With the work on its gaps, those of the recording and of what is expected among them."""
+        todo = () if self.expected is None else self.expected.todo
+        gaps: list[Gap | SeenGap] = [*self.report.gaps, *self.seen_elsewhere, *(item.gap for item in todo)]
+        cells = {gap.id: gap.cells for gap in gaps}
+        works, closed = work.of_gaps(cells.values(), conditions)
+        own = {gap: one for gap, one in zip(cells, works, strict=True) if one is not None}
+        return replace(self, work=own, closed=tuple((dict(key), work.lines[key]) for key in closed))
 
     @property
     def left_out(self) -> str:
@@ -120,6 +137,7 @@ class Measured:
             "telemetry": None if self.telemetry is None else self.telemetry.to_json(),
             "expected": None if self.expected is None else self.expected.to_json(),
             "asked": self.asked.to_json(),
+            "work": [{"gap": gap, "state": work.state, "owner": work.owner} for gap, work in self.work.items()],
             "baseline": None if self.change is None else self.change.to_json(),
             "gates": [gate.to_json() for gate in self.gates],
         }
@@ -152,7 +170,9 @@ class CoverageResults:
         n_failed = sum(not gate.passed for gate in gates)
         if n_failed:
             return f"{n_failed} of {plural(len(gates), 'threshold')} missed."
-        return f"{plural(len(gates), 'threshold')} met." if gates else ""
+        n_skipped = sum(gate.word == "skipped" for gate in gates)
+        more = f", {n_skipped:,} not measured" if n_skipped else ""
+        return f"{plural(len(gates) - n_skipped, 'threshold')} met{more}." if gates else ""
 
     def to_json(self) -> dict[str, object]:
         return with_marks(
@@ -260,8 +280,12 @@ def _accepted_by(option: str, name: str, sentence: str, is_accepted: bool, more:
     return Gate(option, 0.0, 1.0, is_accepted, message, rule=rule, is_accepted=is_accepted)
 
 
-def fail_under_expected(expected: Expectation, limit: float) -> Gate:
-    """The gate of a least covered share of what is expected; an estimate counts with its lower bound."""
+def fail_under_expected(expected: Expectation | None, limit: float) -> Gate:
+    """The gate of a least covered share of what is expected; an estimate counts with its lower bound. Where nothing is expected of
+    a table, it passes, and says so."""
+    if expected is None:
+        message = "not measured: nothing is expected of this table. A --baseline notices when that is new."
+        return Gate("fail-under-expected", limit, None, True, message, rule="expected-below", is_accepted=True)
     at_least = "" if expected.covered.method == "exact" else "at least "
     sentence = f"{at_least}{{}} of what is expected is covered"
     return bar("fail-under-expected", expected.covered.lower, limit, sentence, rule="expected-below")

@@ -64,6 +64,8 @@ def _gap_lines(measured: Measured, gap: Gap, table: EitherTable, width: int) -> 
         yield f"{format_percent(gap.new_share)} of the contexts are in no gap before it"
     if gap.telemetry is not None:
         yield f"{format_percent(gap.telemetry)} of the recorded moments"
+    if gap.id in measured.work:
+        yield f"Work on it: {printable(measured.work[gap.id].text)}"
     yield ""
     yield from aligned(list(gap.cells.items()) or [("every context", "")], indent="  ")
     if gap.nearest is not None:

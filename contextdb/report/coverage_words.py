@@ -16,6 +16,7 @@ from contextdb.tables.variety import VARIETY
 from contextdb.telemetry.observed import FactNote, Observed
 
 MOST_TOLD = 8
+MOST_CLOSED = 5
 """Conditions and assumptions that are reported one by one."""
 MOST_CHANGES = 3
 """Cells to change that are named."""
@@ -103,7 +104,19 @@ def named_asset(measured: Measured, row: int) -> str:
 
 def gap_sentence(measured: Measured, gap: Gap, most: int = MOST_TOLD) -> str:
     """What to do about a gap."""
-    return f"{cells_text(gap.cells, most)}: nothing plays; {nearest_sentence(measured, gap)}"
+    return f"{cells_text(gap.cells, most)}: {_playing(measured)}; {nearest_sentence(measured, gap)}{work_words(measured, gap)}"
+
+
+def work_words(measured: Measured, gap: Gap) -> str:
+    """Who works on a gap, behind a sentence about it; "" where nobody said anything."""
+    work = measured.work.get(gap.id)
+    return "" if work is None else f" [{work.text}]"
+
+
+def closed_sentence(measured: Measured) -> str:
+    """What of the work on gaps is about none any more."""
+    parts = [f"{cells_text(cells)} [{work.text}]" for cells, work in measured.closed]
+    return f"In the list of work, and no gap any more: {joined(parts, MOST_CLOSED)}" if parts else ""
 
 
 def todo_sentence(measured: Measured, todo: Todo) -> str:
@@ -111,7 +124,12 @@ def todo_sentence(measured: Measured, todo: Todo) -> str:
     own = todo.situation.cells
     more = {name: text for name, text in todo.gap.cells.items() if own.get(name) != text}
     where = f"{todo.situation.text}, where {cells_text(more)}" if more else todo.situation.text
-    return f"{where}: nothing plays; {nearest_sentence(measured, todo.gap)}"
+    return f"{where}: {_playing(measured)}; {nearest_sentence(measured, todo.gap)}{work_words(measured, todo.gap)}"
+
+
+def _playing(measured: Measured) -> str:
+    """What the game sees in a gap."""
+    return f"only the fallback {measured.fallback} plays" if measured.fallback else "nothing plays"
 
 
 def overlap_sentence(report: CoverageReport) -> str:

@@ -17,6 +17,8 @@ from contextdb.report.render_text import INDENT, hanging, wrapped
 from contextdb.report.results import Gate
 
 BAR_CELLS = 40
+GATE_WORDS = {"passed": ("passed", "green"), "failed": ("FAILED", "red"), "skipped": ("skipped", "yellow")}
+GATE_MARKS = {"passed": "✓", "failed": "✗", "skipped": "–"}
 FEW, MOST = 6, 20
 """The most items of a list in a terminal, and in Markdown."""
 
@@ -208,7 +210,7 @@ def _row_lines(block: Rows, colour: bool, width: int) -> Iterator[str]:
 
 def gate_lines(gate: Gate, colour: bool, width: int) -> Iterator[str]:
     """A threshold, and whether it is met."""
-    word, style = ("passed", "green") if gate.passed else ("FAILED", "red")
+    word, style = GATE_WORDS[gate.word]
     first, *rest = hanging(f"{word}  {gate.name}  ", gate.message, width)
     yield styled(word, style, colour) + first.removeprefix(word)
     yield from rest
@@ -221,7 +223,7 @@ def as_markdown(document: Document, most_bytes: int = MOST_BYTES) -> str:
     text = "\n\n".join(filter(None, (*head, *map(_markdown, closing.blocks)))) + "\n"
     for i, section in enumerate(document.sections):
         title, summary = f"### {escaped(section.title)}", escaped(section.summary)
-        parts = [title, summary, _gates(section.gates), *map(_markdown, section.sentences), *map(_markdown, section.blocks)]
+        parts = [title, summary, *map(_markdown, section.sentences), _gates(section.gates), *map(_markdown, section.blocks)]
         part = "\n" + "\n\n".join(filter(None, parts)) + "\n"
         if len((text + part).encode()) > most_bytes:
             return f"{text}\n{len(document.sections) - i:,} more {document.noun}s are not shown.\n"
@@ -230,7 +232,7 @@ def as_markdown(document: Document, most_bytes: int = MOST_BYTES) -> str:
 
 
 def _gates(gates: Iterable[Gate]) -> str:
-    return "\n".join(f"- {'✓' if gate.passed else '✗'} {escaped(gate.name)}: {escaped(gate.message)}" for gate in gates)
+    return "\n".join(f"- {GATE_MARKS[gate.word]} {escaped(gate.name)}: {escaped(gate.message)}" for gate in gates)
 
 
 def _markdown(block: Block) -> str:

@@ -55,8 +55,9 @@ def _section(section: Section, number: int) -> str:
 def _gates(gates: Iterable[Gate]) -> str:
     items = []
     for gate in gates:
-        word = "passed" if gate.passed else "failed"
-        items.append(f'<li><span class="{word}">{word.capitalize()}</span> {escape(gate.name)}: {escaped(gate.message)}</li>')
+        items.append(
+            f'<li><span class="{gate.word}">{gate.word.capitalize()}</span> {escape(gate.name)}: {escaped(gate.message)}</li>'
+        )
     return f'<ul class="gates">{"".join(items)}</ul>\n' if items else ""
 
 

@@ -73,10 +73,15 @@ class Gate:
     rule: str | None = None
     """The rule that a table breaks which misses the bar, where it has a name of its own."""
     is_accepted: bool = False
-    """Whether it passes only because an option of the command says so."""
+    """Whether it passes only because an option of the command says so, or because it has nothing to look at."""
+
+    @property
+    def word(self) -> str:
+        """Whether it passed, in a word."""
+        return "failed" if not self.passed else "skipped" if self.is_accepted and self.value is None else "passed"
 
     def findings(self, table: str, file: str | None = None) -> Iterator[Finding]:
-        """What a gate that fails, or that passes by an option, is in formats that know only findings."""
+        """What a gate that fails, or that passes without having measured, is in formats that know only findings."""
         if not self.passed or self.is_accepted:
             yield Finding(self.rule or self.name, "info" if self.passed else "error", self.message, table, file)
 

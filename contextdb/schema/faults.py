@@ -105,7 +105,18 @@ def _derivation_faults(conditions: Mapping[str, Condition]) -> Iterator[PathFaul
             yield (*path, "expr"), replace(fault, found=f"{header(path)} expr {fault.found}", mend=mend, rule="unreadable")
 
 
+_ELSEWHERE = {
+    **dict.fromkeys(("outputs", "output_columns"), 'outputs = { NAME = { type = "text" } } in [tables.NAME]'),
+    **dict.fromkeys(("roles", "role", "actors"), '[conditions."Defender.speed"]'),
+    **dict.fromkeys(("enums", "facts", "columns", "schema"), "[conditions.NAME]"),
+}
+"""What is no section of its own, and how it is declared."""
+_RANGES = ("bounds", "range", "limits", "domain", "interval")
+
+
 def _no_section(name: str, section: object) -> Fault:
+    if elsewhere := _ELSEWHERE.get(name.casefold()):
+        return Fault(f"{in_quotes(name)} is not a section.", ", ".join(_HEADERS.values()), elsewhere)
     near = nearest(name, SECTIONS)
     inner = next(iter(section), None) if isinstance(section, dict) and near != "project" else None
     mend = header((near, inner) if inner else (near,)) if near else ""
@@ -160,7 +171,10 @@ def _no_key(path: Path, key: str, value: object) -> Fault:
     if isinstance(value, Mapping) and len(path) == 2:
         mend = header((path[0], f"{path[1]}.{key}"))
         return Fault(f"{header(path)} {key_value(key, value)}: this is a table, not a key.", "a name with a dot in quotes", mend)
-    return no_key(header(path), key, keys, near_key(key, keys, KEY_SYNONYMS))
+    fault = no_key(header(path), key, keys, near_key(key, keys, KEY_SYNONYMS))
+    if "min" in keys and str(key).casefold() in _RANGES and isinstance(value, list) and len(value) == 2:
+        return replace(fault, mend=f"{key_value('min', value[0])} and {key_value('max', value[1])}")
+    return fault
 
 
 def _condition_faults(path: Path, part: Part) -> Iterator[PathFault]:

@@ -107,7 +107,8 @@ def _declaration_faults(outputs: Part) -> Iterator[PathFault]:
             continue
         if not isinstance(part, Mapping):
             mend = _typed(name, {"type": part}) if isinstance(part, str) and part in OUTPUT_TYPES else ""
-            yield path, Fault(f"{_typed(name, part)}: this is {what(part)}, not a table.", _typed(name, {"type": "number"}), mend)
+            wrong = f"output {_typed(name, part)}: this is {what(part)}, not a table."
+            yield path, Fault(wrong, _typed(name, {"type": "number"}), mend)
             continue
         faults = list(_key_faults(path, part))
         yield from faults

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -255,11 +255,11 @@ def read_folder_schema(folder: Path) -> Schema:
     return schema_of(read_bytes(path), path)
 
 
-def schema_of(raw: bytes, path: Path) -> Schema:
-    """What the bytes of a contextdb.toml say, with what it extends. Raises SchemaError where they are no UTF-8, or have an invalid
-    setting; FileError where the project that it extends cannot be read."""
+def schema_of(raw: bytes, path: Path, read: Callable[[Path], bytes] = read_bytes) -> Schema:
+    """What the bytes of a contextdb.toml say, with what it extends, whose bytes `read` gives. Raises SchemaError where they are no
+    UTF-8, or have an invalid setting; FileError where the project that it extends cannot be read."""
     text = _decoded(raw, path)
-    return read_schema(text, str(path), _studio_of(text, path, ()))
+    return read_schema(text, str(path), _studio_of(text, path, (), read))
 
 
 def _decoded(raw: bytes, path: Path) -> str:
@@ -270,7 +270,7 @@ def _decoded(raw: bytes, path: Path) -> str:
         raise SchemaError(Fault("the file is not UTF-8.", "TOML is UTF-8", "to save it as UTF-8", Place(str(path), line))) from None
 
 
-def _studio_of(text: str, path: Path, way: tuple[Path, ...]) -> Studio | None:
+def _studio_of(text: str, path: Path, way: tuple[Path, ...], read: Callable[[Path], bytes]) -> Studio | None:
     """What the text of a contextdb.toml extends; None where it extends nothing, or not in a way that can be read."""
     extends = extends_of(text, str(path))
     if extends is None:
@@ -279,8 +279,8 @@ def _studio_of(text: str, path: Path, way: tuple[Path, ...]) -> Studio | None:
     if file in (real_path(path), *way):
         problem = f"[project] extends = {in_quotes(extends)}: the project extends itself."
         raise SchemaError(Fault(problem, "another project", "to leave it out", Place(str(path))))
-    known = _decoded(read_bytes(file), file)
-    return Studio(known, str(file), _studio_of(known, file, (*way, real_path(path), file)))
+    known = _decoded(read(file), file)
+    return Studio(known, str(file), _studio_of(known, file, (*way, real_path(path), file), read))
 
 
 def table_files(folder: Path, schema: Schema) -> Iterator[tuple[str, Path]]:

@@ -22,6 +22,7 @@ _LIGHT = {
     "color-brand-primary": "#a3440a",
     "color-brand-content": "#a3440a",
     "color-background-secondary": "#f4f1ea",
+    "color-foreground-muted": "#5c6066",
     "color-sidebar-link-text--top-level": "#3a3530",
     "font-stack": "Inter, 'Segoe UI', 'Helvetica Neue', Arial, sans-serif",
 }
@@ -30,6 +31,8 @@ _DARK = {
     "color-brand-content": "#f2a65a",
     "color-background-primary": "#14181c",
     "color-background-secondary": "#1b2126",
+    "color-foreground-muted": "#9aa0a8",
+    "color-sidebar-link-text--top-level": "#d5d8dc",
 }
 html_theme_options = {
     "navigation_with_keys": True,

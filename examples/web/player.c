@@ -3,25 +3,16 @@
 #include "contextdb_motion.h"
 
 #define EXPORT(name) __attribute__((export_name(name)))
-#define MOST 64
 #define MOST_CONDITIONS 32
 
-static cdbm_bundle bundle;
-static cdbm_player player;
-static cdbm_room room;
-static double *states;
-static cdbm_pose poses[MOST];
-static cdbm_input inputs[MOST];
-static cdb_fact facts[MOST][MOST_CONDITIONS];
-static const cdb_fact *lists[MOST][CDBM_MOST_TABLES];
+static cdbm_crowd *crowd;
 static cdb_fault fault;
 static uint64_t rows[64];
 static int reasons[MOST_CONDITIONS];
-static char name_text[64];
 
 static const cdb_any *table(void)
 {
-    return player.opened[0];
+    return cdbm_crowd_table(crowd, 0);
 }
 
 EXPORT("alloc") void *alloc_bytes(size_t n)
@@ -32,105 +23,86 @@ EXPORT("alloc") void *alloc_bytes(size_t n)
 /* Open a bundle for so many characters; why it is refused, NULL where it is not. */
 EXPORT("open") const char *open_player(const void *bytes, size_t size, int n)
 {
-    const char *why = cdbm_open_bundle(&bundle, bytes, size);
-    int i;
-    if (!why) why = cdbm_open_player(&player, &bundle, NULL);
-    if (why) return why;
-    if (n > MOST || player.n_tables == 0 || table()->schema.n_conditions > MOST_CONDITIONS || table()->table.n_words > 64) return "too much";
-    room.left = cdbm_room_size(&player, (size_t)n), room.at = (char *)malloc(room.left);
-    states = (double *)malloc((size_t)n * cdbm_state_size(&player));
-    if (!room.at || !states) return "there is not enough memory";
-    for (i = 0; i < n; i++) {
-        char *memory = (char *)malloc(cdbm_pose_size(&player));
-        if (!memory) return "there is not enough memory";
-        cdbm_lay_out(&player, &poses[i], memory);
-        lists[i][0] = facts[i], inputs[i].facts = lists[i], inputs[i].goal.facing = NAN, inputs[i].fault = &fault;
-        inputs[i].unknown = CDB_UNKNOWN_ANY;
-        for (size_t k = 0; k < table()->schema.n_conditions; k++) facts[i][k] = cdbm_missing_fact(&table()->schema.conditions[k]);
-    }
-    return NULL;
+    const char *why;
+    crowd = cdbm_open_crowd(bytes, size, NULL, (size_t)n, CDB_UNKNOWN_ANY, &why);
+    if (crowd && (!table() || table()->schema.n_conditions > MOST_CONDITIONS || table()->table.n_words > 64)) why = "too much";
+    return why;
 }
 
 EXPORT("begin") void begin(int i, double x, double z, double heading)
 {
-    cdbm_begin(&player, states + (size_t)i * cdbm_state_width(&player), x, z, heading);
+    cdbm_place_one(crowd, (size_t)i, x, z, heading);
 }
 
 EXPORT("steer") void steer(int i, double x, double z)
 {
-    inputs[i].goal.velocity[0] = x, inputs[i].goal.velocity[1] = z;
+    cdbm_steer_one(crowd, (size_t)i, x, z, NAN);
 }
 
 EXPORT("set_fact") void set_fact(int i, int condition, double number)
 {
-    const cdb_condition *own = &table()->schema.conditions[condition];
-    if (own->type == CDB_NUMBER || own->type == CDB_ANGLE) facts[i][condition].number = number;
-    else facts[i][condition].whole = (int64_t)number;
+    cdb_set_number(cdbm_crowd_live(crowd, (size_t)i, 0), condition, number);
 }
 
+/* Update the first n. */
 EXPORT("update") int update(int n, double dt_s)
 {
-    return cdbm_update_all(&player, (size_t)n, states, dt_s, inputs, poses, room);
+    return cdbm_update_all(&crowd->player, (size_t)n, crowd->states, dt_s, crowd->inputs, crowd->poses, crowd->room);
 }
 
 EXPORT("n_joints") int n_joints(void)
 {
-    return (int)player.poses.rig.n_joints;
+    return (int)cdbm_crowd_size(crowd, CDBM_N_JOINTS);
 }
 
 EXPORT("parent") int parent(int joint)
 {
-    return (int)player.poses.rig.parents[joint];
+    return cdbm_crowd_parent(crowd, (size_t)joint);
 }
 
 EXPORT("positions") const double *positions(int i)
 {
-    return poses[i].positions;
+    return cdbm_crowd_numbers(crowd, (size_t)i, CDBM_POSITION_NUMBERS);
 }
 
 EXPORT("rotations") const double *rotations(int i)
 {
-    return poses[i].rotations;
+    return cdbm_crowd_numbers(crowd, (size_t)i, CDBM_ROTATION_NUMBERS);
 }
 
 EXPORT("root") const double *root(int i)
 {
-    return poses[i].root;
+    return cdbm_crowd_numbers(crowd, (size_t)i, CDBM_ROOT_NUMBERS);
 }
 
 EXPORT("state") const double *state_of(int i)
 {
-    return states + (size_t)i * cdbm_state_width(&player);
+    return cdbm_crowd_numbers(crowd, (size_t)i, CDBM_STATE_NUMBERS);
 }
 
 EXPORT("state_bytes") size_t state_bytes(void)
 {
-    return cdbm_state_size(&player);
+    return cdbm_crowd_size(crowd, CDBM_STATE_BYTES);
 }
 
 EXPORT("asset") const char *asset(int i)
 {
-    return cdbm_asset(&player, &poses[i].decision.playing);
+    return cdbm_crowd_text(crowd, (size_t)i, CDBM_ASSET_TEXT);
 }
 
 EXPORT("time_s") double time_s(int i)
 {
-    return poses[i].decision.playing.at_s;
-}
-
-EXPORT("cost") double cost(int i)
-{
-    return poses[i].decision.cost;
+    return crowd->poses[i].decision.playing.at_s;
 }
 
 EXPORT("action") const char *action(int i)
 {
-    return cdbm_action_name(&poses[i].decision);
+    return cdbm_crowd_text(crowd, (size_t)i, CDBM_ACTION_TEXT);
 }
 
 EXPORT("reason") const char *reason(int i)
 {
-    return cdbm_reason(&poses[i].decision);
+    return cdbm_crowd_text(crowd, (size_t)i, CDBM_REASON_TEXT);
 }
 
 /* ---- the table */
@@ -194,16 +166,21 @@ EXPORT("accept") void accept(int row, int at, int number, int is_accepted)
     *word = is_accepted ? *word | bit : *word & ~bit;
 }
 
+/* The facts of a character, with those that it knows itself. */
+static const cdb_fact *facts_of(int i)
+{
+    static cdb_fact own[MOST_CONDITIONS];
+    for (size_t k = 0; k < table()->schema.n_conditions; k++) {
+        own[k] = cdbm_crowd_live(crowd, (size_t)i, 0)->facts[k];
+        cdbm_add_own(&crowd->player, 0, k, (const cdbm_walk *)(const void *)state_of(i), &crowd->inputs[i].goal, &own[k]);
+    }
+    return own;
+}
+
 /* Ask the table with the facts of a character. */
 EXPORT("ask") int ask(int i)
 {
-    const cdbm_walk *walk = (const cdbm_walk *)(const void *)state_of(i);
-    cdb_fact own[MOST_CONDITIONS];
-    for (size_t k = 0; k < table()->schema.n_conditions; k++) {
-        own[k] = facts[i][k];
-        cdbm_add_own(&player, 0, k, walk, &inputs[i].goal, &own[k]);
-    }
-    return cdb_query(&table()->table, table()->columns, &table()->schema, own, CDB_UNKNOWN_ANY, rows, 64, &fault);
+    return cdb_query(&table()->table, table()->columns, &table()->schema, facts_of(i), CDB_UNKNOWN_ANY, rows, 64, &fault);
 }
 
 EXPORT("is_valid") int is_valid(int row)
@@ -214,15 +191,9 @@ EXPORT("is_valid") int is_valid(int row)
 /* The conditions that keep a row from being valid: how many, and which. */
 EXPORT("why_not") int why_not(int i, int row)
 {
-    const cdbm_walk *walk = (const cdbm_walk *)(const void *)state_of(i);
-    cdb_fact own[MOST_CONDITIONS];
     size_t n = 0;
-    for (size_t k = 0; k < table()->schema.n_conditions; k++) {
-        own[k] = facts[i][k];
-        cdbm_add_own(&player, 0, k, walk, &inputs[i].goal, &own[k]);
-    }
-    if (cdb_why_not(&table()->table, table()->columns, &table()->schema, own, CDB_UNKNOWN_ANY, row, reasons, MOST_CONDITIONS, &n, &fault) != CDB_OK)
-        return 0;
+    if (cdb_why_not(&table()->table, table()->columns, &table()->schema, facts_of(i), CDB_UNKNOWN_ANY, row, reasons, MOST_CONDITIONS, &n, &fault)
+        != CDB_OK) return 0;
     return (int)n;
 }
 
@@ -234,13 +205,6 @@ EXPORT("why_not_condition") int why_not_condition(int number)
 EXPORT("fact_number") double fact_number(int i, int at)
 {
     const cdb_condition *own = &table()->schema.conditions[at];
-    cdb_fact fact = facts[i][at];
-    cdbm_add_own(&player, 0, (size_t)at, (const cdbm_walk *)(const void *)state_of(i), &inputs[i].goal, &fact);
-    return own->type == CDB_NUMBER || own->type == CDB_ANGLE ? fact.number : (double)fact.whole;
-}
-
-EXPORT("joint_name") const char *joint_name(int joint)
-{
-    const char *name = cdbm_joint_name(&player, (size_t)joint);
-    return name ? name : name_text;
+    const cdb_fact *fact = &facts_of(i)[at];
+    return own->type == CDB_NUMBER || own->type == CDB_ANGLE ? fact->number : (double)fact->whole;
 }

@@ -1,7 +1,5 @@
 """The contexts of a table that let other clips play, compared with asking the table every context there is."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """`contextdb check` refuses rows that say otherwise than the markup of their clips."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Weights and thresholds written into contextdb.toml: only these numbers change, in whichever form the file has its channels."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 

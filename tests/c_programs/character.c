@@ -1,4 +1,5 @@
-/* character BUNDLE IN OUT   characters of the first controller, by what a file gives in each update: their states and poses.
+/* character BUNDLE IN OUT   characters of the first controller, by what a file gives in each update: their states and poses, and what
+ *                           they pack. Copies of them that are given this alone must play the same.
  * character BUNDLE N        N times opened with something damaged; what is not refused is played. Prints how often it was refused. */
 #include <stdio.h>
 #include <stdlib.h>
@@ -39,9 +40,41 @@ static void write_all(FILE *out, const void *items, size_t size, size_t n)
     if (fwrite(items, size, n, out) != n) exit(2);
 }
 
-/* An update: seconds, whether there is a ground, and for each its goal, and the number of its gait, a fact of the one table. */
-static void update(const cdbm_player *player, size_t n, double *states, cdbm_pose *poses, cdbm_input *inputs, cdbm_room room, FILE *out)
+typedef struct memory {
+    double *states;
+    cdbm_pose *poses;
+    cdbm_input *inputs;
+    char *of_poses;
+    cdbm_room room;
+} memory;
+
+/* Let copies play what these pack, with the bodies where they have them. */
+static void follow(const cdbm_player *player, size_t n, double dt_s, const memory *own, const memory *copies, FILE *out)
 {
+    size_t i, width = cdbm_state_width(player), n_joints = player->poses.rig.n_joints;
+    uint8_t *packets = (uint8_t *)malloc(n * CDBM_MOST_PACKET);
+    if (!packets) exit(1);
+    for (i = 0; i < n; i++) {
+        uint8_t *packet = packets + i * CDBM_MOST_PACKET, n_bytes = (uint8_t)cdbm_pack(player, own->states + i * width, packet);
+        copies->inputs[i] = own->inputs[i];
+        copies->inputs[i].facts = NULL, copies->inputs[i].is_copy = 1, copies->inputs[i].packet = packet, copies->inputs[i].n_packet = n_bytes;
+        copies->inputs[i].body = (const cdbo_body *)(const void *)(own->states + i * width);
+        write_all(out, &n_bytes, 1, 1);
+        write_all(out, packet, 1, n_bytes);
+    }
+    if (cdbm_update_all(player, n, copies->states, dt_s, copies->inputs, copies->poses, copies->room) != 1) exit(8);
+    for (i = 0; i < n; i++)
+        if (memcmp(copies->poses[i].rotations, own->poses[i].rotations, 10 * n_joints * sizeof(double)) != 0) exit(9);
+    free(packets);
+}
+
+/* An update: seconds, whether there is a ground, and for each its goal, and the number of its gait, a fact of the one table. */
+static void update(const cdbm_player *player, size_t n, const memory *own, const memory *copies, FILE *out)
+{
+    double *states = own->states;
+    cdbm_pose *poses = own->poses;
+    cdbm_input *inputs = own->inputs;
+    cdbm_room room = own->room;
     double dt_s = *(const double *)take(8, 1);
     int64_t numbers[2];
     const cdb_schema *schema = player->n_tables > 0 ? &player->opened[0]->schema : NULL;
@@ -68,13 +101,23 @@ static void update(const cdbm_player *player, size_t n, double *states, cdbm_pos
         write_all(out, poses[i].root, sizeof(double), 3);
         write_all(out, poses[i].rotations, sizeof(double), 10 * n_joints);
     }
+    follow(player, n, dt_s, own, copies, out);
     free(lists);
     free(facts);
 }
 
-static void try_out(const cdbm_player *player, double *state, cdbm_pose *pose, cdbm_room room)
+static uint64_t drawn(uint64_t *seed)
+{
+    uint64_t z = *seed += 0x9E3779B97F4A7C15;
+    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9;
+    z = (z ^ (z >> 27)) * 0x94D049BB133111EB;
+    return z ^ (z >> 31);
+}
+
+static void try_out(const cdbm_player *player, double *state, cdbm_pose *pose, cdbm_room room, uint64_t *seed)
 {
     cdbm_input input;
+    uint8_t packet[CDBM_MOST_PACKET];
     float *matrices = (float *)malloc(16 * sizeof(float) * player->poses.rig.n_joints + 1);
     int tick;
     memset(&input, 0, sizeof input);
@@ -83,20 +126,15 @@ static void try_out(const cdbm_player *player, double *state, cdbm_pose *pose, c
     for (tick = 0; tick < 40; tick++) {
         input.goal.velocity[1] = tick < 20 ? 1.2 : -2.0;
         if (tick > 10) input.ground = slope;
-        if (cdbm_update(player, state, 1.0 / 30.0, &input, pose, room) != 1) break;
+        input.n_packet = cdbm_pack(player, state, packet), input.packet = packet;
+        if (input.n_packet > 0 && tick % 2) packet[drawn(seed) % input.n_packet] = (uint8_t)drawn(seed);
+        input.is_copy = tick > 30;
+        if (cdbm_update(player, state, 1.0 / 30.0, &input, pose, room) != 1 && !input.is_copy) break;
         if (!cdbm_asset(player, &pose->decision.playing) && pose->decision.playing.database >= 0.0) break;
         if (player->has_poses) cdbm_matrices(player, pose, matrices);
     }
     free(matrices);
 }
-
-typedef struct memory {
-    double *states;
-    cdbm_pose *poses;
-    cdbm_input *inputs;
-    char *of_poses;
-    cdbm_room room;
-} memory;
 
 static memory taken(const cdbm_player *player, size_t n)
 {
@@ -132,23 +170,16 @@ static void play(const cdbm_player *player, const char *from, const char *to)
     char *input = read_all(from, &size);
     FILE *out = fopen(to, "wb");
     int64_t n_ticks, tick;
-    memory own;
+    memory own, copies;
     at = input;
     n = (size_t)*(const int64_t *)take(8, 1), n_ticks = *(const int64_t *)take(8, 1);
-    own = taken(player, n);
+    own = taken(player, n), copies = taken(player, n);
     if (!out || !cdbm_has_digest(&player->bundle)) exit(6);
-    for (tick = 0; tick < n_ticks; tick++) update(player, n, own.states, own.poses, own.inputs, own.room, out);
+    for (tick = 0; tick < n_ticks; tick++) update(player, n, &own, &copies, out);
     fclose(out);
     give_back(&own);
+    give_back(&copies);
     free(input);
-}
-
-static uint64_t drawn(uint64_t *seed)
-{
-    uint64_t z = *seed += 0x9E3779B97F4A7C15;
-    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9;
-    z = (z ^ (z >> 27)) * 0x94D049BB133111EB;
-    return z ^ (z >> 31);
 }
 
 /* Write other numbers into some places, as often into the directory and into small parts as into the large ones. */
@@ -188,7 +219,7 @@ static void try_damaged(const char *bytes, size_t size, long n_times)
         if (!why) why = cdbm_open_player(player, &bundle, NULL);
         if (!why) {
             memory own = taken(player, 1);
-            try_out(player, own.states, own.poses, own.room);
+            try_out(player, own.states, own.poses, own.room, &seed);
             give_back(&own);
             cdbm_close_player(player);
         } else n_refused++;

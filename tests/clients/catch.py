@@ -1,7 +1,5 @@
 """A catch: actors who are cast for a role, and why nothing is valid."""
 
-from __future__ import annotations
-
 from facts import ContestedCatchActors, ContestedCatchFactsWithActors
 
 import contextdb as cdb

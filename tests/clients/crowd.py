@@ -1,7 +1,5 @@
 """A crowd: many contexts at once, facts that are kept, picks for all."""
 
-from __future__ import annotations
-
 import numpy as np
 
 import contextdb as cdb

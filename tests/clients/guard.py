@@ -1,7 +1,5 @@
 """A guard: facts that are kept, a picker that remembers, a link, hot reload."""
 
-from __future__ import annotations
-
 from facts import LocomotionFacts, LocomotionLive, LocomotionSomeFacts
 
 import contextdb as cdb

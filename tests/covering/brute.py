@@ -1,7 +1,5 @@
 """Coverage in the plainest way: every context that cells can tell apart, each row read anew, measures summed as fractions."""
 
-from __future__ import annotations
-
 import itertools
 import random
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Coverage of tables with assumptions and derived facts: exact where boxes can tell, else estimated from what can happen."""
 
-from __future__ import annotations
-
 import pytest
 
 import contextdb as cdb

@@ -1,7 +1,5 @@
 """A coverage report against an earlier one: gaps are compared by the contexts that they hold."""
 
-from __future__ import annotations
-
 import json
 from contextlib import suppress
 
@@ -69,12 +67,6 @@ def test_a_gap_is_closed_when_every_context_of_it_has_a_row():
     found = change(table_of(WALK), table_of(WALK, ("run", "Any", "Run")))
     assert [gap.cells for gap in found.closed] == [{"gait": "Run"}]
     assert found.opened == ()
-
-
-def test_single_points_count():
-    found = change(table_of(("a", "..5", "Any"), ("b", "5..", "Any")), table_of(("a", "..5)", "Any"), ("b", "(5..", "Any")))
-    assert [(gap.cells, gap.share) for gap in found.opened] == [({"speed": "5"}, 0.0)]
-    assert found.drop == 0.0
 
 
 def test_rows_that_died_since_are_told_and_those_dead_before_are_not():

@@ -1,7 +1,5 @@
 """What `contextdb check` finds of rows, assumptions and declarations."""
 
-from __future__ import annotations
-
 import random
 from pathlib import Path
 

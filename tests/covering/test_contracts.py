@@ -1,7 +1,5 @@
 """Contracts: proved as trying every context says, and every counterexample breaks what it says it breaks."""
 
-from __future__ import annotations
-
 import datetime
 import fnmatch
 import random

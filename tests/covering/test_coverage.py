@@ -1,7 +1,5 @@
 """The coverage of small random tables is what going through every context gives."""
 
-from __future__ import annotations
-
 import random
 
 import pytest

@@ -1,7 +1,5 @@
 """Crowded contexts: the rows named are those valid there, and no context of a small table has more."""
 
-from __future__ import annotations
-
 import random
 
 import pytest
@@ -52,11 +50,6 @@ def test_crowds_are_found_in_a_table_too_large_to_go_through():
     [crowd] = coverage(table, samples=200).crowded
     assert crowd.rows == tuple(range(20))
     assert crowd.cells == {f"b{i}": "True" for i in range(20)}
-
-
-def test_ends_that_touch_are_no_crowd():
-    schema = {"speed": {"type": "number", "min": 0, "max": 10}}
-    assert coverage(cdb.Table.from_columns({"Asset": ["A", "B"], "speed": ["..5", "5.."]}, schema)).crowded == ()
 
 
 def test_contexts_are_climbed_from_as_far_as_their_work_goes(monkeypatch: pytest.MonkeyPatch):

@@ -1,7 +1,5 @@
 """Coverage where it is easily wrong: ends that touch, numbers that nearly round, domains without bounds, input that cannot be."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import replace
@@ -44,32 +42,9 @@ def gaps(report: cdb.CoverageReport) -> list[dict[str, str]]:
     return [gap.cells for gap in report.gaps]
 
 
-def test_a_closed_end_and_an_open_one_leave_nothing_open():
-    report = report_of({"speed": ["..5", "(5.."]}, SPEED)
-    assert (report.covered, report.method, gaps(report), report.gaps_complete) == (1.0, "exact", [], True)
-
-
 def test_two_open_ends_leave_one_point_of_no_volume():
     report = report_of({"speed": ["..5)", "(5.."]}, SPEED)
     assert (report.covered, gaps(report), report.gaps[0].share, report.gaps_complete) == (1.0, [{"speed": "5"}], 0.0, True)
-
-
-def test_ends_touch_without_declared_bounds_too():
-    assert gaps(report_of({"speed": ["..5)", "(5.."]}, {"speed": {"type": "number"}})) == [{"speed": "5"}]
-    assert gaps(report_of({"speed": ["..5", "(5.."]}, {"speed": {"type": "number"}})) == []
-
-
-def test_half_turns_touch_across_180_degrees():
-    assert gaps(report_of({"heading": ["(90..-90)", "-90..90"]}, {"heading": {"type": "angle"}})) == []
-    assert gaps(report_of({"heading": ["(90..180)", "(180..-90)", "-90..90"]}, {"heading": {"type": "angle"}})) == [
-        {"heading": "180"}
-    ]
-
-
-def test_whole_numbers_are_counted_one_by_one():
-    report = report_of({"count": ["0..2", "5"]}, {"count": {"type": "int", "min": 0, "max": 9}})
-    assert report.covered == pytest.approx(0.4)
-    assert gaps(report) == [{"count": "3..4 | 6..9"}]
 
 
 def test_a_gap_between_neighbouring_doubles_is_not_rounded_away():
@@ -79,20 +54,6 @@ def test_a_gap_between_neighbouring_doubles_is_not_rounded_away():
     assert report.covered < 1.0
     assert len(report.gaps) == 1
     assert 0.0 < report.gaps[0].share < 1e-3
-
-
-def test_tags_follow_their_hierarchy_in_shares_and_gaps():
-    schema = {"tags": {"type": "tags", "values": ["Move", "Move.Run", "InAir"]}}
-    report = report_of({"tags": ["+Move.Run", "-Move"]}, schema)
-    assert report.covered == 0.75
-    assert gaps(report) == [{"tags": "+Move -Move.Run"}]
-
-
-def test_impossible_contexts_belong_to_no_share():
-    schema = {"in_air": {"type": "bool"}, "on_wall": {"type": "bool"}}
-    report = report_of({"in_air": ["True"], "on_wall": ["False"]}, schema, impossible=[{"in_air": "True", "on_wall": "True"}])
-    assert report.covered == pytest.approx(1 / 3)
-    assert gaps(report) == [{"in_air": "False"}]
 
 
 def test_assumptions_that_leave_no_context_are_an_error():
@@ -146,13 +107,6 @@ def test_what_is_assumed_of_a_domain_without_bounds_is_said():
     assert report.covered == pytest.approx(0.5 * 2 / 3)
     assert report.assumed["speed"] == "..0) counts 5, (10.. counts 5"
     assert "any other text" in report.assumed["word"]
-
-
-def test_the_nearest_row_is_named_with_its_change():
-    report = report_of({"speed": ["..5", "7.."], "run": ["Any", "True"]}, SPEED | {"run": {"type": "bool"}})
-    nearest = report.gaps[0].nearest
-    assert nearest is not None
-    assert (nearest.asset, nearest.n_changes, nearest.condition, nearest.cell) == ("A0", 1, "speed", "..10")
 
 
 def test_a_broken_promise_of_one_row_shows_the_overlap():

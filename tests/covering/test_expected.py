@@ -1,7 +1,5 @@
 """Expected contexts: the share of them that has a valid row, and what to do for the rest."""
 
-from __future__ import annotations
-
 import json
 
 import pytest
@@ -148,6 +146,12 @@ def test_a_gate_of_what_is_expected_does_not_pass_where_nothing_is(tmp_path):
     (tmp_path / "moves.csv").write_text("Asset,gait\nidle,Idle\n")
     result = run("coverage", tmp_path / "moves.csv", "--fail-under-expected", "50")
     assert (result.code, "no table says what is expected of it" in result.err) == (2, True)
+    (tmp_path / "contextdb.toml").write_text('[tables.other]\nexpected = "asked.csv"\n')
+    (tmp_path / "other.csv").write_text("Asset,gait\nwalk,Walk\n")
+    (tmp_path / "asked.csv").write_text("Situation,gait\na,Walk\n")
+    for form in ("text", "markdown", "html", "json", "github", "junit", "sarif"):
+        result = run("coverage", tmp_path, "--fail-under-expected", "50", "--format", form)
+        assert (result.code, "nothing is expected of this table" in " ".join(result.out.split())) == (0, True), form
 
 
 @pytest.mark.parametrize("how", ["the setting", "a row"])

@@ -1,7 +1,5 @@
 """The fewest sets that hold everything, as trying every choice says."""
 
-from __future__ import annotations
-
 from itertools import combinations
 
 from hypothesis import given

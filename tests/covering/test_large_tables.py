@@ -1,7 +1,5 @@
 """Tables that are too large to compare every row: what is left out is said, and what is found holds all the same."""
 
-from __future__ import annotations
-
 import random
 from functools import reduce
 from operator import add, or_

@@ -1,7 +1,5 @@
 """Columns of very many tags, and tables of very many conditions: nothing recurses without a bound, and answers stay exact."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """Pairs of conditions: what going through every context gives, and what is said where it was sampled."""
 
-from __future__ import annotations
-
 import json
 import random
 from collections.abc import Callable

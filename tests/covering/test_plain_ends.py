@@ -1,7 +1,5 @@
 """Ends of cells that nobody wrote: as short as people write them, and on the same side of every number that people write."""
 
-from __future__ import annotations
-
 import math
 import re
 

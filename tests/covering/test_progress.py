@@ -1,7 +1,5 @@
 """A long computation tells how far it is and can be stopped; neither changes the report."""
 
-from __future__ import annotations
-
 import itertools
 
 import pytest

@@ -1,7 +1,5 @@
 """The two ways of answering questions about boxes agree, and the count with the simplest one there is."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

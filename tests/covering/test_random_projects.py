@@ -1,7 +1,5 @@
 """Coverage, check, diff and evaluate of random projects say what trying every context gives; asked as users ask them."""
 
-from __future__ import annotations
-
 import csv
 import itertools
 import random

@@ -89,5 +89,5 @@ def test_a_merged_group_header_beside_a_legend_of_one_column_is_read(legend: lis
     for at, text in enumerate(legend, 1):
         sheet.cell(at, 5, text)
     reading = read_book(book)
-    assert texts(reading) == {"Clip": ["jog", "run"], "min": ["1", "2"], "max": ["2", "3"]}
+    assert texts(reading) == {"Clip": ["jog", "run"], "Speed min": ["1", "2"], "Speed max": ["2", "3"]}
     assert 'left out because it is not a table: "Legend"' in told(reading)

@@ -1,7 +1,5 @@
 """Whatever a file holds, reading it gives a table or an error in words, never anything else."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from functools import cache
 

@@ -1,7 +1,5 @@
 """Texts with delimiters: the dialects that Excel writes are told apart, and what was decided is said."""
 
-from __future__ import annotations
-
 import pytest
 
 from contextdb.errors import TableError

@@ -1,7 +1,5 @@
 """DMN decision tables: what a cell can say comes through both ways, what it cannot is told with its place, bombs are refused."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from xml.etree import ElementTree
 

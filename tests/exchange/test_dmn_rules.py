@@ -1,7 +1,5 @@
 """Tests of a decision table that no cell can say: rules of their rows where an expression can, else unreadable, never data."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from xml.sax.saxutils import escape
 

@@ -1,7 +1,5 @@
 """Types, defaults and every hit policy of DMN files: what they say of an input's values is kept, or told with its place."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from itertools import product

@@ -1,7 +1,5 @@
 """Every cell of a file of another program means here what it meant there, or the report names it."""
 
-from __future__ import annotations
-
 import csv
 import datetime
 import io

@@ -1,7 +1,5 @@
 """A hostile file of a few kilobytes costs no more than its size: the work on it grows with its length, not with the square."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import time

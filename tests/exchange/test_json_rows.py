@@ -1,7 +1,5 @@
 """JSON documents and JSON lines, of ours and of others, as rows."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

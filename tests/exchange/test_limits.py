@@ -1,7 +1,5 @@
 """Files that are too large, packed too well, or half merged: refused in words, with their place, and soon."""
 
-from __future__ import annotations
-
 import io
 import tracemalloc
 import zipfile

@@ -1,7 +1,5 @@
 """What a column becomes: a declared condition by its name, a new one by its cells, or a job; and what contextdb.toml then says."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

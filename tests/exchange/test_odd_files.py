@@ -78,7 +78,7 @@ def test_a_lock_that_only_the_reader_finds_is_told_and_an_interruption_passes(mo
     ("raw", "name", "options", "said"),
     [
         (b"Asset;note\na;" + b"x" * 140_000 + b"\n", "x.csv", ReadOptions(), "line 2: a field has more than 65,536 characters"),
-        (b"Asset,speed\na,1\n", "x.csv", ReadOptions(sheet="one"), "has no sheets. Accepted: no --sheet"),
+        (b"Asset,speed\na,1\n", "x.csv", ReadOptions(sheet="one"), "has no sheets. Accepted: its cells, such as A1:F20"),
         (b"Asset,speed\na,1\n", "x.csv", ReadOptions(format="jsno"), 'there is no format "jsno"'),
     ],
 )

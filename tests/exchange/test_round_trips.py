@@ -1,7 +1,5 @@
 """A table written in any format and read back is the table it was; our own CSV keeps its bytes."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -162,14 +162,14 @@ def test_groups_merged_over_the_header_are_left_out_and_said(has_title: bool, fi
     assert f'sheet row {n + 1}: left out above the header: "{said}".' in told(reading)
 
 
-def test_names_that_appear_twice_have_the_group_that_is_merged_over_them_in_front():
+def test_groups_with_a_column_of_one_name_are_roles_and_stand_before_all_their_columns():
     out, book, (sheet,) = workbook([["Fights, version 3"], [""], ["Clip", "Stance", "Reach", "Stance", "Size"], ["a", 1, 2, 3, 4]])
     sheet.merge_range(0, 0, 0, 4, "Fights, version 3")
     sheet.merge_range(1, 1, 1, 2, "Player")
     sheet.merge_range(1, 3, 1, 4, "Opponent")
     reading = reading_of(out, book)
-    assert reading.names == ["Clip", "Player.Stance", "Reach", "Opponent.Stance", "Size"]
-    assert 'names that appear twice have their group in front: "Stance" is now "Player.Stance".' in told(reading)
+    assert reading.names == ["Clip", "Player.Stance", "Player.Reach", "Opponent.Stance", "Opponent.Size"]
+    assert 'names have their group in front: "Stance" is now "Player.Stance".' in told(reading)
 
 
 def test_a_header_with_a_merged_name_is_no_row_of_groups():
@@ -214,11 +214,15 @@ def test_a_first_row_that_looks_like_values_is_doubted(first: str):
     assert told(read(b"Asset,speed,pos\njog,3.5,CB\n", "x.csv")) == ""
 
 
-@pytest.mark.parametrize("word", ["Total", "TOTAL:", "Sum", "Summe"])
-def test_a_row_that_sums_up_is_named(word: str):
+@pytest.mark.parametrize("word", ["Total", "TOTAL:", "Sum", "Summe", "Gesamt"])
+def test_a_row_that_sums_up_is_left_out_and_said(word: str):
     reading = reading_of(*workbook([*ROWS, [word, 4]])[:2])
-    assert f'the last row: a row that begins with "{word}" is read as an asset like others.' in told(reading)
-    assert "begins with" not in told(reading_of(*workbook([*ROWS, ["Total_A", 4]])[:2]))
+    assert f'sheet row 4: left out, as it is no asset: "{word}".' in told(reading)
+    assert reading.names == ROWS[0]
+    assert reading.n_rows == 2
+    assert reading_of(*workbook([*ROWS, ["Total_A", 4]])[:2]).n_rows == 3
+    assert reading_of(*workbook([*ROWS, [word, "CB"]])[:2]).n_rows == 3  # it says more than a sum
+    assert reading_of(*workbook([*ROWS, [word, 4]])[:2], "A1:C4").n_rows == 3  # these cells are what somebody chose
 
 
 # ---- what Excel does not show

@@ -1,7 +1,5 @@
 """Typed outputs that leave a project and come back: with their values, and with their types as far as the format has types."""
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Workbooks: what we write a second reader understands; what others write is read with all that a person should know."""
 
-from __future__ import annotations
-
 import io
 import re
 import zipfile

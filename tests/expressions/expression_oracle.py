@@ -1,7 +1,5 @@
 """Random expressions, each with a function of its own that tells its value: Python's arithmetic, and None for what is missing."""
 
-from __future__ import annotations
-
 import math
 import operator
 from collections.abc import Callable, Mapping

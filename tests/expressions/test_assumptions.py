@@ -1,7 +1,5 @@
 """Assumptions: what they rule out, as boxes of cells and context by context."""
 
-from __future__ import annotations
-
 from itertools import product
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Expressions: one context and a frame of them give the values that an evaluator too simple to be wrong gives, bit by bit."""
 
-from __future__ import annotations
-
 import math
 import struct
 from fractions import Fraction
@@ -163,10 +161,3 @@ def test_a_column_may_be_written_in_any_way_that_a_table_is_asked_with(column):
 
 def test_no_contexts_give_no_values():
     assert read_expression("a > 1 and gait == word", CONDITIONS).evaluate_frame({"a": [], "gait": [], "word": []}, 0).tolist() == []
-
-
-@pytest.mark.parametrize("text", ["atan2(a, Role.b)", "atan2(Role.b, a)"])
-def test_a_direction_with_a_missing_part_is_missing_also_where_the_other_is_0(text):
-    expression = read_expression(text, CONDITIONS)
-    assert expression.evaluate({"a": 0.0}) is expression.evaluate({"Role.b": 0.0}) is None
-    assert np.isnan(expression.evaluate_frame({"a": [0.0, None], "Role.b": [None, 0.0]}, 2)).all()

@@ -1,7 +1,5 @@
 """Names in the text of an expression."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -1,7 +1,5 @@
 """What is refused in an expression, and how it is told. `refused.txt`: the text, the place, the message; blank lines between."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Tables with rules against reading every cell and every rule anew: one context and many, live, explained, opened from a file."""
 
-from __future__ import annotations
-
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Databases on a line, for tests of choosing: a frame's one feature is a place, and its cost the squared distance to the query."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Oracles for motion, too simple to be wrong: one frame and one joint at a time, plain matrices, plain loops."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

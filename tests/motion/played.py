@@ -1,7 +1,5 @@
 """Decisions as a controller makes them, written down: which clip plays from when, for how many ticks."""
 
-from __future__ import annotations
-
 from functools import cache
 
 from made_once import make_clip

@@ -3,8 +3,6 @@
 What an update is given is taken as the pipeline hands it to the core. Velocities at seams are differences of poses a moment apart.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field, replace
 

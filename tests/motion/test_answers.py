@@ -1,7 +1,5 @@
 """What motion needs of an answer is what tables answer; motion itself imports no table."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

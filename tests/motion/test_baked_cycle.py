@@ -1,7 +1,5 @@
 """A baked cycle has its joints where the cycle has them, points where their joints hold them, and is read as it was written."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from made_once import make_clip

@@ -1,7 +1,5 @@
 """Building a project's databases: with the cache, after any change, the same to the last bit as without; and only what changed."""
 
-from __future__ import annotations
-
 import json
 import threading
 

@@ -1,7 +1,5 @@
 """Reading and writing BVH: what is accepted, what is refused, and with which words."""
 
-from __future__ import annotations
-
 import io
 import re
 

@@ -1,7 +1,5 @@
 """What each type of channel holds, against an oracle of matrices and loops; custom channels; mirrored features."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -15,7 +13,7 @@ from strategies import examples, some
 from test_mocap import FOLDER, listed, load
 
 from contextdb.errors import MotionError, SchemaError
-from contextdb.motion import Clip, FeatureSchema, Skeleton, query_from, steady_path
+from contextdb.motion import Clip, FeatureSchema, query_from, steady_path
 from contextdb.motion.clips.foot_bones import feet_of
 from contextdb.motion.features.channels import AXES, WHATS
 from contextdb.motion.features.extraction import clip_features, features_of
@@ -95,34 +93,6 @@ SYMMETRIC = [
 ]
 
 
-def other_name(name):
-    """The feature that a feature becomes in the mirror: the bone of the other side, the other foot's phase."""
-    swapped = name.replace("Left", "?").replace("Right", "Left").replace("?", "Right")
-    if name.startswith("phase"):
-        return name.replace("left", "?").replace("right", "left").replace("?", "right")
-    return swapped
-
-
-def mirror_sign(name):
-    """What is to the side changes its sign; of a turning, and of a bone's own x axis, all but that does."""
-    if name.startswith("phase") or "speed" in name:
-        return 1.0
-    is_turned = "angular" in name or " x axis " in name
-    return -1.0 if name.endswith("left") != is_turned else 1.0
-
-
-@pytest.mark.parametrize("name", ["walk", "walk_turn_left_90", "jog_turn_right_60", "start_run", "stop_walk_tired", "idle"])
-def test_mirrored_features_are_the_other_side_s_with_lateral_signs_flipped(name):
-    schema = schema_of(*SYMMETRIC, mirror=PAIRS)
-    clip = make_clip(name).clip
-    plain, mirrored = (clip_features(clip, schema, mirrored=flag) for flag in (False, True))
-    names = schema.feature_names
-    expected = plain.features[:, [names.index(other_name(n)) for n in names]] * [mirror_sign(n) for n in names]
-    assert np.allclose(mirrored.features, expected, atol=2e-5)
-    assert (plain.asset, plain.mirrored, mirrored.asset, mirrored.mirrored) == (name, False, name, True)
-    assert np.allclose(mirrored.root, plain.root * [-1.0, 1.0, -1.0], atol=1e-6)
-
-
 def test_clip_features_carry_the_body_s_path_and_the_same_features():
     schema = schema_of(*SYMMETRIC)
     found = clip_features(WALK, schema)
@@ -136,21 +106,6 @@ def test_clip_features_carry_the_body_s_path_and_the_same_features():
 # ---- single channels
 
 
-def spinning(axis, dps, n_frames=6):
-    """A root that turns steadily about one world axis; the body faces where it points."""
-    skeleton = Skeleton(("Root",), np.array([-1]), np.zeros((1, 3)), ((f"{axis}rotation",),))
-    return Clip("spin", skeleton, 1.0 / 30.0, np.arange(n_frames)[:, None] * dps / 30.0, 1.0)
-
-
-@pytest.mark.parametrize(("axis", "expected"), [("X", (1, 0, 0)), ("Y", (0, 1, 0)), ("Z", (0, 0, 1))])
-@pytest.mark.parametrize("dps", [90.0, -3000.0, 5000.0])
-def test_a_steady_turn_has_its_angular_velocity_in_every_frame(axis, expected, dps):
-    found = features(spinning(axis, dps, 2 if axis == "X" else 6), Channel("angular_velocity", 1.0, "Root"))
-    size = np.linalg.norm(found, axis=1)
-    assert np.allclose(size, math.radians(abs(dps)), rtol=1e-5)
-    assert np.allclose(found[0], np.array(expected) * math.radians(dps), rtol=1e-4, atol=1e-3)
-
-
 def test_a_head_that_turns_against_the_chest_turns_relative_to_it():
     values = WALK.values.copy()
     schema = schema_of(Channel("direction", 1.0, "Head", relative_to="Neck"))
@@ -162,68 +117,6 @@ def test_a_head_that_turns_against_the_chest_turns_relative_to_it():
     found = features_of(replace(WALK, values=values), schema)
     assert np.allclose(found, [[0.5, 0.0, math.sqrt(0.75)]], atol=1e-6)
     assert schema.feature_names[0] == "Head direction z relative to Neck x"
-
-
-def strafing(degrees, speed, n_frames=31):
-    """A body that faces +z and moves at an angle to it."""
-    skeleton = Skeleton(("Root",), np.array([-1]), np.zeros((1, 3)), (("Xposition", "Zposition"),))
-    way = (
-        np.arange(n_frames)[:, None] * speed / 30.0 * np.array([[math.sin(math.radians(degrees)), math.cos(math.radians(degrees))]])
-    )
-    return Clip("strafe", skeleton, 1.0 / 30.0, way, 1.0)
-
-
-@pytest.mark.parametrize("sampling", [{"at": (-0.5, 0.0, 2.0)}, {"along": (-0.5, 0.0, 3.0)}])
-def test_direction_to_velocity_is_the_facing_seen_along_the_way(sampling):
-    channel = Channel("trajectory", what="direction_to_velocity", **sampling)
-    for degrees, expected in ((0.0, (0, 1)), (90.0, (-1, 0)), (180.0, (0, -1)), (-45.0, (math.sqrt(0.5), math.sqrt(0.5)))):
-        assert np.allclose(features(strafing(degrees, 1.4), channel).reshape(-1, 2), expected, atol=1e-6)
-        assert np.allclose(
-            query_from(schema_of(channel), strafing(0, 1.0), 3, steady_path(2.0, strafe_deg=degrees)).reshape(-1, 2),
-            expected,
-            atol=1e-6,
-        )
-
-
-def test_direction_to_velocity_fades_to_nothing_as_the_body_comes_to_stand():
-    channel = Channel("trajectory", what="direction_to_velocity", at=(0.0,))
-    lengths = [float(np.linalg.norm(features(strafing(30.0, speed), channel)[5])) for speed in (0.0, 0.1, 0.2, 0.3, 3.0)]
-    assert lengths == pytest.approx([0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0, 1.0], abs=1e-6)
-
-
-def test_speed_by_distance_is_the_speed_when_the_body_gets_there():
-    z = np.concatenate((np.arange(30) / 30.0, 1.0 + np.arange(60) * 3.0 / 30.0))
-    skeleton = Skeleton(("Root",), np.array([-1]), np.zeros((1, 3)), (("Zposition",),))
-    channel = Channel("trajectory", what="speed", along=(0.0, 2.0))
-    found = features(Clip("faster", skeleton, 1.0 / 30.0, z[:, None], 1.0), channel)
-    assert np.allclose(found[5], [1.0, 3.0], atol=1e-6)
-    assert np.allclose(found[60], [3.0, 3.0], atol=1e-6)
-
-
-def test_no_metres_along_the_path_is_here_even_where_the_body_stands_and_turns():
-    values = np.zeros((40, 2))
-    values[:, 0] = np.concatenate((np.zeros(30), np.arange(1, 11) * 0.1))
-    values[:30, 1] = np.arange(30) * 3.0
-    values[30:, 1] = 87.0
-    skeleton = Skeleton(("Root",), np.array([-1]), np.zeros((1, 3)), (("Zposition", "Yrotation"),))
-    clip = Clip("turn_then_go", skeleton, 1.0 / 30.0, values, 1.0)
-    direction = features(clip, Channel("trajectory", what="direction", along=(0.0,)))
-    assert np.allclose(direction, [0.0, 1.0], atol=1e-6)
-    assert np.allclose(features(clip, Channel("trajectory", what="speed", along=(0.0,)))[:29], 0.0)
-
-
-def test_a_pose_at_another_moment_stays_within_the_clip():
-    now = features(WALK, Channel("position", 1.0, "LeftFoot"))
-    moved = features(WALK, Channel("position", 1.0, "LeftFoot", at=(-0.1, 0.2)))
-    assert np.array_equal(moved[3:, :3], now[:-3])
-    assert np.array_equal(moved[:-6, 3:], now[6:])
-    assert np.array_equal(moved[:3, :3], now[[0, 0, 0]])
-    assert np.array_equal(moved[-6:, 3:], now[[-1] * 6])
-
-
-def test_unit_vectors_have_length_one():
-    made = [features(make_clip(name).clip, *SYMMETRIC[4:6], SYMMETRIC[8]) for name in ("sprint", "walk_turn_left_90")]
-    assert np.allclose(np.linalg.norm(np.concatenate(made).reshape(-1, 3), axis=1), 1.0, atol=1e-6)
 
 
 def test_phases_of_a_clip_without_steps_are_zero_and_of_a_walk_go_round():

@@ -1,7 +1,5 @@
 """A character does in one update what its parts do by hand, and each part may be another; a crowd does what each does alone."""
 
-from __future__ import annotations
-
 import copy
 import math
 import pickle

@@ -1,10 +1,12 @@
-"""Characters in C are those of Python to the bit: what they decide, how they stand, and where they are."""
+"""Characters in C are those of Python to the bit: what they decide, how they stand, where they are, and what they pack."""
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import os
 import random
+import shutil
 import struct
 from functools import cache
 from pathlib import Path
@@ -21,13 +23,18 @@ from contextdb import motion
 from contextdb.commands.motion_bundle import file_of
 from contextdb.compiled.c_header import c_header_of
 from contextdb.motion.markup.markup import Markup
+from contextdb.motion.output.bank import moving_alike
 from contextdb.motion.selection.chooser import N_DECISION
 from contextdb.motion.storage.bundle import Played, bundle_of
 from contextdb.motion.storage.c_header import c_motion_header
 
 pytestmark = pytest.mark.skipif(os.name == "nt" or not all_compilers(), reason="no gcc or clang was found")
+MOCAP = Path(os.environ.get("CONTEXTDB_MOCAP", Path(__file__).parents[2].parent / "shared" / "data" / "mocap"))
 NAMES = ("idle", "walk", "walk_turn_left_90", "jog", "start_walk", "stop_walk")
-POSE = [{"type": "position", "bone": "LeftFoot"}, {"type": "position", "bone": "RightFoot"}, {"type": "velocity", "bone": "Hips"}]
+CAPTURED = (
+    "walk_normal", "walk_tired", "walk-turn-left_normal", "run_normal", "walk-turn-right_normal", "run_tired", "walk-back_normal",
+    "walk-left_normal", "dash_normal",
+)  # fmt: skip
 AHEAD = [
     {"type": "trajectory", "what": "position", "at": [0.33, 0.67, 1.0]},
     {"type": "trajectory", "what": "direction", "at": [0.33, 0.67, 1.0]},
@@ -40,9 +47,19 @@ WAYS = {
         {"type": "trajectory", "what": "direction", "along": [-0.5, 1.0]},
     ],
 }
+IN_NODE = """
+import { readFileSync } from 'node:fs'
+import { WASI } from 'node:wasi'
+const [module, ...args] = process.argv.slice(2)
+const wasi = new WASI({ version: 'preview1', args: ['character', ...args], preopens: { '/': '/' }, returnOnExit: true })
+const { instance } = await WebAssembly.instantiate(readFileSync(module), { wasi_snapshot_preview1: wasi.wasiImport })
+process.exitCode = wasi.start(instance)
+"""
 MARKS = Markup.parse(
     "asset,tag,from,to,value\nidle,Looping,,,\nwalk,Looping,,,\njog,Looping,,,\nstop_walk,NextNaturalOnly,0,0.5,\n"
 )
+CAPTURED_GAITS = [{"run": "Run", "dash": "Run"}.get(name.split("_")[0], "Idle Walk") for name in CAPTURED]
+CAPTURED_COLUMNS = {"Asset Name": list(CAPTURED), "gait": CAPTURED_GAITS, "direction": ["Any"] * len(CAPTURED)}
 CONDITIONS = {"gait": {"type": "enum", "values": ["Idle", "Walk", "Run"]}, "direction": {"type": "angle"}}
 COLUMNS = {
     "Asset Name": list(NAMES),
@@ -52,24 +69,36 @@ COLUMNS = {
 
 
 @cache
-def table():
-    return cdb.Table.from_columns(COLUMNS, CONDITIONS).compile()
+def table(is_captured=False):
+    return cdb.Table.from_columns(CAPTURED_COLUMNS if is_captured else COLUMNS, CONDITIONS).compile()
+
+
+def captured(name):
+    path = next(MOCAP.glob(f"bandai_namco/*_{name}_001.bvh"))
+    return dataclasses.replace(motion.load_bvh(path, metres_per_unit=0.01), name=name)
 
 
 @cache
-def parts(ways):
-    schema = motion.FeatureSchema.from_dict(
-        "loco", {"rate": 30.0, "channels": [*POSE, *WAYS[ways]], "mirror": [["Left*", "Right*"]]}
-    )
-    clips = [make_clip(name).clip for name in NAMES]
-    databases = {
-        "turns": motion.MotionDatabase.build(clips[2:3], schema, mirror=True, markup=MARKS),
-        "all": motion.MotionDatabase.build(clips, schema, mirror=True, markup=MARKS),
-    }
-    banks = {
-        name: motion.PoseBank.build(own, schema, mirror=True, markup=MARKS) for name, own in (("turns", clips[2:3]), ("all", clips))
-    }
-    return schema, databases, banks
+def parts(ways, is_captured):
+    left, right, mirrored = ("Foot_L", "Foot_R", "*_L *_R") if is_captured else ("LeftFoot", "RightFoot", "Left* Right*")
+    feet = [{"type": "position", "bone": bone} for bone in (left, right)]
+    channels = [*feet, {"type": "velocity", "bone": "Hips"}, *WAYS[ways]]
+    schema = motion.FeatureSchema.from_dict("loco", {"rate": 30.0, "channels": channels, "mirror": [mirrored.split()]})
+    marks = None if is_captured else MARKS
+    clips = [*map(captured, CAPTURED)] if is_captured else [make_clip(name).clip for name in NAMES]
+    takes = {"turns": clips[2:3], "all": clips}
+    databases = {name: motion.MotionDatabase.build(own, schema, mirror=True, markup=marks) for name, own in takes.items()}
+    banks = {name: motion.PoseBank.build(own, schema, mirror=True, markup=marks) for name, own in takes.items()}
+    if is_captured:
+        return schema, databases, banks
+    return schema, databases, {**banks, "all": with_one_more_position(banks["all"])}
+
+
+def with_one_more_position(bank):
+    """A bank of the same poses in which another joint has positions of its own too, as of a take that moved its hips."""
+    assert bank.moving.tolist() == [0]
+    offsets = np.tile(bank.skeleton.offsets[1].astype(np.float32), (bank.n_frames, 1, 1))
+    return dataclasses.replace(bank, moving=np.array([0, 1]), positions=np.concatenate((bank.positions, offsets), axis=1))
 
 
 @cache
@@ -86,16 +115,25 @@ def programs(tmp_path_factory):
         (*first, *own) for own in [sanitizers(*first)] if own
     ]
     options = ["-std=c99", "-ffp-contract=off", "-Wall", "-Wextra", "-Wconversion", "-Wno-unused-function"]
-    return [
+    made = [
         compiled([*command, *options], PROGRAMS / "character.c", folder / f"character{number}", folder, "-lm")
         for number, command in enumerate(commands)
     ]
+    zig = next((command for command in all_compilers() if command[-1] == "cc"), None)
+    if IS_FULL and zig and (node := shutil.which("node")):
+        options = [*options, "-O2", "-target", "wasm32-wasi"]
+        module = compiled([*zig, *options], PROGRAMS / "character.c", folder / "character.wasm", folder)
+        (folder / "wasm.mjs").write_text(IN_NODE, encoding="ascii")
+        (folder / "wasm").write_text(f'#!/bin/sh\nexec "{node}" --no-warnings "{folder}/wasm.mjs" "{module}" "$@"\n')
+        (folder / "wasm").chmod(0o755)
+        made.append(folder / "wasm")
+    return made
 
 
-def drawn(rng):
+def drawn(rng, is_captured):
     """A controller, what it plays, and how its characters' poses are made; all at random."""
     ways, root = rng.choice(list(WAYS)), rng.choice(["mixed", "animation", "code", "path"])
-    schema, databases, banks = parts(ways)
+    schema, databases, banks = parts(ways, is_captured)
     entries = [motion.Entry("turns", databases["turns"], rng.choice([0.2, 0.6])), motion.Entry("all", databases["all"])]
     settings = motion.ControllerSettings(
         search_every_s=rng.choice([0.0, 0.1, 0.3]), history_s=rng.choice([0.0, 0.5]), until_natural=rng.random() < 0.3,
@@ -105,14 +143,16 @@ def drawn(rng):
     return motion.Controller(motion.Selector(entries), settings), schema, banks, output
 
 
-def session(rng, n_ticks):
+def session(rng, n_ticks, is_captured=False):
     """A bundle, what characters are given in it, and what Python makes of that."""
-    controller, schema, banks, output = drawn(rng)
+    controller, schema, banks, output = drawn(rng, is_captured)
     played = Played(controller, schema, banks, output)
-    bundle = bundle_of({"player": played}, {"turns": "moves", "all": "moves"}, {"moves": file_of("moves", table())})
+    banks = moving_alike(banks)
+    bundle = bundle_of({"player": played}, {"turns": "moves", "all": "moves"}, {"moves": file_of("moves", table(is_captured))})
     n, ground = rng.randint(1, 4), rng.choice([None, slope])
     members = [
-        motion.Character(controller.copy(), schema, table(), motion.PoseStream(banks, output), ground=ground) for _ in range(n)
+        motion.Character(controller.copy(), schema, table(is_captured), motion.PoseStream(banks, output), ground=ground)
+        for _ in range(n)
     ]
     crowd, given, expected = motion.Crowd(members), [struct.pack("qq", n, n_ticks)], []
     sticks, facings = [(0.0, 0.0)] * n, [math.nan] * n
@@ -131,14 +171,15 @@ def session(rng, n_ticks):
         states = b"".join(one.state for one in crowd)
         poses = [updated.pose for updated in updates]
         numbers = [(np.array(pose.root), pose.rotations, pose.translations, pose.positions) for pose in poses]
-        expected.append((states, [b"".join(np.ascontiguousarray(each).tobytes() for each in own) for own in numbers]))
+        packets = b"".join(bytes([len(packet)]) + packet for packet in (one.pack() for one in crowd))
+        expected.append((states, [b"".join(np.ascontiguousarray(each).tobytes() for each in own) for own in numbers], packets))
     return bundle, b"".join(given), expected
 
 
 def same(out, expected):
     """Compare what C wrote with what Python did, update by update."""
     at = 0
-    for tick, (states, poses) in enumerate(expected):
+    for tick, (states, poses, packets) in enumerate(expected):
         own = out[at : at + len(states)]
         assert own == states, f"tick {tick}: {np.flatnonzero(np.frombuffer(own) != np.frombuffer(states))[:20]}"
         at += len(states)
@@ -146,12 +187,15 @@ def same(out, expected):
             at += N_DECISION * 8  # the decision, of which all that counts is in the states
             assert out[at : at + len(pose)] == pose, f"tick {tick}"
             at += len(pose)
+        assert out[at : at + len(packets)] == packets, f"tick {tick}"
+        at += len(packets)
     assert at == len(out)
 
 
 @pytest.mark.parametrize("seed", range(30 if IS_FULL else 3))
 def test_characters_in_c_are_those_of_python_to_the_bit(seed, programs, tmp_path: Path):
-    bundle, given, expected = session(random.Random(seed), 1800 if IS_FULL else 150)
+    is_captured = seed % 2 == 1 and (MOCAP / "assets.csv").is_file()
+    bundle, given, expected = session(random.Random(seed), 1800 if IS_FULL else 150, is_captured)
     (tmp_path / "bundle").write_bytes(bundle)
     (tmp_path / "in").write_bytes(given)
     for program in programs:

@@ -5,34 +5,42 @@ from __future__ import annotations
 import base64
 import io
 import json
+import signal
+import tomllib
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
-from clip_files import SMPL_OFFSETS, Moving, amass, fbx, gltf, usda
+from clip_files import BODY, SMPL_OFFSETS, Moving, amass, binary_fbx, fbx, gltf, usda, usdc
 from made_once import make_clip
+from packaging.requirements import Requirement
+from running import ROOT
 from strategies import some
 
 from contextdb import motion
 from contextdb.errors import ContextDBError
 from contextdb.motion.clips import parser_process
 from contextdb.motion.clips.feet import footfalls_of
-from contextdb.motion.clips.parser_process import ParserProcess
+from contextdb.motion.clips.joint_worlds import unique_names
+from contextdb.motion.clips.parser_process import ParserProcess, has_wheel
 from contextdb.motion.clips.poses import poses_of
 from contextdb.motion.features.extraction import clip_features
 from contextdb.motion.made.recipes import RECIPES
 from contextdb.motion.storage.building import build_all
 from contextdb.motion.storage.written_poses import write_arrays
 
-OTHERS: dict[str, Callable[[Moving, str], bytes]] = {
-    ".glb": lambda body, up: gltf(body, up=up),
-    ".gltf": lambda body, up: gltf(body, up=up, binary=False),
-    ".fbx": lambda body, up: fbx(body, up=up, metres_per_unit=0.01 if up == "z" else 1.0),
-    ".usda": lambda body, up: usda(body, up=up, metres_per_unit=0.01 if up == "z" else 1.0),
+OTHERS: dict[str, Callable[[Moving, str, float], bytes]] = {
+    ".glb": lambda body, up, _: gltf(body, up=up),
+    ".gltf": lambda body, up, _: gltf(body, up=up, binary=False),
+    ".fbx": lambda body, up, unit: fbx(body, up=up, metres_per_unit=unit),
+    ".FBX": lambda body, up, unit: binary_fbx(fbx(body, up=up, metres_per_unit=unit)),
+    ".usda": lambda body, up, unit: usda(body, up=up, metres_per_unit=unit),
+    ".usdc": lambda body, up, unit: usdc(usda(body, up=up, metres_per_unit=unit)),
 }
-"""Writers of other formats than BVH: with z up in centimetres, or another unit than the one with y up."""
+"""Writers of other formats than BVH, in a unit; glTF is in metres, or in centimetres below a node that scales them."""
 CHANNELS = [
     {"type": "position", "bone": "LeftFoot"},
     {"type": "velocity", "bone": "Hips"},
@@ -240,7 +248,7 @@ def test_a_gltf_reads_the_buffers_beside_it_and_none_elsewhere(walk: motion.Clip
         document["buffers"][0]["uri"] = place.replace(" ", "%20")
         (tmp_path / "clips/walk.gltf").write_text(json.dumps(document), encoding="utf-8")
         if ".." in place:
-            with pytest.raises(ContextDBError):
+            with pytest.raises(ContextDBError, match=r'walk\.gltf: the buffer "\.\./outside\.bin": a link leads to'):
                 motion.load_clips([tmp_path / "clips/walk.gltf"])
         else:
             same_joints(walk, motion.load_clips([tmp_path / "clips/walk.gltf"])[0])
@@ -280,11 +288,12 @@ RATES = (24.0, 30.0, 60.0, 120.0)
 @pytest.mark.parametrize("up", ["y", "z"])
 @pytest.mark.parametrize("ending", sorted(OTHERS))
 def test_one_motion_in_any_format_is_one_clip(walk: motion.Clip, ending: str, up: str, rate: float, tmp_path: Path):
-    """The same joints, contacts, features and description as BVH, in units of metres and centimetres."""
+    """The same joints, contacts, features and description as BVH, each axis in metres at two rates, and in centimetres."""
     body = replace(Moving.of(walk), rate=rate)
     plain = motion.Clip.from_arrays(body.names, body.parents, body.offsets, body.rotations, body.root, rate, name="walk")
     motion.write_bvh(plain, tmp_path / "walk.bvh", digits=9)
-    (tmp_path / f"walk{ending}").write_bytes(OTHERS[ending](body, up))
+    unit = 0.01 if (up == "z") == (rate in RATES[::2]) else 1.0
+    (tmp_path / f"walk{ending}").write_bytes(OTHERS[ending](body, up, unit))
     bvh, other = (motion.load_clips([tmp_path / f"walk{each}"])[0] for each in (".bvh", ending))
     same_joints(bvh, other)
     assert other.rate == pytest.approx(rate, rel=1e-6)
@@ -311,6 +320,8 @@ def load_memory(content, **options):
         os._exit(11)
     if b"sleep" in content:
         time.sleep(600)
+    while b"work" in content:
+        pass
     raise ValueError("no scene")
 """
 
@@ -333,7 +344,9 @@ def odd_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_takes_of_an_fbx_are_clips_and_helpers_are_left_out(walk: motion.Clip, tmp_path: Path):
-    (tmp_path / "all.fbx").write_bytes(fbx(Moving.of(walk), takes=("Walk", "Run &amp; jump"), helper="LeftFootCtrl"))
+    comment = b'; AnimationStack: 1, "AnimStack::None", ""'
+    whole = fbx(Moving.of(walk), takes=("Walk", "Run &amp; jump"), helper="LeftFootCtrl")
+    (tmp_path / "all.fbx").write_bytes(whole.replace(b"Objects:", comment + b"\nObjects:"))
     clips = motion.load_clips([tmp_path / "all.fbx"])
     assert [clip.name for clip in clips] == ["all:Walk", "all:Run & jump"]
     assert clips[0].notes == ('1 node beside the body left out: "LeftFootCtrl".',)
@@ -361,9 +374,27 @@ def test_a_child_that_dies_is_one_fault_of_that_file_and_the_next_is_read(odd_li
 def test_a_silent_child_is_given_up(odd_library: Path, child: ParserProcess, monkeypatch: pytest.MonkeyPatch):
     with pytest.raises(motion.ClipError):
         child.worlds(b"live", 0, "walk.fbx")
+    assert child.folder is not None
+    folder = Path(child.folder.name)
+    assert folder.is_dir()
     monkeypatch.setattr(parser_process, "SILENCE_S", 0.5)
     with pytest.raises(motion.ClipError, match=r"walk\.fbx: the file was read for too long"):
         child.worlds(b"sleep", 0, "walk.fbx")
+    assert child.child is None
+    assert not folder.exists()
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="what a process works is not limited here")
+def test_a_child_that_works_for_long_on_a_small_file_ends(odd_library: Path, child: ParserProcess, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(parser_process, "WORK_S", 0.3)
+    with pytest.raises(motion.ClipError, match=r"walk\.fbx: the file takes longer to read than a file of its size may"):
+        child.worlds(b"work", 0, "walk.fbx")
+
+
+def test_a_child_that_answers_out_of_turn_is_ended(odd_library: Path, child: ParserProcess, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(parser_process, "MOST_LINE", 4)
+    with pytest.raises(motion.ClipError, match=r"walk\.fbx: the process that read the file answered what is no clip"):
+        child.worlds(b"live", 0, "walk.fbx")
     assert child.child is None
 
 
@@ -373,15 +404,54 @@ def test_without_the_library_a_message_names_the_extra(odd_library: Path, child:
         child.worlds(b"live", 0, "walk.fbx")
 
 
+def test_the_extra_installs_ufbx_where_it_has_wheels_and_a_message_says_where_not(
+    odd_library: Path, child: ParserProcess, monkeypatch: pytest.MonkeyPatch
+):
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["optional-dependencies"]
+    marker = Requirement(extras["fbx"][0]).marker
+    assert marker is not None
+    for system, machine in product(("linux", "darwin", "win32"), ("x86_64", "AMD64", "ARM64")):
+        for minor in range(11, 17):
+            where = {"sys_platform": system, "platform_machine": machine, "python_version": f"3.{minor}"}
+            assert marker.evaluate(where) == has_wheel(system, machine, (3, minor))
+    odd_library.write_text("raise ImportError", encoding="utf-8")
+    monkeypatch.setattr(parser_process, "has_wheel", lambda *_: False)
+    with pytest.raises(motion.ClipError, match=r"wheels for Python 3\.11 to 3\.14, and none for 3\.14 on Windows"):
+        child.worlds(b"live", 0, "walk.fbx")
+
+
 def test_a_usd_that_refers_to_other_files_is_refused(walk: motion.Clip, tmp_path: Path):
     (tmp_path / "walk.usda").write_bytes(usda(Moving.of(walk), reference="other.usda"))
     with pytest.raises(motion.ClipError, match=r"refers to other files, such as 'other\.usda': flatten it"):
         motion.load_clips([tmp_path / "walk.usda"])
 
 
+def test_damage_in_a_usd_is_reported_by_its_line(walk: motion.Clip, tmp_path: Path):
+    lines = usda(Moving.of(walk)).split(b"\n")
+    for damage, problem in ((b"\xff", r"line 9 is not UTF-8"), (b"{", "the file is damaged in line 9")):
+        (tmp_path / "walk.usda").write_bytes(b"\n".join([*lines[:8], damage + lines[8], *lines[9:]]))
+        with pytest.raises(motion.ClipError, match=problem):
+            motion.load_clips([tmp_path / "walk.usda"])
+
+
+def test_a_small_file_means_no_endless_clip(tmp_path: Path):
+    document = json.loads(gltf(BODY, binary=False))
+    data = bytearray(base64.b64decode(document["buffers"][0]["uri"].partition(",")[2]))
+    data[12:16] = np.float32(1e5).tobytes()  # the last time
+    document["buffers"][0]["uri"] = "data:;base64," + base64.b64encode(data).decode()
+    (tmp_path / "a.gltf").write_text(json.dumps(document), encoding="utf-8")
+    with pytest.raises(motion.ClipError, match="3,000,001 frames of 4 nodes are too many for its size"):
+        motion.load_clips([tmp_path / "a.gltf"])
+
+
+def test_many_joints_of_one_name_get_their_own():
+    names = unique_names(["a", "a_2", *["a"] * 9998])
+    assert (len(set(names)), names[:4]) == (10_000, ["a", "a_2", "a_3", "a_4"])
+
+
 @pytest.mark.parametrize("ending", sorted(OTHERS))
 def test_a_file_that_was_cut_off_is_one_fault_with_its_name(walk: motion.Clip, ending: str, tmp_path: Path):
-    whole = OTHERS[ending](Moving.of(walk), "y")
+    whole = OTHERS[ending](Moving.of(walk), "y", 1.0)
     path = tmp_path / f"walk{ending}"
     for n in (0, 30, len(whole) // 3):
         path.write_bytes(whole[:n])

@@ -1,7 +1,5 @@
 """Footfalls from heel and toe: on made clips of every rate and rig, on captured ones, and as marks say them."""
 
-from __future__ import annotations
-
 import json
 import math
 import os

@@ -1,7 +1,5 @@
 """One character: each rule as a scenario."""
 
-from __future__ import annotations
-
 import math
 import random
 from itertools import pairwise
@@ -20,7 +18,6 @@ from contextdb.motion.search.filters import Biases
 from contextdb.motion.selection.choice import Status
 from contextdb.motion.selection.controller import Controller
 from contextdb.motion.selection.controller_settings import ControllerSettings
-from contextdb.motion.selection.controller_state import ControllerState
 from contextdb.motion.selection.decision import Action
 from contextdb.motion.selection.variation import Variation
 from contextdb.motion.trace.reasked_decision import continuing_cost
@@ -113,12 +110,6 @@ def test_the_cost_of_playing_on_is_exact_in_a_database_of_many_channels():
         assert continuing_cost(database, query, database.filter(current=current)) == expected
 
 
-def test_on_a_tie_the_character_plays_on():
-    one = controller(line(walk=[0, 1, 2], run=[1, 1, 1]))
-    one.update(DT, [0.0])
-    assert one.update(DT, [1.0]).action is Action.CONTINUE
-
-
 # ---- when to search
 
 
@@ -150,12 +141,6 @@ def test_an_interruption_leaves_what_plays_though_it_would_win():
     assert alone.update(0.0, [0.0], interrupt=True).why == "walk was interrupted, but nothing else may play: walk plays on."
 
 
-def test_after_a_forced_search_the_next_one_is_due_a_whole_interval_later():
-    one = controller(line(walk=range(30)), search_every_s=0.3)
-    searched = [one.update(DT, [0.0], force=i == 2).searched for i in range(7)]
-    assert searched == [True, False, True, False, False, True, False]
-
-
 # ---- where it may not jump
 
 
@@ -166,56 +151,6 @@ def test_frames_within_the_jump_threshold_of_the_playing_one_are_no_candidates()
     assert [frame for frame in range(60) if candidates.why[frame] == LeftOut.JUMP] == [5, 6, 7, 8, 9, 11, 12, 13, 14, 15]
     assert at(one.update(0.0, [15.0], valid("walk"))) == ("walk", 1.6)
     assert at(one.update(0.0, [10.0], valid("walk"))) == ("walk", 1.0)
-
-
-def test_the_jump_threshold_goes_round_the_end_of_a_looping_range():
-    one = controller(line("walk,Looping,,,", walk=[9, 1, 2, 3, 4, 5, 6, 7, 8, 9]), jump_threshold_s=0.2, recorder=Recorder(1))
-    one.update(0.0, [1.0])  # at frame 1: 9 and 0, which are the same pose, are one frame away, 8 two
-    candidates = one.update(0.0, [0.0]).candidates[0][1]
-    assert [frame for frame in range(10) if candidates.why[frame] == LeftOut.JUMP] == [0, 2, 3, 8, 9]
-    one.restore(ControllerState())
-    one.update(0.0, [8.0])  # at frame 8: 9 and 0 are one away, 1 two
-    candidates = one.update(0.0, [0.0]).candidates[0][1]
-    assert [frame for frame in range(10) if candidates.why[frame] == LeftOut.JUMP] == [0, 1, 6, 7, 9]
-
-
-def test_frames_played_just_now_are_not_entered_again_until_the_history_forgets_them():
-    one = controller(line(walk=[0, 1, 2, 3, 4, 5], run=[100] * 12), history_s=0.5)
-    one.update(DT, [0.0], valid("walk"))
-    for _ in range(4):
-        one.update(DT, [100.0], valid("run"))  # by then, walk at 0.1 s would have played
-    assert at(one.update(0.0, [0.0])) == ("walk", 0.2)
-    assert at(one.update(DT, [0.0])) == ("walk", 0.0)
-
-
-def test_the_end_of_a_turn_is_not_found_over_and_over():
-    """A stick held aside asks at every moment for a turn that then goes straight: for the end of a turning clip."""
-    turn = line(turn=[9, 9, 9, 9, 5, 6, 7, 8], walk=[0] * 20)
-    for history_s, n_entered in ((0.0, 10), (1.0, 1)):
-        one = controller(turn, history_s=history_s)
-        decisions = [one.update(DT, [5.0]) for _ in range(10)]
-        entered = [decision for decision in decisions if decision.action in (Action.START, Action.JUMP)]
-        assert [at(decision) for decision in entered].count(("turn", 0.4)) == n_entered
-
-
-def test_while_a_next_natural_frame_plays_no_other_frame_of_its_range_may_be_chosen():
-    markup = "vault,NextNaturalOnly,0.2,0.6,0.1"
-    one = controller(line(markup, vault=range(10), fall=[50] * 10), recorder=Recorder(3))
-    assert at(one.update(DT, [4.0])) == ("vault", 0.3)  # the entry zone ends there, and 0.7 s is not nearer
-    for time_s in (0.4, 0.5, 0.6):
-        decision = one.update(DT, [9.0])
-        assert (decision.action, at(decision)) == (Action.CONTINUE, ("vault", time_s))
-        assert decision.candidates[0][1].counts[LeftOut.NEXT_NATURAL] == 9
-    assert at(one.update(DT, [9.0])) == ("vault", 0.9)
-    one.restore(ControllerState())
-    one.update(DT, [3.0])
-    assert at(one.update(DT, [50.0])) == ("fall", 0.0)  # another asset may still be chosen
-
-
-def test_a_do_not_choose_frame_plays_on_but_is_not_entered():
-    one = controller(line("turn,DoNotChoose,0.3,,", turn=range(8)))
-    assert at(one.update(DT, [5.0])) == ("turn", 0.2)
-    assert [at(one.update(DT, [place])) for place in (3.0, 4.0, 5.0, 2.0)] == [("turn", t) for t in (0.3, 0.4, 0.5, 0.2)]
 
 
 def test_tags_that_no_longer_fit_let_it_play_on():
@@ -268,13 +203,6 @@ def test_an_excluded_frame_ahead_ends_the_clip():
     assert decision.before.frame == 2
 
 
-def test_a_looping_range_with_an_excluded_start_ends():
-    one = controller(line("walk,Looping,,,\nwalk,Excluded,,0.05,\nrun,DoNotChoose,,,", walk=range(4), run=[9]), history_s=60.0)
-    one.update(DT, [2.0])
-    one.update(DT, [2.0])
-    assert one.update(DT, [2.0], valid("run")).action is Action.HOLD
-
-
 # ---- what the table says
 
 
@@ -303,12 +231,6 @@ def test_with_nothing_valid_nothing_plays_and_the_next_update_tries_again():
     assert one.update(DT, [0.0]).action is Action.START
 
 
-def test_soft_penalties_reach_the_search():
-    one = controller(line(walk=[0.0] * 5, run=[1.0] * 5))
-    assert at(one.update(DT, [0.0], penalties={"walk": 2.0})) == ("run", 0.0)
-    assert at(one.update(DT, [0.0], penalties={"walk": math.inf})) == ("run", 0.1)
-
-
 # ---- several databases
 
 
@@ -326,14 +248,6 @@ def test_a_priority_database_under_its_threshold_wins_over_the_continuing_pose()
     assert decision.continuing_cost == 0.0
     expected = "A search was due: jog_tired at 0.00 s costs 0.25, under the threshold 2.75 of jog_tired, playing on 0."
     assert decision.why == expected
-
-
-def test_above_the_threshold_the_lower_of_the_two_wins():
-    one = priority(threshold=0.1)
-    one.update(DT, [9.0])
-    decision = one.update(DT, [9.5])
-    assert (decision.action, at(decision)) == (Action.CONTINUE, ("jog", 0.1))
-    assert [search.status for search in decision.choice.searches] == [Status.BEATEN, Status.WINNER]
 
 
 def test_another_bucket_is_entered_at_once():

@@ -1,7 +1,5 @@
 """A crowd is decided as its characters are one by one: decision for decision, state for state, whatever they are asked with."""
 
-from __future__ import annotations
-
 import random
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Every update of a character against a plain reading of all rules, frame by frame."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What contextdb.toml may say of controllers, and what it may not."""
 
-from __future__ import annotations
-
 from contextdb.motion.selection.controller_settings import ControllerSettings, read_controllers
 from contextdb.motion.selection.variation import Variation
 

@@ -1,7 +1,5 @@
 """The scale of costs: a weighted mean of squared differences, whatever the schema; the oracle is one line of numpy."""
 
-from __future__ import annotations
-
 from functools import reduce
 from operator import add
 
@@ -127,13 +125,6 @@ def test_a_channel_that_is_there_twice_at_half_its_weight_changes_no_cost(schema
     assert [row.cost for row in twice.candidates(np.concatenate([query[:first], query]), 60)] == pytest.approx(before, rel=1e-9)
 
 
-def test_costs_of_features_stay_the_plain_sum_of_squares():
-    features, query = random_features(3, 7)
-    database = MotionDatabase.from_features(features, [0], [60], ["a"])
-    assert database.search(query).cost == pytest.approx(((features.astype(float) - query) ** 2).sum(axis=1).min(), rel=1e-12)
-    assert database.cost_weights.tolist() == [1.0]
-
-
 def test_frames_that_have_nothing_to_do_with_each_other_cost_about_two():
     rng = np.random.default_rng(1)
     features = rng.normal(size=(2000, 12)).astype(np.float32)
@@ -151,15 +142,6 @@ def test_weights_that_float64_can_hardly_add_are_weighed_all_the_same():
         database = database_of(features, [2, 2], [1.0, 1.0]).with_weights({"custom c0": weight, "custom c1": weight})
         assert database.cost_weights.tolist() == [0.25, 0.25]
         assert database.search(query) == database_of(features, [2, 2], [1.0, 1.0]).search(query)
-
-
-def test_a_saved_database_has_the_same_costs(tmp_path):
-    from contextdb.motion.storage.stored import open_database, save_database
-
-    features, query = random_features(5, 6)
-    database = database_of(features, [2, 4], [0.3, 7.0]).with_weights({"custom c1": 2.0})
-    save_database(database, tmp_path / "x.motion.safetensors")
-    assert open_database(tmp_path / "x.motion.safetensors").search(query) == database.search(query)
 
 
 def test_the_normalisation_of_another_database_is_taken_as_it_is():

@@ -1,7 +1,5 @@
 """A table from clips: made clips of known speed, turn, direction, gait and style come back; their cells share out all contexts."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Clips that read well and mean nonsense: each doubt, told with its measure and its mend, and no doubt about good clips."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import replace
 from pathlib import Path

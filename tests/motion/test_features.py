@@ -1,7 +1,5 @@
 """Feature schemas: what is read from contextdb.toml, and the numbers that come of a clip."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -12,7 +10,7 @@ from made_once import make_clip
 from strategies import for_each
 
 from contextdb.errors import MotionError, QueryError, SchemaError
-from contextdb.motion import Channel, Clip, FeatureSchema, MotionConfig, Skeleton, poses_of, query_from, steady_path, with_path
+from contextdb.motion import Channel, Clip, FeatureSchema, MotionConfig, Skeleton, query_from, steady_path, with_path
 from contextdb.motion.features.extraction import features_of
 
 POINTS = {
@@ -232,33 +230,6 @@ def test_any_mapping_is_a_schema_or_a_schema_error(channels, rate, mirror):
 # ---- extraction
 
 
-def slow_features(clip, schema):
-    """The features of a clip in world axes and plain loops, for a clip at the schema's rate that faces +z throughout."""
-    poses = poses_of(clip)
-    hips = poses.positions[:, poses.skeleton.hips]
-    rows = []
-    for frame in range(poses.n_frames):
-        before, after = max(frame - 1, 0), min(frame + 1, poses.n_frames - 1)
-        row = []
-        for channel in schema.channels:
-            if channel.type == "position":
-                place = poses.positions[frame, poses.skeleton.index(channel.bone)]
-                row += [place[0] - hips[frame, 0], place[1], place[2] - hips[frame, 2]]
-            elif channel.type == "velocity":
-                places = poses.positions[:, poses.skeleton.index(channel.bone)]
-                row += ((places[after] - places[before]) * clip.rate / (after - before)).tolist()
-        rows.append(row)
-    return np.array(rows)
-
-
-def test_positions_and_velocities_are_in_the_body_s_own_frame():
-    made = make_clip("idle").clip
-    schema = FeatureSchema.from_dict(
-        "pose", {"rate": 30.0, "channels": [*POINTS["channels"][:2], {"type": "velocity", "bone": "Head"}]}
-    )
-    assert np.allclose(features_of(made, schema), slow_features(made, schema), atol=1e-6)
-
-
 def moved(clip, degrees, x, z):
     """The same clip, begun elsewhere and turned."""
     values = clip.values.copy()
@@ -291,19 +262,6 @@ def test_a_turning_trajectory_bends_to_its_side():
     assert right[:60, at_1s].max() < -0.4
     assert left[:60, facing].mean() > 0.4
     assert right[:60, facing].mean() < -0.4
-
-
-def test_directions_are_unit_vectors():
-    features = features_of(make_clip("jog_turn_right_60").clip, LOCO)
-    assert np.allclose(np.linalg.norm(features[:, 12:16].reshape(-1, 2), axis=1), 1.0, atol=1e-6)
-
-
-def test_features_are_float32_one_row_for_each_frame_at_the_schema_s_rate():
-    clip = make_clip("walk").clip
-    for rate in (10.0, 30.0, 60.0):
-        features = features_of(clip, FeatureSchema.from_dict("x", {**POINTS, "rate": rate}))
-        assert features.dtype == np.float32
-        assert features.shape == (int(clip.duration_s * rate + 1e-6) + 1, LOCO.n_features)
 
 
 def test_the_speed_of_a_trajectory_is_that_of_its_velocity():
@@ -370,12 +328,6 @@ def test_a_wished_path_replaces_the_trajectory_and_leaves_the_pose():
     assert wanted["trajectory position at -0.5 s ahead"] == pytest.approx(-radius * math.sin(np.pi / 4.0), abs=0.01)
     assert wanted["trajectory direction along 2 m left"] == pytest.approx(1.0, abs=0.01)
     assert wanted["trajectory speed at 1 s"] == pytest.approx(2.0, abs=0.01)
-
-
-def test_a_made_clip_wishes_for_nearly_the_path_it_takes():
-    clip = make_clip("walk").clip
-    own, wished = query_from(LOCO, clip, 31), query_from(LOCO, clip, 31, steady_path(1.3))
-    assert np.abs(own - wished).max() < 0.15
 
 
 @pytest.mark.parametrize("frame", [-1, 125, 10**9])

@@ -1,7 +1,5 @@
 """When feet are down: the questions of Forsyth's talk, and finding the answers in any clip."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

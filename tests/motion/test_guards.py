@@ -1,7 +1,5 @@
 """What lets an asset play on that is no longer valid: each guard as a scenario, and how it is told."""
 
-from __future__ import annotations
-
 import math
 import pickle
 from dataclasses import replace
@@ -66,13 +64,6 @@ def test_after_the_grace_time_the_best_jump_is_the_last_resort_and_says_so():
     )
 
 
-def test_an_asset_that_is_valid_again_begins_a_new_grace_time():
-    one = controller(line(walk=range(20), run=range(50, 60)), cost_bar=2.0, grace_s=0.2)
-    one.update(DT, [0.0])
-    masks = [valid("run"), valid("run"), None, valid("run"), valid("run"), valid("run")]
-    assert [one.update(DT, [1.0], mask).action for mask in masks] == [*[Action.CONTINUE] * 5, Action.JUMP]
-
-
 def test_databases_with_a_schema_have_a_bar_and_others_none_unless_it_is_given():
     channels = [{"type": "trajectory", "what": "speed", "at": 0.0}]
     schema = FeatureSchema.from_dict("speed", {"rate": RATE, "channels": channels})
@@ -83,12 +74,6 @@ def test_databases_with_a_schema_have_a_bar_and_others_none_unless_it_is_given()
     one = controller(replace(plain, schema=schema))
     one.update(DT, [0.0])
     assert updates(one, [1.0], valid("run"))[0].held == "cost bar"
-
-
-def test_without_a_bar_a_grace_time_changes_nothing():
-    one = controller(line(walk=range(10), run=range(50, 60)), grace_s=5.0)
-    one.update(DT, [0.0])
-    assert updates(one, [1.0], valid("run"))[0].action is Action.JUMP
 
 
 def test_the_end_of_a_clip_and_an_interruption_pass_the_bar():
@@ -114,13 +99,6 @@ def test_a_forced_jump_waits_for_the_end_of_a_next_natural_span():
         (Action.JUMP, "", True),
     ]
     assert decisions[0].why == "walk is not valid any more, but plays on while its NextNaturalOnly span lasts."
-
-
-def test_a_loop_that_is_next_natural_all_over_is_left_after_its_round():
-    one = controller(line("walk,Looping,,,\nwalk,NextNaturalOnly,,,9\n", walk=range(4), run=range(50, 60)))
-    one.update(DT, [0.0])
-    actions = [d.action for d in updates(one, [1.0] * 4, valid("run"))]
-    assert actions == [Action.CONTINUE, Action.CONTINUE, Action.CONTINUE, Action.JUMP]
 
 
 def test_until_natural_lets_a_clip_play_to_its_end_and_a_loop_does_not_wait():

@@ -1,7 +1,5 @@
 """The default biases hold a clip: who walks straight on at one speed seldom jumps. On made clips, and on captured ones."""
 
-from __future__ import annotations
-
 import csv
 import os
 import shutil

@@ -1,7 +1,5 @@
 """Several characters at once: clip, frame and cast against trying all of them, and what was found played so that bodies meet."""
 
-from __future__ import annotations
-
 import math
 import tomllib
 from dataclasses import replace
@@ -38,7 +36,7 @@ from contextdb.motion.joint import searcher as searching
 from contextdb.motion.joint.alignment import aligned
 from contextdb.motion.made.joint import HOLD_S, JOINT_RECIPES, JOINT_ROLES, make_joint_clip, write_joint_clips
 from contextdb.motion.markup.left_out import LeftOut, Skip
-from contextdb.motion.markup.marks import Mark, Marks, TagFilter
+from contextdb.motion.markup.marks import Mark, Marks
 from contextdb.motion.nodes.pose_match import pose_schema
 from contextdb.motion.search.filters import Biases
 from contextdb.motion.selection.decision import Together
@@ -153,25 +151,6 @@ def test_the_search_finds_what_trying_every_cast_clip_and_frame_finds(moment):
     assert [(each.cost, each.frame, each.cast) for each in best_of_each] == [(found.cost, found.frame, found.cast)] * bool(found)
 
 
-def test_on_a_tie_the_first_frame_and_then_the_first_cast_wins():
-    names = ["b.Tackler", "b.Carrier", "a.Tackler", "a.Carrier"]
-    plain = MotionDatabase.from_features(np.ones((80, 2)), [0, 20, 40, 60], [20, 40, 60, 80], names)
-    joint = JointDatabase.of(replace(plain, root=np.zeros((80, 3), np.float32)), ROLES[:2])
-    everybody = dict.fromkeys((5, 4, 6), (0.0, 0.0))
-    found = JointSearcher(joint).search(everybody, dict.fromkeys(everybody, (0.0, 0.0, 0.0)))
-    assert (found.asset, found.frame, found.cast) == ("b", 0, {"Tackler": 5, "Carrier": 4})
-
-
-@pytest.mark.parametrize("at_once", [2, 512])
-def test_on_a_tie_it_does_not_matter_how_many_casts_are_compared_together(at_once):
-    plain = MotionDatabase.from_features(np.ones((40, 2)), [0, 20], [20, 40], ["a.Tackler", "a.Carrier"])
-    joint = JointDatabase.of(replace(plain, root=np.zeros((40, 3), np.float32)), ROLES[:2])
-    queries = {5: (0.0, 0.0), 6: (1.0, 1.0), 7: (1.0, 1.0), 8: (1.0, 1.0)}
-    with mock.patch.object(searching, "CASTS_AT_ONCE", at_once):
-        found = JointSearcher(joint).search(queries, dict.fromkeys(queries, (0.0, 0.0, 0.0)))
-    assert (found.frame, found.cast) == (0, {"Tackler": 6, "Carrier": 7})
-
-
 @pytest.mark.parametrize("at", [0, 1, 4])
 def test_actors_who_are_as_recorded_cost_nothing_wherever_in_the_world_they_are(greetings, at):
     queries, places = recorded(greetings, at, 40)
@@ -264,17 +243,6 @@ def test_a_priority_database_under_its_threshold_wins_outright(greetings):
     assert found.why.endswith("all has the lowest cost and wins.")
 
 
-def test_candidates_are_the_best_of_each_clip_and_cast(greetings):
-    queries, places = recorded(greetings, 0, 40)
-    searcher = JointSearcher(greetings)
-    found = searcher.candidates(queries, places, 99)
-    assert len(found) == 2 * len(greetings.assets)
-    assert len({(each.range, tuple(each.cast.values())) for each in found}) == len(found)
-    costs = [each.cost for each in found]
-    assert costs == sorted(costs)
-    assert costs[0] == searcher.search(queries, places).cost
-
-
 def test_an_explanation_names_roles_channels_and_what_is_to_be_made_up(greetings):
     queries, places = recorded(greetings, 0, 40)
     places[3] = (places[3][0] + 1.0, *places[3][1:])
@@ -283,13 +251,6 @@ def test_an_explanation_names_roles_channels_and_what_is_to_be_made_up(greetings
     assert told[1].startswith("  Host is 7: cost ")
     assert "Guest place" in told[1]
     assert told[2] == "    to make up: 0.00 m left, 0.00 m ahead, 0° left"
-
-
-def test_tags_must_pass_for_every_role(greetings):
-    one_role = Markup.parse("asset,tag,from,to,value\ngreet_walk.Host,Polite,0,9,\ngreet_run.*,Polite,0,9,\n")
-    joint = JointDatabase.of(MotionDatabase.build(CLIPS, SCHEMA, markup=one_role), JOINT_ROLES)
-    queries, places = recorded(joint, 0, 40)
-    assert JointSearcher(joint).search(queries, places, tags=TagFilter("Polite")).asset == "greet_run"
 
 
 def test_biases_and_skips_are_of_one_database_or_by_its_name(greetings):
@@ -385,10 +346,6 @@ def test_the_play_ends_before_a_frame_that_is_excluded_for_one_role():
     joint = JointDatabase.of(MotionDatabase.build(CLIPS, SCHEMA, markup=markup), JOINT_ROLES)
     play, _ = entered(joint, options={"valid": np.array(joint.assets) == "greet_walk"})
     assert play.hit.time_s + play.duration_s == pytest.approx(4.0 - 1 / SCHEMA.rate)
-
-
-def test_nothing_is_entered_when_nothing_may_play(greetings):
-    assert entered(greetings, options={"casts": []})[0] is None
 
 
 def test_the_hands_of_two_streams_meet_at_the_contact(greetings):

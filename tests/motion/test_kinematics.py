@@ -1,7 +1,5 @@
 """Quaternions, forward kinematics, resampling and the skeleton's guesses about sides."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """Clips that take long to read: that is said, and can be interrupted; files that did not change are not read again."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """Weights learned from choices: hidden ones come back, nothing costs less than what was fitted, and sessions follow the choices."""
 
-from __future__ import annotations
-
 import random
 
 import numpy as np

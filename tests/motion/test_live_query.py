@@ -1,7 +1,5 @@
 """A query from a pose that is shown is what `query_from` gives for the last frame of a clip that ends there."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from made_once import make_clip

@@ -1,7 +1,5 @@
 """Clips that loop: at their ends features see the next round, and not a path that runs out straight."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from made_once import make_clip

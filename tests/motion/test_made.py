@@ -1,7 +1,5 @@
 """Made clips keep the promises of their recipes."""
 
-from __future__ import annotations
-
 import dataclasses
 from functools import cache
 

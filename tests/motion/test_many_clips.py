@@ -1,7 +1,5 @@
 """Many clips: the same bytes here, on all cores and on Dask; a run that was killed goes on where it stopped."""
 
-from __future__ import annotations
-
 import os
 import pickle
 import signal
@@ -13,6 +11,7 @@ import numpy as np
 import pytest
 from made_once import make_clip
 from running import run
+from strategies import in_full_runs
 
 from contextdb import motion
 from contextdb.authoring import clip_looks, saved_looks
@@ -77,6 +76,7 @@ def test_all_cores_build_the_same_bytes_and_fill_the_same_cache(folder: Path):
     assert saved(folder, "again", engines.here) == (*here, ())
 
 
+@in_full_runs  # all cores every day
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL here")
 def test_dask_builds_the_same_bytes_although_a_worker_is_killed(folder: Path):
     distributed = pytest.importorskip("distributed", reason='dask is not installed: pip install "contextdb[dask]"')

@@ -1,7 +1,5 @@
 """The bodies, paths and queries of a crowd are those of its characters one by one."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Markup on frames: spans become kinds of frames, and filters choose among them. The oracle asks every span about every frame."""
 
-from __future__ import annotations
-
 import math
 import pickle
 
@@ -13,7 +11,7 @@ from hypothesis import strategies as st
 from contextdb.errors import MotionError, QueryError
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.markup.marking import marks_of
-from contextdb.motion.markup.marks import ANY_TAGS, Mark, Marks, TagFilter, covers, tags_of
+from contextdb.motion.markup.marks import ANY_TAGS, Mark, Marks, TagFilter, covers
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.markup.reserved import ReservedTag
 from contextdb.motion.markup.spans import TOLERANCE_S, Span, fits
@@ -233,89 +231,8 @@ def frames_with(marks, mark):
     return np.flatnonzero(marks.kind_marks[marks.kinds] & mark).tolist()
 
 
-def test_a_span_holds_the_frames_at_both_its_ends():
-    assert frames_with(one_clip(Span("jog", "DoNotChoose", 0.1, 0.2)), Mark.DO_NOT_CHOOSE) == [3, 4, 5, 6]
-
-
 def test_a_third_of_a_second_need_not_be_typed_to_the_last_digit():
     assert frames_with(one_clip(Span("jog", "DoNotChoose", 0.333334, 0.366666)), Mark.DO_NOT_CHOOSE) == [10, 11]
-
-
-def test_a_next_natural_span_is_entered_in_its_zone_and_else_reached_by_playing_on():
-    marks = one_clip(Span("jog", "NextNaturalOnly", 0.1, 0.5, 0.1))
-    assert frames_with(marks, Mark.NEXT_NATURAL) == list(range(3, 16))
-    assert frames_with(marks, Mark.PAST_ENTRY) == list(range(7, 16))
-    why = marks.left_out()[marks.kinds]
-    assert [i for i in range(31) if why[i] == LeftOut.NEXT_NATURAL] == list(range(7, 16))
-
-
-def test_without_a_zone_the_first_frame_of_a_next_natural_span_is_its_entry_even_between_frames():
-    assert frames_with(one_clip(Span("jog", "NextNaturalOnly", 0.1, 0.2)), Mark.PAST_ENTRY) == [4, 5, 6]
-    assert frames_with(one_clip(Span("jog", "NextNaturalOnly", 0.09, 0.2)), Mark.PAST_ENTRY) == [4, 5, 6]
-
-
-def test_the_last_frames_of_a_range_cannot_be_entered_but_may_play_on():
-    marks = one_clip(end_s=0.3)
-    assert frames_with(marks, Mark.CLIP_END) == list(range(22, 31))  # frame 21 is 0.3 s before the last
-    assert marks.left_out()[marks.kinds[30]] == LeftOut.CLIP_END
-    assert marks.playable().all()
-
-
-def test_a_looping_range_has_no_end():
-    assert frames_with(one_clip(Span("jog", "Looping"), end_s=0.3), Mark.CLIP_END) == []
-
-
-def test_a_clip_shorter_than_the_end_is_entered_at_its_first_frame():
-    assert frames_with(one_clip(length=5, end_s=0.3), Mark.CLIP_END) == [1, 2, 3, 4]
-    assert frames_with(one_clip(length=1, end_s=0.3), Mark.CLIP_END) == []
-
-
-def test_without_a_match_range_a_match_node_may_start_anywhere():
-    assert len(frames_with(one_clip(), Mark.MATCH_RANGE)) == 31
-    marks = one_clip(Span("jog", "MatchRange", 0.0, 0.1), Span("jog", "MatchRange", 0.9, 1.0))
-    assert frames_with(marks, Mark.MATCH_RANGE) == [0, 1, 2, 3, 27, 28, 29, 30]
-    assert marks.left_out()[marks.kinds[10]] == LeftOut.NO
-    assert marks.left_out(in_match_range=True)[marks.kinds[10]] == LeftOut.MATCH_RANGE
-
-
-def test_a_root_motion_weight_for_an_asset_is_stronger_than_one_for_a_pattern():
-    marks = one_clip(Span("jog", "RootMotionWeight", 0.2, 0.4, 0.9), Span("*", "RootMotionWeight", 0.0, 0.6, 0.25))
-    assert [marks.root_weight(i) for i in (0, 6, 12, 13, 18, 19)] == [0.25, 0.9, 0.9, 0.25, 0.25, 1.0]
-
-
-def test_it_is_so_where_the_one_for_the_pattern_begins_later_too():
-    marks = one_clip(Span("jog", "RootMotionWeight", 0.0, 0.4, 0.9), Span("*", "RootMotionWeight", 0.2, 0.6, 0.25))
-    assert [marks.root_weight(i) for i in (0, 6, 12, 13)] == [0.9, 0.9, 0.9, 0.25]
-
-
-def test_a_warp_for_an_asset_is_stronger_than_one_for_a_pattern_whichever_comes_first():
-    for spans in (pair := [Span("*", "WarpRotation", 0.0, 1.0), Span("jog", "WarpRotation", 0.5, 0.75)]), pair[::-1]:
-        warps = one_clip(*spans).warps
-        assert warps[0, 1].tolist() == [0.5, 0.75]
-        assert np.isnan(warps[0, 0]).all()
-
-
-def test_where_two_root_motion_weights_touch_the_later_one_holds():
-    marks = one_clip(Span("jog", "RootMotionWeight", 0.5, 1.0, 0.75), Span("jog", "RootMotionWeight", 0.0, 0.5, 0.25))
-    assert [marks.root_weight(i) for i in (14, 15, 16)] == [0.25, 0.75, 0.75]
-
-
-def test_cost_modifiers_that_overlap_add_up():
-    marks = one_clip(Span("jog", "CostModifier", 0.0, 0.5, 0.1), Span("*", "CostModifier", 0.5, 1.0, 0.2))
-    assert [marks.bias(i) for i in (0, 15, 30)] == [0.1, math.fsum([0.1, 0.2]), 0.2]
-
-
-def test_two_ranges_of_one_asset_are_marked_alike_each_from_its_own_start():
-    marks = marks_of(Markup((Span("jog", "Move", 0.0, 0.1),)), ["jog", "jog"], [0, 12], [10, 22], 30.0)
-    assert [bool(marks.tags_of(i)) for i in range(22)] == [i in (0, 1, 2, 3, 12, 13, 14, 15) for i in range(22)]
-
-
-def test_kinds_do_not_depend_on_the_order_of_spans():
-    spans = [Span("jog", "Move", 0.0, 0.5), Span("jog", "CostModifier", 0.2, 0.7, 0.1), Span("jog", "CostModifier", 0.4, 0.6, 0.2)]
-    spans.append(Span("jog", "CostModifier", 0.4, 0.6, 0.4))  # 0.1 + 0.2 + 0.4 is not 0.1 + 0.4 + 0.2 when added one by one
-    one, other = one_clip(*spans), one_clip(*reversed(spans))
-    assert one.kinds.tolist() == other.kinds.tolist()
-    assert one.kind_biases.tolist() == other.kind_biases.tolist()
 
 
 def test_more_kinds_than_fit_16_bits_take_32():
@@ -443,12 +360,6 @@ def test_a_tag_that_the_markup_does_not_know_is_refused_with_the_nearest():
     for ask in (marks.left_out, marks.tag_biases):
         with pytest.raises(QueryError, match=r'there is no tag "HipFier".*Did you mean "HipFire"'):
             ask(TagFilter(avoid={"HipFier": 1.0}, include="HipFier"))
-
-
-def test_a_tag_covers_those_below_it_and_no_others():
-    marks = marks_of(Markup((Span("a", "Move.Run"), Span("b", "Moved"))), ["a", "b"], [0, 5], [5, 10], 30.0)
-    assert [marks.left_out(["Move"])[marks.kinds[i]] for i in (0, 5)] == [LeftOut.NO, LeftOut.TAGS]
-    assert tags_of("Move") == tags_of(["Move"]) == TagFilter(["Move"])
 
 
 def test_answers_to_a_filter_are_kept_and_cannot_be_written_to():

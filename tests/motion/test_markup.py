@@ -1,7 +1,5 @@
 """Markup files: what is read, what is refused and how, and what does nothing with the assets there are."""
 
-from __future__ import annotations
-
 import math
 
 import pytest
@@ -46,11 +44,6 @@ def test_a_row_is_a_span_and_empty_times_are_the_start_and_the_end():
 def test_columns_stand_in_any_order_and_value_may_be_absent():
     text = "To,from, tag ,asset\n2,1,Move,jog\n"
     assert Markup.parse(text).spans == (Span("jog", "Move", 1.0, 2.0),)
-
-
-def test_a_header_alone_is_no_markup():
-    assert Markup.parse(HEADER).spans == ()
-    assert Markup.parse("asset,tag,from,to").spans == ()
 
 
 @pytest.mark.parametrize("tag", list(ReservedTag))
@@ -210,10 +203,6 @@ def test_a_fault_names_its_column_what_was_found_and_the_mend(line, column, said
     assert mend in told
 
 
-def test_a_first_time_of_zero_may_have_a_sign():
-    assert spans("jog,Move,-0,0,") == (Span("jog", "Move", 0.0, 0.0),)
-
-
 @for_each(
     [
         ("Do Not Choose", "DoNotChoose"),
@@ -320,17 +309,6 @@ def test_spans_made_in_python_are_checked_alike():
 # ---- patterns
 
 
-def test_a_star_stands_for_any_text_and_every_other_character_for_itself():
-    assert fits("jog_*", "jog_left")
-    assert fits("jog_*", "jog_")
-    assert fits("*", "")
-    assert fits("*_l*_*", "jog_left_turn")
-    assert not fits("jog_*", "Jog_left")
-    assert not fits("a*a", "a")
-    assert not fits("jog_?", "jog_1")
-    assert not fits("[a]*", "a")
-
-
 @given(st.text("ab*", max_size=8), st.text("ab", max_size=8))
 def test_a_pattern_fits_what_trying_every_cut_finds(pattern, name):
     def holds(pattern, name):
@@ -395,11 +373,6 @@ def test_with_a_rate_a_span_between_two_frames_is_told():
     assert "line 2" in told
     assert "is between two frames and contains none" in told
     assert told_for(lines, {"jog": 3.0}) == []
-
-
-def test_an_asset_of_unknown_length_is_not_measured():
-    markup = Markup.parse(HEADER + "jog,Move,99,,\n")
-    assert markup.faults_for(["jog"], {}, rate=30.0) == []
 
 
 def test_patterns_that_contradict_each_other_on_an_asset_are_told():

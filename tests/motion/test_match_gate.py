@@ -1,7 +1,5 @@
 """A match gate: when it opens and closes, what it tells, and the entry animation that it gives."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -72,29 +70,12 @@ def test_it_opens_under_its_threshold_and_closes_when_no_longer_under_the_other_
         assert (look.opens, look.closes) == (is_open and not was_open, was_open and not is_open)
 
 
-def test_a_second_bar_keeps_it_open_while_the_cost_goes_up_and_down_about_the_first():
-    costs = [1.9, 2.1, 1.9, 2.1]
-    flapping, steady = MatchGate(POINTS, 2.0), MatchGate(POINTS, 2.0, close_above=3.0)
-    assert [flapping.update(at(cost)).is_open for cost in costs] == [True, False, True, False]
-    assert [steady.update(at(cost)).is_open for cost in costs] == [True] * 4
-
-
-def test_a_cost_at_the_threshold_is_not_under_it():
-    assert not MatchGate(POINTS, 4.0).update([2.0]).is_open
-
-
 def test_it_is_shut_when_nothing_may_play():
     gate = MatchGate(POINTS, 1e9)
     assert gate.update([0.0]).is_open
     look = gate.update([0.0], valid=NamedAssets([]))
     assert look.closes
     assert look.cost == math.inf
-
-
-def test_penalties_and_masks_count_in_its_cost():
-    gate = MatchGate(POINTS, 2.0)
-    assert gate.cost([0.0], valid=np.array([False, True])) == 100.0
-    assert gate.cost([0.0], penalties={"near": 1.5}) == 1.5
 
 
 def test_closed_by_hand_it_gives_the_entry_animation_anew():

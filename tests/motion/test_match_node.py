@@ -1,7 +1,5 @@
 """A match node: which frame it enters, where the body is on the way, and that it arrives. Scenarios read like the talks."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from itertools import pairwise
@@ -15,9 +13,8 @@ from strategies import examples
 
 from contextdb.errors import MotionError, QueryError
 from contextdb.motion import Clip, MotionDatabase, query_from
-from contextdb.motion.answers import NamedAssets
 from contextdb.motion.markup.left_out import LeftOut
-from contextdb.motion.markup.marks import Mark, Marks, TagFilter
+from contextdb.motion.markup.marks import Mark, Marks
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.nodes.match_node import MatchNode
 from contextdb.motion.nodes.pose_match import pose_schema
@@ -50,19 +47,6 @@ def handmade(paths, warps=None, features=None, **marks):
 def ahead(n_frames, speed=1.0):
     """A path straight ahead."""
     return np.column_stack((np.zeros(n_frames), np.arange(n_frames) * speed / RATE, np.zeros(n_frames)))
-
-
-def only(n_frames, *frames):
-    """Kinds and marks that let a search choose these frames alone."""
-    kinds = np.ones(n_frames, np.uint16)
-    kinds[list(frames)] = 0
-    return {
-        "kinds": kinds,
-        "kind_tags": np.zeros((2, 0), np.bool_),
-        "kind_marks": np.array([Mark.MATCH_RANGE, Mark.DO_NOT_CHOOSE], np.uint8),
-        "kind_biases": np.zeros(2),
-        "kind_root_weights": np.ones(2),
-    }
 
 
 def node(database, **options):
@@ -109,30 +93,6 @@ def test_a_running_character_that_decides_to_go_into_cover_stands_there_in_the_e
     stands = body.then(there)
     assert math.hypot(stands.left_m - cover.left_m, stands.ahead_m - cover.ahead_m) < 0.01
     assert abs(stands.turn_rad - cover.turn_rad) < 0.01
-
-
-def test_it_starts_later_in_the_animation_when_the_target_is_nearer():
-    database = made(COVER)
-    query = query_from(SCHEMA, make_clip("run").clip, 14)
-    entries = [node(database, position_weight=100.0).enter(query, Target(0.0, far)).entry_s for far in (5.0, 4.0, 3.0)]
-    assert entries == sorted(entries)
-    assert len(set(entries)) == 3
-
-
-def test_the_animation_whose_end_is_nearest_to_the_target_is_chosen_when_the_pose_leaves_it_open():
-    query = query_from(SCHEMA, make_clip("walk").clip, 7)
-    for side, asset in ((1.0, "walk_turn_left_90"), (-1.0, "walk_turn_right_90")):
-        play = node(made(), position_weight=100.0, rotation_weight=100.0).enter(query, Target(side, 1.0, side * math.pi / 2.0))
-        assert play.hit.asset == asset
-        assert math.sqrt(play.costs.distance / 100.0) < 0.5  # metres, by itself
-        assert math.sqrt(play.costs.rotation / 100.0) < 0.3
-
-
-def test_without_weights_it_is_the_search_for_the_pose_alone():
-    database = made()
-    query = query_from(SCHEMA, make_clip("run").clip, 5)
-    free = node(database, position_weight=0.0, rotation_weight=0.0)
-    assert free.search(query, Target(3.0, 3.0, 1.0)) == database.search(query)
 
 
 def test_a_mirrored_animation_ends_on_the_other_side():
@@ -285,15 +245,6 @@ def test_candidates_begin_with_the_frame_entered_and_tell_why_others_are_out():
     assert found.rows[1].biases["given"] == pytest.approx(costs[0][found.rows[1].frame] + costs[1][found.rows[1].frame])
 
 
-def test_masks_tags_and_marks_hold_as_in_every_search():
-    database = made("walk,Gait.Walk run,Gait.Run run,DoNotChoose,0.5")
-    query, target = query_from(SCHEMA, make_clip("run").clip, 30), Target(0.0, 2.0)
-    assert node(database).enter(query, target, NamedAssets(["walk"])).hit.asset == "walk"
-    assert node(database).enter(query, target, tags=TagFilter(include=("Gait.Walk",))).hit.asset == "walk"
-    assert node(database).enter(query, target, NamedAssets(["run"])).entry_s < 0.5
-    assert node(database).enter(query, target, NamedAssets([])) is None
-
-
 # ---- playing
 
 
@@ -304,13 +255,6 @@ def test_advancing_ends_at_the_end_of_the_animation_and_stays_there():
     assert [there.ahead_m for there in placements] == pytest.approx([0.1 * (i + 1) for i in range(30)])
     assert play.advance(5.0) == placements[-1] == play.at(100.0) == RootMotion(0.0, 3.0, 0.0)
     assert play.frame == 30
-
-
-def test_the_frame_shown_follows_the_time():
-    play = node(handmade([ahead(5), ahead(31)], features=[[1.0]] * 5 + [[0.0]] * 31)).enter([0.0], Target(0.0, 1.0))
-    assert (play.hit.asset, play.frame) == ("asset 1", 5)
-    play.advance(0.5)
-    assert play.frame == 20
 
 
 def test_a_looping_animation_ends_with_its_range():
@@ -327,26 +271,6 @@ def test_it_plays_no_excluded_frame_and_arrives_before_one():
     assert play.at(play.duration_s).ahead_m == pytest.approx(5.0)
 
 
-def test_entered_within_its_warp_range_the_share_begins_at_0_and_still_comes_to_1():
-    database = handmade([ahead(61)], [[[0.5, 1.5], [np.nan, np.nan]]], **only(61, 30))
-    play = node(database).enter([0.0], Target(0.0, 2.0))
-    assert play.entry_s == 1.0
-    assert play.warp_share(0.0).position == 0.0
-    assert play.warp_share(0.25).position == pytest.approx(0.5)
-    assert play.at(0.5).ahead_m == 2.0
-    assert play.at(1.0).ahead_m == pytest.approx(2.5)  # and on at the animation's own pace
-
-
-@pytest.mark.parametrize("warp", [[0.2, 0.6], [1.0, 1.0], [0.5, 0.5], [5.0, 9.0]], ids=["behind", "here", "no time", "never"])
-def test_an_entry_with_no_time_to_warp_costs_the_distance_at_its_end_and_plays_as_it_is(warp):
-    database = handmade([ahead(61)], [[warp, [np.nan, np.nan]]], **only(61, 30))
-    play = node(database).enter([0.0], Target(0.0, 1.5))
-    assert play.costs.distance == pytest.approx(0.5**2)
-    assert play.path.position_s is None
-    assert play.at(1.0).ahead_m == pytest.approx(1.0)
-    assert play.warp_share(1.0).position == 0.0
-
-
 def test_a_range_of_one_frame_is_done_at_once():
     play = node(handmade([ahead(1)])).enter([0.0], Target(0.0, 1.0, 1.0))
     assert play.is_done
@@ -354,19 +278,6 @@ def test_a_range_of_one_frame_is_done_at_once():
     assert play.advance(1.0) == RootMotion()
     assert play.costs.distance == 1.0
     assert (play.path.position_s, play.path.rotation_s) == (None, None)
-
-
-def test_a_warp_range_within_one_frame_is_long_enough():
-    database = handmade([ahead(31)], [[[0.41, 0.42], [np.nan, np.nan]]], **only(31, 0))
-    play = node(database).enter([0.0], Target(0.3, 0.42))
-    assert play.at(0.41).left_m == pytest.approx(0.0)
-    assert play.at(0.42) == RootMotion(0.3, 0.42, 0.0)
-
-
-def test_headings_that_were_wrapped_are_taken_the_short_way():
-    headings = np.linspace(3.0, 3.6, 31)
-    path = np.column_stack((np.zeros((31, 2)), np.arctan2(np.sin(headings), np.cos(headings))))
-    assert node(handmade([path])).ends[0, 2] == pytest.approx(0.6)
 
 
 def test_an_empty_database_has_nothing_to_enter():

@@ -1,7 +1,5 @@
 """Each measure against a body whose motion is worked out by hand; and measures do not change with rate, place and direction."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

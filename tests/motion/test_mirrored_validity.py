@@ -1,8 +1,5 @@
 """Ranges that are played mirrored are valid by the answer with mirrored facts: in searches, choices, reasons and commands."""
 
-from __future__ import annotations
-
-import math
 from dataclasses import replace
 from itertools import pairwise
 
@@ -27,7 +24,6 @@ from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.decision import Action
 from contextdb.motion.trace.session import Trace
 
-SIDES = (("Left*", "Right*"),)
 TURNS = ("walk_turn_left_90", "walk_turn_right_90")
 COLUMNS = {"Asset": [*TURNS, "walk"], "direction": ["45..135", "-135..-45", "-45..45"]}
 
@@ -42,22 +38,6 @@ def database():
 
 def table(**more):
     return cdb.Table.from_columns({**COLUMNS, **more}, {"direction": {"type": "angle"}}).compile()
-
-
-def turned(database, at):
-    """Degrees by which a range turns to the left."""
-    headings = np.unwrap(database.root[database.starts[at] : database.stops[at], 2].astype(float))
-    return math.degrees(headings[-1] - headings[0])
-
-
-@pytest.mark.parametrize("direction", [88.0, -88.0])
-def test_a_wish_to_one_side_finds_turns_to_that_side_alone_mirrored_or_not(database, direction):
-    flags = database.filter(table().query({"direction": direction})).ranges
-    sides = [turned(database, at) * math.copysign(1.0, direction) for at in np.flatnonzero(flags)]
-    assert len(sides) == 2
-    assert min(sides) > 80.0
-    found = {(database.assets[at], bool(database.mirrored[at])) for at in np.flatnonzero(flags)}
-    assert found == ({(TURNS[0], False), (TURNS[1], True)} if direction > 0 else {(TURNS[1], False), (TURNS[0], True)})
 
 
 def test_searches_starts_and_reasons_all_go_by_the_mirror(database):

@@ -3,8 +3,6 @@
 The clips are not part of this project. Set CONTEXTDB_MOCAP to a folder with `assets.csv` and the BVH files it lists.
 """
 
-from __future__ import annotations
-
 import csv
 import os
 from pathlib import Path

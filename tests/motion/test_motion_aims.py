@@ -1,12 +1,11 @@
 """What the motion is to be with everything on: a character of default settings, measured beside the clips that it plays."""
 
-from __future__ import annotations
-
 import os
 from functools import cache
 
 import numpy as np
 import pytest
+from strategies import in_full_runs
 
 from benchmarks import captured, motion_quality
 from contextdb import motion
@@ -80,6 +79,7 @@ def test_feet_slide_no_more_than_in_the_clips(name):
         assert probes["turns of 180"].skate_cm_s < 10.0
 
 
+@in_full_runs  # the same characters hardly jump and come to their path every day
 @pytest.mark.parametrize("name", SETS)
 def test_the_response_is_no_slower_than_that_of_plain_motion_matching(name):
     clips, turns = clips_of(name), [probe for probe in PROBES if measured(name)[probe].reach_s is not None]

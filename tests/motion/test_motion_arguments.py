@@ -1,7 +1,5 @@
 """Wrong arguments: no public call of `contextdb.motion` ends in an error that does not say what was wrong."""
 
-from __future__ import annotations
-
 import contextlib
 import inspect
 import re
@@ -20,7 +18,7 @@ from contextdb.motion.clips.clip import parse_bvh
 from contextdb.motion.clips.doubts import doubts_of
 from contextdb.motion.clips.feet import footfalls
 from contextdb.motion.clips.many_steered import ManySteered, steered_paths
-from contextdb.motion.clips.mirror import mirrored_path, partners_of
+from contextdb.motion.clips.mirror import partners_of
 from contextdb.motion.clips.poses import forward_kinematics, local_poses
 from contextdb.motion.clips.steering import steered_path
 from contextdb.motion.features.extraction import clip_features, clip_permutations, features_of
@@ -103,7 +101,6 @@ CALLS = [
     lambda: partial(motion.root_trajectory, POSES),
     lambda: partial(footfalls, CLIP),
     lambda: partial(motion.mirrored, POSES, [("LeftFoot", "RightFoot")]),
-    lambda: partial(mirrored_path),
     lambda: partial(partners_of, CLIP.skeleton, []),
     lambda: partial(doubts_of),
     lambda: partial(make_clip),

@@ -1,7 +1,5 @@
 """The sections features, databases and selectors of contextdb.toml, from reading to a search."""
 
-from __future__ import annotations
-
 import copy
 
 import pytest

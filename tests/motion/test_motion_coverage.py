@@ -1,7 +1,5 @@
 """Motion coverage of databases: filled, wanted and missing bins, what to capture next, near clips and transitions."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,10 +1,6 @@
 """The search is exact: held to a scan of every frame in float64, for any ranges, masks, tags, ties, biases and current frames."""
 
-from __future__ import annotations
-
 import math
-from functools import reduce
-from operator import add
 
 import numpy as np
 import pytest
@@ -16,7 +12,6 @@ from motion_oracles import best_frame
 from contextdb.errors import MotionError, QueryError
 from contextdb.motion import Clip, FeatureSchema, Hit, MotionDatabase, query_from
 from contextdb.motion.answers import NamedAssets
-from contextdb.motion.features.extraction import features_of
 from contextdb.motion.features.normalisation import floor_of
 from contextdb.motion.search.database import build_databases
 
@@ -115,29 +110,6 @@ def test_one_mask_serves_all_queries_or_each_has_its_own():
     assert frames([None, [True, False]]) == [0, 1]
 
 
-def test_frames_between_ranges_are_never_chosen_and_may_hold_anything():
-    features = np.array([[1.0], [np.nan], [0.0], [np.inf], [2.0]])
-    database = MotionDatabase.from_features(features, [0, 4], [1, 5], ["a", "b"])
-    assert database.search([0.0]) == Hit("a", 0, 0, 1.0)
-    assert [database.range_of(frame) for frame in range(5)] == [0, -1, -1, -1, 1]
-    assert database.search([0.0], current=2) == Hit("a", 0, 0, 1.0)
-
-
-def test_the_current_frame_wins_ties_only_while_its_asset_is_valid():
-    database = MotionDatabase.from_features(np.zeros((6, 2)), [0, 3], [3, 6], ["walk", "run"])
-    assert database.search([0, 0]).frame == 0
-    assert database.search([0, 0], current=4).frame == 4
-    assert database.search([0, 0], matches("walk"), current=4).frame == 0
-    assert database.search([0, 0], tags=[True] * 4 + [False] * 2, current=4).frame == 0
-    assert database.search([0, 0], current=-1).frame == 0
-
-
-def test_a_hit_in_a_database_of_many_blocks_is_the_lowest_of_equal_frames():
-    database = MotionDatabase.from_features(np.ones((40_000, 3), np.float32), [10], [40_000], ["a"])
-    assert database.search([0, 0, 0]) == Hit("a", 0, 10, 3.0)
-    assert database.search([0, 0, 0], current=39_999) == Hit("a", 0, 39_999, 3.0)
-
-
 def test_nothing_valid_is_a_false_hit_of_infinite_cost():
     for hit in (
         LOCO.search(np.zeros(LOCO.n_features), matches()),
@@ -154,16 +126,6 @@ def test_nothing_valid_is_a_false_hit_of_infinite_cost():
 # ---- built from clips
 
 
-def test_a_frame_of_a_clip_is_found_by_its_own_features():
-    for name, frame in (("walk", 9), ("jog_turn_left_60", 3), ("stop_run", 100)):
-        query = query_from(SCHEMA, make_clip(name).clip, frame)
-        hit = LOCO.search(query)
-        assert (hit.asset, hit.frame - LOCO.starts[hit.range]) == (name, frame)
-        assert hit.cost < 1e-9
-        assert LOCO.time_s(hit) == pytest.approx(frame / 30.0)
-        assert np.allclose(LOCO.raw(hit), query, atol=1e-5)
-
-
 def test_a_built_search_equals_a_scan_of_normalised_frames():
     rng = np.random.default_rng(5)
     scale, offset = LOCO.normalisation.scale, LOCO.normalisation.offset
@@ -178,31 +140,6 @@ def test_a_built_search_equals_a_scan_of_normalised_frames():
         hit = LOCO.search(query, valid)
         assert hit.cost == pytest.approx(costs[allowed].min(), rel=1e-12)
         assert hit.frame == np.flatnonzero(allowed)[np.argmin(costs[allowed])]
-
-
-def test_channel_costs_add_up_to_the_cost_that_the_choice_was_made_by():
-    query = query_from(SCHEMA, make_clip("walk_tired").clip, 10)
-    for valid in (None, matches("run"), matches("idle", "sprint")):
-        hit = LOCO.search(query, valid)
-        parts = LOCO.channel_costs(hit, query)
-        assert list(parts) == list(SCHEMA.slices)
-        assert reduce(add, parts.values()) == hit.cost
-        assert LOCO.channel_costs(hit.frame, query) == parts
-
-
-def test_features_are_normalised_by_their_mean_and_one_scale_for_each_channel():
-    raw = np.concatenate([features_of(clip, SCHEMA) for clip in CLIPS]).astype(float)
-    assert np.allclose(LOCO.normalisation.offset, raw.mean(axis=0))
-    for part in SCHEMA.slices.values():
-        assert np.allclose(LOCO.normalisation.scale[part], raw[:, part].std(axis=0).mean())
-    assert np.allclose(LOCO.normalisation.undo(LOCO.features), raw, atol=1e-4)
-
-
-def test_channels_of_one_group_share_a_scale():
-    feet = [{"type": "position", "bone": bone, "group": "feet"} for bone in ("LeftFoot", "Head")]
-    schema = FeatureSchema.from_dict("feet", {"rate": 30.0, "channels": feet})
-    scale = MotionDatabase.build(CLIPS, schema).normalisation.scale
-    assert len(set(scale.tolist())) == 1
 
 
 def test_features_without_variation_are_compared_by_the_floors_of_their_channels():

@@ -1,7 +1,5 @@
 """A copy of a character that is told what its owner plays, over a line that may lose it."""
 
-from __future__ import annotations
-
 import math
 import random
 

@@ -1,7 +1,5 @@
 """Normalisation: one scale for each group, and features that do not vary."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from made_once import make_clip

@@ -1,7 +1,5 @@
 """Clips on the spot: the speed of a body is that of the ground under its standing feet."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import replace
 from pathlib import Path

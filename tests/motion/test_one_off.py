@@ -1,7 +1,5 @@
 """A one-off moves a character to its target, and what would play without it goes on below."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pose banks: the clips' own poses, between frames, over loops and in a mirror."""
 
-from __future__ import annotations
-
 import pickle
 import re
 from dataclasses import replace

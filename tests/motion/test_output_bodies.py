@@ -1,7 +1,5 @@
 """Poses as glTF with a body of capsules, and as USD: read back, they are the poses; tools of others find nothing wrong."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import subprocess

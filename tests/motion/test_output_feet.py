@@ -1,7 +1,5 @@
 """Feet that are down stay where they came down, and legs bend to them without growing."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Pose banks on disk: the same to the bit, memory-mapped, and refused when they were altered."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

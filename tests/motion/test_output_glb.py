@@ -1,7 +1,5 @@
 """Poses as glTF, read back with the library and placed joint by joint."""
 
-from __future__ import annotations
-
 import sys
 
 import numpy as np

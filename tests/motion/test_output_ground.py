@@ -1,7 +1,5 @@
 """Ground and stride: feet on steps and slopes, hips by the lowest foot, steps of another length."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

@@ -1,11 +1,10 @@
 """Pose banks of captured clips, whose rigs have axes of their own; see `test_mocap`."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
+from strategies import in_full_runs
 from test_mocap import listed, load, pytestmark
 from test_output_bank import placed
 
@@ -53,6 +52,7 @@ def test_captured_poses_are_the_clips_and_in_a_mirror_what_the_mirror_shows_on_a
                 np.testing.assert_allclose(found[below], wanted.positions[frame, below], atol=near)
 
 
+@in_full_runs
 def test_a_steered_character_on_captured_clips_hardly_pops_and_slides_far_less_than_where_it_cuts():
     walks = [load(row) for row in listed() if row["asset"].startswith("bandai") and row["content"] in ("walk", "run")][:16]
     schema = FeatureSchema.from_dict("loco", {"rate": 30.0, "facing_smooth_s": 0.2, "channels": CHANNELS})

@@ -1,7 +1,5 @@
 """One-offs in a pose stream: into a match node, through its warp, and out again, without a step."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 

@@ -1,7 +1,5 @@
 """The streams of a crowd give what each gives alone, to the last bit, whatever happens to each."""
 
-from __future__ import annotations
-
 import math
 from concurrent.futures import ThreadPoolExecutor
 from copy import copy

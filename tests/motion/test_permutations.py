@@ -1,7 +1,5 @@
 """Permutations of clips: what their features are, what a search finds among them, and that playing on in another is no jump."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -40,12 +38,10 @@ from contextdb.motion.clips.clip import parse_bvh
 from contextdb.motion.clips.poses import local_poses
 from contextdb.motion.features.extraction import clip_features, clip_permutations
 from contextdb.motion.features.permutations import Permutations
-from contextdb.motion.features.schema_dict import schema_to_dict
 from contextdb.motion.made.joint import make_joint_clip
 from contextdb.motion.measuring.coverage import coverage
 from contextdb.motion.measuring.near_clips import near_clips
 from contextdb.motion.storage.building import build_all
-from contextdb.motion.storage.stored import open_database, save_database
 from contextdb.motion.trace.views import decision_lines
 
 N_FRAMES = 60
@@ -160,13 +156,6 @@ def test_each_clip_has_a_range_for_each_permutation_and_they_follow_one_another(
     assert [database.permutation_s(i) for i in range(9)] == pytest.approx([0.2, 0.4, 0.6] * 3)
 
 
-def test_a_saved_database_has_its_permutations(tmp_path):
-    save_database(DATABASE, tmp_path / "a.motion.safetensors")
-    opened = open_database(tmp_path / "a.motion.safetensors")
-    assert opened.schema == SCHEMA
-    assert opened.permutation_s(1) == pytest.approx(0.4)
-
-
 def test_features_that_are_not_all_permutations_of_their_clips_are_refused():
     with pytest.raises(MotionError, match='features of "catch" are not those of its 3 permutations'):
         MotionDatabase.from_parts(clip_permutations(CLIP, SCHEMA)[:2], SCHEMA)
@@ -279,12 +268,6 @@ def test_a_clip_is_counted_once_whatever_its_permutations():
 
 
 # ---- settings
-
-
-def test_permutations_are_read_and_written():
-    schema = FeatureSchema.from_dict("catch", KEYS)
-    assert schema.permutations == Permutations(3, 0.2, 0.2)
-    assert FeatureSchema.from_dict("catch", schema_to_dict(schema)) == schema
 
 
 @pytest.mark.parametrize(

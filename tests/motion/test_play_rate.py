@@ -1,7 +1,5 @@
 """The play rate of a controller: as fast as the query asks for, within limits, and known to all that follows."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Facts of what plays: which foot is down, how fast the clip goes, its phase and its tags, given to tables that ask for them."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

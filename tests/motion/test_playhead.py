@@ -1,7 +1,5 @@
 """Moving through a range, and the movement over the ground that comes of it, against walking every frame."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The core's poses are those of an oracle that works one character out, one update after the other."""
 
-from __future__ import annotations
-
 import math
 import random
 from copy import copy

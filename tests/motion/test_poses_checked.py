@@ -1,7 +1,5 @@
 """What the core takes over for poses and paths is checked there: no index that comes from an array leads out of another one."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from played import bank

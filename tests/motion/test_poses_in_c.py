@@ -1,7 +1,5 @@
 """The core's functions of numbers are right to the last places, and its poses the same bits whatever compiled them."""
 
-from __future__ import annotations
-
 import math
 import os
 import platform

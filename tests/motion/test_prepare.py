@@ -1,13 +1,12 @@
 """Markup proposed for clips: what is known of made clips comes back, and nothing is proposed beside its own result."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from made_once import made_clips
+from strategies import in_full_runs
 
 from contextdb import motion
 from contextdb.errors import ContextDBError
@@ -48,6 +47,7 @@ def test_the_clips_that_loop_are_found_and_no_others():
     assert {each.tag for each in of("loops")} == {ReservedTag.LOOPING}
 
 
+@in_full_runs  # loops of made clips every day
 def test_loops_of_one_cycle_are_found_whose_feet_come_down_at_an_end():
     gaits = [
         Gait(name, [Cycle.of(CLIPS[each]) for each in own])

@@ -1,7 +1,5 @@
 """The path of a body is made from hips that sway: known paths of made clips come back, and no joint moves in the world."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A recorded decision asked again: what was recorded comes out bit for bit, and every other asset has its cost and reason too."""
 
-from __future__ import annotations
-
 import random
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Random sessions asked again: unchanged they give what was recorded bit for bit, changed what a search with the change gives."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A clip on another rig: the same rig changes nothing, a larger one goes farther in the same way, and feet still stand."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """`rig` of a database: clips of another body come to the rig when they are built; others stay as they are, to the last bit."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A row says how it plays: a character obeys as one does whose settings or markup say the same by hand."""
 
-from __future__ import annotations
-
 import math
 import pickle
 from itertools import pairwise

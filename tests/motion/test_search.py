@@ -1,7 +1,5 @@
 """The search and the candidates against an oracle that looks at one frame after another."""
 
-from __future__ import annotations
-
 import math
 import pickle
 from dataclasses import replace
@@ -229,15 +227,6 @@ def test_many_characters_are_answered_like_each_alone(data):
     assert database.search_many(queries, masks, currents, tags) == singly
 
 
-def test_a_new_mask_rebuilds_nothing():
-    database = MotionDatabase.from_features(np.arange(100.0)[:, None], [0, 50], [50, 100], ["a", "b"])
-    database.search([10.0])
-    layout, searcher = database.layout, database._searcher
-    assert database.search([10.0], np.array([False, True])).frame == 50
-    assert database.layout is layout
-    assert database._searcher is searcher
-
-
 def test_a_weight_turned_to_zero_hides_no_frame_at_the_ends_of_float32():
     features = np.array([[3e38, 1.0], [-3e38, 0.0]], np.float32)
     plain = MotionDatabase.from_features(features, [0], [2], ["a"])
@@ -253,30 +242,11 @@ def test_a_frame_just_cheaper_than_another_is_found_where_float32_cannot_tell_th
     assert database.search([0.0, 1e-4]).frame == 40
 
 
-def test_penalties_of_an_asset_count_for_all_its_ranges():
-    database = MotionDatabase.from_features([[0.0], [1.0], [0.5]], [0, 1, 2], [1, 2, 3], ["a", "b", "a"])
-    assert database.search([0.0]).frame == 0
-    assert database.search([0.0], penalties={"a": 2.0, "elsewhere": 1.0}) == Hit("b", 1, 1, 1.0)
-    assert database.search([0.0], penalties={"a": 0.5}) == Hit("a", 0, 0, 0.5)
-
-
 @pytest.mark.parametrize("penalties", [[1.0], {"a": math.nan}, np.array([0.0, -math.inf])])
 def test_penalties_that_do_not_fit_are_refused(penalties):
     database = MotionDatabase.from_features([[0.0], [1.0]], [0, 1], [1, 2], ["a", "b"])
     with pytest.raises(QueryError, match="penalties"):
         database.search([0.0], penalties=penalties)
-
-
-def test_the_frame_that_plays_is_kept_from_playing_on_by_its_asset_alone():
-    plain = MotionDatabase.from_features([[0.0], [9.0]], [0, 1], [1, 2], ["a", "b"])
-    marks = replace(plain.marks, kinds=np.array([0, 1], np.uint16), kind_tags=np.zeros((2, 0), bool), kind_biases=np.zeros(2))
-    barred = replace(plain, marks=replace(marks, kind_marks=np.array([32, 32 | Mark.DO_NOT_CHOOSE], np.uint8)))
-    assert barred.search([9.0]).frame == 0
-    assert barred.search([9.0], current=1).frame == 1
-    assert barred.search([9.0], current=1, skip=[Skip(0, 2)]).frame == 1
-    assert barred.search([9.0], np.array([True, False]), current=1).frame == 0
-    excluded = replace(plain, marks=replace(marks, kind_marks=np.array([32, Mark.EXCLUDED], np.uint8)))
-    assert excluded.search([9.0], current=1).frame == 0
 
 
 def test_the_memory_of_a_search_is_a_fifth_more_than_the_features_at_most():

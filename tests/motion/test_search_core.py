@@ -1,8 +1,6 @@
 """The search in C by itself: the same bits by all compilers and widths of registers, no byte read outside of its arrays, and no
 more work than it needs."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 from typing import Any

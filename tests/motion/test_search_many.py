@@ -1,7 +1,5 @@
 """Searches for many characters at once: each is answered as when it asks alone, to the last bit, whatever the masks come as."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -86,31 +84,11 @@ def test_many_searches_with_everything_of_their_own_are_answered_like_each_alone
     assert database.search_each(queries, asked) == singly
 
 
-def test_of_equal_frames_the_playing_one_wins_then_the_lowest_also_in_one_box():
-    features = np.zeros((40, 2), np.float32)
-    features[:3] = 1.0
-    database = MotionDatabase.from_features(features, [0, 20], [20, 40], ["a", "b"])
-    hits = database.search_many(np.zeros((4, 2)), [None, None, np.array([False, True]), None], [None, 30, None, 2])
-    assert [hit.frame for hit in hits] == [3, 30, 20, 3]
-
-
-def test_of_frames_that_a_bias_makes_equal_the_lowest_wins_though_a_later_one_is_nearer():
-    database = MotionDatabase.from_features([[2.0], [1.0]], [0], [2], ["a"])
-    hits = database.search_each(np.zeros((2, 1)), [{"bias": [0.0, 3.0]}, {"bias": [0.0, 3.0], "current": 1}])
-    assert [(hit.frame, hit.cost) for hit in hits] == [(0, 4.0), (1, 4.0)]
-
-
 def test_a_weight_turned_to_zero_hides_no_frame_from_many_at_the_ends_of_float32():
     features = np.array([[3e38, 1.0], [-3e38, 0.0]], np.float32)
     plain = MotionDatabase.from_features(features, [0], [2], ["a"])
     database = replace(plain, slices=(slice(0, 1), slice(1, 2)), channel_names=("far", "near"), weights=np.array([0.0, 1.0]))
     assert [hit.frame for hit in database.search_many([[3e38, 0.0], [-3e38, 1.0]])] == [1, 0]
-
-
-def test_frames_without_features_cost_nothing_and_the_lowest_that_may_play_wins():
-    database = MotionDatabase.from_features(np.zeros((40, 0)), [0, 20], [20, 40], ["a", "b"])
-    hits = database.search_many(np.zeros((2, 0)), [None, np.array([False, True])])
-    assert [(hit.frame, hit.cost) for hit in hits] == [(0, 0.0), (20, 0.0)]
 
 
 def test_one_query_that_is_no_number_is_named_and_nobody_is_answered():

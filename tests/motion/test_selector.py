@@ -1,7 +1,5 @@
 """Priority databases: the rule of the talk as scenarios, and chains against a plain recursion."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -29,44 +27,6 @@ JOG = database(9.0, 15.0, 20.0, asset="jog")
 SELECTOR = Selector([Entry("jog_tired", TIRED, threshold=2.75), Entry("jog", JOG)])
 
 
-def test_the_priority_database_wins_outright_below_its_threshold_though_the_default_is_nearer():
-    choice = SELECTOR.search([9.0])  # tired costs 1.0, jog would cost nothing
-    assert (choice.database, choice.hit.asset, choice.hit.cost) == ("jog_tired", "jog_tired", 1.0)
-    assert choice.reason is Reason.UNDER_THRESHOLD
-    assert [search.status for search in choice.searches] == [Status.WINNER, Status.NOT_SEARCHED]
-    assert choice.searches[1].hit is None
-
-
-def test_above_the_threshold_the_default_is_searched_and_the_lower_of_the_two_wins():
-    choice = SELECTOR.search([15.5])  # tired costs 20.25, jog 0.25
-    assert (choice.database, choice.hit.cost) == ("jog", 0.25)
-    assert choice.reason is Reason.LOWEST
-    assert [search.status for search in choice.searches] == [Status.BEATEN, Status.WINNER]
-
-
-def test_above_the_threshold_the_priority_database_still_wins_when_it_is_lower():
-    choice = SELECTOR.search([12.0])  # tired costs 4.0, jog 9.0
-    assert (choice.database, choice.hit.cost) == ("jog_tired", 4.0)
-    assert choice.reason is Reason.LOWEST
-
-
-def test_a_cost_equal_to_the_threshold_is_not_below_it():
-    selector = Selector([Entry("priority", database(2.0), threshold=4.0), Entry("default", database(1.0))])
-    assert selector.search([0.0]).database == "default"
-
-
-def test_on_a_tie_the_priority_database_wins():
-    choice = SELECTOR.search([20.0 + 1e9])
-    assert choice.searches[0].hit.cost == choice.searches[1].hit.cost
-    assert choice.database == "jog_tired"
-
-
-def test_a_priority_database_without_a_valid_asset_leaves_the_choice_to_the_default():
-    choice = SELECTOR.search([9.0], valid=NamedAssets(["jog"]))
-    assert choice.database == "jog"
-    assert [search.status for search in choice.searches] == [Status.NOTHING_VALID, Status.WINNER]
-
-
 def test_nothing_valid_anywhere_is_a_false_choice():
     choice = SELECTOR.search([9.0], valid=NamedAssets(["swim"]))
     assert not choice
@@ -87,23 +47,6 @@ def test_a_choice_tells_in_a_sentence_why_the_winner_won():
     assert told == "jog_tired: cost 1, under its threshold 2.75; jog: not searched. jog_tired wins outright."
     told = SELECTOR.search([15.5]).why
     assert told == "jog_tired: cost 20.25, not under its threshold 2.75; jog: cost 0.25. jog has the lowest cost and wins."
-
-
-def test_the_current_frame_wins_ties_in_its_own_database():
-    selector = Selector([Entry("priority", database(0.0, 0.0), 1.0), Entry("default", database(0.0, 0.0))])
-    assert selector.search([0.0], current=("priority", 1)).hit.frame == 1
-    assert selector.search([0.0], current=("default", 1)).hit.frame == 0
-    again = selector.search([0.0], current=selector.search([0.0], current=("priority", 1)))
-    assert again.hit.frame == 1
-    nothing = selector.search([0.0], valid=[False])
-    assert selector.search([0.0], current=nothing).hit.frame == 0
-
-
-def test_masks_tags_and_biases_may_differ_between_databases():
-    assert SELECTOR.search([10.0], valid={"jog_tired": [False]}).database == "jog"
-    assert SELECTOR.search([10.0], tags={"jog_tired": [False, True]}).database == "jog"
-    assert SELECTOR.search([10.0], bias={"jog_tired": [5.0, 0.0]}).database == "jog"
-    assert SELECTOR.search([9.9], bias={"jog_tired": [2.0, 0.0]}).reason is Reason.UNDER_THRESHOLD
 
 
 COSTS = st.lists(st.sampled_from([0.0, 1.0, 4.0, 9.0, math.inf]), min_size=1, max_size=5)
@@ -246,14 +189,6 @@ def test_frames_are_skipped_in_the_database_that_they_are_named_for():
 
 
 # ---- candidates
-
-
-def test_candidates_are_of_the_databases_that_the_choice_looked_into():
-    assert [name for name, _ in SELECTOR.candidates([9.0])] == ["jog_tired"]
-    found = SELECTOR.candidates([15.5], 2)
-    assert [(name, [row.cost for row in rows]) for name, rows in found] == [("jog_tired", [20.25, 30.25]), ("jog", [0.25, 20.25])]
-    ((_, left),) = SELECTOR.candidates([9.0], 5, valid={"jog_tired": [True]}, skip={"jog_tired": [Skip(1, 2)]}, left_out=True)
-    assert [row.left_out for row in left] == [LeftOut.NO, LeftOut.FORBIDDEN]
 
 
 @given(st.lists(st.lists(st.integers(0, 6), min_size=1, max_size=4), min_size=1, max_size=4), st.integers(0, 6), st.data())

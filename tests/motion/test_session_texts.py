@@ -1,7 +1,5 @@
 """What is said of a session that was asked again, where there is little to say."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from contextdb.motion.trace.answer_views import diff_lines, stats_lines, what_if_lines, why_lines

@@ -1,7 +1,5 @@
 """A body that follows a stick, against small steps of the spring's own equation."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

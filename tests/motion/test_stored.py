@@ -1,7 +1,5 @@
 """Saved databases: opened from its file, a database answers every search exactly as the one saved; any other file is refused."""
 
-from __future__ import annotations
-
 import json
 import mmap
 import os
@@ -145,21 +143,6 @@ def test_an_opened_database_of_clips_answers_as_the_built_one(walking, tmp_path_
     if one:
         assert opened.channel_costs(one, query) == walking.channel_costs(one, query)
         assert opened.time_s(one) == walking.time_s(one)
-
-
-def test_weights_that_were_turned_come_back(walking, tmp_path):
-    turned = walking.with_weights({"LeftFoot position": 3.0})
-    save_database(turned, tmp_path / "t.safetensors")
-    opened = open_database(tmp_path / "t.safetensors")
-    assert opened.weights.tolist() == [3.0, 1.0, 1.0]
-    assert opened.schema == SCHEMA
-
-
-def test_an_empty_database_comes_back(tmp_path):
-    save_database(MotionDatabase.build([], SCHEMA), tmp_path / "none.safetensors")
-    opened = open_database(tmp_path / "none.safetensors", verify=True)
-    assert (opened.n_frames, opened.assets) == (0, ())
-    assert not opened.search(np.zeros(opened.n_features))
 
 
 def test_the_same_database_gives_the_same_bytes(walking, saved, tmp_path):

@@ -1,7 +1,5 @@
 """A table plays without a search: what it picks plays as its row says, and is blended as a stream does by hand."""
 
-from __future__ import annotations
-
 import pickle
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The path of a body over the ground."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -17,13 +15,6 @@ EVERY = np.arange(61.0)
 def straight(speed, n_frames=61, rate=30.0):
     positions = np.stack((np.zeros(n_frames), np.arange(n_frames) * speed / rate), axis=-1)
     return Trajectory(rate, positions, np.zeros(n_frames))
-
-
-def test_a_heading_grows_to_the_left_and_own_coordinates_are_left_then_ahead():
-    quarter = np.array([np.pi / 2.0])
-    assert np.allclose(heading_vectors(quarter), [[1.0, 0.0]])
-    assert np.allclose(to_own_frame(np.array([[1.0, 0.0]]), np.zeros(1)), [[1.0, 0.0]])
-    assert np.allclose(to_own_frame(np.array([[1.0, 0.0]]), quarter), [[0.0, 1.0]])
 
 
 @given(st.floats(-10, 10), st.floats(-10, 10), st.floats(-10, 10))
@@ -115,26 +106,8 @@ def test_a_steady_path_has_the_speed_and_turn_it_was_asked_for(speed, turn, seco
     assert own[1] == pytest.approx(speed, rel=0.01)
 
 
-def test_a_strafing_path_travels_beside_its_facing():
-    path = steady_path(1.0, strafe_deg=90.0)
-    assert np.allclose(path.velocities, [1.0, 0.0])
-    assert np.allclose(path.headings, 0.0)
-
-
-def test_smoothing_keeps_steady_turns_and_lowers_what_sways():
-    steady = np.linspace(-1.0, 2.0, 40)
-    assert np.allclose(smoothed(steady, 6.0), steady)
-    sway = np.sin(np.arange(90) * 2.0 * np.pi / 30.0)
-    assert np.abs(smoothed(sway, 6.0)[30:60]).max() == pytest.approx(np.exp(-0.5 * (2.0 * np.pi * 6.0 / 30.0) ** 2), abs=0.01)
-
-
 @given(st.lists(st.floats(-10.0, 10.0), max_size=12), st.floats(0.0, 200.0))
 def test_smoothing_the_values_backwards_gives_the_same_backwards(values, deviation):
     found = smoothed(np.array(values), deviation)
     assert found.shape == (len(values),)
     assert np.allclose(smoothed(np.array(values)[::-1], deviation)[::-1], found, atol=1e-9)
-
-
-def test_smoothing_by_nothing_changes_nothing():
-    values = np.array([1.0, 5.0, 2.0])
-    assert np.array_equal(smoothed(values, 0.0), values)

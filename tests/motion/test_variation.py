@@ -1,7 +1,5 @@
 """Random variation: near ties alone, evenly, with a memory, and the same again from the same seed."""
 
-from __future__ import annotations
-
 import random
 from collections import Counter
 

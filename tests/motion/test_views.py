@@ -1,7 +1,5 @@
 """What people read of a session and of one decision: whole texts of small ones, and what holds for all of them."""
 
-from __future__ import annotations
-
 import math
 import textwrap
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Clips of a walker are loops at their speeds and turns, and a database of them plays beside captured ones."""
 
-from __future__ import annotations
-
 import functools
 
 import numpy as np

@@ -1,9 +1,6 @@
 """Blends of cycles and changes of gait: weights that sum to one, feet that stand, a change while a foot is in the air."""
 
-from __future__ import annotations
-
 import itertools
-import math
 from dataclasses import replace
 from functools import cache
 
@@ -17,7 +14,6 @@ from contextdb.motion import MotionError
 from contextdb.motion.walking.blending import Gait, Mix
 from contextdb.motion.walking.cycle import Cycle
 from contextdb.motion.walking.gaits import GaitState, advanced, wanted_gait
-from contextdb.motion.walking.stances import Stances
 
 SPEEDS = st.floats(0.0, 8.0)
 AXES = st.floats(-1.5, 1.5)
@@ -62,13 +58,6 @@ def test_weights_have_no_step(speed, acceleration, turn, corners, moved):
     assert np.abs(first - second).max() < 1e-5
 
 
-@pytest.mark.parametrize("corners", [{}, LEANING, BOTH])
-def test_a_steady_cycle_has_all_the_weight_at_its_own_speed(corners):
-    gait = run(**corners)
-    for i, each in enumerate(gait.steady):
-        np.testing.assert_allclose(gait.weights(each.speed_mps), np.eye(len(gait.cycles))[i], atol=1e-12)
-
-
 def test_steady_cycles_are_kept_from_slow_to_fast():
     assert [each.name for each in run().steady] == ["jog", "run", "sprint"]
 
@@ -78,15 +67,6 @@ def test_a_corner_without_a_cycle_goes_to_its_steady_neighbour(acceleration, tur
     np.testing.assert_allclose(run().weights(3.0, acceleration, turn), run().weights(3.0), atol=1e-12)
     leaning = run(**LEANING)
     np.testing.assert_allclose(leaning.weights(3.0, acceleration, turn), leaning.weights(3.0, 0.0, turn), atol=1e-12)
-
-
-def test_the_full_of_an_acceleration_is_its_cycle_alone_whatever_the_turn():
-    gait = run(**BOTH)
-    names = [each.name for each in gait.cycles]
-    for turn in (0.0, 1.0, -1.0):
-        assert gait.weights(3.0, 1.0, turn)[names.index("jog_tired")] == pytest.approx(1.0)
-        assert gait.weights(3.0, -1.0, turn)[names.index("run_tired")] == pytest.approx(1.0)
-    assert gait.weights(3.0, 0.0, 1.0)[names.index("jog_turn_left_60")] == pytest.approx(1.0)
 
 
 # ---- blends
@@ -112,13 +92,6 @@ def test_a_foot_stands_still_in_a_blend(first, second, share):
     duration_s = sum(weight * each.duration_s for each, weight in zip(mix.cycles, mix.weights, strict=True))
     speeds = np.linalg.norm(np.diff(places, axis=0), axis=-1) / (2.0 * reach / 199.0 * duration_s)
     assert speeds.max() < 0.02
-
-
-def test_rotations_given_with_the_other_sign_blend_as_the_same():
-    own, other = cycle("walk"), cycle("walk_fast")
-    turned = replace(other, rotations=-other.rotations)
-    shares = np.array([0.6, 0.4])
-    np.testing.assert_allclose(Mix.of([own, turned], shares).at(0.3)[0], Mix.of([own, other], shares).at(0.3)[0], atol=1e-12)
 
 
 def test_cycles_of_one_speed_of_other_rigs_or_none_are_refused():
@@ -160,12 +133,6 @@ def ramped(speeds, dphase=0.013):
     return each, states
 
 
-def test_a_ramp_up_and_down_gives_two_changes():
-    _, states = ramped([*np.linspace(1.0, 4.0, 600), *np.linspace(4.0, 1.0, 600)])
-    kept = [state.now for _, state in states if not state.is_changing]
-    assert sum(a != b for a, b in itertools.pairwise(kept)) == 2
-
-
 @given(st.lists(SPEEDS, min_size=20, max_size=20), st.floats(0.003, 0.08))
 def test_a_change_begins_when_a_foot_lifts_and_is_over_before_that_foot_lands(speeds, dphase):
     each, states = ramped(np.repeat(speeds, 10), dphase)
@@ -179,15 +146,3 @@ def test_a_change_begins_when_a_foot_lifts_and_is_over_before_that_foot_lands(sp
         elif foot is not None and new.is_changing:
             assert not any(own.is_down(foot, after) and not own.is_down(foot, before) for own in (each[old.now], each[old.to]))
         assert 0.0 <= new.share < 1.0
-
-
-def test_a_share_begins_and_ends_without_a_step():
-    assert GaitState(0, 1, 0.4, 0.0).share == 0.0
-    assert math.isclose(GaitState(0, 1, 0.4, 0.4).share, 1.0)
-    assert GaitState(1, 1).share == 0.0
-
-
-def test_no_change_begins_while_a_foot_that_is_up_stays_up():
-    stances = [Stances((0.7, 0.2), (0.3, 0.8))] * 2
-    state = advanced(GaitState(0, 0), [walk(), run()], 1, stances, 0.4, 0.05)
-    assert not state.is_changing

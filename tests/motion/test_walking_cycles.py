@@ -1,7 +1,5 @@
 """Cycles and their stances: cut from made clips, whose speed, cadence and steps are known."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Transitions by name: which clip leads from a state to another, and which pairs have none."""
 
-from __future__ import annotations
-
 import pytest
 
 from contextdb.motion import MotionError

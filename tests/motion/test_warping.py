@@ -1,7 +1,5 @@
 """A warp reaches its target whatever the path, follows the animation's movement, and is held to a slow step-by-step oracle."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -153,32 +151,12 @@ def test_without_a_window_the_path_is_the_animations_own(given):
 # ---- what the share follows
 
 
-def test_outside_its_window_a_path_keeps_the_animations_steps():
-    path = straight([1.0] * 30)
-    found = warped(times(31), path, Window(0.2, 0.5), NEVER, Target(1.0, 2.0))
-    before, behind = found.at(0.1), (found.at(0.6), found.at(0.8))
-    assert (before.left_m, before.ahead_m) == pytest.approx((0.0, 0.1))
-    assert behind[1].left_m == pytest.approx(behind[0].left_m)
-    assert behind[1].ahead_m - behind[0].ahead_m == pytest.approx(0.2)
-
-
 def test_while_the_animation_stands_nothing_is_warped_so_that_its_feet_do_not_slide():
     path = straight([1.5] * 10 + [0.0] * 10 + [1.5] * 10)
     found = warped(times(31), path, Window(0.0, 1.0), NEVER, Target(0.4, 3.0))
     standing = [found.share_at(i / RATE).position for i in range(10, 21)]
     assert standing == pytest.approx([0.5] * 11, abs=1e-12)
     assert found.at(10 / RATE) == found.at(20 / RATE)
-
-
-def test_a_share_is_the_part_of_the_way_that_was_covered():
-    path = straight([1.0] * 10 + [3.0] * 10)
-    found = warped(times(21), path, Window(0.0, 20 / RATE), NEVER, Target(0.0, 3.0))
-    assert found.share_at(10 / RATE).position == pytest.approx(0.25)
-
-
-def test_an_animation_that_stays_on_the_spot_is_warped_evenly_in_time():
-    found = warped(times(31), straight([0.0] * 30), Window(0.0, 1.0), Window(0.0, 1.0), Target(1.0, 0.0, 1.0))
-    assert found.share_at(0.25) == pytest.approx((0.25, 0.25))
 
 
 def test_a_slow_drift_of_a_standing_body_does_not_carry_a_warp():
@@ -195,40 +173,11 @@ def test_a_short_step_does_not_carry_a_long_way_in_a_blink():
     assert (far.share_at(0.5).position, far.share_at(0.6).position) == pytest.approx((0.5, 0.6))
 
 
-def test_a_turn_is_warped_where_the_animation_turns():
-    headings = np.concatenate((np.zeros(10), np.linspace(0.0, 1.5, 11), np.full(10, 1.5)))
-    path = np.column_stack((np.zeros(31), np.arange(31) / RATE, headings))
-    found = warped(times(31), path, NEVER, Window(0.0, 1.0), Target(0.0, 0.0, 2.0))
-    assert found.share_at(10 / RATE).rotation == 0.0
-    assert found.share_at(15 / RATE).rotation == pytest.approx(0.5)
-    assert found.share_at(20 / RATE).rotation == 1.0
-
-
 def test_one_that_turns_on_the_spot_is_moved_while_it_turns_and_one_that_walks_straight_is_turned_while_it_walks():
     turning = np.column_stack((np.zeros((21, 2)), np.concatenate((np.zeros(10), np.linspace(0.0, 1.5, 11)))))
     assert warped(times(21), turning, Window(0.0, 20 / RATE), NEVER, Target(0.5, 0.0)).share_at(10 / RATE).position == 0.0
     walking = straight([0.0] * 10 + [1.0] * 10)
     assert warped(times(21), walking, NEVER, Window(0.0, 20 / RATE), Target(0.0, 1.0, 1.0)).share_at(10 / RATE).rotation == 0.0
-
-
-def test_a_body_that_was_turned_goes_on_in_the_direction_it_faces():
-    path = straight([1.0] * 30, heading=0.7)
-    found = warped(times(31), path, NEVER, Window(0.0, 0.5), Target(0.0, 0.0, math.pi / 2.0))
-    behind = found.at(0.6), found.at(0.9)
-    assert behind[1].left_m - behind[0].left_m == pytest.approx(0.3)
-    assert behind[1].ahead_m == pytest.approx(behind[0].ahead_m)
-    assert behind[1].turn_rad == pytest.approx(math.pi / 2.0)
-
-
-def test_a_body_turns_the_shorter_way():
-    found = warped(times(31), straight([1.0] * 30), NEVER, Window(0.0, 1.0), Target(0.0, 0.0, math.radians(350.0)))
-    assert found.at(1.0).turn_rad == pytest.approx(math.radians(-10.0))
-
-
-def test_without_a_turn_in_the_target_the_body_faces_as_the_animation_brings_it():
-    path = np.column_stack((np.zeros(31), np.arange(31) / RATE, np.linspace(0.0, 0.8, 31)))
-    found = warped(times(31), path, Window(0.0, 1.0), Window(0.0, 1.0), Target(1.0, 1.0))
-    assert found.at(1.0) == RootMotion(pytest.approx(1.0), pytest.approx(1.0), pytest.approx(0.8))
 
 
 # ---- targets

@@ -1,7 +1,5 @@
 """Why an asset was not chosen: each reason is named, and what is proposed is what a search with it gives."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

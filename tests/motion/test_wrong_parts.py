@@ -1,7 +1,5 @@
 """Parts of a motion search that do not go together, and numbers that are none: refused with what is accepted."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

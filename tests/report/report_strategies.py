@@ -1,7 +1,5 @@
 """Reports whose every text may be hostile: line ends, markup of every format, terminal escapes, NUL, halves of surrogate pairs."""
 
-from __future__ import annotations
-
 from hypothesis import strategies as st
 
 from contextdb.checks.rules import RULES

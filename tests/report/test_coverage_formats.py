@@ -1,7 +1,5 @@
 """Coverage in every format: hostile names stay text, numbers never round to 0 or 100, documents read back."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections import Counter

@@ -1,7 +1,5 @@
 """Documents as pages: figures sort by their size, and what a text holds is no markup."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st

@@ -1,7 +1,5 @@
 """docs/messages.md: a section for each rule, examples that are true, and the words of the reports that carry their own help."""
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """GitHub annotations, read back as the runner of GitHub Actions reads them."""
 
-from __future__ import annotations
-
 import re
 
 from hypothesis import given

@@ -1,7 +1,5 @@
 """JSON: the fixed shape, and every text as it was."""
 
-from __future__ import annotations
-
 import json
 
 from hypothesis import given

@@ -1,7 +1,5 @@
 """JUnit XML, read back by an XML parser."""
 
-from __future__ import annotations
-
 from collections import Counter
 from xml.etree import ElementTree as ET
 

@@ -1,7 +1,5 @@
 """Markdown, read back by a CommonMark parser with GitHub's tables."""
 
-from __future__ import annotations
-
 import re
 from itertools import pairwise
 

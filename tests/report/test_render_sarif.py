@@ -1,7 +1,5 @@
 """SARIF 2.1.0: held to the official schema where it is installed, and to what GitHub needs in any case."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections import Counter

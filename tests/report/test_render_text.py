@@ -1,7 +1,5 @@
 """Text for a terminal: what it says, how wide it gets and where it stops."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

@@ -1,7 +1,5 @@
 """What holds of every format, and of the report that all of them are rendered from."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """What tests of the live link share: a folder for running games of their own, tables, and waiting without a clock."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import tempfile

@@ -1,7 +1,5 @@
 """What a change would have done to recorded moments: as asking both versions moment by moment says, however files are cut."""
 
-from __future__ import annotations
-
 import json
 import random
 import tempfile

@@ -1,7 +1,5 @@
 """Telemetry on a real Dask cluster: the same sums, also when a worker is killed; a failure names the files."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

@@ -1,7 +1,5 @@
 """One list of gaps, by volume and by recorded moments: held to a loop over every moment and every context of a grid."""
 
-from __future__ import annotations
-
 import json
 import random
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Keys of contexts: exact, and counted well when there are many."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """A link: what is watched tells of itself while somebody listens, and is what it was before when nobody does."""
 
-from __future__ import annotations
-
 import copy
 import gc
 import os

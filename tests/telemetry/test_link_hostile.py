@@ -1,7 +1,5 @@
 """Hostile peers: whatever a listener sends to a game, or a game to a listener, is bounded, and costs the game nothing."""
 
-from __future__ import annotations
-
 import json
 import os
 import socket

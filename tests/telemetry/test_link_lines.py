@@ -1,7 +1,5 @@
 """The lines of a link: facts come out as they went in, whatever they are; what is no line is refused."""
 
-from __future__ import annotations
-
 import datetime
 import json
 import math

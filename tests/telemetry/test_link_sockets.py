@@ -1,7 +1,5 @@
 """Where a game is met: only by programs of the same user; and no listener, however bad, costs the game anything."""
 
-from __future__ import annotations
-
 import gc
 import json
 import os

@@ -1,7 +1,5 @@
 """Telemetry against an oracle: a plain loop over every recorded moment, with every cell of every row read anew."""
 
-from __future__ import annotations
-
 import math
 import tempfile
 from dataclasses import replace

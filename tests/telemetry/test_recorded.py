@@ -1,7 +1,5 @@
 """Recordings of a link are files of contexts: read like any others, while they grow too, and told of where they are damaged."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

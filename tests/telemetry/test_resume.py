@@ -1,7 +1,5 @@
 """Runs over telemetry that are interrupted, go on, and never count a file twice or an old one."""
 
-from __future__ import annotations
-
 import os
 import sys
 

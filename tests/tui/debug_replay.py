@@ -6,8 +6,6 @@
 `python tests/tui/update_replays.py` writes what is shown now into these files too.
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import Any

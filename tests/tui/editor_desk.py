@@ -1,7 +1,5 @@
 """A small app with a cell editor in it, for the tests of the editor."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -10,8 +10,6 @@ that call to the system inside its saves and journal, a write only half done; wi
     end             the editor is dead
 """
 
-from __future__ import annotations
-
 import os
 import random
 import signal

@@ -5,8 +5,6 @@ dialog, or a pane with keys of its own, that is shown then. The sequences come f
 before it is reported.
 """
 
-from __future__ import annotations
-
 import asyncio
 import random
 import unicodedata

@@ -1,7 +1,5 @@
 """Write what a terminal sends for keys to a file, until the key "!": python raw_reader.py FILE."""
 
-from __future__ import annotations
-
 import os
 import sys
 import tty

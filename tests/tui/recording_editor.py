@@ -5,8 +5,6 @@ python recording_editor.py TABLE FILE [HOLD]
 With the name of a third file keys do what they do elsewhere while there is no such file.
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import Any

@@ -22,8 +22,6 @@ begin with `|` are what a command shows, and a test compares them:
 `python tests/tui/update_replays.py` writes what is shown now into the files.
 """
 
-from __future__ import annotations
-
 import difflib
 import re
 import shutil

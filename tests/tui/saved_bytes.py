@@ -1,7 +1,5 @@
 """What a table that is saved has in its file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from contextdb.files.texts import new_source

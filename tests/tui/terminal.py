@@ -1,7 +1,5 @@
 """Drive a Textual app in tests without a terminal, and read its screen as text."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 from collections.abc import Awaitable, Callable, Iterator

@@ -1,7 +1,5 @@
 """The screen of actors: a small sheet for each role, whose actors the test row casts."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The dialogs Add Column and Blueprints: what there is to insert, new columns with their faults, and blueprints kept."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

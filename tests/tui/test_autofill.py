@@ -1,7 +1,5 @@
 """Autofill: the open table filled from its clips, as `contextdb motion describe --into` fills it."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Awaitable, Callable
 from contextlib import AbstractContextManager

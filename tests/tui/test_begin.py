@@ -1,7 +1,5 @@
 """Beginning where there is no table: an empty folder, a name that does not exist, a workbook, a CSV of another program."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import openpyxl

@@ -1,7 +1,5 @@
 """Rows that stand for other tables in the editor's test row, against the flat table that a game asks."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -171,7 +169,6 @@ def test_rows_behind_rows_behind_a_row_are_counted_in_a_table_that_is_opened_alo
     (tmp_path / "deep.csv").write_text("Asset,speed\na,1\nb,2\nc,7\n")
     query = QueryRow(cdb.load(tmp_path / "outer.csv"))
     query.load({"speed": "2"})
-    assert query.counts[:2] == (4, 2)
     assert query.inside(0).text == "2 of 4 rows"
     query.load({"speed": "7"})
-    assert query.counts[:2] == (4, 1)
+    assert query.inside(0).text == "1 of 4 rows"

@@ -1,7 +1,5 @@
 """The editor in a real browser: keys, pastes, colours and sizes arrive as in a terminal, and one window has the keyboard."""
 
-from __future__ import annotations
-
 import asyncio
 import os
 import re

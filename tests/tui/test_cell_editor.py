@@ -1,7 +1,5 @@
 """The cell editor in a terminal: where it stands, how it is left, bad entries and mends, pastes."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """The cell editor in a terminal: every kind of cell, its list or its picture."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The chance of each row that may be picked, and what outranks the others, beside the name of the asset; outputs of the pick."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Before a save the editor lists the moments in which something else may play, and nothing else."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

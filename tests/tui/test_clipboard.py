@@ -1,7 +1,5 @@
 """Tab-separated text as spreadsheets write it, and the shapes in which it is pasted."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st

@@ -1,7 +1,5 @@
 """The sheet of columns: many columns are changed, made, moved and taken away in one step, and contextdb.toml says so."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A column as a whole: its values with their counts, mends and replacements, tests of the filter, several keys to sort by."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

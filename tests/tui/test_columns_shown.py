@@ -1,7 +1,5 @@
 """Columns that are hidden, folded to a group, or frozen: what is seen, where the cursor goes, and that the file stays as it is."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

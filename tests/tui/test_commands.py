@@ -1,7 +1,5 @@
 """The commands: one list for keys, palette, help and keymap; each of them runs wherever one is."""
 
-from __future__ import annotations
-
 import inspect
 import re
 from collections import Counter

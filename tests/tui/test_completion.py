@@ -1,7 +1,5 @@
 """Completion, ticks, and the texts of numbers: what an editor does to a text, without a terminal."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st

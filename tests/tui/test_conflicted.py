@@ -1,7 +1,5 @@
 """A file with git's marks is opened as choices."""
 
-from __future__ import annotations
-
 import subprocess
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Dialogs that keep edits safe: conflicts decided one by one, leaving with unsaved edits, a table that is open elsewhere."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

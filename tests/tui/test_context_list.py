@@ -1,7 +1,5 @@
 """The list of contexts: stepping, what is expected, saving, and long recordings."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

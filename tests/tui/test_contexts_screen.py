@@ -1,7 +1,5 @@
 """The dialog of the contexts: load, filter, save, rename, delete, open another file."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Mapping
 from pathlib import Path

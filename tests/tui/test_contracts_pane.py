@@ -1,7 +1,5 @@
 """The Contracts tab: sentences, proved as one types; Enter takes the counterexample to the test row."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

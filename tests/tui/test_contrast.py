@@ -1,7 +1,5 @@
 """Text can be read on its ground in every theme."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """The Coverage tab: what it shows of a report, what its keys tell the screen, and what becomes of it after an edit."""
 
-from __future__ import annotations
-
 from collections.abc import Awaitable, Callable, Mapping
 from importlib import import_module
 from threading import Event

@@ -1,7 +1,5 @@
 """A run in the background: what it tells, how an edit stops it, and what is known afterwards."""
 
-from __future__ import annotations
-
 from threading import Event
 
 import pytest

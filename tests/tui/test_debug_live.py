@@ -1,7 +1,5 @@
 """The debugger of a running game: what a link tells in full is what a recorder keeps, and the screen follows it."""
 
-from __future__ import annotations
-
 import json
 import random
 import sys

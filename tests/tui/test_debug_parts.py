@@ -1,7 +1,5 @@
 """The parts of the debugger without a screen: canvas, camera, weights by steps, bars, and what it says of jumps."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

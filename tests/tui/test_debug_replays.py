@@ -1,7 +1,5 @@
 """Replay files of the debugger show what its screen shows now."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import debug_replay

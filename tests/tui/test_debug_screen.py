@@ -1,7 +1,5 @@
 """The debugger's screen, with keys: it shows what `motion replay --json` says, answers the four questions, and writes weights."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Awaitable, Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What dialogs share: one kind of button, a title and keys in the frame, and room for what is longer than the screen."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

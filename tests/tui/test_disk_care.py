@@ -1,7 +1,5 @@
 """A screen that takes in what others write: merged, asked about, told once."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Awaitable, Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Long work on a sheet: its share is said, Esc stops it, keys wait, and it is one step."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import count
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Signs of which terminals differ in the width: on the screen each takes as many cells as the layout counts for it."""
 
-from __future__ import annotations
-
 import pytest
 from rich.cells import cell_len
 from terminal import press, screen_text, with_editor

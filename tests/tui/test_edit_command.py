@@ -1,7 +1,5 @@
 """`contextdb edit`: where it cannot run it says so in one message, with exit code 2, and leaves the terminal alone."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The clipboard: what is copied goes as far as it can, and what is pasted is the newest."""
 
-from __future__ import annotations
-
 import subprocess
 from dataclasses import dataclass, field
 from typing import Any

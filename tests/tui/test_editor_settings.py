@@ -1,7 +1,5 @@
 """What a person sets: themes and keys, and what is said of a file that cannot be taken."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -25,11 +25,13 @@ from contextdb.errors import ContextDBError
 from contextdb.exchange.formats import FORMATS, ReadOptions, write
 from contextdb.exchange.mapping import as_job
 from contextdb.exchange.reading import Reading
+from contextdb.exchange.remembered import Choices
 from contextdb.tables.table import Table
 from tui.model.importing import Draft, Import, Mode
 from tui.model.sheet import Sheet
 from tui.screens.export_table import Export, ExportDialog
 from tui.screens.import_table import ImportDialog
+from tui.widgets.line_list import LineList
 
 TOML = '[conditions.speed]\ntype = "number"\n[conditions.pos]\ntype = "enum"\nvalues = ["CB", "FS"]\n'
 
@@ -117,18 +119,18 @@ def test_new_columns_are_added_with_their_declarations(table: Table):
 def test_a_column_can_be_left_out_or_become_another_condition(table: Table):
     found = draft(table, "name;velocity\nrun;5\n")
     assert found.becomes(1) == "+ new number"
-    labels = [choice.label for choice in found.choices(1)]
+    labels = [choice.label for choice in found.choices_for(1)]
     assert labels[:3] == ["(left out)", "Asset Name (asset)", "speed"]
     assert labels[-1] == "new column of data"
-    found.choose(1, next(choice.mapped for choice in found.choices(1) if choice.label == "speed"))
+    found.choose(1, next(choice.mapped for choice in found.choices_for(1) if choice.label == "speed"))
     assert texts(found.edit().apply(table))["speed"] == ["1..2", "5", "0"]
-    found.choose(1, found.choices(1)[0].mapped)
+    found.choose(1, found.choices_for(1)[0].mapped)
     assert not found.edit().changes
 
 
 def test_two_columns_never_become_the_same(table: Table):
     found = draft(table, "name;velocity;speed\nrun;5;6\n")
-    found.choose(1, next(choice.mapped for choice in found.choices(1) if choice.label == "speed"))
+    found.choose(1, next(choice.mapped for choice in found.choices_for(1) if choice.label == "speed"))
     assert [found.becomes(at) for at in range(3)] == ["Asset Name (asset)", "speed", "(left out)"]
     assert found.label(2) == "(left out)"
 
@@ -286,6 +288,44 @@ def test_a_sheet_is_chosen_where_a_workbook_has_several(table: Table):
     assert answer.edit.apply(table).assets == ["jog", "run", "idle", "Other_jog"]
 
 
+def test_rows_and_decimals_are_asked_for_once_and_the_next_file_of_that_name_is_one_key(table: Table):
+    assert table.path is not None
+    for week, more in ((12, []), (13, [["hop", "2,5"]])):
+        book = openpyxl.Workbook()
+        sheet = book.worksheets[0]
+        for row in (["Moves of the week"], ["x", "y"], ["1", "2"], [], ["Asset", "speed"], ["sprint", "0,5"], *more):
+            sheet.append(row)
+        book.save(table.path.parent / "work" / f"W{week}.xlsx")
+
+    async def choosing(pilot: Pilot[Any]) -> None:
+        await read_file(pilot, "W12.xlsx")
+        assert "the sheet holds" not in screen_text(pilot.app)  # blank rows belong to a table; so it is one, of wrong rows
+        await pilot.press("f4")
+        await pilot.pause()
+        lines = pilot.app.screen.query_one("#rows-lines", LineList)
+        assert lines.index == 1
+        await pilot.press("down", "down", "down", "enter", "f6")
+        await pilot.pause()
+        await settled(pilot)
+        assert "0,5 → 0 ± 5" in screen_text(pilot.app)
+        await pilot.press("down", "enter")  # the list of decimals is open: a comma
+        await pilot.pause()
+        await settled(pilot)
+        assert "0,5 → 0 ± 5" not in screen_text(pilot.app)
+        await pilot.press("f6")
+
+    [answer], _ = played(importing(table), choosing)
+    assert answer.edit.apply(table).text(3, "speed") == "0.5"
+
+    async def again(pilot: Pilot[Any]) -> None:
+        await read_file(pilot, "W13.xlsx")
+        await pilot.press("f6")
+
+    [answer], _ = played(importing(table), again)
+    after = answer.edit.apply(table)
+    assert (after.assets[3:], after.text(4, "speed")) == (["sprint", "hop"], "2.5")
+
+
 NAMES_SAID = 'column "where": each text is one name, such as "Mid Air"; Names, "each word is a name", reads each word as a name.'
 
 
@@ -293,7 +333,7 @@ def test_a_text_with_blanks_is_one_name_or_several_as_it_is_chosen(table: Table)
     raw = b"name;where\nrun;Mid Air\nsprint;Mid\n"
     cells = {None: ['"Mid Air"', "Mid"], "whole": ['"Mid Air"', "Mid"], "words": ["Mid Air", "Mid"]}
     for names, expected in cells.items():
-        found = Draft.read(table, raw, "more.csv", ReadOptions("csv"), names)
+        found = Draft.read(table, raw, "more.csv", ReadOptions("csv"), Choices(names=names or ""))
         after = texts(found.edit().apply(table))
         assert [after["where"][1], after["where"][3]] == expected
         assert (NAMES_SAID in found.notes) is (names is None)
@@ -305,7 +345,7 @@ def test_a_table_of_ours_keeps_its_cells_where_nothing_else_is_chosen(table: Tab
     ours.write_text("name,where\nrun,Mid Air\n", encoding="utf-8")
     ours.with_name("contextdb.toml").write_text(f"{TOML}[tables.ours]\n", encoding="utf-8")
     for names, cell in ((None, "Mid Air"), ("whole", '"Mid Air"')):
-        found = Draft.read(table, ours.read_bytes(), str(ours), ReadOptions(), names)
+        found = Draft.read(table, ours.read_bytes(), str(ours), ReadOptions(), Choices(names=names or ""))
         assert texts(found.edit().apply(table))["where"][1] == cell
 
 

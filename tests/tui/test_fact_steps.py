@@ -1,7 +1,5 @@
 """Undo in the test row: it takes back facts, and never an edit of the table."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Cells that fail: counted in the gutter, pointed at from the edges, and gone to by a key."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

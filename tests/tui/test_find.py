@@ -1,7 +1,5 @@
 """Find and replace over the cells of a sheet."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """The test row follows a game: a link in this process and in another, a recording, and games that end, stop and flood."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import os

@@ -3,8 +3,6 @@
 The keys are those of section 9 of docs/tutorial.md.
 """
 
-from __future__ import annotations
-
 import shutil
 import sys
 import tempfile

@@ -1,7 +1,5 @@
 """The grid: what is painted, where the cursor goes, and that no table and no window is too odd for it."""
 
-from __future__ import annotations
-
 from itertools import product
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The mouse in the grid: what a click, a drag and a double click do, wherever they go."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """What the hands know from Excel: runs of Tabs, prefixes, new values from the cell, series, the menu of the right button."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """The loudest line says what plays and how many rows are valid; a row that misses by one cell stands out from the others."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """The heat map: squares that never round to 0 or 100, labels that stay, a cursor that is seen without colour."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import pytest

@@ -1,7 +1,5 @@
 """No edit of a selection changes a cell that is hidden, and each says how much of the selection is hidden."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import pytest

@@ -1,7 +1,5 @@
 """Pictures of sets of numbers, against an oracle that asks the cell at sample points."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

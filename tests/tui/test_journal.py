@@ -1,7 +1,5 @@
 """Unsaved edits come back after a kill at any byte, and two editors know of each other."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

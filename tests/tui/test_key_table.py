@@ -1,7 +1,5 @@
 """The page of keys: it has every key of the program, and what it says of terminals is what they send and what the editor reads."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What terminals send, read as keys: never a part of a key as text, and never a text lost."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import pytest

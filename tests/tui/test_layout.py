@@ -1,7 +1,5 @@
 """Where columns stand: every one can be reached, and what stands at a place is what was put there."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st

@@ -1,7 +1,5 @@
 """What is opened now and then costs nothing before: the bars under the grid, and the lists of a form."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from terminal import press, screen_text, with_editor

@@ -1,7 +1,5 @@
 """The screen of a table: its tabs and lines, what is said, saving, leaving, and other tables of the folder."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

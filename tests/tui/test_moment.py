@@ -1,7 +1,5 @@
 """A moment of a gap that the test row can take: derived facts come out as the gap says, though they cannot be typed."""
 
-from __future__ import annotations
-
 import pytest
 
 from contextdb.errors import ContextError

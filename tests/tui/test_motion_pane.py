@@ -1,7 +1,5 @@
 """The tab Motion: the sessions of a project and the games that run, the debugger inside the editor, and the way to a row."""
 
-from __future__ import annotations
-
 import asyncio
 import os
 import shutil

@@ -1,7 +1,5 @@
 """The dialog that says why a row is not valid, and which rows are nearest."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

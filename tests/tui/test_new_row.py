@@ -1,7 +1,5 @@
 """The empty row below the last one: it takes what is typed and pasted, and no other row is changed from there."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """A new table: its name, its file, its columns, and that it opens."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Notes on cells and colours of rows, texts found in all tables, copied cells inserted, and what the mouse drags elsewhere."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

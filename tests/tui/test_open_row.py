@@ -1,7 +1,5 @@
 """Going into the table that a row stands for, and back to the row."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

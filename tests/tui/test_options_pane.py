@@ -1,7 +1,5 @@
 """The tab Options: settings become edits, and what cannot be meant stays in its field with the reason."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Cells of outputs in the editor: what they may say is offered, and what the game could not read is refused."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """What is kept from one painting to the next: the screen looks after each step as if all of it were painted anew."""
 
-from __future__ import annotations
-
 import pytest
 from editor_desk import CHART, HIT, SPEED, STATE, WAY, Desk, checker
 from terminal import drive, press, with_editor

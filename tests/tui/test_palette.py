@@ -1,7 +1,5 @@
 """The palette finds a command by what people call it, above all people who come from Excel."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Recorded moments in the Coverage tab: the numbers of the command line, rows that were never used, and a key to the moment."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import time

@@ -1,7 +1,5 @@
 """Selectors for the test context: which assets are valid, what wins, and other orders of databases."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

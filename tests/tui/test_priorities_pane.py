@@ -1,7 +1,5 @@
 """The tab Priorities: databases in order, what wins for the test row, and edits of the order."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The Problems tab: findings of the table as it is, errors first, a filter, and the way to the cell."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Awaitable, Callable
 from pathlib import Path
@@ -9,6 +7,7 @@ from threading import Event
 from typing import Any
 
 import pytest
+from strategies import in_full_runs
 from terminal import drive, press, screen_text, settled, with_editor
 from textual.app import App, ComposeResult
 from textual.pilot import Pilot
@@ -187,6 +186,7 @@ def test_rows_that_cause_a_problem_are_named(table):
     assert "(row 1)" in twin.text
 
 
+@in_full_runs  # a check that ends when it is no longer wanted every day
 def test_a_large_table_is_checked_beside_the_keys():
     n_rows = 20_001
     names = [f"b{i}" for i in range(9)]

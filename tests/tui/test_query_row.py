@@ -1,7 +1,5 @@
 """The test row of the editor against query and explain."""
 
-from __future__ import annotations
-
 import numpy as np
 from edit_strategies import edits_of
 from hypothesis import given

@@ -1,7 +1,5 @@
 """What one should know of an import is shown whole, to read through, where it is more than a line."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from terminal import press, screen_text, with_editor

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from terminal import press, said, screen_text, with_editor
-from test_renaming import FILES, texts, write
+from test_renaming import FAMILY, FILES, family, family_now, texts, write
 
 from contextdb.edits.renaming import renaming
 from contextdb.errors import TableError
@@ -87,3 +87,27 @@ def test_a_column_that_nothing_else_names_is_renamed_as_one_step(folder):
 
     after, undone = with_editor(folder / "a.csv", script)
     assert (after[2], undone[2]) == ("gap", "closing")
+
+
+def test_a_rename_in_the_base_carries_an_open_variant_and_projects_that_extend_and_is_one_step(tmp_path):
+    studio = family(tmp_path) / "studio"
+
+    async def script(app, pilot):
+        assert app.workspace.session("boss").sheet.table.condition("speed").condition.name == "speed"
+        await press(pilot, "right")
+        await rename(pilot, "pace")
+        question = screen_text(app)
+        await press(pilot, "enter")
+        message, names = said(app), [c.condition.name for c in app.workspace.session("boss").sheet.table.conditions]
+        now = family_now(tmp_path)
+        await press(pilot, "ctrl+z")
+        return question, message, names, now, [c.condition.name for c in app.workspace.session("boss").sheet.table.conditions]
+
+    question, message, names, now, undone = with_editor(studio / "human.csv", script, (120, 30))
+    assert "2 extending projects" in question
+    assert "../game/moves.csv" in message
+    assert "pace" in names
+    assert "speed" not in names
+    assert "speed" in undone
+    assert "pace" in now["far/all.csv"]
+    assert family_now(tmp_path) == FAMILY

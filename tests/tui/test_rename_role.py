@@ -1,7 +1,5 @@
 """Roles and assets get another name in a whole project or in one table, and Ctrl+Z takes it back."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A value is renamed in one table as a step, or in the whole project, with all that speaks of it."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Each file of replays/ is a session with the editor: what it shows is what the editor shows."""
 
-from __future__ import annotations
-
 import pytest
 import replay
 from strategies import some

@@ -1,7 +1,5 @@
 """Below a list of gaps, problems or databases are the rows of the table that its line is about, where there is room for them."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The column of rows' own rules in the editor: text that is checked, marked where it cannot be read or does not hold."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

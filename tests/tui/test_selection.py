@@ -1,7 +1,5 @@
 """Moving and selecting with the keys of a spreadsheet."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st

@@ -1,7 +1,5 @@
 """A table that is being edited: its file, its journal, its saves."""
 
-from __future__ import annotations
-
 import errno
 import os
 import shutil

@@ -1,7 +1,5 @@
 """The sheet under any sequence of its verbs."""
 
-from __future__ import annotations
-
 import pytest
 from edit_strategies import edits_of, insert_column
 from hypothesis import given

@@ -1,7 +1,5 @@
 """What the sheet says is what the game does: marks, F12, saved contexts and `contextdb query` agree, row by row."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import tempfile

@@ -1,7 +1,5 @@
 """Sorting and filtering are views: no row is lost or doubled."""
 
-from __future__ import annotations
-
 import numpy as np
 from edit_strategies import edits_of
 from hypothesis import given

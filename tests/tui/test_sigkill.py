@@ -1,8 +1,6 @@
 """Killed with SIGKILL at any moment while editing and saving: the file is the old or the new one, and all edits but the one in
 progress come back."""
 
-from __future__ import annotations
-
 import os
 import random
 import signal

@@ -1,7 +1,5 @@
 """Screens of every size: nothing fails, and what matters most is still seen."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

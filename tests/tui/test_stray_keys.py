@@ -1,7 +1,5 @@
 """No key goes astray: what is typed goes to what is shown, and no cell changes that is not seen."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

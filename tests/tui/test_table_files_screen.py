@@ -1,7 +1,5 @@
 """Tables are renamed, copied and deleted in the editor; it goes on with what is there then."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

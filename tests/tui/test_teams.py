@@ -1,7 +1,5 @@
 """Actors for the test row: how they are written and kept; rows are valid when their roles can be filled, as by brute force."""
 
-from __future__ import annotations
-
 import json
 from itertools import permutations
 from pathlib import Path

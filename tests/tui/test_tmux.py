@@ -3,8 +3,6 @@
 Nothing sleeps to be safe: each step waits until the screen shows what it is to show.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import shutil
@@ -18,7 +16,7 @@ from pathlib import Path
 
 import pytest
 from motion_project import session_folder
-from strategies import in_full_runs, some
+from strategies import in_full_runs
 from textual.binding import Binding
 
 from tui.commands import COMMANDS
@@ -323,7 +321,8 @@ def test_the_debugger_works_in_a_real_terminal(terminal):
 # ---- a cell that is edited
 
 
-@pytest.mark.parametrize("size", some([(80, 24), (120, 36), (160, 48)], 3), ids=lambda size: f"{size[0]}x{size[1]}")
+@in_full_runs  # tests/tui/test_stray_keys.py every day
+@pytest.mark.parametrize("size", [(80, 24), (120, 36), (160, 48)], ids=lambda size: f"{size[0]}x{size[1]}")
 def test_what_is_typed_goes_to_the_tab_or_the_bar_that_was_opened_over_a_cell(terminal, size):
     terminal.start("screen-256color")
     terminal.resize(*size)

@@ -1,7 +1,5 @@
 """The keys of each tab and dialog in a real terminal, in the encoding of old: each does there what the page of keys says."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import tempfile

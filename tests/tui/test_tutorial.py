@@ -1,7 +1,5 @@
 """Section 8 of docs/tutorial.md, pressed and pasted as it is written there, in an empty folder."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from pathlib import Path

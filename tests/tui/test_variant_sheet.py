@@ -1,7 +1,5 @@
 """A variant in the editor: every row of its base is there, what is inherited is grey, and typing overrides."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Why rows are not valid, cell by cell, against explain."""
 
-from __future__ import annotations
-
 from hypothesis import given
 from hypothesis import strategies as st
 from strategies import examples, sets, tables

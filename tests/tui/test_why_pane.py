@@ -1,7 +1,5 @@
 """The side pane Why: beside the table where there is room, after the cursor, and a dialog elsewhere."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

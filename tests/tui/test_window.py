@@ -1,7 +1,5 @@
 """The part of a sheet on the screen: what it says of rows and cells is what the sheet says."""
 
-from __future__ import annotations
-
 import pytest
 
 from contextdb.columns import TextColumn

@@ -1,7 +1,5 @@
 """A folder of tables: which there are, what they are called, and which are open."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Write what the editor and the debugger show now into their replay files; with names only into those."""
 
-from __future__ import annotations
-
 import sys
 
 import debug_replay

@@ -83,10 +83,10 @@ def _displayed_points(displayed: Displayed, index: int) -> Floats:
     at = displayed.positions[index].astype(np.float64)
     across, along = at[:, 0] - x, at[:, 2] - z
     sin, cos = np.sin(heading), np.cos(heading)
-    return _pairs(np.stack((cos * across - sin * along, at[:, 1], sin * across + cos * along), axis=1), displayed.parents)
+    return bones_between(np.stack((cos * across - sin * along, at[:, 1], sin * across + cos * along), axis=1), displayed.parents)
 
 
-def _pairs(positions: Floats, parents: Ints) -> Floats:
+def bones_between(positions: Floats, parents: Ints) -> Floats:
     """Joints [J, 3] as bones; a joint that stays on the ground is none."""
     children = np.flatnonzero(parents >= 0)
     starts = positions[parents[children]]
@@ -99,7 +99,7 @@ def _bones(banks: Mapping[str, PoseBank], database: str, asset: str, mirrored: b
     bank = banks.get(database)
     if bank is None:
         return NO_BONES
-    return _pairs(bank.joints_at(bank.range_of(asset, mirrored), time_s), bank.skeleton.parents)
+    return bones_between(bank.joints_at(bank.range_of(asset, mirrored), time_s), bank.skeleton.parents)
 
 
 def wanted_path(moment: Moment) -> Floats:
@@ -136,7 +136,7 @@ def _got(recording: Recording, index: int) -> Floats:
     line = recording.line
     n = round(AHEAD_S * line.rate)
     roots = line.roots[max(0, index - n) : index + n + 1]
-    return _in_body(roots[:, 0], roots[:, 1], line.roots[index])
+    return in_body(roots[:, 0], roots[:, 1], line.roots[index])
 
 
 def _paths(moment: Moment) -> Iterator[Floats]:
@@ -151,10 +151,10 @@ def _paths(moment: Moment) -> Iterator[Floats]:
         rate = 30.0 if database.schema is None else database.schema.rate
         stop = min(row.frame + round(AHEAD_S * rate) + 1, int(database.stops[row.range]))
         root = np.asarray(database.root[row.frame : stop], np.float64)
-        yield _in_body(root[:, 0], root[:, 1], root[0])
+        yield in_body(root[:, 0], root[:, 1], root[0])
 
 
-def _in_body(x: Floats, z: Floats, place: Floats) -> Floats:
+def in_body(x: Floats, z: Floats, place: Floats) -> Floats:
     """Points on the ground, seen from a body at a place."""
     sin, cos = np.sin(place[2]), np.cos(place[2])
     x, z = x - place[0], z - place[1]
@@ -169,5 +169,5 @@ def grid(place: tuple[float, float, float], half_m: float = 2.0) -> tuple[Floats
     across = [((x0 + low, z0 + s), (x0 + high, z0 + s)) for s in steps]
     along = [((x0 + s, z0 + low), (x0 + s, z0 + high)) for s in steps]
     points = np.array(across + along)
-    ends = [_in_body(points[:, i, 0], points[:, i, 1], np.array(place)) for i in (0, 1)]
+    ends = [in_body(points[:, i, 0], points[:, i, 1], np.array(place)) for i in (0, 1)]
     return ends[0], ends[1]

@@ -13,14 +13,18 @@ from typing import Any, Literal
 import numpy as np
 
 from contextdb.cells.kinds import KINDS
+from contextdb.cells.words import quoted
 from contextdb.columns import TextColumn
 from contextdb.edits.edits import edit_between
 from contextdb.errors import ContextDBError, Fault, TableError, nearest, plural, safe_text
+from contextdb.exchange.decimal_commas import PAIR, as_pair
 from contextdb.exchange.formats import FORMATS, ReadOptions, read
 from contextdb.exchange.importing import NAMES, decimal_commas_reported, has_whole_names, whole_names_sentence
 from contextdb.exchange.mapping import COLUMN_JOBS, Mapped, as_condition, as_job, as_type, propose
+from contextdb.exchange.pairs import with_intervals
 from contextdb.exchange.proposals import names_of
 from contextdb.exchange.reading import Reading, listed
+from contextdb.exchange.remembered import NOTHING_CHOSEN, Choices, chosen_columns
 from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict
 from contextdb.tables.changes import CameFrom, Edit
 from contextdb.tables.table import Table
@@ -33,6 +37,9 @@ MODES: dict[Mode, str] = {
     "append": "all added at the end",
     "replace": "in place of those of the table",
 }
+DECIMAL_COMMA = "0,5 is 0.5"
+"""The choice of a decimal comma."""
+NUMERIC = frozenset(name for name, kind in KINDS.items() if kind.is_numeric)
 N_SHOWN = 3
 """Cells of a column that are displayed before it is imported."""
 
@@ -57,23 +64,41 @@ class Choice:
 class Draft:
     """A file that was read, and what is decided of it so far."""
 
-    def __init__(self, table: Table, reading: Reading, name: str, tells_names: bool = True, tells_commas: bool = True) -> None:
-        """`name` is what the file is called in the step's name; `tells_names` says in the notes which texts became one name,
-        `tells_commas` which numbers have a comma."""
+    def __init__(self, table: Table, reading: Reading, name: str, chosen: Choices = NOTHING_CHOSEN) -> None:
+        """`name` is what the file is called in the step's name; `chosen` is what a person said of it before."""
         self.table = table
-        self.reading = reading
         self.name = name
-        self.tells_names, self.tells_commas = tells_names, tells_commas
-        self.mode: Mode = "merge"
-        self.columns: list[Mapped] = list(propose(reading, self._schema, self._settings))
+        self.chosen = chosen
+        apart = {*table.schema.conditions, *(column.name for column in table.columns), *chosen.columns}
+        paired = with_intervals(reading, apart)
+        self.has_pairs = paired is not reading
+        """Whether columns of least and greatest values are, or could be, one interval."""
+        self.reading = reading if chosen.pairs == "apart" else paired
+        self.mode: Mode = next((mode for mode in MODES if mode == chosen.mode), "merge")
+        self.columns = chosen.applied(propose(self.reading, self._schema, self._settings), self.reading, self._schema)
 
     @classmethod
-    def read(cls, table: Table, raw: bytes, name: str, options: ReadOptions, names: str | None = None) -> Draft:
-        """Read a file for a table; `names` is how its texts are read, "whole" or "words", where that is given. Raises
-        ContextDBError where it cannot be read, with every fault."""
-        whole = has_whole_names(names, Path(name))
-        reading = read(raw, name, replace(options, has_whole_names=whole))
-        return cls(table, reading, Path(name).name, not names, options.is_decimal_comma is None)
+    def read(cls, table: Table, raw: bytes, name: str, options: ReadOptions, chosen: Choices = NOTHING_CHOSEN) -> Draft:
+        """Read a file for a table, as a person chose. Raises ContextDBError where it cannot be read, with every fault."""
+        whole = has_whole_names(chosen.names or None, Path(name))
+        is_comma = chosen.decimal == "comma" if chosen.decimal else options.is_decimal_comma
+        sheet = chosen.sheet or options.sheet
+        reading = read(raw, name, replace(options, sheet=sheet, is_decimal_comma=is_comma, has_whole_names=whole))
+        return cls(table, reading, Path(name).name, chosen)
+
+    @property
+    def choices(self) -> Choices:
+        """What a person chose so far, for the next file of this name."""
+        mode = "" if self.mode == "merge" else self.mode
+        columns = {name: one for name, one in self.chosen.columns.items() if name not in self.reading.names}
+        return replace(self.chosen, mode=mode, columns={**columns, **chosen_columns(self.columns)})
+
+    @property
+    def comma_doubts(self) -> list[str]:
+        """What nobody said yet of numbers with a comma, which may be decimals: a sentence for each column."""
+        if self.chosen.decimal:
+            return []
+        return decimal_commas_reported(self.columns, self.reading, self._schema, f'the choice "{DECIMAL_COMMA}"')
 
     @property
     def _schema(self) -> Schema:
@@ -89,8 +114,20 @@ class Draft:
 
     def preview(self, at: int) -> str:
         """The first cells of a column, as one text."""
-        column = self.reading.columns[at]
-        return " · ".join(column[row].strip() or "(empty)" for row in range(min(N_SHOWN, column.n_rows)))
+        column, mapped = self.reading.columns[at], self.columns[at]
+        return " · ".join(self._cell(column[row].strip(), mapped, row) or "(empty)" for row in range(min(N_SHOWN, column.n_rows)))
+
+    def _cell(self, text: str, mapped: Mapped, row: int) -> str:
+        """A text of the file, and where that is another the cell that it becomes."""
+        cell = mapped.cells[row] if mapped.cells is not None else text
+        if PAIR.fullmatch(cell) and self._kind(mapped) in NUMERIC:
+            return f"{text} → {as_pair(cell)}"
+        return text if cell in (text, quoted(text)) else f"{text} → {cell}"
+
+    def _kind(self, mapped: Mapped) -> str:
+        """The type of the condition that a column becomes; empty for another job."""
+        declared = self._schema.conditions.get(mapped.name)
+        return "" if mapped.job != "condition" else mapped.kind if mapped.is_new else declared.domain.kind if declared else ""
 
     def becomes(self, at: int) -> str:
         """What a column becomes, in few words."""
@@ -115,7 +152,7 @@ class Draft:
         """Which of the choices of a column is taken."""
         mapped = self.columns[at]
         same = (mapped.job, mapped.name, mapped.declared and mapped.declared["type"])
-        choices = self.choices(at)
+        choices = self.choices_for(at)
         return next(
             (c.label for c in choices if (c.mapped.job, c.mapped.name, c.mapped.declared and c.mapped.declared["type"]) == same), ""
         )
@@ -125,7 +162,7 @@ class Draft:
         mapped = self.columns[at]
         return mapped.job != "left out" and (mapped.n_unreadable > 0 or not self._is_here(mapped))
 
-    def choices(self, at: int) -> list[Choice]:
+    def choices_for(self, at: int) -> list[Choice]:
         """All that a column may become, the likeliest first."""
         return list(self._choices(at))
 
@@ -219,11 +256,9 @@ class Draft:
         have = {self._name(column) for column in self.columns if column.job != "left out"}
         missing = [name for name in self._names if name not in have]
         missing_note = [f"Not in the file: {listed(missing, 3)}. New rows are empty there, others stay."] if missing else []
-        names_note = whole_names_sentence(self.columns, self.reading, f'Names, "{NAMES["words"]}",') if self.tells_names else ""
-        commas = (
-            decimal_commas_reported(self.columns, self.reading, self._schema, 'Decimal sign, "comma",') if self.tells_commas else []
-        )
-        return (*map(str, self.reading.remarks), *commas, *([names_note] if names_note else []), *missing_note)
+        words = f'Names, "{NAMES["words"]}",'
+        names_note = "" if self.chosen.names else whole_names_sentence(self.columns, self.reading, words)
+        return (*self.comma_doubts, *map(str, self.reading.remarks), *([names_note] if names_note else []), *missing_note)
 
     def answer(self) -> Import:
         """What the dialog gives back."""

@@ -16,10 +16,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from contextdb.disk.own_files import FOLDER as FOLDER
 from contextdb.disk.own_files import NOT_OURS, make_own_folder, open_own, read_own, rewrite_own
 from contextdb.errors import Fault, FileError
 
-FOLDER = ".contextdb-journal"
 MOST_BYTES = 1000
 
 

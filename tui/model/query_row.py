@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,16 +36,6 @@ MOST_PLAYED = 50
 """So many rows that may be picked are looked at, to name the asset where it is one."""
 MOST_EXPLAINED = 50
 """So many rows behind one row are looked through for the cells of it that keep actors from a role."""
-
-
-class Counts(NamedTuple):
-    """The rows of a table, those behind its rows counted instead of them."""
-
-    n_rows: int
-    n_valid: int
-    """Of these the valid ones."""
-    n_decided: int
-    """Of those the ones that are valid whatever is not known."""
 
 
 class QueryRow:
@@ -158,14 +147,6 @@ class QueryRow:
         names = None if self.actors else frozenset(name for name in self._places if self.facts[name] is not None)
         return TableAnswer(queried, queried.compiled(names), self.given, actors)
 
-    @property
-    def counts(self) -> Counts:
-        """The rows of the table, those behind its rows counted instead of them."""
-        if self.answer is None:
-            return Counts(self._queried.flat.n_rows, 0, 0)
-        n_valid = len(self.answer.matches)
-        return Counts(self._queried.flat.n_rows, n_valid, n_valid - self.answer.explained.undecided.bit_count())
-
     def answers(self) -> Iterator[tuple[str, bool]]:
         """The assets of the table, those behind its rows instead of these, and whether each is valid."""
         if self.answer is not None:
@@ -269,6 +250,13 @@ class QueryRow:
             return "may be valid: for some values of the facts"
         named = some(name for name in lacking)
         return f"may be valid: its rule needs {named}" if named else "may be valid: its rule has no value"
+
+    @property
+    def pickable(self) -> list[str]:
+        """The assets that may be picked, in the order of the table; else the fallback."""
+        rows = self.outcome.candidates[:MOST_PLAYED].tolist() if self.answer is not None else []
+        assets = list(dict.fromkeys(self.outcome.compiled.assets[row] for row in rows))
+        return assets or [name for name in (self._table.settings.fallback,) if name]
 
     @property
     def headline(self) -> str:

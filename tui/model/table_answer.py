@@ -164,6 +164,10 @@ class TableAnswer:
         """The rows of the flat table that come from a row of the sheet."""
         return np.flatnonzero(self._table.own == row) if self._table.inner else np.array([row])
 
+    def row_of_sheet(self, flat: int) -> int:
+        """The row of the sheet that a row of the flat table comes from."""
+        return int(self._table.own[flat])
+
     def valid_rows(self, row: int) -> list[int]:
         """The valid rows of the flat table that come from a row of the sheet."""
         return [flat for flat in self.rows_of(row).tolist() if self.matches.bits >> flat & 1]

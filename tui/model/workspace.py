@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -141,7 +142,11 @@ class Workspace:
 
     def _write_renaming(self, name: str, renaming: Renaming, names: Mapping[str, str]) -> tuple[str, ...]:
         paths = {real_path(file.path) for file in renaming.files}
-        open_here = [one for one, session in self.sessions.items() if real_path(session.path) in paths or one == name]
+        open_here = [
+            one
+            for one, session in self.sessions.items()
+            if one == name or real_path(session.path) in paths or is_variant(session.sheet.table)
+        ]
         if waiting := [one for one in open_here if one in self.unsaved]:
             problem = f"{some(waiting)} {'has' if len(waiting) == 1 else 'have'} unsaved edits, and the rename is written at once."
             raise TableError(Fault(problem, "tables that are saved", "to save first: Ctrl+S"))
@@ -151,7 +156,7 @@ class Workspace:
         for one in open_here:
             query = self.sessions[one].sheet.query
             self.reopen(one).sheet.query.load({names.get(fact, fact): text for fact, text in query.texts.items()})
-        return tuple(file.path.name for file in renaming.files)
+        return tuple(Path(os.path.relpath(file.path, self.folder)).as_posix() for file in renaming.files)
 
     @property
     def unsaved(self) -> list[str]:

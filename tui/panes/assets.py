@@ -11,18 +11,20 @@ import numpy as np
 from textual import on
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
-from textual.containers import Container
+from textual.containers import Container, Vertical
 from textual.geometry import Size
 
 from contextdb.cells.words import MARK
 from contextdb.columns import TextColumn
 from contextdb.errors import ContextDBError, Fault, plural
+from contextdb.tables.data import known_conditions
 
 from ..clipboard import Clipboard
 from ..messages import Edited, Notice, RenameWanted
 from ..model.column_values import selection_summary
 from ..model.find import PatternError, Search
 from ..model.notes import COLOURS, Notes
+from ..model.rule_builder import RuleBuilder
 from ..model.selection import Block
 from ..model.sheet import READS_ONLY, Done, Sheet
 from ..model.table_answer import Offered, fact_fault
@@ -56,6 +58,7 @@ class AssetsPane(SheetView):
     AssetsPane {
         layout: vertical;
         & Grid { height: 1fr; } & #chips { display: none; } & #live { display: none; } & #over { height: 0; }
+        & > #side { dock: right; width: auto; height: 1fr; }
     }
     """
     BLANK = True
@@ -70,7 +73,8 @@ class AssetsPane(SheetView):
 
     def compose(self) -> ComposeResult:
         yield CellLine()
-        yield WhyPane()
+        with Vertical(id="side"):
+            yield WhyPane()
         yield LiveLine()
         yield Bar(id="live")
         yield Bar(id="chips")
@@ -85,6 +89,15 @@ class AssetsPane(SheetView):
     @property
     def why_pane(self) -> WhyPane:
         return self.query_one(WhyPane)
+
+    @property
+    def assets_here(self) -> Sequence[str]:
+        """The asset of the row of the cursor; in the test row those that may be picked."""
+        sheet, row = self.sheet, self.sheet.cursor[0]
+        if self.grid.is_in_test_row:
+            return () if sheet.query.is_empty else sheet.query.pickable
+        is_a_row = len(sheet.view) and not self.grid.is_in_new_row
+        return [sheet.text(row, sheet.asset_at) or sheet.inherited(row, sheet.asset_at)] if is_a_row else ()
 
     @property
     def editor(self) -> CellEditor | None:
@@ -142,6 +155,7 @@ class AssetsPane(SheetView):
     @on(Grid.Moved)
     def _show_cell(self) -> None:
         self.why_pane.follow(self.sheet)
+        self.follow_clip()
         self._show_place()
 
     def _show_place(self) -> None:
@@ -193,9 +207,16 @@ class AssetsPane(SheetView):
             is_fact=self._edited.is_fact,
             is_typing=event.is_typing,
             open_list=event.opens_list,
+            rule=self._rule_builder(column),
         )
         if editor.parent is None:
             over.mount(editor)
+
+    def _rule_builder(self, column: int) -> RuleBuilder | None:
+        """What a rule may name, with the facts of the test row, where the cell is one."""
+        if self._edited.is_fact or self.sheet.header(column).kind != "rule":
+            return None
+        return RuleBuilder(known_conditions(self.sheet.table), self.sheet.query.facts)
 
     def _known(self, texts: TextColumn) -> list[str]:
         """What a cell may be completed to: an asset first to the clips that no row names yet, an output to what it may say."""

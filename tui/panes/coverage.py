@@ -10,19 +10,22 @@ from typing import ClassVar
 from textual import on, work
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
-from textual.containers import VerticalScroll
+from textual.containers import Vertical, VerticalScroll
 from textual.content import Content
 from textual.message import Message
 from textual.widget import Widget
 from textual.widgets import ContentSwitcher, Static
 
-from contextdb.covering import CoverageReport, Nearest, format_percent
+from contextdb.covering import CoverageReport, Gap, Nearest, format_percent
 from contextdb.errors import ContextDBError, in_quotes
+from contextdb.tables.gap_work import Work
+from contextdb.tables.table import Table
 from contextdb.telemetry.observed import SeenGap
 
 from ..messages import FillGap, GoToCell, Notice, SetContext
 from ..model import coverage_lines as lines
 from ..model.coverage_run import CoverageRun, Result, is_quick
+from ..model.gap_desk import GapDesk, owner_fault
 from ..model.moment import moment_inside
 from ..model.moments import Moment
 from ..model.played_run import Played, PlayedRun, moment_in
@@ -50,6 +53,9 @@ EMPTY_OF_PLAY = {"played": "Every recorded moment has a valid row.", "unused": "
 """What a list without lines says once the table is measured."""
 
 
+TONES = {"open": "warning", "animating": "info", "done": "muted"}
+
+
 class GapList(LineList):
     """The gaps, largest first."""
 
@@ -70,6 +76,8 @@ class CoveragePane(Pane):
         Binding("left_square_bracket", "turn(-1)", "Section before", show=False),
         Binding("right_square_bracket", "turn(1)", "Next section", show=False),
         Binding("t", "try_context", "To the test row"),
+        Binding("s", "next_state", "Next state"),
+        Binding("w", "give", "Owner"),
         Binding("r", "measure", "Measure again"),
         Binding("o", "read_files", "Recorded moments"),
         Binding("l", "read_live", "Of the game"),
@@ -84,6 +92,7 @@ class CoveragePane(Pane):
         & > #coverage-sections { margin: 1 0 0 0; }
         & > ContentSwitcher { height: 1fr; }
         & LineList, & HeatMap { height: 1fr; }
+        & > #side { dock: right; width: auto; height: 1fr; }
         & HeatMap { padding: 0 2; }
         & #about { padding: 1 2; }
         & > #coverage-detail {
@@ -109,6 +118,7 @@ class CoveragePane(Pane):
         super().__init__(id=id)
         self.sheet, self.run, self.live, self.folder = sheet, run, live, folder
         self.played = PlayedRun()
+        self.desk = GapDesk()
         self._shown_play: Played | None = None
         self.section = 0
         self._displayed: Result | None = None
@@ -116,16 +126,12 @@ class CoveragePane(Pane):
         self._detail = ""
 
     def compose(self) -> ComposeResult:
+        yield Vertical(id="side")
         yield Static(id="coverage-state", markup=False)
         yield Static(id="coverage-bar", markup=False)
         yield ChoiceLine(self._labels(), id="coverage-sections")
         with ContentSwitcher(initial="gaps"):
-            columns = [ListColumn("Share", 8, 0, True), ListColumn("New", 8, 0, True)]
-            yield GapList(
-                [*columns, ListColumn("Contexts without a valid row", 27, 3), ListColumn("Nearest row", 13, 2)],
-                empty=EMPTY["gaps"],
-                id="gaps",
-            )
+            yield GapList(_gap_columns("gaps"), empty=EMPTY["gaps"], id="gaps")
             yield PairMap(id="pairs")
             yield RowList(
                 [ListColumn("Rows", 5, 0, True), ListColumn("Share", 8, 0, True), ListColumn("Contexts", 30, 1)],
@@ -137,11 +143,7 @@ class CoveragePane(Pane):
                 empty=EMPTY["rows"],
                 id="rows",
             )
-            yield GapList(
-                [*columns, ListColumn("Moments without a valid row", 27, 3), ListColumn("Nearest row", 13, 2)],
-                empty=NO_PLAY,
-                id="played",
-            )
+            yield GapList(_gap_columns("played"), empty=NO_PLAY, id="played")
             yield RowList([ListColumn("Row", 6, 0, True), ListColumn("Asset", 16, 2, is_name=True)], empty=NO_PLAY, id="unused")
             with VerticalScroll(id="about"):
                 yield Static(id="about-text", markup=False)
@@ -167,6 +169,7 @@ class CoveragePane(Pane):
     def show(self) -> None:
         """Bring everything up to date; a small table is measured at once."""
         self.run.follow(self.sheet.table)
+        self._read_work()
         if self.run.state in ("none", "stale") and self.is_on_screen_now and is_quick(self.sheet.table):
             self.run.start(self.sheet.table)
         self._show_state()
@@ -211,7 +214,7 @@ class CoveragePane(Pane):
         self._shown_play = result
         for name, text in EMPTY_OF_PLAY.items():
             self.query_one(f"#{name}", LineList).say_empty(text)
-        self.query_one("#played", LineList).show(len(result.gaps), lambda at: _played_line(result.gaps[at]))
+        self._list_gaps("played", 0)
         assets = result.table.assets
         self.query_one("#unused", LineList).show(
             len(result.unused), lambda at: [str(result.unused[at] + 1), assets[result.unused[at]]]
@@ -230,11 +233,69 @@ class CoveragePane(Pane):
 
     def _fill(self, result: Result) -> None:
         report = result.report
-        self.query_one("#gaps", LineList).show(len(report.gaps), lambda at: _gap_line(report, at))
+        self._list_gaps("gaps", 0)
         self.query_one(PairMap).show_pairs(result.pairs, result.left_out)
         self.query_one("#crowded", LineList).show(len(report.crowded), lambda at: _crowd_line(report, at))
         self.query_one("#rows", LineList).show(len(report.findings), lambda at: _finding_line(report, at))
         self.query_one("#about-text", Static).update(lines.about_text(result))
+
+    # ---- the list of work
+
+    def _gaps_of(self, section: str) -> Sequence[Gap | SeenGap]:
+        if section == "played":
+            return () if self.played.result is None else self.played.result.gaps
+        return self.run.result.report.gaps if section == "gaps" and self.run.result is not None else ()
+
+    def _list_gaps(self, section: str, at: int) -> None:
+        """List gaps, with who works on each."""
+        gaps = self._gaps_of(section)
+        works = self.desk.of(self.sheet.table, [gap.cells for gap in gaps])
+        listed, has_work = self.query_one(f"#{section}", LineList), any(works)
+        listed.columns = _gap_columns(section, has_work)
+        listed.show(len(gaps), lambda at: _gap_line(gaps[at], works[at], has_work), at)
+
+    def _read_work(self) -> None:
+        before = self.desk.problem
+        self.desk.read(self.sheet.table)
+        if self.desk.problem and self.desk.problem != before:
+            self.post_message(Notice(self.desk.problem, "warning"))
+        for section in ("gaps", "played"):
+            if self._gaps_of(section):
+                self._list_gaps(section, self._at(section))
+
+    def _work_on(self, change: Callable[[Table, Sequence[Mapping[str, str]], int], str]) -> None:
+        """Change the work on the gap of the cursor, as it is in the file now."""
+        section = SECTIONS[self.section]
+        gaps, at = self._gaps_of(section), self._at_or_none
+        if not gaps or at is None:
+            self.post_message(Notice("There is no gap here.", "warning"))
+            return
+        self.desk.read(self.sheet.table)
+        try:
+            message = change(self.sheet.table, [gap.cells for gap in gaps], at)
+        except ContextDBError as error:
+            self.post_message(Notice(str(error.faults[0]), "error"))
+            return
+        self.post_message(Notice(message))
+        for each in ("gaps", "played"):
+            self._list_gaps(each, max(0, self._at(each)))
+
+    def action_next_state(self) -> None:
+        """Open, animating, done, and off the list."""
+        self._work_on(self.desk.step)
+
+    def action_give(self) -> None:
+        """Ask who works on the gap of the cursor."""
+        if not self._gaps_of(SECTIONS[self.section]) or self._at_or_none is None:
+            self.post_message(Notice("There is no gap here.", "warning"))
+            return
+
+        def named(text: str | None) -> None:
+            if text is not None:
+                self._work_on(lambda table, gaps, at: self.desk.give(table, gaps, at, text))
+
+        question = "Who makes the animation for this gap? Empty: nobody yet"
+        self.app.push_screen(AskDialog("Owner", question, self.desk.last_owner, owner_fault), named)
 
     def _show_section(self) -> None:
         name = SECTIONS[self.section]
@@ -303,8 +364,33 @@ class CoveragePane(Pane):
         self._details["pairs"] = event.text
         self._show_section()
 
+    @property
+    def assets_here(self) -> Sequence[str]:
+        """The asset of the row nearest to a gap; of rows that crowd, or that something is about, their own."""
+        at, section, play, result = self._at_or_none, SECTIONS[self.section], self.played.result, self.run.result
+        table, rows = self.run.table or self.sheet.table, []
+        if at is None:
+            return ()
+        if section in OF_PLAY and play is not None:
+            table = play.table
+            rows = [play.unused[at]] if section == "unused" else _row_of(play.gaps[at].nearest)
+        elif section == "gaps" and result is not None:
+            rows = _row_of(result.report.gaps[at].nearest)
+        elif section == "crowded" and result is not None:
+            rows = list(result.report.crowded[at].rows)
+        elif section == "rows" and result is not None:
+            rows = [row for row in (result.report.findings[at].row,) if row is not None]
+        return [table.text(row, table.asset_column) for row in rows if row < table.n_rows]
+
+    @property
+    def _at_or_none(self) -> int | None:
+        """The line of the cursor in the list that is seen."""
+        current = self._current
+        return current.index if isinstance(current, LineList) and current.n_lines else None
+
     def _show_rows(self) -> None:
-        """The rows of the table that the line of the cursor is about, where there is room for them."""
+        """The rows of the table that the line of the cursor is about, where there is room for them; and the clip of one."""
+        self.follow_clip()
         below, section, table = self.query_one(RowsBelow), SECTIONS[self.section], self.sheet.table
         result, play = self.run.result, self.played.result
         below.show_none()
@@ -457,7 +543,9 @@ class CoveragePane(Pane):
             self.post_message(GoToCell(row, column))
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """Only where there are contexts, one can be tried."""
+        """Only where there are contexts, one can be tried; only on gaps, somebody works."""
+        if action in ("next_state", "give"):
+            return SECTIONS[self.section] in ("gaps", "played")
         return action != "try_context" or SECTIONS[self.section] in ("gaps", "pairs", "crowded", "played")
 
     def action_try_context(self) -> None:
@@ -492,17 +580,20 @@ class CoveragePane(Pane):
         return (f"gap {at + 1}" if section == "gaps" else f"crowd {at + 1}", dict(places[at].cells)) if places else None
 
 
-def _gap_line(report: CoverageReport, at: int) -> Sequence[ListCell]:
-    gap = report.gaps[at]
+def _gap_columns(section: str, has_work: bool = False) -> tuple[ListColumn, ...]:
+    """Those of a list of gaps; that of the work on them where there is any."""
+    what = "Moments" if section == "played" else "Contexts"
+    work = [ListColumn("Work", 9, 1)] if has_work else []
+    cells = ListColumn(f"{what} without a valid row", 24 if has_work else 27, 3)
+    return ListColumn("Share", 8, 0, True), ListColumn("New", 8, 0, True), cells, *work, ListColumn("Nearest row", 13, 2)
+
+
+def _gap_line(gap: Gap | SeenGap, work: Work | None, has_work: bool) -> Sequence[ListCell]:
     share = (f"{'' if gap.is_exact else '~'}{format_percent(gap.share)}", "strong") if gap.share else ("points", "muted")
     new: ListCell = ("same", "muted") if gap.new_share == gap.share else format_percent(gap.new_share)
-    return [share, new, partial(lines.cells_within, gap.cells), lines.nearest_text(gap.nearest)]
-
-
-def _played_line(gap: SeenGap) -> Sequence[ListCell]:
-    new: ListCell = ("same", "muted") if gap.new_share == gap.share else format_percent(gap.new_share)
-    share = f"{'' if gap.is_exact else '~'}{format_percent(gap.share)}"
-    return [(share, "strong"), new, partial(lines.cells_within, gap.cells), lines.nearest_text(gap.nearest)]
+    state: ListCell = "" if work is None else (work.text, TONES[work.state])
+    works = [state] if has_work else []
+    return [share, new, partial(lines.cells_within, gap.cells), *works, lines.nearest_text(gap.nearest)]
 
 
 def _crowd_line(report: CoverageReport, at: int) -> Sequence[ListCell]:
@@ -514,3 +605,7 @@ def _finding_line(report: CoverageReport, at: int) -> Sequence[ListCell]:
     finding = report.findings[at]
     row = "" if finding.row is None else str(finding.row + 1)
     return [row, finding.asset or "", (lines.TITLES.get(finding.rule, finding.rule), finding.level)]
+
+
+def _row_of(nearest: Nearest | None) -> list[int]:
+    return [] if nearest is None else [nearest.row]

@@ -27,7 +27,7 @@ class WhyPane(ScrollView, can_focus=False):
 
     DEFAULT_CSS = """
     WhyPane {
-        dock: right; width: 46; display: none; padding: 0 1; background: $surface; border-left: solid $panel;
+        width: 46; height: 1fr; display: none; padding: 0 1; background: $surface; border-left: solid $panel;
         scrollbar-size-vertical: 1; overflow-x: hidden;
         &.-open { display: block; }
     }

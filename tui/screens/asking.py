@@ -15,6 +15,7 @@ from ..messages import GoToCell, SetContext
 from ..model.context_list import ContextList
 from ..model.session import Session
 from ..model.teams import Teams, roles_of
+from ..panes.why import NO_FACTS
 from .actors import ActorsDialog
 from .contexts import ContextsDialog, Loaded
 from .nearest import CellAnswer, NearestDialog
@@ -120,13 +121,29 @@ class TestRow:
         self.session.teams = Teams.beside(table) if teams is None else teams.of(table)
         return self.session.teams
 
-    # ---- why
+    # ---- what is picked, and why
+
+    def picks(self) -> None:
+        """The next picks, as a game would make them."""
+        sheet = self.session.sheet
+        if sheet.query.is_empty or sheet.query.answer is None:
+            self.screen.say(NO_FACTS if sheet.query.is_empty else "The table cannot be asked: see Problems.")
+            return
+        from .next_picks import NextPicksDialog  # loads the picker
+
+        dialog = NextPicksDialog(sheet.query.answer, sheet.table.asset_column)
+
+        def chosen(answer: GoToCell | None) -> None:
+            if answer is not None:
+                self.screen.go_to_cell(answer)
+
+        self.screen.app.push_screen(dialog, chosen)
 
     def why(self) -> None:
         """Why the row of the cursor is not valid, and which rows are nearest."""
         sheet = self.session.sheet
         if sheet.query.is_empty:
-            self.screen.say("The test row is empty: F6 goes there, F9 loads a context.")
+            self.screen.say(NO_FACTS)
             return
         row = int(sheet.view.rows[sheet.cursor[0]]) if len(sheet.view) else None
         self.screen.app.push_screen(NearestDialog(sheet.query, sheet.table, row), self._answered)

@@ -5,7 +5,7 @@ Nothing is changed here: the dialog gives back an `Import`, whose edit the sheet
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar
@@ -20,24 +20,28 @@ from textual.worker import get_current_worker
 
 from contextdb.disk import read_bytes
 from contextdb.errors import ContextDBError, Fault, safe_text
-from contextdb.exchange.formats import FORMATS, ReadOptions, format_of, sheet_names
+from contextdb.exchange.formats import FORMATS, ReadOptions, format_of, grid_of, sheet_names
 from contextdb.exchange.importing import NAMES
-from contextdb.exchange.reading import SheetWanted
+from contextdb.exchange.reading import SheetWanted, TableWanted
+from contextdb.exchange.remembered import Choices, choices_of, remember
 from contextdb.tables.table import Table
 
-from ..model.importing import MODES, Choice, Draft, Import, Mode, suffixes_read, why_not
+from ..model.importing import DECIMAL_COMMA, MODES, Choice, Draft, Import, Mode, suffixes_read, why_not
 from ..model.paths import resolved
 from ..widgets.cursor_lines import UP_DOWN
 from ..widgets.field import Field
 from ..widgets.line_list import LineList, ListCell, ListColumn
 from ..widgets.pick import Pick
+from .choose_rows import RowsDialog, first_header
 from .dialog import Dialog, buttons
 from .path_dialog import PathDialog
 
 BY_ITSELF = "by its content"
 THE_ONLY = "the filled sheet"
-THE_USUAL = "each text is one name, but in our own files"
-DECIMALS = [("by the cells", ""), ("comma: 0,5 is 0.5", "comma"), ("point: 0,5 is 0 ± 5", "point")]
+THE_TABLE, OTHER_ROWS = "all of the table", "choose rows"
+THE_USUAL = "names as usual"
+DECIMALS = [("0,5 as usual", ""), (DECIMAL_COMMA, "comma"), ("0,5 is 0 ± 5", "point")]
+PAIRS = [("min, max joined", ""), ("min, max apart", "apart")]
 COLUMNS = (ListColumn("Column", 18, 2, is_name=True), ListColumn("First cells", 12, 3), ListColumn("Becomes", 20, 3))
 
 
@@ -77,6 +81,7 @@ class ImportDialog(PathDialog[Import]):
         Binding("tab", "complete", "Complete", show=False, priority=True),
         Binding("f6,ctrl+j", "import", "Import"),
         Binding("f2", "path", "Another file", show=False),
+        Binding("f4", "rows", "Choose rows", show=False),
         *UP_DOWN,
     ]
     DEFAULT_CSS = """
@@ -95,7 +100,7 @@ class ImportDialog(PathDialog[Import]):
         & #import-summary { height: auto; margin: 1 0 0 0; text-style: bold; }
         & #import-notes { height: auto; max-height: 18%; color: $text-muted; }
         & #import-buttons { height: 1; }
-        &.-no-sheets #import-sheet { display: none; }
+        &.-no-sheets #import-sheet, &.-no-rows #import-rows, &.-no-pairs #import-pairs { display: none; }
         &.-tall > #dialog, &.-tall > #dialog > #dialog-body { height: auto; }
         &.-tall LineList { height: auto; min-height: 8; max-height: 50vh; }
     }
@@ -104,7 +109,7 @@ class ImportDialog(PathDialog[Import]):
 
     def __init__(self, table: Table, folder: Path, text: str | None = None, path: Path | None = None) -> None:
         """`folder` is where paths start; `text` is imported instead of a file: what is on the clipboard. `path` is read at once."""
-        super().__init__(folder, suffixes_read(), classes="-wide -no-sheets")
+        super().__init__(folder, suffixes_read(), classes="-wide -no-sheets -no-rows -no-pairs")
         self.title_text = f"Import into {table.name}"
         self.table = table
         self.text = text
@@ -112,6 +117,9 @@ class ImportDialog(PathDialog[Import]):
         self.reason = ""
         """Why there is no draft."""
         self.path: Path | None = path
+        self._columns: Mapping[str, Sequence[str]] = {}
+        """What was chosen for the columns of such a file before."""
+        self._asked_commas = False
 
     def compose_body(self) -> ComposeResult:
         """The file and how it is read; then its columns."""
@@ -120,13 +128,15 @@ class ImportDialog(PathDialog[Import]):
         formats = [(BY_ITSELF, ""), *((one.about.split(";")[0], one.name) for one in FORMATS.values() if one.is_read)]
         kind = Pick(formats, value="" if self.text is None else "tsv", allow_blank=False, compact=True, id="import-format")
         sheet = Pick([(THE_ONLY, "")], value="", allow_blank=False, compact=True, id="import-sheet")
-        yield Field("Format, sheet", Horizontal(kind, sheet), key="how")
+        rows = Pick([(THE_TABLE, "")], value="", allow_blank=False, compact=True, id="import-rows")
+        yield Field("Format, cells", Horizontal(kind, sheet, rows), key="how")
         modes = [(about, mode) for mode, about in MODES.items()]
         yield Field("Rows", Pick(modes, value="merge", allow_blank=False, compact=True, id="import-mode"), key="mode")
         texts = [(THE_USUAL, ""), *((about, name) for name, about in NAMES.items())]
         names = Pick(texts, value="", allow_blank=False, compact=True, id="import-texts")
         decimal = Pick(DECIMALS, value="", allow_blank=False, compact=True, id="import-decimal")
-        yield Field("Names, decimals", Horizontal(names, decimal), key="texts")
+        pairs = Pick(PAIRS, value="", allow_blank=False, compact=True, id="import-pairs")
+        yield Field("How to read", Horizontal(names, decimal, pairs), key="texts")
         yield self.path_names("import", "No such file.")
         yield LineList(COLUMNS, empty="No column.", id="import-columns")
         yield Static("", id="import-why")
@@ -175,7 +185,32 @@ class ImportDialog(PathDialog[Import]):
         with self.prevent(Input.Changed):
             self.write(text)
         self.path = resolved(text, self.folder)
+        self._take_over(choices_of(self._home, self.path.name) or Choices())
         self._read()
+
+    @property
+    def _home(self) -> Path:
+        """The folder that remembers what is chosen."""
+        return self.table.path.parent if self.table.path is not None else self.folder
+
+    def _take_over(self, known: Choices) -> None:
+        """Choose what was chosen for such a file before."""
+        self._columns, self._asked_commas = known.columns, False
+        is_range = ":" in known.sheet
+        with self.prevent(Select.Changed):
+            self._offer_rows([known.sheet] if is_range else [])
+            self._pick("rows", known.sheet if is_range else "")
+            sheets = [(THE_ONLY, ""), *([(known.sheet, known.sheet)] if known.sheet and not is_range else [])]
+            self.query_one("#import-sheet", Select).set_options(sheets)
+            for name, value in (("sheet", "" if is_range else known.sheet), ("decimal", known.decimal), ("texts", known.names)):
+                self._pick(name, value)
+            self._pick("pairs", known.pairs)
+            self._pick("mode", known.mode or "merge")
+
+    def _pick(self, name: str, value: str) -> None:
+        select = self.query_one(f"#import-{name}", Select)
+        if value in (each for _, each in select._options):
+            select.value = value
 
     def action_path(self) -> None:
         """Go back to the path."""
@@ -188,54 +223,119 @@ class ImportDialog(PathDialog[Import]):
     @on(Select.Changed, "#import-sheet")
     @on(Select.Changed, "#import-texts")
     @on(Select.Changed, "#import-decimal")
+    @on(Select.Changed, "#import-pairs")
     def _read_otherwise(self) -> None:
         if self.path is not None or (self.text is not None and self.draft is not None):
             self._read()
 
+    @on(Select.Changed, "#import-rows")
+    def _rows_picked(self, event: Select.Changed) -> None:
+        if event.value == OTHER_ROWS:
+            self.action_rows()
+        else:
+            self._read_otherwise()
+
+    def action_rows(self) -> None:
+        """Show the sheet, to choose its header and its last row."""
+        try:
+            name, raw = self._source()
+            sheet, grid = grid_of(raw, name, replace(self._options(), sheet=self._value("sheet") or None))
+        except ContextDBError as error:
+            self._say(wrong=why_not(error))
+            return
+        if not grid or not grid[0]:
+            return
+
+        def chosen(cells: str | None) -> None:
+            many = len(self.query_one("#import-sheet", Select)._options) > 2
+            cells = f"{sheet}!{cells}" if cells and many else cells
+            with self.prevent(Select.Changed):
+                self._offer_rows([cells] if cells else [])
+                self._pick("rows", cells or "")
+            self._read()
+
+        self.app.push_screen(RowsDialog(grid, sheet, first_header(grid, self._value("rows"))), chosen)
+
+    def _offer_rows(self, blocks: Sequence[str]) -> None:
+        """Offer these cells of the sheet, and to choose others."""
+        select = self.query_one("#import-rows", Select)
+        chosen = select.value if select.value in blocks else ""
+        select.set_options([(THE_TABLE, ""), *((block, block) for block in blocks), (f"{OTHER_ROWS} …", OTHER_ROWS)])
+        select.value = chosen
+
+    def _value(self, name: str) -> str:
+        value = str(self.query_one(f"#import-{name}", Select).value)
+        return "" if value == OTHER_ROWS else value
+
+    def _options(self) -> ReadOptions:
+        return ReadOptions(self._value("format") or None)
+
+    def _source(self) -> tuple[str, bytes]:
+        """What is read: a name for messages, and its bytes. Raises FileError."""
+        if self.path is None:
+            return "the clipboard", (self.text or "").encode("utf-8", "replace")
+        return str(self.path), read_bytes(self.path)
+
     def _read(self) -> None:
         self._say("Reading …")
-        choices = (str(self.query_one(f"#import-{name}", Select).value) or None for name in ("format", "sheet", "texts", "decimal"))
-        kind, sheet, names, sign = choices
-        is_comma = None if sign is None else sign == "comma"
-        self._read_file(self.path, ReadOptions(kind, sheet, is_decimal_comma=is_comma), names)
+        sheet, decimal, names, pairs = map(self._value, ("sheet", "decimal", "texts", "pairs"))
+        chosen = Choices(self._value("rows") or sheet, decimal, names, pairs, self._value("mode"), self._columns)
+        self._read_file(self._options(), chosen)
 
     @work(thread=True, exclusive=True)
-    def _read_file(self, path: Path | None, options: ReadOptions, names: str | None) -> None:
+    def _read_file(self, options: ReadOptions, chosen: Choices) -> None:
         """Read in the background, so that a large file does not hold the keys."""
         sheets: list[str] = []
         result: Draft | ContextDBError
+        has_rows = False
         try:
-            name = str(path) if path is not None else "the clipboard"
-            raw = (self.text or "").encode("utf-8", "replace") if path is None else read_bytes(path)
-            sheets = sheet_names(raw, name) if format_of(name, options.format, raw).name == "xlsx" else []
-            options = options if options.sheet in sheets else replace(options, sheet=None)
-            result = Draft.read(self.table, raw, name, options, names)
+            name, raw = self._source()
+            kind = format_of(name, options.format, raw).name
+            sheets, has_rows = sheet_names(raw, name) if kind == "xlsx" else [], kind in ("xlsx", "csv", "tsv")
+            is_there = ":" in chosen.sheet or chosen.sheet in sheets
+            result = Draft.read(self.table, raw, name, options, chosen if is_there else replace(chosen, sheet=""))
             result.summary()
         except ContextDBError as error:
             result = error
         except Exception as error:  # a file that we fail at must not take the edits of the open table with it
             result = _unexpected(error)
         if not get_current_worker().is_cancelled:
-            self.app.call_from_thread(self._show, result, sheets)
+            self.app.call_from_thread(self._show, result, sheets, has_rows)
 
-    def _show(self, result: Draft | ContextDBError, sheets: Sequence[str]) -> None:
+    def _show(self, result: Draft | ContextDBError, sheets: Sequence[str], has_rows: bool = False) -> None:
         self._show_sheets(sheets)
+        self.set_class(not has_rows, "-no-rows")
         is_read = isinstance(result, Draft)
         self.set_class(is_read, "-read")
         if isinstance(result, ContextDBError):
             self.draft, self.reason = None, why_not(result)
             if isinstance(result, SheetWanted):
-                self._say(self.reason)
-                self.query_one("#import-sheet", Select).action_show_overlay()
+                self._ask("sheet", self.reason)
+            elif isinstance(result, TableWanted):
+                with self.prevent(Select.Changed):
+                    self._offer_rows(result.blocks)
+                self._ask("rows", self.reason)
             else:
                 self._say(wrong=self.reason)
             return
-        if self.draft is not None:
-            result.mode = self.draft.mode
         self.draft = result
+        self.set_class(not result.has_pairs, "-no-pairs")
+        with self.prevent(Select.Changed):
+            rows = self._value("rows")
+            self._offer_rows([rows] if rows else [])
         self._show_columns()
-        self._show_keys("F6 import · Enter change a column · F2 another file · Esc cancel")
+        self._show_keys("F6 import · Enter change a column · F4 choose rows · F2 another file · Esc cancel")
         self.set_focus(self.query_one("#import-columns", LineList))  # before it is painted: a key then goes there
+        if result.comma_doubts and not self._asked_commas:
+            self._asked_commas = True
+            self._ask("decimal", result.summary(), result.notes)
+
+    def _ask(self, name: str, message: str, notes: Sequence[str] = ()) -> None:
+        """Open the list of what one has to choose from."""
+        self._say(message, notes=notes)
+        select = self.query_one(f"#import-{name}", Select)
+        select.focus()
+        select.action_show_overlay()
 
     def _show_sheets(self, sheets: Sequence[str]) -> None:
         self.set_class(len(sheets) < 2, "-no-sheets")
@@ -275,9 +375,10 @@ class ImportDialog(PathDialog[Import]):
         def decided(choice: Choice | None) -> None:
             if choice is not None:
                 draft.choose(at, choice.mapped)
+                self._columns = draft.choices.columns
                 self._show_columns(at)
 
-        self.app.push_screen(ChoiceDialog(draft.columns[at].source, draft.choices(at), draft.label(at)), decided)
+        self.app.push_screen(ChoiceDialog(draft.columns[at].source, draft.choices_for(at), draft.label(at)), decided)
 
     @on(Select.Changed, "#import-mode")
     def _mode(self, event: Select.Changed) -> None:
@@ -299,6 +400,8 @@ class ImportDialog(PathDialog[Import]):
             self._say(wrong=why_not(_unexpected(error)))
             return
         if answer.edit.changes:
+            if self.path is not None:
+                remember(self._home, self.path.name, self.draft.choices)
             self.dismiss(answer)
         else:
             self._say("Nothing would change: the table says all of this already.")

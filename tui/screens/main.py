@@ -355,6 +355,10 @@ class MainScreen(TableScreen):
     def action_actors(self) -> None:
         self.try_to(self.test_row.actors)
 
+    def action_next_picks(self) -> None:
+        """What would be picked in turn for the test row."""
+        self.try_to(self.test_row.picks)
+
     def action_why(self) -> None:
         """Why the row of the cursor is not valid: beside the table where there is room, else as `action_nearest`."""
         pane = self.assets.why_pane
@@ -373,6 +377,8 @@ class MainScreen(TableScreen):
         self.try_to(self.workspace.look_again)
         self.care.look()
         self._look_for_sessions()
+        if self._clips is not None:
+            self._clips.forget()
         self.assets.refresh_view()
         self.show()
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from rich.text import Text
 from textual import events, on
@@ -39,11 +40,16 @@ from .disk_care import DiskCare
 from .following import Following
 from .renames import Renames
 
+if TYPE_CHECKING:
+    from ..panes.clip import Clips
+
 CONTRACTS = "contracts"
 """The tab that gives way on a narrow screen where the project declares no contracts."""
 TABS = ("assets", "options", "priorities", "coverage", "problems", CONTRACTS)
 MOTION = "motion"
 """The tab that there is where the project declares motion databases and has a recorded session, and where it was gone to."""
+WITH_SIDE = ("assets", "coverage")
+"""The tabs with room for the animation."""
 WITH_TOOLS = 30
 """On a screen of fewer lines the tools give way to the rows; the palette, where all of them are too, stands behind the tabs."""
 TOOLS = ("add-column", "blueprints", "import", "export", "refresh", "autofit", "history", "palette")
@@ -74,6 +80,7 @@ class TableScreen(Screen[None]):
         self.workspace = workspace
         self.table_name = name
         self.session: Session = workspace.session(name)
+        self._clips: Clips | None = None
         self.coverage = CoverageRun()
         self.test_row = TestRow(self)
         self.following = Following(self)
@@ -124,6 +131,7 @@ class TableScreen(Screen[None]):
 
     def on_resize(self) -> None:
         self._show_bars()
+        self._show_clip()
 
     def on_unmount(self) -> None:
         self.coverage.cancel()
@@ -235,6 +243,7 @@ class TableScreen(Screen[None]):
         if name != "assets":
             self._pane(name).show()
         self._pane(name).take_focus()
+        self._show_clip()
 
     def _new_pane(self, name: str) -> Pane:
         sheet = self.session.sheet
@@ -265,6 +274,30 @@ class TableScreen(Screen[None]):
         """Go to the tab beside."""
         tabs = self.tabs
         await self.action_tab(tabs[(tabs.index(self.tab) + by) % len(tabs)])
+
+    def action_clip(self) -> None:
+        """Show the animation at the side of the table and of the gaps, or hide it."""
+        from ..panes.clip import Clips  # loads the motion search
+
+        self._clips = self._clips or Clips(lambda: self.session.sheet.table)
+        self._clips.is_open = not self._clips.is_open
+        if self.tab not in WITH_SIDE:
+            self._switch_to("assets")
+        else:
+            self._show_clip()
+
+    def _show_clip(self) -> None:
+        """Make the animation of the tab that is seen, or hide it."""
+        if self._clips is None or self.tab not in WITH_SIDE:
+            return
+        from ..panes.clip import ClipPane
+
+        pane, side = self._pane(self.tab), self._pane(self.tab).query_one("#side")
+        shower = next(iter(pane.query(ClipPane)), None)
+        if shower is None and self._clips.is_open:
+            side.mount(ClipPane(self._clips, lambda: pane.assets_here), before=0 if side.children else None)
+        elif shower is not None:
+            shower.turn()
 
     def action_help(self) -> None:
         from .help import HelpDialog

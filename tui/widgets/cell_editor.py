@@ -33,6 +33,7 @@ from ..model.condition_form import undeclared
 from ..model.layout import cut
 from ..model.meaning import Meaning, meaning, mend_of
 from ..model.number_forms import nudged, other_form
+from ..model.rule_builder import RuleBuilder, RuleChooser
 from .editing.choice_list import ChoiceList
 from .editing.entry import Entry
 from .editing.keys import KEYS
@@ -112,6 +113,7 @@ class CellEditor(Widget):
         is_fact: bool = False,
         is_typing: bool = False,
         open_list: bool = False,
+        rule: RuleBuilder | None = None,
     ) -> None:
         """Edit a cell, and take the keys; nothing is left of the cell before. `on_done` is called once with the outcome, before
         anything else happens."""
@@ -124,7 +126,8 @@ class CellEditor(Widget):
         """The keys go to the list."""
         self._check, self._on_done = check, on_done
         self._began_with = None if is_typing else text
-        self._chooser = Chooser(condition, kind, known, is_fact)
+        self._rule = rule
+        self._chooser = Chooser(condition, kind, known, is_fact) if rule is None else RuleChooser(rule)
         self._choices.begin("(not given)" if is_fact else "Any")
         self.entry.begin(text)
         self._offer = Offer()
@@ -201,6 +204,8 @@ class CellEditor(Widget):
         self._seen = text, self.entry.cursor_position
         self._offer = self._chooser.offer(text, self.entry.cursor_position, self.is_list_open)
         self._meaning = meaning(text, self.condition, self.is_fact) if self.condition is not None else Meaning()
+        if self._rule is not None:
+            self._meaning = Meaning(self._rule.words(text))
         has_boxes = self._chooser.has_ticks and self._offer.word is None and self.is_list_open
         highlight = self._highlight() if self.is_list_open else None
         ticks = None if self._chooser.has_ticks and not has_boxes else self._chooser.ticks(text)
@@ -268,7 +273,8 @@ class CellEditor(Widget):
     def _caret_moved(self, event: Entry.CaretMoved) -> None:
         """Another word possible."""
         event.stop()
-        if self.is_open and self._chooser.has_ticks and self._seen != (self.text, self.entry.cursor_position):
+        follows = self._chooser.has_ticks or self._rule is not None
+        if self.is_open and follows and self._seen != (self.text, self.entry.cursor_position):
             self._update()
 
     def _typed(self, typed: str) -> bool:

@@ -88,14 +88,8 @@ def c_header_of(tables: Mapping[str, CompiledTable], guard: str = "CDB_TABLES_H"
                 written.add(condition)
                 parts.append("\n" + "".join(f"{line}\n" for line in _choices(condition, names.choices[condition])))
         parts.append("\n" + "".join(f"{line}\n" for line in _table(table, names.tables[name], names.choices)))
-    head = _HEAD.format(version=READER, reader=_with_bodies_apart(header_text()), guard=names.guard)
+    head = _HEAD.format(version=READER, reader=header_text(), guard=names.guard)
     return "".join([head, *parts, _FOOT.format(guard=names.guard)])
-
-
-def _with_bodies_apart(text: str) -> str:
-    """The text of the reader, in which a public function is only declared where another file has it."""
-    function = re.compile(r"^(CDB_API [^{;]*?\))\n(\{\n.*?^\})$", re.M | re.S)
-    return function.sub(r"\1\n#if CDBI_HAS_BODIES\n\2\n#else\n;\n#endif", text)
 
 
 def reader_names() -> frozenset[str]:

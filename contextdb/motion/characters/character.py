@@ -24,8 +24,8 @@ from contextdb.cells.arguments import require_callable, require_kind, require_ma
 from contextdb.errors import ContextError, Fault, in_quotes, some
 from contextdb.motion.answers import Answer
 from contextdb.motion.arguments import query_of
-from contextdb.motion.characters import network, walks
 from contextdb.motion.characters import tables as asking
+from contextdb.motion.characters import walks
 from contextdb.motion.characters.facts import FACTS, FactOf, Ground, Moment
 from contextdb.motion.characters.played import Played
 from contextdb.motion.characters.project import HasTables, Parts
@@ -321,7 +321,7 @@ class Character:
     def pack(self) -> bytes:
         """What plays now, for a copy of this character on another machine: a few bytes, to be sent after each update or, where
         a late change does no harm, after some. Empty where nothing plays."""
-        return network.packed(self.controller.chooser, self.controller.row[0])
+        return self.controller.chooser.core.pack(self.controller.row)
 
     def unpack(
         self,
@@ -351,11 +351,10 @@ class Character:
         ContextError
             The bytes are none of such a character. It then stands where it stood; so it does after any other error of `update`.
         """
-        followed = network.followed(self.controller.chooser, data)
         step = self._step(dt, stick, None, facing, body)
         paths, query = self._wished(step, path)
         before = self.controller.place
-        decision = follow(self.controller, step.dt_s, query, followed, place_of(step.body))
+        decision = follow(self.controller, step.dt_s, query, data, place_of(step.body))
         return self._answer(step, paths, decision, before)
 
     # ---- the parts of an update, for a crowd

@@ -48,11 +48,6 @@ def read(text: str, file: str | None = None) -> tuple[Skeleton, float, Floats]:
     return skeleton, frame_time_s, _read_values(words, n_frames, skeleton.n_channels)
 
 
-def read_skeleton(text: str) -> Skeleton:
-    """The skeleton alone, of a text that was read before, as a whole."""
-    return _read_hierarchy(Words(text))
-
-
 def write(skeleton: Skeleton, frame_time_s: float, values: Floats, digits: int = 6) -> str:
     """The text of a BVH file, with so many digits behind the point."""
     lines = [

@@ -12,6 +12,7 @@ import base64
 import binascii
 import json
 import struct
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -25,8 +26,8 @@ from contextdb.disk.boundary import inside
 from contextdb.errors import ClipError, ContextDBError, Fault, Place, in_quotes
 from contextdb.motion.clips import quaternions
 from contextdb.motion.clips.clip import Clip
-from contextdb.motion.clips.joint_arrays import MOST_JOINTS, depth_first
-from contextdb.motion.clips.joint_worlds import JointWorlds
+from contextdb.motion.clips.joint_arrays import MOST_FRAME_JOINTS, MOST_JOINTS, depth_first, most_frame_joints
+from contextdb.motion.clips.joint_worlds import JointWorlds, numbered
 from contextdb.motion.clips.quaternions import Floats
 
 MAGIC = b"glTF"
@@ -37,7 +38,6 @@ PATHS = {"translation": 3, "rotation": 4, "scale": 3}
 RATE = 30.0
 """Frames a second of an animation whose keys have no rate of a recording."""
 LEAST_RATE, LARGEST_RATE = 10.0, 480.0
-MOST_FRAME_JOINTS = 20_000_000
 MOST_DEPTH = 200
 """Braces within each other; a plain list of numbers and names needs ten."""
 
@@ -48,8 +48,7 @@ def is_gltf(content: bytes) -> bool:
 
 
 def packed(content: bytes, path: Path) -> bytes:
-    """The bytes of a file with those of the buffers that it names, which are in its folder or below. Raises ClipError and
-    FileError."""
+    """The bytes of a file with those of the buffers that it names, which are in its folder or below. Raises ClipError."""
     if content.startswith(MAGIC):
         return content
     try:
@@ -64,7 +63,11 @@ def packed(content: bytes, path: Path) -> bytes:
             if not name or "\0" in name or "://" in name:
                 fault = Fault(f"the buffer {in_quotes(uri)} is no file of this folder.", "a file beside it", place=Place(str(path)))
                 raise ClipError(fault)
-            parts.append(read_bytes(inside(path.parent / name, path.parent)))
+            try:
+                parts.append(read_bytes(inside(path.parent / name, path.parent)))
+            except ContextDBError as error:
+                named = (replace(each, found=f"the buffer {in_quotes(uri)}: {each.found}") for each in error.faults)
+                raise ClipError(*(replace(each, place=Place(str(path))) for each in named)) from None
     if len(parts) == 1:
         return content
     head = b"".join(struct.pack("<Q", len(part)) for part in parts)
@@ -77,12 +80,12 @@ _PACKED = MAGIC + b"+files\0"
 def takes(content: bytes, file: str) -> tuple[str, ...]:
     """The names of the animations, one after another; those without a name by their number."""
     try:
-        animations = _list(_File.of(content).document, "animations")
+        animations = _list(_json(_split(content)[0]), "animations")
     except ContextDBError as error:
         raise ClipError(*(fault.at(Place(file)) for fault in error.faults)) from None
     names = [each.get("name") if isinstance(each, dict) else None for each in animations]
     listed = [name if isinstance(name, str) and name else f"take {i}" for i, name in enumerate(names, start=1)]
-    return tuple(name if listed.count(name) == 1 else f"{name} {i}" for i, name in enumerate(listed, start=1))
+    return numbered(listed)
 
 
 def read(content: bytes, take: int, name: str, file: str) -> Clip:
@@ -106,20 +109,8 @@ class _File:
 
     @classmethod
     def of(cls, content: bytes) -> _File:
-        if content.startswith(_PACKED):
-            start = len(_PACKED) + 4
-            (count,) = struct.unpack_from("<I", content, len(_PACKED))
-            sizes = struct.unpack_from(f"<{count}Q", content, start)
-            ends = np.cumsum([start + 8 * count, *sizes]).tolist()
-            raw, *outer = (content[a:b] for a, b in pairwise(ends))
-            return cls._with(_json(raw), outer, b"")
-        if content.startswith(MAGIC):
-            return cls._with(*_chunks(content))
-        return cls._with(_json(content), [], b"")
-
-    @classmethod
-    def _with(cls, document: dict[str, Any], outer: list[bytes], binary: bytes) -> _File:
-        buffers, files = [], iter(outer)
+        raw, outer, binary = _split(content)
+        document, buffers, files = _json(raw), [], iter(outer)
         for buffer in _list(document, "buffers"):
             uri = buffer.get("uri") if isinstance(buffer, dict) else None
             if uri is None:
@@ -187,8 +178,9 @@ class _File:
         start, stop = (times[0], times[-1]) if times else (0.0, 0.0)
         n_frames = round((stop - start) * rate) + 1
         parents = self.parents()
-        if n_frames * len(self.nodes) > MOST_FRAME_JOINTS:
-            raise _refused(f"{n_frames:,} frames of {len(self.nodes):,} nodes are too many.", f"{MOST_FRAME_JOINTS:,} in all")
+        most = most_frame_joints(sum(map(len, self.buffers)))
+        if n_frames * len(self.nodes) > most:
+            raise _refused(f"{n_frames:,} frames of {len(self.nodes):,} nodes are too many for its size.", f"{most:,} in all")
         at = np.minimum(start + np.arange(n_frames) / rate, stop)
         rest_local = np.array([_local(node) for node in self.nodes]).reshape(-1, 4, 4)
         local = np.repeat(rest_local[None], n_frames, axis=0)
@@ -235,21 +227,15 @@ class _File:
             if any(joint >= len(parents) for joint in joints):
                 raise _refused("a skin has a joint that is no node.")
             deforms[joints] = True
-        wanted = set(np.flatnonzero(deforms).tolist()) or moved
+        below = deforms.copy()
         if not deforms.any():
-            top = {joint for joint in wanted if parents[joint] < 0 or not wanted & set(_above(parents, joint))}
-            wanted = {node for node in range(len(parents)) if node in top or top & set(_above(parents, node))}
-        else:
-            tops = {joint for joint in wanted if not wanted & set(_above(parents, joint))}
-            wanted |= {node for joint in wanted - tops for node in _above(parents, joint) if tops & set(_above(parents, node))}
-        return np.array(sorted(wanted), np.int64), deforms
-
-
-def _above(parents: NDArray[np.int64], node: int) -> list[int]:
-    above = []
-    while (node := int(parents[node])) >= 0:
-        above.append(node)
-    return above
+            below[list(moved)] = True
+        above, order = below.copy(), depth_first(parents).tolist()
+        for node in order:
+            below[node] |= parents[node] >= 0 and below[parents[node]]
+        for node in reversed(order):
+            above[parents[node]] |= parents[node] >= 0 and above[node]
+        return np.flatnonzero(below & above if deforms.any() else below), deforms
 
 
 def _local(node: Any) -> Floats:
@@ -311,7 +297,19 @@ def _rate(tracks: list[Floats]) -> float:
     return float(round(rate)) if abs(rate - round(rate)) < 1e-3 * rate else rate
 
 
-def _chunks(content: bytes) -> tuple[dict[str, Any], list[bytes], bytes]:
+def _split(content: bytes) -> tuple[bytes, list[bytes], bytes]:
+    """The document of a file, the buffers beside it and that in it."""
+    if content.startswith(_PACKED):
+        start = len(_PACKED) + 4
+        (count,) = struct.unpack_from("<I", content, len(_PACKED))
+        sizes = struct.unpack_from(f"<{count}Q", content, start)
+        ends = np.cumsum([start + 8 * count, *sizes]).tolist()
+        raw, *outer = (content[a:b] for a, b in pairwise(ends))
+        return raw, outer, b""
+    return _chunks(content) if content.startswith(MAGIC) else (content, [], b"")
+
+
+def _chunks(content: bytes) -> tuple[bytes, list[bytes], bytes]:
     """The document and the buffer of a .glb file."""
     if len(content) < 20:
         raise _refused(f"the file ends after {len(content)} bytes.")
@@ -325,7 +323,7 @@ def _chunks(content: bytes) -> tuple[dict[str, Any], list[bytes], bytes]:
         if len(chunk) < size:
             raise _refused(f"a part of {size:,} bytes has {len(chunk):,}.", "a whole file")
         if kind == JSON_CHUNK and document is None:
-            document = _json(chunk)
+            document = chunk
         elif kind == BINARY_CHUNK and not binary:
             binary = chunk
         at += 8 + size

@@ -20,6 +20,15 @@ TURNS = ("Zrotation", "Xrotation", "Yrotation")
 STILL_M = 1e-6
 """A joint that moves less against its parent is at its offset."""
 MOST_JOINTS = 10_000
+MOST_FRAME_JOINTS = 10_000_000
+"""Joints of all frames together."""
+SMALL_FRAME_JOINTS = 500_000
+"""So many may a file of few keys mean, and a large one one more for each of its bytes."""
+
+
+def most_frame_joints(n_bytes: int) -> int:
+    """How many joints of frames a file of a size may mean, so that a damaged time in a small file does not take all memory."""
+    return min(SMALL_FRAME_JOINTS + n_bytes, MOST_FRAME_JOINTS)
 
 
 def channels_of(n_joints: int, placed: Collection[int]) -> tuple[tuple[str, ...], ...]:

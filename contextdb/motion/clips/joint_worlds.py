@@ -6,6 +6,7 @@ turned against its own rest, so that where nothing is turned the body rests, as 
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -55,7 +56,7 @@ class JointWorlds:
         if not (np.isfinite(self.rest).all() and np.isfinite(self.frames).all()):
             raise ClipError(Fault("places of joints are not finite.", "finite numbers"))
         body = self._body()
-        left_out = [self.names[joint] for joint in range(len(self.names)) if joint not in set(body.tolist())]
+        left_out = [self.names[joint] for joint in sorted({*range(len(self.names))} - {*body.tolist()})]
         rank = np.full(len(self.names), -1, np.int64)
         rank[body] = np.arange(len(body))
         parents = np.where(self.parents[body] >= 0, rank[self.parents[body]], -1)
@@ -98,13 +99,22 @@ class JointWorlds:
 def unique_names(names: Sequence[str]) -> list[str]:
     """The names, those that are empty or were there before with a number behind them."""
     taken: set[str] = set()
+    counts: dict[str, int] = {}
     unique = []
     for each in names:
-        plain = " ".join(each.split()) or "joint"
-        name = next(name for i in range(1, len(names) + 2) if (name := plain if i == 1 else f"{plain}_{i}") not in taken)
+        name = plain = " ".join(each.split()) or "joint"
+        while name in taken:
+            counts[plain] = counts.get(plain, 1) + 1
+            name = f"{plain}_{counts[plain]}"
         taken.add(name)
         unique.append(name)
     return unique
+
+
+def numbered(names: Sequence[str]) -> tuple[str, ...]:
+    """The names of takes, those that are there more than once with their number, from 1."""
+    counts = Counter(names)
+    return tuple(name if counts[name] == 1 else f"{name} {i}" for i, name in enumerate(names, start=1))
 
 
 def _turns(matrices: Floats) -> Floats:

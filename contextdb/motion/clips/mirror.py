@@ -30,7 +30,6 @@ from contextdb.motion.clips.own_axes import own_axes
 from contextdb.motion.clips.poses import LocalPoses, Poses
 from contextdb.motion.clips.quaternions import inverse, multiply, rotate
 from contextdb.motion.clips.skeleton import Ints, Skeleton, sided_pairs
-from contextdb.motion.clips.trajectory import Trajectory
 
 Pairs = tuple[tuple[str, str], ...]
 Moved = TypeVar("Moved", LocalPoses, Poses)
@@ -73,12 +72,6 @@ def mirrored(moved: Moved, pairs: Pairs) -> Moved:
         positions[:, children] = rotate(back, positions[:, children])
         rotations[:, children] = multiply(back, rotations[:, children])
     return replace(moved, positions=positions, rotations=rotations)
-
-
-def mirrored_path(path: Trajectory) -> Trajectory:
-    """The same path in a mirror; raises ContextError for what is no path."""
-    require_kind(path, Trajectory, "path", "a Trajectory")
-    return replace(path, positions=path.positions * FLIPPED_X[:2], headings=-path.headings)
 
 
 def partners_of(skeleton: Skeleton, pairs: Pairs) -> Ints:

@@ -1,8 +1,9 @@
 """The child process that reads FBX or USD: one file after another, of which it hands back arrays. It imports nothing of ours.
 
-    python parser_child.py fbx       (or usd)
+    python parser_child.py fbx FOLDER      (or usd; the folder is for its files, and goes with it)
 
-A request on standard input is a line of JSON, `{"size": n, "take": i}`, and n bytes. An answer on standard output is one line of
+A request on standard input is a line of JSON, `{"size", "take", "joints", "frame_joints", "seconds"}`, the last three the most that
+may be, and the bytes of the file. An answer on standard output is one line of
 JSON: `{"fault": text}`, or `{"names", "parents", "deforms", "rate", "frames"}` and float64 matrices [J, 4, 4] at rest and
 [F, J, 4, 4] in the world, metres, y up. Before it `{"done": n, "of": m}` says that the process is alive.
 What kills this process kills no other.
@@ -12,9 +13,10 @@ from __future__ import annotations
 
 import json
 import os
+import re
+import shutil
 import signal
 import sys
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from typing import Any
@@ -22,7 +24,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-MOST_FRAME_JOINTS = 20_000_000
 USUAL_RATE = 30.0
 MOST_MEMORY = 2 << 30
 """Bytes that a small file may take; a large one so many times its size more."""
@@ -39,7 +40,7 @@ class Refusal(Exception):
     """What is wrong with a file, in a sentence."""
 
 
-def fbx(content: bytes, take: int, tell: Tell) -> Joints:
+def fbx(content: bytes, take: int, most: int, tell: Tell) -> Joints:
     """The bones of an FBX file, against their parents."""
     import ufbx
 
@@ -61,7 +62,7 @@ def fbx(content: bytes, take: int, tell: Tell) -> Joints:
         raise Refusal(f"there are {len(stacks)} takes, and take {take + 1} is wanted.")
     stack, rate = stacks[take], settings.frames_per_second
     rate = rate if 1.0 <= rate <= 1e4 else USUAL_RATE
-    n_frames = frames_of(stack.time_end - stack.time_begin, rate, len(nodes))
+    n_frames = frames_of(stack.time_end - stack.time_begin, rate, len(nodes), most)
     ids = {node.typed_id: i for i, node in enumerate(nodes)}
     tell(0, n_frames)
     rest = np.array([of_transform(node.local_transform) for node in nodes]).reshape(-1, 4, 4)
@@ -168,25 +169,43 @@ def matrices(places: Floats, turns: Floats, sizes: Floats) -> Floats:
     return whole
 
 
-def usd(content: bytes, take: int, tell: Tell) -> Joints:
+def usd(content: bytes, take: int, most: int, tell: Tell) -> Joints:
     """The joints of the largest skeleton that moves in a USD file, in the world."""
-    from pxr import Sdf, Usd, UsdGeom, UsdSkel
+    from pxr import Sdf, Tf, Usd, UsdGeom, UsdSkel
 
-    with tempfile.TemporaryDirectory() as folder:
-        path = os.path.join(folder, "clip.usdc" if content.startswith(b"PXR-USDC") else "clip.usda")
+    is_crate = content.startswith(b"PXR-USDC")
+    if not is_crate:
+        require_utf8(content)
+    path = os.path.join(sys.argv[2], "clip.usdc" if is_crate else "clip.usda")
+    try:
         with open(path, "wb") as file:
             file.write(content)
         layer = Sdf.Layer.FindOrOpen(path)
-        if layer is None:
-            raise Refusal("the file is damaged, or no USD.")
-        others = [name for name in layer.GetCompositionAssetDependencies() if name]
-        if others:
-            raise Refusal(f"the file refers to other files, such as {others[0]!r}: flatten it, by usdcat --flatten")
-        stage = Usd.Stage.Open(layer)
-        return usd_joints(stage, tell, Usd, UsdGeom, UsdSkel)
+    except Tf.ErrorException as error:
+        lines = re.findall(r"clip\.usda:(\d+):", text_of(error))
+        raise Refusal(f"the file is damaged{f' in line {lines[-1]}' if lines else ''}.") from None
+    finally:
+        with suppress(OSError):  # a file that is mapped, on Windows
+            os.remove(path)
+    if layer is None:
+        raise Refusal("the file is damaged, or no USD.")
+    others = [name for name in layer.GetCompositionAssetDependencies() if name]
+    if others:
+        raise Refusal(f"the file refers to other files, such as {others[0]!r}: flatten it, by usdcat --flatten")
+    stage = Usd.Stage.Open(layer)
+    return usd_joints(stage, most, tell, Usd, UsdGeom, UsdSkel)
 
 
-def usd_joints(stage: Any, tell: Tell, Usd: Any, UsdGeom: Any, UsdSkel: Any) -> Joints:
+def require_utf8(content: bytes) -> None:
+    """Refuse a text that is none, by the line: the library shows such bytes in messages that cannot be read."""
+    try:
+        content.decode()
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise Refusal(f"line {line} is not UTF-8.") from None
+
+
+def usd_joints(stage: Any, most: int, tell: Tell, Usd: Any, UsdGeom: Any, UsdSkel: Any) -> Joints:
     """The joints of the skeleton of a stage, in the world."""
     prim, query = usd_skeleton(stage, Usd, UsdSkel)
     moves, rate = query.GetAnimQuery(), stage.GetTimeCodesPerSecond()
@@ -198,7 +217,7 @@ def usd_joints(stage: Any, tell: Tell, Usd: Any, UsdGeom: Any, UsdSkel: Any) -> 
     times = sorted({*moves.GetJointTransformTimeSamples()}) or [0.0]
     step = float(np.median(np.diff(times))) if len(times) > 1 else 1.0
     step = step if step > 1e-6 else 1.0
-    codes = np.minimum(times[0] + step * np.arange(frames_of((times[-1] - times[0]) / step, 1.0, len(paths))), times[-1])
+    codes = np.minimum(times[0] + step * np.arange(frames_of((times[-1] - times[0]) / step, 1.0, len(paths), most)), times[-1])
     index = {path: i for i, path in enumerate(paths)}
     parents = [index.get(path.rpartition("/")[0], -1) for path in paths]
     unit = UsdGeom.GetStageMetersPerUnit(stage)
@@ -244,19 +263,30 @@ def usd_skeleton(stage: Any, Usd: Any, UsdSkel: Any) -> tuple[Any, Any]:
     return best[1:]
 
 
-def frames_of(duration_s: float, rate: float, n_joints: int) -> int:
-    """How many frames there are; a refusal of more than can be meant."""
-    if not 0.0 <= duration_s * rate * n_joints <= MOST_FRAME_JOINTS:
+def frames_of(duration_s: float, rate: float, n_joints: int, most: int) -> int:
+    """How many frames there are; a refusal of more joints in all than can be meant."""
+    if not 0.0 <= duration_s * rate * n_joints <= most:
         raise Refusal(f"{duration_s:g} s of {n_joints} joints at {rate:g} frames a second are too much, or nothing.")
     return round(duration_s * rate) + 1
 
 
+def text_of(error: Exception) -> str:
+    """What an exception of a library says, in one line; nothing where its text is none."""
+    try:
+        return " ".join(str(error).split())
+    except UnicodeDecodeError:
+        return ""
+
+
 def in_order(parents: Sequence[int]) -> list[int]:
     """The joints, a parent before its children."""
-    waiting, order = [joint for joint, parent in enumerate(parents) if parent < 0], []
-    while waiting:
-        order.append(waiting.pop())
-        waiting += [joint for joint, parent in enumerate(parents) if parent == order[-1]]
+    children: list[list[int]] = [[] for _ in parents]
+    for joint, parent in enumerate(parents):
+        if parent >= 0:
+            children[parent].append(joint)
+    order = [joint for joint, parent in enumerate(parents) if parent < 0]
+    for joint in order:
+        order += children[joint]
     return order
 
 
@@ -278,12 +308,10 @@ def in_world(
                 local[:, node] = local[:, parents[node]] @ local[:, node]
     joints = [i for i in range(len(names)) if is_joint[i]]
     rank = {joint: i for i, joint in enumerate(joints)}
-    above: list[int] = []
-    for joint in joints:
-        parent = parents[joint]
-        while parent >= 0 and parent not in rank:
-            parent = parents[parent]
-        above.append(rank.get(parent, -1))
+    nearest = {-1: -1}  # of each node the joint that it is, or that is next above it
+    for node in in_order(parents):
+        nearest[node] = rank.get(node, nearest[parents[node]])
+    above = [nearest[parents[joint]] for joint in joints]
     about = {"names": [names[i] for i in joints], "parents": above, "deforms": [bool(deforms[i]) for i in joints]}
     return {**about, "rate": float(rate), "frames": len(local)}, bound[joints], local[:, joints]
 
@@ -298,6 +326,12 @@ def limit_memory(size: int) -> None:
     wanted = MOST_MEMORY + TIMES_MEMORY * size
     with suppress(ValueError, OSError):
         resource.setrlimit(resource.RLIMIT_AS, (wanted if hard < 0 else min(wanted, hard), hard))
+
+
+def limit_time(seconds: float) -> None:
+    """End this process by a signal when it has worked for longer; 0 takes that back."""
+    if hasattr(signal, "setitimer"):
+        signal.setitimer(signal.ITIMER_PROF, seconds)
 
 
 def main() -> None:
@@ -318,8 +352,12 @@ def main() -> None:
         wanted = json.loads(line)
         content = sys.stdin.buffer.read(wanted["size"])
         limit_memory(wanted["size"])
+        limit_time(wanted["seconds"])
         try:
-            about, rest, frames = in_world(*read(content, wanted["take"], lambda done, of: answer({"done": done, "of": of})))
+            joints = read(content, wanted["take"], wanted["frame_joints"], lambda done, of: answer({"done": done, "of": of}))
+            about, rest, frames = in_world(*joints)
+            if len(rest) > wanted["joints"]:
+                raise Refusal(f"there are {len(rest):,} joints, and at most {wanted['joints']:,} are read.")
         except ImportError:
             answer({"missing": True})
         except MemoryError:
@@ -327,10 +365,14 @@ def main() -> None:
         except Refusal as refusal:
             answer({"fault": str(refusal)})
         except Exception as error:  # whatever the libraries raise
-            answer({"fault": f"the file is damaged ({type(error).__name__}: {str(error)[:200]})."})
+            answer({"fault": f"the file is damaged ({type(error).__name__}: {text_of(error)[:200]})."})
         else:
             answer(about, rest, frames)
+        limit_time(0.0)
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    finally:
+        shutil.rmtree(sys.argv[2], ignore_errors=True)

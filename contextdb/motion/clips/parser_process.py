@@ -1,6 +1,7 @@
 """FBX and USD files, read by a child process: their libraries end the process now and then, which is then a fault of one file.
 
-One child of a kind reads many files, and is started again when it dies. It is given up when it says nothing for long.
+One child of a kind reads many files, and is started again when it dies. It ends by itself where it works for long on a small file,
+and is given up when it says nothing for long.
 """
 
 from __future__ import annotations
@@ -8,7 +9,9 @@ from __future__ import annotations
 import atexit
 import json
 import os
+import platform
 import queue
+import signal
 import subprocess
 import sys
 import threading
@@ -16,12 +19,13 @@ from collections.abc import Mapping
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import IO, Any
 
 import numpy as np
 
 from contextdb.errors import ClipError, Fault, Place
-from contextdb.motion.clips.joint_arrays import MOST_JOINTS, depth_first
+from contextdb.motion.clips.joint_arrays import MOST_FRAME_JOINTS, MOST_JOINTS, depth_first, most_frame_joints
 from contextdb.motion.clips.joint_worlds import JointWorlds
 
 CHILD = Path(__file__).with_name("parser_child.py")
@@ -29,8 +33,10 @@ SILENCE_S = 20.0
 """So long a child may say nothing of a small file, on a machine that does other things too."""
 BYTES_PER_S = 2e6
 """Of a large file it may be silent so much longer."""
+WORK_S, BYTES_PER_WORK_S = 4.0, 5e4
+"""So long it may work on a file, in seconds of CPU, and so many bytes more give it another one: a clip of a minute takes one."""
 MOST_LINE = 1 << 24
-MOST_FRAME_JOINTS = 20_000_000
+NO_WHEEL = "and none for 3.14 on Windows with x86-64"
 Answer = tuple[dict[str, Any], bytes] | None
 
 
@@ -40,6 +46,7 @@ class ParserProcess:
     def __init__(self, kind: str, library: str, extra: str) -> None:
         self.kind, self.library, self.extra = kind, library, extra
         self.child: subprocess.Popen[bytes] | None = None
+        self.folder: TemporaryDirectory[str] | None = None
         self.answers: queue.SimpleQueue[Answer] = queue.SimpleQueue()
         self.turn = threading.Lock()
 
@@ -57,6 +64,8 @@ class ParserProcess:
         if about.get("missing"):
             problem = f"{self.kind.upper()} files cannot be read: {self.library} is not installed."
             mend = f'to install it: pip install "contextdb[{self.extra}]"'
+            if self.kind == "fbx" and not has_wheel(sys.platform, platform.machine(), sys.version_info[:2]):
+                mend = f"ufbx has wheels for Python 3.11 to 3.14, {NO_WHEEL}: another Python, or the file as .glb"
             raise ClipError(Fault(problem, ".bvh, .glb and .npz, which need nothing more", mend, Place(file)))
         if "fault" in about:
             raise self._refused(str(about["fault"]), file)
@@ -68,13 +77,15 @@ class ParserProcess:
     def close(self) -> None:
         """End the child; the next file starts another."""
         child, self.child = self.child, None
-        if child is not None:
+        if child is not None and self.folder is not None:
             child.kill()
-            child.wait()
+            with suppress(KeyboardInterrupt):  # whoever ends it for one raises it; at the end of the program it is no news
+                child.wait()
             for stream in (child.stdin, child.stdout):
                 if stream is not None:
                     with suppress(OSError):
                         stream.close()
+            self.folder.cleanup()
 
     def _asked(self, content: bytes, take: int) -> tuple[dict[str, Any], bytes]:
         child = self._running()
@@ -86,14 +97,15 @@ class ParserProcess:
             except queue.Empty:
                 raise _Lost("the file was read for too long without an answer.") from None
             if answer is None:
-                raise _Lost(f"the process that read the file ended (exit code {child.wait()}).")
+                raise _Lost(_end_of(child))
             if "done" not in answer[0]:
                 return answer
 
     def _running(self) -> subprocess.Popen[bytes]:
         if self.child is None or self.child.poll() is not None:
             self.close()
-            command = [sys.executable, "-P", str(CHILD), self.kind]
+            self.folder = TemporaryDirectory(prefix="contextdb-", ignore_cleanup_errors=True)
+            command = [sys.executable, "-P", str(CHILD), self.kind, self.folder.name]
             alone = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
             pipe, nowhere = subprocess.PIPE, subprocess.DEVNULL
             self.child = subprocess.Popen(command, env=alone, stdin=pipe, stdout=pipe, stderr=nowhere)
@@ -106,10 +118,23 @@ class _Lost(Exception):
     """The child gives no answer."""
 
 
+def _end_of(child: subprocess.Popen[bytes]) -> str:
+    """Why a child gives no more answers."""
+    try:
+        code = child.wait(1.0)
+    except subprocess.TimeoutExpired:
+        return "the process that read the file answered what is no clip."
+    if hasattr(signal, "SIGPROF") and code == -signal.SIGPROF:
+        return "the file takes longer to read than a file of its size may."
+    return f"the process that read the file ended (exit code {code})."
+
+
 def _send(stream: IO[bytes] | None, content: bytes, take: int) -> None:
     assert stream is not None
+    size = len(content)
+    most = {"joints": MOST_JOINTS, "frame_joints": most_frame_joints(size), "seconds": WORK_S + size / BYTES_PER_WORK_S}
     with suppress(OSError, ValueError):  # the child died, which the other thread reports
-        stream.write(json.dumps({"size": len(content), "take": take}).encode() + b"\n")
+        stream.write(json.dumps({"size": size, "take": take, **most}).encode() + b"\n")
         stream.write(content)
         stream.flush()
 
@@ -145,6 +170,11 @@ def _worlds(about: Mapping[str, Any], data: bytes) -> JointWorlds:
     assert len(depth_first(parents)) == n, "the child sends trees"
     names = [str(name) for name in about["names"]]
     return JointWorlds(names, parents, numbers[0], numbers[1:], np.array(about["deforms"], bool), float(about["rate"]))
+
+
+def has_wheel(system: str, machine: str, version: tuple[int, int]) -> bool:
+    """Whether the extra fbx installs ufbx there: PyPI has it ready for a Python of such a version."""
+    return version < ((3, 14) if (system, machine) == ("win32", "AMD64") else (3, 15))
 
 
 def parser(kind: str) -> ParserProcess:

@@ -11,13 +11,16 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache, partial
 from os import PathLike
 from pathlib import Path
+from time import monotonic
+
+import numpy as np
 
 from contextdb.cells.arguments import require_many, require_path
-from contextdb.console import announced_while
+from contextdb.console import announce_very_large, announced_while
 from contextdb.disk import read_bytes
 from contextdb.errors import ClipError, Fault, FileError, Place, in_quotes, mend_for, some
 from contextdb.motion.clips import gltf, npz, scenes
@@ -68,27 +71,31 @@ class ClipSource:
     path: Path
     content: bytes
     format: Format
+    opened_s: float = field(default_factory=monotonic, compare=False)
 
     @classmethod
     def of(cls, path: str | PathLike[str]) -> ClipSource:
         """A file; raises FileError where it cannot be opened, ClipError where it is of no format of clips."""
-        place = require_path(path)
+        place, start = require_path(path), monotonic()
         try:
             content = read_bytes(place)
         except FileError as error:
             raise FileError(*(replace(fault, rule="file") for fault in error.faults), errno=error.errno) from None
         form = format_of(content, str(path))
-        return cls(place, form.whole(content, place), form)
+        announce_very_large(str(path), len(content))
+        with announced_while(str(path), start):
+            return cls(place, form.whole(content, place), form, start)
 
     @property
     def file(self) -> str:
         """The file's name in messages."""
         return str(self.path)
 
-    @property
+    @cached_property
     def takes(self) -> tuple[str, ...]:
         """The names of its animations, where it has several."""
-        takes = self.format.takes(self.content, self.file)
+        with announced_while(self.file, self.opened_s):
+            takes = self.format.takes(self.content, self.file)
         return takes if len(takes) > 1 else ONE_TAKE
 
     @property
@@ -104,7 +111,7 @@ class ClipSource:
             problem = f"the file has {len(takes)} takes, and none is named {in_quotes(take)}."
             raise ClipError(Fault(problem, some(takes), mend_for(take, takes), Place(self.file)))
         plain = CENTIMETRE if metres_per_unit == BY_SIZE else metres_per_unit
-        with announced_while(self.file, len(self.content)):
+        with announced_while(self.file, self.opened_s), np.errstate(all="ignore"):  # readers refuse what is not finite
             clip = self.format.read(self, clip_name(self.path, take) if name is None else name, take, plain, up)
         if metres_per_unit != BY_SIZE or self.format.states_unit:
             return clip

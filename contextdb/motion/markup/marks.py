@@ -126,11 +126,6 @@ class Marks:
         """Whether a frame of each kind may play on: bool [K], read-only."""
         return self._playable
 
-    @cached_property
-    def are_all_playable(self) -> bool:
-        """Whether a frame of any kind may play on."""
-        return bool(self._playable.all())
-
     def tag_biases(self, tags: TagFilter | Sequence[str] = ANY_TAGS) -> Floats:
         """What the soft categories of a filter add to the cost of frames of each kind: float64 [K], read-only."""
         return self._tag_biases(tags_of(tags))
@@ -144,10 +139,6 @@ class Marks:
     def _tag_biases(self) -> Callable[[TagFilter], Floats]:
         known = _Tags(self.tags, self.kind_tags)
         return lru_cache(KEPT_FILTERS)(lambda tags: read_only(_tag_biases(known, tags)))
-
-    @cached_property
-    def _has_next_natural(self) -> bool:
-        return bool((self.kind_marks & Mark.NEXT_NATURAL.value).any())
 
     @cached_property
     def _moves_all(self) -> bool:
@@ -165,10 +156,6 @@ class Marks:
     def mark_of(self, frame: int) -> Mark:
         """The flags of a frame."""
         return Mark(int(self.kind_marks[self._kind_of(frame)]))
-
-    def is_next_natural(self, frame: int) -> bool:
-        """Whether nothing but playing on comes next in a frame, for its own range."""
-        return self._has_next_natural and bool(self.kind_marks[self._kind_of(frame)] & Mark.NEXT_NATURAL.value)
 
     def tags_of(self, frame: int) -> tuple[str, ...]:
         """The plain tags of a frame, sorted."""

@@ -20,11 +20,6 @@ class Trigger(StrEnum):
     FORCED = "A search was forced"
     DUE = "A search was due"
 
-    @property
-    def may_continue(self) -> bool:
-        """Whether playing on takes part in the search."""
-        return self in (Trigger.FORCED, Trigger.DUE)
-
     def sentence(self, before: Playing | None) -> str:
         """The trigger in words, of what played."""
         return self if before is None else self.format(asset=before.asset, database=before.database)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from contextdb.errors import Fault, MotionError, Place, in_quotes
 from contextdb.motion.clips.steering import Steered
 from contextdb.motion.features.schema import FeatureSchema
-from contextdb.motion.output.bank import PoseBank
+from contextdb.motion.output.bank import PoseBank, moving_alike
 from contextdb.motion.output.pipeline import numbers_of, rig_parts
 from contextdb.motion.output.settings import PoseSettings
 from contextdb.motion.search.database import MotionDatabase
@@ -128,7 +128,7 @@ def bundle_of(players: Mapping[str, Played], table_of: Mapping[str, str], tables
     """
     _check(players)
     bundle, numbers, names = Bundle(), {name: i for i, name in enumerate(tables)}, list[str]()
-    banks = {name: bank for player in players.values() for name, bank in (player.banks or {}).items()}
+    banks = moving_alike({name: bank for player in players.values() for name, bank in (player.banks or {}).items()})
     for number, (name, table) in enumerate(tables.items()):
         bundle.add(TABLE, number, [table.octets, _texts([name]), *table.parts])
     for number, (name, player) in enumerate(players.items()):
@@ -139,7 +139,8 @@ def bundle_of(players: Mapping[str, Played], table_of: Mapping[str, str], tables
                 _add_database(bundle, len(names) - 1, player, database, banks.get(database), tables.get(table_of.get(database, "")))
             at, has_bank = names.index(database), player.banks is not None and database in player.banks
             entries.append((at, at if has_bank else -1, numbers.get(table_of.get(database, ""), -1)))
-        bundle.add(CONTROLLER, number, _controller(name, player, entries))
+        own = [banks[each] for each in player.controller.chooser.names if player.banks is not None and each in player.banks]
+        bundle.add(CONTROLLER, number, _controller(name, player, entries, own))
     return bytes(bundle)
 
 
@@ -183,7 +184,7 @@ def _add_database(bundle: Bundle, number: int, player: Played, name: str, bank: 
         bundle.add(BANK, number, [*frames, np.array([bank_rate])])
 
 
-def _controller(name: str, player: Played, entries: list[tuple[int, int, int]]) -> list[Part]:
+def _controller(name: str, player: Played, entries: list[tuple[int, int, int]], banks: list[PoseBank]) -> list[Part]:
     chooser, body = player.controller.chooser, Steered()
     settings, shared = chooser.settings, chooser.shared(None, None)
     biases = chooser.ranges(None, 1)[1][0]
@@ -203,7 +204,6 @@ def _controller(name: str, player: Played, entries: list[tuple[int, int, int]]) 
     parts: list[Part] = [np.array(entries, np.int64), numbers, thresholds, bars, *choice, *ways]
     if player.banks is None:
         return [*parts, *[None] * 10, _texts([name])]
-    banks = [player.banks[each] for each in chooser.names if each in player.banks]
     *rig, most_accel, n_moving = rig_parts(banks)
     output = numbers_of(player.output)
     joints = np.array([n_moving, most_accel], np.float64)

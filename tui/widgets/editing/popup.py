@@ -96,7 +96,7 @@ class Popup(Vertical):
     @property
     def wanted_width(self) -> int:
         """How wide it would like to be."""
-        words = WIDEST if self._verdict.is_refused else cell_len(self._verdict.words)
+        words = WIDEST if self._verdict.is_refused else max(map(cell_len, self._verdict.words.splitlines()), default=0)
         wanted = max(words, cell_len(str(self.border_subtitle or "")) + 2, self.choices.wanted_width) + GUTTER
         least = NARROWEST if self._domain is None else WIDEST if self._domain.type.is_circular else OF_NUMBERS
         return max(least, min(wanted, WIDEST))
@@ -170,7 +170,8 @@ def _coloured(line: Iterable[Run]) -> Content:
 def _worded(verdict: Verdict, width: int) -> Iterable[Content]:
     """The words, or the fault: in short while one types, at length when the text was refused."""
     if verdict.fault is None:
-        yield from _styled(wrapped(verdict.words, width), MUTED)
+        for line in verdict.words.splitlines():
+            yield from _styled(wrapped(line, width), MUTED)
     elif not verdict.is_refused:
         yield from _styled(wrapped(f"! {verdict.fault.found}", width)[:2], "$text-warning")
     else:

@@ -1,0 +1,180 @@
+
+/* ---- Characters for languages that call C and know none of its structures: some of one bundle, counted from 0.
+ *
+ *   cdbm_open_crowd      characters of a controller, who stand at the origin; with all the memory that they need
+ *   cdbm_crowd_size      how many there are of something
+ *   cdbm_crowd_table, cdbm_crowd_live   a table of the bundle, and a character's facts for it: set them by cdb_set_number and the others
+ *   cdbm_place_one, cdbm_steer_one      put one somewhere, with nothing played yet; and what its stick asks for
+ *   cdbm_update_crowd    all of them
+ *   cdbm_crowd_numbers, cdbm_crowd_text what came of it
+ *
+ * What one was given stays as it was until it is given anew. */
+
+typedef enum cdbm_crowd_what {
+    CDBM_N_CHARACTERS, CDBM_N_JOINTS, CDBM_N_TABLES, CDBM_STATE_BYTES,      /* sizes */
+    CDBM_ROOT_NUMBERS, CDBM_ROTATION_NUMBERS, CDBM_TRANSLATION_NUMBERS, CDBM_POSITION_NUMBERS, CDBM_STATE_NUMBERS, /* as in cdbm_pose */
+    CDBM_ASSET_TEXT, CDBM_ACTION_TEXT, CDBM_REASON_TEXT, CDBM_JOINT_TEXT    /* of CDBM_JOINT_TEXT the number is that of a joint */
+} cdbm_crowd_what;
+
+typedef struct cdbm_crowd {
+    cdbm_player player;
+    size_t n;
+    double *states;
+    cdbm_pose *poses;
+    cdbm_input *inputs;
+    cdb_live **lives;               /* [n, tables] */
+    const cdb_fact **lists;         /* [n, tables] */
+    cdbm_room room;
+    void *memory;
+    cdb_fault fault;
+} cdbm_crowd;
+
+/* Take all that n characters need out of room; 0 where there is too little. */
+static inline int cdbm_take_crowd(cdbm_crowd *crowd, size_t n, cdb_unknown unknown, cdbm_room *room)
+{
+    const cdbm_player *player = &crowd->player;
+    size_t n_tables = player->n_tables, i, t;
+    char *of_poses;
+    crowd->states = (double *)cdbm_part(room, n * cdbm_state_size(player));
+    crowd->poses = (cdbm_pose *)cdbm_part(room, n * sizeof *crowd->poses);
+    crowd->inputs = (cdbm_input *)cdbm_part(room, n * sizeof *crowd->inputs);
+    crowd->lives = (cdb_live **)cdbm_part(room, n * n_tables * sizeof *crowd->lives);
+    crowd->lists = (const cdb_fact **)cdbm_part(room, n * n_tables * sizeof *crowd->lists);
+    of_poses = (char *)cdbm_part(room, n * cdbm_pose_size(player));
+    crowd->room.left = cdbm_room_size(player, n), crowd->room.at = (char *)cdbm_part(room, crowd->room.left);
+    if (!crowd->states || !crowd->poses || !crowd->inputs || !crowd->lives || !crowd->lists || !of_poses || !crowd->room.at) return 0;
+    for (i = 0; i < n; i++) {
+        cdbm_lay_out(player, &crowd->poses[i], of_poses + i * cdbm_pose_size(player));
+        cdbm_begin(player, crowd->states + i * cdbm_state_width(player), 0.0, 0.0, 0.0);
+        memset(&crowd->inputs[i], 0, sizeof crowd->inputs[i]);
+        crowd->inputs[i].goal.facing = NAN, crowd->inputs[i].unknown = unknown, crowd->inputs[i].fault = &crowd->fault;
+        crowd->inputs[i].facts = crowd->lists + i * n_tables;
+        for (t = 0; t < n_tables; t++) {
+            void *memory = cdbm_part(room, cdb_live_bytes(&player->opened[t]->schema));
+            if (!memory) return 0;
+            crowd->lives[i * n_tables + t] = cdb_live_of(player->opened[t], unknown, memory);
+            crowd->lists[i * n_tables + t] = crowd->lives[i * n_tables + t]->facts;
+        }
+    }
+    crowd->n = n;
+    return 1;
+}
+
+static inline size_t cdbm_crowd_bytes(const cdbm_player *player, size_t n)
+{
+    size_t each = cdbm_rounded(cdbm_state_size(player)) + cdbm_rounded(cdbm_pose_size(player)) + sizeof(cdbm_pose) + sizeof(cdbm_input), t;
+    for (t = 0; t < player->n_tables; t++) each += cdbm_rounded(cdb_live_bytes(&player->opened[t]->schema)) + 2 * sizeof(void *);
+    return n * each + cdbm_rounded(cdbm_room_size(player, n)) + 64;
+}
+
+CDB_API void cdbm_close_crowd(cdbm_crowd *crowd)
+{
+    if (!crowd) return;
+    cdbm_close_player(&crowd->player);
+    CDB_FREE(crowd->memory);
+    CDB_FREE(crowd);
+}
+
+/* Characters of a controller of a bundle, by its name, or of the first where that is NULL; `unknown` is what missing facts do, see
+ * cdb_unknown. NULL where it is refused, with the reason. The bytes stay where they are, on an address that 16 divides. */
+CDB_API cdbm_crowd *cdbm_open_crowd(const void *bytes, size_t size, const char *controller, size_t n, int unknown, const char **why)
+{
+    cdbm_bundle bundle;
+    cdbm_room room;
+    cdbm_crowd *crowd;
+    *why = cdbm_open_bundle(&bundle, bytes, size);
+    if (!*why && (n < 1 || n > (size_t)1 << 20)) *why = "there are too many characters, or none";
+    if (*why) return NULL;
+    *why = "there is not enough memory";
+    crowd = (cdbm_crowd *)CDB_MALLOC(sizeof *crowd);
+    if (!crowd) return NULL;
+    memset(crowd, 0, sizeof *crowd);
+    *why = cdbm_open_player(&crowd->player, &bundle, controller);
+    if (!*why) {
+        room.left = cdbm_crowd_bytes(&crowd->player, n), room.at = (char *)(crowd->memory = CDB_MALLOC(room.left));
+        if (room.at && cdbm_take_crowd(crowd, n, (cdb_unknown)unknown, &room)) return crowd;
+        *why = "there is not enough memory";
+    }
+    cdbm_close_crowd(crowd);
+    return NULL;
+}
+
+CDB_API size_t cdbm_crowd_size(const cdbm_crowd *crowd, int what)
+{
+    switch (what) {
+    case CDBM_N_CHARACTERS: return crowd->n;
+    case CDBM_N_JOINTS: return crowd->player.poses.rig.n_joints;
+    case CDBM_N_TABLES: return crowd->player.n_tables;
+    default: return what == CDBM_STATE_BYTES ? cdbm_state_size(&crowd->player) : 0;
+    }
+}
+
+/* The joint that one is moved by; -1 for the root, and for none. */
+CDB_API int cdbm_crowd_parent(const cdbm_crowd *crowd, size_t joint)
+{
+    return joint < crowd->player.poses.rig.n_joints ? (int)crowd->player.poses.rig.parents[joint] : -1;
+}
+
+/* A table of the bundle; NULL for none. */
+CDB_API const cdb_any *cdbm_crowd_table(const cdbm_crowd *crowd, size_t table)
+{
+    return table < crowd->player.n_tables ? crowd->player.opened[table] : NULL;
+}
+
+/* The facts of a character for a table; NULL for none. */
+CDB_API cdb_live *cdbm_crowd_live(const cdbm_crowd *crowd, size_t i, size_t table)
+{
+    return i < crowd->n && table < crowd->player.n_tables ? crowd->lives[i * crowd->player.n_tables + table] : NULL;
+}
+
+/* Put a character somewhere, with nothing played yet. 0 where there is none of that number. */
+CDB_API int cdbm_place_one(cdbm_crowd *crowd, size_t i, double x, double z, double heading)
+{
+    if (i >= crowd->n) return 0;
+    cdbm_begin(&crowd->player, crowd->states + i * cdbm_state_width(&crowd->player), x, z, heading);
+    return 1;
+}
+
+/* The velocity that a stick asks for, m/s, and the heading, NaN: where the body goes. 0 where there is no character of that number. */
+CDB_API int cdbm_steer_one(cdbm_crowd *crowd, size_t i, double x, double z, double facing)
+{
+    if (i >= crowd->n) return 0;
+    crowd->inputs[i].goal.velocity[0] = x, crowd->inputs[i].goal.velocity[1] = z, crowd->inputs[i].goal.facing = facing;
+    return 1;
+}
+
+/* Update all; why they stand where they stood, or NULL. A fault names the fact that a table refused, and is else without a name. */
+CDB_API const char *cdbm_update_crowd(cdbm_crowd *crowd, double dt_s, cdb_fault *fault)
+{
+    int is_done;
+    memset(&crowd->fault, 0, sizeof crowd->fault);
+    is_done = cdbm_update_all(&crowd->player, crowd->n, crowd->states, dt_s, crowd->inputs, crowd->poses, crowd->room);
+    if (fault) *fault = crowd->fault;
+    if (is_done == 1) return NULL;
+    return is_done == -2 ? crowd->fault.reason : "a time or what is asked for is no finite number";
+}
+
+/* The numbers of a character: those of its pose, as in cdbm_pose, or its state, which may be written too. NULL for none. */
+CDB_API double *cdbm_crowd_numbers(cdbm_crowd *crowd, size_t i, int what)
+{
+    if (i >= crowd->n) return NULL;
+    switch (what) {
+    case CDBM_ROOT_NUMBERS: return crowd->poses[i].root;
+    case CDBM_ROTATION_NUMBERS: return crowd->poses[i].rotations;
+    case CDBM_TRANSLATION_NUMBERS: return crowd->poses[i].translations;
+    case CDBM_POSITION_NUMBERS: return crowd->poses[i].positions;
+    default: return what == CDBM_STATE_NUMBERS ? crowd->states + i * cdbm_state_width(&crowd->player) : NULL;
+    }
+}
+
+/* What plays, what it did and why, or the name of a joint; "" for none. */
+CDB_API const char *cdbm_crowd_text(const cdbm_crowd *crowd, size_t i, int what)
+{
+    const char *text = NULL;
+    if (what == CDBM_JOINT_TEXT) text = i < crowd->player.poses.rig.n_joints ? cdbm_joint_name(&crowd->player, i) : NULL;
+    else if (i >= crowd->n) return "";
+    else if (what == CDBM_ASSET_TEXT) text = cdbm_asset(&crowd->player, &crowd->poses[i].decision.playing);
+    else if (what == CDBM_ACTION_TEXT) text = cdbm_action_name(&crowd->poses[i].decision);
+    else if (what == CDBM_REASON_TEXT) text = cdbm_reason(&crowd->poses[i].decision);
+    return text ? text : "";
+}

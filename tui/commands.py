@@ -229,7 +229,7 @@ _OF_SCREEN = (
     Command("history", "alt+z", "Undo history", "Every step; go back to any of them.", "Edit", "history"),
     Command(
         "git-history",
-        "shift+f8",
+        "shift+f1",
         "Git history",
         "Who changed this cell and row, when and why; the row then and now.",
         "Edit",
@@ -279,7 +279,12 @@ _OF_SCREEN = (
     ),
     Command("nearest", "shift+f12", "Nearest rows", "Which rows are nearest to valid; correct cells.", "Test row", "nearest"),
     Command(
-        "clip", "shift+f7", "Animation", "Play the clip of the row, of the gap's nearest row, or of what is picked.", "View", "clip"
+        "clip",
+        "shift+f11",
+        "Animation",
+        "Play the clip of the row, of the gap's nearest row, or of what is picked.",
+        "View",
+        "clip",
     ),
     Command("next-tab", "ctrl+pagedown,alt+right", "Next tab", "Go to the next tab.", "Tabs", "next_tab(1)"),
     Command("previous-tab", "ctrl+pageup,alt+left", "Previous tab", "Go to the previous tab.", "Tabs", "next_tab(-1)"),

@@ -83,7 +83,7 @@ def test_the_pane_follows_the_cursor_the_test_row_and_gaps_and_reads_no_clip_tha
             title, note = (str(shower.query_one(f"#clip-{part}").render()) for part in ("title", "note"))
             return title, note
 
-        await press(pilot, "shift+f7")
+        await press(pilot, "shift+f11")
         first = await at_rest()
         await press(pilot, *["down"] * 3)
         passed = set(app.main._clips.of()._seen)
@@ -98,7 +98,7 @@ def test_the_pane_follows_the_cursor_the_test_row_and_gaps_and_reads_no_clip_tha
         app.main.coverage.join(20)
         await pilot.pause()
         gap = await at_rest()
-        await press(pilot, "shift+f7")
+        await press(pilot, "shift+f11")
         return first, passed, jog, drawn, broken, picked, gap, [one.is_open for one in app.main.query(ClipPane)]
 
     first, passed, jog, drawn, broken, picked, gap, are_open = with_editor(game / "moves.csv", script, (120, 36))

@@ -362,10 +362,9 @@ def test_the_pictures_of_the_page_show_what_is_drawn_now():
     assert np.abs(drawn - kept).mean() < 4.0, "run: make docs"
 
 
-def test_the_game_is_as_small_as_its_page_says():
+def test_the_game_is_small():
     files = (ROOT / "examples" / "playground").glob("*.py")
     assert sum(len(file.read_text("utf-8").splitlines()) for file in files) < 1800
-    assert "under 1,800 lines" in (ROOT / "docs" / "playground.md").read_text(encoding="utf-8")
 
 
 def test_the_pages_name_what_there_is():

@@ -260,7 +260,7 @@ ALLOWED = {
     "contextdb/commands/demo_command.py": {"TemporaryDirectory", "shutil.copyfile"},  # into a folder that nobody has yet
     "contextdb/commands/play_command.py": {"shutil.copytree"},  # into a folder that nobody has yet
     "contextdb/motion/clips/parser_process.py": {"TemporaryDirectory"},  # what the child writes, away with it
-    "contextdb/motion/clips/parser_child.py": {"TemporaryDirectory", "open", "os.open"},  # what a library reads as a file; nowhere
+    "contextdb/motion/clips/parser_child.py": {"open", "os.open", "os.remove", "shutil.rmtree"},  # in that folder; nowhere
     "tui/model/played_run.py": {"TemporaryDirectory"},
     "contextdb/telemetry/link/game.py": {"path.open"},  # a recording, which grows while the game runs
     "contextdb/telemetry/link/folder.py": {"os.open", "mkdir"},  # a lock, in a folder of this user alone

@@ -52,7 +52,7 @@ class _Place:
 
 
 class AssetsPane(SheetView):
-    """A table as a spreadsheet, with the test row at its foot."""
+    """A table as a spreadsheet, with the test row under its header."""
 
     DEFAULT_CSS = """
     AssetsPane {

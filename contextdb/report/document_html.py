@@ -31,7 +31,8 @@ def as_html(document: Document) -> str:
     parts += [f'<p class="{"passed" if is_met else "failed"}">{escape(closing.summary)}</p>\n'] if closing.summary else []
     parts += [_gates(closing.gates), _contents(sections) if len(sections) > 1 else "", *map(_block, closing.blocks)]
     articles = "".join(_section(section, number) for number, section in enumerate(sections))
-    return page(title, "coverage", f'{"".join(parts)}<main>\n{articles}</main>\n<p class="muted">contextdb {__version__}</p>\n')
+    main = f'{"".join(parts)}{articles}<p class="muted">contextdb {__version__}</p>\n'
+    return page(title, "coverage", f"<main>\n{main}</main>\n")
 
 
 def _contents(sections: Sequence[Section]) -> str:
@@ -76,7 +77,7 @@ def _block(block: Block) -> str:
         case Table(head, rows, title):
             return heading(title) + _table(title or head[0], head, rows)
         case Picture(title, lines, html):
-            return heading(title) + (html() if html else f"<pre>{escaped_lines(lines(False))}</pre>\n")
+            return heading(title) + (html() if html else f'<pre tabindex="0">{escaped_lines(lines(False))}</pre>\n')
         case Rows(title, rows, head) if head and rows:
             return heading(title) + _table(title, head, [(*row.columns, *row.texts) for row in rows])
         case Rows(title, rows):

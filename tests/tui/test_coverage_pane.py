@@ -107,7 +107,7 @@ def test_a_small_table_is_measured_at_once_and_its_gaps_stand_largest_first():
     lines = [line.strip() for line in screen.splitlines()]
     assert lines[0] == "35.00 % of the contexts have a valid row (exact)."
     assert lines[3].startswith("1 Gaps 3   2 Pairs   3 Crowded 1   4 Rows 1   5 About")
-    assert lines[5].startswith("▸  50.00 %      same  speed: (5..10]")
+    assert lines[5].startswith("▸  50.00 %       all  speed: (5..10]")
     assert "Gap 1 of 3: 50.00 % of the contexts" in screen
 
 

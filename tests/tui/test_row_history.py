@@ -88,7 +88,7 @@ def test_the_dialog_shows_who_changed_the_cell_and_two_versions_beside_each_othe
     commit(folder, "Asset,speed\nwalk,0..5\n", "Bo", "playtest of Tuesday")
 
     async def script(app, pilot):
-        await press(pilot, "right", *"0..6", "enter", "up", "shift+f1")
+        await press(pilot, "right", *"0..6", "enter", "shift+f1")
         await app.workers.wait_for_complete()
         await settled(pilot)
         cell = screen_text(app)

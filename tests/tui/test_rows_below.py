@@ -96,7 +96,7 @@ def test_a_problem_is_shown_at_its_place_among_the_other_rows(path):
 
 def test_the_rows_of_a_database_are_shown_with_the_valid_ones_first(tmp_path):
     shutil.copytree(TABLES, tmp_path / "game")
-    title, _, *rows = below(tmp_path / "game" / "locomotion.csv", "f8", "f8", "f8", "alt+3")
+    title, _, *rows = below(tmp_path / "game" / "locomotion.csv", "f8", "f8", "alt+3")
     assert "Rows of loco_tired, then of loco" in title
     assert rows[0].split()[:3] == ["▸", "10", "walk_tired"]
     assert "×" not in rows[0]

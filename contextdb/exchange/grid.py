@@ -129,7 +129,9 @@ def columns_of(
     else:
         remarks = list[Remark]()
         block = Block(block.top, block.left, min(block.bottom, len(grid)), min(block.right, len(grid[0]) if grid else 0))
-    rows = [[text if text.strip() else "" for text in row[block.left : block.right]] for row in grid[block.top : block.bottom]]
+    rows: list[Sequence[str]] = [
+        [text if text.strip() else "" for text in row[block.left : block.right]] for row in grid[block.top : block.bottom]
+    ]
     if not rows or not any(map(any, rows)):
         raise TableError(
             Fault("there is nothing to read.", "a row with the names of the columns, then one for each asset", place=Place(file))

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from random_projects import DOMAINS, RandomProject, changed_project, date_text, random_project
 from running import run
-from strategies import IS_FULL, examples
+from strategies import examples
 
 import contextdb as cdb
 from contextdb.compiled.choosing import Choosing
@@ -54,7 +54,7 @@ def answer(compiled: CompiledTable, context: dict[str, object]) -> tuple[list[tu
     return sorted(valid), sorted(keys[row] for row in candidates)
 
 
-@examples(3 if IS_FULL else 1)
+@examples(1)
 @given(st.integers(0, 2**32))
 def test_sums_are_those_of_asking_both_versions_moment_by_moment(seed: int):
     rng = random.Random(seed)

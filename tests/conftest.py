@@ -26,7 +26,7 @@ from hypothesis import HealthCheck, settings
 from hypothesis.database import DirectoryBasedExampleDatabase
 
 ROOT = Path(__file__).parent.parent
-SIZES = {"few": 10, "full": 60, "thorough": 2000}
+SIZES = {"few": 10, "full": 40, "thorough": 2000}
 SIZE = os.environ.get("EXAMPLES") or "few"
 # The workers of pytest-xdist are started with this environment: all of them draw from one seed.
 SEED = os.environ.setdefault("EXAMPLES_SEED", str(random.randrange(10**9)))

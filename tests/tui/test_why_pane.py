@@ -32,7 +32,7 @@ def test_it_follows_the_cursor_and_the_facts(path):
 
     empty, first, second, closed = with_editor(path, script, (150, 30))
     assert "The test row is empty" in empty
-    assert "Row 1, a: not valid, 1 cell keeps" in first
+    assert "Row 1, a: not valid because of 1 cell" in first
     assert "is Run; the cell says Walk" in first
     assert "Row 2, b: valid" in second
     assert "Row 2, b" not in closed

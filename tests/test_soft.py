@@ -1,5 +1,6 @@
 """Soft cells whose cost grows with the distance: what they cost in known cases, in every way of asking, and out of a file."""
 
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +33,15 @@ def test_the_cost_is_the_penalty_for_each_distance(x: float, tmp_path: Path):
         assert answer.penalties.tolist() == pytest.approx(KNOWN[x])
     many = table.query_many({"x": [x, 25.0]})
     np.testing.assert_allclose(many.penalties, [KNOWN[x], KNOWN[25.0]])
+
+
+def test_a_fact_as_far_as_numbers_go_costs_without_end_in_every_way_of_asking():
+    table, far = compiled(["0 ~2.5/0.5", "0 ~2.5"]), float(np.finfo(np.float64).max)
+    for x in (far, -far):
+        assert table.query({"x": x}).penalties.tolist() == [np.inf, 2.5]
+        assert pickle.loads(pickle.dumps(table.query({"x": x}))).penalties.tolist() == [np.inf, 2.5]
+        assert table.query_many({"x": [x]}).penalties.tolist() == [[np.inf, 2.5]]
+        assert table.query({"x": cdb.cell(repr(x))}).penalties.tolist() == [np.inf, 2.5]
 
 
 def test_an_angle_is_away_the_short_way_round_and_a_date_in_days():

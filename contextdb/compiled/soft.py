@@ -72,7 +72,7 @@ class Growth:
         spans = (EVERYTHING if fact.accepts is None else _spans_of(fact)) if isinstance(fact, Cell) else ((fact, fact),)
         apart = np.full(len(self.per), np.inf)
         owners = np.repeat(np.arange(len(self.per)), np.diff(self.starts))
-        with np.errstate(invalid="ignore"):
+        with np.errstate(invalid="ignore", over="ignore"):  # beyond the largest number is infinitely far
             for low, high in spans:
                 for turn in ROUND if self.is_circular else ROUND[:1]:
                     np.minimum.at(apart, owners, _gaps(float(low) + turn, float(high) + turn, self.ends))  # type: ignore[arg-type]
@@ -114,5 +114,5 @@ class SoftMasks(NamedTuple):
         """The same for rows whose cells do not match."""
         if self.growth is None:
             return self.penalties
-        with np.errstate(invalid="ignore"):
+        with np.errstate(invalid="ignore", over="ignore"):
             return np.where(self.penalties > 0.0, self.penalties * self.growth.steps(fact), 0.0)

@@ -80,6 +80,19 @@ def test_a_silent_child_is_given_up(odd_library: Path, child: ParserProcess, mon
     assert not folder.exists()
 
 
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="whether a process sleeps is not known here")
+def test_a_child_that_sleeps_on_a_file_is_given_up_long_before(
+    odd_library: Path, child: ParserProcess, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(parser_process, "SILENCE_S", 500.0)
+    monkeypatch.setattr(parser_process, "STILL_S", 0.2)
+    for _ in range(2):
+        with pytest.raises(motion.ClipError, match=r"walk\.fbx: the file was read for too long"):
+            child.worlds(b"sleep", 0, "walk.fbx")
+    with pytest.raises(motion.ClipError, match="no scene"):
+        child.worlds(b"live", 0, "walk.fbx")
+
+
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="what a process works is not limited here")
 def test_a_child_that_works_for_long_on_a_small_file_ends(odd_library: Path, child: ParserProcess, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(parser_process, "WORK_S", 0.3)

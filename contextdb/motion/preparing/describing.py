@@ -15,11 +15,12 @@ from typing import Any
 
 from contextdb.cells.arguments import require_callable, require_kind, require_many_of
 from contextdb.errors import ContextError, Fault, MotionError, in_quotes
-from contextdb.motion.clips.clip import Clip
+from contextdb.motion.clips.clip import BY_SIZE, Clip
 from contextdb.motion.clips.mirror import partners_of
 from contextdb.motion.clips.rig import Rig
 from contextdb.motion.preparing.cells_of_clips import CONDITIONS, OUTPUTS, cells_of
 from contextdb.motion.preparing.clip_facts import GAITS, NORMAL, ClipFacts, common_words, facts_of, style_of
+from contextdb.motion.preparing.meeting import Meeting, meetings
 
 RATE = 30.0
 MOST_TURN_DPS = 1080.0
@@ -179,25 +180,37 @@ def _fallback_rank(row: Described) -> tuple[bool, bool, float]:
 
 @dataclass(frozen=True, eq=False)
 class RigClips:
-    """The clips of one rig, with the unit and the axis that their files leave open, and patterns that fit their files alone."""
+    """The clips of one rig, with the unit and the axis that their files leave open, and patterns that fit their files alone. `rig`
+    is the file of the rig on which the others are put."""
 
     clips: Sequence[Clip]
     patterns: Sequence[str]
     roles: tuple[str, ...] = ()
+    rig: str | None = None
 
 
 def by_rig(clips: Sequence[Clip], paths: Sequence[str]) -> list[RigClips]:
-    """The clips of each rig, unit and axis, those of which there are most first; joint clips by their roles behind the others.
-    `paths` are their files, below the folder of contextdb.toml, with "/" between names."""
-    groups = defaultdict[object, list[int]](list)
+    """The clips of each rig, with those of others that can be put on it; joint clips by their roles behind the others. `paths` are
+    their files, below the folder of contextdb.toml, with "/" between names."""
+    together, by_roles = meeting_rigs(clips)
+    rigs = []
+    for met, roles in (*((met, ()) for met in together), *((Meeting((members,)), roles) for roles, members in by_roles)):
+        members = met.members
+        own = {paths[i] for i in members}
+        rig = paths[members[0]] if len(met.rigs) > 1 else None
+        rigs.append(RigClips([clips[i] for i in members], patterns_of(sorted(own), {*paths} - own), roles, rig))
+    return rigs
+
+
+def meeting_rigs(clips: Sequence[Clip]) -> tuple[list[Meeting], list[tuple[tuple[str, ...], tuple[int, ...]]]]:
+    """The clips of each rig, unit and axis, those of which there are most first, as they meet; and joint clips by their roles."""
+    groups = defaultdict[tuple[tuple[str, ...], object], list[int]](list)
     roles_of = {i: tuple(roles) for roles in joint_clips(clips).values() for i in roles.values()}
     for i, clip in enumerate(clips):
-        groups[clip.skeleton.names, clip.metres_per_unit, clip.up, roles_of.get(i, ())].append(i)
-    rigs = []
-    for members in sorted(groups.values(), key=lambda members: (members[0] in roles_of, -len(members), members[0])):
-        own = {paths[i] for i in members}
-        rigs.append(RigClips([clips[i] for i in members], patterns_of(sorted(own), {*paths} - own), roles_of.get(members[0], ())))
-    return rigs
+        groups[roles_of.get(i, ()), (clip.skeleton.names, clip.metres_per_unit, clip.up)].append(i)
+    ordered = sorted(groups.items(), key=lambda group: (-len(group[1]), group[1][0]))
+    alone = [members for (roles, _), members in ordered if not roles]
+    return meetings(clips, alone), [(roles, tuple(members)) for (roles, _), members in ordered if roles]
 
 
 def patterns_of(own: Sequence[str], others: set[str]) -> list[str]:
@@ -245,6 +258,7 @@ def motion_sections(rigs: Sequence[RigClips], table: str, markup: str | None = N
     for i, rig in enumerate(rigs):
         behind = "" if i == 0 else f"_{i + 1}"
         mirror = mirror_of(rig.clips[0])
+        units = {clip.metres_per_unit for clip in rig.clips}
         sections["features", f"{table}{behind}"] = _features(rig.clips[0], mirror)
         names = [f"{table}{behind}" + ("" if j == 0 else f"_part{j + 1}") for j in range(len(rig.patterns))]
         for name, pattern in zip(names, rig.patterns, strict=True):
@@ -252,9 +266,10 @@ def motion_sections(rigs: Sequence[RigClips], table: str, markup: str | None = N
                 "table": table,
                 "clips": pattern,
                 "features": f"{table}{behind}",
-                "metres_per_unit": rig.clips[0].metres_per_unit,
+                "metres_per_unit": BY_SIZE if len(units) > 1 else rig.clips[0].metres_per_unit,
                 "up": rig.clips[0].up,
                 "mirror": bool(mirror),
+                **({"rig": rig.rig} if rig.rig is not None else {}),
                 **({"root": "feet"} if is_by_feet else {}),
                 **({"markup": markup} if markup is not None else {}),
                 **({"roles": list(rig.roles)} if rig.roles else {}),

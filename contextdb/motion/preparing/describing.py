@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from contextdb.cells.arguments import require_callable, require_kind, require_many_of
+from contextdb.disk import MOST_PATTERNS
 from contextdb.errors import ContextError, Fault, MotionError, in_quotes
 from contextdb.motion.clips.clip import BY_SIZE, Clip
 from contextdb.motion.clips.mirror import partners_of
@@ -214,19 +215,27 @@ def meeting_rigs(clips: Sequence[Clip]) -> tuple[list[Meeting], list[tuple[tuple
 
 
 def patterns_of(own: Sequence[str], others: set[str]) -> list[str]:
-    """Patterns of files that fit some paths, and none of some others."""
+    """Patterns of files that fit some paths, and none of some others: one for a folder, where its names can stand in one."""
     folders = defaultdict[tuple[str, str], list[str]](list)
     for path in own:
         folder, _, name = path.rpartition("/")
         stem, dot, ending = name.rpartition(".")
         folders[f"{folder}/" if folder else "", f"{dot}{ending}"].append(stem)
-    endings = defaultdict[str, list[str]](list)
+    names = defaultdict[str, dict[str, list[str]]](dict)
     for (folder, ending), stems in folders.items():
         beside = [path.removeprefix(folder).removesuffix(ending) for path in others if path.startswith(folder)]
         beside = [stem for stem in beside if "/" not in stem]
         for pattern in _parted(stems, beside, ""):
-            endings[f"{_escaped(folder)}{pattern}"].append(_escaped(ending))
-    return [f"{pattern}{_one_of(own)}" for pattern, own in endings.items()]
+            names[_escaped(folder)].setdefault(pattern, []).append(_escaped(ending))
+    return [f"{folder}{pattern}" for folder, own_names in names.items() for pattern in _in_one(own_names)]
+
+
+def _in_one(names: Mapping[str, Sequence[str]]) -> list[str]:
+    """Beginnings of names, each with its endings, as one pattern; as several where names have letters that choose."""
+    every = [f"{pattern}{ending}" for pattern, endings in names.items() for ending in endings]
+    if len(names) > 1 and len(every) <= MOST_PATTERNS and not set("".join(every)) & set("{},"):
+        return [f"{{{','.join(every)}}}"]
+    return [f"{pattern}{_one_of(endings)}" for pattern, endings in names.items()]
 
 
 def _one_of(endings: Sequence[str]) -> str:

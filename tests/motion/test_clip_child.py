@@ -59,6 +59,18 @@ def test_one_child_reads_many_files(child: ParserProcess):
     assert first is child.child
 
 
+def test_after_many_bytes_another_child_reads(child: ParserProcess, monkeypatch: pytest.MonkeyPatch):
+    raw = fbx(BODY)
+    monkeypatch.setattr(parser_process, "MOST_SENT", 2 * len(raw))
+    children = []
+    for _ in range(6):
+        child.worlds(raw, 0, "walk.fbx")
+        children.append(child.child)
+    assert children[0] is children[1] is children[2]
+    assert children[2] is not children[3]
+    assert children[3] is children[4] is children[5]
+
+
 def test_a_child_that_dies_is_one_fault_of_that_file_and_the_next_is_read(odd_library: Path, child: ParserProcess):
     for _ in range(2):
         with pytest.raises(motion.ClipError, match=r"walk\.fbx: the process that read the file ended \(exit code 11\)"):

@@ -38,6 +38,8 @@ BYTES_PER_S = 2e6
 """Of a large file it may be silent so much longer."""
 WORK_S, BYTES_PER_WORK_S = 4.0, 5e4
 """So long it may work on a file, in seconds of CPU, and so many bytes more give it another one: a clip of a minute takes one."""
+MOST_SENT = 1 << 25
+"""Bytes of files after which a new child is started: libraries do not give all memory back."""
 MOST_LINE = 1 << 24
 THREADS = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PXR_WORK_THREAD_LIMIT": "2"}
 NO_WHEEL = "and none for 3.14 on Windows with x86-64"
@@ -53,6 +55,7 @@ class ParserProcess:
         self.folder: TemporaryDirectory[str] | None = None
         self.answers: queue.SimpleQueue[Answer] = queue.SimpleQueue()
         self.turn = threading.Lock()
+        self.n_sent = 0
 
     def worlds(self, content: bytes, take: int, file: str) -> JointWorlds:
         """The joints of a take. Raises ClipError where the file cannot be read, the child dies or is silent, or the library is not
@@ -92,7 +95,10 @@ class ParserProcess:
             self.folder.cleanup()
 
     def _asked(self, content: bytes, take: int) -> tuple[dict[str, Any], bytes]:
+        if self.n_sent > MOST_SENT:
+            self.close()
         child = self._running()
+        self.n_sent += len(content)
         sender = threading.Thread(target=_send, args=(child.stdin, content, take), daemon=True)
         sender.start()
         while True:
@@ -123,6 +129,7 @@ class ParserProcess:
     def _running(self) -> subprocess.Popen[bytes]:
         if self.child is None or self.child.poll() is not None:
             self.close()
+            self.n_sent = 0
             self.folder = TemporaryDirectory(prefix="contextdb-", ignore_cleanup_errors=True)
             command = [sys.executable, "-P", str(CHILD), self.kind, self.folder.name]
             # Threads would take memory by the cores of the machine; a library that dies writes a report.

@@ -147,7 +147,9 @@ def columns_of(
         ]
     filled = list(body.values())
     names = _with_groups(_groups_above(grid, block, wide), rows[0])
-    renamed = next(((old.strip(), new) for old, new in zip(rows[0], names, strict=True) if " ".join(old.split()) not in ("", new)), None)
+    renamed = next(
+        ((old.strip(), new) for old, new in zip(rows[0], names, strict=True) if " ".join(old.split()) not in ("", new)), None
+    )
     if renamed:
         remarks.append(Remark("names have their group in front: {} is now {}.".format(*map(in_quotes, renamed))))
     _require_names(names, filled, block, Place(file, block.top + 1), _mend(rows, block, sheet))

@@ -409,6 +409,7 @@ class Controllers:
         max_rate: float,
         grace_s: float,
         settle_s: float,
+        asset_history_s: float,
         until_natural: bool,
     ) -> None: ...
     @property

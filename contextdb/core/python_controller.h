@@ -10,14 +10,14 @@ typedef struct cdbp_controller {
     int is_made;
 } cdbp_controller;
 
-/* One database: (frames, starts, stops, looping, root or None, marks, root_weights, rate, threshold, bar, continuing, settle, permutations, pace, n_pace,
+/* One database: (frames, starts, stops, assets, looping, root or None, marks, root_weights, rate, threshold, bar, continuing, settle, permutations, pace, n_pace,
  * pace_s). */
 static int cdbp_take_clips(cdbp_controller *own, PyObject *part, cdbm_clips *to, cdbp_arrays *a)
 {
-    PyObject *frames, *in[6];
+    PyObject *frames, *in[7];
     long long n_permutations, pace, n_pace;
     size_t s[3];
-    if (!PyArg_ParseTuple(part, "OOOOOOOdddddLLLd", &frames, &in[0], &in[1], &in[2], &in[3], &in[4], &in[5], &to->rate, &to->threshold,
+    if (!PyArg_ParseTuple(part, "OOOOOOOOdddddLLLd", &frames, &in[0], &in[1], &in[2], &in[3], &in[4], &in[5], &in[6], &to->rate, &to->threshold,
         &to->bar, &to->continuing, &to->settle, &n_permutations, &pace, &n_pace, &to->pace_s)) return -1;
     to->range_at = own->n_ranges, to->kind_at = own->n_kinds, to->frame_at = own->n_frames;
     if (frames == Py_None) return 0;
@@ -29,17 +29,19 @@ static int cdbp_take_clips(cdbp_controller *own, PyObject *part, cdbm_clips *to,
     to->n_ranges = to->frames->n_ranges, to->n_permutations = (size_t)n_permutations, to->pace = (size_t)pace, to->n_pace = (size_t)n_pace;
     if (!(to->starts = cdbp_int64s(a, in[0], s, 1, to->n_ranges, 0)) || !(to->stops = cdbp_int64s(a, in[1], s, 1, to->n_ranges, 0)))
         return -1;
-    if (!(to->looping = (const uint8_t *)cdbp_shaped(a, in[2], 'b', 1, 0, s, 1, to->n_ranges, 0, 0))) return -1;
-    if (in[3] != Py_None && !(to->root = (const float *)cdbp_shaped(a, in[3], 'f', 4, 0, s, 2, to->frames->n_frames, 3, 0))) return -1;
-    if (!(to->marks = (const uint8_t *)cdbp_shaped(a, in[4], 'u', 1, 0, s, 1, CDBP_ANY, 0, 0))) return -1;
+    if (!(to->assets = cdbp_int64s(a, in[2], s, 1, to->n_ranges, 0))) return -1;
+    if (!(to->looping = (const uint8_t *)cdbp_shaped(a, in[3], 'b', 1, 0, s, 1, to->n_ranges, 0, 0))) return -1;
+    if (in[4] != Py_None && !(to->root = (const float *)cdbp_shaped(a, in[4], 'f', 4, 0, s, 2, to->frames->n_frames, 3, 0))) return -1;
+    if (!(to->marks = (const uint8_t *)cdbp_shaped(a, in[5], 'u', 1, 0, s, 1, CDBP_ANY, 0, 0))) return -1;
     to->n_kinds = s[0];
-    if (!(to->root_weights = cdbp_numbers(a, in[5], s, 1, to->n_kinds, 0, 0))) return -1;
+    if (!(to->root_weights = cdbp_numbers(a, in[6], s, 1, to->n_kinds, 0, 0))) return -1;
     own->n_ranges += to->n_ranges, own->n_kinds += to->n_kinds, own->n_frames += to->frames->n_frames;
     own->controller.n_features = to->frames->n_features;
     return 0;
 }
 
-/* Controllers(databases, n_played, search_every_s, jump_threshold_s, history_s, min_rate, max_rate, grace_s, settle_s, until_natural) */
+/* Controllers(databases, n_played, search_every_s, jump_threshold_s, history_s, min_rate, max_rate, grace_s, settle_s, asset_history_s,
+ * until_natural) */
 static int cdbp_controller_init(PyObject *self, PyObject *arguments, PyObject *named)
 {
     cdbp_controller *own = (cdbp_controller *)self;
@@ -49,8 +51,8 @@ static int cdbp_controller_init(PyObject *self, PyObject *arguments, PyObject *n
     Py_ssize_t n, i;
     int is_right = 1;
     (void)named;
-    if (own->parts || !PyArg_ParseTuple(arguments, "OLdddddddp", &parts, &n_played, &to->search_every_s, &to->jump_threshold_s,
-        &to->history_s, &to->min_rate, &to->max_rate, &to->grace_s, &to->settle_s, &to->until_natural)) {
+    if (own->parts || !PyArg_ParseTuple(arguments, "OLddddddddp", &parts, &n_played, &to->search_every_s, &to->jump_threshold_s,
+        &to->history_s, &to->min_rate, &to->max_rate, &to->grace_s, &to->settle_s, &to->asset_history_s, &to->until_natural)) {
         if (!PyErr_Occurred()) PyErr_SetString(PyExc_TypeError, "Controllers are made once");
         return -1;
     }

@@ -180,7 +180,7 @@ class Updates(NamedTuple):
     def _skips(self, i: int, d: int) -> Iterable[Skip]:
         database = self.chooser.databases[d]
         assert database is not None, "of a database that is not loaded nothing is left out"
-        most = (self.chooser.n_played + 4) * database.n_permutations + 2 * len(database.assets) + 1
+        most = (self.chooser.n_played + 4) * database.n_permutations + 3 * len(database.assets) + 1
         spans, whys = np.empty((most, 2), np.int64), np.empty(most, np.uint8)
         each = slice(i, i + 1)
         row = self.after[each].copy()
@@ -218,8 +218,7 @@ class Chooser:
         self.n_ranges, self.n_kinds, self.n_frames = starts[-1]
         self.rates = [settings.rate if d is None or d.schema is None else d.schema.rate for d in self.databases]
         a_second = max(self.rates) * settings.max_play_rate + MOST_JUMPS_PER_S
-        is_remembering = settings.history_s > 0.0
-        self.n_played = min(16 + math.ceil(min(settings.history_s, 1e3) * a_second), MOST_PLAYED) if is_remembering else 0
+        self.n_played = self._most_played(a_second)
         self.core = Controllers(
             tuple(self.part(*each) for each in zip(selector.entries, self.databases, self.rates, strict=True)),
             self.n_played,
@@ -230,12 +229,20 @@ class Chooser:
             settings.max_play_rate,
             settings.grace_s,
             settings.settle_s,
+            settings.asset_history_s,
             settings.until_natural,
         )
         self.width: int = self.core.width
         self.n_features = next((d.n_features for d in self.databases if d is not None), 0)
         self._tables: dict[object, tuple[object, tuple[Any, ...]]] = {}
         self._shared: dict[TagFilter | None, Shared] = {}
+
+    def _most_played(self, a_second: float) -> int:
+        """How much of what was played is remembered at most: all for a while, then each asset once."""
+        history_s, barred_s = (min(each, 1e3) for each in (self.settings.history_s, self.settings.asset_history_s))
+        n_assets = sum(len(set(database.assets)) for database in self.databases if database is not None) if barred_s else 0
+        n_played = 16 + math.ceil(history_s * a_second) + min(n_assets, math.ceil(barred_s * MOST_JUMPS_PER_S))
+        return min(n_played, MOST_PLAYED) if history_s or barred_s else 0
 
     def __reduce__(self) -> tuple[Callable[..., Chooser], tuple[Selector, ControllerSettings]]:
         return Chooser.of, (self.selector, self.settings)
@@ -254,12 +261,14 @@ class Chooser:
         """One database as the core takes it."""
         threshold = math.nan if entry.threshold is None else float(entry.threshold)
         if database is None:
-            return (None,) * 7 + (rate, threshold, math.inf, 0.0, 0.0, 1, 0, 0, 1.0)
+            return (None,) * 8 + (rate, threshold, math.inf, 0.0, 0.0, 1, 0, 0, 1.0)
         marks, root = database.marks, database.root
         pace = None if database.schema is None else database.schema.speed_features
         columns, pace_s = (slice(0, 0), 1.0) if pace is None else pace
         arrays = (marks.looping, root if root is None else np.asarray(root, np.float32), marks.kind_marks, marks.kind_root_weights)
-        bounds = (np.asarray(each, np.int64) for each in (database.starts, database.stops))
+        first: dict[str, int] = {}
+        same = [first.setdefault(asset, number) for number, asset in enumerate(database.assets)]
+        bounds = (np.asarray(each, np.int64) for each in (database.starts, database.stops, same))
         return (
             database.frames,
             *(each if each is None else np.ascontiguousarray(each) for each in (*bounds, *arrays)),

@@ -98,6 +98,8 @@ typedef struct cdbm_given {      /* what some characters may choose from; of all
     const cdb_row_play *plays;   /* how rows play; NULL: no row says */
     const int64_t *play_of;      /* [n or 1, R] which of them is that of each range, -1 for none */
     size_t plays_step;
+    const double *to_event;      /* [N] seconds of its clip from each frame to the event that is asked for; or NULL */
+    double event_s;              /* when that is to happen */
     const double *wide;          /* [n] the bias of what plays by hysteresis, NaN where that does not hold; or NULL */
 } cdbm_given;
 
@@ -773,17 +775,25 @@ static inline double cdbm_pace(const cdbm_clips *clips, const double *features)
     return (clips->n_pace == 1 ? cdbo_size(features[0]) : cdbo_flat_length(features[0], features[1])) / clips->pace_s;
 }
 
-/* At what rate a frame is to play for a query, so that it goes about as fast as that asks, within the limits of its row or of the
- * settings. */
-static inline double cdbm_play_rate(const cdbm_controller *controller, const cdbm_playing *playing, const cdb_row_play *play,
-    const double *query)
+/* Seconds of its clip from what plays to the event that is asked for; NaN where it does not lead there, or none is. */
+static inline double cdbm_to_event(const cdbm_given *given, const cdbm_clips *clips, const cdbm_playing *playing)
+{
+    double into_s = playing->at_s - (playing->frame - (double)clips->starts[(size_t)playing->range]) / clips->rate;
+    return given->to_event ? given->to_event[clips->frame_at + (size_t)playing->frame] - into_s : NAN;
+}
+
+/* At what rate a frame is to play, within the limits of its row or of the settings: so that an event happens when it is to, or so
+ * that it goes about as fast as a query asks. */
+static inline double cdbm_play_rate(const cdbm_controller *controller, const cdbm_given *given, const cdbm_playing *playing,
+    const cdb_row_play *play, const double *query)
 {
     const cdbm_clips *clips = &controller->databases[(size_t)playing->database];
     int is_said = play->min_rate == play->min_rate;
     double least = is_said ? play->min_rate : controller->min_rate, most = is_said ? play->max_rate : controller->max_rate;
-    double wanted, own, features[2], one = cdbo_within(1.0, least, most);
+    double wanted, own, features[2], one = cdbo_within(1.0, least, most), to_event = cdbm_to_event(given, clips, playing);
     int64_t box;
     size_t f;
+    if (to_event == to_event) return given->event_s > 0.0 ? cdbo_within(to_event / given->event_s, least, most) : one;
     if (clips->n_pace == 0 || least == most) return one;
     box = cdbm_box_of(clips->frames, (int64_t)playing->frame);
     if (box < 0) return one;
@@ -876,9 +886,10 @@ static inline void cdbm_decide(const cdbm_controller *controller, const cdbm_giv
     if (decision->playing.database >= 0.0) {
         const cdbm_clips *clips = &controller->databases[(size_t)decision->playing.database];
         decision->root_weight = clips->root_weights[clips->frames->kinds ? clips->frames->kinds[(int64_t)decision->playing.frame] : 0];
-        wanted = decision->action == CDBM_HOLDS ? 1.0 : cdbm_play_rate(controller, &decision->playing, &decision->play, query);
+        wanted = decision->action == CDBM_HOLDS ? 1.0 : cdbm_play_rate(controller, given, &decision->playing, &decision->play, query);
         decision->rate = wanted;
-        if (decision->action == CDBM_PLAYS_ON || decision->action == CDBM_LOOPS)
+        if ((decision->action == CDBM_PLAYS_ON || decision->action == CDBM_LOOPS)
+            && !(cdbm_to_event(given, clips, &decision->playing) == cdbm_to_event(given, clips, &decision->playing)))
             decision->rate += (state->rate - wanted) * cdbo_exp(-CDBO_LN2 * given->dt_s / CDBM_RATE_HALFLIFE_S);
     }
     cdbm_go_on(controller, state, after, decision);

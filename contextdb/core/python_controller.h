@@ -163,7 +163,7 @@ static int cdbp_take_plays(const cdbp_controller *own, cdbp_arrays *a, PyObject 
 }
 
 /* before, moved, queries, seconds, ranges, range_biases, allowed, playable, kind_biases, flags, frame_biases, among, urgent, plays, play_of, wide,
- * after, decisions, found */
+ * to_event, event_s, after, decisions, found */
 static int cdbp_take_given(const cdbp_controller *own, cdbp_arrays *a, PyObject *const *in, cdbp_update *to)
 {
     const cdbm_controller *controller = &own->controller;
@@ -186,9 +186,12 @@ static int cdbp_take_given(const cdbp_controller *own, cdbp_arrays *a, PyObject 
     if (!(given->urgent = (const uint8_t *)cdbp_shaped(a, in[12], 'u', 1, 0, s, 1, n, 0, 0))) return -1;
     if (cdbp_take_plays(own, a, in + 13, given) != 0) return -1;
     if (in[15] != Py_None && !(given->wide = cdbp_numbers(a, in[15], s, 1, n, 0, 0))) return -1;
-    if (!(to->after = cdbp_to_numbers(a, in[16], s, 2, n, width, 0))) return -1;
-    if (!(to->decisions = (cdbm_decision *)cdbp_to_numbers(a, in[17], s, 2, n, sizeof(cdbm_decision) / sizeof(double), 0))) return -1;
-    if (!(to->found = (cdbm_found *)cdbp_to_numbers(a, in[18], s, 3, n, n_databases, 3))) return -1;
+    if (in[16] != Py_None && !(given->to_event = cdbp_numbers(a, in[16], s, 1, own->n_frames, 0, 0))) return -1;
+    given->event_s = PyFloat_AsDouble(in[17]);
+    if (PyErr_Occurred()) return -1;
+    if (!(to->after = cdbp_to_numbers(a, in[18], s, 2, n, width, 0))) return -1;
+    if (!(to->decisions = (cdbm_decision *)cdbp_to_numbers(a, in[19], s, 2, n, sizeof(cdbm_decision) / sizeof(double), 0))) return -1;
+    if (!(to->found = (cdbm_found *)cdbp_to_numbers(a, in[20], s, 3, n, n_databases, 3))) return -1;
     return 0;
 }
 
@@ -246,7 +249,7 @@ static PyObject *cdbp_controller_update(PyObject *self, PyObject *const *in, Py_
     int64_t parts, start, stop;
     int is_done = -2;
     a.n = 0;
-    if (own->is_made && n == 22 && cdbp_int_of(in[0], &parts) && cdbp_int_of(in[1], &start) && cdbp_int_of(in[2], &stop)
+    if (own->is_made && n == 24 && cdbp_int_of(in[0], &parts) && cdbp_int_of(in[1], &start) && cdbp_int_of(in[2], &stop)
         && cdbp_take_given(own, &a, in + 3, &to) == 0 && start >= 0 && start <= stop && (uint64_t)stop <= to.given.n
         && cdbp_are_moved(&own->controller, &to) && (parts & CDBP_ASK || cdbp_are_chosen(&own->controller, &to))) {
         size_t n_bytes = cdbm_choice_room(&own->controller, (size_t)(stop - start))

@@ -28,7 +28,7 @@ HEADER = ("bone", "channels", "height m", "role", "mirrored to")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("files", metavar="FILE", nargs="+", help="files of clips, or folders of them")
+    parser.add_argument("files", metavar="FILE", nargs="+", help="files of clips, one take as FILE:TAKE, or folders")
     parser.add_argument(
         "--metres-per-unit", metavar="M", type=unit_of, default=CENTIMETRE, help="the unit of BVH files in metres (default: 0.01)"
     )

@@ -507,13 +507,13 @@ class CoveragePane(Pane):
             if event.list.id == "unused":
                 self._go_to(play.unused[event.index])
             else:
-                self._fill_gap(play.gaps[event.index].cells)
+                self._fill_gap(play.gaps[event.index].cells, play.gaps[event.index].nearest)
             return
         if result is None:
             return
         report = result.report
         if event.list.id == "gaps":
-            self._fill_gap(report.gaps[event.index].cells)
+            self._fill_gap(report.gaps[event.index].cells, report.gaps[event.index].nearest)
         elif event.list.id == "crowded":
             self._go_to(report.crowded[event.index].rows[0])
         elif event.list.id == "rows":
@@ -521,7 +521,8 @@ class CoveragePane(Pane):
             if row is not None:
                 self._go_to(row, report.findings[event.index].column)
 
-    def _fill_gap(self, cells: Mapping[str, str]) -> None:
+    def _fill_gap(self, cells: Mapping[str, str], nearest: Nearest | None) -> None:
+        """Ask for a row of these cells, below the one that comes nearest to them."""
         conditions = {c.condition.name: c.condition for c in self.sheet.table.conditions}
         gone = cells.keys() - conditions.keys()
         if gone and self.sheet.query.is_nested:
@@ -534,7 +535,8 @@ class CoveragePane(Pane):
             )
         else:
             is_number = {name: conditions[name].domain.type.is_numeric for name in cells}
-            self.post_message(FillGap({name: lines.as_typed(cell) if is_number[name] else cell for name, cell in cells.items()}))
+            typed = {name: lines.as_typed(cell) if is_number[name] else cell for name, cell in cells.items()}
+            self.post_message(FillGap(typed, None if nearest is None else nearest.row))
 
     def _go_to(self, row: int, column: str | None = None) -> None:
         if self.run.state == "stale" and row >= self.sheet.table.n_rows:

@@ -300,8 +300,8 @@ class Character:
             The path that the body is wished to take over the ground, beginning where the body is, for a game that plans paths.
             Default: `steered_path`.
         **options
-            `tags`, `bias`, `penalties`, `among`, `force`, `interrupt` as for `Controller.update`; and `valid`, in place of what
-            the tables answer.
+            `tags`, `bias`, `penalties`, `among`, `force`, `interrupt`, `event` as for `Controller.update`; and `valid`,
+            in place of what the tables answer.
 
         Raises
         ------
@@ -429,12 +429,10 @@ class Character:
             self._stand(walks.settled(self.schema.ways, step.walk, roots, False), step.body)
             return Updated(step.body, step.facts, paths, decision)
         try:
-            pose = self.stream.update(decision, step.dt_s, step.body, self.ground)
+            poses = self.stream.posed(decision, step.dt_s, np.array([place_of(step.body)]), self.ground)
         except Exception:
             self.controller.put_back(before)
             raise
         moves_body = root_of(decision, self.stream.settings) == "animation"
-        self._stand(
-            walks.settled(self.schema.ways, step.walk, np.array([pose.root]), moves_body), None if moves_body else step.body
-        )
-        return Updated(self.body, step.facts, paths, decision, (pose,))
+        self._stand(walks.settled(self.schema.ways, step.walk, poses.roots, moves_body), None if moves_body else step.body)
+        return Updated(self.body, step.facts, paths, decision, poses)

@@ -442,11 +442,12 @@ class CoveragePane(Pane):
         event.stop()
         place = self._place(event.list.id or "", event.index)
         if place is not None and event.list.id in OF_GAPS:
-            self._fill_gap(place.cells or {})
+            self._fill_gap(place.cells or {}, place.nearest)
         elif place is not None and place.rows:
             self._go_to(place.rows[0], place.column)
 
-    def _fill_gap(self, cells: Mapping[str, str]) -> None:
+    def _fill_gap(self, cells: Mapping[str, str], nearest: Nearest | None) -> None:
+        """Ask for a row of these cells, below the one that comes nearest to them."""
         conditions = {c.condition.name: c.condition for c in self.sheet.table.conditions}
         gone = cells.keys() - conditions.keys()
         if gone and self.sheet.query.is_nested:
@@ -459,7 +460,8 @@ class CoveragePane(Pane):
             )
         else:
             is_number = {name: conditions[name].domain.type.is_numeric for name in cells}
-            self.post_message(FillGap({name: lines.as_typed(cell) if is_number[name] else cell for name, cell in cells.items()}))
+            typed = {name: lines.as_typed(cell) if is_number[name] else cell for name, cell in cells.items()}
+            self.post_message(FillGap(typed, None if nearest is None else nearest.row))
 
     def _go_to(self, row: int, column: str | None = None) -> None:
         if self.run.state == "stale" and row >= self.sheet.table.n_rows:

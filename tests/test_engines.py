@@ -18,6 +18,7 @@ from contextdb import motion
 from contextdb.cli import main as run_contextdb
 from contextdb.compiled.c_header import c_header_of
 from contextdb.compiled.engine_facts import csharp_of, godot_of, unreal_of
+from contextdb.motion.made.body import made_skeleton
 from contextdb.motion.storage.c_header import c_motion_header
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -34,6 +35,8 @@ SCHEMA: dict[str, dict[str, object]] = {
     "is_hurt": {"type": "bool", "expr": "wounds > 2"},
 }
 N_MOMENTS = 1000
+BODY = made_skeleton()
+CPP17 = [*CXX[:1], "-std=c++17", *CXX[2:]]
 
 
 def table(rng: random.Random) -> cdb.CompiledTable:
@@ -367,6 +370,31 @@ def rows_of_facts(compiled: cdb.CompiledTable) -> list[int]:
     return rows
 
 
+@pytest.mark.parametrize("project", ["unreal"], indirect=True)
+def test_in_the_part_for_unreal_a_character_walks_a_square_as_in_python(project: Path, square: tuple[Path, list[str], bytes]):
+    options = [*CPP17, *sanitizers(compiler_for(CPP17)), "-ffp-contract=off"]
+    program = built(project / "Walk.cpp", project / "Walk.exe", options)
+    bundle, played, poses = square
+    done = run(program, bundle, "poses.bin", "joints.bin", cwd=project)
+    assert [line.split("|")[0] for line in done.stdout.splitlines()] == played, done.stderr
+    assert (project / "poses.bin").read_bytes() == poses
+    numbers, in_unreal = (np.fromfile(project / name).reshape(len(played), -1) for name in ("poses.bin", "joints.bin"))
+    places = numbers[:, -(in_unreal.shape[1] - 3) // 4 :].reshape(len(played), -1, 3)
+    axes = in_unreal[:, 3:].reshape(len(played), -1, 4, 3)  # X, Y and Z of each joint, then its place
+    x, z, heading = numbers[:, :3].T
+    np.testing.assert_allclose(in_unreal[:, :3], np.transpose([100.0 * z, -100.0 * x, np.degrees(-heading)]), atol=1e-9)
+    np.testing.assert_allclose(axes[:, :, 3], 100.0 * places[:, :, [2, 0, 1]] * [1.0, -1.0, 1.0], atol=1e-3)
+    np.testing.assert_allclose(np.linalg.det(axes[:, :, :3]), 1.0, atol=1e-5)
+    for joint, parent in enumerate(BODY.parents.tolist()):
+        if parent >= 0:  # a joint is where its parent's axes carry its offset
+            left, up, ahead = BODY.offsets[joint]  # centimetres
+            carried = np.einsum("a,tad->td", [ahead, -left, up], axes[:, parent, :3])
+            np.testing.assert_allclose(axes[:, joint, 3] - axes[:, parent, 3], carried, atol=1e-3)
+    (project / "bad.motion").write_bytes(b"CDBMOTN0")
+    done = run(program, "bad.motion", "poses.bin", "joints.bin", cwd=project)
+    assert (done.returncode, done.stderr) == (1, "it is no bundle of motion\n")
+
+
 @pytest.mark.parametrize("project", ["unity"], indirect=True)
 def test_facts_in_csharp_are_those_of_the_table(project: Path):
     mono, compiler = needed("mono", "it runs C# as Unity does"), needed("mcs", "mono's compiler of C#")
@@ -401,9 +429,7 @@ def test_facts_for_unreal_are_those_of_the_table(tmp_path: Path):
     (tmp_path / "Facts.generated.h").write_text("", encoding="ascii")
     (tmp_path / "Facts.h").write_text(unreal_of({"moves": compiled}, "Facts"), encoding="utf-8")
     (tmp_path / "game.cpp").write_text(UNREAL, encoding="ascii")
-    program = built(
-        tmp_path / "game.cpp", tmp_path / "game.exe", [*CXX[:1], "-std=c++17", *CXX[2:]], *sanitizers(compiler_for(CXX))
-    )
+    program = built(tmp_path / "game.cpp", tmp_path / "game.exe", CPP17, *sanitizers(compiler_for(CPP17)))
     assert [*map(int, ran(program, tmp_path / "moves.safetensors").split())] == rows_of_facts(compiled)
 
 

@@ -8,7 +8,7 @@ from dataclasses import FrozenInstanceError, dataclass, replace
 
 import pytest
 
-from contextdb.motion.records import collector_at_rest, quickly_made
+from contextdb.motion.records import Unfinished, collector_at_rest, quickly_made
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +41,14 @@ class Wider(Quick):
     more: int = 0
 
 
+@quickly_made
+@dataclass(frozen=True, slots=True)
+class Late(Unfinished):
+    name: str
+    start: int
+    share: float | None = None
+
+
 @pytest.mark.parametrize("make", [lambda of: of("a", 1), lambda of: of("a", start=2, share=0.5), lambda of: of("a", 1, ("b",))])
 def test_it_has_the_fields_of_the_plain_one(make):
     plain, quick = make(Plain), make(Quick)
@@ -71,6 +79,25 @@ def test_it_can_be_replaced_copied_pickled_and_asked_for_its_signature():
 def test_a_subclass_with_more_fields_is_made_too():
     assert Wider("a", 1, more=4).more == 4
     assert type(Wider("a", 1)) is Wider
+
+
+def test_what_is_not_known_yet_is_worked_out_once_when_it_is_read():
+    n_asked = []
+
+    def rest():
+        n_asked.append(1)
+        return {"start": 2, "share": 0.5}
+
+    late, whole = Late.begun(rest, name="a"), Late("a", 2, 0.5)
+    assert (late.name, n_asked) == ("a", [])
+    assert not hasattr(late, "other")
+    assert (late.share, late.start, n_asked) == (0.5, 2, [1])
+    with pytest.raises(FrozenInstanceError):
+        late.start = 3
+    for made in (copy.copy, replace, lambda one: pickle.loads(pickle.dumps(one)), lambda one: one):
+        assert made(Late.begun(rest, name="a")) == whole
+    assert (hash(Late.begun(rest, name="a")), repr(Late.begun(rest, name="a"))) == (hash(whole), repr(whole))
+    assert not hasattr(whole, "other")
 
 
 @pytest.mark.parametrize("is_on", [True, False])

@@ -86,8 +86,8 @@ def require_point(value: object, what: str, accepted: str) -> tuple[float, float
     is_row = isinstance(value, (tuple, list)) or (isinstance(value, np.ndarray) and value.ndim == 1)
     if not is_row or len(value) != 2:  # type: ignore[arg-type]
         raise _wrong(value, what, accepted)
-    first, second = (require_real(each, f"one of {what}") for each in value)  # type: ignore[attr-defined]
-    return first, second
+    each = f"one of {what}"
+    return require_real(value[0], each), require_real(value[1], each)  # type: ignore[index]
 
 
 def require_pair(value: object, what: str, accepted: str) -> None:

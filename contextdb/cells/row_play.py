@@ -62,7 +62,7 @@ class RowPlay:
     def of(cls, numbers: Sequence[float]) -> Self | None:
         """That of a row of numbers; None where nothing is said."""
         values = [None if value != value else value for value in numbers]
-        if all(value is None for value in values):
+        if values.count(None) == len(values):
             return None
         blend_s, start_s, min_rate, max_rate = values[:MIRROR]
         mirror, loop, root, until = (None if value is None else int(value) for value in values[MIRROR:])

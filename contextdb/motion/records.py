@@ -7,10 +7,10 @@ object is of a class with the same slots that allows assignment for as long as i
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import MISSING, fields
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
 T = TypeVar("T")
 
@@ -20,6 +20,31 @@ def quickly_made(cls: type[T]) -> type[T]:
     own: Any = cls
     own.__init__ = _init(own, {field.name: field.default for field in fields(own)})
     return cls
+
+
+class Unfinished:
+    """A base of such classes, of whose objects some fields may be worked out when one of them is first read."""
+
+    __slots__ = ("_rest",)
+
+    _rest: Callable[[], Mapping[str, object]] | None
+    """Gives those fields, and all of them at once."""
+
+    @classmethod
+    def begun(cls, rest: Callable[[], Mapping[str, object]], **known: object) -> Self:
+        """An object of which the fields of `rest` are not known yet."""
+        made = cls.__new__(cls)
+        for name, value in (("_rest", rest), *known.items()):
+            object.__setattr__(made, name, value)
+        return made
+
+    def __getattr__(self, name: str) -> Any:
+        """A field that has no value yet; Python asks here for nothing else."""
+        rest = self._rest if name in type(self).__slots__ else None
+        if rest is not None:
+            for field, value in (*rest().items(), ("_rest", None)):
+                object.__setattr__(self, field, value)
+        return object.__getattribute__(self, name)  # or say that there is none
 
 
 @contextmanager
@@ -40,7 +65,7 @@ def collector_at_rest() -> Iterator[None]:
 def _init(cls: Any, defaults: dict[str, Any]) -> Callable[..., None]:
     """The `__init__` of a class whose fields have such defaults, `MISSING` for none."""
     slow = cls.__init__
-    filling = type(f"_Filling{cls.__name__}", (), {"__slots__": cls.__slots__})
+    filling = type(f"_Filling{cls.__name__}", cls.__bases__, {"__slots__": cls.__slots__})
     parameters = ", ".join(name if default is MISSING else f"{name}={name}" for name, default in defaults.items())
     source = [
         f"def __init__(self, {parameters}):",

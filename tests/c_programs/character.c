@@ -197,7 +197,8 @@ static void damage(unsigned char *bytes, size_t size, uint64_t *seed)
             if (part->n_bytes == 0) continue;
             at_byte = (size_t)(part->at + drawn(seed) % part->n_bytes);
         }
-        if (at_byte + 8 > size || drawn(seed) % 2) bytes[at_byte % size] = (unsigned char)drawn(seed);
+        if (at_byte > size - 8 || drawn(seed) % 2) /* what says where a part is may be damaged by now */
+            bytes[at_byte % size] = (unsigned char)drawn(seed);
         else memcpy(bytes + at_byte / 8 * 8, &odd[drawn(seed) % 7], 8);
     }
 }

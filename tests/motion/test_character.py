@@ -412,6 +412,18 @@ def test_a_crowd_plays_what_each_plays_alone(more):
         assert_same_poses(together, each, atol=1e-6)
 
 
+@pytest.mark.parametrize("tables", [table, lambda: {"all": table()}])
+def test_a_crowd_of_one_table_plays_what_each_plays_alone(tables):
+    own = tables()
+    crowd, alone = crowd_of([character("mixed", own) for _ in range(4)])
+    for tick in range(60):
+        sticks = [stick_at(tick + 9 * i) for i in range(4)]
+        together = crowd.update(DT, sticks, {"gait": [gait(stick)["gait"] for stick in sticks]})
+        each = [one.update(DT, stick, gait(stick)) for one, stick in zip(alone, sticks, strict=True)]
+        assert_same_poses(together, each)
+        assert [one.decision.why for one in together] == [one.decision.why for one in each]
+
+
 def test_a_crowd_goes_back_to_its_states():
     crowd, _ = crowd_of([character() for _ in range(3)])
     facts = {"gait": "Walk"}

@@ -30,6 +30,7 @@ from contextdb.motion.storage.c_header import c_motion_header
 
 pytestmark = pytest.mark.skipif(os.name == "nt" or not all_compilers(), reason="no gcc or clang was found")
 MOCAP = Path(os.environ.get("CONTEXTDB_MOCAP", Path(__file__).parents[2].parent / "shared" / "data" / "mocap"))
+N_DAMAGED = int(os.environ.get("DAMAGED", 4_000 if IS_FULL else 100))
 NAMES = ("idle", "walk", "walk_turn_left_90", "jog", "start_walk", "stop_walk")
 CAPTURED = (
     "walk_normal", "walk_tired", "walk-turn-left_normal", "run_normal", "walk-turn-right_normal", "run_tired", "walk-back_normal",
@@ -206,8 +207,7 @@ def test_characters_in_c_are_those_of_python_to_the_bit(seed, programs, tmp_path
 def test_a_damaged_bundle_is_refused_or_plays_and_never_reads_outside(programs, tmp_path: Path):
     bundle, *_ = session(random.Random(1), 1)
     (tmp_path / "bundle").write_bytes(bundle)
-    n = 4_000 if IS_FULL else 100
-    assert all(0 < int(ran(program, tmp_path / "bundle", str(n))) < n for program in programs)
+    assert all(0 < int(ran(program, tmp_path / "bundle", str(N_DAMAGED))) < N_DAMAGED for program in programs)
 
 
 @pytest.mark.parametrize(

@@ -409,6 +409,15 @@ def test_recording_changes_no_decision():
     assert [told(plain.update(DT, place)) for place in asked] == [told(recorded.update(DT, place)) for place in asked]
 
 
+def test_a_decision_that_is_read_late_says_what_it_said_at_once():
+    asked = [[math.sin(i) * 5.0 + 5.0] for i in range(40)]
+    database = line(walk=range(10), run=range(2, 12))
+    one, other = controller(database, search_every_s=0.2, history_s=0.5), controller(database, search_every_s=0.2, history_s=0.5)
+    at_once = [told(one.update(DT, place, valid("walk") if i % 9 else None)) for i, place in enumerate(asked)]
+    late = [other.update(DT, place, valid("walk") if i % 9 else None) for i, place in enumerate(asked)]
+    assert list(map(told, late)) == at_once
+
+
 def test_what_was_entered_just_now_is_left_for_a_large_gain_alone_and_says_so():
     settings = ControllerSettings(
         rate=RATE, search_every_s=0.1, jump_threshold_s=0.0, history_s=0.0, settle_bias=-5.0, settle_s=1.0

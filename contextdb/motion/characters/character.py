@@ -429,12 +429,10 @@ class Character:
             self._stand(walks.settled(self.schema.ways, step.walk, roots, False), step.body)
             return Updated(step.body, step.facts, paths, decision)
         try:
-            pose = self.stream.update(decision, step.dt_s, step.body, self.ground)
+            poses = self.stream.posed(decision, step.dt_s, np.array([place_of(step.body)]), self.ground)
         except Exception:
             self.controller.put_back(before)
             raise
         moves_body = root_of(decision, self.stream.settings) == "animation"
-        self._stand(
-            walks.settled(self.schema.ways, step.walk, np.array([pose.root]), moves_body), None if moves_body else step.body
-        )
-        return Updated(self.body, step.facts, paths, decision, (pose,))
+        self._stand(walks.settled(self.schema.ways, step.walk, poses.roots, moves_body), None if moves_body else step.body)
+        return Updated(self.body, step.facts, paths, decision, poses)

@@ -6,8 +6,9 @@ Bodies and paths are computed in arrays, each table is asked once with all conte
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from operator import eq
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,7 +16,6 @@ from numpy.typing import ArrayLike
 from contextdb.cells.arguments import require_kind, require_many_of, require_mapping, require_real
 from contextdb.cells.sequences import ListSequence
 from contextdb.errors import ContextError, Fault, MotionError, in_quotes, plural
-from contextdb.motion.answers import Answer
 from contextdb.motion.characters import tables as asking
 from contextdb.motion.characters import walks
 from contextdb.motion.characters.character import Character
@@ -31,6 +31,7 @@ from contextdb.motion.selection.controller_group import ControllerGroup
 from contextdb.motion.selection.decision import Decision
 from contextdb.motion.selection.search_options import OfValid
 
+T = TypeVar("T")
 FactsOfMany = Mapping[str, Any] | Sequence[Facts]
 
 
@@ -177,41 +178,37 @@ class Crowd(ListSequence[Character]):
 
     def _equal_streams(self) -> list[list[int]]:
         """The numbers of the characters with a stream, those together that have the same banks and settings."""
-        groups: list[tuple[PoseStream, list[int]]] = []
-        for i, character in enumerate(self):
-            stream = character.stream
-            if stream is None:
-                continue
-            for other, numbers in groups:
-                if stream.is_like(other):
-                    numbers.append(i)
-                    break
-            else:
-                groups.append((stream, [i]))
-        return [numbers for _, numbers in groups]
+        streams = {i: own for i, character in enumerate(self) if (own := character.stream) is not None}
+        return _alike(streams, PoseStream.is_like)
 
     def _valid(self, steps: list[Step]) -> Any:
-        """What may play of each, every table asked once with the facts of all who have it."""
-        users: dict[tuple[int, str], list[int]] = {}
-        table_of: dict[int, Table] = {}
-        for i, character in enumerate(self):
-            for table in asking.each_of(character.tables):
-                table_of[id(table)] = table
-                users.setdefault((id(table), character.unknown), []).append(i)
-        if not users:
-            return None
-        answers: list[dict[int, Answer]] = [{} for _ in self]
-        for (key, unknown), numbers in users.items():
-            for i, answer in zip(numbers, _answers(table_of[key], [steps[i].facts for i in numbers], unknown), strict=True):
-                answers[i][key] = answer
-        first = self[0].tables
-        if isinstance(first, dict) and all(character.tables == first for character in self):
-            return {database: [each[id(table)] for each in answers] for database, table in first.items()}
-        valid: list[OfValid | None] = [asking.valid_of(each.tables, answer) for each, answer in zip(self, answers, strict=True)]
+        """What may play of each: every table is asked once with the facts of all who have the same tables."""
+        asked = {i: (character.tables, character.unknown) for i, character in enumerate(self)}
+        valid: list[OfValid | None] = [None] * len(self)
+        for numbers in _alike(asked, eq):
+            tables, unknown = asked[numbers[0]]
+            facts = [steps[i].facts for i in numbers]
+            answers: dict[int, Any] = {id(table): _answers(table, facts, unknown) for table in asking.each_of(tables)}
+            if len(numbers) == len(self):
+                return asking.valid_of(tables, answers)
+            for k, i in enumerate(numbers):
+                valid[i] = asking.valid_of(tables, {key: each[k] for key, each in answers.items()})
         return valid
 
 
-def _answers(table: Table, facts: Sequence[Facts], unknown: Any) -> Iterable[Answer]:
+def _alike(things: Mapping[int, T], is_like: Callable[[T, T], bool]) -> list[list[int]]:
+    """The numbers of some things, those of like things together."""
+    groups: list[list[int]] = []
+    for i, own in things.items():
+        known = next((numbers for numbers in groups if is_like(own, things[numbers[0]])), None)
+        if known is None:
+            groups.append([i])
+        else:
+            known.append(i)
+    return groups
+
+
+def _answers(table: Table, facts: Sequence[Facts], unknown: Any) -> Any:
     """A table's answer to each of some contexts."""
     if asking.answers_many(table):
         columns = {name: [each.get(name) for each in facts] for name in table.asked}

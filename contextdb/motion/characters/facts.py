@@ -16,11 +16,13 @@ from contextdb.cells.conditions import Condition
 from contextdb.core import direction_of
 from contextdb.motion.characters.played import Played, of_played
 from contextdb.motion.clips.steering import Steered
+from contextdb.motion.records import quickly_made
 from contextdb.motion.selection.decision import Playing
 
 Ground = tuple[float, float]
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Moment:
     """What a character's own facts are computed from, at one update, before its tables are asked.

@@ -26,6 +26,7 @@ import numpy as np
 
 from contextdb.cells.conditions import Condition
 from contextdb.motion.output.bank import PoseBank
+from contextdb.motion.records import quickly_made
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.decision import Playing
 from contextdb.motion.selection.root_motion import motion_between
@@ -37,6 +38,7 @@ FEET = ("LeftFoot", "RightFoot")
 DOWN, UNTIL, TAG = ".Down", ".UntilDown_s", "Playing.Tag."
 
 
+@quickly_made
 @dataclass(frozen=True, eq=False, slots=True)
 class Played:
     """What plays, with the database and the poses that it is of, as far as there are any."""

@@ -14,9 +14,11 @@ from contextdb.cells.arguments import require_many_of
 from contextdb.errors import Fault, QueryError
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.trajectory import Trajectory
+from contextdb.motion.records import quickly_made
 
 
-@dataclass(frozen=True, eq=False)
+@quickly_made
+@dataclass(frozen=True, eq=False, slots=True)
 class ManyTrajectories:
     """Paths of one rate and one length, with their present at one frame.
 

@@ -143,9 +143,10 @@ class Pipeline:
         plays: list[float] = []
         all_playing = [decision.playing for decision in decisions]
         for decision, displayed, ground in zip(decisions, rows.playing, _gives(grounds, len(rows)), strict=True):
-            motion = decision.root_motion
+            motion, playing, before = decision.root_motion, decision.playing, decision.before
+            now = self.moment_of(playing)
             plays += (
-                *self.moment_of(decision.playing), *self.moment_of(decision.before), *self.moment_of(displayed),
+                *now, *(now if before is playing else self.moment_of(before)), *self.moment_of(displayed),
                 NUMBERS[decision.action], decision.play_rate,
                 motion.left_m, motion.ahead_m, motion.turn_rad, decision.root_weight, ground,
                 *_said(decision.play),

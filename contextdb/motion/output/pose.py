@@ -47,6 +47,7 @@ class Pose:
     play_rate: float
 
 
+@quickly_made
 @dataclass(frozen=True, eq=False, slots=True)
 class CrowdPoses(Made[Pose]):
     """The poses of N characters: a sequence, whose poses are made when they are requested, with their arrays as views.

@@ -20,7 +20,7 @@ from contextdb.motion.clips.steering import Steered
 from contextdb.motion.output.bank import PoseBank
 from contextdb.motion.output.ground import A_GROUND, Ground
 from contextdb.motion.output.pipeline import COLUMNS, Pipeline, Rows
-from contextdb.motion.output.pose import Pose
+from contextdb.motion.output.pose import CrowdPoses, Pose
 from contextdb.motion.output.settings import PoseSettings, RootMode
 from contextdb.motion.selection.decision import Decision, Playing, plays
 
@@ -185,11 +185,14 @@ class PoseStream:
         if ground is not None and not callable(ground):
             raise ContextError(Fault(f"ground is {ground!r}.", A_GROUND))
         place = checked_place(body, root_of(decision, self.settings))
-        places = None if place is None else np.array([place])
+        return self.posed(decision, dt, None if place is None else np.array([place]), ground)[0]
+
+    def posed(self, decision: Decision, dt: float, places: Floats | None, ground: Ground | None) -> CrowdPoses:
+        """The same unchecked, of one, with the place of its body [1, 3], whose `Pose` is made when it is requested."""
         grounds = None if ground is None else [ground]
         rows, poses = self._pipeline.update(self._rows.row(self._at), [decision], dt, places, grounds)
         self._go_on(rows, 0)
-        return poses[0]
+        return poses
 
 
 def root_of(decision: Decision, settings: PoseSettings) -> RootMode:

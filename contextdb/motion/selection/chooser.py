@@ -47,7 +47,7 @@ NEW, WIDENED = (0.0, 2.0), 1.0
 NO_DATABASE, GONE, GO_ON = -1, -2, -2
 MOST_PLAYED, MOST_JUMPS_PER_S = 1024, 60.0
 """So much of what was played is remembered at most, and so many jumps of each second."""
-MOST_CHOOSERS = 16
+MOST_CHOOSERS, MOST_ANSWERS = 16, 64
 
 
 class Shared(NamedTuple):
@@ -247,6 +247,7 @@ class Chooser:
         self.n_features = next((d.n_features for d in self.databases if d is not None), 0)
         self._tables: dict[object, tuple[object, tuple[Any, ...]]] = {}
         self._shared: dict[TagFilter | None, Shared] = {}
+        self._answers: dict[object, tuple[object, Ranges]] = {}
         self._to_event: dict[str, Floats] = {}
 
     def _most_played(self, a_second: float) -> int:
@@ -428,13 +429,23 @@ class Chooser:
     def check_names(self, inputs: SearchOptions, valid: Any) -> None:
         """Refuse a database that the selector does not have."""
         given = valid if are_mappings(valid) else [valid]
-        self.selector.check_names(name for each in given if isinstance(each, Mapping) for name in each)
-        self.selector.check_names(inputs.databases())
+        names = [name for each in given if isinstance(each, Mapping) for name in each]
+        self.selector.check_names([*names, *inputs.databases()])
 
     def ranges(self, valid: OfValidForMany | None, n: int) -> Ranges:
         """Which ranges may play in each of n updates."""
         if valid is None:
             return self._all_ranges
+        key = _answered_key(valid)
+        if key is None:
+            return self._ranges_of(valid, n)
+        if (known := self._answers.get(key)) is None:
+            if len(self._answers) >= MOST_ANSWERS:
+                self._answers.clear()
+            known = self._answers[key] = valid, self._ranges_of(valid, n)
+        return known[1]
+
+    def _ranges_of(self, valid: OfValidForMany, n: int) -> Ranges:
         if are_mappings(valid):
             return Ranges.joined([self.ranges(own, 1) for own in cast("Sequence[Any]", valid)])
         if not isinstance(valid, Mapping) and (answers := AnswersOfMany.of(valid, n)) is not None:
@@ -565,6 +576,16 @@ class AnswersOfMany(NamedTuple):
         masks = tuple(np.repeat(each, n, axis=0) if len(each) < n else each for each in self.masks)
         costs = self.costs and tuple(np.repeat(each, n, axis=0) if len(each) < n else each for each in self.costs)
         return masks, costs
+
+
+def _answered_key(valid: Any) -> tuple[object, ...] | None:
+    """What tells one answer without costs, or those of some databases, from all others while it is kept; None for anything else."""
+    if isinstance(valid, dict):
+        keys = [(name, _answered_key(each)) for name, each in valid.items()]
+        return None if any(key is None for _, key in keys) else tuple(keys)
+    if not hasattr(valid, "bits") or valid.has_penalties:
+        return None
+    return id(valid.table_assets), valid.bits, valid.mirrored.bits
 
 
 def widens(valid: object) -> bool:

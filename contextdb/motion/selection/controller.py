@@ -29,6 +29,7 @@ from contextdb.motion.arguments import Flags
 from contextdb.motion.clips.ground_place import GroundPlace, OfBody, place_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.markup.tag_filter import TagFilter
+from contextdb.motion.records import quickly_made
 from contextdb.motion.search.hit import Hit
 from contextdb.motion.selection import variation
 from contextdb.motion.selection.chooser import (
@@ -62,6 +63,7 @@ Place = tuple[Floats, int, Playing | None, bool, tuple[str, ...], object]
 FORCE, INTERRUPT = 1, 2
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Asked:
     """What n controllers are asked with beside their queries: one for each, and `valid` as for many."""
@@ -199,7 +201,7 @@ class Controller:
     @property
     def place(self) -> Place:
         """Where the controller is, to `put_back` this one with the same selector and settings; it costs less than `state`."""
-        rng = None if self._rng is None else variation.state_of(self._rng)
+        rng = None if self._rng is None or self.settings.variation is None else variation.state_of(self._rng)
         return self._rows, self._at, self._playing, self._is_decoded, self._recent, rng
 
     def put_back(self, place: Place) -> None:
@@ -380,7 +382,9 @@ def prepared(own: Sequence[Controller], dt_s: float, queries: Floats, asked: Ask
     among = [asked.among[i] for i in numbers]
     is_one = all(each is None for each in among)
     flags = chooser.among(None) if is_one else np.concatenate([chooser.among(each) for each in among])
-    urgent = np.array([FORCE * bool(asked.force[i]) + INTERRUPT * bool(asked.interrupt[i]) for i in numbers], np.uint8)
+    urgent = np.zeros(n, np.uint8)
+    if any(asked.force) or any(asked.interrupt):
+        urgent[:] = [FORCE * bool(asked.force[i]) + INTERRUPT * bool(asked.interrupt[i]) for i in numbers]
     wide = _wide(chooser, moved, ranges, valid, penalties) if widens(valid) else None
     wanted, shared, event = np.ascontiguousarray(queries[:, : chooser.n_features]), chooser.shared(first.tags, first.bias), None
     if (asked_event := asked.event[numbers[0]]) is not None:

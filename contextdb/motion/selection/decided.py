@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import NamedTuple
 
 from contextdb.cells.row_play import RowPlay
@@ -41,42 +42,48 @@ class Told(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """A decision as the core gives it, in its order."""
+    """What the words of a decision are made of, in the core's order."""
 
     tick: float
     time_s: float
     action: float
     cause: float
     held: float
-    standing: float
-    playing: Sequence[float]
-    before: Sequence[float]
     cost: float | None
     continuing_cost: float | None
-    winner: int
     chosen: Sequence[float]
-    motion: Sequence[float]
-    root_weight: float
-    rate: float
     due_s: float
     waited_s: float
-    play: Sequence[float]
 
     @classmethod
     def of(cls, row: list[float]) -> Numbers:
         """A row of decisions."""
         cost, continuing = (None if each != each else each for each in row[14:16])
-        parts = row[6:10], row[10:14], cost, continuing, int(row[16]), row[18:22], row[22:25]
-        return cls._make((*row[:6], *parts, *row[25:29], row[31:39]))
+        return cls._make((*row[:5], cost, continuing, row[18:22], *row[27:29]))
 
 
 def decision_of(updates: Updates, i: int, was: Playing | None, asked: Told) -> Decision:
-    """The decision of one of some updates; `was` is what played before it."""
-    numbers, chooser = Numbers.of(updates.decisions[i].tolist()), updates.chooser
+    """The decision of one of some updates; `was` is what played before it. What poses are made of it knows at once."""
+    row, chooser = updates.decisions[i].tolist(), updates.chooser
+    before = chooser.playing(row[10:14]) or was
+    return Decision.begun(
+        partial(_rest, updates, i, row, before, asked),
+        action=ACTIONS[int(row[2])],
+        playing=before if row[6:10] == row[10:14] else chooser.playing(row[6:10]),
+        before=before,
+        continuing_cost=None if row[15] != row[15] else row[15],
+        root_motion=RootMotion(*row[22:25]),
+        root_weight=row[25],
+        play_rate=row[26],
+        play=RowPlay.of(row[31:39]),
+    )
+
+
+def _rest(updates: Updates, i: int, row: list[float], before: Playing | None, asked: Told) -> dict[str, object]:
+    """The other fields of a decision."""
+    numbers, chooser = Numbers.of(row), updates.chooser
     cause = CAUSES[int(numbers.cause)]
     choice = None if cause is None else updates.choice(i)
-    before = chooser.playing(numbers.before) or was
-    is_same = numbers.playing == numbers.before
     filters: tuple[tuple[str, Filter], ...] = ()
     candidates: Sequence[tuple[str, Candidates]] = ()
     if choice is not None and asked.n_candidates > 0:
@@ -85,30 +92,23 @@ def decision_of(updates: Updates, i: int, was: Playing | None, asked: Told) -> D
         filters = tuple((name, updates.filter_of(i, d)) for d, (name, own, is_in) in enumerate(each) if own is not None and is_in)
         if filters:
             candidates = WorkedOut(chooser.selector.databases, asked.query, filters, choice, asked.n_candidates)
-    return Decision(
-        tick=int(numbers.tick),
-        time_s=numbers.time_s,
-        action=ACTIONS[int(numbers.action)],
-        why=_why(updates, i, numbers, cause, before, choice),
-        searched=cause is not None,
-        playing=before if is_same else chooser.playing(numbers.playing),
-        before=before,
-        cost=numbers.cost,
-        continuing_cost=numbers.continuing_cost,
-        choice=choice,
-        context=asked.context,
-        query=asked.query,
-        candidates=candidates,
-        search_us=None if cause is None else asked.search_us,
-        root_motion=RootMotion(*numbers.motion),
-        root_weight=numbers.root_weight,
-        body=asked.body,
-        held=str(HELD[int(numbers.held)]),
-        play_rate=numbers.rate,
-        play=RowPlay.of(numbers.play),
-        filters=filters,
-        inputs=_inputs(updates, asked) if asked.n_candidates > 0 else None,
-    )
+    return {
+        "tick": int(numbers.tick),
+        "time_s": numbers.time_s,
+        "why": _why(updates, i, numbers, cause, before, choice),
+        "searched": cause is not None,
+        "cost": numbers.cost,
+        "choice": choice,
+        "context": asked.context,
+        "query": asked.query,
+        "candidates": candidates,
+        "search_us": None if cause is None else asked.search_us,
+        "body": asked.body,
+        "held": str(HELD[int(numbers.held)]),
+        "filters": filters,
+        "inputs": _inputs(updates, asked) if asked.n_candidates > 0 else None,
+        "together": None,
+    }
 
 
 def _inputs(updates: Updates, asked: Told) -> Inputs:

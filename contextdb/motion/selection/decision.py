@@ -14,7 +14,7 @@ from contextdb.cells.row_play import RowPlay
 from contextdb.errors import in_quotes
 from contextdb.motion.clips.ground_place import GroundPlace
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.records import quickly_made
+from contextdb.motion.records import Unfinished, quickly_made
 from contextdb.motion.search.candidates import Candidates
 from contextdb.motion.search.filters import Filter
 from contextdb.motion.selection.choice import Choice
@@ -96,8 +96,8 @@ class Together:
 
 @quickly_made
 @dataclass(frozen=True, slots=True)
-class Decision:
-    """One update of a controller.
+class Decision(Unfinished):
+    """One update of a controller. What nobody reads, such as `why`, is not worked out.
 
     Attributes
     ----------

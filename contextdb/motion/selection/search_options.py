@@ -54,8 +54,8 @@ class SearchOptions:
     penalties: OfPenalties | None = None
 
     def __post_init__(self) -> None:
-        for what in ("bias", "skip", "penalties"):
-            if (given := getattr(self, what)) is not None and not isinstance(given, (dict, Mapping)):
+        for what, given in (("bias", self.bias), ("skip", self.skip), ("penalties", self.penalties)):
+            if given is not None and not isinstance(given, (dict, Mapping)):
                 accepted = f"{'a mapping of assets to costs, or ' if what == 'penalties' else ''}a mapping of databases"
                 raise QueryError(Fault(f"{what} is a {type(given).__name__}.", accepted))
         if self.tags is not None and not isinstance(self.tags, (TagFilter, Mapping)):

@@ -424,6 +424,24 @@ def test_a_crowd_of_one_table_plays_what_each_plays_alone(tables):
         assert [one.decision.why for one in together] == [one.decision.why for one in each]
 
 
+@pytest.mark.parametrize(
+    ("sticks", "facing", "message"),
+    [
+        ([[0.0, 1.0]], None, r"the sticks have shape \(1, 2\)\. Accepted: \(2, 2\), x and z for each character"),
+        ([[0.0, 1.0], [np.nan, 0.0]], None, r"the velocity \[nan, 0.0\] is asked of character 1. Accepted: numbers from -1e\+09"),
+        (np.zeros((2, 2)), np.zeros(3), r"the facing has shape \(3,\)"),
+        (np.zeros((2, 2)), [np.inf, 0.0], "the facing inf is asked of character 0. Accepted: radians"),
+        ("north", None, "sticks"),
+    ],
+)
+def test_a_stick_or_facing_of_a_crowd_that_is_none_is_refused_with_its_character(sticks, facing, message):
+    crowd = motion.Crowd([character() for _ in range(2)])
+    states = crowd.states
+    with pytest.raises(cdb.ContextDBError, match=message):
+        crowd.update(DT, sticks, {"gait": "Walk"}, facing)
+    assert crowd.states == states
+
+
 def test_a_crowd_goes_back_to_its_states():
     crowd, _ = crowd_of([character() for _ in range(3)])
     facts = {"gait": "Walk"}

@@ -189,6 +189,8 @@ def _main(given: Sequence[str]) -> int:
         if error.encoding != sys.getfilesystemencoding() or error.encoding == "utf-8":
             return _crashed(error, given)
         return _failed(unnameable(error, Path(error.object)))
+    except ImportError as error:
+        return _failed(Fault(f"{error}.")) if error.name == "contextdb.core" else _crashed(error, given)
     except KeyboardInterrupt:
         note("interrupted")
         return ExitCode.INTERRUPTED

@@ -444,7 +444,7 @@ class Drawing:
     def table(self, name: str, most_rows: int, inner: Sequence[str] = ()) -> RandomTable:
         rng = self.rng
         n_rows = rng.randint(0, most_rows)
-        assets = ["A", "B", "C", *(f"@{table}" for table in inner)]
+        assets = ["A", "B", "C", *(f"@{table}" for table in inner), *(f"@{table}" for table in inner)]
         columns = {"Asset": [rng.choice(assets) if self.chance(0.5) else f"{name}_{row}" for row in range(n_rows)]}
         for condition in (*self.names, *self.derived):
             if self.chance(0.8):

@@ -3,6 +3,7 @@
 import os
 import re
 import subprocess
+import sys
 from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
@@ -168,3 +169,20 @@ def test_a_table_that_is_a_link_to_itself_is_refused_in_words_by_every_command(f
         result = run(*command.split(), "loop.csv")
         assert result.code in (1, 2), result
         assert result.out + result.err
+
+
+NOT_BUILT = """
+import sys
+sys.modules["contextdb.core._core"] = None
+from contextdb.cli import main
+sys.exit(main(["query", "t.csv", "ok=True"]))
+"""
+
+
+def test_a_checkout_whose_core_is_not_built_says_how_to_build_it(folder):
+    done = subprocess.run([sys.executable, "-c", NOT_BUILT], cwd=folder, capture_output=True, text=True)
+    assert done.returncode == ExitCode.BAD_USE
+    assert done.stderr.startswith(
+        "contextdb: contextdb's core is not built for this Python: run `python build_core.py` in the checkout"
+    )
+    assert len(done.stderr.splitlines()) == 1

@@ -193,6 +193,13 @@ def test_a_rule_that_no_casting_meets_is_told_with_the_row_whose_rule_it_is(rule
     assert failing_rules(ruled.explain({"speed": 9.0}, actors=actors), 1) == [("If", "speed < 5", "false with speed = 9", "outer")]
 
 
+def test_rows_are_in_order_of_their_failures_whether_or_not_a_rule_is_among_them(ruled):
+    near, far = {"Defender.x": 1.0, "Receiver.x": 2.0}, {"Defender.x": 3.0, "Receiver.x": 2.0}
+    assert [row.row for row in ruled.explain({"speed": 1.0} | near)] == [0, 1]
+    assert [row.row for row in ruled.explain({"speed": 1.0} | far)] == [1, 0]
+    assert [row.row for row in ruled.explain({"speed": 9.0} | far).nearest(2)] == [1, 0]
+
+
 def test_a_rule_that_is_false_for_every_value_of_a_set_is_told_as_false(ruled):
     facts = {"speed": cdb.cell("6..9"), "Defender.x": 1.0, "Receiver.x": 2.0}
     assert failing_rules(ruled.explain(facts), 1) == [("If", "speed < 5", "false with speed = 6..9", "outer")]

@@ -55,7 +55,7 @@ HEAD = "Asset,speed,hurt,P,Once,Rest,Turns\n"
 
 
 def test_cells_of_rests_that_cannot_be_read_are_errors_at_their_place(tmp_path: Path):
-    table = made(tmp_path, HEAD + "a,1,,,maybe,soon,1.5\nb,2,,,True,-1,-1\nc,3,,,,,\nd,4,,,no,inf,2\n")
+    table = made(tmp_path, HEAD + 'a,1,,,maybe,soon,1.5\nb,2,,,True,-1,-1\nc,3,,,,,\nd,4,,,no,inf,2\ne,5,,,1,"0,5",3 turns\n')
     found = {(f.row, f.column): f.message for f in check(table) if f.rule == "unreadable-cell"}
     assert found == {
         (0, "Once"): 'cannot read "maybe". Accepted: "True" or "False".',
@@ -64,6 +64,8 @@ def test_cells_of_rests_that_cannot_be_read_are_errors_at_their_place(tmp_path: 
         (1, "Rest"): 'cannot read "-1". Accepted: a number of seconds from 0 up.',
         (1, "Turns"): 'cannot read "-1". Accepted: a whole number of picks from 0 up.',
         (3, "Rest"): 'cannot read "inf". Accepted: a number of seconds from 0 up.',
+        (4, "Rest"): 'cannot read "0,5". Accepted: a number of seconds from 0 up. Did you mean "0.5"?',
+        (4, "Turns"): 'cannot read "3 turns". Accepted: a whole number of picks from 0 up. Did you mean "3"?',
     }
 
 

@@ -62,6 +62,7 @@ def test_one_that_fails_is_named_and_the_others_are_not(games):
         (["check", "--projects", "games/one/moves.csv"], "a folder with projects below it"),
         (["index", "games", "--out", "rows.csv"], "does not end in .parquet"),
         (["index", "none", "--out", "rows.parquet"], "there is no such folder"),
+        (["index", "games", "--out", "games/one/rows.parquet"], "would take the file for one of its tables"),
     ],
 )
 def test_what_cannot_be_meant_is_refused(games, monkeypatch, arguments, words):

@@ -154,7 +154,7 @@ TABLES = {
     "coverage": command("coverage", ".", finds=OF_FOLDER),
     "cases": command("cases", "t.csv", "--write", writes=("t.cases.csv",), finds=OF_TABLE),
     "tidy": command("tidy", "t.csv", "--write", finds=OF_TABLE),
-    "index": command("index", ".", "--out", "rows.parquet", finds=OF_FOLDER),
+    "index": command("index", ".", "--out", "out/rows.parquet", finds=OF_FOLDER),
     "query": command("query", "t.csv", "speed=1", "hit=True", finds=OF_TABLE),
     "query by name": command("query", "t", "speed=1", "hit=True", finds=("contextdb.toml", "t.csv")),
     "compile": command("compile", ".", writes=("t.safetensors", "below/other.safetensors"), finds=OF_FOLDER),
@@ -433,7 +433,17 @@ def test_a_command_writes_in_its_project_and_reads_nothing_around_it(tmp_path, n
         assert result.code in (0, 1), result.err
         assert found.outside(place.clone, place.around) == []
         there = {path.relative_to(place.clone).as_posix(): path.read_bytes() for path in place.clone.rglob("*") if path.is_file()}
-        typed = {"t.csv", "new.csv", "x.json", "answers.csv", "rows.parquet", "moves.csv", "new.jsonl", "new.parquet", "new.npz"}
+        typed = {
+            "t.csv",
+            "new.csv",
+            "x.json",
+            "answers.csv",
+            "out/rows.parquet",
+            "moves.csv",
+            "new.jsonl",
+            "new.parquet",
+            "new.npz",
+        }
         new = {file for file in there if there[file] != before.get(file) and not file.startswith(".git/")} - typed
         own = {file for file in new if file.startswith((*OWN, "parts/", "kept/"))}
         assert new - own <= set(WORKS[name].writes)

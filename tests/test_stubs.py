@@ -1,5 +1,7 @@
 """Facts as Python types: what a type checker says of a context is what a query would say."""
 
+import importlib.util
+import json
 import os
 import re
 import subprocess
@@ -48,15 +50,23 @@ def names_in(text: str) -> dict[str, object]:
     return module
 
 
-def with_role(name: str) -> CompiledTable:
-    """A table of the fact "speed" and three of roles."""
+def with_outputs() -> CompiledTable:
+    """A table with roles and two outputs."""
+    columns = {
+        "Asset": ["a"],
+        "speed": ["Any"],
+        "Defender.height": ["1..2"],
+        "Receiver.tags": ["+InAir"],
+        "damage": ["3"],
+        "word": ["Hey"],
+    }
     schema: dict[str, dict[str, object]] = {
         "speed": {"type": "number"},
         "Defender.height": {"type": "number"},
-        "Defender.name of": {"type": "enum", "values": ["CB"]},
         "Receiver.tags": {"type": "tags", "values": ["InAir"]},
     }
-    return compiled(schema, name)
+    outputs = {"damage": {"type": "int"}, "word": {"type": "enum", "values": ["Hey", "Ho"]}}
+    return Table.from_columns(columns, schema, {"outputs": outputs}, "jog").compile()
 
 
 WRONG = [
@@ -69,11 +79,11 @@ WRONG = [
 ]
 VALUES: dict[str, object] = {"type": "enum", "values": ["a'b\"", "x\ny", "Größe", "\\"]}
 ODD_NAMES = ("class", "Class", "a.b", "a b", "3", "…", "None", "Literal", "ﬁ", "fi", "np", "cdb", "AnyNumber", "Defender.class")
-ODD_TABLES = ("jog", "Jog", "jog facts", "jog live", "jog some facts", "-", "2 tables", "表")
+ODD_TABLES = ("jog", "Jog", "jog facts", "jog live", "jog some facts", "jog table", "-", "2 tables", "表")
 ODD = {name: compiled({c: VALUES | {"description": c} for c in ODD_NAMES}, name) for name in ODD_TABLES}
 SAMPLES = Project.load(ROOT / "tables").compile()
 PLAIN = {"jog": compiled(SCHEMA)}
-LIVE = "from contextdb import CompiledTable\n\ndef f(table: CompiledTable, live: facts.JogLive) -> None:\n    "
+LIVE = "\ndef f(table: facts.JogTable, live: facts.JogLive) -> None:\n    "
 NUMPY = (
     CONTEXT.replace("True", "np.True_")
     .replace('"n": 3', '"n": np.int64(3)')
@@ -85,7 +95,40 @@ SETS = (
     .replace("2.5", 'cdb.cell("2 ± 1")')
     .replace('"Half Air"', 'cdb.cell("not Ground")')
 )
-CAST = '"Defender": [{"height": 1.8, "name of": "CB", "id": 21, "name": "Ann"}], "Receiver": [{"tags": ["InAir"]}]'
+CAST = '"Defender": [{"height": 1.8, "id": 21, "name": "Ann"}], "Receiver": [{"tags": ["InAir"]}]'
+PLAY = {"jog": with_outputs()}
+ANSWERS = f"""from typing import assert_type
+
+import contextdb as cdb
+import numpy as np
+from numpy.typing import NDArray
+
+
+def f(plain: cdb.CompiledTable) -> None:
+    opened: cdb.CompiledTable = facts.JogTable.open("jog.safetensors")
+    jog = facts.JogTable.of(plain)
+    m = jog.query({{"speed": 1.0}}, actors={{{CAST}}})
+    assert_type(m.outputs("damage"), NDArray[np.int64])
+    assert_type(m.outputs("word"), NDArray[np.object_])
+    assert_type(m.casting(0)["Defender"], facts.JogDefenderActor)
+    for role, actor in m.castings(0)[0].items():
+        print(opened, m.casting(0)[role], actor)
+    pick = jog.picker(seed=1).pick(m)
+    assert_type(pick.outputs["damage"], int)
+    assert_type(pick.outputs["word"], facts.JogWord)
+    assert_type(pick.casting["Receiver"], facts.JogReceiverActor)
+    assert_type(jog.live({{"speed": 1.0}}).query(), facts.JogMatches)
+    assert_type(next(iter(jog.query_many({{"speed": [1.0]}}))), facts.JogMatches)
+    jog.explain({{}}, unknown="any").nearest(1)
+"""
+SLIPS = [
+    "m.outputs('damag')",
+    "pick.outputs['damag']",
+    "m.casting(0)['Refree']",
+    "pick.casting['Defender']['heigth']",
+    "jog.query({'sped': 1.0}, unknown='any')",
+    "jog.query({}, actors={})",
+]
 MODULES: dict[str, tuple[dict[str, CompiledTable], str]] = {
     "context": (PLAIN, f"context: facts.JogFacts = {CONTEXT}\n"),
     **{
@@ -121,21 +164,23 @@ MODULES: dict[str, tuple[dict[str, CompiledTable], str]] = {
     "slip in del": (PLAIN, LIVE + 'del live["sped"]\n'),
     "one fact": ({"jog": compiled({"n": SCHEMA["n"]})}, LIVE + 'live = table.live()\n    live["n"] = 1\n'),
     "no facts": ({"jog": compiled({})}, LIVE + "live = table.live()\n    context: facts.JogFacts = {}\n"),
+    "answers": (PLAY, ANSWERS),
+    **{f"slip in an answer {i}": (PLAY, f"{ANSWERS}    {slip}\n") for i, slip in enumerate(SLIPS)},
     "actors": (
-        {"jog": with_role("jog")},
+        PLAY,
         LIVE
         + 'context: facts.JogFactsWithActors = {"speed": 1.0}\n    live = table.live(context)\n'
         + f"    actors: facts.JogActors = {{{CAST}}}\n    table.query(context, actors=actors)\n    live.actors(actors)\n",
     ),
     "own data of actors": (
-        {"jog": with_role("jog")},
+        PLAY,
         "class Ours(facts.JogDefenderActor):\n    mass: float\n\n"
         + LIVE
-        + 'ann: Ours = {"height": 1.8, "name of": "CB", "mass": 80.0}\n    given: facts.JogActors = {"Defender": [ann]}\n'
+        + 'ann: Ours = {"height": 1.8, "mass": 80.0}\n    given: facts.JogActors = {"Defender": [ann]}\n'
         + "    live.actors(given)\n",
     ),
-    "slip in actor": ({"jog": with_role("jog")}, 'actor: facts.JogDefenderActor = {"heigth": 1.8, "name of": "CB"}\n'),
-    "no plain fact": ({"jog": with_role("jog")}, 'context: facts.JogFactsWithActors = {"Defender.height": 1.8}\n'),
+    "slip in actor": (PLAY, 'actor: facts.JogDefenderActor = {"heigth": 1.8}\n'),
+    "no plain fact": (PLAY, 'context: facts.JogFactsWithActors = {"Defender.height": 1.8}\n'),
     "odd names": (ODD, ""),
     "samples": (SAMPLES, ""),
     "names": (
@@ -151,12 +196,18 @@ MODULES: dict[str, tuple[dict[str, CompiledTable], str]] = {
 
 
 @pytest.fixture(scope="module")
-def said(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
-    """What mypy says of each of MODULES, in strict mode."""
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The files of MODULES."""
     folder = tmp_path_factory.mktemp("typed")
     for i, (tables, use) in enumerate(MODULES.values()):
         (folder / f"facts_{i}.py").write_text(stubs_of(tables), encoding="utf-8")
         (folder / f"use_{i}.py").write_text(f"import facts_{i} as facts\n{use}", encoding="utf-8")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def said(folder: Path) -> dict[str, list[str]]:
+    """What mypy says of each of MODULES, in strict mode."""
     cache = ROOT / ".mypy_cache" / f"stubs-{os.environ.get('PYTEST_XDIST_WORKER', 'alone')}"  # what it knows of contextdb, kept
     options = ["--strict", "--no-error-summary", "--hide-error-context", "--cache-dir", str(cache)]
     command = [sys.executable, "-m", "mypy", *options, *map(str, sorted(folder.glob("*.py")))]  # what it read is gone with it
@@ -166,11 +217,17 @@ def said(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
     for line in done.stdout.splitlines():
         file, _, told = line.partition(": error: ")
         if told:
-            found[list(MODULES)[int(re.findall(r"_(\d+)\.py", file)[-1])]].append(told)
+            found[module_of(file)].append(told)
     return found
 
 
+def module_of(file: str) -> str:
+    """Which of MODULES a file is of."""
+    return list(MODULES)[int(re.findall(r"_(\d+)\.py", file)[-1])]
+
+
 RIGHT = [
+    "answers",
     "context",
     "numpy",
     "sets",
@@ -195,7 +252,40 @@ def test_mypy_accepts_what_a_query_accepts(said: dict[str, list[str]], name: str
 @pytest.mark.parametrize("context", [CONTEXT, NUMPY, SETS])
 def test_a_query_answers_the_contexts_that_mypy_accepts(context: str):
     assert compiled(SCHEMA).query(eval(context, {"np": np, "cdb": cdb})).assets == ["a"]
-    assert with_role("jog").query({"speed": 1.0}, actors=eval(f"{{{CAST}}}")).assets == ["a"]
+
+
+def test_pyright_refuses_and_accepts_what_mypy_does(said: dict[str, list[str]], folder: Path):
+    if importlib.util.find_spec("pyright") is None:
+        pytest.skip("pyright is not installed")
+    settings = {"typeCheckingMode": "strict", "extraPaths": [str(ROOT)], "reportUnusedImport": False, "reportUnusedVariable": False}
+    (folder / "pyrightconfig.json").write_text(json.dumps(settings), encoding="utf-8")
+    command = [sys.executable, "-m", "pyright", "--outputjson", "--pythonpath", sys.executable]
+    done = subprocess.run(command, cwd=folder, capture_output=True, encoding="utf-8")
+    faults = [(module_of(fault["file"]), fault["message"]) for fault in json.loads(done.stdout)["generalDiagnostics"]]
+    mypys = {name for name, lines in said.items() if lines}
+    assert {name for name, _ in faults} == mypys, faults
+
+
+def test_answers_and_picks_are_what_their_types_say():
+    names = names_in(stubs_of(PLAY))
+    jog = names["JogTable"].of(PLAY["jog"])  # type: ignore[attr-defined]
+    matches = jog.query({"speed": 1.0}, actors=eval(f"{{{CAST}}}"))
+    pick = jog.picker().pick(matches)
+    assert (matches.assets, dict(pick.outputs)) == (["a"], {"damage": 3, "word": "Hey"})
+    assert [matches.outputs(name).dtype for name in ("damage", "word")] == [np.int64, np.object_]
+    assert list(matches.casting(0)) == ["Defender", "Receiver"] == list(get_args(names["JogRole"]))
+
+
+def test_a_compiled_file_is_opened_with_the_types_of_its_table(tmp_path: Path):
+    PLAY["jog"].save(tmp_path / "jog.safetensors")
+    opened = names_in(stubs_of(PLAY))["JogTable"].open(tmp_path / "jog.safetensors")  # type: ignore[attr-defined]
+    assert isinstance(opened, CompiledTable)
+    assert opened.query({}, unknown="any").assets == ["a"]
+
+
+@pytest.mark.parametrize("slip", range(len(SLIPS)))
+def test_mypy_refuses_slips_with_answers(said: dict[str, list[str]], slip: int):
+    assert len(said[f"slip in an answer {slip}"]) == 1, said[f"slip in an answer {slip}"]
 
 
 @pytest.mark.parametrize(("number", "right", "wrong", "told"), [(i, *row) for i, row in enumerate(WRONG)])
@@ -227,7 +317,7 @@ def test_mypy_refuses_slips(said: dict[str, list[str]], name: str, told: str):
 
 def test_a_table_without_roles_has_no_types_of_actors():
     names = {name for name in names_in(stubs_of({"jog": compiled({"n": SCHEMA["n"]})})) if name.startswith("Jog")}
-    assert names == {"JogFacts", "JogSomeFacts", "JogFact", "JogLive"}
+    assert names == {"JogFacts", "JogSomeFacts", "JogFact", "JogLive", "JogTable"}
 
 
 def test_bounds_units_and_descriptions_stand_behind_the_facts_on_one_line():

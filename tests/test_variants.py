@@ -203,8 +203,8 @@ def test_an_index_lists_all_rows_with_their_files_and_moments(tmp_path):
     )
     (tmp_path / "seen").mkdir()
     (tmp_path / "seen" / "a.csv").write_text("speed,Air\n1,True\n1,False\n9,True\n")
-    assert run("index", folder, "--out", tmp_path / "rows.parquet", "--telemetry", tmp_path / "seen" / "a.csv").code == 0
-    rows = pl.read_parquet(tmp_path / "rows.parquet").filter(pl.col("table") == "orc")
+    assert run("index", folder, "--out", tmp_path / "seen" / "rows.parquet", "--telemetry", tmp_path / "seen" / "a.csv").code == 0
+    rows = pl.read_parquet(tmp_path / "seen" / "rows.parquet").filter(pl.col("table") == "orc")
     assert rows.select("asset", "file", "line", "moments").rows() == [("walk", "human.csv", 2, 2), ("fly", "orc.csv", 3, 2)]
 
 

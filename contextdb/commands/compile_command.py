@@ -47,7 +47,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-o", "--out", metavar="FILE", help="the compiled file, or a folder for several (default: next to each table)"
     )
-    parser.add_argument("--stubs", metavar="FILE", help="also write the facts of the tables as Python types: a .py or .pyi file")
+    parser.add_argument(
+        "--stubs", metavar="FILE", help="also write the tables' facts, outputs and roles as Python types: a .py or .pyi file"
+    )
     parser.add_argument(
         "--c-header", metavar="FILE", help="also write one C99 header that opens and queries the compiled files: a .h file"
     )

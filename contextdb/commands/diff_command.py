@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 from contextdb.checks.effects import Effects
 from contextdb.commands import add_format_arguments, deliver, is_coloured
-from contextdb.commands.diff_views import as_markdown, as_text, effects_json, effects_markdown, effects_text
+from contextdb.commands.diff_views import as_markdown, as_text, effects_json, effects_markdown, effects_text, look_first
 from contextdb.commands.numbers import percent
 from contextdb.console import ExitCode
 from contextdb.edits.diffing import Diff, diff
@@ -122,7 +122,9 @@ def _rendered(
     if arguments.format == "json":
         more = {} if replayed is None else replayed.to_json()
         more |= {"sessions": [session.to_json() for session in sessions]} if sessions else {}
-        return as_json(changes.to_json() | {"effects": effects_json(effect)} | more)
+        return as_json(
+            changes.to_json() | {"look_first": next(iter(look_first(effect)), None), "effects": effects_json(effect)} | more
+        )
     if arguments.format == "html":
         from contextdb.commands.diff_page import as_page
 
@@ -130,8 +132,8 @@ def _rendered(
     if arguments.format == "markdown":
         below = "" if replayed is None else replayed.markdown
         below += "".join(f"\n- {escaped(line)}" for line in lines) + "\n" if lines else ""
-        return as_markdown(changes, arguments.all, effects_markdown(effect, arguments.all) + below)
+        return as_markdown(changes, arguments.all, effects_markdown(effect, arguments.all) + below, look_first(effect))
     colour = is_coloured(arguments)
     below = "" if replayed is None else replayed.text(colour, arguments.all)
     below += "\nsessions\n" + "".join(f"  {line}\n" for line in lines) if lines else ""
-    return as_text(changes, colour, arguments.all) + effects_text(effect, colour, arguments.all) + below
+    return as_text(changes, colour, arguments.all, look_first(effect)) + effects_text(effect, colour, arguments.all) + below

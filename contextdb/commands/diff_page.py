@@ -7,10 +7,10 @@ from collections.abc import Iterator, Sequence
 from contextdb.checks.contracts import proofs_of
 from contextdb.checks.effects import Effects
 from contextdb.commands.diff_backtest import Replayed
-from contextdb.commands.diff_views import TITLE, columns_changed, gap_line, headings, owners, rows_changed
+from contextdb.commands.diff_views import TITLE, columns_changed, headings, look_first, owners, rows_changed
 from contextdb.covering.contracts import Proof
 from contextdb.edits.diffing import CellChange, Diff
-from contextdb.errors import Fault, plural
+from contextdb.errors import Fault
 from contextdb.report.document import Block, Document, Row, Rows, Section, Table
 from contextdb.report.document_html import as_html
 from contextdb.tables.table import Table as Sheet
@@ -24,23 +24,9 @@ def as_page(changes: Diff, effect: Effects | Fault | None, replayed: Replayed | 
     blocks = [*_cells(changes), *_effect(effect), *_contracts(changes), *([] if replayed is None else replayed.blocks)]
     name = str(changes.after.path or changes.after.name)
     of_moments = [] if replayed is None else replayed.sentences
-    sentences = [*_to_look_at(effect), changes.summary, *owners(changes), *of_moments, *more]
+    sentences = [*look_first(effect), changes.summary, *owners(changes), *of_moments, *more]
     gates = () if replayed is None else replayed.gates
     return as_html(Document("diff", "table", [Section(changes.after.name, name, sentences, blocks, gates)]))
-
-
-def _to_look_at(effect: Effects | Fault | None) -> Iterator[str]:
-    """What a reviewer looks at first."""
-    if not isinstance(effect, Effects):
-        return
-    if effect.opened:
-        yield f"Look first at {plural(len(effect.opened), 'gap')} that it opens, the largest {gap_line(effect.opened[0])}."
-    elif effect.dead:
-        yield f"Look first at {plural(len(effect.dead), 'row')} that can no longer be chosen."
-    elif not effect:
-        yield "Nothing to look at: every context keeps its assets."
-    else:
-        yield "No context loses its last asset." if effect.is_complete else "No gap is known that it opens."
 
 
 def _cells(changes: Diff) -> Iterator[Block]:

@@ -28,10 +28,10 @@ Part = tuple[str, str]
 """What became of a row or a column, and which."""
 
 
-def as_text(changes: Diff, colour: bool, shows_all: bool = False) -> str:
-    """Differences as aligned lines."""
+def as_text(changes: Diff, colour: bool, shows_all: bool = False, first: Sequence[str] = ()) -> str:
+    """Differences as aligned lines; `first` is what to look at first."""
     name = printable(str(changes.after.path or changes.after.name))
-    lines = [styled(f"{name}: {changes.summary}", "bold", colour), *map(printable, owners(changes))]
+    lines = [styled(f"{name}: {changes.summary}", "bold", colour), *map(printable, [*first, *owners(changes)])]
     for title, parts in (("columns", columns_changed(changes)), ("rows", rows_changed(changes))):
         if parts:
             displayed = [styled(f"  {MARKS[verb][0]} {printable(text)}", MARKS[verb][1], colour) for verb, text in parts]
@@ -40,10 +40,15 @@ def as_text(changes: Diff, colour: bool, shows_all: bool = False) -> str:
     return "".join(f"{line}\n" for line in lines)
 
 
-def as_markdown(changes: Diff, shows_all: bool = False, more: str = "") -> str:
-    """Differences as Markdown with more below it, together small enough for a comment."""
+def as_markdown(changes: Diff, shows_all: bool = False, more: str = "", first: Sequence[str] = ()) -> str:
+    """Differences as Markdown with more below it, together small enough for a comment; `first` is what to look at first."""
     name = str(changes.after.path or changes.after.name)
-    lines = [f"### {escaped(name)}", "", f"{escaped(changes.summary)}", *(f"\n{escaped(text)}" for text in owners(changes))]
+    lines = [
+        f"### {escaped(name)}",
+        "",
+        f"{escaped(changes.summary)}",
+        *(f"\n{escaped(text)}" for text in [*first, *owners(changes)]),
+    ]
     parts = [f"- column {verb}: {escaped(text)}" for verb, text in columns_changed(changes)]
     parts += [f"- row {verb}: {escaped(text)}" for verb, text in rows_changed(changes)]
     rows = [f"| {' | '.join(escaped(safe_text(t, 200)) for t in _markdown_texts(c))} |" for c in changes.cells]
@@ -56,6 +61,20 @@ def as_markdown(changes: Diff, shows_all: bool = False, more: str = "") -> str:
         lines += ["", *head, *fitting] if fitting else []
         lines += ["", f"… and {left:,} more; `contextdb diff --all` shows every one."] if left else []
     return "\n".join(lines) + "\n" + more
+
+
+def look_first(effect: Effects | Fault | None) -> list[str]:
+    """What a reviewer looks at first, in a sentence; nothing where the effect is not known."""
+    if not isinstance(effect, Effects):
+        return []
+    if effect.opened:
+        gaps = plural(len(effect.opened), "gap")
+        return [f"Look first at {gaps} that it opens, the largest {gap_line(effect.opened[0])}."]
+    if effect.dead:
+        return [f"Look first at {plural(len(effect.dead), 'row')} that can no longer be chosen."]
+    if not effect:
+        return ["Nothing to look at: every context keeps its assets."]
+    return ["No context loses its last asset." if effect.is_complete else "No gap is known that it opens."]
 
 
 def owners(changes: Diff) -> list[str]:

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 from contextdb.commands.projects_below import extend_up_to, project_folders
 from contextdb.console import ExitCode, note, output, printable, progress
 from contextdb.disk import write_atomic
+from contextdb.disk.boundary import real_path
 from contextdb.disk.git import is_in_a_repository, run_git
 from contextdb.errors import ContextDBError, Fault, FileError, Place, plural
 from contextdb.tables.project import Project
@@ -44,6 +45,9 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     if out.suffix.lower() != ".parquet":
         raise FileError(Fault("the file does not end in .parquet.", "FILE.parquet", place=Place(arguments.out)))
     folders = project_folders(arguments.folder)
+    if real_path(out.parent) in map(real_path, folders):
+        problem = "the project in this folder would take the file for one of its tables."
+        raise FileError(Fault(problem, "a file outside of folders of tables", place=Place(arguments.out)))
     extend_up_to(arguments.folder)
     rows: list[dict[str, object]] = []
     n_tables = n_left_out = 0

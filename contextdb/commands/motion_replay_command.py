@@ -51,7 +51,7 @@ from contextdb.motion.trace.reasked import Changes, Reasked, require_known, why_
 from contextdb.motion.trace.session import Trace
 from contextdb.motion.trace.status import Status, status_of
 from contextdb.motion.trace.stock import Stock
-from contextdb.motion.trace.views import decision_lines, session_lines, summary_line
+from contextdb.motion.trace.views import decision_lines, look_first, session_lines, summary_line
 from contextdb.motion.trace.what_if import what_if
 from contextdb.motion.trace.why_not import WhyNot
 from contextdb.report.render_json import as_json
@@ -179,7 +179,7 @@ def _parts(replay: Replay, other: Trace | None) -> Iterator[Part]:
     options, trace, width = replay.options, replay.trace, terminal_width()
     if options.stats:
         stats = trace.stats()
-        yield {"stats": stats.to_json()}, [summary_line(trace.brief()), "", *stats_lines(stats, width)]
+        yield {"stats": stats.to_json()}, [*_heading(trace), "", *stats_lines(stats, width)]
     if options.what_if:
         replay.require_databases()
         comparison = what_if(replay.reasked(), replay.reasked(changes_of(options.what_if, replay.databases)))
@@ -219,13 +219,20 @@ def place_of(text: str, trace: Trace, file: str) -> int:
     raise QueryError(Fault(f"there is no decision at {in_quotes(text)}.", accepted, mend, place))
 
 
+def _heading(trace: Trace) -> list[str]:
+    """A session in a line, and where to look first."""
+    first = look_first(trace.brief())
+    return [summary_line(trace.brief()), *([first] if first else [])]
+
+
 def _session(replay: Replay) -> Part:
     trace, options = replay.trace, replay.options
     if options.json:
         decisions = [decision for decision in trace.brief() if _is_named(decision.playing, options.name)]
-        return {"decisions": [_brief(decision_json(decision)) for decision in decisions]}, []
+        first = look_first(trace.brief()) or None
+        return {"look_first": first, "decisions": [_brief(decision_json(decision)) for decision in decisions]}, []
     lines = list(session_lines(trace.brief(), name=options.name, width=terminal_width()))
-    return {}, [summary_line(trace.brief()), "", *(lines or [_never_played(replay) if options.name else "no decision"])]
+    return {}, [*_heading(trace), "", *(lines or [_never_played(replay) if options.name else "no decision"])]
 
 
 def _never_played(replay: Replay) -> str:

@@ -181,7 +181,7 @@ class Explanation:
                 totals += np.where(self._fails[at], _n_failing(layers, self.facts[condition.name], condition.domain) - 1, 0)
         if self.compiled.ways is not None and self.compiled.ways.rules is not None:
             rows = np.flatnonzero(self.breaks_rule)
-            totals[rows] += [sum(1 for _ in self._rule_failures(row)) - 1 for row in rows.tolist()]
+            totals[rows] += np.array([sum(1 for _ in self._rule_failures(row)) - 1 for row in rows.tolist()], np.int64)
         return bitmask.read_only(totals)
 
     @cached_property

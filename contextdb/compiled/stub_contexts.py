@@ -4,7 +4,7 @@ For a table "jog" of the facts "speed" and "Defender.height":
 
     JogSomeFacts          some of the facts, or None for a missing one: for unknown="any" and "never", and for `live.update`
     JogFact               a Literal of their names
-    JogLive               a live context: `live: JogLive = compiled.live()`; its names and values are checked
+    JogLive               a live context, of `JogTable.live()`; its names and values are checked
     JogFactsWithActors    "speed", and "Defender.height" only where the game gives it itself
     JogDefenderActor      "height", of an actor who is offered as Defender
     JogActors             what `actors=` accepts
@@ -14,9 +14,10 @@ The last three are written for tables with roles alone.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 
 from contextdb.compiled.casting.roles import role_of
+from contextdb.compiled.stub_tables import TypeOf
 from contextdb.errors import safe_text
 
 NUMBERS = """
@@ -27,29 +28,27 @@ WIDER = {"float": "AnyNumber", "int": "AnyWhole", "bool": "bool | np.bool"}
 """What is accepted where the annotation of a type says less. A bool has no set of values besides Any."""
 OF_ACTORS = {"id": "NotRequired[object]", "name": "NotRequired[str]"}
 
-NameOf = Callable[[str], str]
-
 
 def accepted(annotation: str) -> str:
     """The type of a fact that is no set of tags: its values, numpy's too, and but for a bool a set of them."""
     return WIDER.get(annotation) or f"{annotation} | cdb.FactSet"
 
 
-def contexts_of(table: str, facts: Mapping[str, str], name_of: NameOf) -> Iterator[str]:
-    """The types of a table's contexts; `facts` are the types of its facts by name."""
-    some = name_of(f"{table} some facts")
+def contexts_of(table: str, facts: Mapping[str, str], type_of: TypeOf, matches: str) -> Iterator[str]:
+    """The types of a table's contexts; `facts` are the types of its facts by name, `matches` that of an answer."""
+    some = type_of("some facts")
     yield typed_dict(some, f"table {table}, some facts", {name: f"{kind} | None" for name, kind in facts.items()}, is_total=False)
-    roles = dict.fromkeys(role_of(name) for name in facts if role_of(name))
-    actors = name_of(f"{table} actors") if roles else ""
+    roles = roles_of(facts)
+    actors = type_of("actors") if roles else ""
     if roles:
         besides = {name: f"NotRequired[{kind}]" if role_of(name) else kind for name, kind in facts.items()}
-        yield typed_dict(name_of(f"{table} facts with actors"), f"table {table}, where actors are given", besides)
-        of_role = {role: name_of(f"{table} {role} actor") for role in roles}
+        yield typed_dict(type_of("facts with actors"), f"table {table}, where actors are given", besides)
+        of_role = {role: type_of(f"{role} actor") for role in roles}
         for role, name in of_role.items():
             own = {fact.partition(".")[2]: kind for fact, kind in facts.items() if role_of(fact) == role}
             yield typed_dict(name, f"table {table}, an actor who is offered as {role}", {**OF_ACTORS, **own})
         yield f"{actors}: TypeAlias = Mapping[str, Sequence[{' | '.join(of_role.values())}]]\n"
-    yield from _live(table, facts, name_of, some, actors)
+    yield from _live(table, facts, type_of, actors, matches)
 
 
 def typed_dict(name: str, comment: str, fields: Mapping[str, str], is_total: bool = True) -> str:
@@ -59,11 +58,16 @@ def typed_dict(name: str, comment: str, fields: Mapping[str, str], is_total: boo
     return f"# {safe_text(comment, 200)}\n{name} = TypedDict(\n    {name!r},\n    {{\n{lines}    }},\n{total})\n"
 
 
-def _live(table: str, facts: Mapping[str, str], name_of: NameOf, some: str, actors: str) -> Iterator[str]:
-    name = name_of(f"{table} live")
+def roles_of(facts: Mapping[str, object]) -> list[str]:
+    """The roles that facts are of."""
+    return list(dict.fromkeys(role_of(name) for name in facts if role_of(name)))
+
+
+def _live(table: str, facts: Mapping[str, str], type_of: TypeOf, actors: str, matches: str) -> Iterator[str]:
+    name = type_of("live")
     lines = [f"class {name}(Protocol):"]
     if facts:
-        fact = name_of(f"{table} fact")
+        fact = type_of("fact")
         yield f"# table {safe_text(table, 200)}, the names of its facts\n{fact}: TypeAlias = Literal[{_listed(facts)}]\n"
         kinds = list(dict.fromkeys(facts.values()))
         for kind in kinds:
@@ -79,10 +83,10 @@ def _live(table: str, facts: Mapping[str, str], name_of: NameOf, some: str, acto
         lines.append(f"    def __iter__(self) -> Iterator[{fact}]: ...")
         lines.append(f"    def keys(self) -> KeysView[{fact}]: ...")
         lines += ["    def __len__(self) -> int: ...", "    def __contains__(self, name: object, /) -> bool: ..."]
-    lines.append(f"    def update(self, facts: {some}, /) -> None: ...")
+    lines.append(f"    def update(self, facts: {type_of('some facts')}, /) -> None: ...")
     if actors:
         lines.append(f"    def actors(self, actors: {actors} | None, *, prefer: cdb.Prefer = None) -> None: ...")
-    lines += [f"    def {name_of_query}(self) -> cdb.Matches: ..." for name_of_query in ("query", "matches")]
+    lines += [f"    def {name_of_query}(self) -> {matches}: ..." for name_of_query in ("query", "matches")]
     lines.append("    def explain(self) -> cdb.Explanation: ...")
     lines.append("    def pick(self, rng: cdb.Rng | int | None = None, last: str | None = None) -> str | None: ...")
     lines.append(f"    def copy(self) -> {name}: ...")

@@ -1,7 +1,8 @@
 """Facts and outputs of compiled tables as Python types, so that an editor completes names and values and a type checker knows them.
 
-For each table a TypedDict of the facts that it asks for, those of `stub_contexts`, and where it has outputs one of those of a row;
-for each condition and output with declared values a Literal of them. The text is a module that imports typing, numpy and contextdb.
+For each table a TypedDict of the facts that it asks for, those of `stub_contexts` and `stub_tables`, and where it has outputs one
+of those of a row; for each condition and output with declared values a Literal of them. The text is a module that imports typing,
+numpy and contextdb.
 Nothing here touches the disk.
 """
 
@@ -10,8 +11,9 @@ from __future__ import annotations
 import keyword
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from unicodedata import normalize
 
 from contextdb.cells.conditions import Condition
@@ -19,23 +21,29 @@ from contextdb.cells.domains import Domain
 from contextdb.cells.outputs import Output
 from contextdb.cells.words import format_number
 from contextdb.compiled.core_table import values_of
-from contextdb.compiled.stub_contexts import NUMBERS, accepted, contexts_of
+from contextdb.compiled.stub_contexts import NUMBERS, accepted, contexts_of, roles_of
+from contextdb.compiled.stub_tables import matches_of, table_of
 from contextdb.compiled.table import CompiledTable
 from contextdb.errors import safe_text
 
 _HEAD = '''"""The facts that each table asks for, as types. Written by `contextdb compile --stubs`: do not edit."""
 
+# mypy: disable-error-code="override, no-overload-impl"
+# pyright: reportIncompatibleMethodOverride=false, reportIncompatibleVariableOverride=false, reportNoOverloadImplementation=false
+
 from __future__ import annotations
 
 {imports}from collections.abc import Iterator, KeysView, Mapping, Sequence
-from typing import Any, Literal, NotRequired, Protocol, TypeAlias, TypedDict, overload
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal, NotRequired, Protocol, TypeAlias, TypedDict, cast, overload
 
 import contextdb as cdb
 import numpy as np
+from numpy.typing import NDArray
 {numbers}'''
 _TAKEN = (
-    "Any AnyNumber AnyWhole Iterator KeysView Literal Mapping NotRequired Protocol Sequence TypeAlias TypedDict annotations cdb"
-    " datetime np overload"
+    "Any AnyNumber AnyWhole Iterator KeysView Literal Mapping NDArray NotRequired Protocol Sequence TYPE_CHECKING TypeAlias"
+    " TypedDict annotations cached_property cast cdb datetime np overload"
 )
 
 
@@ -49,13 +57,22 @@ def stubs_of(tables: Mapping[str, CompiledTable]) -> str:
             if condition.domain.values and condition not in literals:
                 literals[condition] = names.of(condition.name)
                 parts.append(_listed(literals[condition], condition.name, values_of(condition)))
-        parts.append(_facts(names.of(f"{table.name} facts"), table, literals))
-        parts += contexts_of(table.name, {c.name: _type(c, literals.get(c)) for c in table.asked.values()}, names.of)
-        if len(table.outputs):
-            parts.append(_outputs(names, table))
+        parts += _of_table(names, table, literals)
     modules = {c.domain.type.annotation.rpartition(".")[0] for table in tables.values() for c in table.asked.values()}
     imports = "".join(f"import {module}\n" for module in sorted(modules - {""}))
     return _HEAD.format(imports=imports, numbers=NUMBERS) + "".join(f"\n{part}" for part in parts)
+
+
+def _of_table(names: Names, table: CompiledTable, literals: Mapping[Condition, str]) -> Iterator[str]:
+    """All types of a table."""
+    type_of = cache(lambda what: names.of(f"{table.name} {what}"))
+    yield _facts(type_of("facts"), table, literals)
+    roles, outputs = roles_of(table.asked), table.outputs.declared
+    matches = matches_of(type_of, bool(roles or outputs))
+    yield from contexts_of(table.name, {c.name: _type(c, literals.get(c)) for c in table.asked.values()}, type_of, matches)
+    if outputs:
+        yield _outputs(names, type_of("outputs"), table)
+    yield from table_of(table.name, type_of, roles, outputs, bool(table.asked))
 
 
 @dataclass
@@ -86,7 +103,7 @@ def _facts(name: str, table: CompiledTable, literals: Mapping[Condition, str]) -
     return _typed_dict(name, table, lines)
 
 
-def _outputs(names: Names, table: CompiledTable) -> str:
+def _outputs(names: Names, name: str, table: CompiledTable) -> str:
     """The outputs of a row, as `compiled.outputs.of_row` gives them, with a Literal for the values of each enum."""
     types, literals = dict[str, str](), ""
     for output in table.outputs.declared:
@@ -97,7 +114,7 @@ def _outputs(names: Names, table: CompiledTable) -> str:
         else:
             types[output.name] = output.type.annotation.format(", ".join(["float"] * output.size))
     lines = [f"        {o.name!r}: {types[o.name]},{_output_comment(o)}\n" for o in table.outputs.declared]
-    return literals + _typed_dict(names.of(f"{table.name} outputs"), table, lines)
+    return literals + _typed_dict(name, table, lines)
 
 
 def _typed_dict(name: str, table: CompiledTable, lines: Sequence[str]) -> str:

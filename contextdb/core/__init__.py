@@ -53,7 +53,8 @@ try:
     )
 except ImportError as error:
     problem = "contextdb's core is not built for this Python"
-    raise ImportError(f"{problem}: run `python build_core.py` in the checkout, or install contextdb again ({error})") from None
+    mend = "run `python build_core.py` in the checkout, or install contextdb again"
+    raise ImportError(f"{problem}: {mend} ({error})", name="contextdb.core") from None
 
 __all__ = [
     "FLAT",

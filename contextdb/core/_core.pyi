@@ -409,6 +409,7 @@ class Controllers:
         max_rate: float,
         grace_s: float,
         settle_s: float,
+        asset_history_s: float,
         until_natural: bool,
     ) -> None: ...
     @property
@@ -420,8 +421,9 @@ class Controllers:
         """Write what plays some time later, [Q, 16], and the features of its frames, [Q, F]."""
     def update(self, parts: int, start: int, stop: int, *arrays: NDArray[Any] | float | None) -> bool:
         """update(parts, start, stop, before, moved, queries, dt_s, ranges, range_biases, allowed, playable, kind_biases, flags,
-        frame_biases, among, urgent, plays, play_of, wide, after, decisions, found): 1 asks, 2 chooses, 4 decides, for characters
-        `start` to `stop` - 1, into the last three. Whether all queries can be compared. Several threads may run it at once."""
+        frame_biases, among, urgent, plays, play_of, wide, to_event, event_s, after, decisions, found): 1 asks, 2
+        chooses, 4 decides, for characters `start` to `stop` - 1, into the last three.
+        Whether all queries can be compared. Several threads may run it at once."""
     def pack(self, row: NDArray[np.float64], /) -> bytes: ...
     def read_packet(self, packet: bytes, moved: NDArray[np.float64], followed: NDArray[np.float64], /) -> bool: ...
     def skips(

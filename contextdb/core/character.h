@@ -181,7 +181,7 @@ static inline const char *cdbm_open_player(cdbm_player *player, const cdbm_bundl
     if (!cdbm_text(bundle, CDBM_P_CONTROLLER_NAME, number, 0)) return "the bundle has no controller of that name";
     entries = CDBM_TAKE_ALL(int64_t, CDBM_P_ENTRIES, &n_entries);
     settings = CDBM_TAKE_ALL(double, CDBM_P_SETTINGS, &n_settings);
-    if (n_entries % 3 || n_entries == 0 || n_entries / 3 > CDBM_MOST_DATABASES || n_settings != 12) cdbm_refuse(bundle, "a controller is damaged");
+    if (n_entries % 3 || n_entries == 0 || n_entries / 3 > CDBM_MOST_DATABASES || n_settings != 13) cdbm_refuse(bundle, "a controller is damaged");
     if (bundle->why) return bundle->why;
     n_entries /= 3;
     thresholds = CDBM_TAKE(double, CDBM_P_THRESHOLDS, n_entries), bars = CDBM_TAKE(double, CDBM_P_BARS, n_entries);
@@ -189,7 +189,7 @@ static inline const char *cdbm_open_player(cdbm_player *player, const cdbm_bundl
     to->history_s = settings[3], to->min_rate = settings[4], to->max_rate = settings[5], to->grace_s = settings[6];
     to->until_natural = settings[7] != 0.0, player->has_poses = settings[8] != 0.0;
     player->velocity_halflife_s = player->heading_halflife_s = settings[9], player->ways.rate = settings[10];
-    to->settle_s = settings[11];
+    to->settle_s = settings[11], to->asset_history_s = settings[12];
     for (i = 0; i < n_settings; i++)
         if (!(settings[i] >= 0.0 && settings[i] <= 1e6)) cdbm_refuse(bundle, "a setting of a controller is none");
     if (to->n_played > 1024) cdbm_refuse(bundle, "a controller is damaged");

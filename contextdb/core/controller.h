@@ -22,7 +22,8 @@ typedef enum cdbm_cause { CDBM_NOT_DUE, CDBM_NOTHING_PLAYS, CDBM_LOST, CDBM_ENDE
 typedef enum cdbm_held { CDBM_NOT_HELD, CDBM_BY_NATURE, CDBM_TO_ITS_END, CDBM_BY_BAR, CDBM_BY_HYSTERESIS } cdbm_held;
 typedef enum cdbm_action { CDBM_STARTS, CDBM_PLAYS_ON, CDBM_JUMPS, CDBM_LOOPS, CDBM_HOLDS, CDBM_PLAYS_NOTHING } cdbm_action;
 typedef enum cdbm_standing { CDBM_IS_VALID, CDBM_IS_WIDENED, CDBM_IS_NOT_VALID } cdbm_standing;
-typedef enum cdbm_why { CDBM_WHY_NOT_VALID = 1, CDBM_WHY_NATURE = 4, CDBM_WHY_JUMP = 8, CDBM_WHY_HISTORY = 9, CDBM_WHY_START = 12 } cdbm_why;
+typedef enum cdbm_why { CDBM_WHY_NOT_VALID = 1, CDBM_WHY_NATURE = 4, CDBM_WHY_JUMP = 8, CDBM_WHY_HISTORY = 9, CDBM_WHY_START = 12, CDBM_WHY_ASSET = 13 }
+    cdbm_why;
 enum { CDBM_EXCLUDED = 1, CDBM_NEXT_NATURAL = 8 }; /* flags of a kind of frames */
 enum { CDBM_FORCE = 1, CDBM_INTERRUPT = 2 };
 enum { CDBM_NO_DATABASE = -1, CDBM_GONE = -2, CDBM_GO_ON = -2 };
@@ -30,6 +31,7 @@ enum { CDBM_NO_DATABASE = -1, CDBM_GONE = -2, CDBM_GO_ON = -2 };
 typedef struct cdbm_clips {   /* a database, as a controller sees it; without frames where it is not loaded */
     const cdbm_frames *frames;
     const int64_t *starts, *stops;   /* [R] */
+    const int64_t *assets;           /* [R] the first range of the same asset */
     const uint8_t *looping;          /* [R] */
     const float *root;               /* [N, 3]: x, z and heading; NULL where it does not know */
     const uint8_t *marks;            /* [K] flags of each kind of frames */
@@ -45,7 +47,7 @@ typedef struct cdbm_clips {   /* a database, as a controller sees it; without fr
 typedef struct cdbm_controller { /* what characters share */
     const cdbm_clips *databases;
     size_t n_databases, n_features, n_played; /* n_played: so much of what was played is remembered at most */
-    double search_every_s, jump_threshold_s, history_s, min_rate, max_rate, grace_s, settle_s;
+    double search_every_s, jump_threshold_s, history_s, min_rate, max_rate, grace_s, settle_s, asset_history_s;
     int until_natural;
 } cdbm_controller;
 
@@ -96,6 +98,8 @@ typedef struct cdbm_given {      /* what some characters may choose from; of all
     const cdb_row_play *plays;   /* how rows play; NULL: no row says */
     const int64_t *play_of;      /* [n or 1, R] which of them is that of each range, -1 for none */
     size_t plays_step;
+    const double *to_event;      /* [N] seconds of its clip from each frame to the event that is asked for; or NULL */
+    double event_s;              /* when that is to happen */
     const double *wide;          /* [n] the bias of what plays by hysteresis, NaN where that does not hold; or NULL */
 } cdbm_given;
 
@@ -110,6 +114,7 @@ static inline int cdbm_are_clips(const cdbm_clips *clips, size_t n_features)
     if (clips->n_pace && (clips->pace > n_features || clips->n_pace > n_features - clips->pace)) return 0;
     for (i = 0; i < clips->n_ranges; i++) {
         if (clips->starts[i] < 0 || clips->stops[i] < clips->starts[i] || (uint64_t)clips->stops[i] > clips->frames->n_frames) return 0;
+        if (clips->assets[i] < 0 || (uint64_t)clips->assets[i] > i) return 0;
         if (i % clips->n_permutations && clips->stops[i] - clips->starts[i] != clips->stops[i - 1] - clips->starts[i - 1]) return 0;
     }
     return 1;
@@ -311,18 +316,46 @@ static inline int64_t cdbm_from_first(const cdbm_clips *clips, size_t range)
     return (int64_t)(range % clips->n_permutations) * (clips->stops[range] - clips->starts[range]);
 }
 
+/* The asset of a span that was played, as the number of its first range; -1 for one that is no longer there. */
+static inline int64_t cdbm_asset_of(const cdbm_controller *controller, const cdbm_played *played)
+{
+    int is_known = played->database >= 0.0 && played->database < (double)controller->n_databases;
+    const cdbm_clips *clips = is_known ? &controller->databases[(size_t)played->database] : NULL;
+    int64_t box = clips && clips->frames ? cdbm_box_of(clips->frames, (int64_t)played->start) : -1;
+    return box < 0 ? -1 : clips->assets[clips->frames->box_ranges[box]];
+}
+
+/* Whether some seconds since a span was played are over. */
+static inline int cdbm_is_past(const cdbm_state *state, const cdbm_played *played, double seconds)
+{
+    return played->time_s <= state->time_s - seconds + CDBM_TOLERANCE_S;
+}
+
+/* The asset of the span of that number, where it bars that asset and no later one does; else -1. */
+static inline int64_t cdbm_barred(const cdbm_controller *controller, const double *row, size_t number)
+{
+    const cdbm_state *state = (const cdbm_state *)row;
+    const cdbm_played *played = cdbm_played_of((double *)(uintptr_t)row);
+    int64_t asset;
+    size_t i;
+    if (cdbm_is_past(state, &played[number], controller->asset_history_s)) return -1;
+    asset = cdbm_asset_of(controller, &played[number]);
+    for (i = number + 1; asset >= 0 && i < (size_t)state->n_played; i++)
+        if (played[i].database == played[number].database && cdbm_asset_of(controller, &played[i]) == asset) asset = -1;
+    return asset;
+}
+
 /* Forget what was played too long ago, and remember a span that is played now. */
 static inline void cdbm_remember(const cdbm_controller *controller, double *row, size_t range, const double *span)
 {
     cdbm_state *state = (cdbm_state *)row;
     cdbm_played *played = cdbm_played_of(row);
-    size_t n = (size_t)state->n_played, n_old = 0;
-    double oldest_s = state->time_s - controller->history_s + CDBM_TOLERANCE_S;
-    while (n_old < n && played[n_old].time_s <= oldest_s) n_old++;
-    if (span && n_old == 0 && n == controller->n_played && n > 0) n_old = 1;
-    memmove(played, played + n_old, (n - n_old) * sizeof *played);
-    memset(played + n - n_old, 0, n_old * sizeof *played);
-    n -= n_old;
+    size_t n = (size_t)state->n_played, n_kept = 0, i;
+    for (i = 0; i < n; i++) /* a span moves down over those that are forgotten: none behind it is looked at in its old place */
+        if (!cdbm_is_past(state, &played[i], controller->history_s) || cdbm_barred(controller, row, i) >= 0) played[n_kept++] = played[i];
+    if (span && n_kept == n && n == controller->n_played && n > 0) memmove(played, played + 1, --n_kept * sizeof *played);
+    memset(played + n_kept, 0, (n - n_kept) * sizeof *played);
+    n = n_kept;
     if (span && n < controller->n_played) {
         double shift = (double)cdbm_from_first(&controller->databases[(size_t)state->playing.database], range);
         played[n].database = state->playing.database, played[n].time_s = state->time_s;
@@ -341,7 +374,7 @@ typedef struct cdbm_skips { /* frames that a search leaves out: [n, 2], and why 
 /* So many spans a search leaves out at most. */
 static inline size_t cdbm_most_skips(const cdbm_controller *controller, const cdbm_clips *clips)
 {
-    return (controller->n_played + 4) * clips->n_permutations + 2 * clips->n_ranges + 1;
+    return (controller->n_played + 4) * clips->n_permutations + 3 * clips->n_ranges + 1;
 }
 
 static inline void cdbm_skip(cdbm_skips *skips, int64_t start, int64_t stop, cdbm_why why)
@@ -367,7 +400,7 @@ static inline void cdbm_skip_played(const cdbm_controller *controller, const dou
     for (i = 0; i < n_played; i++) {
         int64_t start = (int64_t)played[i].start, stop = (int64_t)played[i].stop;
         int64_t *last = skips->n > first ? skips->spans + 2 * skips->n - 2 : NULL;
-        if (played[i].database != (double)database) continue;
+        if (played[i].database != (double)database || cdbm_is_past((const cdbm_state *)row, &played[i], controller->history_s)) continue;
         if (last && last[0] <= start && start <= last[1]) { /* it played on, as mostly */
             if (stop > last[1]) last[1] = stop;
             continue;
@@ -395,6 +428,19 @@ static inline void cdbm_skip_played(const cdbm_controller *controller, const dou
         memmove(skips->spans + 2 * k, skips->spans + 2 * k + 2, 2 * (skips->n - k - 1) * sizeof(int64_t));
         if (box >= 0) cdbm_skip_all(&others, clips, (size_t)clips->frames->box_ranges[box], span[0], span[1], CDBM_WHY_HISTORY);
         skips->n = others.n;
+    }
+}
+
+/* All frames of the assets that were played lately. */
+static inline void cdbm_skip_assets(const cdbm_controller *controller, const double *row, size_t database, cdbm_skips *skips)
+{
+    const cdbm_clips *clips = &controller->databases[database];
+    const cdbm_played *played = cdbm_played_of((double *)(uintptr_t)row);
+    size_t n = controller->asset_history_s > 0.0 ? (size_t)((const cdbm_state *)row)->n_played : 0, i, range;
+    for (i = 0; i < n; i++) {
+        int64_t asset = played[i].database == (double)database ? cdbm_barred(controller, row, i) : -1;
+        for (range = asset < 0 ? clips->n_ranges : (size_t)asset; range < clips->n_ranges; range++)
+            if (clips->assets[range] == asset) cdbm_skip(skips, clips->starts[range], clips->stops[range], CDBM_WHY_ASSET);
     }
 }
 
@@ -446,6 +492,7 @@ static inline void cdbm_list_skips(const cdbm_controller *controller, const cdbm
         cdbm_skip_near(controller, &((const cdbm_state *)row)->play, move, skips);
     }
     cdbm_skip_played(controller, row, database, skips);
+    cdbm_skip_assets(controller, row, database, skips);
     cdbm_skip_starts(given, i, clips, skips);
 }
 
@@ -728,17 +775,25 @@ static inline double cdbm_pace(const cdbm_clips *clips, const double *features)
     return (clips->n_pace == 1 ? cdbo_size(features[0]) : cdbo_flat_length(features[0], features[1])) / clips->pace_s;
 }
 
-/* At what rate a frame is to play for a query, so that it goes about as fast as that asks, within the limits of its row or of the
- * settings. */
-static inline double cdbm_play_rate(const cdbm_controller *controller, const cdbm_playing *playing, const cdb_row_play *play,
-    const double *query)
+/* Seconds of its clip from what plays to the event that is asked for; NaN where it does not lead there, or none is. */
+static inline double cdbm_to_event(const cdbm_given *given, const cdbm_clips *clips, const cdbm_playing *playing)
+{
+    double into_s = playing->at_s - (playing->frame - (double)clips->starts[(size_t)playing->range]) / clips->rate;
+    return given->to_event ? given->to_event[clips->frame_at + (size_t)playing->frame] - into_s : NAN;
+}
+
+/* At what rate a frame is to play, within the limits of its row or of the settings: so that an event happens when it is to, or so
+ * that it goes about as fast as a query asks. */
+static inline double cdbm_play_rate(const cdbm_controller *controller, const cdbm_given *given, const cdbm_playing *playing,
+    const cdb_row_play *play, const double *query)
 {
     const cdbm_clips *clips = &controller->databases[(size_t)playing->database];
     int is_said = play->min_rate == play->min_rate;
     double least = is_said ? play->min_rate : controller->min_rate, most = is_said ? play->max_rate : controller->max_rate;
-    double wanted, own, features[2], one = cdbo_within(1.0, least, most);
+    double wanted, own, features[2], one = cdbo_within(1.0, least, most), to_event = cdbm_to_event(given, clips, playing);
     int64_t box;
     size_t f;
+    if (to_event == to_event) return given->event_s > 0.0 ? cdbo_within(to_event / given->event_s, least, most) : one;
     if (clips->n_pace == 0 || least == most) return one;
     box = cdbm_box_of(clips->frames, (int64_t)playing->frame);
     if (box < 0) return one;
@@ -831,9 +886,10 @@ static inline void cdbm_decide(const cdbm_controller *controller, const cdbm_giv
     if (decision->playing.database >= 0.0) {
         const cdbm_clips *clips = &controller->databases[(size_t)decision->playing.database];
         decision->root_weight = clips->root_weights[clips->frames->kinds ? clips->frames->kinds[(int64_t)decision->playing.frame] : 0];
-        wanted = decision->action == CDBM_HOLDS ? 1.0 : cdbm_play_rate(controller, &decision->playing, &decision->play, query);
+        wanted = decision->action == CDBM_HOLDS ? 1.0 : cdbm_play_rate(controller, given, &decision->playing, &decision->play, query);
         decision->rate = wanted;
-        if (decision->action == CDBM_PLAYS_ON || decision->action == CDBM_LOOPS)
+        if ((decision->action == CDBM_PLAYS_ON || decision->action == CDBM_LOOPS)
+            && !(cdbm_to_event(given, clips, &decision->playing) == cdbm_to_event(given, clips, &decision->playing)))
             decision->rate += (state->rate - wanted) * cdbo_exp(-CDBO_LN2 * given->dt_s / CDBM_RATE_HALFLIFE_S);
     }
     cdbm_go_on(controller, state, after, decision);

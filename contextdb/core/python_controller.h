@@ -10,14 +10,14 @@ typedef struct cdbp_controller {
     int is_made;
 } cdbp_controller;
 
-/* One database: (frames, starts, stops, looping, root or None, marks, root_weights, rate, threshold, bar, continuing, settle, permutations, pace, n_pace,
+/* One database: (frames, starts, stops, assets, looping, root or None, marks, root_weights, rate, threshold, bar, continuing, settle, permutations, pace, n_pace,
  * pace_s). */
 static int cdbp_take_clips(cdbp_controller *own, PyObject *part, cdbm_clips *to, cdbp_arrays *a)
 {
-    PyObject *frames, *in[6];
+    PyObject *frames, *in[7];
     long long n_permutations, pace, n_pace;
     size_t s[3];
-    if (!PyArg_ParseTuple(part, "OOOOOOOdddddLLLd", &frames, &in[0], &in[1], &in[2], &in[3], &in[4], &in[5], &to->rate, &to->threshold,
+    if (!PyArg_ParseTuple(part, "OOOOOOOOdddddLLLd", &frames, &in[0], &in[1], &in[2], &in[3], &in[4], &in[5], &in[6], &to->rate, &to->threshold,
         &to->bar, &to->continuing, &to->settle, &n_permutations, &pace, &n_pace, &to->pace_s)) return -1;
     to->range_at = own->n_ranges, to->kind_at = own->n_kinds, to->frame_at = own->n_frames;
     if (frames == Py_None) return 0;
@@ -29,17 +29,19 @@ static int cdbp_take_clips(cdbp_controller *own, PyObject *part, cdbm_clips *to,
     to->n_ranges = to->frames->n_ranges, to->n_permutations = (size_t)n_permutations, to->pace = (size_t)pace, to->n_pace = (size_t)n_pace;
     if (!(to->starts = cdbp_int64s(a, in[0], s, 1, to->n_ranges, 0)) || !(to->stops = cdbp_int64s(a, in[1], s, 1, to->n_ranges, 0)))
         return -1;
-    if (!(to->looping = (const uint8_t *)cdbp_shaped(a, in[2], 'b', 1, 0, s, 1, to->n_ranges, 0, 0))) return -1;
-    if (in[3] != Py_None && !(to->root = (const float *)cdbp_shaped(a, in[3], 'f', 4, 0, s, 2, to->frames->n_frames, 3, 0))) return -1;
-    if (!(to->marks = (const uint8_t *)cdbp_shaped(a, in[4], 'u', 1, 0, s, 1, CDBP_ANY, 0, 0))) return -1;
+    if (!(to->assets = cdbp_int64s(a, in[2], s, 1, to->n_ranges, 0))) return -1;
+    if (!(to->looping = (const uint8_t *)cdbp_shaped(a, in[3], 'b', 1, 0, s, 1, to->n_ranges, 0, 0))) return -1;
+    if (in[4] != Py_None && !(to->root = (const float *)cdbp_shaped(a, in[4], 'f', 4, 0, s, 2, to->frames->n_frames, 3, 0))) return -1;
+    if (!(to->marks = (const uint8_t *)cdbp_shaped(a, in[5], 'u', 1, 0, s, 1, CDBP_ANY, 0, 0))) return -1;
     to->n_kinds = s[0];
-    if (!(to->root_weights = cdbp_numbers(a, in[5], s, 1, to->n_kinds, 0, 0))) return -1;
+    if (!(to->root_weights = cdbp_numbers(a, in[6], s, 1, to->n_kinds, 0, 0))) return -1;
     own->n_ranges += to->n_ranges, own->n_kinds += to->n_kinds, own->n_frames += to->frames->n_frames;
     own->controller.n_features = to->frames->n_features;
     return 0;
 }
 
-/* Controllers(databases, n_played, search_every_s, jump_threshold_s, history_s, min_rate, max_rate, grace_s, settle_s, until_natural) */
+/* Controllers(databases, n_played, search_every_s, jump_threshold_s, history_s, min_rate, max_rate, grace_s, settle_s, asset_history_s,
+ * until_natural) */
 static int cdbp_controller_init(PyObject *self, PyObject *arguments, PyObject *named)
 {
     cdbp_controller *own = (cdbp_controller *)self;
@@ -49,8 +51,8 @@ static int cdbp_controller_init(PyObject *self, PyObject *arguments, PyObject *n
     Py_ssize_t n, i;
     int is_right = 1;
     (void)named;
-    if (own->parts || !PyArg_ParseTuple(arguments, "OLdddddddp", &parts, &n_played, &to->search_every_s, &to->jump_threshold_s,
-        &to->history_s, &to->min_rate, &to->max_rate, &to->grace_s, &to->settle_s, &to->until_natural)) {
+    if (own->parts || !PyArg_ParseTuple(arguments, "OLddddddddp", &parts, &n_played, &to->search_every_s, &to->jump_threshold_s,
+        &to->history_s, &to->min_rate, &to->max_rate, &to->grace_s, &to->settle_s, &to->asset_history_s, &to->until_natural)) {
         if (!PyErr_Occurred()) PyErr_SetString(PyExc_TypeError, "Controllers are made once");
         return -1;
     }
@@ -161,7 +163,7 @@ static int cdbp_take_plays(const cdbp_controller *own, cdbp_arrays *a, PyObject 
 }
 
 /* before, moved, queries, seconds, ranges, range_biases, allowed, playable, kind_biases, flags, frame_biases, among, urgent, plays, play_of, wide,
- * after, decisions, found */
+ * to_event, event_s, after, decisions, found */
 static int cdbp_take_given(const cdbp_controller *own, cdbp_arrays *a, PyObject *const *in, cdbp_update *to)
 {
     const cdbm_controller *controller = &own->controller;
@@ -184,9 +186,12 @@ static int cdbp_take_given(const cdbp_controller *own, cdbp_arrays *a, PyObject 
     if (!(given->urgent = (const uint8_t *)cdbp_shaped(a, in[12], 'u', 1, 0, s, 1, n, 0, 0))) return -1;
     if (cdbp_take_plays(own, a, in + 13, given) != 0) return -1;
     if (in[15] != Py_None && !(given->wide = cdbp_numbers(a, in[15], s, 1, n, 0, 0))) return -1;
-    if (!(to->after = cdbp_to_numbers(a, in[16], s, 2, n, width, 0))) return -1;
-    if (!(to->decisions = (cdbm_decision *)cdbp_to_numbers(a, in[17], s, 2, n, sizeof(cdbm_decision) / sizeof(double), 0))) return -1;
-    if (!(to->found = (cdbm_found *)cdbp_to_numbers(a, in[18], s, 3, n, n_databases, 3))) return -1;
+    if (in[16] != Py_None && !(given->to_event = cdbp_numbers(a, in[16], s, 1, own->n_frames, 0, 0))) return -1;
+    given->event_s = PyFloat_AsDouble(in[17]);
+    if (PyErr_Occurred()) return -1;
+    if (!(to->after = cdbp_to_numbers(a, in[18], s, 2, n, width, 0))) return -1;
+    if (!(to->decisions = (cdbm_decision *)cdbp_to_numbers(a, in[19], s, 2, n, sizeof(cdbm_decision) / sizeof(double), 0))) return -1;
+    if (!(to->found = (cdbm_found *)cdbp_to_numbers(a, in[20], s, 3, n, n_databases, 3))) return -1;
     return 0;
 }
 
@@ -244,7 +249,7 @@ static PyObject *cdbp_controller_update(PyObject *self, PyObject *const *in, Py_
     int64_t parts, start, stop;
     int is_done = -2;
     a.n = 0;
-    if (own->is_made && n == 22 && cdbp_int_of(in[0], &parts) && cdbp_int_of(in[1], &start) && cdbp_int_of(in[2], &stop)
+    if (own->is_made && n == 24 && cdbp_int_of(in[0], &parts) && cdbp_int_of(in[1], &start) && cdbp_int_of(in[2], &stop)
         && cdbp_take_given(own, &a, in + 3, &to) == 0 && start >= 0 && start <= stop && (uint64_t)stop <= to.given.n
         && cdbp_are_moved(&own->controller, &to) && (parts & CDBP_ASK || cdbp_are_chosen(&own->controller, &to))) {
         size_t n_bytes = cdbm_choice_room(&own->controller, (size_t)(stop - start))

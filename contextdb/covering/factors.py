@@ -32,7 +32,6 @@ from contextdb.cells.grammar import format_cell
 from contextdb.cells.intervals import Span
 from contextdb.cells.kinds import Kind
 from contextdb.cells.sets import Accepted, Cell, NumberSet, TagMeet, TagSet, ValueSet, tags_above
-from contextdb.cells.words import format_number
 from contextdb.compiled.classes import Value
 from contextdb.errors import Fault, TableError, plural
 
@@ -275,7 +274,7 @@ def _measures(spans: Sequence[Span], kind: Kind) -> tuple[list[float], str]:
     lengths = [_length(spans, at, kind, margin) for at in range(len(spans))]
     endless = [s for s in (spans[0], spans[-1]) if math.inf in map(abs, s) and s[0] != s[1]]
     texts = [format_cell(Cell(NumberSet((s,))), Domain(kind.name)) for s in endless]
-    return lengths, ", ".join(f"{text} counts {format_number(margin)}" for text in texts)
+    return lengths, ", ".join(f"{text} counts {margin:.6g}" for text in texts)
 
 
 def margin_of(spans: Sequence[Span], kind: Kind) -> float:

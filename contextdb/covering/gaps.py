@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import re
 from bisect import bisect_left
 from collections import Counter
@@ -193,6 +194,9 @@ class NearRows:
         return failing
 
 
+EVERY_NUMBER = NumberSet(((-math.inf, math.inf),))
+
+
 def _cell_with(cell: Cell, space: Space, at: int, gap: Sides) -> str:
     """The cell that holds what it held and the gap's contexts too."""
     more, domain = space.accepted(at, gap), space.conditions[at].domain
@@ -200,7 +204,8 @@ def _cell_with(cell: Cell, space: Space, at: int, gap: Sides) -> str:
     if more is None or old is None:
         return "Any"
     if isinstance(old, NumberSet) and isinstance(more, NumberSet):
-        return space.written(at, union(old, more))
+        both = union(old, more)
+        return "Any" if both == EVERY_NUMBER else space.written(at, both)
     if isinstance(old, ValueSet) and isinstance(more, ValueSet):
         return _values_joined(old, more, space, at, gap)
     if isinstance(old, TagSet) and isinstance(more, TagSet) and not old.is_complement:

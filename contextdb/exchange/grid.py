@@ -147,7 +147,9 @@ def columns_of(
         ]
     filled = list(body.values())
     names = _with_groups(_groups_above(grid, block, wide), rows[0])
-    renamed = next(((old.strip(), new) for old, new in zip(rows[0], names, strict=True) if " ".join(old.split()) != new), None)
+    renamed = next(
+        ((old.strip(), new) for old, new in zip(rows[0], names, strict=True) if " ".join(old.split()) not in ("", new)), None
+    )
     if renamed:
         remarks.append(Remark("names have their group in front: {} is now {}.".format(*map(in_quotes, renamed))))
     _require_names(names, filled, block, Place(file, block.top + 1), _mend(rows, block, sheet))
@@ -226,13 +228,13 @@ def is_title(row: Sequence[str]) -> bool:
 
 
 def _is_groups(rows: Grid, is_wide: bool) -> bool:
-    """Whether the first of two rows groups the columns of the second: its first cell is blank, or merged with the next one, and a
-    group that is not merged has blank cells behind it."""
+    """Whether the first of two rows groups the columns of the second: its first cell is blank, or merged with the next one, or
+    names a column whose cell below is blank; and a group that is not merged has blank cells behind it."""
     first, *_ = rows
     if len(rows) < 2 or len(first) < 2:
         return False
     if is_wide:
-        return first[0] in ("", first[1], rows[-1][0])
+        return first[0] in ("", first[1], rows[-1][0]) or rows[-1][0] == ""
     texts = [text for text in first if text]
     return first[0] == "" and 0 < len(set(texts)) == len(texts) and len(texts) <= len(first) // 2 and all(rows[-1])
 
@@ -256,10 +258,11 @@ def _groups_above(grid: Grid, block: Block, wide: Collection[int]) -> Sequence[s
 
 def _with_groups(groups: Sequence[str], row: Sequence[str]) -> list[str]:
     """The names of a row under their groups. Groups with a column of one name are roles, as Attacker.Stance and Victim.Stance are,
-    and stand before the names of all their columns; one over "min" and "max" is what these are of."""
+    and stand before the names of all their columns; one over "min" and "max" is what these are of; one over a single blank cell is
+    the name."""
     names = [" ".join(name.split()) for name in row]
-    n_times = Counter(names)
-    pairs = list(zip_longest(groups, names, fillvalue=""))
+    n_times, n_groups = Counter(names), Counter(groups)
+    pairs = [(group, name or (group if n_groups[group] == 1 else "")) for group, name in zip_longest(groups, names, fillvalue="")]
     roles = {group for group, name in pairs if group and name and n_times[name] > 1 and name.casefold() not in LOWS | HIGHS}
     return [_in_group(group, name, group in roles) if group and group != name else name for group, name in pairs]
 
@@ -331,10 +334,8 @@ def _without_titles(blocks: Sequence[Block], grid: Grid, wide: Collection[int]) 
         if n_titles == len(rows):  # a title of several lines
             first = next(at for at, row in enumerate(rows, block.top) if any(row))
             without.append(Block(first, block.left, first + 1, block.right))
-        elif n_titles and is_header(
-            _with_groups(_groups_above(grid, replace(block, top=block.top + n_titles), wide), rows[n_titles])
-        ):
-            without.append(Block(block.top + n_titles, block.left, block.bottom, block.right))
+        elif header := next((at for at in range(1, n_titles + 1) if is_header(_names_at(grid, block, at, wide))), 0):
+            without.append(replace(block, top=block.top + header))
         else:
             without.append(block)
             continue
@@ -342,6 +343,12 @@ def _without_titles(blocks: Sequence[Block], grid: Grid, wide: Collection[int]) 
             if text := ", ".join(dict.fromkeys(filter(None, row[block.left : block.right]))):
                 remarks.append(Remark(f"left out above the header: {in_quotes(text)}.", f"sheet row {at}"))
     return without, remarks
+
+
+def _names_at(grid: Grid, block: Block, at: int, wide: Collection[int]) -> list[str]:
+    """The names of the columns, if a row of a block were its header."""
+    below = replace(block, top=block.top + at)
+    return _with_groups(_groups_above(grid, below, wide), grid[below.top][block.left : block.right])
 
 
 def _first_text(grid: Grid, block: Block) -> str:

@@ -43,7 +43,7 @@ def heat_map(pairs: PairTable, number: int) -> str:
         f'<section data-map="{map_id}">\n<h3>Pairs of conditions</h3>\n'
         '<p class="muted">How much, in percent, of the least covered combination of two conditions\u2019 values has a valid row; '
         f"the diagonal is one condition alone. A square opens its values.{how}{more}</p>\n"
-        f'<div class="scroll"><table class="heat"><thead><tr><th></th>{head}</tr></thead>\n'
+        f'<div class="scroll"><table class="heat"><thead><tr><td></td>{head}</tr></thead>\n'
         f"<tbody>\n{''.join(rows)}</tbody></table></div>\n"
         '<div class="detail" hidden aria-live="polite"></div>\n'
         f'<script type="application/json" id="{map_id}">{_data(pairs, order, squares)}</script>\n</section>\n'

@@ -17,6 +17,8 @@ from contextdb.report.results import Gate
 
 _FIGURE = re.compile(r"(?:≈ |about |at least )?([<>]?)(-?\d[\d,]*(?:\.\d+)?)(?: %|\+| or more)?")
 _WORD = re.compile(r"[\w-]{0,16}")
+REGION = 'role="region" aria-label="'
+"""How a box that scrolls begins to say its name; no text of a table can hold this."""
 POINT = "point"
 """A share of no volume, which is sorted as 0."""
 
@@ -30,7 +32,7 @@ def as_html(document: Document) -> str:
     parts = [f"<h1>{escape(title)}</h1>\n"]
     parts += [f'<p class="{"passed" if is_met else "failed"}">{escape(closing.summary)}</p>\n'] if closing.summary else []
     parts += [_gates(closing.gates), _contents(sections) if len(sections) > 1 else "", *map(_block, closing.blocks)]
-    articles = "".join(_section(section, number) for number, section in enumerate(sections))
+    articles = "".join(_section(section, number, len(sections) > 1) for number, section in enumerate(sections))
     main = f'{"".join(parts)}{articles}<p class="muted">contextdb {__version__}</p>\n'
     return page(title, "coverage", f"<main>\n{main}</main>\n")
 
@@ -47,10 +49,12 @@ def _contents(sections: Sequence[Section]) -> str:
     return f"<ul>\n{''.join(items)}</ul>\n"
 
 
-def _section(section: Section, number: int) -> str:
+def _section(section: Section, number: int, is_one_of_several: bool) -> str:
+    """A section; where there are several, the names of its regions begin with its title."""
     parts = [f'<h2 id="t{number}">{escaped(section.title)}</h2>\n', paragraph(section.summary, "muted") if section.summary else ""]
     parts += [*map(_block, section.sentences), _gates(section.gates), *map(_block, section.blocks)]
-    return f"<article>\n{''.join(parts)}</article>\n"
+    article = f"<article>\n{''.join(parts)}</article>\n"
+    return article.replace(REGION, f"{REGION}{escaped(section.title)}: ") if is_one_of_several else article
 
 
 def _gates(gates: Iterable[Gate]) -> str:
@@ -104,10 +108,10 @@ def _table(label: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> st
     columns = list(zip_longest(*rows, fillvalue=""))[: len(head)]
     cells = [_cells(column) for column in columns]
     classes = ['<th scope="col" class="n">' if "data-v" in column[0] else '<th scope="col">' for column in cells]
-    top = "".join(f"{opening}{escape(name)}</th>" for opening, name in zip(classes, head, strict=False))
+    top = "".join(f"{opening}{escape(name) or '#'}</th>" for opening, name in zip(classes, head, strict=False))
     body = "".join(f"<tr>{''.join(row)}</tr>\n" for row in zip(*cells, strict=True))
     return (
-        f'<div class="scroll" tabindex="0" role="region" aria-label="{escaped(label)}"><table class="sortable">'
+        f'<div class="scroll" tabindex="0" {REGION}{escaped(label)}"><table class="sortable">'
         f"<thead><tr>{top}</tr></thead>\n<tbody>\n{body}</tbody></table></div>\n"
     )
 

@@ -125,10 +125,27 @@ class SessionMeasures:
                 of.setdefault(why, []).append(OF_KEY[key].label)
         return (f"not measured, as {why}: {'; '.join(labels)}" for why, labels in of.items())
 
+    @property
+    def to_do(self) -> str:
+        """What to do first, in a sentence; "" where nothing is over its bar and no column forces jumps."""
+        over = [gate for gate in self.gates if not gate.passed]
+        if over:
+            return f"To do first: {over[0].message}"
+        if not self.forced_by:
+            return ""
+        columns, jumps = " and ".join(self.forced_by[0].columns), plural(self.forced_by[0].jumps, "forced jump")
+        return f"To do first: make the cells of {columns} soft, or Any, where they end what plays: {jumps}."
+
     def to_json(self) -> dict[str, object]:
         forced = [each.to_json() for each in self.forced_by]
         gates = [gate.to_json() for gate in self.gates]
-        return {"file": as_path(self.file), **self.measures.to_json(), "forced_by": forced, "bars": gates}
+        return {
+            "file": as_path(self.file),
+            **self.measures.to_json(),
+            "to_do": self.to_do or None,
+            "forced_by": forced,
+            "bars": gates,
+        }
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from contextdb.errors import plural
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.measuring.moves import Counts, Map
 from contextdb.report.coverage_heat import EDGES
+from contextdb.report.document_html import REGION
 
 
 def header_of(name: str) -> tuple[str, str]:
@@ -32,7 +33,7 @@ def html_map(of: Map, frames: Counts, wanted: Floats, holes: Floats) -> str:
     )
     label = escape(f"{of.caption}, in m/s")
     return (
-        f'<div class="scroll" tabindex="0" role="region" aria-label="{label}"><table class="heat motion">'
+        f'<div class="scroll" tabindex="0" {REGION}{label}"><table class="heat motion">'
         f'<thead><tr><th scope="col">m/s</th>{head}</tr></thead>\n<tbody>\n{body}</tbody></table></div>\n'
     )
 

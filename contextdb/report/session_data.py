@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
+from contextdb.motion.trace.views import nothing_fits
 
 SHOWN_HZ = 30.0
 """The most poses a second in the page."""
@@ -172,7 +173,7 @@ class SessionView:
         costs = self.strips.get("cost")
         if len(forced) and costs is not None and not np.isnan(costs[forced]).all():
             at = int(forced[np.nanargmax(costs[forced])])
-            return at / self.rate, f"what plays ends there and nothing fits well: {self.playing[at][0]} costs {costs[at]:.3g}"
+            return at / self.rate, nothing_fits(self.playing[at][0], float(costs[at]))
         for strip, sentence, least in WORST:
             values = self.strips.get(strip)
             if values is not None and not np.isnan(values).all() and np.nanmax(values) > least:

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from contextdb.motion.selection.decision import Action, Decision
 from contextdb.motion.trace.cost_views import cost_text
+from contextdb.motion.trace.views import look_first
 from contextdb.report.measure_results import SessionMeasures
 from contextdb.report.render_markdown import MOST_BYTES, escaped
 
@@ -15,7 +16,13 @@ CHANGES = (Action.START, Action.JUMP)
 def render(sessions: Sequence[SessionMeasures], decisions: Sequence[Sequence[Decision]], parting: str, page: str | None) -> str:
     """The comment; `page` is the name of its HTML page."""
     names = [session.file for session in sessions]
-    parts = [f"## Session {' and '.join(map(escaped, names))}", *(f"{escaped(s.file)}: {s.headline}" for s in sessions)]
+    parts = [
+        f"## Session {' and '.join(map(escaped, names))}",
+    ]
+    parts += [
+        f"{escaped(s.file)}: {s.headline}{'. ' if (first := look_first(each)) else ''}{escaped(first)}"
+        for s, each in zip(sessions, decisions, strict=True)
+    ]
     if parting:
         parts.append(f"**{escaped(parting)}**")
     if page:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -15,6 +16,9 @@ from contextdb.compiled.pick_columns import NOTHING, PickColumns
 from contextdb.errors import Fault, Place, in_quotes
 from contextdb.schema.settings import TableSettings
 from contextdb.schema.table_settings import PLAIN_JOBS
+
+ONE_NUMBER = re.compile(r"\s*(-?\d+(?:[.,]\d+)?)\s*[^\W\d_]*\s*")
+"""A number, perhaps with a unit, as people write it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +73,10 @@ class Reader:
 
     def fault(self, column: str, text: str) -> Fault:
         """That a cell cannot be read."""
-        return Fault(f"cannot read {in_quotes(text)}.", self.accepted, place=Place(column=column), rule="unreadable-cell")
+        only = ONE_NUMBER.fullmatch(text)
+        number = only[1].replace(",", ".") if only else ""
+        mend = in_quotes(number) if number and self.read(number) is not None else ""
+        return Fault(f"cannot read {in_quotes(text)}.", self.accepted, mend, Place(column=column), "unreadable-cell")
 
 
 def plain_fault(job: str, column: str, text: str) -> Fault | None:

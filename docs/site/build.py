@@ -158,10 +158,16 @@ def make_live_pages(folder: Path) -> None:
             shutil.copy(work / page, folder)
 
 
+NO_CHARACTER = """<!DOCTYPE html>
+<html lang="en"><title>A character to steer</title>
+<main><h1>A character to steer</h1><p>It was not made with this site: PyPI's ziglang was not installed.</p></main></html>
+"""
+
+
 def make_character(page: Path) -> None:
     """The example in a browser as one file; a line in its place where the compiler that makes it is not installed."""
     if importlib.util.find_spec("ziglang") is None:
-        page.write_text("<p>It was not made with this site: PyPI's ziglang was not installed.</p>", encoding="utf-8")
+        page.write_text(NO_CHARACTER, encoding="utf-8")
         return
     with tempfile.TemporaryDirectory() as made, contextlib.redirect_stdout(io.StringIO()):
         web.build(Path(made))

@@ -1,19 +1,18 @@
 """A guard: facts that are kept, a picker that remembers, a link, hot reload."""
 
-from facts import LocomotionFacts, LocomotionLive, LocomotionSomeFacts
+from facts import LocomotionFacts, LocomotionTable
 
 import contextdb as cdb
 
 
 def main() -> None:
-    moves = cdb.CompiledTable.open("build/locomotion.safetensors")
+    moves = LocomotionTable.open("build/locomotion.safetensors")
     facts: LocomotionFacts = {"gait": "Walk", "speed": 1.3, "direction": 0.0, "style": "normal"}
     valid = moves.query(facts)
     print([asset.upper() for asset in valid], valid.rows.tolist(), valid[0], len(valid))
-    live: LocomotionLive = moves.live(facts)
+    live = moves.live(facts)
     live["speed"] = 3.2
-    some: LocomotionSomeFacts = {"gait": "Run"}
-    live.update(some)
+    live.update({"gait": "Run"})
     pick = moves.picker(seed=7, memory=2).pick(live.query(), time_s=0.5)
     row: int | None = pick.row
     name: str | None = pick.asset

@@ -54,6 +54,12 @@ def test_the_nearest_cell_ends_at_the_decimal_too():
     assert gap.nearest.cell == "[10.01..40)"
 
 
+def test_a_nearest_cell_that_would_hold_every_number_is_any():
+    (gap,) = coverage(table_of(["1..2"], {"speed": {"type": "number"}})).gaps
+    assert gap.nearest is not None
+    assert (gap.cells, gap.nearest.cell) == ({"speed": "..1) | (2.."}, "Any")
+
+
 def test_where_two_valid_rows_are_an_error_a_gap_is_written_to_the_last_bit():
     (gap,) = coverage(table_of(["20, 9.99"], NUMBER, "unique")).gaps
     assert not spans_of(gap.cells["speed"], NUMBER).holds(29.990000000000002)

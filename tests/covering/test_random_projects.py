@@ -144,6 +144,22 @@ def test_evaluate_gives_in_each_line_what_query_gives(seed: int):
         assert (answer["count"], answer["rows"]) == (str(len(rows)), " ".join(rows)), facts
 
 
+@examples(2)
+@given(SEEDS)
+def test_query_says_the_valid_rows_and_of_every_other_what_fails(seed: int):
+    project, rng = drawn(seed), random.Random(seed)
+    with written(project) as (folder,):
+        names = list(cdb.Project.load(folder)["outer"].compile().asked)
+        for at in rng.sample(range(len(project.contexts)), min(5, len(project.contexts))):
+            facts = [f"{name}={as_text(name, project.contexts[at][0][name])}" for name in names]
+            result = run("query", folder / "outer.csv", *facts, "--explain", "--json", "--most", "1000")
+            assert result.code in (0, 1), result.err
+            assert {row["row"] for row in result.json["matches"]} == project.valid[at]
+            others = {row["row"]: row["failures"] for row in result.json["explain"]}
+            assert set(others) == set(range(len(project.rows))) - project.valid[at]
+            assert run("query", folder / "outer.csv", *facts, "--explain").code == result.code
+
+
 def as_text(name: str, fact: object) -> str:
     """A fact as a file of contexts has it."""
     if DOMAINS[name].kind == "date":

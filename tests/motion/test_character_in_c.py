@@ -138,7 +138,7 @@ def drawn(rng, is_captured):
     entries = [motion.Entry("turns", databases["turns"], rng.choice([0.2, 0.6])), motion.Entry("all", databases["all"])]
     settings = motion.ControllerSettings(
         search_every_s=rng.choice([0.0, 0.1, 0.3]), history_s=rng.choice([0.0, 0.5]), until_natural=rng.random() < 0.3,
-        grace_s=rng.choice([0.0, 0.3]),
+        grace_s=rng.choice([0.0, 0.3]), asset_history_s=rng.choice([0.0, 1.5]),
     )  # fmt: skip
     output = motion.PoseSettings(root=root, foot_lock=rng.random() < 0.7, path_alignment=rng.random() < 0.5)
     return motion.Controller(motion.Selector(entries), settings), schema, banks, output

@@ -5,6 +5,7 @@ import random
 from itertools import pairwise
 
 import numpy as np
+import played
 import pytest
 from lines import DT, RATE, line
 from made_once import make_clip
@@ -431,3 +432,21 @@ def test_what_was_entered_just_now_is_left_for_a_large_gain_alone_and_says_so():
     later = [one.update(DT, [float(tick)]) for tick in range(2, 10)][-1]
     assert later.playing.asset == "walk"
     assert one.update(DT, [7.5]).action is Action.JUMP
+
+
+def test_an_asset_that_was_played_lately_is_entered_again_in_none_of_its_forms_until_its_time_is_over():
+    one, rng = Controller(Selector([Entry("a", played.database())]), ControllerSettings(asset_history_s=2.0)), random.Random(3)
+    last, entered = {}, []
+    for tick in range(1200):
+        decision = one.update(1 / 30, [rng.gauss(0.0, 0.2) for _ in range(3)], interrupt=tick % 40 == 0)
+        if decision.action is Action.JUMP:
+            entered.append((decision.playing.mirrored, tick - last.get(decision.playing.asset, -99)))
+        last[decision.playing.asset] = tick
+    assert 60 <= min(ticks for _, ticks in entered) < 64
+    assert {is_mirrored for is_mirrored, _ in entered} == {False, True}
+
+
+def test_where_nothing_else_may_play_an_asset_that_is_barred_is_held():
+    one = controller(line(walk=range(3)), asset_history_s=0.5)
+    actions = [one.update(DT, [0.0]).action for _ in range(8)]
+    assert actions == [Action.START, Action.CONTINUE, Action.CONTINUE, *[Action.HOLD] * 4, Action.JUMP]

@@ -1,6 +1,7 @@
 """Every update of a character against a plain reading of all rules, frame by frame."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from hypothesis import given
@@ -29,8 +30,11 @@ def scenes(draw):
             tag = draw(st.sampled_from(["DoNotChoose", "Excluded", "NextNaturalOnly"]))
             rows.append(f"{name},{tag},{start},{start + length},{0.1 if length and tag == 'NextNaturalOnly' else ''}")
     made = line("\n".join(rows), continuing=draw(st.sampled_from([0.0, -0.5, -3.0])), **assets)
+    if len(names) == 3 and draw(st.booleans()):
+        made = replace(made, assets=("p", "q", "p"))  # another take of the same asset
     seconds = st.sampled_from([0.0, 0.1, 0.2, 0.3])
     rules = {key: draw(seconds) for key in ("search_every_s", "jump_threshold_s", "history_s", "grace_s")}
+    rules["asset_history_s"] = draw(st.sampled_from([0.0, 0.0, 0.2, 0.5, 1.3]))
     rules["cost_bar"] = draw(st.sampled_from([None, 0.0, 1.0, 4.0]))
     rules["until_natural"] = draw(st.booleans())
     rules["settle_bias"], rules["settle_s"] = draw(st.sampled_from([None, -0.77, -2.3, -9.1])), draw(st.sampled_from([0.2, 0.5]))
@@ -39,7 +43,7 @@ def scenes(draw):
     return made, rules, asked
 
 
-@examples(3)
+@examples(10)
 @given(scenes())
 def test_every_update_follows_from_the_rules_read_frame_by_frame(scene):
     database, rules, asked = scene
@@ -127,6 +131,9 @@ class Oracle:
     def _is_valid(self, frame, mask):
         return mask is None or mask[self.database.range_of(frame)]
 
+    def _asset(self, frame):
+        return self.database.assets[self.database.range_of(frame)]
+
     def _best(self, place, mask, here, may_continue, is_ended):
         found, least = None, math.inf
         for frame in range(self.database.n_frames):
@@ -153,6 +160,9 @@ class Oracle:
         if mark & (Mark.EXCLUDED | Mark.DO_NOT_CHOOSE | Mark.PAST_ENTRY) or not self._is_valid(frame, mask):
             return False
         if self.tick - self.played.get(frame, -99) < self.n["history_s"]:
+            return False
+        of_asset = [played for each, played in self.played.items() if self._asset(each) == self._asset(frame)]
+        if self.tick - max(of_asset, default=-99) < self.n["asset_history_s"]:
             return False
         if here is None or self.database.range_of(frame) != self.database.range_of(here):
             return True

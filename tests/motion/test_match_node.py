@@ -60,6 +60,57 @@ def misses_by(play, target):
     return math.hypot(there.left_m - target.left_m, there.ahead_m - target.ahead_m), angle
 
 
+# ---- stitches
+
+
+@examples(10)
+@given(st.data())
+def test_a_stitch_is_the_shortest_part_that_joins_two_poses_under_a_cost(data):
+    lengths = data.draw(st.lists(st.integers(1, 9), min_size=1, max_size=3))
+    features = data.draw(st.lists(st.integers(0, 6), min_size=sum(lengths), max_size=sum(lengths)))
+    kinds = data.draw(st.lists(st.integers(0, 3), min_size=sum(lengths), max_size=sum(lengths)))
+    flags = np.array([Mark.MATCH_RANGE, 0, Mark.EXCLUDED | Mark.MATCH_RANGE, Mark.DO_NOT_CHOOSE | Mark.MATCH_RANGE], np.uint8)
+    costs, weights, tags = np.array([0.0, 0.0, 0.0, 0.0]), np.ones(4), np.zeros((4, 0), np.bool_)
+    marks = {"kinds": np.array(kinds, np.uint16), "kind_marks": flags, "kind_biases": costs, "kind_root_weights": weights}
+    made_by_hand = handmade([ahead(n) for n in lengths], features=features)
+    database = replace(made_by_hand, marks=replace(made_by_hand.marks, **marks, kind_tags=tags))
+    old, new, most = (data.draw(st.integers(0, 6)) for _ in range(3))
+    parts = []
+    for start, stop in zip(database.starts.tolist(), database.stops.tolist(), strict=True):
+        for first in range(start, stop):
+            for last in range(first + 1, stop):
+                cost = (features[first] - old) ** 2 + (features[last] - new) ** 2
+                if cost <= most and kinds[first] == 0 and all(kinds[frame] != 2 for frame in range(first, last + 1)):
+                    parts.append((last - first, cost, first))
+    play = node(database).stitch([old], [new], most)
+    found = play and (round(play.duration_s * RATE), play.hit.cost, play.hit.frame)
+    assert found == min(parts, default=None)
+    if play is not None:
+        assert play.at(play.duration_s).ahead_m == pytest.approx(play.duration_s)
+        assert play.costs.total == pytest.approx(play.hit.cost)
+
+
+def test_a_stitch_from_standing_to_walking_is_a_start_and_a_dearer_one_is_shorter():
+    clips = {name: make_clip(name).clip for name in ("idle", "walk", "start_walk", "stop_walk", "jog")}
+    stitches = MatchNode(MotionDatabase.build([clips["start_walk"], clips["stop_walk"]], SCHEMA))
+    stands, walks = query_from(SCHEMA, clips["idle"], 10), query_from(SCHEMA, clips["walk"], 40)
+    plays = [stitches.stitch(stands, walks, most) for most in (0.0, 0.05, 0.4)]
+    assert plays[0] is None
+    assert [play.hit.asset for play in plays[1:]] == ["start_walk", "start_walk"]
+    assert plays[1].duration_s > plays[2].duration_s > 0.0
+    back = stitches.stitch(walks, stands, 0.05)
+    assert back.hit.asset == "stop_walk"
+    while not back.is_done:
+        back.advance(1 / 60)
+    assert back.frame == back.hit.frame + round(back.duration_s * RATE)
+
+
+@pytest.mark.parametrize("most", [-1.0, math.nan, "0.1", None])
+def test_what_is_no_cost_of_a_stitch_is_refused(most):
+    with pytest.raises(QueryError, match="the most that a part may cost is"):
+        node(handmade([ahead(4)])).stitch([0.0], [0.0], most)
+
+
 # ---- as in the talks
 
 

@@ -273,8 +273,8 @@ def test_foreign_files_are_refused_with_a_reason(saved, tmp_path):
     saved.write_bytes(b"HIERARCHY\nROOT Hips\n" * 9)
     assert refusal(saved).startswith("not a whole .safetensors file (")
     saved.write_bytes(as_safetensors({"starts": np.zeros(1)}, {"contextdb.motion": "7"}))
-    assert refusal(saved) == "layout 7; this version reads layout 3."
-    saved.write_bytes(as_safetensors({"starts": np.zeros(1)}, {"contextdb.motion": "3"}))
+    assert refusal(saved) == "layout 7; this version reads layout 4."
+    saved.write_bytes(as_safetensors({"starts": np.zeros(1)}, {"contextdb.motion": "4"}))
     assert refusal(saved) == "the file does not hold what its header says (KeyError)."
     with pytest.raises(FileError, match="there is no such file"):
         open_database(tmp_path / "none.safetensors")

@@ -66,8 +66,9 @@ def test_flags_of_frames_are_tags_too():
     assert kinds(found) == [("tags", "tags on walk", True)]
 
 
-def test_what_was_played_just_now_is_named_with_the_settings():
-    settings = ControllerSettings(search_every_s=0.0, jump_threshold_s=0.0, history_s=5.0, rate=RATE)
+@pytest.mark.parametrize(("setting", "reason"), [("history_s", "played just now"), ("asset_history_s", "asset played lately")])
+def test_what_was_played_lately_is_named_with_its_setting(setting, reason):
+    settings = ControllerSettings(**{"search_every_s": 0.0, "jump_threshold_s": 0.0, "history_s": 0.0, "rate": RATE, setting: 5.0})
     database = line(walk=[5.0, 5.0], jog=[5.25] * 20)
     selector = Selector([Entry("moves", database)])
     trace = Trace(3, selector.databases)
@@ -76,8 +77,8 @@ def test_what_was_played_just_now_is_named_with_the_settings():
         controller.update(DT, [5.0], interrupt=interrupt)
     found = trace.reasked().why_not(1, "walk")
     assert (found.winner, found.rank) == ("jog", 1)
-    assert found.reasons == ("history: played just now",)
-    assert kinds(found) == [("setting", "history_s", True)]
+    assert found.reasons == (f"history: {reason}",)
+    assert kinds(found) == [("setting", setting, True)]
 
 
 def test_a_priority_database_that_won_outright_is_named_with_its_threshold():

@@ -1,5 +1,7 @@
 """Documents as pages: figures sort by their size, and what a text holds is no markup."""
 
+import re
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -31,3 +33,12 @@ def test_no_text_of_a_document_is_markup(text: str):
         return Document("coverage", "table", [Section(name, name, [name], blocks)] * 2, Section("", name, (), blocks))
 
     assert as_html(document(text)).count("<") == as_html(document("plain")).count("<")
+
+
+def test_boxes_that_scroll_have_names_of_their_own_and_heads_are_never_empty():
+    table = Table(("", "share"), [("1", "2 %"), ("2", "1 %")], "To do")
+    page = as_html(Document("coverage", "table", [Section("moves", blocks=[table]), Section("dives", blocks=[table])]))
+    assert re.findall(r'role="region" aria-label="([^"]*)"', page) == ["moves: To do", "dives: To do"]
+    assert re.findall(r"<th[^>]*>([^<]*)</th>", page) == ["#", "share"] * 2
+    alone = as_html(Document("coverage", "table", [Section("moves", blocks=[table])]))
+    assert 'aria-label="To do"' in alone

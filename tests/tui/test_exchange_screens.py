@@ -326,6 +326,24 @@ def test_rows_and_decimals_are_asked_for_once_and_the_next_file_of_that_name_is_
     assert (after.assets[3:], after.text(4, "speed")) == (["sprint", "hop"], "2.5")
 
 
+def test_the_sheet_of_rows_is_looked_through_sideways_as_far_as_its_last_column(table: Table):
+    assert table.path is not None
+    names = [f"fact {at:02}" for at in range(30)]
+    (table.path.parent / "work" / "wide.csv").write_text(f"{','.join(['Asset', *names])}\n{','.join(['jog', *'1' * 30])}\n")
+
+    async def script(pilot: Pilot[Any]) -> None:
+        await read_file(pilot, "wide.csv")
+        await pilot.press("f4", "right")
+        await pilot.pause()
+        assert "Asset" not in screen_text(pilot.app).partition("Row ")[2]
+        assert "fact 00" in screen_text(pilot.app)
+        await pilot.press(*["right"] * 40)
+
+    text = played(importing(table), script)[1]
+    assert "fact 29" in text
+    assert "fact 25" in text  # the columns before it stay, as many as there is room for
+
+
 NAMES_SAID = 'column "where": each text is one name, such as "Mid Air"; Names, "each word is a name", reads each word as a name.'
 
 

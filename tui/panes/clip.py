@@ -74,12 +74,12 @@ class ClipPane(Shower):
 
     DEFAULT_CSS = """
     ClipPane {
-        width: 46; height: 1fr; max-height: 26; display: none; background: $background; border-left: solid $panel;
+        width: 46; height: 1fr; display: none; background: $background; border-left: solid $panel;
         &.-open { display: block; }
         &.-narrow { width: 30; }
         & > #clip-title { height: auto; max-height: 2; padding: 0 1; text-style: bold; }
         & > #clip-note { height: auto; padding: 0 1; color: $text-muted; }
-        & > Stage { height: 1fr; padding: 0 1; }
+        & > Stage { height: 1fr; max-height: 24; padding: 0 1; }
     }
     """
 

@@ -37,6 +37,7 @@ WORDS = {True: ("holds", "info"), False: ("broken", "error"), None: ("open", "wa
 BEGUN = "Whenever "
 """What a new contract begins with."""
 NEW = ""
+NONE = "A contract says in a sentence which rows can play, and is proved for every context."
 """The name of a contract that is being written."""
 
 
@@ -148,7 +149,8 @@ class ContractsPane(Pane):
         contracts, proofs = self.contracts, self.proofs
         n_held = sum(proof.holds is True for proof in proofs.values())
         rest = "" if len(proofs) == len(contracts) else " Proving …"
-        self.query_one("#contracts-summary", Static).update(f"{n_held} of {plural(len(contracts), 'contract')} proved.{rest}")
+        proved = f"{n_held} of {plural(len(contracts), 'contract')} proved.{rest}" if contracts else NONE
+        self.query_one("#contracts-summary", Static).update(proved)
         lines = self.query_one(LineList)
         at = next((at for at, contract in enumerate(contracts) if contract.name == chosen), max(lines.index, 0))
         lines.show(len(contracts), lambda at: _line(contracts[at], proofs.get(contracts[at].name)), at)

@@ -23,9 +23,8 @@ class ChangesDialog(Dialog[SetContext]):
 
     DEFAULT_CSS = """
     ChangesDialog {
-        & > #dialog { width: 120; height: 92%; }
-        & > #dialog > #dialog-body { height: 1fr; }
-        & LineList { height: 1fr; margin: 1 0 0 0; }
+        & > #dialog { width: 120; }
+        & LineList { height: auto; max-height: 70vh; margin: 1 0 0 0; }
     }
     """
     title_text = "What changes since the last save"
@@ -40,7 +39,7 @@ class ChangesDialog(Dialog[SetContext]):
     def compose_body(self) -> ComposeResult:
         """How many, and each with what may play before and after."""
         yield Static(id="changes-summary")
-        columns = [ListColumn("Moment", 20, 2, is_name=True), ListColumn("Before", 16, 1), ListColumn("After", 16, 0)]
+        columns = [ListColumn("Moment", 20, 2, is_name=True), ListColumn("Before", 16, 1), ListColumn("After", 16, 1)]
         yield LineList(columns, empty="No moment changes.")
 
     def on_mount(self) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
+from itertools import accumulate
 from typing import ClassVar
 
 from textual.app import ComposeResult
@@ -21,7 +23,7 @@ from .dialog import Dialog, buttons
 SAMPLE = 100
 """Rows of which the columns are as wide as their texts."""
 WIDEST = 18
-KEYS = "Enter the header is here · L the last row is here · F6 read these · Esc as it was"
+KEYS = "Enter header · L last row · ←→ columns · F6 read these · Esc as it was"
 
 
 def first_header(grid: Sequence[Sequence[str]], cells: str) -> int:
@@ -39,6 +41,8 @@ class RowsDialog(Dialog[str]):
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("l", "last_row", "The last row is here"),
         Binding("f6,ctrl+j", "accept", "Read these"),
+        Binding("left", "turn(-1)", "Columns before", show=False),
+        Binding("right", "turn(1)", "Next columns", show=False),
     ]
     DEFAULT_CSS = """
     RowsDialog {
@@ -55,6 +59,8 @@ class RowsDialog(Dialog[str]):
         self.title_text = f"The rows of {name or 'the file'}"
         self.grid = grid
         self.header, self.last = at, LAST_ROW
+        self.first = 0
+        """The first column that is seen."""
 
     @property
     def block(self) -> Block:
@@ -67,11 +73,8 @@ class RowsDialog(Dialog[str]):
 
     def compose_body(self) -> ComposeResult:
         """The sheet, and what is chosen of it."""
-        rows = self.grid[:SAMPLE]
-        widths = [min(max(3, *(len(row[at]) for row in rows)), WIDEST) for at in range(len(rows[0]))]
-        columns = [ListColumn(column_letters(at), width, is_name=True) for at, width in enumerate(widths)]
         yield Static("", id="rows-said")
-        yield LineList([ListColumn("Row", len(f"{len(self.grid)}") + 7, 0, True), *columns], id="rows-lines")
+        yield LineList([], id="rows-lines")
         yield Static(buttons([("accept", "Read these"), ("cancel", "Cancel")]))
 
     def on_mount(self) -> None:
@@ -83,7 +86,23 @@ class RowsDialog(Dialog[str]):
         block = self.block
         end = "to the last row" if block.is_open else f"and {plural(block.bottom - block.top - 1, 'row')} below it"
         self.query_one("#rows-said", Static).update(Content(f"{block}: the header is row {block.top + 1}, {end}."))
-        self.query_one(LineList).show(len(self.grid), self._line, at)
+        lines = self.query_one(LineList)
+        lines.columns = (ListColumn("Row", len(f"{len(self.grid)}") + 7, 0, True), *self._columns[self.first :])
+        lines.show(len(self.grid), self._line, at)
+
+    @cached_property
+    def _columns(self) -> list[ListColumn]:
+        rows = self.grid[:SAMPLE]
+        widths = [min(max(3, *(len(row[at]) for row in rows)), WIDEST) for at in range(len(rows[0]))]
+        return [ListColumn(column_letters(at), width, is_name=True) for at, width in enumerate(widths)]
+
+    def action_turn(self, step: int) -> None:
+        """Show the columns from the next one on, or from that before."""
+        room = self.query_one(LineList).size.width - 16
+        seen = accumulate(column.width + 2 for column in reversed(self._columns))
+        last = len(self._columns) - max(1, sum(wide <= room for wide in seen))
+        self.first = max(0, min(self.first + step, last))
+        self._show(self.query_one(LineList).index)
 
     def _line(self, at: int) -> Sequence[ListCell]:
         block = self.block
@@ -91,8 +110,8 @@ class RowsDialog(Dialog[str]):
         sign = "header " if is_header else "last " if at + 1 == block.bottom else ""
         tone = "info" if is_header else "" if block.top < at < block.bottom else "muted"
         cells = [text.replace("\n", " ") for text in self.grid[at]]
-        in_block = [tone if block.left <= column < block.right else "muted" for column in range(len(cells))]
-        return (f"{sign}{at + 1}", tone), *((text, each) for text, each in zip(cells, in_block, strict=True))
+        in_block = [(text, tone if block.left <= column < block.right else "muted") for column, text in enumerate(cells)]
+        return (f"{sign}{at + 1}", tone), *in_block[self.first :]
 
     def on_line_list_chosen(self, event: LineList.Chosen) -> None:
         """The header is here; a last row above it counts no more."""

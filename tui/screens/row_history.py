@@ -49,7 +49,7 @@ class RowHistoryDialog(Dialog[None]):
         """Whether of the cell or of the row, the versions, and the two of one beside each other."""
         yield ChoiceLine(())
         yield LineList(
-            [ListColumn("When", 16), ListColumn("Who", 8, 1), ListColumn("What", 14, 2), ListColumn("Why", 12, 2)],
+            [ListColumn("When", 16), ListColumn("Who", 8, 1), ListColumn("What", 12, 1), ListColumn("Why", 16, 4)],
             empty=READING,
             id="history-versions",
         )

@@ -63,7 +63,11 @@ class FindBar(SheetBar):
         Binding("up,shift+f3", "next(True)", "Previous"),
         Binding("alt+r", "replace", "Replace"),
         Binding("alt+a", "replace_all", "Replace all"),
+        Binding("tab", "turn(1)", "Next part", show=False),
+        Binding("shift+tab", "turn(-1)", "Part before", show=False),
     ]
+    ORDER = ("text", "replacement", "selection", "replace", "all", "whole", "case", "pattern")
+    """Where Tab goes: from the text to what replaces it."""
 
     @dataclass
     class Sought(Message):
@@ -108,6 +112,12 @@ class FindBar(SheetBar):
 
     def action_next(self, is_backwards: bool) -> None:
         self.post_message(self.Sought(self.search, is_backwards))
+
+    def action_turn(self, step: int) -> None:
+        """Go to another part of the bar."""
+        here = (self.screen.focused.id or "").removeprefix("find-") if self.screen.focused else ""
+        at = self.ORDER.index(here) + step if here in self.ORDER else 0
+        self.query_one(f"#find-{self.ORDER[at % len(self.ORDER)]}").focus()
 
     def action_replace(self) -> None:
         """Replace in the cursor's cell and go on."""

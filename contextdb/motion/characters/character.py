@@ -300,8 +300,8 @@ class Character:
             The path that the body is wished to take over the ground, beginning where the body is, for a game that plans paths.
             Default: `steered_path`.
         **options
-            `tags`, `bias`, `penalties`, `among`, `force`, `interrupt` as for `Controller.update`; and `valid`, in place of what
-            the tables answer.
+            `tags`, `bias`, `penalties`, `among`, `force`, `interrupt`, `event` as for `Controller.update`; and `valid`,
+            in place of what the tables answer.
 
         Raises
         ------

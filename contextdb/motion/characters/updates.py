@@ -16,6 +16,7 @@ from contextdb.motion.clips.trajectory import Trajectory
 from contextdb.motion.output.stream import Pose
 from contextdb.motion.records import quickly_made
 from contextdb.motion.selection.decision import Decision, plays
+from contextdb.motion.selection.events import Event
 from contextdb.motion.selection.search_options import Among, OfPenalties, OfTags, OfValid
 
 UNKNOWN = ("error", "any", "never")
@@ -32,6 +33,7 @@ class Options(TypedDict, total=False):
     among: Among | None
     force: bool
     interrupt: bool
+    event: Event | None
 
 
 def _at(body: Steered) -> str:

@@ -25,8 +25,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 USUAL_RATE = 30.0
-MOST_MEMORY = 2 << 30
-"""Bytes that a small file may take; a large one so many times its size more."""
+MOST_MEMORY = 3 << 29
+"""Bytes that this process may take with a small file, of which a library needs 1.1e9; a large one so many times its size more."""
 TIMES_MEMORY = 24
 
 Floats = NDArray[np.float64]
@@ -220,6 +220,8 @@ def usd_joints(stage: Any, most: int, tell: Tell, Usd: Any, UsdGeom: Any, UsdSke
     codes = np.minimum(times[0] + step * np.arange(frames_of((times[-1] - times[0]) / step, 1.0, len(paths), most)), times[-1])
     index = {path: i for i, path in enumerate(paths)}
     parents = [index.get(path.rpartition("/")[0], -1) for path in paths]
+    if len(in_order(parents)) < len(parents):
+        raise Refusal("a joint is above itself.")
     unit = UsdGeom.GetStageMetersPerUnit(stage)
     upright = np.eye(4) * [unit, unit, unit, 1.0]
     if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z:
@@ -268,6 +270,11 @@ def frames_of(duration_s: float, rate: float, n_joints: int, most: int) -> int:
     if not 0.0 <= duration_s * rate * n_joints <= most:
         raise Refusal(f"{duration_s:g} s of {n_joints} joints at {rate:g} frames a second are too much, or nothing.")
     return round(duration_s * rate) + 1
+
+
+def words_of(error: Exception) -> str:
+    """What to add about an exception; nothing where a library names its own sources."""
+    return "" if type(error).__module__.startswith("pxr") else f" ({type(error).__name__}: {text_of(error)[:200]})"
 
 
 def text_of(error: Exception) -> str:
@@ -365,7 +372,7 @@ def main() -> None:
         except Refusal as refusal:
             answer({"fault": str(refusal)})
         except Exception as error:  # whatever the libraries raise
-            answer({"fault": f"the file is damaged ({type(error).__name__}: {text_of(error)[:200]})."})
+            answer({"fault": f"the file is damaged{words_of(error)}."})
         else:
             answer(about, rest, frames)
         limit_time(0.0)

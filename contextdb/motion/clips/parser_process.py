@@ -36,6 +36,7 @@ BYTES_PER_S = 2e6
 WORK_S, BYTES_PER_WORK_S = 4.0, 5e4
 """So long it may work on a file, in seconds of CPU, and so many bytes more give it another one: a clip of a minute takes one."""
 MOST_LINE = 1 << 24
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "PXR_WORK_THREAD_LIMIT")
 NO_WHEEL = "and none for 3.14 on Windows with x86-64"
 Answer = tuple[dict[str, Any], bytes] | None
 
@@ -106,7 +107,8 @@ class ParserProcess:
             self.close()
             self.folder = TemporaryDirectory(prefix="contextdb-", ignore_cleanup_errors=True)
             command = [sys.executable, "-P", str(CHILD), self.kind, self.folder.name]
-            alone = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+            # Threads would take memory by the cores of the machine; a library that dies writes a report.
+            alone = {**os.environ, **dict.fromkeys(THREADS, "1"), "TMPDIR": self.folder.name}
             pipe, nowhere = subprocess.PIPE, subprocess.DEVNULL
             self.child = subprocess.Popen(command, env=alone, stdin=pipe, stdout=pipe, stderr=nowhere)
             self.answers = queue.SimpleQueue()

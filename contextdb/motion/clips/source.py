@@ -110,6 +110,9 @@ class ClipSource:
         if takes and take not in takes:
             problem = f"the file has {len(takes)} takes, and none is named {in_quotes(take)}."
             raise ClipError(Fault(problem, some(takes), mend_for(take, takes), Place(self.file)))
+        if take and not takes:
+            problem = f"the file has one clip, and no take {in_quotes(take)}."
+            raise ClipError(Fault(problem, "the file without a take", place=Place(self.file)))
         plain = CENTIMETRE if metres_per_unit == BY_SIZE else metres_per_unit
         with announced_while(self.file, self.opened_s), np.errstate(all="ignore"):  # readers refuse what is not finite
             clip = self.format.read(self, clip_name(self.path, take) if name is None else name, take, plain, up)
@@ -159,7 +162,7 @@ def _takes_of(path: Path, *_state: int) -> tuple[str, ...]:
 
 
 def load_clips(paths: Iterable[str | PathLike[str]], *, metres_per_unit: float = CENTIMETRE, up: Up = "y") -> list[Clip]:
-    """Read the clips of several files, of any format; of a file with several takes all, in order.
+    """Read the clips of several files, of any format; of a file with several takes all, in order, of `FILE:TAKE` that one.
 
     `metres_per_unit` and `up` are about files whose format does not say either. Raises one ClipError with the faults of all that
     are broken or cannot be read.
@@ -173,14 +176,22 @@ def clips_by_file(paths: Iterable[str | PathLike[str]], metres_per_unit: float, 
     faults: list[Fault] = []
     for path in require_many(paths, "paths", "a list of paths"):
         try:
-            source = ClipSource.of(path)
-            for take in source.takes or ("",):
-                clips.append((source.file, source.clip(take, metres_per_unit=metres_per_unit, up=up)))
+            file, wanted = _file_and_take(path)
+            source = ClipSource.of(file)
+            for take in (wanted,) if wanted else source.takes or ("",):
+                clip = source.clip(take, metres_per_unit=metres_per_unit, up=up)
+                clips.append((f"{source.file}{TAKE}{wanted}" if wanted else source.file, clip))
         except (ClipError, FileError) as error:
             faults.extend(error.faults)
     if faults:
         raise ClipError(*faults)
     return clips
+
+
+def _file_and_take(path: str | PathLike[str]) -> tuple[str | PathLike[str], str]:
+    """A path, and the take that is named after it; of a file whose own name looks so none."""
+    file, take = take_at(os.fspath(require_path(path)))
+    return (path, "") if not take or file is None or os.path.exists(path) else (file, take)
 
 
 PICKLES = (b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05")

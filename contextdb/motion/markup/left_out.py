@@ -24,6 +24,7 @@ class LeftOut(IntEnum):
     PHASE = 10
     FORBIDDEN = 11
     START = 12
+    ASSET = 13
 
     @property
     def text(self) -> str:
@@ -45,6 +46,7 @@ _TEXTS = {
     LeftOut.PHASE: "phase",
     LeftOut.FORBIDDEN: "forbidden by bias",
     LeftOut.START: "not the start_s of its row",
+    LeftOut.ASSET: "asset played lately",
 }
 
 

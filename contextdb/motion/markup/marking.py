@@ -131,7 +131,13 @@ def marks_of(
         for a, b, kind in cuts[name, length]:
             of_frame[start + a : start + b] = kind
     looping = np.array([about[name].looping for name in names], np.bool_)
-    return _marks(known.tags, of_frame, list(kinds), looping, _warps(about, names, last - first, per_second))
+    touches = np.zeros(total, np.uint8)
+    for name, start, length in zip(names, first.tolist(), (last - first).tolist(), strict=True):
+        for span in about[name].spans:
+            at = bisect_left(times, span.from_s - TOLERANCE_S, 0, length)
+            if span.tag in CONTACTS and 0 < at < length:
+                touches[start + at] |= 1 << CONTACTS.index(ReservedTag(span.tag))
+    return _marks(known.tags, of_frame, list(kinds), looping, _warps(about, names, last - first, per_second), touches)
 
 
 def _number(value: object, what: str, accepted: str, least: float, most: float) -> float:
@@ -241,7 +247,12 @@ def _warps(about: dict[str, _Asset], names: Sequence[str], lengths: Ints, rate: 
 
 
 def _marks(
-    tags: tuple[str, ...], of_frame: NDArray[np.int32], kinds: Sequence[_Effect], looping: NDArray[np.bool_], warps: Floats
+    tags: tuple[str, ...],
+    of_frame: NDArray[np.int32],
+    kinds: Sequence[_Effect],
+    looping: NDArray[np.bool_],
+    warps: Floats,
+    touches: NDArray[np.uint8],
 ) -> Marks:
     place = {tag: i for i, tag in enumerate(tags)}
     kind_tags = np.zeros((len(kinds), len(tags)), np.bool_)
@@ -256,4 +267,5 @@ def _marks(
         np.array([effect.root_weight for effect in kinds]),
         looping,
         warps,
+        touches,
     )

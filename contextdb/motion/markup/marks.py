@@ -74,6 +74,8 @@ class Marks:
         Whether the range continues at its start when it ends.
     warps : float64 array, shape (R, 2, 2)
         For position and rotation, from and to in seconds since the range's start: where a match node may warp. NaN: anywhere.
+    touches : uint8 array, shape (N,)
+        Where the markup has a foot come down: 1 the left, 2 the right, 3 both.
     """
 
     tags: tuple[str, ...]
@@ -84,6 +86,7 @@ class Marks:
     kind_root_weights: Floats
     looping: Flags
     warps: Floats
+    touches: NDArray[np.uint8]
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -103,6 +106,7 @@ class Marks:
             np.ones(1),
             np.zeros(n_ranges, np.bool_),
             np.full((n_ranges, 2, 2), np.nan),
+            np.zeros(n_frames, np.uint8),
         )
 
     @property
@@ -184,6 +188,13 @@ class Marks:
         if weight != 1.0:
             texts.append(f"{ReservedTag.ROOT_MOTION_WEIGHT} {weight:g}")
         return (*self.tags_of(frame), *texts)
+
+    def begin(self, tag: str) -> Flags:
+        """The frames, but for the first of a database, at which spans of a plain tag or of one below it begin: bool [N].
+
+        Raises QueryError for one that the markup does not know, with the nearest."""
+        has = _Tags(self.tags, self.kind_tags).has(tag)[self.kinds]
+        return np.asarray(np.diff(has, prepend=True) & has)
 
     def _kind_of(self, frame: int) -> int:
         return int(self.kinds[frame_of(frame, len(self.kinds), "frame")])

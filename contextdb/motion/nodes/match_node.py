@@ -16,7 +16,7 @@ match range says where an animation can be started and whose warp range says in 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TypedDict, Unpack
 
@@ -33,6 +33,7 @@ from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.clips.trajectory import to_own_frame
 from contextdb.motion.features.channels import require_weight
 from contextdb.motion.markup.spans import TOLERANCE_S
+from contextdb.motion.nodes.stitching import shortest_part
 from contextdb.motion.nodes.warping import Target, WarpedPath, WarpShare, Window, warped, wrapped
 from contextdb.motion.search.candidates import Candidates
 from contextdb.motion.search.database import MotionDatabase
@@ -257,6 +258,47 @@ class MatchNode:
         position, rotation = (Window(*each) for each in (self._windows(frames[:1])[0] / rate).tolist())
         path = warped((frames - hit.frame) / (self.rate * rate), _path(self._root, frames), position, rotation, target)
         return MatchPlay(hit, target, costs, path, Playhead(self.database, hit.range, self.rate), how=how, play_rate=rate)
+
+    def stitch(
+        self, query: ArrayLike, after: ArrayLike, most_cost: float, valid: Valid | None = None, **options: Unpack[MatchOptions]
+    ) -> MatchPlay | None:
+        """Choose the shortest part of an animation that leads from one pose to another, and play it as it is; None where none does.
+
+        Parameters
+        ----------
+        query, after : float array, shape (F,)
+            The pose that it begins with, such as `Character.features()`, and the one that follows it, such as `raw(frame)` of the
+            database of what plays next.
+        most_cost : float
+            What the first frame may cost for the one and the last for the other, together. Of parts that are equally short the one
+            that costs least plays.
+        valid, tags, penalties
+            As for `enter`, of the frame that it begins with.
+
+        Raises
+        ------
+        QueryError
+            As from `MotionDatabase.search`, or a cost that is none.
+        """
+        ranges = self._ranges(valid)
+        bias = self._start_bias(ranges) + np.zeros(self.database.n_frames)
+        chosen = self.database.filter(self._valid(valid, ranges), bias=bias, in_match_range=True, **options)
+        part = shortest_part(self.database, query, after, most_cost, chosen, self._last)
+        if part is None:
+            return None
+        first, last, total = part
+        at = self.database.range_of(first)
+        hit = Hit(self.database.assets[at], at, first, total)
+        how = None if ranges is None or ranges.plays is None else ranges.plays.of_range(at)
+        rate, frames = 1.0 if how is None else how.rate, np.arange(first, last + 1)
+        path, still = _path(self._root, frames), Window(0.0, 0.0)
+        (left, ahead), turn = to_own_frame(path[-1:, :2] - path[0, :2], path[0, 2])[0].tolist(), path[-1, 2] - path[0, 2]
+        target = Target(left, ahead, float(turn))
+        ends = self.database.channel_costs(hit, query), self.database.channel_costs(replace(hit, frame=last), after)
+        motion = {name: own + ends[1][name] for name, own in ends[0].items()}
+        costs = MatchCosts(motion, 0.0, 0.0, total - math.fsum(motion.values()))
+        there = warped((frames - first) / (self.rate * rate), path, still, still, target)
+        return MatchPlay(hit, target, costs, there, Playhead(self.database, at, self.rate), how=how, play_rate=rate)
 
     # ---- how the rows of an answer play
 

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from contextdb.cells.row_play import RowPlay
+from contextdb.cells.row_play import LEAST, MOST, RowPlay
 from contextdb.core import Controllers, fill_ranges
 from contextdb.errors import Fault, QueryError, plural
 from contextdb.motion import arguments
@@ -33,6 +33,7 @@ from contextdb.motion.selection.choice import Choice
 from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.controller_state import ControllerState, Played
 from contextdb.motion.selection.decision import Playing
+from contextdb.motion.selection.events import Event, checked, leads, seconds_to
 from contextdb.motion.selection.search_options import Among, OfPenalties, OfTags, OfValidForMany, SearchOptions
 from contextdb.motion.selection.selector import Selector, choice_of
 
@@ -59,6 +60,12 @@ class Shared(NamedTuple):
     flags: Flags | None
     frame_biases: Floats | None
     filters: dict[str, Filter]
+
+    def among_frames(self, frames: Flags, frames_at: Sequence[slice], names: Sequence[str]) -> Shared:
+        """The same of some frames alone, bool [N]."""
+        flags = frames if self.flags is None else self.flags & frames
+        own = {name: flags[at] for name, at in zip(names, frames_at, strict=True) if name in self.filters}
+        return self._replace(flags=flags, filters={name: each._replace(frames=own[name]) for name, each in self.filters.items()})
 
     @classmethod
     def of(cls, chooser: Chooser, inputs: SearchOptions) -> Shared:
@@ -129,6 +136,8 @@ class Given(NamedTuple):
     urgent: NDArray[np.uint8]
     wide: Floats | None = None
     plays: Plays | None = None
+    to_event: Floats | None = None
+    event_s: float = 1.0
 
 
 class Updates(NamedTuple):
@@ -153,6 +162,8 @@ class Updates(NamedTuple):
             given.urgent,
             *(given.plays or (None, None)),
             given.wide,
+            given.to_event,
+            given.event_s,
         )
         arrays = (self.before, self.moved, given.queries, given.dt_s, *what, self.after, self.decisions, self.found)
         if n < 2 * THREAD_QUERIES:
@@ -180,7 +191,7 @@ class Updates(NamedTuple):
     def _skips(self, i: int, d: int) -> Iterable[Skip]:
         database = self.chooser.databases[d]
         assert database is not None, "of a database that is not loaded nothing is left out"
-        most = (self.chooser.n_played + 4) * database.n_permutations + 2 * len(database.assets) + 1
+        most = (self.chooser.n_played + 4) * database.n_permutations + 3 * len(database.assets) + 1
         spans, whys = np.empty((most, 2), np.int64), np.empty(most, np.uint8)
         each = slice(i, i + 1)
         row = self.after[each].copy()
@@ -218,8 +229,7 @@ class Chooser:
         self.n_ranges, self.n_kinds, self.n_frames = starts[-1]
         self.rates = [settings.rate if d is None or d.schema is None else d.schema.rate for d in self.databases]
         a_second = max(self.rates) * settings.max_play_rate + MOST_JUMPS_PER_S
-        is_remembering = settings.history_s > 0.0
-        self.n_played = min(16 + math.ceil(min(settings.history_s, 1e3) * a_second), MOST_PLAYED) if is_remembering else 0
+        self.n_played = self._most_played(a_second)
         self.core = Controllers(
             tuple(self.part(*each) for each in zip(selector.entries, self.databases, self.rates, strict=True)),
             self.n_played,
@@ -230,6 +240,7 @@ class Chooser:
             settings.max_play_rate,
             settings.grace_s,
             settings.settle_s,
+            settings.asset_history_s,
             settings.until_natural,
         )
         self.width: int = self.core.width
@@ -237,6 +248,14 @@ class Chooser:
         self._tables: dict[object, tuple[object, tuple[Any, ...]]] = {}
         self._shared: dict[TagFilter | None, Shared] = {}
         self._answers: dict[object, tuple[object, Ranges]] = {}
+        self._to_event: dict[str, Floats] = {}
+
+    def _most_played(self, a_second: float) -> int:
+        """How much of what was played is remembered at most: all for a while, then each asset once."""
+        history_s, barred_s = (min(each, 1e3) for each in (self.settings.history_s, self.settings.asset_history_s))
+        n_assets = sum(len(set(database.assets)) for database in self.databases if database is not None) if barred_s else 0
+        n_played = 16 + math.ceil(history_s * a_second) + min(n_assets, math.ceil(barred_s * MOST_JUMPS_PER_S))
+        return min(n_played, MOST_PLAYED) if history_s or barred_s else 0
 
     def __reduce__(self) -> tuple[Callable[..., Chooser], tuple[Selector, ControllerSettings]]:
         return Chooser.of, (self.selector, self.settings)
@@ -255,12 +274,14 @@ class Chooser:
         """One database as the core takes it."""
         threshold = math.nan if entry.threshold is None else float(entry.threshold)
         if database is None:
-            return (None,) * 7 + (rate, threshold, math.inf, 0.0, 0.0, 1, 0, 0, 1.0)
+            return (None,) * 8 + (rate, threshold, math.inf, 0.0, 0.0, 1, 0, 0, 1.0)
         marks, root = database.marks, database.root
         pace = None if database.schema is None else database.schema.speed_features
         columns, pace_s = (slice(0, 0), 1.0) if pace is None else pace
         arrays = (marks.looping, root if root is None else np.asarray(root, np.float32), marks.kind_marks, marks.kind_root_weights)
-        bounds = (np.asarray(each, np.int64) for each in (database.starts, database.stops))
+        first: dict[str, int] = {}
+        same = [first.setdefault(asset, number) for number, asset in enumerate(database.assets)]
+        bounds = (np.asarray(each, np.int64) for each in (database.starts, database.stops, same))
         return (
             database.frames,
             *(each if each is None else np.ascontiguousarray(each) for each in (*bounds, *arrays)),
@@ -382,6 +403,28 @@ class Chooser:
     @cached_property
     def _all_among(self) -> Flags:
         return np.ones((1, len(self.names)), np.bool_)
+
+    def to_event(self, event: Event) -> Floats:
+        """The seconds from each frame to an event, see `seconds_to`: float64 [N]. Raises QueryError for what is none, and for a tag
+        that no markup has."""
+        name, _ = checked(event)
+        if name not in self._to_event:
+            each = zip(self.databases, self.rates, strict=True)
+            self._to_event[name] = np.concatenate([np.empty(0), *(seconds_to(d, name, rate) for d, rate in each if d is not None)])
+        return self._to_event[name]
+
+    def leading(self, event: Event, plays: Plays | None) -> Flags:
+        """Which frames lead to an event in time, by the play rates of their rows or the settings: bool [N]."""
+        rates = np.tile([[self.settings.min_play_rate], [self.settings.max_play_rate]], self.n_ranges)
+        if plays is not None:
+            own = np.where(plays.of[0] < 0, np.nan, plays.rows[plays.of[0], LEAST : MOST + 1].T)
+            rates = np.where(np.isnan(own), rates, own)
+        parts, seconds = [np.zeros(0, np.bool_)], self.to_event(event)
+        for database, rate, ranges, frames in zip(self.databases, self.rates, self.ranges_at, self.frames_at, strict=True):
+            if database is not None:
+                of_frames = np.append(rates[:, ranges], [[np.nan]] * 2, axis=1)[:, database.layout.frame_ranges]
+                parts.append(leads(seconds[frames], event[1], (of_frames[0], of_frames[1]), rate))
+        return np.concatenate(parts)
 
     def check_names(self, inputs: SearchOptions, valid: Any) -> None:
         """Refuse a database that the selector does not have."""

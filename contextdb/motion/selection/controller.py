@@ -53,6 +53,7 @@ from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.controller_state import ControllerState
 from contextdb.motion.selection.decided import Told, decision_of
 from contextdb.motion.selection.decision import Action, Decision, Playing, Recorder, Watcher, plays
+from contextdb.motion.selection.events import Event
 from contextdb.motion.selection.search_options import Among, OfPenalties, OfTags, OfValid, OfValidForMany, SearchOptions
 from contextdb.motion.selection.selector import Selector
 from contextdb.motion.selection.variation import Rng
@@ -74,6 +75,7 @@ class Asked:
     penalties: Sequence[OfPenalties | None]
     force: Sequence[bool]
     interrupt: Sequence[bool]
+    event: Sequence[Event | None]
 
     def options(self, i: int) -> SearchOptions:
         """Those of one, checked."""
@@ -246,6 +248,7 @@ class Controller:
         among: Among | None = None,
         force: bool = False,
         interrupt: bool = False,
+        event: Event | None = None,
         body: OfBody | None = None,
     ) -> Decision:
         """Move what plays on by some time, search if it is time to, and say what plays now.
@@ -266,6 +269,11 @@ class Controller:
             Search now, though no search is due. What plays may win, and guards hold.
         interrupt : bool
             Search now, and leave what plays if anything else may; no guard holds it.
+        event : (str, float), optional
+            A tag of the markup, `Contact.Left` and `Contact.Right` too, and in how many seconds it shall begin. Only frames are
+            chosen that lead there in that time, at a play rate within the limits of their row or the settings; what plays is left
+            at once when it does not; and the rate is that with which it happens on time, to half a frame. Give it in each update
+            until then.
         body : Steered or (x, z, heading), optional
             Where the game has the body, for the recorder alone: `motion.measure` compares it with where the poses are.
 
@@ -277,7 +285,7 @@ class Controller:
             `body` is none.
         """
         wanted = self._checked(query)
-        asked = Asked(valid, [tags], [bias], [among], [penalties], [force], [interrupt])
+        asked = Asked(valid, [tags], [bias], [among], [penalties], [force], [interrupt], [event])
         return update_all([self], seconds_of(dt_s), wanted[None], asked, [context], [place_of(body)])[0]
 
     def _checked(self, query: ArrayLike) -> Floats:
@@ -292,6 +300,8 @@ class Controller:
         chooser.check_names(options, None)
         chooser.shared(options.tags, options.bias)
         chooser.among(options.among)
+        if (event := asked.event[i]) is not None:
+            chooser.to_event(event)
 
     @property
     def _n_candidates(self) -> int:
@@ -346,12 +356,13 @@ def update_all(
 
 
 def _together(controllers: Sequence[Controller], asked: Asked) -> list[list[int]]:
-    """The numbers of those that share selector, settings, tags and biases of frames."""
+    """The numbers of those that share selector, settings, tags and biases of frames; who is asked for an event is alone."""
     if len(controllers) == 1:
         return [[0]]
     groups: dict[object, list[int]] = {}
-    for i, (one, tags, bias) in enumerate(zip(controllers, asked.tags, asked.bias, strict=True)):
-        key = id(one.chooser), tags if isinstance(tags, TagFilter) else id(tags), id(bias)
+    each = zip(controllers, asked.tags, asked.bias, asked.event, strict=True)
+    for i, (one, tags, bias, event) in enumerate(each):
+        key = id(one.chooser), tags if isinstance(tags, TagFilter) else id(tags), id(bias), -1 if event is None else i
         groups.setdefault(key, []).append(i)
     return list(groups.values())
 
@@ -375,8 +386,14 @@ def prepared(own: Sequence[Controller], dt_s: float, queries: Floats, asked: Ask
     if any(asked.force) or any(asked.interrupt):
         urgent[:] = [FORCE * bool(asked.force[i]) + INTERRUPT * bool(asked.interrupt[i]) for i in numbers]
     wide = _wide(chooser, moved, ranges, valid, penalties) if widens(valid) else None
-    wanted = np.ascontiguousarray(queries[:, : chooser.n_features])
-    given = Given(wanted, dt_s, ranges, biases, chooser.shared(first.tags, first.bias), flags, urgent, wide, plays)
+    wanted, shared, event = np.ascontiguousarray(queries[:, : chooser.n_features]), chooser.shared(first.tags, first.bias), None
+    if (asked_event := asked.event[numbers[0]]) is not None:
+        event = chooser.to_event(asked_event), asked_event[1]
+        leading = chooser.leading(asked_event, plays)
+        shared = shared.among_frames(leading, chooser.frames_at, chooser.names)
+        d, _, frame = moved[0, :3].astype(np.int64).tolist()
+        urgent[0] |= FORCE * (d >= 0 and not leading[chooser.frames_at[d].start + frame])
+    given = Given(wanted, dt_s, ranges, biases, shared, flags, urgent, wide, plays, *(event or ()))
     found = np.empty((n, len(chooser.names), 3))
     return Updates(chooser, rows, moved, given, np.empty_like(rows), np.empty((n, N_DECISION)), found)
 

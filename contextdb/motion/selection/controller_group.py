@@ -25,6 +25,7 @@ from contextdb.motion.selection.chooser import are_mappings
 from contextdb.motion.selection.controller import Asked, Controller, rows_of, seconds_of, update_all
 from contextdb.motion.selection.controller_state import ControllerState
 from contextdb.motion.selection.decision import Decision, Playing
+from contextdb.motion.selection.events import Event
 from contextdb.motion.selection.search_options import (
     Among,
     OfPenalties,
@@ -126,6 +127,7 @@ class ControllerGroup(ListSequence[Controller]):
         among: Among | Sequence[Among | None] | None = None,
         force: Flag = False,
         interrupt: Flag = False,
+        event: Event | Sequence[Event | None] | None = None,
         body: OfBodies | None = None,
     ) -> list[Decision]:
         """Update every character as `Controller.update` does; the decision of each, in order. Python's garbage collector rests
@@ -139,7 +141,7 @@ class ControllerGroup(ListSequence[Controller]):
         valid : optional
             As for `Selector.search_many`: one for all; one for each, such as what `query_many` answers; or a mapping of database
             name to either.
-        tags, bias, penalties, among, force, interrupt : optional
+        tags, bias, penalties, among, force, interrupt, event : optional
             As for `Controller.update`: one for all, or a list of one for each.
         contexts : sequence of Q mappings, optional
             The facts of the moment, for the recorders alone.
@@ -165,6 +167,7 @@ class ControllerGroup(ListSequence[Controller]):
             _each(penalties, n, "penalty"),
             _each_flag(force, n, "flag to force"),
             _each_flag(interrupt, n, "flag to interrupt"),
+            each_of(event, n, "event", is_one=event is None or isinstance(event, tuple)),
         )
         facts, places = _each(contexts, n, "context"), _each_place(body, n)
         if not self._have_width(wanted.shape[1]) or not arguments.are_finite(wanted):
@@ -173,7 +176,7 @@ class ControllerGroup(ListSequence[Controller]):
                     controller._checked(wanted[i])
         with _of_character(0):
             seconds = seconds_of(dt_s)
-        if any(each is not None for each in (tags, bias, among, penalties)):
+        if any(each is not None for each in (tags, bias, among, penalties, event)):
             for i, controller in enumerate(self):
                 with _of_character(i):
                     controller.check(asked, i)

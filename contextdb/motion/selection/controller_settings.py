@@ -69,6 +69,11 @@ class ControllerSettings(Declared, error=MotionError):
         unit="a cost", such_as=USUAL_SETTLING, without=f"{USUAL_SETTLING}; 0 where a database is made from features",
     )  # fmt: skip
     settle_s: float = number("The time in which that fades to nothing.", 1.5, 1e-3, unit="seconds")
+    asset_history_s: float = _seconds(
+        "An asset that was played so shortly ago is not entered again, mirrored or not. "
+        "Where nothing else may play, the last frame is held.",
+        0.0, "0 is no such bar",
+    )  # fmt: skip
     until_natural: bool = flag("Whether an asset that does not loop plays on to its end when it is no longer valid.", False)
 
     def bar_of(self, database: MotionDatabase) -> float:

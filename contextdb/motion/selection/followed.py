@@ -30,7 +30,7 @@ def follow(controller: Controller, dt_s: float, query: Floats, packet: bytes, bo
     if not isinstance(packet, bytes) or not chooser.core.read_packet(packet, chooser.move(controller.row, dt_s)[0], followed):
         raise ContextError(NO_PACKET)
     enters, (d, at, frame) = bool(followed[ENTERS]), (int(number) for number in followed[:3].tolist())
-    asked = Asked(None, [None], [None], [None], [None], [enters], [False])
+    asked = Asked(None, [None], [None], [None], [None], [enters], [False], [None])
     updates = prepared([controller], dt_s, query[None], asked, [0])
     updates.found[:] = NOT_SEARCHED
     row = updates.decisions[0]

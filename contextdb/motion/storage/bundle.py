@@ -164,7 +164,7 @@ def _add_database(bundle: Bundle, number: int, player: Played, name: str, bank: 
     at = chooser.names.index(name)
     database = chooser.databases[at]
     assert database is not None, "it was checked"
-    _, starts, stops, looping, root, marks, weights, rate, _, _, *rest = chooser.part(
+    _, starts, stops, same, looping, root, marks, weights, rate, _, _, *rest = chooser.part(
         chooser.selector.entries[at], database, chooser.rates[at]
     )
     *arrays, kinds, n_frames, n_kinds, offset, scale, channels, channel_weights, roots = database.frame_parts
@@ -175,7 +175,7 @@ def _add_database(bundle: Bundle, number: int, player: Played, name: str, bank: 
         row_starts, row_numbers, mirrored, _ = chooser.rows_of(name, table.assets)
         rows = mirrored, row_starts, row_numbers
     measures = kinds, offset, scale, channels, channel_weights, roots
-    played = starts, stops, looping, root, marks, weights, own
+    played = starts, stops, same, looping, root, marks, weights, own
     bundle.add(
         DATABASE, number, [*arrays, *measures, *played, ranges, _texts(database.assets), *rows, _texts([name]), *_levels(database)]
     )
@@ -194,7 +194,7 @@ def _controller(name: str, player: Played, entries: list[tuple[int, int, int]], 
         [
             chooser.n_played, settings.search_every_s, settings.jump_threshold_s, settings.history_s, settings.min_play_rate,
             settings.max_play_rate, settings.grace_s, settings.until_natural, player.banks is not None, body.velocity_halflife_s,
-            player.schema.rate, settings.settle_s,
+            player.schema.rate, settings.settle_s, settings.asset_history_s,
         ],
         np.float64,
     )  # fmt: skip

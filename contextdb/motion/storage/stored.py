@@ -51,7 +51,7 @@ from contextdb.motion.search.layout import Layout
 
 STORED = FileKind(
     "contextdb.motion",
-    3,
+    4,
     "a motion database of contextdb",
     "a motion database that this version of contextdb built",
     "to build it again with `contextdb motion build`",

@@ -53,6 +53,20 @@ def summary_line(decisions: Iterable[Decision]) -> str:
     return f"{last_s:.2f} s: {', '.join(parts)}"
 
 
+def look_first(decisions: Iterable[Decision]) -> str:
+    """Where to look first, in a sentence: at the forced jump that fits worst; "" where none is."""
+    forced = [(decision.cost, decision) for decision in decisions if decision.is_forced and decision.cost is not None]
+    if not forced:
+        return ""
+    cost, worst = max(forced, key=lambda pair: pair[0])
+    return f"Look first at {worst.time_s:.2f} s: {nothing_fits('' if worst.playing is None else worst.playing.asset, cost)}."
+
+
+def nothing_fits(asset: str | None, cost: float) -> str:
+    """What is wrong with a forced jump."""
+    return f"what plays ends there and nothing fits well: {asset} costs {cost:.3g}"
+
+
 def session_lines(decisions: Iterable[Decision], *, name: str = "", width: int = WIDTH) -> Iterator[str]:
     """One row for each decision that changed something, with how long it then went on; only where an asset whose name contains
     `name` plays or is left. `width` is in cells; the names of assets are shortened to fit."""

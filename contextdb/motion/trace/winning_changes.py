@@ -305,7 +305,12 @@ def _rounded(number: float, *, downwards: bool) -> float:
 
 
 OF_MARKUP = {LeftOut.EXCLUDED, LeftOut.DO_NOT_CHOOSE, LeftOut.NEXT_NATURAL, LeftOut.CLIP_END, LeftOut.MATCH_RANGE}
-OF_TIME = {LeftOut.JUMP: "jump_threshold_s", LeftOut.HISTORY: "history_s", LeftOut.PHASE: "phase"}
+OF_TIME = {
+    LeftOut.JUMP: "jump_threshold_s",
+    LeftOut.HISTORY: "history_s",
+    LeftOut.PHASE: "phase",
+    LeftOut.ASSET: "asset_history_s",
+}
 
 
 @dataclass(frozen=True, eq=False)

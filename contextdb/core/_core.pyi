@@ -195,10 +195,9 @@ class Ways:
         bodies: NDArray[np.float64] | None,
         dt_s: float,
         after: NDArray[np.float64],
-        places: NDArray[np.float64],
         /,
     ) -> None:
-        """Write walks as they are some time later, and where their animations are; a body that is NaN follows its goal."""
+        """Write walks as they are some time later; a body that is NaN follows its goal."""
     def n_frames(self, walks: NDArray[np.float64], goals: NDArray[np.float64], /) -> int:
         """How many frames the longest of their paths has."""
     def n_behind(self, rate: float, /) -> int:

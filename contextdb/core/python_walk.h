@@ -58,7 +58,7 @@ static double *cdbp_walks(const cdbm_ways *ways, cdbp_arrays *a, PyObject *array
     return rows;
 }
 
-/* ways.move(before, goals, bodies or None, seconds, after, places): each some time later; a body that is NaN follows its goal. */
+/* ways.move(before, goals, bodies or None, seconds, after): each some time later; a body that is NaN follows its goal. */
 static PyObject *cdbp_ways_move(PyObject *self, PyObject *const *in, Py_ssize_t n)
 {
     const cdbm_ways *ways = cdbp_made_ways(self);
@@ -66,22 +66,21 @@ static PyObject *cdbp_ways_move(PyObject *self, PyObject *const *in, Py_ssize_t 
     const double *before = NULL;
     const cdbo_goal *goals;
     const cdbo_body *bodies = NULL;
-    double *after, *places, dt_s = ways && n == 6 ? PyFloat_AsDouble(in[3]) : 0.0;
+    double *after, dt_s = ways && n == 5 ? PyFloat_AsDouble(in[3]) : 0.0;
     size_t s[3], n_rows = CDBP_ANY, width = ways ? cdbm_walk_width(ways) : 0, i;
     int is_done = 0;
     a.n = 0;
-    if (ways && n == 6 && !PyErr_Occurred() && (before = cdbp_walks(ways, &a, in[0], 0, &n_rows))
+    if (ways && n == 5 && !PyErr_Occurred() && (before = cdbp_walks(ways, &a, in[0], 0, &n_rows))
         && (goals = (const cdbo_goal *)cdbp_numbers(&a, in[1], s, 2, n_rows, 3, 0))
         && (in[2] == Py_None || (bodies = (const cdbo_body *)cdbp_numbers(&a, in[2], s, 2, n_rows, 10, 0)))
-        && (after = cdbp_walks(ways, &a, in[4], 1, &n_rows)) && (places = cdbp_to_numbers(&a, in[5], s, 2, n_rows, 3, 0))) {
+        && (after = cdbp_walks(ways, &a, in[4], 1, &n_rows))) {
         for (i = 0; i < n_rows; i++) {
             const cdbo_body *moved = bodies && bodies[i].heading == bodies[i].heading ? &bodies[i] : NULL;
             cdbm_walk_on(ways, before + i * width, &goals[i], moved, dt_s, after + i * width);
-            cdbm_place_of(after + i * width, places + 3 * i);
         }
         is_done = 1;
     }
-    return cdbp_given_back(&a, is_done, "move takes walks, goals, bodies, seconds and two arrays");
+    return cdbp_given_back(&a, is_done, "move takes walks, goals, bodies, seconds and an array");
 }
 
 /* ways.n_frames(walks, goals): how many frames the longest of their paths has. */

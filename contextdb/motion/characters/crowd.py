@@ -115,8 +115,7 @@ class Crowd(ListSequence[Character]):
         if any(character.schema is not schema and character.schema != schema for character in self):
             raise MotionError(Fault("the characters have different features.", "characters of one feature schema"))
         goals, given = _goals(sticks, facing, len(self)), _facts_of_each(facts, len(self))
-        rows = np.concatenate([character._row for character in self])
-        rows, _ = walks.moved(schema.ways, rows, goals, dt, [None] * len(self))
+        rows = walks.moved(schema.ways, np.concatenate([character._row for character in self]), goals, dt)
         steps, each = [], zip(self, given, walks.bodies_of(rows), goals.tolist(), strict=True)
         for i, (character, own, body, (x, z, heading)) in enumerate(each):
             wanted = None if math.isnan(heading) else heading

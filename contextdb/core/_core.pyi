@@ -121,11 +121,6 @@ class Boxes:
 def direction_of(x: float, z: float, heading: float, /) -> float:
     """Where a stick points against the way a body faces, degrees."""
 
-def return_path(
-    place: NDArray[np.float64], rate: float, halflife_s: float, positions: NDArray[np.float64], headings: NDArray[np.float64], /
-) -> bool:
-    """Let a path, which is written, begin at a place and come back to itself; gives whether that changes it."""
-
 def count_holders(
     codes: NDArray[np.int32],
     starts: NDArray[np.int64],

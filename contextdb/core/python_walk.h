@@ -199,25 +199,6 @@ static PyObject *cdbp_direction_of(PyObject *module, PyObject *const *in, Py_ssi
     return PyFloat_FromDouble(cdbm_direction(numbers, numbers[2]));
 }
 
-/* return_path(place, rate, halflife_s, positions, headings): let a path begin at a place; whether that changes it. */
-static PyObject *cdbp_return_path(PyObject *module, PyObject *const *in, Py_ssize_t n)
-{
-    cdbp_arrays a;
-    const double *place;
-    double *positions, *headings, rate, halflife_s;
-    size_t s[3], n_frames = 0;
-    int is_changed = -1;
-    (void)module;
-    a.n = 0;
-    if (n == 5 && cdbp_float_of(in[1], &rate) && cdbp_float_of(in[2], &halflife_s) && (place = cdbp_numbers(&a, in[0], s, 1, 3, 0, 0))
-        && (headings = cdbp_to_numbers(&a, in[4], s, 1, CDBP_ANY, 0, 0)) && (n_frames = s[0]) > 0
-        && (positions = cdbp_to_numbers(&a, in[3], s, 2, n_frames, 2, 0)))
-        is_changed = cdbm_return(place, rate, halflife_s, n_frames, positions, headings);
-    if (is_changed < 0) return cdbp_given_back(&a, 0, "return_path takes a place, two numbers and the frames of a path");
-    cdbp_release(&a);
-    return cdbp_new_ref(is_changed ? Py_True : Py_False);
-}
-
 static PyMethodDef cdbp_ways_methods[] = {
     {"move", CDBP_CALL(cdbp_ways_move), METH_FASTCALL, "Write walks as they are some time later."},
     {"n_frames", CDBP_CALL(cdbp_ways_n_frames), METH_FASTCALL, "How many frames the longest path has."},
@@ -241,5 +222,4 @@ static PyType_Slot cdbp_ways_slots[] = {
 static PyType_Spec cdbp_ways_spec = {"contextdb.core._core.Ways", (int)sizeof(cdbp_ways), 0, Py_TPFLAGS_DEFAULT, cdbp_ways_slots};
 
 #define CDBP_WALK_FUNCTIONS \
-    {"direction_of", CDBP_CALL(cdbp_direction_of), METH_FASTCALL, "Where a stick points against the way a body faces."}, \
-    {"return_path", CDBP_CALL(cdbp_return_path), METH_FASTCALL, "Let a path begin at a place, and come back to itself."},
+    {"direction_of", CDBP_CALL(cdbp_direction_of), METH_FASTCALL, "Where a stick points against the way a body faces."},

@@ -13,7 +13,7 @@ from strategies import some
 
 from contextdb import motion
 from contextdb.errors import ContextDBError
-from contextdb.motion.characters.paths import path_ahead, path_from
+from contextdb.motion.characters.paths import path_ahead
 from contextdb.motion.clips.clip import parse_bvh
 from contextdb.motion.clips.doubts import doubts_of
 from contextdb.motion.clips.feet import footfalls
@@ -231,7 +231,6 @@ CALLS = [
     lambda: partial(path_ahead, BUILT, DECISION.playing, (0, 0, 0)),
     lambda: partial(PLAYER.restore),
     lambda: partial(motion.Readout().update, PLAYER.copy().update(0.1), 0),
-    lambda: partial(path_from, (0.0, 0.0, 0.0), PATH),
     lambda: partial(motion.Crowd),
     lambda: partial(motion.Crowd().add),
     lambda: partial(motion.Crowd().remove),

@@ -297,7 +297,7 @@ _ALL = (
     Kind(
         "enum",
         Family.VALUES,
-        cells='one or more declared values with spaces between, "not" before them for all others, "Any"',
+        cells='one or more declared values with spaces between, for all others not before them, "Any"',
         facts="one of its declared values",
         words="one of the names below",
         noun="an enum",

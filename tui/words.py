@@ -73,7 +73,7 @@ WORDS: Mapping[str, str] = {
     "import": "csv, excel, xlsx, open file, load, workbook, json, parquet, get data, text to columns",
     "export": "csv, excel, xlsx, send, print, share, pdf, download, workbook, save as excel",
     "history": "versions, undo list, steps, changes, track changes",
-    "git-history": "who changed this, when, blame, log, commits, previous version, versions, track changes, compare with yesterday, show changes",
+    "git-history": "who changed this, blame, log, commits, previous version, track changes, compare with yesterday, show changes",
     "autofill": "fill from clips, animation data, guess, suggestions",
     "add-column": "new column, insert column, condition, parameter, new condition",
     "rename-role": "change role",

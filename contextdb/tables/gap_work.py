@@ -19,7 +19,7 @@ from pathlib import Path
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.grammar import parse_cell
-from contextdb.cells.sets import meet
+from contextdb.cells.sets import Cell, meet
 from contextdb.disk import GAPS_SUFFIX, read_bytes, write_atomic
 from contextdb.errors import CellError, Fault, FileError, Place, in_quotes
 
@@ -91,6 +91,11 @@ class GapWork:
         """The work on each of some gaps, and the lines that no gap is left of."""
         sources = self.sources(gaps, conditions)
         return [None if key is None else self.lines[key] for key in sources], sorted(self.lines.keys() - sources)
+
+    def closed(self, gaps: Iterable[Mapping[str, str]], conditions: Sequence[Condition]) -> list[Key]:
+        """The lines of which no context is in a gap any more, where these are all the gaps."""
+        space, keys = _Space(conditions), [key_of(cells) for cells in gaps]
+        return [line for line in self.lines if all(space.are_apart(line, key) for key in keys)]
 
     @cached_property
     def _by_size(self) -> list[Key]:
@@ -184,13 +189,23 @@ class _Space:
         cells = dict(gap)
         return bool(line) and all(name in cells and self._accepts_less(name, cells[name], cell) for name, cell in line)
 
+    def are_apart(self, line: Key, gap: Key) -> bool:
+        """Whether no context is in both, as the cells of one condition say."""
+        cells = dict(gap)
+        both = (self._parsed(name, [cell, cells[name]]) for name, cell in line if name in cells)
+        return any(parsed is not None and meet(parsed).is_empty for parsed in both)
+
     def _accepts_less(self, name: str, less: str, more: str) -> bool:
         if less == more:
             return True
+        parsed = self._parsed(name, [less, more])
+        return parsed is not None and meet(parsed).accepts == parsed[0].accepts
+
+    def _parsed(self, name: str, cells: Sequence[str]) -> list[Cell] | None:
+        """The cells of a condition; None where it is gone, or one cannot be read."""
         if name not in self._conditions:
-            return False
+            return None
         try:
-            one, other = (parse_cell(text, self._conditions[name].domain, wants_mend=False) for text in (less, more))
+            return [parse_cell(text, self._conditions[name].domain, wants_mend=False) for text in cells]
         except CellError:
-            return False
-        return meet([one, other]).accepts == one.accepts
+            return None

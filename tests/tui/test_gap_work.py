@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 from running import run
 from terminal import press, screen_text, settled, with_editor
 
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import Domain
 from contextdb.edits.renaming import renaming
 from contextdb.edits.renaming_values import value_renaming
 from contextdb.errors import FileError
@@ -127,3 +129,43 @@ def test_the_editor_gives_states_and_owners_in_the_tab_and_writes_what_others_wr
     assert "animating Ana" in screen
     works = sorted(work.text for work in GapWork.beside(path).lines.values())
     assert works == ["animating Ana"]  # the second gap was part of Bo's, was taken on as animating, and then off the list
+
+
+def test_a_gap_that_a_saved_change_has_closed_leaves_the_list_and_one_that_is_closed_in_part_stays(path: Path):
+    for cells, owner in (({"gait": "Walk", "speed": "(4..10]"}, "Ana"), ({"gait": "Run", "speed": "[0..2)"}, "Bo")):
+        write_work(path, cells, Work("animating", owner))
+
+    async def script(app, pilot):
+        async def measured() -> str:
+            await press(pilot, "alt+4")
+            app.main.coverage.join(20)
+            await settled(pilot)
+            await settled(pilot)
+            return screen_text(app)
+
+        await press(pilot, "right", "right", *"Any", "enter")  # walk plays at any speed
+        unsaved = await measured(), len(GapWork.beside(path).lines)
+        await press(pilot, "ctrl+s")
+        await settled(pilot)
+        await press(pilot, "alt+1", *"1..10", "enter")  # and run from 1 on
+        await measured()
+        await press(pilot, "ctrl+s")
+        await settled(pilot)
+        return unsaved, screen_text(app)
+
+    (before, n_before), after = with_editor(path, script, (120, 30))
+    assert n_before == 2
+    assert "Closed, and off the list of work" not in before
+    assert [work.text for work in GapWork.beside(path).lines.values()] == ["animating Bo"]
+    assert "animating Bo" in after
+
+
+@given(st.lists(st.tuples(st.integers(0, 5), st.integers(0, 5)), max_size=3), st.tuples(st.integers(0, 5), st.integers(0, 5)))
+def test_a_line_is_closed_where_no_context_of_it_is_in_a_gap(gaps: list[tuple[int, int]], line: tuple[int, int]):
+    def cells(span: tuple[int, int]) -> dict[str, str]:
+        return {"speed": f"{min(span)}..{max(span)}"}
+
+    conditions = [Condition("speed", Domain("number", 0, 10))]
+    work = GapWork({key_of(cells(line)): Work("open")})
+    is_met = any(min(gap) <= max(line) and min(line) <= max(gap) for gap in gaps)
+    assert bool(work.closed(map(cells, gaps), conditions)) == (not is_met)

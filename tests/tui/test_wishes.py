@@ -50,7 +50,10 @@ WISHES = {
     "a drop-down of values": ("Right", "Right", "?drop-down > Choose", "1 of 2 declared values"),
     "allowed values of a column": ("?allowed values > Sheet of columns", "Walk Run"),
     "type of a column": ("?data type > Sheet of columns", "condition │ number"),
-    "unit of a column": ("?unit > Sheet of columns", "Down", "Right", "Right", "Right", "=km", "Enter", "C-s", "Change the column speed.", "│ km "),
+    "unit of a column": (
+        *("?unit > Sheet of columns", "Down", "Right", "Right", "Right", "=km", "Enter", "C-s"),
+        *("Change the column speed.", "│ km "),
+    ),
     "a comment": ("?comment > Note", "=as in the film", "Enter", "note: as in the film"),
     "mark a row with a colour": ("?highlight > Colour rows", "=green", "Enter", "green"),
     "fill down": ("Right", "S-Down", "C-d", "Fill down 2 × 1."),

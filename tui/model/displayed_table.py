@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import Domain
 from contextdb.cells.outputs import Output
 from contextdb.columns import TextColumn
 from contextdb.edits import edits
@@ -86,6 +87,7 @@ class DisplayedTable:
         self._places: dict[str, tuple[TextColumn, int]] = {}
         """For columns of numbers how far they are indented, for the assets how long their shared end is, and of which texts."""
         self._conditions: tuple[Table | None, list[ConditionColumn | None]] = (None, [])
+        self._domains: tuple[Table | None, Sequence[Domain]] = (None, ())
         """The table, and by column the condition that it is."""
         self._findings: NDArray[np.bool_] | None = None
         self._inner_faults: tuple[object, dict[str, Fault | None]] = (None, {})
@@ -220,6 +222,14 @@ class DisplayedTable:
         return self._conditions[1][column]
 
     @property
+    def domains(self) -> Sequence[Domain]:
+        """Those of the conditions: the same object as long as they are as they were."""
+        if self._domains[0] is not self.table:
+            now = tuple(column.condition.domain for column in self.table.conditions)
+            self._domains = self.table, self._domains[1] if now == self._domains[1] else now
+        return self._domains[1]
+
+    @property
     def n_unread(self) -> int:
         """How many texts of the cursor's column cannot be read."""
         condition = self.condition(self.selection.column)
@@ -319,11 +329,6 @@ class DisplayedTable:
             return self._doubts.of_cell(condition, file_row)
         texts = self.table.columns[column]
         return self._doubts.of_name(texts, file_row) if texts.name == self.table.asset_column else ""
-
-    def doubtful(self, row: int, columns: Sequence[int]) -> tuple[int, ...]:
-        """Which cells of a row that is displayed are odd."""
-        file_row = int(self.view.rows[row])
-        return tuple(column for column in columns if self.doubt(file_row, column))
 
     def clip_mark(self, row: int, column: int) -> str:
         """What stands before the text of a cell: that it is odd, or what its clip says; a space where there is nothing to say."""

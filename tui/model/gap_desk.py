@@ -11,6 +11,8 @@ from contextdb.errors import ContextDBError
 from contextdb.tables.gap_work import MOST_OWNER, STATES, GapWork, Work, write_work
 from contextdb.tables.table import Table
 
+from .coverage_lines import cells_text
+
 STEPS: tuple[str, ...] = ("", *STATES)
 """The states in turn; none takes the gap off the list."""
 
@@ -49,6 +51,16 @@ class GapDesk:
         """Give one of some gaps to somebody, or to nobody; gives what was done. Raises FileError."""
         work, self.last_owner = self.of(table, gaps)[at], owner.strip() or self.last_owner
         return self._write(table, gaps, at, Work(work.state if work else STATES[0], owner.strip()))
+
+    def close(self, table: Table, gaps: Sequence[Mapping[str, str]]) -> str:
+        """Take the closed ones off the list, where these are all the gaps; gives what was done. Raises FileError."""
+        closed = self._work.closed(gaps, [column.condition for column in table.conditions]) if self._work.lines else []
+        if table.path is None or not closed:
+            return ""
+        for key in closed:
+            self._work = write_work(table.path, dict(key), None)
+        first = cells_text(dict(closed[0]))
+        return f"Closed, and off the list of work: {first}{f', and {len(closed) - 1} more' if closed[1:] else ''}."
 
     def _write(self, table: Table, gaps: Sequence[Mapping[str, str]], at: int, work: Work | None) -> str:
         if table.path is None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from typing import ClassVar
 
@@ -16,9 +15,8 @@ from textual.message import Message
 from textual.widget import Widget
 from textual.widgets import ContentSwitcher, Static
 
-from contextdb.covering import CoverageReport, Gap, Nearest, format_percent
+from contextdb.covering import Gap, Nearest
 from contextdb.errors import ContextDBError, in_quotes
-from contextdb.tables.gap_work import Work
 from contextdb.tables.table import Table
 from contextdb.telemetry.observed import SeenGap
 
@@ -33,27 +31,12 @@ from ..model.rows_near import is_near_at_once, rows_near
 from ..model.sheet import Sheet
 from ..screens.ask import AskDialog
 from ..widgets.choice_line import ChoiceLine
-from ..widgets.fitted import bar
-from ..widgets.line_list import LineList, ListCell, ListColumn
+from ..widgets.line_list import LineList
+from . import coverage_places as places
+from .coverage_places import OF_GAPS, OF_PLAY, SECTIONS, Place
 from .pair_map import PairMap
 from .pane import Pane
 from .rows_below import IN_TABLE, MOST, RowsBelow
-
-SECTIONS = ("gaps", "pairs", "crowded", "rows", "about", "played", "unused")
-NAMES = ("Gaps", "Pairs", "Crowded", "Rows", "About", "Played", "Unused")
-OF_PLAY = ("played", "unused")
-NO_PLAY = "O reads recorded moments from files, L those of the game that is followed."
-NEAREST = "The nearest rows: a change of the marked cells would close it"
-EMPTY = {
-    "gaps": "No gap is known.",
-    "crowded": "Nowhere are two rows valid at once, as far as is known.",
-    "rows": "No row is redundant.",
-}
-EMPTY_OF_PLAY = {"played": "Every recorded moment has a valid row.", "unused": "Every row was valid in some recorded moment."}
-"""What a list without lines says once the table is measured."""
-
-
-TONES = {"open": "warning", "animating": "info", "done": "muted"}
 
 
 class GapList(LineList):
@@ -72,7 +55,7 @@ class CoveragePane(Pane):
     """What a table leaves open."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
-        *(Binding(str(at + 1), f"section({at})", name, show=False) for at, name in enumerate(NAMES)),
+        *(Binding(str(at + 1), f"section({at})", name, show=False) for at, name in enumerate(places.NAMES)),
         Binding("left_square_bracket", "turn(-1)", "Section before", show=False),
         Binding("right_square_bracket", "turn(1)", "Next section", show=False),
         Binding("t", "try_context", "To the test row"),
@@ -129,22 +112,14 @@ class CoveragePane(Pane):
         yield Vertical(id="side")
         yield Static(id="coverage-state", markup=False)
         yield Static(id="coverage-bar", markup=False)
-        yield ChoiceLine(self._labels(), id="coverage-sections")
+        yield ChoiceLine(places.labels(None, None), id="coverage-sections")
         with ContentSwitcher(initial="gaps"):
-            yield GapList(_gap_columns("gaps"), empty=EMPTY["gaps"], id="gaps")
+            yield GapList(places.gap_columns("gaps"), empty=places.EMPTY["gaps"], id="gaps")
             yield PairMap(id="pairs")
-            yield RowList(
-                [ListColumn("Rows", 5, 0, True), ListColumn("Share", 8, 0, True), ListColumn("Contexts", 30, 1)],
-                empty=EMPTY["crowded"],
-                id="crowded",
-            )
-            yield RowList(
-                [ListColumn("Row", 6, 0, True), ListColumn("Asset", 16, 2, is_name=True), ListColumn("Details", 22, 2)],
-                empty=EMPTY["rows"],
-                id="rows",
-            )
-            yield GapList(_gap_columns("played"), empty=NO_PLAY, id="played")
-            yield RowList([ListColumn("Row", 6, 0, True), ListColumn("Asset", 16, 2, is_name=True)], empty=NO_PLAY, id="unused")
+            yield RowList(places.COLUMNS["crowded"], empty=places.EMPTY["crowded"], id="crowded")
+            yield RowList(places.COLUMNS["rows"], empty=places.EMPTY["rows"], id="rows")
+            yield GapList(places.gap_columns("played"), empty=places.NO_PLAY, id="played")
+            yield RowList(places.COLUMNS["unused"], empty=places.NO_PLAY, id="unused")
             with VerticalScroll(id="about"):
                 yield Static(id="about-text", markup=False)
         with VerticalScroll(id="coverage-detail"):
@@ -182,37 +157,27 @@ class CoveragePane(Pane):
     @on(Changed)
     def _show_state(self) -> None:
         run = self.run
-        of_play = self._play_text() if SECTIONS[self.section] in OF_PLAY else ""
+        of_play = places.play_text(self.played, self.sheet.table) if SECTIONS[self.section] in OF_PLAY else ""
         self.query_one("#coverage-state", Static).update(of_play or lines.state_text(run, self.sheet.table))
         self._show_play()
         self._show_bar()
         if run.result is not self._displayed:
             self._displayed = run.result
+            self._close_gaps()
             if run.result is not None:
                 self._fill(run.result)
         unknown = lines.unknown_text(run)
-        for name, text in EMPTY.items():
+        for name, text in places.EMPTY.items():
             self.query_one(f"#{name}", LineList).say_empty(unknown or text)
         self.set_class(run.state == "stale", "-stale")
         self._show_section()
-
-    def _play_text(self) -> str:
-        played, result = self.played, self.played.result
-        if played.reading:
-            return f"Reading {played.reading} …"
-        if played.problem:
-            return f"✗ {played.problem}"
-        if result is None:
-            return "Which moments of real play have no valid row?"
-        is_stale = result.table is not self.sheet.table
-        return f"The table has changed since. O or L reads again. Before: {result.headline}" if is_stale else result.headline
 
     def _show_play(self) -> None:
         result = self.played.result
         if result is None or result is self._shown_play:
             return
         self._shown_play = result
-        for name, text in EMPTY_OF_PLAY.items():
+        for name, text in places.EMPTY_OF_PLAY.items():
             self.query_one(f"#{name}", LineList).say_empty(text)
         self._list_gaps("played", 0)
         assets = result.table.assets
@@ -221,22 +186,15 @@ class CoveragePane(Pane):
         )
 
     def _show_bar(self) -> None:
-        result, width = self.run.result, max(10, min(40, self.size.width - 50))
-        if self.run.state == "running":
-            share = self.run.progress[1]
-            text = f"{bar(share, share, width)}  Esc stops"
-        elif result is None:
-            text = ""
-        else:
-            text = f"{bar(result.report.lower, result.report.upper, width)}  {lines.summary_text(result.report)}"
-        self.query_one("#coverage-bar", Static).update(text)
+        shown = self.query_one("#coverage-bar", Static)
+        shown.update(places.bar_text(self.run, max(10, min(40, shown.size.width - 46))))
 
     def _fill(self, result: Result) -> None:
         report = result.report
         self._list_gaps("gaps", 0)
         self.query_one(PairMap).show_pairs(result.pairs, result.left_out)
-        self.query_one("#crowded", LineList).show(len(report.crowded), lambda at: _crowd_line(report, at))
-        self.query_one("#rows", LineList).show(len(report.findings), lambda at: _finding_line(report, at))
+        self.query_one("#crowded", LineList).show(len(report.crowded), lambda at: places.crowd_line(report, at))
+        self.query_one("#rows", LineList).show(len(report.findings), lambda at: places.finding_line(report, at))
         self.query_one("#about-text", Static).update(lines.about_text(result))
 
     # ---- the list of work
@@ -251,34 +209,50 @@ class CoveragePane(Pane):
         gaps = self._gaps_of(section)
         works = self.desk.of(self.sheet.table, [gap.cells for gap in gaps])
         listed, has_work = self.query_one(f"#{section}", LineList), any(works)
-        listed.columns = _gap_columns(section, has_work)
-        listed.show(len(gaps), lambda at: _gap_line(gaps[at], works[at], has_work), at)
+        listed.columns = places.gap_columns(section, works)
+        listed.show(len(gaps), lambda at: places.gap_line(gaps[at], works[at], has_work), at)
 
     def _read_work(self) -> None:
         before = self.desk.problem
         self.desk.read(self.sheet.table)
         if self.desk.problem and self.desk.problem != before:
             self.post_message(Notice(self.desk.problem, "warning"))
-        for section in ("gaps", "played"):
+        self._close_gaps()
+        for section in OF_GAPS:
             if self._gaps_of(section):
                 self._list_gaps(section, self._at(section))
 
+    def _close_gaps(self) -> None:
+        """Take gaps off the list that the saved table has closed, as all its gaps prove."""
+        result, sheet = self.run.result, self.sheet
+        if result is None or self.run.state != "done" or not result.report.gaps_complete or sheet.is_modified or sheet.reads_only:
+            return
+        try:
+            if message := self.desk.close(sheet.table, [gap.cells for gap in result.report.gaps]):
+                self.post_message(Notice(message))
+        except ContextDBError as error:
+            self.post_message(Notice(str(error.faults[0]), "error"))
+
     def _work_on(self, change: Callable[[Table, Sequence[Mapping[str, str]], int], str]) -> None:
         """Change the work on the gap of the cursor, as it is in the file now."""
-        section = SECTIONS[self.section]
-        gaps, at = self._gaps_of(section), self._at_or_none
-        if not gaps or at is None:
-            self.post_message(Notice("There is no gap here.", "warning"))
+        if not self._is_on_gap():
             return
         self.desk.read(self.sheet.table)
         try:
-            message = change(self.sheet.table, [gap.cells for gap in gaps], at)
+            gaps = [gap.cells for gap in self._gaps_of(SECTIONS[self.section])]
+            message = change(self.sheet.table, gaps, self._at(SECTIONS[self.section]))
         except ContextDBError as error:
             self.post_message(Notice(str(error.faults[0]), "error"))
             return
         self.post_message(Notice(message))
-        for each in ("gaps", "played"):
+        for each in OF_GAPS:
             self._list_gaps(each, max(0, self._at(each)))
+
+    def _is_on_gap(self) -> bool:
+        is_gap = bool(self._gaps_of(SECTIONS[self.section])) and self._at_or_none is not None
+        if not is_gap:
+            self.post_message(Notice("There is no gap here.", "warning"))
+        return is_gap
 
     def action_next_state(self) -> None:
         """Open, animating, done, and off the list."""
@@ -286,8 +260,7 @@ class CoveragePane(Pane):
 
     def action_give(self) -> None:
         """Ask who works on the gap of the cursor."""
-        if not self._gaps_of(SECTIONS[self.section]) or self._at_or_none is None:
-            self.post_message(Notice("There is no gap here.", "warning"))
+        if not self._is_on_gap():
             return
 
         def named(text: str | None) -> None:
@@ -300,24 +273,13 @@ class CoveragePane(Pane):
     def _show_section(self) -> None:
         name = SECTIONS[self.section]
         self.query_one(ContentSwitcher).current = name
-        self.query_one(ChoiceLine).show(self._labels(), self.section)
+        self.query_one(ChoiceLine).show(places.labels(self.run.result, self.played.result), self.section)
         detail = self.query_one("#coverage-detail")
         detail.display = name != "about"
         if self._details[name] != self._detail:
             self._detail = self._details[name]
             self.query_one("#coverage-detail-text", Static).update(Content(self._detail))
             detail.scroll_home(animate=False)
-
-    def _labels(self) -> Sequence[str]:
-        result = self.run.result
-        play = self.played.result
-        counts = [""] * 5 if result is None else []
-        if result is not None:
-            report = result.report
-            more = "" if report.gaps_complete else "+"
-            counts = [f" {len(report.gaps)}{more}", "", f" {len(report.crowded)}", f" {len(report.findings)}", ""]
-        counts += ["", ""] if play is None else [f" {len(play.gaps)}", f" {len(play.unused)}"]
-        return [f"{at + 1} {name}{counts[at]}" for at, name in enumerate(NAMES)]
 
     def on_resize(self) -> None:
         """Draw the bar again, and what there is room for."""
@@ -337,24 +299,13 @@ class CoveragePane(Pane):
     @on(LineList.Moved)
     def _moved(self, event: LineList.Moved) -> None:
         event.stop()
-        result, table = self.run.result, self.sheet.table
-        if event.list.id == SECTIONS[self.section]:
+        section = event.list.id or ""
+        if section == SECTIONS[self.section]:
             self._show_rows()
-        if event.list.id in OF_PLAY:
-            self._details[event.list.id] = self._play_detail(event.list.id, event.index)
+        if section in self._details:
+            place = self._place(section, event.index)
+            self._details[section] = "" if place is None else place.text
             self._show_section()
-            return
-        if result is None or event.list.id not in self._details:
-            return
-        text, report = "", result.report
-        if event.index >= 0 and event.list.id == "gaps":
-            text = lines.gap_text(report.gaps[event.index], event.index, report, self.run.table or table)
-        elif event.index >= 0 and event.list.id == "crowded":
-            text = lines.crowd_text(report.crowded[event.index], self.run.table or table)
-        elif event.index >= 0:
-            text = lines.finding_text(report.findings[event.index], self.run.table or table)
-        self._details[event.list.id] = text
-        self._show_section()
 
     @on(PairMap.Described)
     def _described(self, event: PairMap.Described) -> None:
@@ -367,20 +318,24 @@ class CoveragePane(Pane):
     @property
     def assets_here(self) -> Sequence[str]:
         """The asset of the row nearest to a gap; of rows that crowd, or that something is about, their own."""
-        at, section, play, result = self._at_or_none, SECTIONS[self.section], self.played.result, self.run.result
-        table, rows = self.run.table or self.sheet.table, []
-        if at is None:
-            return ()
-        if section in OF_PLAY and play is not None:
-            table = play.table
-            rows = [play.unused[at]] if section == "unused" else _row_of(play.gaps[at].nearest)
-        elif section == "gaps" and result is not None:
-            rows = _row_of(result.report.gaps[at].nearest)
-        elif section == "crowded" and result is not None:
-            rows = list(result.report.crowded[at].rows)
-        elif section == "rows" and result is not None:
-            rows = [row for row in (result.report.findings[at].row,) if row is not None]
+        play = self.played.result
+        of_play = SECTIONS[self.section] in OF_PLAY and play is not None
+        table = play.table if of_play and play is not None else self.run.table or self.sheet.table
+        rows = () if (place := self._place_here) is None else place.rows
         return [table.text(row, table.asset_column) for row in rows if row < table.n_rows]
+
+    def _place(self, section: str, at: int | None) -> Place | None:
+        """What a line of a section is about; None where there is none."""
+        result, play = self.run.result, self.played.result
+        if at is None or at < 0 or section not in (*OF_GAPS, "crowded", "rows", "unused"):
+            return None
+        if section in OF_PLAY:
+            return None if play is None else places.place_of_play(section, play, at)
+        return None if result is None else places.place_of_report(section, result.report, at, self.run.table or self.sheet.table)
+
+    @property
+    def _place_here(self) -> Place | None:
+        return self._place(SECTIONS[self.section], self._at_or_none)
 
     @property
     def _at_or_none(self) -> int | None:
@@ -392,29 +347,25 @@ class CoveragePane(Pane):
         """The rows of the table that the line of the cursor is about, where there is room for them; and the clip of one."""
         self.follow_clip()
         below, section, table = self.query_one(RowsBelow), SECTIONS[self.section], self.sheet.table
-        result, play = self.run.result, self.played.result
+        play, place = self.played.result, self._place_here
         below.show_none()
         if not self.has_class("-roomy") or section == "about":
             return
-        if section == "unused":
-            if play is not None and play.table is table and play.unused:
-                below.show_rows(table, IN_TABLE, range(table.n_rows), {}, play.unused[self._at(section)])
-        elif section == "played":
-            if play is not None and play.table is table and play.gaps:
-                gap = play.gaps[self._at(section)]
-                self._show_near(below, gap.cells, gap.nearest)
-        elif result is None or self.run.state != "done":
+        is_known = play is not None and play.table is table if section in OF_PLAY else self.run.state == "done"
+        if not is_known:
             return
-        elif section == "crowded" and result.report.crowded:
-            rows = list(dict.fromkeys(result.report.crowded[self._at(section)].rows))
-            below.show_rows(table, "The rows that are valid there at once", rows)
-        elif section == "rows" and result.report.findings:
-            finding = result.report.findings[self._at(section)]
-            rows = [row for row in (finding.row, *finding.by) if row is not None]
-            below.show_compared(table, [row for row in dict.fromkeys(rows) if row < table.n_rows], {}, finding.column)
-        elif (cells := self._cells_here()) is not None:
-            nearest = result.report.gaps[self._at(section)].nearest if section == "gaps" else None
-            self._show_near(below, cells[1], nearest)
+        if section == "pairs" and (cells := self._cells_here()) is not None:
+            self._show_near(below, cells[1], None)
+        elif place is None:
+            return
+        elif section == "unused":
+            below.show_rows(table, IN_TABLE, range(table.n_rows), {}, place.rows[0])
+        elif section == "crowded":
+            below.show_rows(table, "The rows that are valid there at once", list(dict.fromkeys(place.rows)))
+        elif section == "rows":
+            below.show_compared(table, [row for row in place.compared if row < table.n_rows], {}, place.column)
+        elif place.cells is not None:
+            self._show_near(below, place.cells, place.nearest)
 
     def _show_near(self, below: RowsBelow, cells: Mapping[str, str], nearest: Nearest | None) -> None:
         table = self.sheet.table
@@ -422,21 +373,10 @@ class CoveragePane(Pane):
             near = rows_near(table, cells, MOST, None if nearest is None else nearest.row)
             tones = {(row, name): "warning" for row, names in near.items() for name in names}
             first = next(iter(near.values()), ())
-            below.show_rows(table, NEAREST, list(near), tones, 0, first[0] if first else None)
+            below.show_rows(table, places.NEAREST, list(near), tones, 0, first[0] if first else None)
 
     def _at(self, section: str) -> int:
         return self.query_one(f"#{section}", LineList).index
-
-    def _play_detail(self, section: str, at: int) -> str:
-        play = self.played.result
-        if play is None or at < 0:
-            return ""
-        if section == "unused":
-            row = play.unused[at]
-            return f"{lines.row_text(row, play.table.assets[row])} was valid in no recorded moment. Enter goes there."
-        gap = play.gaps[at]
-        size = f"{format_percent(gap.share)} of the recorded moments, {gap.moments:,.0f}"
-        return f"Gap {at + 1} of {len(play.gaps)}: {size}\n{gap.text}\nT puts a moment of it into the test row, Enter makes a row."
 
     # ---- what can be done
 
@@ -448,7 +388,6 @@ class CoveragePane(Pane):
                 path = self.folder / Path(text.strip()).expanduser()
                 self.played.start(self.sheet.table, str(path), text.strip(), self._tell)
                 self.action_section(SECTIONS.index("played"))
-                self._show_state()
 
         question = "A file of recorded moments, or a pattern: session.jsonl, telemetry/*.parquet"
         self.app.push_screen(AskDialog("Recorded moments", question, "", lambda _: ""), named)
@@ -461,7 +400,6 @@ class CoveragePane(Pane):
             return
         self.played.start_live(self.sheet.table, recorded[1], recorded[0], self._tell)
         self.action_section(SECTIONS.index("played"))
-        self._show_state()
 
     @work(thread=True, exclusive=True)
     def _try_moment(self, play: Played, at: int) -> None:
@@ -502,26 +440,14 @@ class CoveragePane(Pane):
     @on(LineList.Chosen)
     def _chosen(self, event: LineList.Chosen) -> None:
         event.stop()
-        result, play = self.run.result, self.played.result
-        if event.list.id in OF_PLAY and play is not None:
-            if event.list.id == "unused":
-                self._go_to(play.unused[event.index])
-            else:
-                self._fill_gap(play.gaps[event.index].cells)
-            return
-        if result is None:
-            return
-        report = result.report
-        if event.list.id == "gaps":
-            self._fill_gap(report.gaps[event.index].cells)
-        elif event.list.id == "crowded":
-            self._go_to(report.crowded[event.index].rows[0])
-        elif event.list.id == "rows":
-            row = report.findings[event.index].row
-            if row is not None:
-                self._go_to(row, report.findings[event.index].column)
+        place = self._place(event.list.id or "", event.index)
+        if place is not None and event.list.id in OF_GAPS:
+            self._fill_gap(place.cells or {}, place.nearest)
+        elif place is not None and place.rows:
+            self._go_to(place.rows[0], place.column)
 
-    def _fill_gap(self, cells: Mapping[str, str]) -> None:
+    def _fill_gap(self, cells: Mapping[str, str], nearest: Nearest | None) -> None:
+        """Ask for a row of these cells, below the one that comes nearest to them."""
         conditions = {c.condition.name: c.condition for c in self.sheet.table.conditions}
         gone = cells.keys() - conditions.keys()
         if gone and self.sheet.query.is_nested:
@@ -534,7 +460,8 @@ class CoveragePane(Pane):
             )
         else:
             is_number = {name: conditions[name].domain.type.is_numeric for name in cells}
-            self.post_message(FillGap({name: lines.as_typed(cell) if is_number[name] else cell for name, cell in cells.items()}))
+            typed = {name: lines.as_typed(cell) if is_number[name] else cell for name, cell in cells.items()}
+            self.post_message(FillGap(typed, None if nearest is None else nearest.row))
 
     def _go_to(self, row: int, column: str | None = None) -> None:
         if self.run.state == "stale" and row >= self.sheet.table.n_rows:
@@ -545,8 +472,8 @@ class CoveragePane(Pane):
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """Only where there are contexts, one can be tried; only on gaps, somebody works."""
         if action in ("next_state", "give"):
-            return SECTIONS[self.section] in ("gaps", "played")
-        return action != "try_context" or SECTIONS[self.section] in ("gaps", "pairs", "crowded", "played")
+            return SECTIONS[self.section] in OF_GAPS
+        return action != "try_context" or SECTIONS[self.section] in (*OF_GAPS, "pairs", "crowded")
 
     def action_try_context(self) -> None:
         """Put a context of what the cursor is on into the test row."""
@@ -567,45 +494,8 @@ class CoveragePane(Pane):
         self.post_message(SetContext(facts, name))
 
     def _cells_here(self) -> tuple[str, dict[str, str]] | None:
-        result, section = self.run.result, SECTIONS[self.section]
-        if result is None:
-            return None
-        if section == "pairs":
+        if SECTIONS[self.section] == "pairs":
             cells = self.query_one(PairMap).cells_here()
             return None if cells is None else ("slice", cells)
-        if section not in ("gaps", "crowded"):
-            return None
-        places = result.report.gaps if section == "gaps" else result.report.crowded
-        at = self.query_one(f"#{section}", LineList).index
-        return (f"gap {at + 1}" if section == "gaps" else f"crowd {at + 1}", dict(places[at].cells)) if places else None
-
-
-def _gap_columns(section: str, has_work: bool = False) -> tuple[ListColumn, ...]:
-    """Those of a list of gaps; that of the work on them where there is any."""
-    what = "Moments" if section == "played" else "Contexts"
-    work = [ListColumn("Work", 9, 1)] if has_work else []
-    cells = ListColumn(f"{what} without a valid row", 24 if has_work else 27, 3)
-    return ListColumn("Share", 8, 0, True), ListColumn("Adds", 8, 0, True), cells, *work, ListColumn("Nearest row", 13, 2)
-
-
-def _gap_line(gap: Gap | SeenGap, work: Work | None, has_work: bool) -> Sequence[ListCell]:
-    share = (f"{'' if gap.is_exact else '~'}{format_percent(gap.share)}", "strong") if gap.share else ("points", "muted")
-    new: ListCell = ("all", "muted") if gap.new_share == gap.share else format_percent(gap.new_share)
-    state: ListCell = "" if work is None else (work.text, TONES[work.state])
-    works = [state] if has_work else []
-    return [share, new, partial(lines.cells_within, gap.cells), *works, lines.nearest_text(gap.nearest)]
-
-
-def _crowd_line(report: CoverageReport, at: int) -> Sequence[ListCell]:
-    crowd = report.crowded[at]
-    return [(str(crowd.n_rows), "strong"), format_percent(crowd.share), partial(lines.cells_within, crowd.cells)]
-
-
-def _finding_line(report: CoverageReport, at: int) -> Sequence[ListCell]:
-    finding = report.findings[at]
-    row = "" if finding.row is None else str(finding.row + 1)
-    return [row, finding.asset or "", (lines.TITLES.get(finding.rule, finding.rule), finding.level)]
-
-
-def _row_of(nearest: Nearest | None) -> list[int]:
-    return [] if nearest is None else [nearest.row]
+        place = self._place_here
+        return None if place is None or place.cells is None else (place.name, dict(place.cells))

@@ -264,7 +264,8 @@ class Painter:
         """The line of a row; the one of before where all that is seen of it is as it was."""
         sheet, layout = self.sheet, look.layout
         names = [c.name for c in sheet.table.columns] if sheet.marks.texts or sheet.clips.cells else None
-        lines_of = layout, look.left, sheet.marks, sheet.clips, sheet.asset_at, sheet.shared_end, len(sheet.table.columns), names
+        marks = sheet.marks, sheet.clips, sheet.domains  # a cell is odd by its text and its domain
+        lines_of = layout, look.left, marks, sheet.asset_at, sheet.shared_end, len(sheet.table.columns), names
         if lines_of != self._lines_of or len(self._lines) > MOST_LINES:
             self._lines_of, self._lines = lines_of, {}
         of = self._seen_of(row, look)
@@ -284,8 +285,8 @@ class Painter:
         asset = sheet.text(row, sheet.asset_at) if sheet.marks.texts or sheet.marks.colours or sheet.clips.cells else ""
         flashing = [column for at, column in self.flashing if at == row]
         failing = window.failing(row) if seen.n_failing else []
-        doubts = sheet.doubtful(row, columns)
-        return seen, cells, window.notes(row), self._cursor(row, look), look.has_focus, selected, asset, flashing, failing, doubts
+        doubt = sheet.doubt(int(sheet.view.rows[row]), sheet.asset_at)
+        return seen, cells, window.notes(row), self._cursor(row, look), look.has_focus, selected, asset, flashing, failing, doubt
 
     def _cursor(self, row: int, look: Look) -> int | None:
         """The column of the cursor, where it is in a row."""

@@ -265,7 +265,13 @@ def test_every_public_method_is_asked_with_wrong_arguments():
     methods = re.findall(r"`(?!motion|help|len)(?:\w+\.)*(\w+)\(\w", api)
     assert len(methods) > 30
     # of switches alone, for tools, of motion
-    assert [n for n in methods if not any(f"{n}(" in call for call in CALLS)] == ["prepare", "failing", "decided", "why_not"]
+    assert [n for n in methods if not any(f"{n}(" in call for call in CALLS)] == [
+        "prepare",
+        "failing",
+        "decided",
+        "why_not",
+        "stitch",
+    ]
 
 
 def test_a_seed_or_generator_that_is_none_is_refused_by_name():

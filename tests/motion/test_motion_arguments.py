@@ -176,6 +176,7 @@ CALLS = [
     lambda: partial(motion.MatchGate, DATABASE, 1.0),
     lambda: partial(motion.MatchGate(DATABASE, 1.0).update),
     lambda: partial(NODE.enter, [0.0] * SCHEMA.n_features, motion.Target(0, 1)),
+    lambda: partial(NODE.stitch, [0.0] * SCHEMA.n_features, [0.0] * SCHEMA.n_features, 1.0),
     lambda: partial(PLAY.decision),
     lambda: partial(motion.Target, ahead_m=1.0),
     lambda: partial(motion.Markup.parse),

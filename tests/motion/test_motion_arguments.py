@@ -176,7 +176,7 @@ CALLS = [
     lambda: partial(motion.MatchGate, DATABASE, 1.0),
     lambda: partial(motion.MatchGate(DATABASE, 1.0).update),
     lambda: partial(NODE.enter, [0.0] * SCHEMA.n_features, motion.Target(0, 1)),
-    lambda: partial(NODE.stitch, [0.0] * SCHEMA.n_features, [0.0] * SCHEMA.n_features, 1.0),
+    lambda: partial(NODE.stitch, NODE.database.raw(0), NODE.database.raw(20), 1.0),
     lambda: partial(PLAY.decision),
     lambda: partial(motion.Target, ahead_m=1.0),
     lambda: partial(motion.Markup.parse),
@@ -308,6 +308,7 @@ OTHERS: dict[str, Call] = {
     "Character.update(path)": lambda x: PLAYER.copy().update(0.1, path=x),
     "Character.update(tags)": lambda x: PLAYER.copy().update(0.1, tags=x),
     "Character.update(valid)": lambda x: PLAYER.copy().update(0.1, valid=x),
+    "Character.update(event)": lambda x: PLAYER.copy().update(0.1, event=x),
 }
 
 

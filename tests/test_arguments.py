@@ -270,7 +270,6 @@ def test_every_public_method_is_asked_with_wrong_arguments():
         "failing",
         "decided",
         "why_not",
-        "stitch",
     ]
 
 

@@ -207,7 +207,7 @@ def test_a_report_about_names_that_are_no_text_matches_its_digest():
 def test_a_file_of_an_older_layout_is_called_older_with_what_renews_it():
     result = run("verify", str(ROOT / "tests/written_before/walk.database.safetensors"))
     assert (result.code, result.out.split()[0]) == (1, "OLDER")
-    assert "layout 1, of an older version; this one reads 3. Try to build it again with `contextdb motion build`." in result.out
+    assert "layout 1, of an older version; this one reads 4. Try to build it again with `contextdb motion build`." in result.out
 
 
 @pytest.mark.parametrize("name", ["t.safetensors", "jog.motion.safetensors", "jog.poses.safetensors", "session.parquet"])

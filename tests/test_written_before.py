@@ -55,6 +55,6 @@ def test_a_file_written_before_the_packages_says_what_it_said(name: str, tmp_pat
 
 
 def test_a_database_with_costs_on_the_old_scale_is_refused_with_the_reason():
-    message = "layout 1; this version reads layout 3.* build it again with `contextdb motion build`"
+    message = "layout 1; this version reads layout 4.* build it again with `contextdb motion build`"
     with pytest.raises(ArtefactError, match=message):
         open_database(WRITTEN / "walk.database.safetensors")

@@ -363,7 +363,9 @@ def first_assets(folder: str) -> set[str]:
 
 def at_jump() -> str:
     """The tick at which jog starts."""
-    return next(line.split()[0] for line in motion("replay", "session.parquet").lines if " jog " in line and line.split()[0].isdigit())
+    return next(
+        line.split()[0] for line in motion("replay", "session.parquet").lines if " jog " in line and line.split()[0].isdigit()
+    )
 
 
 def test_why_not_says_the_cell_and_the_change_that_wins():

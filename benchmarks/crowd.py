@@ -48,7 +48,6 @@ from contextdb.motion import (
     Steered,
     Trajectory,
 )
-from contextdb.motion.clips.many_steered import ManySteered, steered_paths
 from contextdb.motion.clips.steering import steered_path
 from contextdb.motion.features.extraction import trajectory_features
 from contextdb.motion.features.path_features import with_paths
@@ -289,7 +288,7 @@ class _Crowd:
         self.group = ControllerGroup([Controller(selector, settings) for _ in range(n)])
         self.alone = [Controller(selector, settings) for _ in range(n)]
         self.moves, self.ticks, self.rng = _moves(1), count(), np.random.default_rng(2)
-        self.past = [ManySteered.of([Steered()] * n)]
+        self.past = [[Steered()] for _ in range(n)]
         self._turn_sticks()
 
     def _turn_sticks(self) -> None:
@@ -306,10 +305,8 @@ class _Crowd:
         """Paths and queries, made one by one and together."""
         for _ in range(PAST):
             self._step()
-        past = [[bodies[i] for bodies in self.past] for i in range(self.n)]
-        paths = steered_paths(self.past, self.sticks)
-        poses = self.group.poses(DT_S)
-        each = list(zip(past, [(float(x), float(z)) for x, z in self.sticks], strict=True))
+        each = self._each()
+        paths, poses = [steered_path(*one) for one in each], self.group.poses(DT_S)
         return {
             "one's path, by moments and at once": (
                 lambda: [_path_by_moments(bodies, stick) for bodies, stick in each],
@@ -318,10 +315,6 @@ class _Crowd:
             "one's query, by channels and at once": (
                 lambda: [_query_by_channels(self.schema, pose, paths[i]) for i, pose in enumerate(poses)],
                 lambda: [motion.with_path(self.schema, pose, paths[i]) for i, pose in enumerate(poses)],
-            ),
-            "paths of sticks": (
-                lambda: [steered_path(bodies, stick) for bodies, stick in each],
-                lambda: steered_paths(self.past, self.sticks),
             ),
             "queries with paths": (
                 lambda: [motion.with_path(self.schema, pose, paths[i]) for i, pose in enumerate(poses)],
@@ -356,8 +349,12 @@ class _Crowd:
     def _step(self) -> Any:
         if next(self.ticks) % 30 == 29:
             self._turn_sticks()
-        self.past = [*self.past, self.past[-1].moved(DT_S, self.sticks)][-PAST:]
-        return with_paths(self.schema, self.group.poses(DT_S), steered_paths(self.past, self.sticks))
+        self.past = [[*past, past[-1].moved(DT_S, stick)][-PAST:] for past, stick in self._each()]
+        return with_paths(self.schema, self.group.poses(DT_S), [steered_path(*one) for one in self._each()])
+
+    def _each(self) -> list[tuple[list[Steered], tuple[float, float]]]:
+        """Where each body was, and its stick."""
+        return list(zip(self.past, [(float(x), float(z)) for x, z in self.sticks], strict=True))
 
 
 def _path_by_moments(past: Sequence[Steered], stick: tuple[float, float]) -> Trajectory:

@@ -10,7 +10,7 @@ import csv
 import json
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from io import BytesIO
 from pathlib import Path
@@ -63,7 +63,36 @@ def amass(offsets: Floats | None = None) -> bytes:
     return whole.getvalue()
 
 
-# ---- binary FBX
+# ---- FBX with a skin, and binary FBX
+
+
+def skinned(text: bytes, body: Moving) -> bytes:
+    """ASCII FBX of ours in centimetres with a triangle that hangs on every bone, and the pose in which it was bound."""
+    places = 100.0 * body.offsets
+    for joint, parent in enumerate(body.parents):
+        places[joint] += places[parent] if parent >= 0 else 0.0
+
+    def array(key: str, values: Iterable[object], n: int) -> list[str]:
+        return [f"{key}: *{n} {{", f"a: {','.join(map(str, values))}", "}"]
+
+    def matrix(key: str, place: Floats) -> list[str]:
+        return array(key, [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, *place.tolist(), 1], 16)
+
+    lines = ['Geometry: 700000, "Geometry::m", "Mesh" {', *array("Vertices", range(9), 9)]
+    lines += [*array("PolygonVertexIndex", (0, 1, -3), 3), "}", 'Model: 700001, "Model::m", "Mesh" {', "Version: 232", "}"]
+    lines += ['Deformer: 700002, "Deformer::s", "Skin" {', "Version: 101", "}", 'Pose: 700003, "Pose::b", "BindPose" {']
+    lines += ['Type: "BindPose"', f"NbPoseNodes: {len(places)}"]
+    for joint, place in enumerate(places):
+        lines += ["PoseNode:  {", f"Node: {1_000 + joint}", *matrix("Matrix", place), "}"]
+    lines.append("}")
+    links = ['C: "OO",700001,0', 'C: "OO",700000,700001', 'C: "OO",700002,700000']
+    for joint, place in enumerate(places):
+        lines += [f'Deformer: {710_000 + joint}, "SubDeformer::c", "Cluster" {{', "Version: 100", *array("Indexes", (0, 1, 2), 3)]
+        lines += [*array("Weights", (1, 1, 1), 3), *matrix("Transform", -place), *matrix("TransformLink", place), "}"]
+        links += [f'C: "OO",{710_000 + joint},700002', f'C: "OO",{1_000 + joint},{710_000 + joint}']
+    objects, connections = "\n".join(lines).encode(), "\n".join(links).encode()
+    return text.replace(b"}\nConnections:  {\n", b"\n" + objects + b"\n}\nConnections:  {\n" + connections + b"\n")
+
 
 ARRAYS = {"KeyTime": ("l", "<i8"), "KeyValueFloat": ("f", "<f4"), "KeyAttrFlags": ("i", "<i4"), "KeyAttrRefCount": ("i", "<i4")}
 """Letter and type of the numbers of an array, by its name; the others are of floats."""

@@ -7,10 +7,11 @@ folder.
   output, standard error included. Commands are `contextdb …`, `python …`, and `echo $?`, the last exit code.
 - A ```python block runs; what it prints stands in a ```text block right under it.
 - A block whose fence names a file, such as ```csv tackles/dives.csv, is that file from there on.
+- `| grep TEXT`, `| head -3` and `| tail -3` behind a command show a part of what it prints.
 - What cannot be run (installing, make) stands in a ```sh block, or ```py for Python.
 
 A transcript has more: the programs of `PROGRAMS`, such as `cat FILE`, and `sed -i s/OLD/NEW/ FILE` for plain text; settings before
-a command, such as `COLUMNS=60`; and behind it `| grep TEXT`, `| head -3` and `| tail -3`. An exit code that is not 0 stands in
+a command, such as `COLUMNS=60`. An exit code that is not 0 stands in
 brackets under the output, with an `o` where 2 comes with standard output, and an `e` where another code comes with standard error.
 """
 
@@ -133,8 +134,12 @@ class Session:
             return self._write(step.file, step.source)
         if step.is_python:
             return self._python(step.source)
-        text = self._piped(shlex.split(step.source)) if self.is_transcript else self._command(shlex.split(step.source))
-        return text.rstrip()
+        words, *filters = [list(part) for is_pipe, part in itertools.groupby(shlex.split(step.source), "|".__eq__) if not is_pipe]
+        text = self._transcribed(words) if self.is_transcript else self._command(words)
+        for name, word in filters:
+            text = FILTERS[name](text, word)
+        status = f"{self.exit_code or ''}{self.stray}" if self.is_transcript else ""
+        return f"{text.rstrip()}\n[{status}]".lstrip() if status else text.rstrip()
 
     def _write(self, file: str, text: str) -> str:
         path = self.folder / file
@@ -148,16 +153,11 @@ class Session:
             exec(compile(source, "<document>", "exec"), self.names)
         return printed.getvalue().rstrip()
 
-    def _piped(self, words: list[str]) -> str:
-        """What a line of a transcript prints, through its filters, and the exit code."""
-        words, *filters = [list(part) for is_pipe, part in itertools.groupby(words, "|".__eq__) if not is_pipe]
+    def _transcribed(self, words: list[str]) -> str:
+        """What a command of a transcript prints."""
         n_set = sum(1 for _ in itertools.takewhile(re.compile(r"[A-Z_]+=").match, words))
         self.terminal = TERMINAL | GIT | dict(word.split("=", 1) for word in words[:n_set])
-        text = self._command(words[n_set:]).replace("\r\n", "\n").replace(str(self.folder), "/here")
-        for name, word in filters:
-            text = FILTERS[name](text, word)
-        status = f"{self.exit_code or ''}{self.stray}"
-        return f"{text.rstrip()}\n[{status}]".lstrip() if status else text
+        return self._command(words[n_set:]).replace("\r\n", "\n").replace(str(self.folder), "/here")
 
     def _command(self, words: list[str]) -> str:
         if words == ["echo", "$?"]:

@@ -80,6 +80,7 @@ LINK = (
 EXPRESSIONS = (
     b'speed > 2 and not (ok or pos in ["CB", "FS"])\nabs(heading - 90) <= 30\n"Move" in tags\nmin(speed, 3) * 2 % 5 // 1\n'
 )
+FBX = clip_files.fbx(clip_files.BODY)
 BVH = b"""HIERARCHY
 ROOT Hips
 {
@@ -386,8 +387,8 @@ READERS: dict[str, Reader] = {
     "bvh": Reader(".bvh", lambda: [BVH], lambda path: motion.load_bvh(path)),
     "npz": Reader(".npz", lambda: [clip_files.amass(clip_files.SMPL_OFFSETS), clip_files.joints()], read_clips),
     "glb": Reader(".glb", lambda: [clip_files.gltf(clip_files.BODY)], read_clips),
-    "fbx": Reader(".fbx", lambda: [clip_files.fbx(clip_files.BODY)], read_clips),
-    "fbx-binary": Reader(".fbx", lambda: [clip_files.binary_fbx(clip_files.fbx(clip_files.BODY))], read_clips),
+    "fbx": Reader(".fbx", lambda: [FBX, clip_files.skinned(FBX, clip_files.BODY)], read_clips),
+    "fbx-binary": Reader(".fbx", lambda: [clip_files.binary_fbx(FBX)], read_clips),
     "usd": Reader(".usda", lambda: [clip_files.usda(clip_files.BODY)], read_clips),
     "usdc": Reader(".usdc", lambda: [clip_files.usdc(clip_files.usda(clip_files.BODY))], read_clips),
     "gltf": Reader(".gltf", lambda: [clip_files.gltf(clip_files.BODY, binary=False)], read_clips),

@@ -27,6 +27,8 @@ class FillGap(Message):
 
     cells: Mapping[str, str]
     """Condition to cell; a condition that is not named accepts everything."""
+    below: int | None = None
+    """The row that the new one belongs below, from 0; None: that of the cursor."""
 
 
 @dataclass

@@ -22,6 +22,7 @@ from contextdb.motion.clips.doubts import LEAST_BODY_M, LYING_SHARE
 from contextdb.motion.clips.skeleton import Skeleton
 from contextdb.motion.clips.source import ENDINGS, clip_name, takes_of
 from contextdb.motion.preparing.clip_facts import ClipFacts
+from contextdb.motion.preparing.meeting import Meeting
 from contextdb.motion.preparing.proposal import ClipHead, KeptClip
 from contextdb.motion.storage.clip_files import named_takes
 from contextdb.motion.storage.config import MotionConfig
@@ -161,6 +162,20 @@ def _guess(clips: FolderClips, guesses_axes: bool, guesses_units: bool, looks: L
     for k, seen in look_at_all([clips.places[i] for i in changed], looks, engines, saved):
         if isinstance(seen, Seen):
             clips.seen[changed[k]] = seen
+
+
+def facts_on_rigs(clips: FolderClips, meetings: Iterable[Meeting], looks: Looks, engines: Engines) -> None:
+    """Look again for the facts of clips that are put on the rig of others, as they are there."""
+    places: dict[int, ClipAt] = {}
+    for meeting in meetings:
+        (first, *_), *others = meeting.rigs
+        head = clips.seen[first].head
+        rig = Rig(head.skeleton, head.metres_per_unit, {}, (), "")
+        places |= {i: replace(clips.places[i], rig=rig) for members in others for i in members}
+    numbers = [*places]
+    for k, seen in look_at_all([*places.values()], looks, engines):
+        if isinstance(seen, Seen):
+            clips.seen[numbers[k]] = replace(clips.seen[numbers[k]], facts=seen.facts, faults=seen.faults)
 
 
 def clips_below(folder: Path, *, needs: bool = False) -> list[Path]:

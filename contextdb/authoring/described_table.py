@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from contextdb.authoring.clip_folder import MARKUP, Databases, FolderClips, Tell, below, clips_of
+from contextdb.authoring.clip_folder import MARKUP, Databases, FolderClips, Tell, below, clips_of, facts_on_rigs
 from contextdb.authoring.clip_looks import Looks
 from contextdb.cells.conditions import Condition
 from contextdb.cells.grammar import parse_cell
@@ -41,11 +41,13 @@ from contextdb.motion.preparing.describing import (
     described,
     joint_clips,
     joint_row,
+    meeting_rigs,
     mirror_of,
     motion_sections,
     table_section,
 )
 from contextdb.motion.preparing.describing import Sections as TomlSections
+from contextdb.motion.preparing.meeting import notes_of
 from contextdb.schema.sections import settings_to_dict
 from contextdb.schema.toml_edit import absent, add_sections
 from contextdb.tables.changes import Cells, Change, Columns, Edit, Rows, Sections
@@ -162,9 +164,10 @@ def rows_for(
     where there is no such folder, no clip in it that can be read, or all are joint clips of several actors.
     """
     notes: list[str] = []
+    looks = Looks(facts=True)
     with progress("reading clips") as tell:
         wants = lambda all_of: _playing_alone(all_of, into, notes)  # noqa: E731
-        folder_clips = clips_of(folder, metres_per_unit, up, tell, wants, Looks(facts=True), engines, root)
+        folder_clips = clips_of(folder, metres_per_unit, up, tell, wants, looks, engines, root)
     clips = folder_clips.clips
     measures = [(seen.head.name, None, seen.measures) for seen in folder_clips.seen]
     folder_clips.notes += [*notes, *grouped(doubts(measures), len(clips))]
@@ -173,9 +176,14 @@ def rows_for(
     joint = {} if folder_clips.config.databases else joint_clips(clips)
     together = {i for roles in joint.values() for i in roles.values()}
     alone = [i for i in range(len(clips)) if i not in together]
+    bones = [clip.skeleton.names for clip in clips]
+    if not folder_clips.config.databases:
+        met, _ = meeting_rigs(clips)
+        facts_on_rigs(folder_clips, met, looks, engines)
+        bones = [bones[{i: each.members[0] for each in met for i in each.members}.get(i, i)] for i in range(len(clips))]
+        folder_clips.notes += notes_of(clips, met)
     facts = folder_clips.facts()
-    bones = [clips[i].skeleton.names for i in alone]
-    rows = described([facts[i] for i in alone], bones, _is_mirrored(folder_clips)) if alone else []
+    rows = described([facts[i] for i in alone], [bones[i] for i in alone], _is_mirrored(folder_clips)) if alone else []
     first = {asset: next(iter(roles.values())) for asset, roles in joint.items()}
     rows += [joint_row(asset, facts[i]) for asset, i in first.items()]
     if joint:

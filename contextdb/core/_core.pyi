@@ -121,11 +121,6 @@ class Boxes:
 def direction_of(x: float, z: float, heading: float, /) -> float:
     """Where a stick points against the way a body faces, degrees."""
 
-def return_path(
-    place: NDArray[np.float64], rate: float, halflife_s: float, positions: NDArray[np.float64], headings: NDArray[np.float64], /
-) -> bool:
-    """Let a path, which is written, begin at a place and come back to itself; gives whether that changes it."""
-
 def count_holders(
     codes: NDArray[np.int32],
     starts: NDArray[np.int64],
@@ -195,10 +190,9 @@ class Ways:
         bodies: NDArray[np.float64] | None,
         dt_s: float,
         after: NDArray[np.float64],
-        places: NDArray[np.float64],
         /,
     ) -> None:
-        """Write walks as they are some time later, and where their animations are; a body that is NaN follows its goal."""
+        """Write walks as they are some time later; a body that is NaN follows its goal."""
     def n_frames(self, walks: NDArray[np.float64], goals: NDArray[np.float64], /) -> int:
         """How many frames the longest of their paths has."""
     def n_behind(self, rate: float, /) -> int:

@@ -830,15 +830,17 @@ static inline void cdbm_compare(const cdbm_controller *controller, const cdbm_gi
         decision->continuing_cost = cdbm_continuing_cost(controller, given, i, &move->to, is_wide ? given->wide[i] : NAN, room);
 }
 
-/* Whether what plays was entered so lately that it plays on though something else costs a little less. */
+/* Whether what plays was entered so lately that it plays on though something else costs a little less; not where it is to stand. */
 static inline int cdbm_settles(const cdbm_controller *controller, const cdbm_state *state, const cdbm_moved *move,
-    const cdbm_decision *decision)
+    const cdbm_decision *decision, const double *query)
 {
+    const cdbm_clips *clips = move->to.database < 0.0 ? NULL : &controller->databases[(size_t)move->to.database];
     double stayed_s = decision->time_s - state->entered_s, left = 1.0 - stayed_s / controller->settle_s;
-    double settle = move->to.database < 0.0 ? 0.0 : controller->databases[(size_t)move->to.database].settle;
+    double settle = clips ? clips->settle : 0.0;
     if (!(decision->chosen[0] >= 0.0) || !(decision->continuing_cost == decision->continuing_cost) || settle == 0.0 || !(left > 0.0)) return 0;
     if (controller->databases[(size_t)decision->chosen[0]].looping[(size_t)decision->chosen[1]]
-        && !controller->databases[(size_t)move->to.database].looping[(size_t)move->to.range]) return 0; /* a loop may stay for good */
+        && !clips->looping[(size_t)move->to.range]) return 0; /* a loop may stay for good */
+    if (clips->n_pace && cdbm_pace(clips, query + clips->pace) < CDBM_LEAST_MPS) return 0;
     if (decision->is_under != 0.0 && decision->winner != move->to.database) return 0; /* a priority database wins outright */
     return decision->continuing_cost + settle * left <= decision->chosen[3];
 }
@@ -870,7 +872,7 @@ static inline void cdbm_decide(const cdbm_controller *controller, const cdbm_giv
     const double *query = given->queries + i * controller->n_features;
     int is_there = move->to.database >= 0.0, is_searched = decision->cause != CDBM_NOT_DUE;
     int goes_on = decision->chosen[0] == CDBM_GO_ON || (decision->current >= 0.0 && decision->chosen[0] == move->to.database
-        && decision->chosen[2] == decision->current) || cdbm_settles(controller, state, move, decision);
+        && decision->chosen[2] == decision->current) || cdbm_settles(controller, state, move, decision, query);
     double wanted;
     decision->playing = move->to;
     decision->action = move->n_loops != 0.0 ? CDBM_LOOPS : CDBM_PLAYS_ON;

@@ -58,7 +58,7 @@ static double *cdbp_walks(const cdbm_ways *ways, cdbp_arrays *a, PyObject *array
     return rows;
 }
 
-/* ways.move(before, goals, bodies or None, seconds, after, places): each some time later; a body that is NaN follows its goal. */
+/* ways.move(before, goals, bodies or None, seconds, after): each some time later; a body that is NaN follows its goal. */
 static PyObject *cdbp_ways_move(PyObject *self, PyObject *const *in, Py_ssize_t n)
 {
     const cdbm_ways *ways = cdbp_made_ways(self);
@@ -66,22 +66,21 @@ static PyObject *cdbp_ways_move(PyObject *self, PyObject *const *in, Py_ssize_t 
     const double *before = NULL;
     const cdbo_goal *goals;
     const cdbo_body *bodies = NULL;
-    double *after, *places, dt_s = ways && n == 6 ? PyFloat_AsDouble(in[3]) : 0.0;
+    double *after, dt_s = ways && n == 5 ? PyFloat_AsDouble(in[3]) : 0.0;
     size_t s[3], n_rows = CDBP_ANY, width = ways ? cdbm_walk_width(ways) : 0, i;
     int is_done = 0;
     a.n = 0;
-    if (ways && n == 6 && !PyErr_Occurred() && (before = cdbp_walks(ways, &a, in[0], 0, &n_rows))
+    if (ways && n == 5 && !PyErr_Occurred() && (before = cdbp_walks(ways, &a, in[0], 0, &n_rows))
         && (goals = (const cdbo_goal *)cdbp_numbers(&a, in[1], s, 2, n_rows, 3, 0))
         && (in[2] == Py_None || (bodies = (const cdbo_body *)cdbp_numbers(&a, in[2], s, 2, n_rows, 10, 0)))
-        && (after = cdbp_walks(ways, &a, in[4], 1, &n_rows)) && (places = cdbp_to_numbers(&a, in[5], s, 2, n_rows, 3, 0))) {
+        && (after = cdbp_walks(ways, &a, in[4], 1, &n_rows))) {
         for (i = 0; i < n_rows; i++) {
             const cdbo_body *moved = bodies && bodies[i].heading == bodies[i].heading ? &bodies[i] : NULL;
             cdbm_walk_on(ways, before + i * width, &goals[i], moved, dt_s, after + i * width);
-            cdbm_place_of(after + i * width, places + 3 * i);
         }
         is_done = 1;
     }
-    return cdbp_given_back(&a, is_done, "move takes walks, goals, bodies, seconds and two arrays");
+    return cdbp_given_back(&a, is_done, "move takes walks, goals, bodies, seconds and an array");
 }
 
 /* ways.n_frames(walks, goals): how many frames the longest of their paths has. */
@@ -200,25 +199,6 @@ static PyObject *cdbp_direction_of(PyObject *module, PyObject *const *in, Py_ssi
     return PyFloat_FromDouble(cdbm_direction(numbers, numbers[2]));
 }
 
-/* return_path(place, rate, halflife_s, positions, headings): let a path begin at a place; whether that changes it. */
-static PyObject *cdbp_return_path(PyObject *module, PyObject *const *in, Py_ssize_t n)
-{
-    cdbp_arrays a;
-    const double *place;
-    double *positions, *headings, rate, halflife_s;
-    size_t s[3], n_frames = 0;
-    int is_changed = -1;
-    (void)module;
-    a.n = 0;
-    if (n == 5 && cdbp_float_of(in[1], &rate) && cdbp_float_of(in[2], &halflife_s) && (place = cdbp_numbers(&a, in[0], s, 1, 3, 0, 0))
-        && (headings = cdbp_to_numbers(&a, in[4], s, 1, CDBP_ANY, 0, 0)) && (n_frames = s[0]) > 0
-        && (positions = cdbp_to_numbers(&a, in[3], s, 2, n_frames, 2, 0)))
-        is_changed = cdbm_return(place, rate, halflife_s, n_frames, positions, headings);
-    if (is_changed < 0) return cdbp_given_back(&a, 0, "return_path takes a place, two numbers and the frames of a path");
-    cdbp_release(&a);
-    return cdbp_new_ref(is_changed ? Py_True : Py_False);
-}
-
 static PyMethodDef cdbp_ways_methods[] = {
     {"move", CDBP_CALL(cdbp_ways_move), METH_FASTCALL, "Write walks as they are some time later."},
     {"n_frames", CDBP_CALL(cdbp_ways_n_frames), METH_FASTCALL, "How many frames the longest path has."},
@@ -242,5 +222,4 @@ static PyType_Slot cdbp_ways_slots[] = {
 static PyType_Spec cdbp_ways_spec = {"contextdb.core._core.Ways", (int)sizeof(cdbp_ways), 0, Py_TPFLAGS_DEFAULT, cdbp_ways_slots};
 
 #define CDBP_WALK_FUNCTIONS \
-    {"direction_of", CDBP_CALL(cdbp_direction_of), METH_FASTCALL, "Where a stick points against the way a body faces."}, \
-    {"return_path", CDBP_CALL(cdbp_return_path), METH_FASTCALL, "Let a path begin at a place, and come back to itself."},
+    {"direction_of", CDBP_CALL(cdbp_direction_of), METH_FASTCALL, "Where a stick points against the way a body faces."},

@@ -213,7 +213,10 @@ def pulled(settings, base, body, own_m, own_turn, dt):
 def aligned(bank, settings, state, now, moment, given, root, dt, rotations, translations):
     """Hips and legs turned to the way of the game, the chest as it was: rotations and translations are changed."""
     spine = spine_of(bank)
-    if spine is None or not settings.is_warping:
+    is_warping = settings.root != "animation" and (
+        settings.path_alignment or settings.min_stride < 1.0 or settings.max_stride > 1.0
+    )
+    if spine is None or not is_warping:
         return replace(now, turn=(0.0, 0.0), stride=(1.0, 0.0))
     turn, stride = 0.0, 1.0
     travel = (0.0, 0.0, 0.0) if moment is None else moment.travel

@@ -93,7 +93,7 @@ def test_a_build_gives_what_the_clips_give(folder):
     clips = {name: CONFIG.load_clips(name, folder) for name in CONFIG.databases}
     assert bits(built["jog"])[1:] == (NAMES, built["jog"].biases)
     usual = Biases(looping=-0.01, continuing=-0.1)
-    expected = MotionDatabase.build(clips["jog"], schema, normalisation=built["jog"].normalisation, biases=usual, end_s=0.3)
+    expected = MotionDatabase.build(clips["jog"], schema, normalisation=built["jog"].normalisation, biases=usual, end_s=0.6)
     assert bits(built["jog"]) == bits(expected)
     assert built["jog"].normalisation is built["jog_tired"].normalisation
 

@@ -18,9 +18,9 @@ import contextdb as cdb
 from contextdb import motion
 from contextdb.motion.characters.drives import drives
 from contextdb.motion.characters.facts import FACTS, Moment
-from contextdb.motion.characters.paths import path_from
 from contextdb.motion.characters.probing import plan_of
-from contextdb.motion.clips.steering import steered_path
+from contextdb.motion.characters.walks import begun, wished_along
+from contextdb.motion.clips.steering import N_NUMBERS, steered_path
 
 DT = 1.0 / 30.0
 NAMES = ("idle", "walk", "walk_turn_left_90", "walk_turn_right_90", "jog", "start_walk", "stop_walk")
@@ -345,14 +345,19 @@ def test_a_record_has_every_decision_and_its_facts():
 # ---- a path from the root
 
 
-@given(
-    st.tuples(st.floats(-2, 2), st.floats(-2, 2), st.floats(-0.78, 0.78)),
-    st.floats(0.05, 0.5),
-    st.tuples(st.floats(-2, 2), st.floats(-2, 2)),
-)
-def test_a_path_from_a_root_begins_there_and_comes_to_the_body_s_path_without_a_step(root, halflife_s, stick):
+def path_from(root, path):
+    """The path that a character wishes for whose root is there, and whose body stands at the origin, where the path begins."""
+    schema = parts()[0]
+    row = begun(schema.ways, motion.Steered())
+    row[0, N_NUMBERS : N_NUMBERS + 3] = root
+    wished = wished_along(schema, row, path, np.zeros((1, schema.n_features)))[0][0]
+    return motion.Trajectory(wished.rate, wished.positions[wished.now :], wished.headings[wished.now :])
+
+
+@given(st.tuples(st.floats(-2, 2), st.floats(-2, 2), st.floats(-0.78, 0.78)), st.tuples(st.floats(-2, 2), st.floats(-2, 2)))
+def test_a_path_from_a_root_begins_there_and_comes_to_the_body_s_path_without_a_step(root, stick):
     path = steered_path([motion.Steered(velocity=(0.0, 1.0))], stick, reach_s=12.0, rate=300.0)
-    found = path_from(root, path, halflife_s=halflife_s)
+    found = path_from(root, path)
     apart = np.column_stack((found.positions - path.positions, found.headings - path.headings))
     assert apart[0] == pytest.approx(root, abs=1e-9)
     np.testing.assert_allclose(apart[-1], 0.0, atol=1e-3)
@@ -369,7 +374,9 @@ def test_a_character_that_faces_far_away_is_told_to_be_45_degrees_away():
 
 def test_a_body_that_is_where_its_root_is_keeps_its_path():
     path = steered_path([motion.Steered()], (0.0, 1.0))
-    assert path_from((0.0, 0.0, math.tau), path) is path
+    found = path_from((0.0, 0.0, math.tau), path)
+    assert np.array_equal(found.positions, path.positions)
+    assert np.array_equal(found.headings, path.headings)
 
 
 def test_what_lies_behind_is_where_the_animation_was():
@@ -422,6 +429,24 @@ def test_a_crowd_of_one_table_plays_what_each_plays_alone(tables):
         each = [one.update(DT, stick, gait(stick)) for one, stick in zip(alone, sticks, strict=True)]
         assert_same_poses(together, each)
         assert [one.decision.why for one in together] == [one.decision.why for one in each]
+
+
+@pytest.mark.parametrize(
+    ("sticks", "facing", "message"),
+    [
+        ([[0.0, 1.0]], None, r"the sticks have shape \(1, 2\)\. Accepted: \(2, 2\), x and z for each character"),
+        ([[0.0, 1.0], [np.nan, 0.0]], None, r"the velocity \[nan, 0.0\] is asked of character 1. Accepted: numbers from -1e\+09"),
+        (np.zeros((2, 2)), np.zeros(3), r"the facing has shape \(3,\)"),
+        (np.zeros((2, 2)), [np.inf, 0.0], "the facing inf is asked of character 0. Accepted: radians"),
+        ("north", None, "sticks"),
+    ],
+)
+def test_a_stick_or_facing_of_a_crowd_that_is_none_is_refused_with_its_character(sticks, facing, message):
+    crowd = motion.Crowd([character() for _ in range(2)])
+    states = crowd.states
+    with pytest.raises(cdb.ContextDBError, match=message):
+        crowd.update(DT, sticks, {"gait": "Walk"}, facing)
+    assert crowd.states == states
 
 
 def test_a_crowd_goes_back_to_its_states():

@@ -59,6 +59,18 @@ def test_one_child_reads_many_files(child: ParserProcess):
     assert first is child.child
 
 
+def test_after_many_bytes_another_child_reads(child: ParserProcess, monkeypatch: pytest.MonkeyPatch):
+    raw = fbx(BODY)
+    monkeypatch.setattr(parser_process, "MOST_SENT", 2 * len(raw))
+    children = []
+    for _ in range(6):
+        child.worlds(raw, 0, "walk.fbx")
+        children.append(child.child)
+    assert children[0] is children[1] is children[2]
+    assert children[2] is not children[3]
+    assert children[3] is children[4] is children[5]
+
+
 def test_a_child_that_dies_is_one_fault_of_that_file_and_the_next_is_read(odd_library: Path, child: ParserProcess):
     for _ in range(2):
         with pytest.raises(motion.ClipError, match=r"walk\.fbx: the process that read the file ended \(exit code 11\)"):
@@ -78,6 +90,19 @@ def test_a_silent_child_is_given_up(odd_library: Path, child: ParserProcess, mon
         child.worlds(b"sleep", 0, "walk.fbx")
     assert child.child is None
     assert not folder.exists()
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="whether a process sleeps is not known here")
+def test_a_child_that_sleeps_on_a_file_is_given_up_long_before(
+    odd_library: Path, child: ParserProcess, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(parser_process, "SILENCE_S", 500.0)
+    monkeypatch.setattr(parser_process, "STILL_S", 0.2)
+    for _ in range(2):
+        with pytest.raises(motion.ClipError, match=r"walk\.fbx: the file was read for too long"):
+            child.worlds(b"sleep", 0, "walk.fbx")
+    with pytest.raises(motion.ClipError, match="no scene"):
+        child.worlds(b"live", 0, "walk.fbx")
 
 
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="what a process works is not limited here")

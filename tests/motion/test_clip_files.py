@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from clip_files import BODY, SMPL_OFFSETS, Moving, amass, binary_fbx, fbx, gltf, usda, usdc
+from clip_files import BODY, SMPL_OFFSETS, Moving, amass, binary_fbx, fbx, gltf, skinned, usda, usdc
 from made_once import make_clip
 from running import run
 from strategies import some
@@ -330,6 +330,15 @@ def test_takes_of_an_fbx_are_clips_and_helpers_are_left_out(walk: motion.Clip, t
     assert clips[0].notes == ('1 node beside the body left out: "LeftFootCtrl".',)
     for clip in clips:
         same_joints(walk, clip)
+
+
+def test_an_fbx_with_a_skin_is_the_clip_without(walk: motion.Clip, tmp_path: Path):
+    body = Moving.of(walk)
+    for name in "abc":
+        (tmp_path / f"{name}.fbx").write_bytes(skinned(fbx(body, helper="LeftFootCtrl"), body))
+    for clip in motion.load_clips([tmp_path / f"{name}.fbx" for name in "abc"]):
+        same_joints(walk, clip)
+        assert clip.notes == ('1 node beside the body left out: "LeftFootCtrl".',)
 
 
 def test_a_small_file_means_no_endless_clip(tmp_path: Path):

@@ -11,7 +11,7 @@ from lines import DT, RATE, line
 from made_once import make_clip
 
 from contextdb.errors import MotionError, QueryError
-from contextdb.motion import Entry, FeatureSchema, MotionDatabase, Selector
+from contextdb.motion import Entry, FeatureSchema, MotionDatabase, Selector, query_from, steady_path, with_path
 from contextdb.motion.answers import NamedAssets
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.markup.marks import TagFilter
@@ -450,3 +450,16 @@ def test_where_nothing_else_may_play_an_asset_that_is_barred_is_held():
     one = controller(line(walk=range(3)), asset_history_s=0.5)
     actions = [one.update(DT, [0.0]).action for _ in range(8)]
     assert actions == [Action.START, Action.CONTINUE, Action.CONTINUE, *[Action.HOLD] * 4, Action.JUMP]
+
+
+def test_what_was_entered_just_now_is_left_at_once_when_the_body_is_to_stand():
+    ways = [{"type": "trajectory", "what": "position", "at": [0.33, 0.67, 1.0]}]
+    schema = FeatureSchema.from_dict("ways", {"rate": 30.0, "channels": [{"type": "velocity", "bone": "Hips"}, *ways]})
+    database = MotionDatabase.build([make_clip(name).clip for name in ("idle", "jog", "walk")], schema)
+    one = Controller(Selector([Entry("a", database)]), ControllerSettings(settle_bias=-1000.0, settle_s=100.0, min_play_rate=1.0))
+
+    def played_along(pose, speed_mps):
+        query = with_path(schema, query_from(schema, make_clip(pose).clip, 20), steady_path(speed_mps))
+        return [one.update(1 / 30, query).playing.asset for _ in range(12)][-1]
+
+    assert [played_along("jog", 2.6), played_along("walk", 1.3), played_along("idle", 0.0)] == ["jog", "jog", "idle"]

@@ -13,7 +13,6 @@ from strategies import examples
 import contextdb as cdb
 from contextdb.errors import ContextError, MotionError, QueryError
 from contextdb.motion import Entry, Selector, Steered
-from contextdb.motion.clips.many_steered import ManySteered
 from contextdb.motion.markup.marks import TagFilter
 from contextdb.motion.selection.controller import Controller
 from contextdb.motion.selection.controller_group import ControllerGroup
@@ -227,7 +226,7 @@ def test_the_bodies_of_a_crowd_are_recorded_each_with_its_own_character():
     group = ControllerGroup([one_on(Selector([Entry("a", line(walk=range(10)))])) for _ in range(2)])
     at_left, at_right = Steered(position=(1.0, 2.0), heading=0.5), Steered(position=(-1.0, 4.0))
     places = [(1.0, 2.0, 0.5), (-1.0, 4.0, 0.0)]
-    for body in (ManySteered.of([at_left, at_right]), [at_left, at_right], places, np.array(places)):
+    for body in ([at_left, at_right], places, np.array(places)):
         assert [d.body for d in group.update(DT, [[0.0], [3.0]], body=body)] == places
     assert [d.body for d in group.update(DT, [[0.0], [3.0]], body=[None, at_left])] == [None, places[0]]
     assert [d.body for d in group.update(DT, [[0.0], [3.0]])] == [None, None]

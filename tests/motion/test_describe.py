@@ -241,7 +241,8 @@ def test_progress_tells_of_each_clip():
         (["clips/a.bvh", "clips/b.bvh"], set(), ["clips/*.bvh"]),
         (["x/a.bvh"], {"y/a.bvh"}, ["x/*.bvh"]),
         (["c/01.bvh", "c/02.bvh"], {"c/131.bvh"}, ["c/0*.bvh"]),
-        (["c/a.bvh", "c/ab.bvh"], {"c/abc.bvh"}, ["c/a.bvh", "c/ab.bvh"]),
+        (["c/a.bvh", "c/ab.bvh"], {"c/abc.bvh"}, ["c/{a.bvh,ab.bvh}"]),
+        (["c/a,.bvh", "c/a,b.bvh"], {"c/a,bc.bvh"}, ["c/a,.bvh", "c/a,b.bvh"]),
         (["c/[a].bvh"], {"c/b.bvh"}, ["c/[[]*.bvh"]),
         (["a.bvh"], {"c/b.bvh"}, ["*.bvh"]),
     ],
@@ -260,4 +261,4 @@ def test_a_clip_that_is_too_far_away_is_refused():
 def test_files_of_several_formats_share_a_pattern():
     paths = ["clips/a.bvh", "clips/b.fbx", "clips/c.glb", "more/d.bvh"]
     assert patterns_of(paths, set()) == ["clips/*.{bvh,fbx,glb}", "more/*.bvh"]
-    assert patterns_of(paths[:2], {"clips/cc.fbx"}) == ["clips/a*.bvh", "clips/b*.fbx"]
+    assert patterns_of(paths[:2], {"clips/cc.fbx"}) == ["clips/{a*.bvh,b*.fbx}"]

@@ -14,18 +14,15 @@ FALLS = Footfalls(4.0, {"LeftFoot": np.array([[0.0, 1.0], [2.0, 3.0]]), "RightFo
 
 
 @pytest.mark.parametrize(
-    ("time_s", "is_down", "until_s", "share"),
-    [(0.0, True, 1.0, 0.0), (0.25, True, 0.75, 0.25), (1.5, False, 0.5, 0.5), (2.0, True, 1.0, 0.0), (3.5, False, math.inf, 0.5)],
+    ("time_s", "is_down", "share"), [(0.0, True, 0.0), (0.25, True, 0.25), (1.5, False, 0.5), (2.0, True, 0.0), (3.5, False, 0.5)]
 )
-def test_a_foot_tells_whether_it_is_down_until_when_and_how_far_through(time_s, is_down, until_s, share):
+def test_a_foot_tells_whether_it_is_down_and_how_far_through(time_s, is_down, share):
     assert FALLS.is_down("LeftFoot", time_s) is is_down
-    assert FALLS.until_change_s("LeftFoot", time_s) == until_s
     assert FALLS.share_of_state("LeftFoot", time_s) == pytest.approx(share)
 
 
 def test_a_foot_that_never_comes_down_is_up_for_the_whole_clip():
     assert not FALLS.is_down("RightFoot", 2.0)
-    assert FALLS.until_change_s("RightFoot", 2.0) == math.inf
     assert FALLS.share_of_state("RightFoot", 1.0) == 0.25
 
 

@@ -1,25 +1,18 @@
-"""The bodies, paths and queries of a crowd are those of its characters one by one."""
-
-import math
+"""The paths and queries of a crowd are those of its characters one by one."""
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
 from strategies import examples
 
-from contextdb.errors import MotionError, QueryError
+from contextdb.errors import QueryError
 from contextdb.motion import FeatureSchema, Trajectory, with_path
 from contextdb.motion.clips.many_paths import ManyTrajectories
-from contextdb.motion.clips.many_steered import ManySteered, steered_paths
-from contextdb.motion.clips.steering import Steered, steered_path
 from contextdb.motion.features.extraction import trajectory_features
 from contextdb.motion.features.path_features import with_paths, write_paths
 
 WHATS = ("position", "direction", "velocity", "direction_to_velocity", "speed")
-SIZES = st.floats(-20.0, 20.0)
-PAIRS = st.tuples(SIZES, SIZES)
-BODIES = st.builds(Steered, PAIRS, PAIRS, PAIRS, SIZES, SIZES, st.sampled_from([0.1, 0.27]), st.sampled_from([0.1, 0.27]))
 
 
 @st.composite
@@ -71,45 +64,6 @@ def test_the_features_of_a_wished_path_are_those_that_a_database_has_of_it(schem
     assert np.array_equal(with_path(schema, pose[0], path), found[0])
 
 
-@given(st.lists(st.tuples(BODIES, PAIRS, SIZES), max_size=4), st.booleans(), st.floats(0.0, 1.0))
-def test_the_bodies_of_a_crowd_move_as_each_alone(drawn, is_facing, dt_s):
-    bodies, wanted, facing = ([each[i] for each in drawn] for i in range(3))
-    assume(all(_is_clear(*each, is_facing) for each in drawn))
-    sticks = np.array(wanted).reshape(-1, 2)
-    moved = ManySteered.of(bodies).moved(dt_s, sticks, facing if is_facing else None)
-    assert list(moved) == [moved[i] for i in range(len(bodies))]
-    for i, body in enumerate(bodies):
-        alone, own = body.moved(dt_s, wanted[i], facing[i] if is_facing else None), moved[i]
-        assert (own.velocity_halflife_s, own.heading_halflife_s) == (alone.velocity_halflife_s, alone.heading_halflife_s)
-        assert (own.heading, own.turn_rate) == pytest.approx((alone.heading, alone.turn_rate), rel=1e-9, abs=1e-9)
-        for name in ("position", "velocity", "acceleration"):
-            assert getattr(own, name) == pytest.approx(getattr(alone, name), rel=1e-9, abs=1e-9)
-
-
-@given(st.lists(st.tuples(BODIES, PAIRS, SIZES), min_size=1, max_size=4), st.integers(1, 5), st.floats(0.0, 1.5))
-def test_the_paths_of_a_crowd_are_those_of_each_alone(drawn, n_moments, reach_s):
-    bodies, wanted, _ = ([each[i] for each in drawn] for i in range(3))
-    past, pasts = [ManySteered.of(bodies)], [[body] for body in bodies]
-    for _ in range(n_moments - 1):
-        past.append(past[-1].moved(1.0 / 30.0, wanted))
-        pasts = [[*own, past[-1][i]] for i, own in enumerate(pasts)]
-    assume(all(_is_clear(own[-1], stick, 0.0, False) for own, stick in zip(pasts, wanted, strict=True)))
-    paths = steered_paths(past, wanted, reach_s=reach_s)
-    assert len(paths) == len(bodies)
-    for i, own in enumerate(pasts):
-        alone = steered_path(own, wanted[i], reach_s=reach_s)
-        assert (paths[i].rate, paths[i].now) == (alone.rate, alone.now)
-        assert paths[i].positions == pytest.approx(alone.positions, rel=1e-9, abs=1e-9)
-        assert paths[i].headings == pytest.approx(alone.headings, rel=1e-9, abs=1e-9)
-
-
-def _is_clear(body, wanted, facing, is_facing):
-    """Whether rounding cannot decide which way the body turns, or whether it stands."""
-    goal = facing if is_facing else math.atan2(*wanted)
-    is_standing_sure = is_facing or abs(math.hypot(*wanted) - 0.1) > 1e-6
-    return is_standing_sure and abs(abs(math.remainder(goal - body.heading, 2.0 * math.pi)) - math.pi) > 1e-6
-
-
 def test_paths_of_different_shapes_are_no_crowd():
     short, long = (Trajectory(30.0, np.zeros((n, 2)), np.zeros(n)) for n in (3, 4))
     with pytest.raises(QueryError, match=r"path 1 has 4 frames at 30 a second.* Accepted: as path 0: 3 frames"):
@@ -127,25 +81,3 @@ def test_each_query_needs_its_path():
         with_paths(schema, np.zeros((2, 1)), [path])
     with pytest.raises(QueryError, match="a path for each query of 1 feature"):
         with_paths(schema, np.zeros((1, 3)), [path])
-
-
-def test_sticks_that_fit_no_crowd_are_refused():
-    bodies = ManySteered.of([Steered()] * 2)
-    with pytest.raises(MotionError, match=r"the velocities that are requested have shape \(1, 2\)"):
-        bodies.moved(0.1, [[0.0, 1.0]])
-    with pytest.raises(MotionError, match=r"the facing has shape \(3,\)"):
-        bodies.moved(0.1, np.zeros((2, 2)), np.zeros(3))
-    with pytest.raises(MotionError, match="there is no body to steer"):
-        steered_paths([], np.zeros((0, 2)))
-    with pytest.raises(MotionError, match="different numbers of bodies"):
-        steered_paths([bodies, ManySteered.of([Steered()])], [[0.0, 1.0]])
-
-
-def test_a_stick_or_facing_that_is_no_number_is_refused_with_its_body():
-    bodies = ManySteered.of([Steered()] * 2)
-    with pytest.raises(
-        MotionError, match=r"the velocity \[nan, 0.0\] is asked of body 1. Accepted: numbers from -1e\+09 to 1e\+09"
-    ):
-        bodies.moved(0.1, [[0.0, 1.0], [np.nan, 0.0]])
-    with pytest.raises(MotionError, match=r"the facing inf is asked of body 0. Accepted: radians"):
-        bodies.moved(0.1, [[0.0, 1.0]] * 2, [np.inf, 0.0])

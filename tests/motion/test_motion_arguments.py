@@ -13,11 +13,10 @@ from strategies import some
 
 from contextdb import motion
 from contextdb.errors import ContextDBError
-from contextdb.motion.characters.paths import path_ahead, path_from
+from contextdb.motion.characters.paths import path_ahead
 from contextdb.motion.clips.clip import parse_bvh
 from contextdb.motion.clips.doubts import doubts_of
 from contextdb.motion.clips.feet import footfalls
-from contextdb.motion.clips.many_steered import ManySteered, steered_paths
 from contextdb.motion.clips.mirror import partners_of
 from contextdb.motion.clips.poses import forward_kinematics, local_poses
 from contextdb.motion.clips.steering import steered_path
@@ -65,7 +64,6 @@ RECORDED = motion.Trace(2)
 motion.Controller(SELECTOR, recorder=RECORDED).update(0.1, QUERY)
 REASKED = RECORDED.reasked()
 STEERED = [motion.Steered()]
-MANY_STEERED = ManySteered.of(STEERED)
 CONFIG = motion.MotionConfig()
 FALLS = footfalls(CLIP)
 LIVE = motion.LivePose(motion.poses_of(CLIP).positions[0], local_poses(CLIP).rotations[0])
@@ -116,7 +114,6 @@ CALLS = [
     lambda: partial(motion.with_path, SCHEMA, PARTS[0].features[0], PATH),
     lambda: partial(motion.steady_path, 1.0),
     lambda: partial(steered_path, STEERED, (0.0, 1.0)),
-    lambda: partial(steered_paths, [MANY_STEERED], [(0.0, 1.0)]),
     lambda: partial(with_paths, SCHEMA, PARTS[0].features[:1], [PATH]),
     lambda: partial(motion.build, CONFIG, "none"),
     lambda: partial(build_all, folder="none"),
@@ -214,8 +211,6 @@ CALLS = [
     lambda: partial(DATABASE.raw_many),
     lambda: partial(SELECTOR.search_many, [QUERY]),
     lambda: partial(motion.ControllerGroup),
-    lambda: partial(ManySteered.of),
-    lambda: partial(MANY_STEERED.moved, 0.1, [(0.0, 1.0)]),
     lambda: partial(DATABASE.raw),
     lambda: partial(DATABASE.frame_at, time_s=0.1),
     lambda: partial(SELECTOR.candidates, QUERY),
@@ -236,7 +231,6 @@ CALLS = [
     lambda: partial(path_ahead, BUILT, DECISION.playing, (0, 0, 0)),
     lambda: partial(PLAYER.restore),
     lambda: partial(motion.Readout().update, PLAYER.copy().update(0.1), 0),
-    lambda: partial(path_from, (0.0, 0.0, 0.0), PATH),
     lambda: partial(motion.Crowd),
     lambda: partial(motion.Crowd().add),
     lambda: partial(motion.Crowd().remove),

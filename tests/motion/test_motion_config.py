@@ -94,7 +94,7 @@ def test_every_key_of_a_database_is_read():
 
 def test_a_database_is_not_mirrored_and_cannot_be_entered_near_the_ends_of_clips_unless_it_says_so():
     settings = MotionConfig.from_dict(SECTIONS).database("jog")
-    assert (settings.mirror, settings.markup, settings.end_s, settings.weights) == (False, None, 0.3, {})
+    assert (settings.mirror, settings.markup, settings.end_s, settings.weights) == (False, None, 0.6, {})
     assert (settings.base_bias, settings.looping_bias, settings.continuing_bias) == (0.0, -0.01, -0.1)
 
 

@@ -13,7 +13,6 @@ from played import NAMES, RATE, bank, decisions, playing_at
 
 from contextdb.errors import ContextError, MotionError
 from contextdb.motion import Action, Decision, PoseSettings, PoseStream, PoseStreams, Steered
-from contextdb.motion.clips.many_steered import ManySteered
 
 STEP = 1.0 / RATE
 N_TICKS = 12
@@ -119,7 +118,7 @@ def walks(n):
 def test_a_ground_of_arrays_is_that_of_its_places():
     one, each = (PoseStreams([PoseStream(bank()) for _ in range(3)]) for _ in range(2))
     for i, decided in enumerate(zip(*walks(3), strict=True)):
-        bodies = ManySteered.of([Steered(position=(k, 1.2 * i * STEP)) for k in range(3)])
+        bodies = [Steered(position=(k, 1.2 * i * STEP)) for k in range(3)]
         arrays = one.update(decided, STEP if i else 0.0, bodies, many_stairs)
         functions = each.update(decided, STEP if i else 0.0, bodies, [stairs] * 3)
         np.testing.assert_allclose(arrays.positions, functions.positions, atol=1e-12)

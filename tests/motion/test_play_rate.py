@@ -1,10 +1,8 @@
 """The play rate of a controller: as fast as the query asks for, within limits, and known to all that follows."""
 
-import math
 from functools import cache
 from itertools import pairwise
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -161,10 +159,3 @@ def test_a_session_keeps_the_rate_and_shows_it(tmp_path):
     again = Trace.load(tmp_path / "session.parquet")
     assert [each.play_rate for each in again] == [each.play_rate for each in made]
     assert any("play rate" in line for line in decision_lines(again[1]))
-
-
-def test_a_database_says_how_fast_the_path_of_a_frame_goes():
-    x, z = database().raw(3)[SCHEMA.speed_features[0]].tolist()
-    assert [database().path_speed(3)] * 2 == [math.hypot(x, z) / 0.5, database().path_speed(3)]
-    plain = MotionDatabase.from_features(np.zeros((2, 1)), [0], [2], ["a"])
-    assert plain.path_speed(0) is None

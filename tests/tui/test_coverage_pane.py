@@ -126,13 +126,13 @@ def test_the_one_cell_that_would_close_a_gap_stands_in_its_line():
 
 def test_enter_on_a_gap_asks_for_a_new_row_of_its_cells():
     app, _ = shown(keys=("enter",))
-    assert app.told == [FillGap({"speed": "(5..10]"})]
+    assert app.told == [FillGap({"speed": "(5..10]"}, below=0)]
 
 
 def test_a_gap_with_open_ends_is_filled_with_a_cell_as_people_write_it():
     free = cdb.Table.from_columns({"Asset": ["a"], "speed": ["0.5..3"]}, schema={"speed": {"type": "number"}})
     app, screen = shown(of=free, keys=("enter",))
-    assert app.told == [FillGap({"speed": "<0.5 | >3"})]
+    assert app.told == [FillGap({"speed": "<0.5 | >3"}, below=0)]
     assert "speed: <0.5 | >3" in screen
     assert [as_typed(cell) for cell in ("..0.5) | (3..4]", "(3..", "-5..5", "..x)")] == ["<0.5 | (3..4]", ">3", "-5..5", "..x)"]
 

@@ -114,6 +114,16 @@ def test_the_row_for_a_gap_is_named_where_it_stands_also_when_one_was_in_the_tes
     assert with_editor(path, script) == ("new", "False", {"hit": "True"})
 
 
+def test_the_row_for_a_gap_comes_below_the_one_that_is_nearest_to_it(path):
+    async def script(app, pilot):
+        last = app.main.session.sheet.table.n_rows - 1
+        app.main.post_message(FillGap({"hit": "False"}, below=last))
+        await press(pilot, *"new", "enter")
+        return app.main.session.sheet.table.assets[last + 1]
+
+    assert with_editor(path, script) == "new"
+
+
 def test_a_row_inserted_from_the_test_row_is_where_one_types_next(path):
     async def script(app, pilot):
         await press(pilot, "f6", "ctrl+n", "home", *"new", "enter")

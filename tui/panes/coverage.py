@@ -442,24 +442,22 @@ class CoveragePane(Pane):
         event.stop()
         place = self._place(event.list.id or "", event.index)
         if place is not None and event.list.id in OF_GAPS:
-            self._fill_gap(place.cells or {})
+            self._fill_gap(place.cells or {}, place.nearest)
         elif place is not None and place.rows:
             self._go_to(place.rows[0], place.column)
 
-    def _fill_gap(self, cells: Mapping[str, str]) -> None:
+    def _fill_gap(self, cells: Mapping[str, str], nearest: Nearest | None) -> None:
+        """Ask for a row of these cells, below the one that comes nearest to them."""
         conditions = {c.condition.name: c.condition for c in self.sheet.table.conditions}
         gone = cells.keys() - conditions.keys()
-        if gone and self.sheet.query.is_nested:
-            self.post_message(
-                Notice(f"{in_quotes(min(gone))} is a condition of a table inside: a row for the gap belongs there.", "warning")
-            )
-        elif gone:
-            self.post_message(
-                Notice(f"{in_quotes(min(gone))} is not a condition any more. R measures the coverage again.", "warning")
-            )
+        if gone:
+            inside = "is a condition of a table inside: a row for the gap belongs there."
+            why = inside if self.sheet.query.is_nested else "is not a condition any more. R measures the coverage again."
+            self.post_message(Notice(f"{in_quotes(min(gone))} {why}", "warning"))
         else:
             is_number = {name: conditions[name].domain.type.is_numeric for name in cells}
-            self.post_message(FillGap({name: lines.as_typed(cell) if is_number[name] else cell for name, cell in cells.items()}))
+            typed = {name: lines.as_typed(cell) if is_number[name] else cell for name, cell in cells.items()}
+            self.post_message(FillGap(typed, None if nearest is None else nearest.row))
 
     def _go_to(self, row: int, column: str | None = None) -> None:
         if self.run.state == "stale" and row >= self.sheet.table.n_rows:

@@ -400,6 +400,8 @@ class MainScreen(TableScreen):
     @on(FillGap)
     def _fill_gap(self, event: FillGap) -> None:
         sheet = self.session.sheet
+        if event.below is not None and event.below < sheet.table.n_rows:
+            self.go_to_cell(GoToCell(event.below, sheet.table.asset_column))
         done = sheet.insert_rows(below=True, texts=[dict(event.cells)])
         self.edited(Edited(done))
         self.go_to_cell(GoToCell(sheet.row_number(sheet.cursor[0]) - 1, sheet.table.asset_column))

@@ -378,7 +378,7 @@ class Character:
         if facing is not None:
             require_real(facing, "facing")
         goals = walks.goals_of([stick], [facing])
-        rows, _ = walks.moved(self.schema.ways, self._row, goals, dt, [body])
+        rows = walks.moved(self.schema.ways, self._row, goals, dt, [body])
         return self._step_of(dt, stick, given, facing, rows, goals, body or walks.body_of(rows))
 
     def _step_of(

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from contextdb.cells.arguments import require_kind, require_many_of, require_mapping, require_real
+from contextdb.cells.arguments import MOST, require_kind, require_many_of, require_mapping, require_numbers, require_real
 from contextdb.cells.sequences import ListSequence
 from contextdb.errors import ContextError, Fault, MotionError, in_quotes, plural
 from contextdb.motion.characters import tables as asking
@@ -21,7 +21,6 @@ from contextdb.motion.characters import walks
 from contextdb.motion.characters.character import Character
 from contextdb.motion.characters.tables import Facts, Table
 from contextdb.motion.characters.updates import Step, Updated
-from contextdb.motion.clips.many_steered import ManySteered
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.output.pose import Pose
 from contextdb.motion.output.stream import PoseStream, root_of
@@ -115,10 +114,8 @@ class Crowd(ListSequence[Character]):
         schema = self[0].schema
         if any(character.schema is not schema and character.schema != schema for character in self):
             raise MotionError(Fault("the characters have different features.", "characters of one feature schema"))
-        bodies = ManySteered.of([character.body for character in self])
-        goals, given = bodies.goals(sticks, facing), _facts_of_each(facts, len(self))
-        rows = np.concatenate([character._row for character in self])
-        rows, _ = walks.moved(schema.ways, rows, goals, dt, [None] * len(self))
+        goals, given = _goals(sticks, facing, len(self)), _facts_of_each(facts, len(self))
+        rows = walks.moved(schema.ways, np.concatenate([character._row for character in self]), goals, dt)
         steps, each = [], zip(self, given, walks.bodies_of(rows), goals.tolist(), strict=True)
         for i, (character, own, body, (x, z, heading)) in enumerate(each):
             wanted = None if math.isnan(heading) else heading
@@ -219,6 +216,22 @@ def _answers(table: Table, facts: Sequence[Facts], unknown: Any) -> Any:
 def _moves_body(character: Character, decision: Decision) -> bool:
     """Whether the animation moves the body of a character."""
     return character.stream is not None and root_of(decision, character.stream.settings) == "animation"
+
+
+def _goals(sticks: ArrayLike, facing: ArrayLike | None, n: int) -> Floats:
+    """The velocities and headings that n sticks ask for, checked: [n, 3], NaN where no heading is asked for."""
+    velocities = require_numbers(sticks, "sticks")
+    if velocities.shape != (n, 2):
+        raise MotionError(Fault(f"the sticks have shape {velocities.shape}.", f"{(n, 2)}, x and z for each character"))
+    if (unfit := np.flatnonzero(~(np.abs(velocities) <= MOST).all(axis=1))).size:
+        problem = f"the velocity {velocities[unfit[0]].tolist()} is asked of character {unfit[0]}."
+        raise MotionError(Fault(problem, f"numbers from {-MOST:g} to {MOST:g}"))
+    headings = np.full(n, walks.UNKNOWN) if facing is None else require_numbers(facing, "facing")
+    if headings.shape != (n,):
+        raise MotionError(Fault(f"the facing has shape {headings.shape}.", f"{(n,)}, a heading for each character"))
+    if facing is not None and (unfit := np.flatnonzero(~np.isfinite(headings))).size:
+        raise MotionError(Fault(f"the facing {headings[unfit[0]]} is asked of character {unfit[0]}.", "radians"))
+    return np.column_stack((velocities, headings))
 
 
 def _facts_of_each(facts: object, n: int) -> list[Facts]:

@@ -1,8 +1,4 @@
-"""Paths that begin where a character is: to the path of the game's body, and where the clip that plays leads.
-
-The animation is rarely where the game has the body. A search that knows only the body's path never learns of that; told where the
-root really is, it prefers frames that lead back.
-"""
+"""The path ahead of a character: where the clip that plays leads."""
 
 from __future__ import annotations
 
@@ -11,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from contextdb.cells.arguments import require_kind, require_real
-from contextdb.core import return_path
 from contextdb.errors import ContextError, Fault, MotionError
 from contextdb.motion.clips.trajectory import Trajectory
 from contextdb.motion.output.samples import Place3
@@ -19,30 +14,8 @@ from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.decision import Playing
 from contextdb.motion.selection.root_motion import RootMotion, between
 
-RETURN_HALFLIFE_S = 0.27
-"""How fast a character is wished to come to the path of the body; as fast as a body follows a stick."""
 MOST_AHEAD_S = 3600.0
 A_PLACE = "x and z in metres and a heading in radians"
-
-
-def path_from(root: Sequence[float], path: Trajectory, *, halflife_s: float = RETURN_HALFLIFE_S) -> Trajectory:
-    """The path that a character is wished to take which is not where the game has the body: from its root, such as `Pose.root`, to
-    the body's path, such as `steered_path` gives it; its frame `now` is where the body is.
-
-    What lies between the two decays as a critically damped spring does, without a step in place or velocity. Headings are at most
-    45 degrees apart. Raises ContextError where `root` is no place, `path` is none, or `halflife_s` is no number above 0.
-    """
-    require_kind(path, Trajectory, "path", "a Trajectory, such as steered_path gives")
-    require_real(halflife_s, "halflife_s", 0.001, 60.0)
-    positions, headings = (np.array(each, np.float64, order="C") for each in (path.positions, path.headings))
-    place = np.array(place_of(root, "root"))
-    is_changed = return_path(place, path.rate, halflife_s, positions[path.now :], headings[path.now :])
-    if not is_changed:
-        return path
-    now = path.now
-    positions[:now] += positions[now] - path.positions[now]
-    headings[:now] += headings[now] - path.headings[now]
-    return Trajectory(path.rate, positions, headings, now)
 
 
 def path_ahead(database: MotionDatabase, playing: Playing, root: Sequence[float], seconds: float = 0.5) -> Trajectory:

@@ -69,14 +69,13 @@ def goals_of(sticks: Sequence[Ground], facings: Sequence[float | None]) -> Float
     return np.array([(*stick, UNKNOWN if facing is None else facing) for stick, facing in each], np.float64)
 
 
-def moved(ways: Ways, rows: Floats, goals: Floats, dt_s: float, bodies: Sequence[Steered | None]) -> tuple[Floats, Floats]:
-    """Characters some time later, where the game has not put their bodies itself; and where their animations are [Q, 3]."""
-    after, places = np.empty_like(rows), np.empty((len(rows), 3))
-    given = None
-    if any(body is not None for body in bodies):
+def moved(ways: Ways, rows: Floats, goals: Floats, dt_s: float, bodies: Sequence[Steered | None] = ()) -> Floats:
+    """Characters some time later, where the game has not put their bodies itself."""
+    after, given = np.empty_like(rows), None
+    if any(bodies):
         given = np.array([(UNKNOWN,) * N_NUMBERS if body is None else body.numbers for body in bodies])
-    ways.move(rows, goals, given, dt_s, after, places)
-    return after, places
+    ways.move(rows, goals, given, dt_s, after)
+    return after
 
 
 def wished(schema: FeatureSchema, rows: Floats, goals: Floats, poses: Floats) -> tuple[ManyTrajectories, Floats]:

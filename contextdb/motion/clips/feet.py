@@ -8,7 +8,6 @@ down or up, how long is it till the next transition, and what fraction of the wa
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -60,12 +59,6 @@ class Footfalls:
         """Whether the foot is down."""
         intervals = self._of(foot)
         return bool(((intervals[:, 0] <= time_s) & (time_s <= intervals[:, 1])).any())
-
-    def until_change_s(self, foot: str, time_s: float) -> float:
-        """Seconds until the foot next comes down or goes up; infinite when it does neither before the clip ends."""
-        later = self._changes(foot)
-        later = later[later > time_s]
-        return float(later[0]) - time_s if len(later) else math.inf
 
     def share_of_state(self, foot: str, time_s: float) -> float:
         """How much of the time for which the foot is now down, or now up, has passed: 0 to 1. The clip's ends count as changes."""

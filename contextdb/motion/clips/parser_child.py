@@ -29,6 +29,10 @@ MOST_MEMORY = 3 << 29
 """Bytes that this process may take with a small file, of which a library needs 1.1e9; a large one so many times its size more."""
 TIMES_MEMORY = 24
 
+HELD: list[Any] = []
+"""What ufbx gave, never to be let go: its binding counts one reference too few of what an object led to when that object goes. The
+process ends before this is much."""
+
 Floats = NDArray[np.float64]
 Tell = Callable[[int, int], None]
 Joints = tuple[list[str], list[int], Any, Any, float, Floats, Floats | None, Floats]
@@ -44,7 +48,6 @@ def fbx(content: bytes, take: int, most: int, tell: Tell) -> Joints:
     """The bones of an FBX file, against their parents."""
     import ufbx
 
-    # Every object is held in a name while others that were taken out of it are used: the binding frees what nobody holds.
     scene = ufbx.load_memory(
         content,
         target_axes=ufbx.axes_right_handed_y_up,
@@ -56,6 +59,7 @@ def fbx(content: bytes, take: int, most: int, tell: Tell) -> Joints:
         node_depth_limit=1000,
     )
     nodes, stacks, settings = list(scene.nodes), list(scene.anim_stacks), scene.settings
+    HELD.extend((scene, nodes, stacks, settings))
     if not stacks:
         raise Refusal("there is no animation.")
     if take >= len(stacks):
@@ -68,8 +72,9 @@ def fbx(content: bytes, take: int, most: int, tell: Tell) -> Joints:
     rest = np.array([of_transform(node.local_transform) for node in nodes]).reshape(-1, 4, 4)
     anim = stack.anim
     baked = ufbx.bake_anim(scene, anim, resample_rate=rate, maximum_sample_rate=rate, max_keyframe_segments=4096)
+    HELD.extend((anim, baked))
     local = fbx_frames(baked, nodes, rest, stack.time_begin + np.arange(n_frames) / rate, tell)
-    bound = fbx_bound(nodes, rest)
+    bound = fbx_bound(nodes, rest, ufbx.get_bone_pose)
     is_joint, deforms = fbx_joints(scene, nodes, ids)
     names = [node.name for node in nodes]
     return names, fbx_parents(nodes, ids), is_joint, deforms, rate, bound if usable(bound) else rest, rest, local
@@ -100,15 +105,15 @@ def fbx_frames(baked: Any, nodes: Sequence[Any], rest: Floats, at: Floats, tell:
     return local
 
 
-def fbx_bound(nodes: Sequence[Any], rest: Floats) -> Floats:
+def fbx_bound(nodes: Sequence[Any], rest: Floats, bone_pose_of: Callable[[Any, Any], Any]) -> Floats:
     """Each node against its parent as skins were bound to it; as it rests where no pose says it."""
     bound = rest.copy()
     for i, node in enumerate(nodes):
         pose = node.bind_pose
-        for bone in list(pose.bone_poses) if pose is not None else []:
-            other = bone.bone_node
-            if other is not None and other.typed_id == node.typed_id:
-                bound[i, :3] = np.array(bone.bone_to_parent, np.float64).T
+        bone = None if pose is None else bone_pose_of(pose, node)
+        HELD.extend((pose, bone))
+        if bone is not None:
+            bound[i, :3] = np.array(bone.bone_to_parent, np.float64).T
     return bound
 
 
@@ -116,7 +121,9 @@ def fbx_joints(scene: Any, nodes: Sequence[Any], ids: Mapping[int, int]) -> tupl
     """Which nodes are joints, and on which of them a skin hangs."""
     is_bone = np.array([node.bone is not None for node in nodes])
     deforms = np.zeros(len(nodes), bool)
-    for cluster in list(scene.skin_clusters):
+    clusters = list(scene.skin_clusters)
+    HELD.append(clusters)
+    for cluster in clusters:
         bone = cluster.bone_node
         if bone is not None and cluster.num_weights and bone.typed_id in ids:
             deforms[ids[bone.typed_id]] = True

@@ -20,6 +20,7 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from time import monotonic
 from typing import IO, Any
 
 import numpy as np
@@ -31,12 +32,16 @@ from contextdb.motion.clips.joint_worlds import JointWorlds
 CHILD = Path(__file__).with_name("parser_child.py")
 SILENCE_S = 20.0
 """So long a child may say nothing of a small file, on a machine that does other things too."""
+STILL_S = 2.0
+"""So long a child may sleep that has a whole file to read."""
 BYTES_PER_S = 2e6
 """Of a large file it may be silent so much longer."""
 WORK_S, BYTES_PER_WORK_S = 4.0, 5e4
 """So long it may work on a file, in seconds of CPU, and so many bytes more give it another one: a clip of a minute takes one."""
+MOST_SENT = 1 << 25
+"""Bytes of files after which a new child is started: libraries do not give all memory back."""
 MOST_LINE = 1 << 24
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "PXR_WORK_THREAD_LIMIT")
+THREADS = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PXR_WORK_THREAD_LIMIT": "2"}
 NO_WHEEL = "and none for 3.14 on Windows with x86-64"
 Answer = tuple[dict[str, Any], bytes] | None
 
@@ -50,6 +55,7 @@ class ParserProcess:
         self.folder: TemporaryDirectory[str] | None = None
         self.answers: queue.SimpleQueue[Answer] = queue.SimpleQueue()
         self.turn = threading.Lock()
+        self.n_sent = 0
 
     def worlds(self, content: bytes, take: int, file: str) -> JointWorlds:
         """The joints of a take. Raises ClipError where the file cannot be read, the child dies or is silent, or the library is not
@@ -89,12 +95,15 @@ class ParserProcess:
             self.folder.cleanup()
 
     def _asked(self, content: bytes, take: int) -> tuple[dict[str, Any], bytes]:
+        if self.n_sent > MOST_SENT:
+            self.close()
         child = self._running()
+        self.n_sent += len(content)
         sender = threading.Thread(target=_send, args=(child.stdin, content, take), daemon=True)
         sender.start()
         while True:
             try:
-                answer = self.answers.get(timeout=SILENCE_S + len(content) / BYTES_PER_S)
+                answer = self._answer(child.pid, sender, SILENCE_S + len(content) / BYTES_PER_S)
             except queue.Empty:
                 raise _Lost("the file was read for too long without an answer.") from None
             if answer is None:
@@ -102,13 +111,29 @@ class ParserProcess:
             if "done" not in answer[0]:
                 return answer
 
+    def _answer(self, pid: int, sender: threading.Thread, silence_s: float) -> Answer:
+        """The next answer. Raises queue.Empty after a silence, or where the child has all it needs and sleeps for STILL_S, as one
+        may that gets no more memory."""
+        start = asleep_since = monotonic()
+        before = ""
+        while (now := monotonic()) < start + silence_s:
+            with suppress(queue.Empty):
+                return self.answers.get(timeout=min(STILL_S / 4.0, start + silence_s - now))
+            asleep = "" if sender.is_alive() else _asleep(pid)
+            if not asleep or asleep != before:
+                asleep_since, before = monotonic(), asleep
+            elif monotonic() > asleep_since + STILL_S:
+                break
+        raise queue.Empty
+
     def _running(self) -> subprocess.Popen[bytes]:
         if self.child is None or self.child.poll() is not None:
             self.close()
+            self.n_sent = 0
             self.folder = TemporaryDirectory(prefix="contextdb-", ignore_cleanup_errors=True)
             command = [sys.executable, "-P", str(CHILD), self.kind, self.folder.name]
             # Threads would take memory by the cores of the machine; a library that dies writes a report.
-            alone = {**os.environ, **dict.fromkeys(THREADS, "1"), "TMPDIR": self.folder.name}
+            alone = {**os.environ, **THREADS, "TMPDIR": self.folder.name}
             pipe, nowhere = subprocess.PIPE, subprocess.DEVNULL
             self.child = subprocess.Popen(command, env=alone, stdin=pipe, stdout=pipe, stderr=nowhere)
             self.answers = queue.SimpleQueue()
@@ -118,6 +143,15 @@ class ParserProcess:
 
 class _Lost(Exception):
     """The child gives no answer."""
+
+
+def _asleep(pid: int) -> str:
+    """How long a process has worked, where it sleeps; nothing where it does not, or that is not known here."""
+    try:
+        state, *rest = Path(f"/proc/{pid}/stat").read_text("ascii", "replace").rpartition(")")[2].split()
+    except (OSError, ValueError):
+        return ""
+    return " ".join(rest[10:12]) if state == "S" else ""
 
 
 def _end_of(child: subprocess.Popen[bytes]) -> str:

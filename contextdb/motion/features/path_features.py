@@ -48,7 +48,7 @@ def with_paths(schema: FeatureSchema, queries: ArrayLike, wanted: ManyTrajectori
     queries : float array, shape (Q, N)
         In the schema's units, such as `ControllerGroup.poses` or `MotionDatabase.raw_many` give them.
     wanted : ManyTrajectories, or sequence of Q Trajectory
-        Where each body shall go, such as `steered_paths` gives it; its frame `now` is this moment. Single ones have one rate, one
+        Where each body shall go, such as `steered_path` gives it; its frame `now` is this moment. Single ones have one rate, one
         length and one present.
 
     Returns

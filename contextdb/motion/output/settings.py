@@ -84,11 +84,6 @@ class PoseSettings(Declared, error=MotionError):
     foot_halflife_s: float = _halflife("How fast a foot that was let go returns to the clip.", 0.1)
     foot_radius_m: float = number("How far from the clip's place a foot is let go.", 0.45, 0.0, 10.0, "metres")
 
-    @property
-    def is_warping(self) -> bool:
-        """Whether a body is bent to the way that the game goes."""
-        return self.root != "animation" and (self.path_alignment or self.min_stride < 1.0 or self.max_stride > 1.0)
-
     @classmethod
     def from_dict(cls, mapping: Mapped, *, name: str = "player", file: str | None = None) -> PoseSettings:
         """Read the keys of one `[output.NAME]`; what is not there is as by default. Raises SchemaError with every fault; `file` is

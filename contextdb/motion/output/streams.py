@@ -15,7 +15,6 @@ from contextdb.cells.arguments import require_many_of, require_real
 from contextdb.cells.sequences import ListSequence
 from contextdb.errors import ContextError, Fault, MotionError, Place, plural
 from contextdb.motion.clips.ground_place import OfBody
-from contextdb.motion.clips.many_steered import ManySteered
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.output.ground import MANY_GROUND, Ground, Grounds, ManyGround
 from contextdb.motion.output.pipeline import Rows
@@ -25,7 +24,7 @@ from contextdb.motion.selection.decision import Decision
 
 UNKNOWN = (math.nan, math.nan, math.nan)
 """The place of a body that is not given."""
-OfBodies = ManySteered | Sequence[OfBody | None] | Floats
+OfBodies = Sequence[OfBody | None] | Floats
 
 
 class PoseStreams(ListSequence[PoseStream]):
@@ -83,7 +82,7 @@ class PoseStreams(ListSequence[PoseStream]):
             Such as `ControllerGroup.update` gives them.
         dt : float
             Seconds since the last update, for all.
-        bodies : ManySteered, sequence of N bodies, or float array of shape (N, 3), optional
+        bodies : sequence of N bodies, or float array of shape (N, 3), optional
             Where the game has each body.
         ground : function, or sequence of N functions or None, optional
             A function is asked once for all feet: of arrays x [n] and z [n], the heights [n] and normals [n, 3], or None where all
@@ -127,8 +126,6 @@ class PoseStreams(ListSequence[PoseStream]):
     def _places(self, bodies: OfBodies | None, decisions: Sequence[Decision]) -> Floats | None:
         """Where all bodies are, [N, 3]; None where none is given."""
         roots = [root_of(decision, self._pipeline.settings) for decision in decisions]
-        if isinstance(bodies, ManySteered):
-            bodies = np.column_stack((bodies.positions, bodies.headings))
         if bodies is None:
             for root in roots:
                 checked_place(None, root)

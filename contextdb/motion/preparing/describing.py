@@ -14,12 +14,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from contextdb.cells.arguments import require_callable, require_kind, require_many_of
+from contextdb.disk import MOST_PATTERNS
 from contextdb.errors import ContextError, Fault, MotionError, in_quotes
-from contextdb.motion.clips.clip import Clip
+from contextdb.motion.clips.clip import BY_SIZE, Clip
 from contextdb.motion.clips.mirror import partners_of
 from contextdb.motion.clips.rig import Rig
 from contextdb.motion.preparing.cells_of_clips import CONDITIONS, OUTPUTS, cells_of
 from contextdb.motion.preparing.clip_facts import GAITS, NORMAL, ClipFacts, common_words, facts_of, style_of
+from contextdb.motion.preparing.meeting import Meeting, meetings
 
 RATE = 30.0
 MOST_TURN_DPS = 1080.0
@@ -179,41 +181,61 @@ def _fallback_rank(row: Described) -> tuple[bool, bool, float]:
 
 @dataclass(frozen=True, eq=False)
 class RigClips:
-    """The clips of one rig, with the unit and the axis that their files leave open, and patterns that fit their files alone."""
+    """The clips of one rig, with the unit and the axis that their files leave open, and patterns that fit their files alone. `rig`
+    is the file of the rig on which the others are put."""
 
     clips: Sequence[Clip]
     patterns: Sequence[str]
     roles: tuple[str, ...] = ()
+    rig: str | None = None
 
 
 def by_rig(clips: Sequence[Clip], paths: Sequence[str]) -> list[RigClips]:
-    """The clips of each rig, unit and axis, those of which there are most first; joint clips by their roles behind the others.
-    `paths` are their files, below the folder of contextdb.toml, with "/" between names."""
-    groups = defaultdict[object, list[int]](list)
-    roles_of = {i: tuple(roles) for roles in joint_clips(clips).values() for i in roles.values()}
-    for i, clip in enumerate(clips):
-        groups[clip.skeleton.names, clip.metres_per_unit, clip.up, roles_of.get(i, ())].append(i)
+    """The clips of each rig, with those of others that can be put on it; joint clips by their roles behind the others. `paths` are
+    their files, below the folder of contextdb.toml, with "/" between names."""
+    together, by_roles = meeting_rigs(clips)
     rigs = []
-    for members in sorted(groups.values(), key=lambda members: (members[0] in roles_of, -len(members), members[0])):
+    for met, roles in (*((met, ()) for met in together), *((Meeting((members,)), roles) for roles, members in by_roles)):
+        members = met.members
         own = {paths[i] for i in members}
-        rigs.append(RigClips([clips[i] for i in members], patterns_of(sorted(own), {*paths} - own), roles_of.get(members[0], ())))
+        rig = paths[members[0]] if len(met.rigs) > 1 else None
+        rigs.append(RigClips([clips[i] for i in members], patterns_of(sorted(own), {*paths} - own), roles, rig))
     return rigs
 
 
+def meeting_rigs(clips: Sequence[Clip]) -> tuple[list[Meeting], list[tuple[tuple[str, ...], tuple[int, ...]]]]:
+    """The clips of each rig, unit and axis, those of which there are most first, as they meet; and joint clips by their roles."""
+    groups = defaultdict[tuple[tuple[str, ...], object], list[int]](list)
+    roles_of = {i: tuple(roles) for roles in joint_clips(clips).values() for i in roles.values()}
+    for i, clip in enumerate(clips):
+        groups[roles_of.get(i, ()), (clip.skeleton.names, clip.metres_per_unit, clip.up)].append(i)
+    ordered = sorted(groups.items(), key=lambda group: (-len(group[1]), group[1][0]))
+    alone = [members for (roles, _), members in ordered if not roles]
+    return meetings(clips, alone), [(roles, tuple(members)) for (roles, _), members in ordered if roles]
+
+
 def patterns_of(own: Sequence[str], others: set[str]) -> list[str]:
-    """Patterns of files that fit some paths, and none of some others."""
+    """Patterns of files that fit some paths, and none of some others: one for a folder, where its names can stand in one."""
     folders = defaultdict[tuple[str, str], list[str]](list)
     for path in own:
         folder, _, name = path.rpartition("/")
         stem, dot, ending = name.rpartition(".")
         folders[f"{folder}/" if folder else "", f"{dot}{ending}"].append(stem)
-    endings = defaultdict[str, list[str]](list)
+    names = defaultdict[str, dict[str, list[str]]](dict)
     for (folder, ending), stems in folders.items():
         beside = [path.removeprefix(folder).removesuffix(ending) for path in others if path.startswith(folder)]
         beside = [stem for stem in beside if "/" not in stem]
         for pattern in _parted(stems, beside, ""):
-            endings[f"{_escaped(folder)}{pattern}"].append(_escaped(ending))
-    return [f"{pattern}{_one_of(own)}" for pattern, own in endings.items()]
+            names[_escaped(folder)].setdefault(pattern, []).append(_escaped(ending))
+    return [f"{folder}{pattern}" for folder, own_names in names.items() for pattern in _in_one(own_names)]
+
+
+def _in_one(names: Mapping[str, Sequence[str]]) -> list[str]:
+    """Beginnings of names, each with its endings, as one pattern; as several where names have letters that choose."""
+    every = [f"{pattern}{ending}" for pattern, endings in names.items() for ending in endings]
+    if len(names) > 1 and len(every) <= MOST_PATTERNS and not set("".join(every)) & set("{},"):
+        return [f"{{{','.join(every)}}}"]
+    return [f"{pattern}{_one_of(endings)}" for pattern, endings in names.items()]
 
 
 def _one_of(endings: Sequence[str]) -> str:
@@ -245,6 +267,7 @@ def motion_sections(rigs: Sequence[RigClips], table: str, markup: str | None = N
     for i, rig in enumerate(rigs):
         behind = "" if i == 0 else f"_{i + 1}"
         mirror = mirror_of(rig.clips[0])
+        units = {clip.metres_per_unit for clip in rig.clips}
         sections["features", f"{table}{behind}"] = _features(rig.clips[0], mirror)
         names = [f"{table}{behind}" + ("" if j == 0 else f"_part{j + 1}") for j in range(len(rig.patterns))]
         for name, pattern in zip(names, rig.patterns, strict=True):
@@ -252,9 +275,10 @@ def motion_sections(rigs: Sequence[RigClips], table: str, markup: str | None = N
                 "table": table,
                 "clips": pattern,
                 "features": f"{table}{behind}",
-                "metres_per_unit": rig.clips[0].metres_per_unit,
+                "metres_per_unit": BY_SIZE if len(units) > 1 else rig.clips[0].metres_per_unit,
                 "up": rig.clips[0].up,
                 "mirror": bool(mirror),
+                **({"rig": rig.rig} if rig.rig is not None else {}),
                 **({"root": "feet"} if is_by_feet else {}),
                 **({"markup": markup} if markup is not None else {}),
                 **({"roles": list(rig.roles)} if rig.roles else {}),

@@ -54,15 +54,6 @@ class Searched:
             return None
         return self.schema.permutation_s[range_number % self.n_permutations]
 
-    def in_permutations(self, range_number: int, start: int, stop: int) -> list[tuple[int, int]]:
-        """Frames [start, stop) of a range as each permutation of its clip has them."""
-        n = self.n_permutations
-        if n == 1:
-            return [(start, stop)]
-        length = int(self.stops[range_number] - self.starts[range_number])
-        steps = [(i - range_number % n) * length for i in range(n)]
-        return [(start + step, stop + step) for step in steps]
-
     @cached_property
     def cost_weights(self) -> Floats:
         """What each channel's squared differences are multiplied by in a cost: float64 [C].
@@ -107,17 +98,6 @@ class Searched:
         for frame in numbers[~self.layout.are_in_ranges(numbers)].tolist():
             self._number(frame)
         return self.normalisation.undo(self.layout.take(numbers))
-
-    def path_speed(self, frame: int) -> float | None:
-        """How fast the path of a frame goes, m/s, by the features that say so; None where the schema has none. Cached."""
-        if frame not in self._path_speeds:
-            where = None if self.schema is None else self.schema.speed_features
-            self._path_speeds[frame] = None if where is None else math.hypot(*self.raw(frame)[where[0]].tolist()) / where[1]
-        return self._path_speeds[frame]
-
-    @cached_property
-    def _path_speeds(self) -> dict[int, float | None]:
-        return {}
 
     def time_s(self, hit: Hit) -> float:
         """Seconds from the start of the hit's range to its frame. Raises QueryError for a hit of nothing, and for a database of

@@ -19,7 +19,6 @@ from contextdb.errors import ContextError, Fault, MotionError, Place, QueryError
 from contextdb.motion import arguments
 from contextdb.motion.answers import are_answers
 from contextdb.motion.clips.ground_place import GroundPlace, OfBody, place_of
-from contextdb.motion.clips.many_steered import ManySteered
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.records import collector_at_rest
 from contextdb.motion.selection.chooser import are_mappings
@@ -38,7 +37,7 @@ from contextdb.motion.selection.search_options import (
 HAS_IT = Fault("the group has this controller already.", "a controller of its own for each character")
 
 Flag = bool | Sequence[bool] | NDArray[np.bool_]
-OfBodies = ManySteered | Sequence[OfBody | None] | NDArray[np.float64]
+OfBodies = Sequence[OfBody | None] | NDArray[np.float64]
 
 
 class ControllerGroup(ListSequence[Controller]):
@@ -146,7 +145,7 @@ class ControllerGroup(ListSequence[Controller]):
             As for `Controller.update`: one for all, or a list of one for each.
         contexts : sequence of Q mappings, optional
             The facts of the moment, for the recorders alone.
-        body : ManySteered, sequence of Q bodies, or float array of shape (Q, 3), optional
+        body : sequence of Q bodies, or float array of shape (Q, 3), optional
             Where the game has each body, for the recorders alone.
 
         Raises
@@ -211,9 +210,6 @@ def _each_among(among: object, n: int) -> Sequence[Any]:
 
 def _each_place(body: OfBodies | None, n: int) -> Sequence[GroundPlace | None]:
     """Where each body is; None for all, or for one of a list, where none is given."""
-    if isinstance(body, ManySteered):
-        together = zip(body.positions.tolist(), body.headings.tolist(), strict=True)
-        return each_of([(x, z, heading) for (x, z), heading in together], n, "body", is_one=False)
     places = []
     for i, each in enumerate(each_of(body, n, "body", is_one=body is None)):
         try:

@@ -450,14 +450,10 @@ class CoveragePane(Pane):
         """Ask for a row of these cells, below the one that comes nearest to them."""
         conditions = {c.condition.name: c.condition for c in self.sheet.table.conditions}
         gone = cells.keys() - conditions.keys()
-        if gone and self.sheet.query.is_nested:
-            self.post_message(
-                Notice(f"{in_quotes(min(gone))} is a condition of a table inside: a row for the gap belongs there.", "warning")
-            )
-        elif gone:
-            self.post_message(
-                Notice(f"{in_quotes(min(gone))} is not a condition any more. R measures the coverage again.", "warning")
-            )
+        if gone:
+            inside = "is a condition of a table inside: a row for the gap belongs there."
+            why = inside if self.sheet.query.is_nested else "is not a condition any more. R measures the coverage again."
+            self.post_message(Notice(f"{in_quotes(min(gone))} {why}", "warning"))
         else:
             is_number = {name: conditions[name].domain.type.is_numeric for name in cells}
             typed = {name: lines.as_typed(cell) if is_number[name] else cell for name, cell in cells.items()}

@@ -209,6 +209,7 @@ static inline const char *cdbm_open_player(cdbm_player *player, const cdbm_bundl
     player->ways.velocities = CDBM_TAKE_ALL(int64_t, CDBM_P_VELOCITIES, &player->ways.n_velocities);
     player->ways.n_features = to->n_features;
     if (!bundle->why && !cdbm_open_ways(&player->ways)) cdbm_refuse(bundle, "a feature of a path is not there");
+    if (!bundle->why && cdbm_most_frames(&player->ways) > (size_t)1 << 20) cdbm_refuse(bundle, "a path is too long");
     if (!bundle->why && player->has_poses && !cdbo_poses_open(&player->poses)) cdbm_refuse(bundle, "the rig and its banks do not go together");
     if (bundle->why) cdbm_close_player(player);
     return bundle->why;

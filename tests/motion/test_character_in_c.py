@@ -193,7 +193,7 @@ def same(out, expected):
     assert at == len(out)
 
 
-@pytest.mark.parametrize("seed", range(6 if IS_FULL else 3))
+@pytest.mark.parametrize("seed", range(12 if IS_FULL else 3))
 def test_characters_in_c_are_those_of_python_to_the_bit(seed, programs, tmp_path: Path):
     is_captured = seed % 2 == 1 and (MOCAP / "assets.csv").is_file()
     bundle, given, expected = session(random.Random(seed), 1800 if IS_FULL else 150, is_captured)

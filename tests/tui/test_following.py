@@ -19,6 +19,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from terminal import press, said, screen_text, with_editor
+from textual.widgets import Static
 
 import contextdb as cdb
 from contextdb.cells.facts import Context
@@ -457,8 +458,11 @@ def test_the_keys_reach_their_commands_without_a_game(path):
             await press(pilot, key)
             seen.append(said(app))
         await press(pilot, "f9")
-        return seen, isinstance(app.screen, ContextsDialog)
+        is_contexts = isinstance(app.screen, ContextsDialog)
+        await press(pilot, "escape", "alt+u")
+        return seen, is_contexts, str(app.screen.query_one("#live-state", Static).content)
 
-    seen, is_contexts = with_editor(path, script)
+    seen, is_contexts, state = with_editor(path, script)
     assert all("No game is followed" in text for text in seen)
     assert is_contexts
+    assert "`contextdb play` starts one to try" in state

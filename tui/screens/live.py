@@ -26,7 +26,10 @@ from .dialog import Dialog
 from .following import Followed
 
 LOOK_EVERY_S, SHOW_EVERY_S = 1.0, 0.25
-NO_GAME = 'No game is running: a game calls contextdb.link("game"). F4 opens a recording.'
+NO_GAME = (
+    'No game is running. `contextdb play` starts one to try; yours is here once its code calls contextdb.link("game"). '
+    "F4 opens a recording."
+)
 
 
 class LiveDialog(Dialog[Followed]):

@@ -165,6 +165,8 @@ def test_an_edit_shares_the_columns_that_it_does_not_touch():
 def test_edits_have_names_for_people():
     table = table_of()
     assert edits.set_cells(table, [(1, "speed", "0..9")]).name == "Type speed of run"
+    nameless = edits.set_cells(table, [(1, table.asset_column, "")]).apply(table)
+    assert edits.set_cells(nameless, [(1, table.asset_column, "run")]).name.endswith(" of row 2")
     assert edits.set_cells(table, [(1, "speed", "0..9"), (0, "hit", "Any")]).name == "Change 2 cells"
     assert edits.delete_rows(table, [1]).name == "Delete run"
     assert edits.delete_rows(table, [1, 2, 1]).name == "Delete 2 rows"

@@ -97,7 +97,7 @@ def _cells_name(table: Table, texts: Mapping[str, Mapping[int, str]]) -> str:
         return f"Change {plural(n_cells, 'cell')}"
     [(column, cells)] = texts.items()
     [row] = cells
-    return f"Type {safe_text(column)} of {safe_text(table.text(row, table.asset_column))}"
+    return f"Type {safe_text(column)} of {_named(table, [row])}"
 
 
 # ---- edits of rows
@@ -339,7 +339,7 @@ def _rows_of(table: Table, rows: Sequence[int]) -> CameFrom:
     return chosen
 
 
-def _named(table: Table, rows: CameFrom) -> str:
+def _named(table: Table, rows: Sequence[int] | CameFrom) -> str:
     if len(rows) != 1:
         return plural(len(rows), "row")
     asset = table.text(int(rows[0]), table.asset_column)

@@ -154,6 +154,7 @@ def test_one_value_fills_what_is_selected():
     select(sheet, 0, 2, 2, 2)
     sheet.paste("False")
     assert column(sheet, 2) == ["False", "False", "False", "Any"]
+    assert sheet.paste("False").notes == ("What is pasted is there already.",)
 
 
 def test_fill_down_copies_the_first_row_or_the_one_above_a_single_one():

@@ -184,7 +184,8 @@ class Sheet(DisplayedTable):
         self._select(self.selection.at(placed.block.top, left, self.shape))
         self._select(self.selection.at(placed.block.bottom - 1, right, self.shape, extend=True))
         cut = f"{plural(placed.n_columns_cut, 'column')} left out: the sheet ends here. Add columns and paste again."
-        notes = (f"{plural(n_new, 'row')} added.",) if n_new else ()
+        is_same = not done.name and not done.warnings
+        notes = (f"{plural(n_new, 'row')} added.",) if n_new else ("What is pasted is there already.",) if is_same else ()
         return replace(done, notes=notes + _unchanged(hidden), warnings=((cut,) if placed.n_columns_cut else ()) + done.warnings)
 
     def type_below(self, text: str) -> Fault | None:

@@ -33,6 +33,8 @@ ON_THE_SPOT = "feet 2"
 UNEVEN_M = 0.005
 """Sides that differ by more metres are reported."""
 
+MEND_WITHOUT_CLIPS = "to put clips there; `contextdb demo --keep FOLDER` makes some to experiment with"
+
 
 @dataclass(frozen=True)
 class ClipFile:
@@ -105,7 +107,7 @@ def clip_files(
     named = named_takes(settings, folder, file)
     if not named:
         problem = f"[databases.{settings.name}] no file matches clips = {as_toml(settings.clips)}."
-        raise MotionError(Fault(problem, place=Place(file), rule="file"))
+        raise MotionError(Fault(problem, mend=MEND_WITHOUT_CLIPS, place=Place(file), rule="file"))
     wanted = [(name, path, take) for name, path, take in named if assets is None or settings.asset_of(name) in assets]
     faults = list(_twice_named(settings.name, wanted, file))
     if faults:

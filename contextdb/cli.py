@@ -72,7 +72,9 @@ class Parser(argparse.ArgumentParser):
         for text in rest:
             if not text.startswith("-"):
                 self.error(f"{in_quotes(text.removeprefix(_PLAIN))} is one argument too many.")
-            mend = mend_for(text.partition("=")[0], self._option_string_actions)
+            formats = self._option_string_actions.get("--format")
+            is_format = formats is not None and text[2:] in (formats.choices or ())
+            mend = in_quotes(f"--format {text[2:]}") if is_format else mend_for(text.partition("=")[0], self._option_string_actions)
             self.error(Fault(f"there is no option {in_quotes(text)}.", mend=mend).message)
         return arguments
 

@@ -141,6 +141,7 @@ def test_a_command_that_is_like_none_is_refused_without_a_guess():
         (["evaluate", "t"], "the following arguments are required: CONTEXTS"),
         (["evaluate", "t", "c.csv", "--engine", "dusk"], 'there is no "dusk". Accepted: "local", "dask". Did you mean "dask"?'),
         (["compile", "t", "--outt", "x"], 'there is no option "--outt". Did you mean "--out"?'),
+        (["coverage", "t", "--html", "x"], 'there is no option "--html". Did you mean "--format html"?'),
     ],
 )
 def test_a_misspelt_argument_is_named_with_the_nearest_and_the_help(arguments: list[str], message: str):

@@ -121,6 +121,43 @@ class Boxes:
 def direction_of(x: float, z: float, heading: float, /) -> float:
     """Where a stick points against the way a body faces, degrees."""
 
+def motion_then(
+    left: float, ahead: float, turn: float, then_left: float, then_ahead: float, then_turn: float, /
+) -> tuple[float, float, float]:
+    """A movement over the ground, and another one after it."""
+
+def motion_from(
+    left: float, ahead: float, turn: float, to_left: float, to_ahead: float, to_turn: float, /
+) -> tuple[float, float, float]:
+    """The movement that leads from one place of a body to another one."""
+
+def warp(
+    times: NDArray[np.float64],
+    path: NDArray[np.float64],
+    windows: NDArray[np.float64],
+    target: NDArray[np.float64],
+    knots: NDArray[np.float64],
+    own: NDArray[np.float64],
+    places: NDArray[np.float64],
+    shares: NDArray[np.float64],
+    /,
+) -> int:
+    """Write a path that is warped to a target, into arrays for four more knots than it has frames; how many it has. The path is
+    unwrapped."""
+
+def row_at(times: NDArray[np.float64], rows: NDArray[np.float64], time_s: float, to: NDArray[np.float64], /) -> None:
+    """Write the row between two times."""
+
+def aim(
+    ends: NDArray[np.float64],
+    target: NDArray[np.float64],
+    weights: NDArray[np.float64],
+    distances: NDArray[np.float64],
+    rotations: NDArray[np.float64],
+    /,
+) -> None:
+    """Write what a target adds to the costs of frames, from where each brings the body by itself."""
+
 def count_holders(
     codes: NDArray[np.int32],
     starts: NDArray[np.int64],

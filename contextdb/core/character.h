@@ -24,6 +24,7 @@ typedef struct cdbm_player {
     cdbm_table_ranges tables[CDBM_MOST_DATABASES]; /* the rows that name the ranges of each database, where it has a table */
     int64_t table_of[CDBM_MOST_DATABASES], bank_of[CDBM_MOST_DATABASES], database_of[CDBM_MOST_DATABASES]; /* in the bundle; -1: none */
     const int64_t *pose_ranges[CDBM_MOST_DATABASES]; /* [R] the range of poses of each range */
+    const double *warps[CDBM_MOST_DATABASES], *ends[CDBM_MOST_DATABASES]; /* [R, 2, 2] and [N, 3], for match nodes; or NULL */
     cdbm_ways ways;
     cdbo_poses poses;
     cdbo_frames banks[CDBM_MOST_DATABASES];
@@ -36,7 +37,7 @@ typedef struct cdbm_player {
     cdb_any *opened[CDBM_MOST_TABLES];
     cdb_row_play *plays;            /* of the rows of all tables, one after the other; NULL where none says */
     int64_t plays_at[CDBM_MOST_TABLES]; /* where those of each table begin; -1 where it says nothing */
-    size_t n_tables, n_most_rows;
+    size_t n_tables, n_most_rows, n_longest; /* the longest range that a match node may enter */
     cdbm_bundle bundle;
     size_t number;                  /* of the controller */
 } cdbm_player;
@@ -59,6 +60,7 @@ typedef struct cdbm_input {
     void *user;                     /* what the ground is asked with */
     int force, interrupt;           /* search now; and leave what plays */
     int is_copy;                    /* it plays what its owner does, on another machine: it neither asks tables nor searches */
+    cdbm_one_off *one_off;          /* what it plays in place of that, and is moved by, see match.h; or NULL */
     const uint8_t *packet;          /* what cdbm_pack of the owner gave; of no bytes where nothing arrived */
     size_t n_packet;
 } cdbm_input;
@@ -122,6 +124,21 @@ static inline void cdbm_read_rows(cdbm_bundle *bundle, size_t number, size_t n_r
         if (of->rows[i] < 0 || (uint64_t)of->rows[i] >= n_table_rows) cdbm_refuse(bundle, "a row of a table is not there");
 }
 
+/* What match nodes know of a database, where there is any. */
+static inline void cdbm_read_ends(cdbm_bundle *bundle, size_t number, size_t at, cdbm_player *player)
+{
+    const cdbm_clips *clips = &player->clips[at];
+    size_t n, r;
+    if (!cdbm_find(bundle, CDBM_P_ENDS, number, 1, &n)) return;
+    player->ends[at] = CDBM_TAKE(double, CDBM_P_ENDS, 3 * clips->frames->n_frames);
+    player->warps[at] = CDBM_TAKE(double, CDBM_P_WARPS, 4 * clips->n_ranges);
+    if (!clips->root) cdbm_refuse(bundle, "a database for match nodes does not say where its clips go");
+    for (r = 0; r < clips->n_ranges; r++) {
+        size_t length = (size_t)(clips->stops[r] - clips->starts[r]);
+        if (length > player->n_longest) player->n_longest = length;
+    }
+}
+
 static inline void cdbm_read_entry(cdbm_bundle *bundle, cdbm_player *player, size_t i, const int64_t *entry, double threshold, double bar)
 {
     cdbm_clips *clips = &player->clips[i];
@@ -141,6 +158,7 @@ static inline void cdbm_read_entry(cdbm_bundle *bundle, cdbm_player *player, siz
         player->tables[i].plays = player->opened[entry[2]]->table.plays;
     }
     player->tables[i].at = clips->range_at;
+    cdbm_read_ends(bundle, number, i, player);
     if (!player->has_poses || entry[1] < 0) {
         if (player->has_poses && clips->n_ranges > 0) cdbm_refuse(bundle, "a database has no poses");
         return;
@@ -273,7 +291,8 @@ static inline size_t cdbm_room_size(const cdbm_player *player, size_t n)
         + cdbm_rounded(player->controller.n_databases * (sizeof(cdbm_found) + 1)) + cdbm_rounded(sizeof(cdbm_decision))
         + cdbm_rounded(sizeof(cdbm_followed));
     return n * each + cdbm_rounded((4 * n_frames + 3 * n_features) * sizeof(double)) + cdbm_choice_room(&player->controller, n)
-        + cdbm_rounded((player->has_poses ? cdbo_pose_room(&player->poses) : 0) * sizeof(double)) + cdbm_answer_room(player) + 256;
+        + cdbm_rounded((player->has_poses ? cdbo_pose_room(&player->poses) : 0) * sizeof(double)) + cdbm_answer_room(player)
+        + cdbm_path_room(player->n_longest) + 256;
 }
 
 /* A character that stands at a place and has not done anything yet. */
@@ -471,6 +490,13 @@ static inline int cdbm_let_follow(const cdbm_player *player, const cdbm_input *i
     return 1;
 }
 
+/* The features of the pose that a query begins with: those of what plays, or of rest. */
+static inline void cdbm_pose_features(const cdbm_player *player, const double *state, const cdbm_moved *moved, double *pose)
+{
+    if (moved->to.database < 0.0) cdbm_rest_pose(&player->ways, state, player->frames[0].offset, pose);
+    else cdbm_features(player->clips[(size_t)moved->to.database].frames, (int64_t)moved->to.frame, pose);
+}
+
 /* Write the query of one: it is some time later, and wishes to take a path. 0 for a path without a frame. */
 static inline int cdbm_query_of(const cdbm_player *player, const cdbm_input *input, double dt_s, const double *before, double *state,
     cdbm_moved *moved, double *query, cdbm_room room)
@@ -486,8 +512,7 @@ static inline int cdbm_query_of(const cdbm_player *player, const cdbm_input *inp
     memcpy(cdbm_played_part(player, state), cdbm_played_part(player, (double *)(uintptr_t)before),
         (cdbm_state_width(player) - cdbm_walk_width(ways)) * sizeof(double));
     cdbm_move(&player->controller, cdbm_played_part(player, state), dt_s, moved);
-    if (moved->to.database < 0.0) cdbm_rest_pose(ways, state, player->frames[0].offset, pose);
-    else cdbm_features(player->clips[(size_t)moved->to.database].frames, (int64_t)moved->to.frame, pose);
+    cdbm_pose_features(player, state, moved, pose);
     if (input->positions) {
         rate = input->path_rate, n_behind = rate > 0.0 ? cdbm_n_behind(ways, rate) : n_most;
         if (input->n_path == 0 || n_behind >= n_most) return 0;
@@ -511,11 +536,52 @@ static inline cdbo_instant cdbm_instant_of(const cdbm_player *player, const cdbm
     return at;
 }
 
-/* The pose of one, by what was decided. */
-static inline void cdbm_pose_of(const cdbm_player *player, const cdbm_input *input, double dt_s, const double *before, double *state,
-    cdbm_pose *pose, double *room)
+/* Where a one-off brings the body in an update. 1; 0 with too little room; -4 for one of another bundle. */
+static inline int cdbm_bring(const cdbm_player *player, const double *state, double dt_s, const cdbm_one_off *one, cdbo_body *body,
+    cdbm_room room)
 {
-    const cdbm_decision *decision = &pose->decision;
+    cdbm_playing entered;
+    cdbm_warped path;
+    double place[3], was[2];
+    size_t k;
+    entered.database = one->database, entered.range = one->range, entered.frame = one->frame, entered.at_s = one->time_s;
+    if (!(one->database >= 0.0) || !cdbm_is_playing(&player->controller, &entered) || !player->ends[(size_t)one->database]) return -4;
+    entered.frame = one->last;
+    if (!cdbm_is_playing(&player->controller, &entered) || !(one->last >= one->frame && one->rate > 0.0)) return -4;
+    if (!cdbm_path_of(&player->clips[(size_t)one->database], one, &path, room)) return 0;
+    *body = ((const cdbm_walk *)(const void *)state)->body;
+    memcpy(was, body->position, sizeof was);
+    cdbm_place_at(&path, one->time_s + dt_s, place);
+    cdbm_then(one->origin, place, place);
+    body->heading = place[2];
+    for (k = 0; k < 2; k++) {
+        body->position[k] = place[k], body->acceleration[k] = 0.0;
+        if (dt_s > 0.0) body->velocity[k] = (place[k] - was[k]) / dt_s;
+    }
+    return 1;
+}
+
+/* What it then shows, in place of what was decided. 0 with too little room. */
+static inline int cdbm_decision_of(const cdbm_player *player, const cdbm_one_off *before, double dt_s, cdbm_decision *decision,
+    cdbm_room room)
+{
+    const cdbm_clips *clips = &player->clips[(size_t)before->database];
+    cdbm_one_off one = *before;
+    cdbm_warped path;
+    memset(decision, 0, sizeof *decision);
+    if (!cdbm_path_of(clips, before, &path, room)) return 0;
+    cdbm_advance(clips, &one, dt_s);
+    decision->action = one.since_s == 0.0 ? CDBM_JUMPS : CDBM_PLAYS_ON;
+    decision->playing = cdbm_playing_of(clips, &one), decision->before.database = CDBM_NO_DATABASE;
+    decision->rate = one.rate, decision->play = one.play;
+    cdbm_motion_of(&path, &one, decision->motion);
+    return 1;
+}
+
+/* The pose of one, by what was decided. */
+static inline void cdbm_pose_of(const cdbm_player *player, const cdbm_input *input, const cdbm_decision *decision, double dt_s,
+    const double *before, double *state, cdbm_pose *pose, double *room)
+{
     const cdbo_rig *rig = &player->poses.rig;
     const cdbm_walk *walk = (const cdbm_walk *)(const void *)state;
     cdbo_instant *displayed = cdbm_displayed(player, state);
@@ -559,7 +625,8 @@ static inline int cdbm_moves_body(const cdbm_player *player, const cdbm_decision
 }
 
 /* Update characters: `states` are their blocks, one after another. 1; 0 with too little room, or a path that is none; -1 where what is
- * asked for is no finite number; -2 for a fact that a table refuses; -3 for a packet that is none. Where it is not 1 all stand where they stood. */
+ * asked for is no finite number; -2 for a fact that a table refuses; -3 for a packet that is none; -4 for a one-off that is none. Where it
+ * is not 1 all stand where they stood. */
 static inline int cdbm_update_all(const cdbm_player *player, size_t n, double *states, double dt_s, const cdbm_input *inputs,
     cdbm_pose *poses, cdbm_room room)
 {
@@ -579,8 +646,14 @@ static inline int cdbm_update_all(const cdbm_player *player, size_t n, double *s
     given.kind_biases = player->kind_biases, given.among = many.among, given.urgent = many.urgent;
     given.among_step = controller->n_databases;
     for (i = 0; i < n; i++) {
+        cdbm_input input = inputs[i];
+        cdbo_body body;
+        if (input.one_off) {
+            if ((is_done = cdbm_bring(player, states + i * width, dt_s, input.one_off, &body, room)) != 1) return is_done;
+            input.body = &body;
+        }
         many.urgent[i] = (uint8_t)((inputs[i].force ? CDBM_FORCE : 0) | (inputs[i].interrupt ? CDBM_INTERRUPT : 0));
-        if (!cdbm_query_of(player, &inputs[i], dt_s, states + i * width, many.states + i * width, &many.moved[i],
+        if (!cdbm_query_of(player, &input, dt_s, states + i * width, many.states + i * width, &many.moved[i],
                 many.queries + i * n_features, room)) return 0;
         is_done = inputs[i].is_copy ? cdbm_let_follow(player, &inputs[i], &many, i) : cdbm_let_play(player, &inputs[i], many.states + i * width, many.ranges + i * player->n_ranges,
             many.biases + i * player->n_ranges, many.play_of + i * player->n_ranges, room);
@@ -612,13 +685,22 @@ static inline int cdbm_update_all(const cdbm_player *player, size_t n, double *s
     for (i = 0; i < n; i++) {
         double *state = many.states + i * width, *own = states + i * width;
         const cdbm_walk *walk = (const cdbm_walk *)(const void *)state;
-        poses[i].root[0] = walk->body.position[0], poses[i].root[1] = walk->body.position[1], poses[i].root[2] = walk->body.heading;
+        const cdbm_decision *decision = &poses[i].decision;
+        cdbm_decision shown;
+        double place[3];
+        place[0] = walk->body.position[0], place[1] = walk->body.position[1], place[2] = walk->body.heading;
+        memcpy(poses[i].root, place, sizeof place);
+        if (inputs[i].one_off && !cdbm_decision_of(player, inputs[i].one_off, dt_s, &shown, room)) return 0;
+        if (inputs[i].one_off) decision = &shown;
         left = room;
         numbers = (double *)cdbm_part(&left, (player->has_poses ? cdbo_pose_room(&player->poses) : 0) * sizeof(double));
         if (!numbers) return 0;
-        if (player->has_poses) cdbm_pose_of(player, &inputs[i], dt_s, own, state, &poses[i], numbers);
-        cdbm_settle(state, poses[i].root, player->has_poses && cdbm_moves_body(player, &poses[i].decision));
+        if (player->has_poses) cdbm_pose_of(player, &inputs[i], decision, dt_s, own, state, &poses[i], numbers);
+        if (inputs[i].one_off) cdbm_settle(state, place, 0);
+        else cdbm_settle(state, poses[i].root, player->has_poses && cdbm_moves_body(player, decision));
     }
+    for (i = 0; i < n; i++)
+        if (inputs[i].one_off) cdbm_advance(&player->clips[(size_t)inputs[i].one_off->database], inputs[i].one_off, dt_s);
     memcpy(states, many.states, n * width * sizeof(double));
     return 1;
 }

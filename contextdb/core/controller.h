@@ -24,7 +24,7 @@ typedef enum cdbm_action { CDBM_STARTS, CDBM_PLAYS_ON, CDBM_JUMPS, CDBM_LOOPS, C
 typedef enum cdbm_standing { CDBM_IS_VALID, CDBM_IS_WIDENED, CDBM_IS_NOT_VALID } cdbm_standing;
 typedef enum cdbm_why { CDBM_WHY_NOT_VALID = 1, CDBM_WHY_NATURE = 4, CDBM_WHY_JUMP = 8, CDBM_WHY_HISTORY = 9, CDBM_WHY_START = 12, CDBM_WHY_ASSET = 13 }
     cdbm_why;
-enum { CDBM_EXCLUDED = 1, CDBM_NEXT_NATURAL = 8 }; /* flags of a kind of frames */
+enum { CDBM_EXCLUDED = 1, CDBM_NEXT_NATURAL = 8, CDBM_IN_MATCH_RANGE = 32 }; /* flags of a kind of frames */
 enum { CDBM_FORCE = 1, CDBM_INTERRUPT = 2 };
 enum { CDBM_NO_DATABASE = -1, CDBM_GONE = -2, CDBM_GO_ON = -2 };
 

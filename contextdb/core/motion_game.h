@@ -1,4 +1,5 @@
 /* The parts of the core for motion in games, behind those of motion.h. */
 #include "bundle.h"
 #include "character.h"
+#include "match.h"
 #include "crowd.h"

@@ -225,7 +225,7 @@ static inline void cdbm_wish(const cdbm_ways *ways, const double *row, const cdb
     cdbm_return(place, rate, CDBM_RETURN_HALFLIFE_S, n - now, at, headings + now);
     if (now == 0) return;
     cdbm_look_back(ways, row, rate, now, positions, headings);
-    cdbo_unwrap(headings, n);
+    cdbo_unwrap(headings, 1, n);
 }
 
 /* Write a query: the features of a pose, rounded as a database's are, and those of a path of n frames. `lengths` has room for n

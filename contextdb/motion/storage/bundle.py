@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.errors import Fault, MotionError, Place, in_quotes
+from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.steering import Steered
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.output.bank import PoseBank, moving_alike
@@ -45,12 +46,15 @@ class Played:
     banks : mapping of database to PoseBank, or None
         None for characters without poses.
     output : PoseSettings
+    ends : mapping of database to float64 array, shape (N, 3)
+        `MatchNode.ends` of the databases whose animations can be entered as one-offs.
     """
 
     controller: Controller
     schema: FeatureSchema
     banks: Mapping[str, PoseBank] | None
     output: PoseSettings
+    ends: Mapping[str, Floats] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,9 +179,12 @@ def _add_database(bundle: Bundle, number: int, player: Played, name: str, bank: 
         row_starts, row_numbers, mirrored, _ = chooser.rows_of(name, table.assets)
         rows = mirrored, row_starts, row_numbers
     measures = kinds, offset, scale, channels, channel_weights, roots
+    nodes = (database.marks.warps, player.ends[name]) if name in player.ends else ()
     played = starts, stops, same, looping, root, marks, weights, own
     bundle.add(
-        DATABASE, number, [*arrays, *measures, *played, ranges, _texts(database.assets), *rows, _texts([name]), *_levels(database)]
+        DATABASE,
+        number,
+        [*arrays, *measures, *played, ranges, _texts(database.assets), *rows, _texts([name]), *_levels(database), *nodes],
     )
     if bank is not None:
         *frames, bank_rate = bank.frame_parts(bank.steps)

@@ -28,6 +28,8 @@ class Wanted:
     """Every question, not only the newest of each character and table."""
     trace: bool = False
     """Every decision in full, as a row of a recorded session, and nothing else."""
+    poses: bool = False
+    """Poses too, of a game that publishes them."""
 
     def takes(self, line: Line) -> bool:
         """Whether a line is requested: a game written in C sends all of them."""
@@ -128,6 +130,7 @@ def _request(wanted: Wanted, token: str) -> bytes:
     request |= {"who": list(wanted.who)} if wanted.who else {}
     request |= {"tables": list(wanted.tables)} if wanted.tables else {}
     request |= {"trace": True} if wanted.trace else {}
+    request |= {"poses": True} if wanted.poses else {}
     return dumped(request)
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from contextdb.errors import ContextDBError, Fault, Place, in_quotes, mend_for, some
 from contextdb.telemetry.link.doors import connected, doors, token_of
-from contextdb.telemetry.link.lines import FORMAT, HEADER, MOST_BYTES, Line, dumped, read_line
+from contextdb.telemetry.link.lines import BONES, FORMAT, HEADER, MOST_BYTES, POSE, Line, dumped, read_line
 
 PIECE = 1 << 16
 HEADER_S = 5.0
@@ -35,6 +35,8 @@ class Wanted:
         """Whether a line is requested: a game written in C sends all of them."""
         if self.who and "who" in line and line["who"] not in self.who:
             return False
+        if line["line"] in (BONES, POSE):
+            return self.poses
         return not self.tables or "table" not in line or line["table"] in self.tables
 
 

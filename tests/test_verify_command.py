@@ -12,7 +12,7 @@ from running import ROOT, run
 
 import contextdb as cdb
 from contextdb import motion
-from contextdb.authoring.verify import UNUSABLE, verified
+from contextdb.commands.verify_command import UNUSABLE, verified
 from contextdb.disk import write_atomic
 from contextdb.files.journal_lines import line_of
 from contextdb.files.reports import document_of, sealed, with_marks

@@ -38,7 +38,7 @@ from contextdb.motion.clips.clip import parse_bvh
 from contextdb.motion.clips.poses import local_poses
 from contextdb.motion.features.extraction import clip_features, clip_permutations
 from contextdb.motion.features.permutations import Permutations
-from contextdb.motion.made.joint import make_joint_clip
+from contextdb.motion.made.game import make_joint_clip
 from contextdb.motion.measuring.coverage import coverage
 from contextdb.motion.measuring.near_clips import near_clips
 from contextdb.motion.storage.building import build_all

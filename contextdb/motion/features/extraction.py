@@ -15,9 +15,9 @@ from contextdb.cells.arguments import require_kind, require_whole
 from contextdb.errors import Fault, MotionError, Place, QueryError, in_quotes, mend_for, plural, some
 from contextdb.motion.clips import mirror, own_axes, quaternions
 from contextdb.motion.clips.clip import Clip
+from contextdb.motion.clips.contacts import three_rounds
 from contextdb.motion.clips.feet import NO_MARKS, ContactMarks, footfalls_of, phases, rounds_of
 from contextdb.motion.clips.foot_bones import feet_of
-from contextdb.motion.clips.looping import three_rounds
 from contextdb.motion.clips.many_paths import ManyTrajectories
 from contextdb.motion.clips.poses import Poses, poses_of
 from contextdb.motion.clips.quaternions import Floats

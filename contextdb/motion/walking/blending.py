@@ -2,7 +2,7 @@
 
 A weight is the product of four columns that each sum to one:
 
-    gait            by `contextdb.motion.walking.gaits`
+    gait            by `contextdb.motion.walking.walker`
     speed           the nearest two steady cycles of the gait; the slowest below it, the fastest above it
     acceleration    slowing down, steady, speeding up
     turn            to the right, none, to the left

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +14,8 @@ from contextdb.cells.fact_columns import is_frame, is_series, listed, plain_numb
 from contextdb.cells.facts import read_fact
 from contextdb.cells.mirroring import frozen_fact, mirrored_fact, partner_of
 from contextdb.cells.sets import Cell
+from contextdb.columns import polars as pl
 from contextdb.errors import ContextError, Fault, Place
-
-if TYPE_CHECKING:
-    import polars as pl
 
 Contexts: TypeAlias = "Mapping[str, Sequence[object] | NDArray[Any]] | pl.DataFrame"
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,12 +21,8 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.fact_columns import as_series, in_context, plain_numbers, read_each
 from contextdb.cells.facts import read_fact
 from contextdb.cells.kinds import Kind
+from contextdb.columns import polars as pl
 from contextdb.errors import ContextError
-
-if TYPE_CHECKING:
-    import polars as pl
-else:
-    from contextdb.columns import polars as pl
 
 Doubles = NDArray[np.float64]
 Truths = NDArray[np.int8]

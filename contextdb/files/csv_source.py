@@ -9,20 +9,15 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from contextdb.columns import TextColumn
+from contextdb.columns import polars as pl
 from contextdb.errors import Fault, Place, TableError, in_quotes
 from contextdb.files.csv_faults import record_faults
 from contextdb.files.csv_records import CR, LF, Positions, Records, field_bounds, fields_of, find_records, line_ends, text_of
 from contextdb.files.strangers import UTF8_BOM, line_of, require_text, seems_json
-
-if TYPE_CHECKING:
-    import polars as pl
-else:
-    from contextdb.columns import polars as pl
 
 MOST_NAME_FAULTS = 20
 FEW_CELLS = 50_000

@@ -22,12 +22,7 @@ LEG_JOINTS = 2
 
 @dataclass(frozen=True, slots=True)
 class FootBones:
-    """What `[features.NAME]` says of the bones of both feet, left first; None is to be detected.
-
-    Attributes
-    ----------
-    feet, heels, toes : (left bone, right bone), optional
-    """
+    """What `[features.NAME]` says of the bones of both feet, left first; None is to be detected."""
 
     feet: Pair | None = None
     heels: Pair | None = None

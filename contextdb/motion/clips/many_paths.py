@@ -22,17 +22,6 @@ from contextdb.motion.records import quickly_made
 class ManyTrajectories:
     """Paths of one rate and one length, with their present at one frame.
 
-    Attributes
-    ----------
-    rate : float
-        Frames a second.
-    positions : float64 array, shape (Q, F, 2)
-        On the ground, metres.
-    headings : float64 array, shape (Q, F)
-        Radians, unwrapped.
-    now : int
-        The frame that counts as time 0.
-
     Raises
     ------
     QueryError
@@ -40,9 +29,13 @@ class ManyTrajectories:
     """
 
     rate: float
+    """Frames a second."""
     positions: Floats
+    """On the ground, metres: float64 [Q, F, 2]."""
     headings: Floats
+    """Radians, unwrapped: float64 [Q, F]."""
     now: int = 0
+    """The frame that counts as time 0."""
 
     def __post_init__(self) -> None:
         shape = np.shape(self.headings)

@@ -35,23 +35,15 @@ LARGEST_CUSTOM = 1e12
 
 @dataclass(frozen=True, eq=False)
 class ClipFeatures:
-    """What a clip, as it is or mirrored, gives to a database.
-
-    Attributes
-    ----------
-    asset : str
-        The clip's name, mirrored or not.
-    mirrored : bool
-    features : float32 array, shape (F, N)
-        In the schema's units.
-    root : float32 array, shape (F, 3)
-        Where the body is on the ground and which way it faces: x and z in metres, heading in radians, unwrapped.
-    """
+    """What a clip, as it is or mirrored, gives to a database."""
 
     asset: str
+    """The clip's name, mirrored or not."""
     mirrored: bool
     features: Features
+    """In the schema's units: float32 [F, N]."""
     root: Features
+    """Where the body is on the ground and which way it faces: x and z in metres, heading in radians, unwrapped. Float32 [F, 3]."""
 
 
 def clip_features(

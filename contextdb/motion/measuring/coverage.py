@@ -86,26 +86,18 @@ class ContextCoverage:
 
 @dataclass(frozen=True)
 class ToCapture:
-    """A bin that a clip should be captured for.
-
-    Attributes
-    ----------
-    map, row, column : str, int, int
-    fills : float
-        The share of all wanted bins, each weighed by its contexts, that a clip with it would fill; with the opposite bin where the
-        clip would be played mirrored too.
-    contexts : float
-        The share of the contexts in which it is missing.
-    elsewhere : tuple of str
-        Clips that move so, and are not valid where it is missing: a cell of the table may be all that is wrong.
-    """
+    """A bin that a clip should be captured for."""
 
     map: str
     row: int
     column: int
     fills: float
+    """The share of all wanted bins, each weighed by its contexts, that a clip with it would fill; with the opposite bin where the
+    clip would be played mirrored too."""
     contexts: float
+    """The share of the contexts in which it is missing."""
     elsewhere: tuple[str, ...]
+    """Clips that move so, and are not valid where it is missing: a cell of the table may be all that is wrong."""
     is_both_sides: bool
 
     @property
@@ -128,28 +120,17 @@ class ToCapture:
 
 @dataclass(frozen=True, eq=False)
 class MotionCoverage:
-    """What the clips of one table, or of databases without one, have of motion. Shares are of all contexts.
-
-    Attributes
-    ----------
-    table : str or None
-    databases : tuple of str
-    clips : tuple of ClipFrames
-    contexts : tuple of ContextCoverage
-        The largest share first.
-    transitions : TransitionCoverage
-    near : tuple of Near
-    never_valid : tuple of str
-        Clips that no context lets play.
-    """
+    """What the clips of one table, or of databases without one, have of motion. Shares are of all contexts."""
 
     table: str | None
     databases: tuple[str, ...]
     clips: tuple[ClipFrames, ...]
     contexts: tuple[ContextCoverage, ...]
+    """The largest share first."""
     transitions: TransitionCoverage
     near: tuple[Near, ...]
     never_valid: tuple[str, ...]
+    """Clips that no context lets play."""
 
     @property
     def n_frames(self) -> int:

@@ -18,28 +18,20 @@ ASKED = 'a mapping such as {"speed": [(0.0, 2.0)]}'
 
 @dataclass(frozen=True)
 class ClipContexts:
-    """Contexts in which the same clips may play.
-
-    Attributes
-    ----------
-    assets, mirrored : frozenset of str
-        The assets that are valid, and those that are valid mirrored: by mirrored facts.
-    share : float
-        0…1 of all contexts.
-    cells : mapping of str to str
-        The smallest box of cells that holds these contexts; conditions that it does not restrict are left out.
-    asked : mapping of str to spans
-        For "speed" (m/s), "turn" (degrees a second) and "direction" (degrees), as far as the table knows them, the spans requested.
-    is_symmetric : bool
-        Whether they are the same contexts in a mirror.
-    """
+    """Contexts in which the same clips may play."""
 
     assets: frozenset[str]
     mirrored: frozenset[str]
+    """`assets`, `mirrored`: the assets that are valid, and those that are valid mirrored: by mirrored facts."""
     share: float = 1.0
+    """0…1 of all contexts."""
     cells: Mapping[str, str] = field(default_factory=dict)
+    """The smallest box of cells that holds these contexts; conditions that it does not restrict are left out."""
     asked: Mapping[str, Sequence[Span]] = field(default_factory=dict)
+    """For "speed" (m/s), "turn" (degrees a second) and "direction" (degrees), as far as the table knows them, the spans requested.
+    """
     is_symmetric: bool = True
+    """Whether they are the same contexts in a mirror."""
 
     def __post_init__(self) -> None:
         for name in ("assets", "mirrored"):

@@ -33,20 +33,13 @@ Tell = Callable[[int, int, str], None]
 
 @dataclass(frozen=True, slots=True)
 class Described:
-    """A clip as a row of a table.
-
-    Attributes
-    ----------
-    asset : str
-    cells : mapping of str to str
-        Of the columns `gait`, `speed`, `direction`, `turn`, `style`, and the outputs `duration_s`, `start` and `end`.
-    facts : ClipFacts
-        What was measured; of joint clips on the actor of the first role.
-    """
+    """A clip as a row of a table."""
 
     asset: str
     cells: Mapping[str, str]
+    """Of the columns `gait`, `speed`, `direction`, `turn`, `style`, and the outputs `duration_s`, `start` and `end`."""
     facts: ClipFacts
+    """What was measured; of joint clips on the actor of the first role."""
 
     def to_json(self) -> dict[str, Any]:
         return {"asset": self.asset, "cells": dict(self.cells), "facts": self.facts.to_json()}

@@ -25,57 +25,37 @@ from contextdb.motion.search.searched import Searched
 
 @dataclass(frozen=True)
 class Candidate:
-    """One frame of a search.
-
-    Attributes
-    ----------
-    asset : str
-    range, frame : int
-    time_s : float or None
-        Seconds since the start of the asset; None for a database made from features.
-    mirrored : bool
-    cost : float
-        The total, its biases in it.
-    channels : dict of str to float
-        What each channel adds.
-    biases : dict of str to float
-        What else is added, as far as it is not 0: "base", "looping", "penalty" (soft cells), "tags", "modifier" (markup), "given"
-        and "continuing".
-    left_out : LeftOut
-        Why it may not be chosen; LeftOut.NO if it may.
-    permutation_s : float or None
-        How many seconds ahead its permuted channels look; None for a database without permutations.
-    """
+    """One frame of a search."""
 
     asset: str
     range: int
     frame: int
     time_s: float | None
+    """Seconds since the start of the asset; None for a database made from features."""
     mirrored: bool
     cost: float
+    """The total, its biases in it."""
     channels: dict[str, float]
+    """What each channel adds."""
     biases: dict[str, float]
+    """What else is added, as far as it is not 0: "base", "looping", "penalty" (soft cells), "tags", "modifier" (markup), "given"
+    and "continuing"."""
     left_out: LeftOut
+    """Why it may not be chosen; LeftOut.NO if it may."""
     permutation_s: float | None = None
+    """How many seconds ahead its permuted channels look; None for a database without permutations."""
 
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """The best frames of a search, and what became of all others.
-
-    Attributes
-    ----------
-    rows : tuple of Candidate
-        Cheapest first.
-    counts : dict of LeftOut to int
-        How many frames of ranges were left out for each reason.
-    why : uint8 array, shape (N,)
-        `LeftOut` of every frame; frames between ranges count as of an asset that is not valid.
-    """
+    """The best frames of a search, and what became of all others."""
 
     rows: tuple[Candidate, ...]
+    """Cheapest first."""
     counts: dict[LeftOut, int]
+    """How many frames of ranges were left out for each reason."""
     why: NDArray[np.uint8]
+    """`LeftOut` of every frame; frames between ranges count as of an asset that is not valid: uint8 [N]."""
 
     def __len__(self) -> int:
         return len(self.rows)

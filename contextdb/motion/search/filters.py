@@ -27,77 +27,52 @@ NO_FLAGS: Flags = np.empty(0, np.bool_)
 
 @dataclass(frozen=True, slots=True)
 class Biases:
-    """What is added to the cost of frames, whatever the query; negative favours them.
-
-    Attributes
-    ----------
-    base : float
-        For every frame of the database.
-    looping : float
-        For frames of looping ranges.
-    continuing : float
-        For the frame that would play on, so that a character does not jump for a trifle.
-    """
+    """What is added to the cost of frames, whatever the query; negative favours them."""
 
     base: float = 0.0
+    """For every frame of the database."""
     looping: float = 0.0
+    """For frames of looping ranges."""
     continuing: float = 0.0
+    """For the frame that would play on, so that a character does not jump for a trifle."""
 
 
 NO_BIAS = Biases()
 
 
 class Kinds(NamedTuple):
-    """What a tag filter says of frames of each kind.
-
-    Attributes
-    ----------
-    allowed : bool array, shape (K,)
-        Whether they may be chosen.
-    biases : float64 array, shape (K,)
-    playable : bool array, shape (K,)
-        Whether they may play on.
-    left_out : uint8 array, shape (K,)
-        Why they may not be chosen, as `LeftOut`.
-    """
+    """What a tag filter says of frames of each kind."""
 
     allowed: Flags
+    """Whether they may be chosen: bool [K]."""
     biases: Floats
+    """Float64 [K]."""
     playable: Flags
+    """Whether they may play on: bool [K]."""
     left_out: NDArray[np.uint8]
+    """Why they may not be chosen, as `LeftOut`: uint8 [K]."""
 
 
 class Filter(NamedTuple):
-    """One search's masks and biases.
-
-    Attributes
-    ----------
-    ranges : bool array, shape (R,)
-        The ranges whose asset is valid.
-    is_whole : bool
-        Whether that is all of them.
-    range_biases : float64 array, shape (R,)
-    kinds : Kinds
-    frames : bool array, shape (N,) or (0,)
-        The frames that the caller lets pass; empty: all.
-    frame_biases : float64 array, shape (N,) or (0,)
-    skips : tuple of Skip
-    current : int
-        The frame that would play on; -1 for none. It may be chosen whatever tags and skips say, if its asset is valid, it is not
-        excluded, and it is among `frames`.
-    continuing : float
-        What is added to its cost alone.
-    """
+    """One search's masks and biases."""
 
     ranges: Flags
+    """The ranges whose asset is valid: bool [R]."""
     is_whole: bool
+    """Whether that is all of them."""
     range_biases: Floats
+    """Float64 [R]."""
     kinds: Kinds
     frames: Flags
+    """The frames that the caller lets pass; empty: all. Bool [N] or [0]."""
     frame_biases: Floats
+    """Float64 [N] or [0]."""
     skips: tuple[Skip, ...]
     current: int
+    """The frame that would play on; -1 for none. It may be chosen whatever tags and skips say, if its asset is valid, it is not
+    excluded, and it is among `frames`."""
     continuing: float
+    """What is added to its cost alone."""
 
     @property
     def skip_spans(self) -> Ints | None:

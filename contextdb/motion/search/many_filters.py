@@ -18,23 +18,16 @@ from contextdb.motion.search.filters import Filter
 
 
 class ManyFilters(NamedTuple):
-    """The filters of many searches.
-
-    Attributes
-    ----------
-    shared : Filter
-        Its kinds, frames, biases of frames and continuing bias are those of all.
-    ranges : bool array, shape (1, R) or (Q, R)
-        One for all, or one for each.
-    range_biases : float64 array, shape (1, R) or (Q, R)
-    currents : int64 array, shape (Q,)
-    skips : tuple of tuples of Skip, of length Q, or empty where nobody skips anything
-    """
+    """The filters of many searches."""
 
     shared: Filter
+    """Its kinds, frames, biases of frames and continuing bias are those of all."""
     ranges: Flags
+    """One for all, or one for each: bool [1, R] or [Q, R]."""
     range_biases: Floats
+    """Float64 [1, R] or [Q, R]."""
     currents: Ints
+    """Int64 [Q]."""
     skips: tuple[tuple[Skip, ...], ...] = ()
 
     @classmethod

@@ -21,24 +21,17 @@ from contextdb.motion.clips.skeleton import Ints
 
 @dataclass(frozen=True, eq=False)
 class TableRanges:
-    """The pairs of a table's rows and the ranges of their assets, in the order of ranges.
-
-    Attributes
-    ----------
-    assets : sequence of str
-        The assets of the table's rows.
-    n_ranges : int
-        R; ranges without a row are in no pair.
-    rows, ranges : int64 arrays, shape (pairs,)
-    firsts : int64 array
-        The first pair of each range that is in any.
-    """
+    """The pairs of a table's rows and the ranges of their assets, in the order of ranges."""
 
     assets: Sequence[str]
+    """The assets of the table's rows."""
     n_ranges: int
+    """R; ranges without a row are in no pair."""
     rows: Ints
     ranges: Ints
+    """`rows`, `ranges`: int64 [pairs]."""
     firsts: Ints
+    """The first pair of each range that is in any."""
 
     @classmethod
     def of(cls, assets: Sequence[str], ranges_of_asset: Mapping[str, Sequence[int]], n_ranges: int) -> TableRanges:

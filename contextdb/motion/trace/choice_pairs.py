@@ -114,20 +114,14 @@ Moment = tuple[int, int]
 
 @dataclass(eq=False)
 class ChoicePairs:
-    """The pairs of some sessions.
-
-    Attributes
-    ----------
-    of_features : dict
-        For features the pairs of each moment: by their two frames the differences of the channels, float64 [C], of the frame that
-        should cost more, less those of the one that should cost less.
-    unusable : list of str
-        Choices that no weight can follow, each with the reason.
-    """
+    """The pairs of some sessions."""
 
     sessions: Sequence[ChoiceSession]
     of_features: dict[str, dict[Moment, dict[object, Floats]]] = field(default_factory=dict)
+    """For features the pairs of each moment: by their two frames the differences of the channels, float64 [C], of the frame that
+    should cost more, less those of the one that should cost less."""
     unusable: list[str] = field(default_factory=list)
+    """Choices that no weight can follow, each with the reason."""
     _better: dict[Moment, list[_Side]] = field(default_factory=dict)
 
     @classmethod

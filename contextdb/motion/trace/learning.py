@@ -54,30 +54,21 @@ class Score:
 
 @dataclass(frozen=True)
 class Learned:
-    """What choices teach.
-
-    Attributes
-    ----------
-    choices, searches, pairs : int
-        How many choices there are, in how many searches, and how many pairs of frames they make.
-    now, after : Score
-        With the present weights, and with the learned ones.
-    held_out : int
-        How many pairs come out right with weights that were learned without the searches that they are of.
-    weights : tuple of LearnedWeight
-        All channels of the features that the pairs are of.
-    unusable : tuple of str
-        Choices that no weight can follow, each with the reason.
-    """
+    """What choices teach."""
 
     choices: int
     searches: int
     pairs: int
+    """`choices`, `searches`, `pairs`: how many choices there are, in how many searches, and how many pairs of frames they make."""
     now: Score
     after: Score
+    """`now`, `after`: with the present weights, and with the learned ones."""
     held_out: int
+    """How many pairs come out right with weights that were learned without the searches that they are of."""
     weights: tuple[LearnedWeight, ...]
+    """All channels of the features that the pairs are of."""
     unusable: tuple[str, ...]
+    """Choices that no weight can follow, each with the reason."""
 
     @property
     def is_better(self) -> bool:

@@ -22,22 +22,14 @@ from contextdb.motion.search.hit import Hit
 
 @dataclass(frozen=True, eq=False)
 class ReaskedSearch:
-    """One database in a search repeated.
-
-    Attributes
-    ----------
-    name : str
-    database : MotionDatabase
-    query : float64 array, shape (F,)
-        In the schema's units.
-    chosen : Filter
-        What could be chosen from.
-    """
+    """One database in a search repeated."""
 
     name: str
     database: MotionDatabase
     query: Floats
+    """In the schema's units: float64 [F]."""
     chosen: Filter
+    """What could be chosen from."""
     _sums: dict[str, Floats] = field(default_factory=dict, repr=False)
 
     @cached_property

@@ -27,31 +27,7 @@ About = Mapping[str, Mapping[str, Any]]
 
 @dataclass(frozen=True)
 class SessionStats:
-    """The figures of a session.
-
-    Attributes
-    ----------
-    seconds : float
-    updates, searches, jumps, forced_jumps, loops : int
-        A forced jump is one for which nothing could play on.
-    jumps_per_s : float
-    causes : dict of str to int
-        How many searches there were for each cause.
-    gain_median : float or None
-        What a jump spares of the cost of playing on, as a share; None without a jump from what could play on. Negative for a jump
-        that costs more: one that variation drew, or to a database that wins outright under its threshold. See `gains_of`.
-    gain_small_share : float or None
-        The share of such jumps that spare less than a fifth.
-    gains : tuple of int
-        How many spare up to 5, 10, 20, 50 and 100 %.
-    stay_s : float or None
-        How long an animation plays until a jump, in the mean.
-    assets_used : int
-    assets_never_used : tuple of str, or None
-        None where the session does not say what its databases hold.
-    frames_used_share : float or None
-        How much of the databases is played: at each moment a frame, and those passed since the moment before.
-    """
+    """The figures of a session."""
 
     seconds: float
     updates: int
@@ -59,15 +35,24 @@ class SessionStats:
     jumps: int
     forced_jumps: int
     loops: int
+    """`updates`, `searches`, `jumps`, `forced_jumps`, `loops`: a forced jump is one for which nothing could play on."""
     jumps_per_s: float
     causes: dict[str, int] = field(default_factory=dict)
+    """How many searches there were for each cause."""
     gain_median: float | None = None
+    """What a jump spares of the cost of playing on, as a share; None without a jump from what could play on. Negative for a jump
+    that costs more: one that variation drew, or to a database that wins outright under its threshold. See `gains_of`."""
     gain_small_share: float | None = None
+    """The share of such jumps that spare less than a fifth."""
     gains: tuple[int, ...] = ()
+    """How many spare up to 5, 10, 20, 50 and 100 %."""
     stay_s: float | None = None
+    """How long an animation plays until a jump, in the mean."""
     assets_used: int = 0
     assets_never_used: tuple[str, ...] | None = None
+    """None where the session does not say what its databases hold."""
     frames_used_share: float | None = None
+    """How much of the databases is played: at each moment a frame, and those passed since the moment before."""
 
     def to_json(self) -> dict[str, object]:
         document = asdict(self)

@@ -35,22 +35,15 @@ AND = " + "
 
 
 class ChangePart(NamedTuple):
-    """One thing that is changed.
-
-    Attributes
-    ----------
-    kind : str
-        "cell", "cells", "mask" (its range is let in, where no table says why it was not), "mark", "tags", "setting", "bias",
-        "weight" or "threshold".
-    what : str
-        What is changed: the cell, the mark, the channel.
-    to : str or float
-        To what.
-    """
+    """One thing that is changed."""
 
     kind: str
+    """"cell", "cells", "mask" (its range is let in, where no table says why it was not), "mark", "tags", "setting", "bias",
+    "weight" or "threshold"."""
     what: str
+    """What is changed: the cell, the mark, the channel."""
     to: str | float
+    """To what."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -61,24 +61,13 @@ def clip_permutations(
 ) -> list[ClipFeatures]:
     """The features of every frame of a clip in each permutation of the schema, one where it has none, in order.
 
-    Parameters
-    ----------
-    clip : Clip
-    schema : FeatureSchema
-    mirrored : bool
-        Take the clip in a mirror, left and right bones exchanged by the schema's `mirror`.
-    looping : bool
-        The clip continues at its start when it ends: its path continues too, and does not run out straight.
-    contacts : (left, right)
-        When each foot of the clip is down, as marks say it: see `Markup.contacts_of`. Default: this is detected.
+    `mirrored` takes the clip in a mirror, left and right bones exchanged by the schema's `mirror`. A `looping` clip continues at
+    its start when it ends: its path continues too, and does not run out straight. `contacts` are when each foot of the clip is
+    down, as marks say it, see `Markup.contacts_of`; without them this is detected.
 
-    Raises
-    ------
-    MotionError
-        The skeleton lacks a bone of the schema (the nearest is named) or cannot be mirrored by its pairs, the clip's numbers are
-        too large to be a body, or a custom channel has no function or one that does not give what it should.
-    ContextError
-        `clip` or `schema` is none.
+    Raises MotionError where the skeleton lacks a bone of the schema (the nearest is named) or cannot be mirrored by its pairs, the
+    clip's numbers are too large to be a body, or a custom channel has no function or one that does not give what it should;
+    ContextError where `clip` or `schema` is none.
     """
     require_kind(clip, Clip, "clip", "a Clip")
     require_kind(schema, FeatureSchema, "schema", "a FeatureSchema")

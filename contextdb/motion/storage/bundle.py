@@ -95,20 +95,9 @@ class Bundle:
 
 
 def bundle_of(players: Mapping[str, Played], table_of: Mapping[str, str], tables: Mapping[str, TableFile]) -> bytes:
-    """The bytes of a bundle.
+    """The bytes of a bundle of controllers by their names, the table of each database that has one, and the tables.
 
-    Parameters
-    ----------
-    players : mapping of str to Played
-        The controllers by their names.
-    table_of : mapping of str to str
-        The table of each database, of those that have one.
-    tables : mapping of str to TableFile
-
-    Raises
-    ------
-    MotionError
-        What a bundle cannot hold yet; all faults together.
+    Raises MotionError for what a bundle cannot hold yet; all faults together.
     """
     _check(players)
     bundle, numbers, names = Bundle(), {name: i for i, name in enumerate(tables)}, list[str]()

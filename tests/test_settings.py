@@ -11,7 +11,7 @@ from strategies import for_each
 from contextdb.errors import ContextDBError, SchemaError
 from contextdb.files.settings import Section, Setting, settings_of
 from contextdb.motion import Channel, ControllerSettings, FeatureSchema, PoseSettings, Variation
-from contextdb.motion.features.permutations import Permutations
+from contextdb.motion.features.channels import Permutations
 from contextdb.motion.storage.database_settings import DatabaseSettings
 from contextdb.motion.walking.walker import WalkSettings
 from contextdb.schema.parts import SECTIONS

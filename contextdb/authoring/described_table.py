@@ -29,7 +29,7 @@ from contextdb.edits.schema_file import schema_change
 from contextdb.errors import ContextDBError, Fault, FileError, Place, TableError, row_name, some
 from contextdb.files.file_names import require_new_table_name
 from contextdb.files.texts import new_source
-from contextdb.files.toml_text import Path as KeyPath
+from contextdb.files.toml_shapes import Path as KeyPath
 from contextdb.motion.characters.facts import UNITS
 from contextdb.motion.clips.clip import Up
 from contextdb.motion.clips.doubts import doubts, grouped

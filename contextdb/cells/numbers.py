@@ -18,10 +18,9 @@ from typing import overload
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.cells.angles import wrap_angle, wrap_angles
 from contextdb.cells.domains import Domain
 from contextdb.cells.grammar import parse_cell
-from contextdb.cells.intervals import CIRCLE, Spans
+from contextdb.cells.intervals import CIRCLE, Spans, wrap_angle, wrap_angles
 from contextdb.cells.sets import Cell, NumberSet
 from contextdb.columns import polars as pl
 

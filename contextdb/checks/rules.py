@@ -163,7 +163,7 @@ RULES: dict[str, Rule] = {
         "warning",
         "Every condition of a row is the same as in another row, and the policy, or the asset, leaves no choice between the two.",
         "Distinguish the rows by a condition, delete one of them, or set the policy collect if the game should have a choice.",
-        ("tables.alike",),
+        ("tables.variety",),
     ),
     "undeclared-condition": Rule(
         "warning",

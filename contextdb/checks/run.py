@@ -29,19 +29,18 @@ from contextdb.errors import ContextDBError, in_quotes, nearest, some
 from contextdb.expressions import constant_truth
 from contextdb.expressions.rules import WhenRules
 from contextdb.files.csv_source import Source
-from contextdb.files.toml_text import as_toml
+from contextdb.files.toml_shapes import as_toml
 from contextdb.findings import Finding, Level
 from contextdb.schema.policies import lets_choose
 from contextdb.schema.settings import derivation_of
 from contextdb.schema.table_settings import missing_job
-from contextdb.tables.alike import finding_at, identical_rows, named, where
 from contextdb.tables.condition_column import ConditionColumn
 from contextdb.tables.data import TableData, known_conditions
 from contextdb.tables.nesting.links import reached
 from contextdb.tables.nesting.names import inner_name
 from contextdb.tables.table import Table
 from contextdb.tables.variants import known_whole, whole_of
-from contextdb.tables.variety import gathered
+from contextdb.tables.variety import finding_at, gathered, identical_rows, named, where
 
 LINE_ENDS = {"\n": "LF", "\r\n": "CRLF", "\r": "CR"}
 MOST_ROWS = 1000

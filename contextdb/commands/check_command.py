@@ -35,11 +35,11 @@ from contextdb.errors import ContextDBError, Fault, in_quotes, nearest
 from contextdb.expressions.tokens import written_name, written_text
 from contextdb.files.file_names import alike, composed, confusable, why_unportable
 from contextdb.files.texts import read_texts
-from contextdb.files.toml_text import as_toml
+from contextdb.files.toml_shapes import as_toml
 from contextdb.findings import LEVELS, Finding, Level
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.markup.reserved import ReservedTag, reserved_of
-from contextdb.motion.markup.spans import Span
+from contextdb.motion.markup.span_faults import Span
 from contextdb.motion.storage.config import MotionConfig
 from contextdb.report.results import CheckReport, TableSummary
 from contextdb.schema.contracts import Contract
@@ -47,12 +47,12 @@ from contextdb.schema.parts import header, keys_of
 from contextdb.schema.settings import Schema
 from contextdb.schema.toml_lines import key_lines
 from contextdb.tables import project
-from contextdb.tables.alike import finding_at
 from contextdb.tables.expected_file import expected_path, read_situations
 from contextdb.tables.gap_work import GapWork
 from contextdb.tables.other_files import cases_path, notes_path
 from contextdb.tables.places import table_path
 from contextdb.tables.table import Table
+from contextdb.tables.variety import finding_at
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

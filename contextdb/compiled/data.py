@@ -34,7 +34,7 @@ from contextdb.columns import TextColumn
 from contextdb.compiled.classes import ColumnMasks, NumberMasks, WideMasks
 from contextdb.compiled.codes import CodeSlots
 from contextdb.compiled.core_table import UNKNOWN, core_table
-from contextdb.compiled.mask_bits import bits_of, nbytes
+from contextdb.compiled.layers import bits_of, nbytes
 from contextdb.compiled.matches import Answering, Matches, with_mirrored, with_penalties, with_widened
 from contextdb.compiled.memory import Memory
 from contextdb.compiled.number_cells import NumberCells, number_cells

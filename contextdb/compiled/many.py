@@ -24,7 +24,7 @@ from contextdb.cells.sequences import Made
 from contextdb.columns import Framed
 from contextdb.columns import polars as pl
 from contextdb.compiled.answered_table import SaidRows
-from contextdb.compiled.batch_costs import CostsOfPairs
+from contextdb.compiled.batch_columns import CostsOfPairs
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.matches import Join, Matches, layered_penalties, minus, rows_frame
 from contextdb.compiled.unchanging import Unchanging

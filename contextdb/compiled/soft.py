@@ -21,7 +21,7 @@ from contextdb.cells.facts import Fact
 from contextdb.cells.intervals import EVERYTHING, Spans
 from contextdb.cells.sets import Cell, NumberSet
 from contextdb.compiled.classes import ColumnMasks, column_masks
-from contextdb.compiled.mask_bits import bits_of
+from contextdb.compiled.layers import bits_of
 
 Floats = NDArray[np.float64]
 GROWTH = ("per", "starts", "ends", "which")

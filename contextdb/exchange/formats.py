@@ -175,8 +175,8 @@ def _read_parquet(raw: bytes, name: str) -> Reading:
 
 def _own_csv(raw: bytes, name: str, is_ours: bool) -> Reading | None:
     """A CSV that contextdb reads as it is, so that it is written as it is; None for every other, as one with a total below it."""
-    from contextdb.exchange.conflicts import begins_like_a_mark
     from contextdb.exchange.everyday import is_sum
+    from contextdb.exchange.reading import begins_like_a_mark
     from contextdb.exchange.unreal import is_unreal_header
     from contextdb.files.csv_source import read_csv
 

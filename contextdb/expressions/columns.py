@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.cells.angles import wrap_angles
 from contextdb.cells.conditions import Condition
 from contextdb.cells.fact_columns import as_series, in_context, plain_numbers, read_each
 from contextdb.cells.facts import read_fact
+from contextdb.cells.intervals import wrap_angles
 from contextdb.cells.kinds import Kind
 from contextdb.columns import polars as pl
 from contextdb.errors import ContextError

@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.cells.angles import wrap_angles
 from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import describe, read_fact
+from contextdb.cells.intervals import wrap_angles
 from contextdb.cells.sets import ANY, Cell
 from contextdb.errors import ContextError, Fault, Place, in_quotes, plural, safe_text, some
 from contextdb.expressions.arithmetic import settled, wrapped

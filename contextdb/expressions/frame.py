@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.cells.angles import wrap_angles
+from contextdb.cells.intervals import wrap_angles
 from contextdb.cells.sets import Cell, NumberSet
 from contextdb.expressions.arithmetic import settled
 from contextdb.expressions.columns import NO, UNKNOWN, YES, Coded, Column, Doubles, Truths

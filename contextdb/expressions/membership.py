@@ -10,10 +10,10 @@ from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 
 from contextdb.cells import intervals
-from contextdb.cells.angles import wrap_angle
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import TEXT, Domain
 from contextdb.cells.grammar import parse_cell
+from contextdb.cells.intervals import wrap_angle
 from contextdb.cells.kinds import KINDS, Kind
 from contextdb.cells.sets import Accepted, Cell, NumberSet, TagSet, ValueSet, covers
 from contextdb.errors import CellError, in_quotes, nearest, some

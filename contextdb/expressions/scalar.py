@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from functools import singledispatch
 from typing import Any
 
-from contextdb.cells.angles import wrap_angle
+from contextdb.cells.intervals import wrap_angle
 from contextdb.expressions.plan import Apply, Compare, Const, Given, Held, Link, Logic, Negation, Part, Select
 
 Value = float | bool | str | frozenset[str] | None

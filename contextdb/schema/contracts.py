@@ -21,8 +21,7 @@ from contextdb.cells.kinds import KINDS
 from contextdb.cells.outputs import Output
 from contextdb.errors import SchemaError
 from contextdb.files.settings import Declared, setting
-from contextdb.files.toml_shapes import Shape, meant_text, wrong_name
-from contextdb.files.toml_text import what
+from contextdb.files.toml_shapes import Shape, meant_text, what, wrong_name
 from contextdb.schema.shapes import COLUMN, EXPRESSION, TEXT
 
 Verb = Literal["some", "every", "none", "at_most", "winner"]

@@ -13,7 +13,7 @@ from contextdb.cells.domains import Domain
 from contextdb.cells.kinds import KINDS, Kind
 from contextdb.errors import safe_text
 from contextdb.files.settings import Settings, settings_of
-from contextdb.files.toml_text import dotted
+from contextdb.files.toml_shapes import dotted
 from contextdb.schema.contracts import Contract
 from contextdb.schema.shapes import BLUEPRINT, CONDITION, PROJECT
 from contextdb.schema.table_settings import TableSettings

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
-from contextdb.files.toml_text import Path, as_toml, dotted
+from contextdb.files.toml_shapes import Path, as_toml, dotted
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,10 +11,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from contextdb.core import Ways
-from contextdb.motion.clips.many_paths import ManyTrajectories
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.steering import N_NUMBERS, Ground, Steered
-from contextdb.motion.clips.trajectory import Trajectory
+from contextdb.motion.clips.trajectory import ManyTrajectories, Trajectory
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.output.samples import Place3
 from contextdb.motion.search.database import MotionDatabase

@@ -18,11 +18,18 @@ from contextdb.motion.clips.clip import Clip
 from contextdb.motion.clips.contacts import three_rounds
 from contextdb.motion.clips.feet import NO_MARKS, ContactMarks, footfalls_of, phases, rounds_of
 from contextdb.motion.clips.foot_bones import feet_of
-from contextdb.motion.clips.many_paths import ManyTrajectories
 from contextdb.motion.clips.poses import Poses, poses_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints, Skeleton
-from contextdb.motion.clips.trajectory import Trajectory, after_seconds, along_path, rates_of_change, to_own_frame, unbroken
+from contextdb.motion.clips.trajectory import (
+    ManyTrajectories,
+    Trajectory,
+    after_seconds,
+    along_path,
+    rates_of_change,
+    to_own_frame,
+    unbroken,
+)
 from contextdb.motion.features.channels import DEFAULT_AXIS, Channel
 from contextdb.motion.features.path_features import point_features, write_paths
 from contextdb.motion.features.schema import CustomFunction, FeatureSchema

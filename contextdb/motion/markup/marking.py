@@ -23,7 +23,7 @@ from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.markup.marks import Mark, Marks
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.markup.reserved import CONTACTS, MOST_SECONDS, ReservedTag
-from contextdb.motion.markup.spans import TOLERANCE_S, Span
+from contextdb.motion.markup.span_faults import TOLERANCE_S, Span
 from contextdb.motion.ranges import check_ranges
 
 MOST_RATE = 1e5

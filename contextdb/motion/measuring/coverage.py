@@ -27,9 +27,7 @@ from contextdb.cells.arguments import require_kind, require_many, require_mappin
 from contextdb.errors import Fault, MotionError, in_quotes
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.measuring.moves import LEAST_FRAMES, MAPS, TURN, WINDOW_S, Counts, Moves
-from contextdb.motion.measuring.near_clips import NEAR_COST, Near, Tell, near_clips
-from contextdb.motion.measuring.transition_names import PATTERN, TransitionCoverage, transitions_of
-from contextdb.motion.measuring.usage import usable
+from contextdb.motion.measuring.usage import NEAR_COST, PATTERN, Near, Tell, TransitionCoverage, near_clips, transitions_of, usable
 from contextdb.motion.measuring.wanted import Bools, ClipContexts, wanted_bins
 from contextdb.motion.search.database import MotionDatabase
 

@@ -17,8 +17,8 @@ from contextdb.cells.arguments import require_callable, require_kind, require_ma
 from contextdb.disk import MOST_PATTERNS
 from contextdb.errors import ContextError, Fault, MotionError, in_quotes
 from contextdb.motion.clips.clip import BY_SIZE, Clip
+from contextdb.motion.clips.foot_bones import Rig
 from contextdb.motion.clips.mirror import partners_of
-from contextdb.motion.clips.rig import Rig
 from contextdb.motion.preparing.cells_of_clips import CONDITIONS, OUTPUTS, cells_of
 from contextdb.motion.preparing.clip_facts import GAITS, NORMAL, ClipFacts, common_words, facts_of, style_of
 from contextdb.motion.preparing.meeting import Meeting, meetings

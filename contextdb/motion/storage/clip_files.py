@@ -13,7 +13,7 @@ from pathlib import Path
 
 from contextdb.disk import matching, path_in_quotes
 from contextdb.errors import Fault, MotionError, Place, in_quotes
-from contextdb.files.toml_text import as_toml
+from contextdb.files.toml_shapes import as_toml
 from contextdb.motion.clips import mirror
 from contextdb.motion.clips.clip import Clip
 from contextdb.motion.clips.clip_measures import Measures, measure

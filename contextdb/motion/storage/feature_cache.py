@@ -36,8 +36,7 @@ from contextdb.motion.clips.clip import BY_SIZE, Unit, Up
 from contextdb.motion.clips.clip_measures import Measures
 from contextdb.motion.clips.feet import NO_MARKS, ContactMarks
 from contextdb.motion.features.extraction import ClipFeatures
-from contextdb.motion.features.schema import FeatureSchema
-from contextdb.motion.features.schema_dict import unweighted
+from contextdb.motion.features.schema import FeatureSchema, unweighted
 
 EXTRACTION = 6
 """The version of what features are made of a clip: one more whenever the same clip would give other features."""

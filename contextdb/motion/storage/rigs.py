@@ -16,7 +16,7 @@ import numpy as np
 from contextdb.disk import matching
 from contextdb.disk.boundary import inside
 from contextdb.errors import Fault, MotionError, Place
-from contextdb.files.toml_text import as_toml
+from contextdb.files.toml_shapes import as_toml
 from contextdb.motion.clips.clip import Clip
 from contextdb.motion.clips.skeleton import Skeleton
 from contextdb.motion.clips.source import ClipSource

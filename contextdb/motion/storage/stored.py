@@ -42,8 +42,7 @@ from contextdb.files.tensors import (
     write_tensors,
 )
 from contextdb.motion.features.normalisation import Normalisation
-from contextdb.motion.features.schema import FeatureSchema
-from contextdb.motion.features.schema_dict import schema_to_dict
+from contextdb.motion.features.schema import FeatureSchema, schema_to_dict
 from contextdb.motion.markup.marks import Marks
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.filters import Biases

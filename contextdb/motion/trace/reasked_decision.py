@@ -21,7 +21,7 @@ from contextdb.motion.selection.choice import Choice, Status
 from contextdb.motion.selection.decision import Decision
 from contextdb.motion.selection.selector import Entry, choice_of
 from contextdb.motion.trace.cost_views import Ranked
-from contextdb.motion.trace.reasked_search import ReaskedSearch
+from contextdb.motion.trace.other_filters import ReaskedSearch
 from contextdb.motion.trace.stock import Stock
 from contextdb.motion.trace.views import role_of
 

@@ -21,9 +21,8 @@ from contextdb.errors import ContextDBError, Fault, MotionError, in_quotes, row_
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.search.filters import Filter
 from contextdb.motion.selection.choice import Choice
-from contextdb.motion.trace.other_filters import filter_by_table
+from contextdb.motion.trace.other_filters import ReaskedSearch, filter_by_table
 from contextdb.motion.trace.reasked_decision import ReaskedDecision
-from contextdb.motion.trace.reasked_search import ReaskedSearch
 from contextdb.motion.trace.stock import Edited, Row, failing_rows
 
 DIGITS = 4

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from contextdb.tables.changes import CameFrom
 from contextdb.tables.data import TableData
-from contextdb.tables.merging.shared import Places, Shared
+from contextdb.tables.merging.conflicts import Places, Shared
 
 LEAST_ALIKE = 0.5
 """Share of the cells that say something, in either row or column, that must be equal for a rename."""

@@ -14,9 +14,8 @@ from contextdb.columns import TextColumn
 from contextdb.errors import CellError
 from contextdb.tables.condition_column import ConditionColumn
 from contextdb.tables.data import TableData
-from contextdb.tables.merging.conflicts import Conflict, Decided
+from contextdb.tables.merging.conflicts import Conflict, Decided, Places, Shared
 from contextdb.tables.merging.order import Flags, Origins
-from contextdb.tables.merging.shared import Places, Shared
 
 Meaning = Callable[[str], object]
 """What a text means; None where nothing is known but the text itself."""

@@ -14,7 +14,7 @@ from contextdb.motion import Channel, ControllerSettings, FeatureSchema, PoseSet
 from contextdb.motion.features.channels import Permutations
 from contextdb.motion.storage.database_settings import DatabaseSettings
 from contextdb.motion.walking.walker import WalkSettings
-from contextdb.schema.parts import SECTIONS
+from contextdb.schema.contracts import SECTIONS
 from contextdb.schema.settings import read_schema
 from contextdb.schema.table_settings import TableSettings
 from docs.settings import DECLARED, PAGE, page

@@ -47,7 +47,7 @@ from contextdb.motion.preparing.describing import (
     table_section,
 )
 from contextdb.motion.preparing.describing import Sections as TomlSections
-from contextdb.motion.preparing.meeting import notes_of
+from contextdb.motion.preparing.look import notes_of
 from contextdb.schema.sections import settings_to_dict
 from contextdb.schema.toml_edit import absent, add_sections
 from contextdb.tables.changes import Cells, Change, Columns, Edit, Rows, Sections

@@ -23,7 +23,7 @@ RULES: dict[str, Rule] = {
         "error",
         "A file is not in the expected format.",
         "Correct the line that the message names; nothing in the file is used until all of it can be read.",
-        ("errors", "expressions.faults", "schema.faults"),
+        ("errors", "expressions.tokens", "schema.faults"),
     ),
     "no-such-path": Rule(
         "error",

@@ -42,8 +42,7 @@ from contextdb.motion.markup.reserved import ReservedTag, reserved_of
 from contextdb.motion.markup.span_faults import Span
 from contextdb.motion.storage.config import MotionConfig
 from contextdb.report.results import CheckReport, TableSummary
-from contextdb.schema.contracts import Contract
-from contextdb.schema.parts import header, keys_of
+from contextdb.schema.contracts import Contract, header, keys_of
 from contextdb.schema.settings import Schema
 from contextdb.schema.toml_lines import key_lines
 from contextdb.tables import project

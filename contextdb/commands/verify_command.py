@@ -150,9 +150,8 @@ Kinds = Iterator[tuple[str, str | None]]
 def _safetensors(path: Path) -> Kinds:
     from contextdb.compiled.artefact import COMPILED, open_artefact
     from contextdb.files.tensors import metadata_of
-    from contextdb.motion.storage.feature_cache import CLIP_FEATURES
     from contextdb.motion.storage.pose_files import STORED_POSES, open_poses
-    from contextdb.motion.storage.stored import STORED, open_database
+    from contextdb.motion.storage.stored import CLIP_FEATURES, STORED, open_database
 
     keys = metadata_of(path, COMPILED)
     if STORED.key in keys:

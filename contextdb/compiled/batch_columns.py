@@ -18,7 +18,7 @@ from contextdb.cells.mirroring import frozen_fact, mirrored_fact, partner_of
 from contextdb.cells.sets import Cell
 from contextdb.columns import polars as pl
 from contextdb.compiled.data import CompiledData
-from contextdb.compiled.soft import SoftMasks
+from contextdb.compiled.layers import SoftMasks
 from contextdb.errors import ContextError, Fault, Place
 
 Contexts: TypeAlias = "Mapping[str, Sequence[object] | NDArray[Any]] | pl.DataFrame"

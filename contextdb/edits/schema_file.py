@@ -19,7 +19,7 @@ from contextdb.files.file_names import alike
 from contextdb.files.toml_shapes import Path as KeyPath
 from contextdb.files.toml_shapes import as_toml, dotted, plain_numbers
 from contextdb.schema import toml_edit
-from contextdb.schema.parts import header
+from contextdb.schema.contracts import header
 from contextdb.schema.sections import schema_to_dict, settings_to_dict
 from contextdb.schema.settings import EMPTY, Schema, TableSettings, resolved, without_inherited
 from contextdb.tables.project import SCHEMA_FILE, read_folder_schema, schema_of

@@ -108,7 +108,7 @@ def read(raw: bytes, name: str, options: ReadOptions = ReadOptions()) -> Reading
 
         reading = replace(reading, remarks=(*reading.remarks, *doubts(reading.columns)))
     if options.is_decimal_comma and kind.name not in ("csv", "tsv", "unreal-csv"):
-        from contextdb.exchange.decimal_commas import with_points
+        from contextdb.exchange.reading import with_points
 
         columns, remarks = with_points(reading.columns, "", True)
         reading = replace(reading, columns=tuple(columns), remarks=(*reading.remarks, *remarks), source=None)

@@ -17,9 +17,8 @@ from contextdb.cells.intervals import wrap_angle
 from contextdb.cells.kinds import KINDS, Kind
 from contextdb.cells.sets import Accepted, Cell, NumberSet, TagSet, ValueSet, covers
 from contextdb.errors import CellError, in_quotes, nearest, some
-from contextdb.expressions.faults import Refusal
 from contextdb.expressions.plan import Const, Given, Held, Part, Type
-from contextdb.expressions.tokens import written_text
+from contextdb.expressions.tokens import Refusal, written_text
 from contextdb.expressions.tree import Likeness, Membership, Node, Text
 
 Choice = tuple[Node, Part, Type]

@@ -1,7 +1,7 @@
 """Compute a plan for one context: a function of the facts, made once.
 
 Facts are in canonical form, a missing number as NaN, any other missing fact as None. The same answers, bit by bit, as
-`contextdb.expressions.frame` gives for many contexts.
+`contextdb.expressions.columns` gives for many contexts.
 """
 
 from __future__ import annotations

@@ -23,9 +23,8 @@ from contextdb.cells.words import NUMBER_TEXT, quoted, says_any, truth_of
 from contextdb.columns import TextColumn
 from contextdb.columns import polars as pl
 from contextdb.errors import Fault, Place, TableError, plural, row_name, safe_text
-from contextdb.files.csv_faults import MOST_CHARACTERS
 from contextdb.files.csv_rewrite import Origin, changed_rows, source_fields
-from contextdb.files.csv_source import name_faults, text_columns
+from contextdb.files.csv_source import MOST_CHARACTERS, name_faults, text_columns
 from contextdb.files.parquet_frame import MAGIC, UNSEALED, DamagedFrame, require_whole, sealed
 from contextdb.files.strangers import seems_to_be
 

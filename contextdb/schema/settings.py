@@ -20,7 +20,7 @@ from contextdb.columns import TextColumn
 from contextdb.errors import Fault, Place, SchemaError, plural
 from contextdb.files.file_names import composed
 from contextdb.files.settings import settings_of
-from contextdb.schema.contracts import Contract
+from contextdb.schema.contracts import Contract, Part, condition_of, fitting_of, parts_of
 from contextdb.schema.faults import (
     column_faults,
     document_faults,
@@ -30,7 +30,6 @@ from contextdb.schema.faults import (
     section_faults,
 )
 from contextdb.schema.outputs import declared_outputs, fallback_of
-from contextdb.schema.parts import Part, condition_of, fitting_of, parts_of
 from contextdb.schema.table_settings import JOBS, TableSettings
 from contextdb.schema.toml_lines import key_lines, line_of, read_toml
 

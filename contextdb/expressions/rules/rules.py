@@ -26,9 +26,8 @@ from contextdb.columns import TextColumn
 from contextdb.errors import ContextError, Fault, Place, in_quotes, plural
 from contextdb.expressions import Expression
 from contextdb.expressions.boxes import Box, meets
-from contextdb.expressions.columns import NO, UNKNOWN, Column, missing_rows, read_column, taken
+from contextdb.expressions.columns import NO, UNKNOWN, Column, missing_rows, read_column, run_frame, taken
 from contextdb.expressions.expression import NAN
-from contextdb.expressions.frame import run_frame
 from contextdb.expressions.rules.column import WhenColumn
 from contextdb.expressions.scalar import Run, Value
 

@@ -26,9 +26,8 @@ import numpy as np
 from contextdb.cells.arguments import require_kind, require_many, require_mapping, require_real, require_text
 from contextdb.errors import Fault, MotionError, in_quotes
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.measuring.moves import LEAST_FRAMES, MAPS, TURN, WINDOW_S, Counts, Moves
+from contextdb.motion.measuring.moves import LEAST_FRAMES, MAPS, TURN, WINDOW_S, Bools, ClipContexts, Counts, Moves, wanted_bins
 from contextdb.motion.measuring.usage import NEAR_COST, PATTERN, Near, Tell, TransitionCoverage, near_clips, transitions_of, usable
-from contextdb.motion.measuring.wanted import Bools, ClipContexts, wanted_bins
 from contextdb.motion.search.database import MotionDatabase
 
 MOST_ELSEWHERE = 3

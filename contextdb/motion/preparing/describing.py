@@ -21,7 +21,7 @@ from contextdb.motion.clips.foot_bones import Rig
 from contextdb.motion.clips.mirror import partners_of
 from contextdb.motion.preparing.cells_of_clips import CONDITIONS, OUTPUTS, cells_of
 from contextdb.motion.preparing.clip_facts import GAITS, NORMAL, ClipFacts, common_words, facts_of, style_of
-from contextdb.motion.preparing.meeting import Meeting, meetings
+from contextdb.motion.preparing.look import Meeting, meetings
 
 RATE = 30.0
 MOST_TURN_DPS = 1080.0

@@ -30,7 +30,7 @@ from contextdb.motion.storage.clip_files import Extracted, named_takes
 from contextdb.motion.storage.config import MotionConfig
 from contextdb.motion.storage.database_settings import DatabaseSettings
 from contextdb.motion.storage.extracting import Progress, extract_all
-from contextdb.motion.storage.feature_cache import FeatureCache, file_name
+from contextdb.motion.storage.stored import FeatureCache, file_name
 
 CACHE_FOLDER = ".contextdb-cache"
 SAVED_SUFFIX = ".motion.safetensors"

@@ -20,9 +20,8 @@ from contextdb.cells.outputs import Output
 from contextdb.cells.sets import ANY, Cell, TagMeet, meet
 from contextdb.cells.words import quoted, says_any, slot_words
 from contextdb.columns import TextColumn
-from contextdb.compiled.layers import Layers
+from contextdb.compiled.layers import Layers, SoftMasks
 from contextdb.compiled.outputs import NO_OUTPUTS, Outputs, cells_of, outputs_of_cells
-from contextdb.compiled.soft import SoftMasks
 from contextdb.errors import Fault, Place, TableError, in_quotes
 from contextdb.schema.settings import derivation_of
 from contextdb.tables.condition_column import ConditionColumn

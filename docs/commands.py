@@ -9,6 +9,7 @@ import argparse
 import os
 import re
 import sys
+import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 from unittest import mock
@@ -98,7 +99,8 @@ def _helps(group: Group) -> Iterator[tuple[str, str, list[str], list[str]]]:
 def _line(parser: argparse.ArgumentParser, action: argparse.Action) -> str:
     """An argument or an option with its help."""
     form = parser._get_formatter()
-    return f"{form._format_action_invocation(action):20}  {' '.join(form._expand_help(action).split())}"
+    line = f"{form._format_action_invocation(action):20}  {' '.join(form._expand_help(action).split())}"
+    return textwrap.fill(line, 118, subsequent_indent=22 * " ", break_on_hyphens=False)
 
 
 def _without_usage(text: str) -> str:

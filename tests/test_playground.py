@@ -418,6 +418,20 @@ def test_the_picture_shows_the_player_and_what_is_said_without_a_screen(window: 
     assert 0.002 < words < 0.3
 
 
+def test_few_pictures_a_second_do_not_make_the_play_slow(window: Any):
+    from panda3d.core import ClockObject
+
+    clock = ClockObject.getGlobalClock()
+    clock.setMode(ClockObject.M_non_real_time)
+    clock.setDt(0.2)
+    window.begin()
+    window.base.taskMgr.step()
+    before_s = window.game.time_s
+    for _ in range(5):
+        window.base.taskMgr.step()
+    assert window.game.time_s - before_s == pytest.approx(1.0)
+
+
 def test_where_the_pointer_comes_from_is_no_look(window: Any, monkeypatch: pytest.MonkeyPatch):
     places, looks = iter([(900, 20), (330, 180)]), []
 

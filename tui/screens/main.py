@@ -98,8 +98,12 @@ class MainScreen(TableScreen):
         workspace = self.workspace
 
         def named(name: str | None) -> None:
-            if name is not None:
+            if name is None:
+                return
+            if self.session.sheet.table.schema.blueprints:
                 self._choose_blueprint(name)
+            else:
+                self.try_to(lambda: self._make_table(name.strip(), ()))
 
         question = "The name of the table and its file"
         check = partial(name_fault, workspace.folder, taken=workspace.files)

@@ -125,6 +125,16 @@ def test_the_other_cells_of_a_row_for_a_gap_say_any_as_their_columns_do(path):
     assert with_editor(path, script) == "new,(2..3],Any,"
 
 
+def test_a_table_that_cannot_be_saved_says_so_beside_its_name_after_edits_too(path):
+    path.chmod(0o444)
+
+    async def script(app, pilot):
+        await press(pilot, *"new", "enter")
+        return screen_text(app)
+
+    assert with_editor(path, script).startswith(f" {path.stem} * (read-only) ")
+
+
 def test_the_row_for_a_gap_comes_below_the_one_that_is_nearest_to_it(path):
     async def script(app, pilot):
         last = app.main.session.sheet.table.n_rows - 1

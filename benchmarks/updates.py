@@ -3,9 +3,9 @@
     python benchmarks/updates.py                      one character, and each of a thousand
     python benchmarks/updates.py --against CHECKOUT   beside another checkout of contextdb, in turn
 
-The captured clips of one rig, or made ones, are in five databases that share one table of four conditions; the character gives two of
-their facts itself. It searches every 0.1 s, stands on a slope and gives poses. A figure is the median of the rounds, each
-of ten updates at 30 a second: in three of ten it searches. The two checkouts must decide the same.
+The captured clips of one rig, or made ones, are in five databases that share one table of four conditions; two of their facts the
+character gives itself. It searches every 0.1 s, stands on a slope and gives poses. A figure is the median of rounds of ten updates
+at 30 a second. The two checkouts must decide the same.
 
 The captured clips are not part of this project: the environment variable CONTEXTDB_MOCAP names their folder.
 """
@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
 import statistics
 import subprocess
 import sys
@@ -25,14 +26,25 @@ from typing import Any
 HERE = Path(__file__).parents[1]
 if __package__ in (None, ""):
     sys.path[0] = str(HERE if sys.argv[1:2] != ["worker"] else Path(sys.argv[2]))
-    sys.path.append(str(HERE))  # the benchmarks themselves are always these
 
-import numpy as np
+import numpy as np  # noqa: E402  (behind the checkout whose benchmarks and contextdb are measured)
 
 RATE, ROUNDS, CROWD = 30.0, 40, 1000
-KINDS = {"back": ("walk-back",), "sides": ("walk-left", "walk-right"), "turns": ("walk-turn",), "runs": ("dash", "run", "jog"), "walks": ("",)}
+KINDS = {
+    "back": ("walk-back",),
+    "sides": ("walk-left", "walk-right"),
+    "turns": ("walk-turn",),
+    "runs": ("dash", "run", "jog"),
+    "walks": ("",),
+}
 """The databases, and how the names of their clips go on behind the set; the first that fits has a clip."""
-GAITS = {"runs": ("Run", ">=1.5"), "walks": ("Any", "Any"), "back": ("Walk", "<=3"), "sides": ("Walk", "<=3"), "turns": ("Walk", "Any")}
+GAITS = {
+    "runs": ("Run", ">=1.5"),
+    "walks": ("Any", "Any"),
+    "back": ("Walk", "<=3"),
+    "sides": ("Walk", "<=3"),
+    "turns": ("Walk", "Any"),
+}
 
 
 def main() -> None:
@@ -57,7 +69,10 @@ def main() -> None:
 
 def _started(checkout: Path) -> Any:
     words = [sys.executable, __file__, "worker", str(checkout)]
-    return subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1)
+    from benchmarks.captured import FOLDER
+
+    where = os.environ | {"CONTEXTDB_MOCAP": str(FOLDER)}
+    return subprocess.Popen(words, env=where, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1)
 
 
 def _round(worker: Any, n: int) -> tuple[float, str]:

@@ -359,9 +359,7 @@ static inline void cdbm_add_own(const cdbm_player *player, size_t table, size_t 
     if (condition->expr || !cdbi_is_missing(condition, fact)) return;
     if (!cdbi_is_double(condition->type)) return;
     if (!cdbm_said_of(player, CDBM_P_OWN_FACTS, table, condition->name, &letter)) return;
-    if (letter == 's') fact->number = cdbo_flat_length(walk->body.velocity[0], walk->body.velocity[1]);
-    if (letter == 'd') fact->number = cdbm_direction(goal->velocity, walk->body.heading);
-    if (letter == 't') fact->number = walk->body.turn_rate * (180.0 / CDBO_PI);
+    fact->number = cdbm_own_fact(walk, goal, letter);
 }
 
 /* The facts as a mirror shows them; whether any is another. */
@@ -482,12 +480,10 @@ static inline int cdbm_query_of(const cdbm_player *player, const cdbm_input *inp
     float *narrow;
     if (!positions) return 0;
     headings = positions + 2 * n_most, lengths = headings + n_most, pose = lengths + n_most, narrow = (float *)(void *)(pose + ways->n_features);
-    cdbm_walk_on(ways, before, &input->goal, input->body, dt_s, state);
     memcpy(cdbm_played_part(player, state), cdbm_played_part(player, (double *)(uintptr_t)before),
         (cdbm_state_width(player) - cdbm_walk_width(ways)) * sizeof(double));
-    cdbm_move(&player->controller, cdbm_played_part(player, state), dt_s, moved);
-    if (moved->to.database < 0.0) cdbm_rest_pose(ways, state, player->frames[0].offset, pose);
-    else cdbm_features(player->clips[(size_t)moved->to.database].frames, (int64_t)moved->to.frame, pose);
+    cdbm_move_on(ways, &player->controller, player->frames[0].offset, before, cdbm_played_part(player, state), &input->goal, input->body, dt_s,
+        state, moved, pose);
     if (input->positions) {
         rate = input->path_rate, n_behind = rate > 0.0 ? cdbm_n_behind(ways, rate) : n_most;
         if (input->n_path == 0 || n_behind >= n_most) return 0;
@@ -525,13 +521,9 @@ static inline void cdbm_pose_of(const cdbm_player *player, const cdbm_input *inp
     cdbo_given given;
     cdbo_seam seams[2];
     cdbo_posed one;
-    memset(&play, 0, sizeof play);
     memset(&one, 0, sizeof one);
-    play.playing = cdbm_instant_of(player, &decision->playing), play.before = cdbm_instant_of(player, &decision->before);
-    play.displayed = *displayed, play.action = decision->action, play.rate = decision->rate, play.weight = decision->root_weight;
-    play.gives_ground = input->ground ? 1.0 : 0.0;
-    memcpy(play.motion, decision->motion, sizeof play.motion);
-    play.blend_s = decision->play.blend_s, play.root = decision->play.root;
+    play = cdbm_pose_play(decision, cdbm_instant_of(player, &decision->playing), cdbm_instant_of(player, &decision->before), *displayed,
+        input->ground != NULL);
     one.poses = &player->poses, one.before = cdbm_pose_part(player, (double *)(uintptr_t)before), one.row = cdbm_pose_part(player, state);
     cdbo_receive(&player->poses, one.before, &play, dt_s, &given, seams, &n_seams);
     place[0] = walk->body.position[0], place[1] = walk->body.position[1], place[2] = walk->body.heading;

@@ -22,7 +22,7 @@ from contextdb.motion.clips.ground_place import GroundPlace, OfBody, place_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.records import collector_at_rest
 from contextdb.motion.selection.chooser import are_mappings
-from contextdb.motion.selection.controller import Asked, Controller, rows_of, seconds_of, update_all
+from contextdb.motion.selection.controller import Asked, Controller, Decided, rows_of, seconds_of, update_all
 from contextdb.motion.selection.controller_state import ControllerState
 from contextdb.motion.selection.decision import Decision, Playing
 from contextdb.motion.selection.events import Event
@@ -180,7 +180,21 @@ class ControllerGroup(ListSequence[Controller]):
             for i, controller in enumerate(self):
                 with _of_character(i):
                     controller.check(asked, i)
-        return update_all(self, seconds, wanted, asked, facts, places)
+        return update_all(self, seconds, wanted, asked, facts, places).decisions
+
+    def decided(
+        self,
+        dt_s: float,
+        queries: Floats,
+        valid: OfValidForMany | None,
+        contexts: Sequence[Mapping[str, object] | None],
+        places: Floats,
+        moved: Floats,
+    ) -> Decided:
+        """The same of what is right already, with the places of bodies [Q, 3] and what has moved [Q, 16]."""
+        nothing, no = [None] * len(self), [False] * len(self)
+        asked = Asked(valid, nothing, nothing, nothing, nothing, no, no, nothing)
+        return update_all(self, dt_s, queries, asked, contexts, places, moved)
 
     def _have_width(self, n_features: int) -> bool:
         """Whether queries of so many features fit all databases."""

@@ -84,15 +84,12 @@ def checked(tables: object) -> Tables:
 
 
 def each_of(tables: Tables) -> list[Table]:
+    """All tables that were `checked`, each once."""
     if tables is None:
         return []
-    if is_one(tables):
-        return [tables]
-    return list({id(table): table for table in _by_database(tables).values()}.values())
-
-
-def _by_database(tables: Tables) -> Mapping[str, Table]:
-    return cast("Mapping[str, Table]", tables)
+    if not isinstance(tables, dict):
+        return [cast("Table", tables)]
+    return list({id(table): table for table in tables.values()}.values())
 
 
 class OwnFacts(NamedTuple):
@@ -125,11 +122,9 @@ def own_facts_of(tables: Tables, functions: Mapping[str, FactOf]) -> dict[str, F
 
 def valid_of(tables: Tables, answers: Mapping[int, Answer]) -> OfValid | None:
     """What may play, for a controller: the answers of the tables, by their ids."""
-    if tables is None:
-        return None
-    if is_one(tables):
-        return answers[id(tables)]
-    return {database: answers[id(table)] for database, table in _by_database(tables).items()}
+    if isinstance(tables, dict):
+        return {database: answers[id(table)] for database, table in tables.items()}
+    return None if tables is None else answers[id(tables)]
 
 
 def answer(table: Table, facts: Facts, unknown: Unknown) -> Answer:

@@ -30,6 +30,7 @@ from contextdb.motion.output.streams import PoseStreams
 from contextdb.motion.records import collector_at_rest
 from contextdb.motion.selection.controller import Decided, rows_of
 from contextdb.motion.selection.controller_group import ControllerGroup
+from contextdb.motion.selection.events import Event
 from contextdb.motion.selection.search_options import OfValid
 
 T = TypeVar("T")
@@ -90,7 +91,13 @@ class Crowd(ListSequence[Character]):
 
     @collector_at_rest()
     def update(
-        self, dt: float, sticks: ArrayLike, facts: FactsOfMany | None = None, facing: ArrayLike | None = None
+        self,
+        dt: float,
+        sticks: ArrayLike,
+        facts: FactsOfMany | None = None,
+        facing: ArrayLike | None = None,
+        *,
+        event: Event | Sequence[Event | None] | None = None,
     ) -> list[Updated]:
         """Update every character as `Character.update` does; what each gave, in order. Python's garbage collector rests meanwhile.
 
@@ -104,6 +111,8 @@ class Crowd(ListSequence[Character]):
             What the game knows: what is no list, tuple or array is the same for all.
         facing : float array, shape (Q,), optional
             The headings that are requested, radians. Default: where the bodies go.
+        event : (str, float), or sequence of Q of them or None, optional
+            What is to happen and in how many seconds, as for `Character.update`: for all, or for each.
 
         Raises
         ------
@@ -123,7 +132,7 @@ class Crowd(ListSequence[Character]):
         group = ControllerGroup(character.controller for character in self)
         valid = self._valid(facts_of)
         before = [controller.place for controller in group]
-        decided = group.decided(dt, on.queries, valid, [own or None for own in facts_of], on.places, on.moved)
+        decided = group.decided(dt, on.queries, valid, event, [own or None for own in facts_of], on.places, on.moved)
         try:
             poses, roots, moves_body = self._posed(dt, decided, on.places)
         except Exception:

@@ -379,7 +379,7 @@ def update_all(
         updates = prepared(own, dt_s, parts[0], asked, numbers, parts[1])
         search_us = _run(updates, own)
         made.append((numbers, updates))
-        question = Question(queries, contexts, bodies, asked.force, asked.interrupt, search_us)
+        question = Question(queries, contexts, bodies, asked.force, asked.interrupt, asked.event, search_us)
         for k, i in enumerate(numbers):
             decisions[i] = decision_of(updates, k, question, own[k].asker(asked, i))
     for numbers, updates in made:
@@ -439,8 +439,8 @@ def _with_more(given: Given, chooser: Chooser, moved: Floats, asked: Asked, numb
     leading = chooser.leading(event, given.plays)
     d, _, frame = moved[0, :3].astype(np.int64).tolist()
     urgent[0] |= FORCE * (d >= 0 and not leading[chooser.frames_at[d].start + frame])
-    shared = shared.among_frames(leading, chooser.frames_at, chooser.names)
-    return given._replace(shared=shared, to_event=chooser.to_event(event), event_s=event[1])
+    shared = shared._replace(flags=leading if shared.flags is None else shared.flags & leading)
+    return given._replace(shared=shared, to_event=chooser.to_event(event), event_s=event[1], leading=leading)
 
 
 def _run(updates: Updates, own: Sequence[Controller]) -> float:

@@ -18,6 +18,7 @@ from contextdb.motion.selection import trigger
 from contextdb.motion.selection.choice import Choice
 from contextdb.motion.selection.chooser import ENTERED, GONE, Updates
 from contextdb.motion.selection.decision import Action, Decision, Playing
+from contextdb.motion.selection.events import Event
 from contextdb.motion.selection.guards import Held
 from contextdb.motion.selection.inputs import Inputs
 from contextdb.motion.selection.root_motion import RootMotion
@@ -38,6 +39,7 @@ class Question(NamedTuple):
     bodies: Sequence[GroundPlace | None] | Floats
     force: Sequence[bool]
     interrupt: Sequence[bool]
+    event: Sequence[Event | None]
     search_us: float | None = None
 
 
@@ -139,7 +141,7 @@ def _inputs(updates: Updates, question: Question, by: Asker) -> Inputs:
     else:  # flags of frames are in the filters
         named = {name: each for name, each in tags.items() if isinstance(each, TagFilter)}
     force, interrupt = bool(question.force[by.number]), bool(question.interrupt[by.number])
-    return Inputs(given.dt_s, force, interrupt, among, named, chooser.settings)
+    return Inputs(given.dt_s, force, interrupt, among, named, chooser.settings, question.event[by.number])
 
 
 def _why(updates: Updates, i: int, numbers: Numbers, cause: Trigger | None, before: Playing | None, choice: Choice | None) -> str:

@@ -44,7 +44,7 @@ def follow(controller: Controller, dt_s: float, query: Floats, packet: bytes, bo
     elif CAUSES[int(row[CAUSE])] is Trigger.DUE:
         row[CAUSE] = 0.0
     updates.run(DECIDE)
-    question = Question(query[None], [None], [body], asked.force, asked.interrupt)
+    question = Question(query[None], [None], [body], asked.force, asked.interrupt, asked.event)
     decision = decision_of(updates, 0, question, Asker(0, controller.playing))
     controller.take(updates, 0, decision)
     return Decided([decision], [([0], updates)])

@@ -44,6 +44,7 @@ from contextdb.motion.output.stream import PoseStream
 from contextdb.motion.selection.controller import Asked, Clock, Controller, Decided, update_all
 from contextdb.motion.selection.controller import Place as ControllerPlace
 from contextdb.motion.selection.decision import Playing, plays
+from contextdb.motion.selection.events import Event
 from contextdb.motion.selection.followed import follow
 from contextdb.motion.selection.root_motion import RootMotion
 from contextdb.motion.selection.search_options import OfValid
@@ -338,11 +339,12 @@ class Character:
         *,
         body: Steered | None = None,
         path: Trajectory | None = None,
+        event: Event | None = None,
     ) -> Updated:
         """An update of a copy: in place of asking tables and searching it plays what its owner packed after this update.
 
-        With the same databases, and the same `dt`, stick and body as the owner had, poses are the owner's to the bit; so they
-        are without a body where the clip alone moves it (`root = "animation"`). Where nothing arrived, give b"": it plays on.
+        With the same databases, and the same `dt`, stick, body and event as the owner had, poses are the owner's to the bit; so
+        they are without a body where the clip alone moves it (`root = "animation"`). Where nothing arrived, give b"": it plays on.
         The next packet puts it right; where that tells of an entry that is past, the copy is at most a frame off until the next
         one.
 
@@ -350,7 +352,7 @@ class Character:
         ----------
         data : bytes
             What `pack` gave. One that comes late must be left out.
-        dt, stick, facing, body, path
+        dt, stick, facing, body, path, event
             As for `update`.
 
         Raises
@@ -360,7 +362,7 @@ class Character:
         """
         step = self._step(dt, stick, None, facing, body, path)
         before, (x, z, heading) = self.controller.place, step.on.places[0].tolist()
-        return self._answer(step, follow(self.controller, step.dt_s, step.on.queries[0], data, (x, z, heading)), before)
+        return self._answer(step, follow(self.controller, step.dt_s, step.on.queries[0], data, (x, z, heading), event), before)
 
     # ---- the parts of an update, for a crowd
 

@@ -18,6 +18,7 @@ from contextdb.cells.arguments import as_number
 from contextdb.errors import Fault, QueryError, no_such, some
 from contextdb.motion.arguments import Flags
 from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.markup.left_out import LeftOut, Skip
 from contextdb.motion.markup.marks import Marks
 from contextdb.motion.markup.reserved import CONTACTS, reserved_of
@@ -68,6 +69,13 @@ def astray(leading: Flags) -> Iterator[Skip]:
     edges = np.flatnonzero(np.diff(np.concatenate(([True], leading, [True]))))
     for start, stop in edges.reshape(-1, 2).tolist():
         yield Skip(start, stop, LeftOut.EVENT)
+
+
+def events_of(database: MotionDatabase) -> dict[str, Ints]:
+    """The frames at which each event of a database begins, by its name: plain tags, those above them, and contacts."""
+    above = [".".join(tag.split(".")[:n]) for tag in database.marks.tags for n in range(1, tag.count(".") + 2)]
+    names = dict.fromkeys((*above, *CONTACTS))
+    return {name: np.flatnonzero(_begins(database, database.marks, name)).astype(np.int64) for name in names}
 
 
 def _begins(database: MotionDatabase, marks: Marks, name: str) -> Flags:

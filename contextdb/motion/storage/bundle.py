@@ -21,6 +21,7 @@ from contextdb.motion.output.pipeline import numbers_of, rig_parts
 from contextdb.motion.output.settings import PoseSettings
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.controller import Controller
+from contextdb.motion.selection.events import events_of
 
 MAGIC = b"CDBMOTN1"
 DATABASE, BANK, CONTROLLER, TABLE = 1, 40, 60, 90
@@ -149,9 +150,8 @@ def _add_database(bundle: Bundle, number: int, player: Played, name: str, bank: 
         rows = mirrored, row_starts, row_numbers
     measures = kinds, offset, scale, channels, channel_weights, roots
     played = starts, stops, same, looping, root, marks, weights, own
-    bundle.add(
-        DATABASE, number, [*arrays, *measures, *played, ranges, _texts(database.assets), *rows, _texts([name]), *_levels(database)]
-    )
+    texts = _texts(database.assets), *rows, _texts([name])
+    bundle.add(DATABASE, number, [*arrays, *measures, *played, ranges, *texts, *_levels(database), *_events(database)])
     if bank is not None:
         *frames, bank_rate = bank.frame_parts(bank.steps)
         bundle.add(BANK, number, [*frames, np.array([bank_rate])])
@@ -192,6 +192,13 @@ def _levels(database: MotionDatabase) -> list[NDArray[Any]]:
     step, levels = np.empty(1), [np.empty(size, np.int16) for size in sizes]
     database.frames.levels(step, *levels)
     return [step, *levels]
+
+
+def _events(database: MotionDatabase) -> list[Part]:
+    """The names of events, where the frames of each begin, and at which frames they happen."""
+    events = events_of(database)
+    starts = np.cumsum([0, *map(len, events.values())], dtype=np.int64)
+    return [_texts(list(events)), starts, np.concatenate(list(events.values()))]
 
 
 def _clips(database: MotionDatabase) -> list[tuple[str, bool]]:

@@ -101,7 +101,8 @@ static inline int cdbm_enter(const cdbm_player *player, const double *state, con
     if (is_done != 1) return is_done;
     cdbm_move(&player->controller, cdbm_played_part(player, (double *)(uintptr_t)state), 0.0, &moved);
     if (match->query) memcpy(query, match->query, clips->frames->n_features * sizeof(double));
-    else cdbm_pose_features(player, state, &moved, query);
+    else if (moved.to.database < 0.0) cdbm_rest_pose(&player->ways, state, player->frames[0].offset, query);
+    else cdbm_features(player->clips[(size_t)moved.to.database].frames, (int64_t)moved.to.frame, query);
     cdbm_write_aims(player, match, &target, play_of, biases, others);
     for (k = 0; k < clips->n_kinds; k++) allowed[k] = player->allowed[clips->kind_at + k] && clips->marks[k] & CDBM_IN_MATCH_RANGE;
     memset(&asked, 0, sizeof asked);

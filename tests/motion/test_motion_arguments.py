@@ -33,12 +33,11 @@ from contextdb.motion.storage.building import build_all, saved_path
 from contextdb.motion.storage.pose_files import open_poses, poses_path, save_poses
 from contextdb.motion.storage.stored import inputs_of, open_database, save_database
 from contextdb.motion.storage.written_poses import write_arrays
-from contextdb.motion.walking.baked import baked_cycle
 from contextdb.motion.walking.blending import Gait
 from contextdb.motion.walking.cycle import Cycle
 from contextdb.motion.walking.stances import Stances
 from contextdb.motion.walking.transitions import Transitions
-from contextdb.motion.walking.walked import walked_clips
+from contextdb.motion.walking.walked import baked_cycle, walked_clips
 from contextdb.motion.walking.walker import Walker
 
 

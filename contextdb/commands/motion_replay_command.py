@@ -50,7 +50,7 @@ from contextdb.motion.trace.reasked import Changes, Reasked, require_known, why_
 from contextdb.motion.trace.session import Trace
 from contextdb.motion.trace.status import Status, status_of
 from contextdb.motion.trace.stock import Stock
-from contextdb.motion.trace.views import decision_lines, look_first, session_lines, summary_line
+from contextdb.motion.trace.views import NOTHING_FORCED, decision_lines, look_first, session_lines, summary_line
 from contextdb.motion.trace.what_if import what_if
 from contextdb.motion.trace.why_not import WhyNot
 from contextdb.report.render_json import as_json
@@ -220,8 +220,7 @@ def place_of(text: str, trace: Trace, file: str) -> int:
 
 def _heading(trace: Trace) -> list[str]:
     """A session in a line, and where to look first."""
-    first = look_first(trace.brief())
-    return [summary_line(trace.brief()), *([first] if first else [])]
+    return [summary_line(trace.brief()), look_first(trace.brief()) or NOTHING_FORCED]
 
 
 def _session(replay: Replay) -> Part:

@@ -197,7 +197,7 @@ class Explanation:
         return one_line("Explanation", self.compiled.name, f"{len(self.matches):,} of {plural(self.compiled.n_rows, 'row')} valid")
 
     def _repr_html_(self) -> str:
-        rows = ((r.asset, "" if r.is_valid else str(r).removeprefix(f"{r.asset}: ")) for r in self)
+        rows = ((r.asset, "valid" if r.is_valid else str(r).removeprefix(f"{r.asset}: ")) for r in self)
         return as_html(repr(self), ("asset", "why not"), rows, len(self))
 
     @cached_property

@@ -25,6 +25,7 @@
 #include "python_joint.h"
 #include "python_controller.h"
 #include "python_walk.h"
+#include "python_nodes.h"
 #include "batch.h"
 #include "python_batch.h"
 #include "fact_columns.h"
@@ -58,6 +59,7 @@ static PyMethodDef cdbp_functions[] = {
     CDBP_JOINT_FUNCTIONS
     CDBP_CONTROLLER_FUNCTIONS
     CDBP_WALK_FUNCTIONS
+    CDBP_NODE_FUNCTIONS
     {"group_keys", CDBP_CALL(cdbp_group_keys), METH_FASTCALL, "The distinct keys of many contexts; see contextdb.telemetry.keys."},
     {"hash_keys", CDBP_CALL(cdbp_hash_keys), METH_FASTCALL, "A hash of each key."},
     {"list_rows", CDBP_CALL(cdbp_list_rows), METH_FASTCALL, "The rows of masks, one mask after the other."},

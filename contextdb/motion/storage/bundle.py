@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.errors import Fault, MotionError, Place, in_quotes
+from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.steering import Steered
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.output.bank import PoseBank, moving_alike
@@ -21,6 +22,7 @@ from contextdb.motion.output.pipeline import numbers_of, rig_parts
 from contextdb.motion.output.settings import PoseSettings
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.controller import Controller
+from contextdb.motion.selection.events import events_of
 
 MAGIC = b"CDBMOTN1"
 DATABASE, BANK, CONTROLLER, TABLE = 1, 40, 60, 90
@@ -43,6 +45,8 @@ class Played:
     banks: Mapping[str, PoseBank] | None
     """None for characters without poses."""
     output: PoseSettings
+    ends: Mapping[str, Floats] = field(default_factory=dict)
+    """`MatchNode.ends`, float64 [N, 3], of the databases whose animations can be entered as one-offs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,10 +152,11 @@ def _add_database(bundle: Bundle, number: int, player: Played, name: str, bank: 
         row_starts, row_numbers, mirrored, _ = chooser.rows_of(name, table.assets)
         rows = mirrored, row_starts, row_numbers
     measures = kinds, offset, scale, channels, channel_weights, roots
+    nodes = (database.marks.warps, player.ends[name]) if name in player.ends else ()
     played = starts, stops, same, looping, root, marks, weights, own
-    bundle.add(
-        DATABASE, number, [*arrays, *measures, *played, ranges, _texts(database.assets), *rows, _texts([name]), *_levels(database)]
-    )
+    texts = _texts(database.assets), *rows, _texts([name])
+    levels, events = _levels(database), _events(database)
+    bundle.add(DATABASE, number, [*arrays, *measures, *played, ranges, *texts, *levels, *events, *nodes])
     if bank is not None:
         *frames, bank_rate = bank.frame_parts(bank.steps)
         bundle.add(BANK, number, [*frames, np.array([bank_rate])])
@@ -192,6 +197,13 @@ def _levels(database: MotionDatabase) -> list[NDArray[Any]]:
     step, levels = np.empty(1), [np.empty(size, np.int16) for size in sizes]
     database.frames.levels(step, *levels)
     return [step, *levels]
+
+
+def _events(database: MotionDatabase) -> list[Part]:
+    """The names of events, where the frames of each begin, and at which frames they happen."""
+    events = events_of(database)
+    starts = np.cumsum([0, *map(len, events.values())], dtype=np.int64)
+    return [_texts(list(events)), starts, np.concatenate(list(events.values()))]
 
 
 def _clips(database: MotionDatabase) -> list[tuple[str, bool]]:

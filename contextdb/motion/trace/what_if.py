@@ -178,6 +178,7 @@ class _Runner:
             among=asked.among,
             force=inputs.force,
             interrupt=inputs.interrupt,
+            event=inputs.event,
         )
 
     def _inputs_of(self, recorded: Decision, inputs: Inputs) -> SearchOptions:

@@ -54,6 +54,12 @@ def test_an_update_writes_the_real_output_under_each_command():
     assert updated(lines)[3:6] == ["1", "2", "$ echo $?"]
     assert updated(lines)[6:] == ["0", "```", "", "```python", "print(3)", "```", "", "```text", "3", "```"]
     assert updated(updated(lines)) == updated(lines)
+    assert updated(["```pycon", ">>> for i in (1, 2):", "...     print(i)", ">>> print(3)", "```"])[3:7] == [
+        "1",
+        "2",
+        ">>> print(3)",
+        "3",
+    ]
     assert updated(["A page without commands."]) == ["A page without commands."]
 
 

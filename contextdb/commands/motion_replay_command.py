@@ -44,9 +44,8 @@ from contextdb.motion.storage.pose_files import saved_poses
 from contextdb.motion.storage.stored import open_database
 from contextdb.motion.trace.answer_views import diff_lines, stats_lines, what_if_lines, why_lines
 from contextdb.motion.trace.chrome_trace import chrome_trace
-from contextdb.motion.trace.cost_views import Ranked, View
+from contextdb.motion.trace.cost_views import Ranked, View, decision_json, ranked_json
 from contextdb.motion.trace.filter_rows import is_recorded
-from contextdb.motion.trace.json_form import decision_json, ranked_json
 from contextdb.motion.trace.reasked import Changes, Reasked, require_known, why_not_asked
 from contextdb.motion.trace.session import Trace
 from contextdb.motion.trace.status import Status, status_of

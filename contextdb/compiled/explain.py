@@ -31,8 +31,7 @@ from contextdb.cells.sets import Accepted, Cell, NumberSet, TagSet, ValueSet, co
 from contextdb.cells.words import NUMBER_TEXT
 from contextdb.compiled.classes import ColumnMasks, NumberMasks, WideMasks, column_masks
 from contextdb.compiled.data import CompiledData
-from contextdb.compiled.layers import Layers
-from contextdb.compiled.mask_bits import bits_of
+from contextdb.compiled.layers import Layers, bits_of
 from contextdb.compiled.matches import Matches
 from contextdb.compiled.ways import Step
 from contextdb.errors import plural

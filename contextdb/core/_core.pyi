@@ -183,16 +183,25 @@ class Ways:
     ) -> None: ...
     @property
     def width(self) -> int: ...
-    def move(
+    def go_on(
         self,
+        controllers: Controllers,
         before: NDArray[np.float64],
         goals: NDArray[np.float64],
         bodies: NDArray[np.float64] | None,
         dt_s: float,
+        rows: NDArray[np.float64],
+        poses: NDArray[np.float64] | None,
         after: NDArray[np.float64],
+        moved: NDArray[np.float64],
+        queries: NDArray[np.float64],
+        places: NDArray[np.float64],
+        facts: NDArray[np.float64],
         /,
     ) -> None:
-        """Write walks as they are some time later; a body that is NaN follows its goal."""
+        """Write walks as they are some time later, what plays, the queries that ask for the paths that are wished for, where bodies
+        are, and their speed, the direction of their sticks and their turn. A body that is NaN follows its goal, a pose that is NaN
+        is that of what plays."""
     def n_frames(self, walks: NDArray[np.float64], goals: NDArray[np.float64], /) -> int:
         """How many frames the longest of their paths has."""
     def n_behind(self, rate: float, /) -> int:
@@ -211,7 +220,7 @@ class Ways:
         """Write the paths that are wished for, and queries; without goals the frames from now on are there."""
     def rest(self, walks: NDArray[np.float64], mean: NDArray[np.float64], poses: NDArray[np.float64], /) -> None:
         """Write the poses of characters that play nothing."""
-    def settle(self, walks: NDArray[np.float64], roots: NDArray[np.float64], moves_body: int, /) -> None:
+    def settle(self, walks: NDArray[np.float64], roots: NDArray[np.float64], moves_body: NDArray[np.bool_], /) -> None:
         """Put walks where poses are displayed."""
 
 class Poses:
@@ -243,9 +252,11 @@ class Poses:
         dt_s: float,
         given: NDArray[np.float64],
         seams: NDArray[np.float64],
+        displayed: NDArray[np.float64],
         /,
     ) -> int:
-        """Write what happens to characters by what was decided; gives how many moments at seams there are, two for each."""
+        """Write what happens to characters by what was decided, and what is displayed then; gives how many moments at seams there
+        are, two for each."""
     def update(
         self,
         before: NDArray[np.float64],
@@ -438,6 +449,19 @@ def fill_ranges(*arguments: NDArray[Any] | int | None) -> None:
     """fill_ranges(starts, rows, mirrored, at, masks, in_mirror, costs, costs_in_mirror, own_biases, ranges, biases, plays, chosen):
     which ranges each of some answers lets play, into columns from `at` on, and by which row; `rows` from `starts[r]` on are those
     of range r."""
+
+def fill_plays(
+    decisions: NDArray[np.float64],
+    starts: NDArray[np.int64],
+    banks: NDArray[np.int64],
+    ranges: NDArray[np.int64],
+    displayed: NDArray[np.float64],
+    gives: NDArray[np.bool_],
+    plays: NDArray[np.float64],
+    /,
+) -> bool:
+    """Write what poses are made of, by what was decided; gives whether the banks have all that plays. `banks` is that of each
+    database, `ranges` from `starts[d]` on the range there of each of its ranges, below 0 for none."""
 
 def search_joint(*arguments: NDArray[Any]) -> None:
     """search_joint(blocks, rank, boxes, lows, highs, channels, weights, ranges, firsts, relative, relative_lows, relative_highs,

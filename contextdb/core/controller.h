@@ -937,3 +937,18 @@ static inline void cdbm_fill_ranges(const cdbm_table_ranges *of, const uint64_t 
         if (cost) biases[of->at + r] = own[of->at + r] + (is_valid ? least : 0.0);
     }
 }
+
+/* ---- what was decided, for poses */
+
+/* What poses are made of, by a decision and the moments of banks that it names. */
+static inline cdbo_play cdbm_pose_play(const cdbm_decision *decision, cdbo_instant playing, cdbo_instant before, cdbo_instant displayed,
+    int gives_ground)
+{
+    cdbo_play play;
+    play.playing = playing, play.before = before, play.displayed = displayed;
+    play.action = decision->action, play.rate = decision->rate, play.weight = decision->root_weight;
+    play.gives_ground = gives_ground ? 1.0 : 0.0;
+    memcpy(play.motion, decision->motion, sizeof play.motion);
+    play.blend_s = decision->play.blend_s, play.root = decision->play.root;
+    return play;
+}

@@ -5,6 +5,7 @@
  *   cdbm_crowd_size      how many there are of something
  *   cdbm_crowd_table, cdbm_crowd_live   a table of the bundle, and a character's facts for it: set them by cdb_set_number and the others
  *   cdbm_place_one, cdbm_steer_one      put one somewhere, with nothing played yet; and what its stick asks for
+ *   cdbm_event_one       what is to happen, and in how many seconds
  *   cdbm_restore_one     put one where it stood
  *   cdbm_update_crowd    all of them
  *   cdbm_crowd_numbers, cdbm_crowd_text what came of it
@@ -149,6 +150,15 @@ CDB_API int cdbm_steer_one(cdbm_crowd *crowd, size_t i, double x, double z, doub
 {
     if (i >= crowd->n) return 0;
     crowd->inputs[i].goal.velocity[0] = x, crowd->inputs[i].goal.velocity[1] = z, crowd->inputs[i].goal.facing = facing;
+    return 1;
+}
+
+/* A tag of the markup that is to begin, and in how many seconds: to be given before each update until then, and NULL behind it. The text
+ * stays where it is while it is asked for. 0 where there is no character of that number, or no database has such an event. */
+CDB_API int cdbm_event_one(cdbm_crowd *crowd, size_t i, const char *event, double in_s)
+{
+    if (i >= crowd->n || (event && !cdbm_event_name(&crowd->player, event))) return 0;
+    crowd->inputs[i].event = event, crowd->inputs[i].event_s = in_s;
     return 1;
 }
 

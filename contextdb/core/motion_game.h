@@ -1,4 +1,5 @@
 /* The parts of the core for motion in games, behind those of motion.h. */
 #include "bundle.h"
+#include "event.h"
 #include "character.h"
 #include "crowd.h"

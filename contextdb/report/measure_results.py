@@ -16,7 +16,7 @@ from contextdb.files.reports import baseline_of, with_marks
 from contextdb.findings import Finding
 from contextdb.motion.measuring.measures import Measures
 from contextdb.motion.measuring.parts import NO_CHANGE, NO_FORCED, NO_JUMP, NO_REST
-from contextdb.motion.trace.forced_by import ForcedBy
+from contextdb.motion.trace.stats import ForcedBy
 from contextdb.report.results import CheckReport, Gate, Subject, as_path
 
 NOTHING_TO_EXCEED = (NO_FORCED, NO_JUMP, NO_CHANGE, NO_REST)

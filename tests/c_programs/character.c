@@ -6,6 +6,7 @@
 #include "contextdb_motion.h"
 
 static const char *at;
+static const char *const events[] = {"Contact.Left", "Contact.Right", "Hit"};
 
 static const void *take(size_t size, size_t n)
 {
@@ -69,7 +70,8 @@ static void follow(const cdbm_player *player, size_t n, double dt_s, const memor
     free(packets);
 }
 
-/* An update: seconds, whether there is a ground, and for each its goal, and the number of its gait, a fact of the one table. */
+/* An update: seconds, whether there is a ground, and for each its goal, the number of its gait, a fact of the one table, the number of an
+ * event, -1 for none, and in how many seconds that is to happen. */
 static void update(const cdbm_player *player, size_t n, const memory *own, const memory *copies, FILE *out)
 {
     double *states = own->states;
@@ -92,6 +94,9 @@ static void update(const cdbm_player *player, size_t n, const memory *own, const
         for (k = 0; schema && k < schema->n_conditions; k++) facts[8 * i + k] = cdbi_missing(&schema->conditions[k]);
         memcpy(&numbers[1], take(8, 1), 8);
         if (gait >= 0) facts[8 * i + (size_t)gait].whole = numbers[1];
+        memcpy(&numbers[1], take(8, 1), 8);
+        memcpy(&inputs[i].event_s, take(8, 1), 8);
+        if (numbers[1] >= 0) inputs[i].event = events[numbers[1]];
         lists[i] = facts + 8 * i;
         inputs[i].facts = lists + i;
     }
@@ -130,6 +135,7 @@ static void try_out(const cdbm_player *player, double *state, cdbm_pose *pose, c
         input.n_packet = cdbm_pack(player, state, packet), input.packet = packet;
         if (input.n_packet > 0 && tick % 2) packet[drawn(seed) % input.n_packet] = (uint8_t)drawn(seed);
         input.is_copy = tick > 30;
+        input.event = tick % 7 > 3 ? events[tick % 2] : NULL, input.event_s = 0.3;
         if (cdbm_update(player, state, 1.0 / 30.0, &input, pose, room) != 1 && !input.is_copy) break;
         if (!cdbm_asset(player, &pose->decision.playing) && pose->decision.playing.database >= 0.0) break;
         if (player->has_poses) cdbm_matrices(player, pose, matrices);

@@ -20,13 +20,13 @@ from test_output_ground import slope
 
 import contextdb as cdb
 from contextdb import motion
-from contextdb.commands.motion_bundle import file_of
+from contextdb.commands.compile_command import c_motion_header
+from contextdb.commands.motion_build_command import file_of
 from contextdb.compiled.c_header import c_header_of
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.output.bank import moving_alike
 from contextdb.motion.selection.chooser import N_DECISION
 from contextdb.motion.storage.bundle import Played, bundle_of
-from contextdb.motion.storage.c_header import c_motion_header
 
 pytestmark = pytest.mark.skipif(os.name == "nt" or not all_compilers(), reason="no gcc or clang was found")
 MOCAP = Path(os.environ.get("CONTEXTDB_MOCAP", Path(__file__).parents[2].parent / "shared" / "data" / "mocap"))
@@ -36,6 +36,7 @@ CAPTURED = (
     "walk_normal", "walk_tired", "walk-turn-left_normal", "run_normal", "walk-turn-right_normal", "run_tired", "walk-back_normal",
     "walk-left_normal", "dash_normal",
 )  # fmt: skip
+EVENTS = ("Contact.Left", "Contact.Right", "Hit")
 AHEAD = [
     {"type": "trajectory", "what": "position", "at": [0.33, 0.67, 1.0]},
     {"type": "trajectory", "what": "direction", "at": [0.33, 0.67, 1.0]},
@@ -58,6 +59,8 @@ process.exitCode = wasi.start(instance)
 """
 MARKS = Markup.parse(
     "asset,tag,from,to,value\nidle,Looping,,,\nwalk,Looping,,,\njog,Looping,,,\nstop_walk,NextNaturalOnly,0,0.5,\n"
+    "walk,Contact.Left,0.2,0.5,\nwalk,Contact.Right,0.7,0.9,\njog,Contact.Left,0.1,0.3,\nwalk_turn_left_90,Contact.Right,0.3,0.6,\n"
+    "walk,Excluded,0.55,0.6,\nidle,Hit.Soft,1.0,1.2,\nstart_walk,Hit,0.5,0.6,\nwalk_turn_left_90,Hit,0.2,0.3,\n"
 )
 CAPTURED_GAITS = [{"run": "Run", "dash": "Run"}.get(name.split("_")[0], "Idle Walk") for name in CAPTURED]
 CAPTURED_COLUMNS = {"Asset Name": list(CAPTURED), "gait": CAPTURED_GAITS, "direction": ["Any"] * len(CAPTURED)}
@@ -156,19 +159,24 @@ def session(rng, n_ticks, is_captured=False):
         for _ in range(n)
     ]
     crowd, given, expected = motion.Crowd(members), [struct.pack("qq", n, n_ticks)], []
-    sticks, facings = [(0.0, 0.0)] * n, [math.nan] * n
+    sticks, facings, events = [(0.0, 0.0)] * n, [math.nan] * n, [None] * n
+    n_events = 2 if is_captured else 3
     for tick in range(n_ticks):
         dt = rng.choice([1 / 30, 1 / 30, 1 / 60, 1 / 144]) if tick else 0.0
         for i in range(n):
             if rng.random() < 0.06:
                 speed, way = rng.choice([0.0, 1.2, 2.6]), rng.uniform(-math.pi, math.pi)
                 sticks[i] = (speed * math.sin(way), speed * math.cos(way))
+            name, left_s = events[i] or (rng.choice(EVENTS[:n_events]), rng.choice([0.2, 0.5, 1.0]))
+            is_going_on = events[i] is not None and left_s > 0.0
+            events[i] = (name, max(left_s - dt, 0.0)) if is_going_on or rng.random() < 0.04 else None
         gaits = ["Idle" if not math.hypot(*stick) else "Walk" if math.hypot(*stick) < 2.0 else "Run" for stick in sticks]
-        updates = crowd.update(dt, sticks, {"gait": gaits})
+        updates = crowd.update(dt, sticks, {"gait": gaits}, event=events)
         given.append(struct.pack("dqq", dt, ground is not None, 0))
-        for stick, facing, updated in zip(sticks, facings, updates, strict=True):
+        for stick, facing, event, updated in zip(sticks, facings, events, updates, strict=True):
             number = CONDITIONS["gait"]["values"].index(updated.facts["gait"])
-            given.append(struct.pack("3dq", *stick, facing, number))
+            event_number, in_s = (-1, 0.0) if event is None else (EVENTS.index(event[0]), event[1])
+            given.append(struct.pack("3dqqd", *stick, facing, number, event_number, in_s))
         states = b"".join(one.state for one in crowd)
         poses = [updated.pose for updated in updates]
         numbers = [(np.array(pose.root), pose.rotations, pose.translations, pose.positions) for pose in poses]

@@ -12,6 +12,8 @@ from hypothesis import given, reject
 from hypothesis import strategies as st
 from strategies import examples, for_each
 
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import Domain
 from contextdb.expressions import Expression, ExpressionError, read_expression
 from contextdb.expressions.columns import as_array
 
@@ -167,3 +169,12 @@ def test_a_column_may_be_written_in_any_way_that_a_table_is_asked_with(column):
 
 def test_no_contexts_give_no_values():
     assert frame_of(read_expression("a > 1 and gait == word", CONDITIONS), {"a": [], "gait": [], "word": []}, 0).tolist() == []
+
+
+def test_what_c_cannot_hold_has_its_value_too():
+    is_word = read_expression('word == "a" or word != gait', CONDITIONS)
+    assert [is_word.evaluate({"word": word, "gait": "Run"}) for word in ("a\0b", "\ud800", "Run", "a")] == [True, True, False, True]
+    assert read_expression("word", CONDITIONS).evaluate({"word": "a\0b"}) == "a\0b"
+    many = {f"Move.{i}" for i in range(300)}
+    has_last = read_expression('"Move.299" in free and "Run" not in free', [Condition("free", Domain("tags"))])
+    assert has_last.evaluate({"free": many}) is True

@@ -5,7 +5,8 @@ folder.
 
 - In a ```console block, lines that begin with `$ ` are commands (a `\\` at the end continues them) and the lines under each are its
   output, standard error included. Commands are `contextdb …`, `python …`, and `echo $?`, the last exit code.
-- A ```python block runs; what it prints stands in a ```text block right under it.
+- A ```python block runs; what it prints stands in a ```text block right under it. In a ```pycon block it stands under the lines of
+  each statement, which begin with `>>> ` and `... `.
 - A block whose fence names a file, such as ```csv tackles/dives.csv, is that file from there on.
 - `| grep TEXT`, `| head -3` and `| tail -3` behind a command show a part of what it prints.
 - What cannot be run (installing, make) stands in a ```sh block, or ```py for Python.
@@ -214,6 +215,8 @@ def steps(lines: list[str]) -> Iterator[Step]:
             yield Step("\n".join(lines[block.first : block.stop]), False, block.stop, block.stop, file=block.file)
         elif block.language == "console":
             yield from commands(lines, block)
+        elif block.language == "pycon":
+            yield from statements(lines, block)
         elif block.language == "python":
             source = "\n".join(lines[block.first : block.stop])
             if after and after.language == "text" and not "".join(lines[block.stop + 1 : after.first - 1]).strip():
@@ -231,6 +234,14 @@ def commands(lines: list[str], block: Block) -> Iterator[Step]:
             first += 1
         text = " ".join(line.removesuffix("\\") for line in lines[start:first])
         yield Step(text.removeprefix("$ "), False, first, stop)
+
+
+def statements(lines: list[str], block: Block) -> Iterator[Step]:
+    """The statements of a pycon block."""
+    starts = [i for i in range(block.first, block.stop) if lines[i].startswith(">>> ")]
+    for start, stop in zip(starts, [*starts[1:], block.stop], strict=False):
+        first = next((i for i in range(start + 1, stop) if not lines[i].startswith("... ")), stop)
+        yield Step("\n".join(line[4:] for line in lines[start:first]), True, first, stop)
 
 
 @contextlib.contextmanager

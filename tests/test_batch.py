@@ -1,12 +1,10 @@
 """Many contexts at once: counts, hits and masks are those of one query after another, in every form that columns come in."""
 
-import enum
 import math
 from bisect import bisect_right
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from datetime import date
-from decimal import Decimal
 from fractions import Fraction
 from typing import Literal
 from unittest import mock
@@ -26,7 +24,7 @@ from contextdb.cells.fact_columns import column_type
 from contextdb.compiled import batch
 from contextdb.compiled.classes import FLAT_BYTES, TagMasks
 from contextdb.compiled.many import ManyMatches
-from contextdb.compiled.table import CompiledTable, data_of
+from contextdb.compiled.table import data_of
 from contextdb.core import read_column
 from contextdb.errors import ContextError
 from contextdb.tables.table import Table
@@ -232,87 +230,8 @@ TABLE = Table.from_columns(
 COLUMNS_GIVEN = {"speed": [1.0, 4.0, 5.0], "state": ["Ground", "Air", "Ground"], "steps": [1, 1, 2]}
 
 
-def said_of(changes: dict[str, object], unknown: str = "error", compiled: CompiledTable = TABLE) -> str:
-    columns = {name: column for name, column in {**COLUMNS_GIVEN, **changes}.items() if column is not ...}
-    with pytest.raises(ContextError) as caught:
-        compiled.query_many(columns, unknown=unknown)
-    return str(caught.value)
-
-
 def test_the_columns_of_these_tests_can_be_asked_with():
     assert [rows.tolist() for rows in TABLE.query_many(COLUMNS_GIVEN).lists()] == [[], [1], [0]]
-
-
-@for_each(
-    [
-        ({"speed": [1.0, 2.0]}, "the columns are not equally long"),
-        (
-            {"state": ["Ground", "Grond", "Air"]},
-            'row 2, column "state": "Grond" is not a declared value. Accepted: "Ground", "Air". Did you mean "Ground"?',
-        ),
-        ({"state": np.array(["Ground", "Air", "Ar"])}, 'row 3, column "state": "Ar" is not a declared value.'),
-        (
-            {"state": pl.Series(["Ground", "Air", "Ar"], dtype=pl.Categorical)},
-            'row 3, column "state": "Ar" is not a declared value.',
-        ),
-        ({"state": [1, 2, 3]}, 'row 1, column "state": int "1" is not a fact of type enum.'),
-        (
-            {"speed": [1.0, None, 2.0]},
-            'row 2, column "speed": the fact is missing in 1 context. Accepted: a value, or unknown="any" or "never".',
-        ),
-        ({"speed": np.array([1.0, math.nan, math.nan])}, 'row 2, column "speed": the fact is missing in 2 contexts.'),
-        ({"state": [None, "Air", None]}, 'row 1, column "state": the fact is missing in 2 contexts.'),
-        ({"speed": pl.Series([1.0, None, math.nan])}, 'row 2, column "speed": the fact is missing in 2 contexts.'),
-        ({"speed": ...}, 'the fact "speed" is missing.'),
-        ({"speed": ..., "sped": [1.0] * 3}, 'there is no condition "sped", and "speed" is missing.'),
-        ({"speed": ["fast"] * 3}, 'row 1, column "speed": cannot read "fast" as a number.'),
-        ({"speed": [1.0, "0..5", "2.."], "state": ["Air", "Air", "Are"]}, 'row 3, column "state": "Are" is not a declared value.'),
-        ({"state": [["Ground", "Air"], "Air", ["Are"]]}, 'row 3, column "state": "Are" is not a declared value.'),
-        ({"speed": [date(2024, 1, 1)] * 3}, 'row 1, column "speed": date "2024-01-01" is not a fact of type number.'),
-        ({"speed": [{}, {}, {}]}, 'row 1, column "speed": '),
-        (
-            {"steps": [1.0, 2.5, 3.0]},
-            'row 2, column "steps": float "2.5" is not a fact of type int. Accepted: a whole number. Did you mean 2?',
-        ),
-        ({"steps": np.array([1.0, 2.0, 2.5])}, 'row 3, column "steps": float "2.5" is not a fact of type int.'),
-    ]
-)
-def test_contexts_that_cannot_be_asked_with_are_refused_with_the_first_one(changes, message):
-    assert message in said_of(changes)
-
-
-@pytest.mark.parametrize("unknown", ["any", "never"])
-def test_a_misspelt_column_is_told_even_where_missing_facts_are_no_error(unknown):
-    assert 'there is no condition "sped", and "speed" is missing.' in said_of({"speed": ..., "sped": [1.0] * 3}, unknown)
-
-
-def test_an_unknown_treatment_of_missing_facts_is_told():
-    assert said_of({}, "anny") == (
-        'there is no treatment "anny" of missing facts. Accepted: "error", "any", "never". Did you mean "any"?'
-    )
-
-
-@pytest.mark.parametrize(
-    "contexts",
-    [
-        {**COLUMNS_GIVEN, "speed": 5.0},
-        {**COLUMNS_GIVEN, "state": "Air"},
-        {**COLUMNS_GIVEN, "speed": None},
-        {**COLUMNS_GIVEN, "speed": np.float64(5.0)},
-        {**COLUMNS_GIVEN, "speed": np.zeros((3, 2))},
-        {**COLUMNS_GIVEN, "state": {"Ground", "Air", "Swim"}},
-        {**COLUMNS_GIVEN, "speed": (v for v in (1.0, 2.0, 3.0))},
-        [{"speed": 1.0, "state": "Air", "steps": 1}],
-        pl.DataFrame(COLUMNS_GIVEN).lazy(),
-        "contexts.csv",
-        None,
-        5,
-    ],
-    ids=["number", "text", "nothing", "numpy number", "matrix", "set", "generator", "rows", "lazy frame", "path", "none", "five"],
-)
-def test_what_is_no_columns_of_facts_is_refused(contexts):
-    with pytest.raises(ContextError):
-        TABLE.query_many(contexts)
 
 
 def test_columns_that_no_condition_asks_for_are_passed_over():
@@ -448,32 +367,6 @@ def test_tags_may_be_lists_sets_or_texts():
         assert [rows.tolist() for rows in table.query_many({"x": column}).lists()] == [[0, 1], [1]]
 
 
-class Gait(enum.Enum):
-    AIR = "Air"
-
-
-@pytest.mark.parametrize(
-    ("kind", "column"),
-    [
-        ("date", [0, 1]),
-        ("date", [True, False]),
-        ("date", np.array([1, 2], dtype=object)),
-        ("date", ["2026-2-1", "2026-02-02"]),
-        ("number", [1.0, np.complex128(1 + 2j)]),
-        ("number", np.array(["2026-02-01", "2026-02-02"], dtype="M8[ns]")),
-        ("number", np.array([1, 2], dtype="m8[ns]")),
-        ("text", [Gait.AIR, Gait.AIR]),
-        ("text", [Decimal("1e400"), "a"]),
-        ("bool", [Decimal("1e400"), True]),
-    ],
-    ids=lambda value: "" if isinstance(value, str) else str(value)[:30],
-)
-def test_a_column_holds_no_fact_that_a_query_refuses(kind, column):
-    table = Table.from_columns({"Asset": ["a", "b"], "x": ["Any", "Any"]}, {"x": {"type": kind}}).compile()
-    with pytest.raises(ContextError, match=r'row \d, column "x": .* is not a fact of type|cannot read "2026-2-1"'):
-        table.query_many({"x": column})
-
-
 def test_days_may_be_nanoseconds_of_numpy():
     table = Table.from_columns({"Asset": ["a", "b"], "x": ["2026-02-01", "2026-02-02.."]}, {"x": {"type": "date"}}).compile()
     days = np.array(["2026-02-01", "2026-02-05"], dtype="M8[ns]")
@@ -497,13 +390,3 @@ def test_what_soft_cells_cost_in_many_contexts_is_what_they_cost_in_each(unknown
     each = [matches.penalties.tolist() for matches in many]
     assert each[1] == pytest.approx([2.2, 0.0, 0.0])
     assert many.penalties.tolist() == many.only([0]).penalties.tolist() == (many | many).penalties.tolist() == each
-
-
-def test_what_only_a_single_answer_has_is_refused_with_what_to_use():
-    many = Table.from_columns({"Asset": ["a"], "x": ["True"]}, {"x": {"type": "bool"}}).compile().query_many({"x": [True]})
-    with pytest.raises(AttributeError, match=r"ManyMatches has no attribute 'indices': use rows and starts, or many\[i\]\.indices"):
-        many.indices  # noqa: B018
-    with pytest.raises(AttributeError, match=r"'widened': each of its answers has it, many\[i\].widened"):
-        many.widened  # noqa: B018
-    with pytest.raises(AttributeError, match=r"ManyMatches has no attribute 'nope'$"):
-        many.nope  # noqa: B018

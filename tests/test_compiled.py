@@ -22,7 +22,7 @@ from contextdb import bitmask
 from contextdb.cells.facts import cell
 from contextdb.compiled.classes import FLAT_BYTES, NumberMasks, WideMasks
 from contextdb.compiled.table import CompiledTable, data_of
-from contextdb.errors import ContextError, TableError
+from contextdb.errors import ContextError
 from contextdb.schema.settings import TableSettings
 from contextdb.tables.table import Table
 
@@ -240,14 +240,6 @@ def strategies_table() -> Table:
     return Table.from_columns({"Asset": ["a"], "speed": ["0..5"]}, {"speed": {"type": "number"}})
 
 
-def test_a_table_with_a_cell_that_cannot_be_read_does_not_compile():
-    table = strategies_table().with_cell(0, "speed", "20; 9")
-    with pytest.raises(TableError) as caught:
-        table.compile()
-    assert 'row 1, column "speed": cannot read "20; 9" as a number.' in str(caught.value)
-    assert 'Did you mean "20, 9"?' in str(caught.value)
-
-
 @COLUMNS
 @given(strategies.tables())
 def test_no_mask_has_a_bit_past_the_last_row(flat_bytes, table):
@@ -299,78 +291,8 @@ DECLARED = {
 COMPLETE = {"speed": 3.0, "state": "Top", "tags": ["InAir"]}
 
 
-def said_of(changes: dict[str, object], unknown: str = "error") -> str:
-    context = {name: fact for name, fact in {**COMPLETE, **changes}.items() if fact is not ...}
-    with pytest.raises(ContextError) as caught:
-        compiled(DECLARED).query(context, unknown=unknown)
-    return str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        (
-            {"state": "Goin_Up"},
-            'column "state": "Goin_Up" is not a declared value. '
-            'Accepted: "Going_Up", "Top", "Going_Down". Did you mean "Going_Up"?',
-        ),
-        ({"tags": ["InAr"]}, 'column "tags": "InAr" is not a declared value. Accepted: "InAir", "Stunned". Did you mean "InAir"?'),
-        ({"speed": "fast"}, 'column "speed": cannot read "fast" as a number.'),
-        ({"speed": [3.0]}, 'column "speed": list "[3.0]" is not a fact of type number. Accepted: a number.'),
-        ({"state": 1}, 'column "state": int "1" is not a fact of type enum. Accepted: one of its declared values.'),
-        ({"speed": None}, 'the fact "speed" is missing. Accepted: a value for each condition, or unknown="any" or "never".'),
-        ({"speed": math.nan}, 'the fact "speed" is missing. Accepted: a value for each condition, or unknown="any" or "never".'),
-        ({"speed": ...}, 'the fact "speed" is missing.'),
-        ({"speed": ..., "tags": ...}, 'the fact "speed" is missing (2 facts missing: "speed", "tags").'),
-        ({"speed": ..., "sped": 3.0}, 'there is no condition "sped", and "speed" is missing.'),
-        ({"speed": ..., "Speed": 3.0}, 'Did you mean "speed"?'),
-        ({"speed": cell("0..5 ~2")}, 'Accepted: a set without a penalty ("~").'),
-        ({"speed": cell("5..3")}, "Accepted: a set that holds at least one value."),
-    ],
-    ids=str,
-)
-def test_a_context_that_cannot_be_asked_with_is_refused_with_its_fact(changes, message):
-    assert message in said_of(changes)
-
-
-def test_every_wrong_fact_of_a_context_is_told_at_once():
-    assert [line.split(":")[0] for line in said_of({"speed": "fast", "state": "Tpo", "tags": 5}).split("\n")] == [
-        'column "speed"',
-        'column "state"',
-        'column "tags"',
-    ]
-
-
-@pytest.mark.parametrize("unknown", ["any", "never"])
-def test_a_misspelt_fact_is_told_even_where_missing_ones_are_no_error(unknown):
-    assert 'there is no condition "sped", and "speed" is missing.' in said_of({"speed": ..., "sped": 3.0}, unknown)
-
-
-def test_a_wrong_fact_is_told_even_where_missing_ones_are_no_error():
-    assert '"Goin_Up" is not a declared value' in said_of({"state": "Goin_Up", "speed": ...}, "any")
-
-
-def test_an_unknown_treatment_of_missing_facts_is_told():
-    assert said_of({"speed": ...}, "nevr") == (
-        'there is no treatment "nevr" of missing facts. Accepted: "error", "any", "never". Did you mean "never"?'
-    )
-    with pytest.raises(ContextError, match='there is no treatment "nevr"'):
-        compiled(DECLARED).live(COMPLETE, unknown="nevr")
-
-
-def test_a_misspelt_treatment_is_refused_even_where_no_fact_is_missing():
-    with pytest.raises(ContextError, match='Did you mean "never"'):
-        compiled(DECLARED).query(COMPLETE, unknown="nevr")
-
-
 def test_facts_that_no_condition_asks_for_are_passed_over():
     assert found(compiled(DECLARED), {**COMPLETE, "weather": "rain", "speed2": object()}) == [0]
-
-
-@pytest.mark.parametrize("context", [None, 5, "speed", [("speed", 3.0)], {"speed"}], ids=str)
-def test_a_context_that_is_no_mapping_is_refused(context):
-    with pytest.raises(ContextError, match="a context is a mapping of facts, not"):
-        compiled(DECLARED).query(context)
 
 
 @pytest.mark.parametrize("unknown", ["any", "never"])

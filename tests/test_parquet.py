@@ -1,7 +1,7 @@
 """Parquet: values to texts that mean the same, and back to the types they had."""
 
 import io
-from datetime import date, datetime, time
+from datetime import date, datetime
 from decimal import Decimal
 
 import numpy as np
@@ -103,51 +103,6 @@ def test_a_record_has_no_line():
 
 def test_columns_whose_names_look_like_patterns_are_read():
     assert texts({"*": ["x"], "^.*$": ["y"], "a": [1]}) == [["x"], ["y"], ["1"]]
-
-
-def test_every_column_of_a_type_that_no_cell_has_is_refused_with_what_it_is():
-    messages = faults_of(
-        parquet({"a": ["x"], "when": [time(12)], "who": [{"n": 1}], "raw": [b"x"], "list": [[1, 2]], "deep": [[["x"]]]})
-    )
-    accepted = "Accepted: strings, categories, bools, numbers, dates, and lists of strings. Try to write it as strings."
-    assert messages[0] == f't.parquet, column "when": the column is of type Time. {accepted}'
-    assert [m.split('"')[1] for m in messages] == ["when", "who", "raw", "list", "deep"]
-
-
-def test_a_time_of_day_and_a_time_zone_which_no_date_has_are_refused():
-    noon = [datetime(2026, 1, 31), None, datetime(2026, 1, 31, 12)]
-    first, second = faults_of(parquet({"a": noon, "b": pl.Series(noon).dt.replace_time_zone("UTC")}))
-    accepted = "Accepted: days: dates, or midnights without a time zone. Try to write it as dates or strings."
-    assert first == f't.parquet, column "a": the column has times of day. {accepted}'
-    assert second == f't.parquet, column "b": the column has a time zone. {accepted}'
-
-
-def test_a_list_that_is_empty_or_has_a_null_is_refused():
-    first, second = faults_of(parquet({"a": [["x"], []], "b": [["x", None], ["y"]]}))
-    assert first.startswith('t.parquet, column "a": a list without names in it, which would match nothing. Accepted: null for Any')
-    assert second.startswith('t.parquet, column "b": a list with a null in it.')
-
-
-def test_an_empty_name_and_a_text_that_is_too_long_are_refused():
-    assert faults_of(parquet({"a": ["x"], " ": ["y"]})) == [
-        "t.parquet: the last of 2 column names is empty. Accepted: a name for each column."
-    ]
-    assert faults_of(parquet({"a": ["x", "y" * 70_000]})) == [
-        't.parquet, column "a": the cell in row 2 has 70,000 characters. Accepted: at most 65,536 characters in a cell.'
-    ]
-
-
-@pytest.mark.parametrize(
-    ("raw", "said"),
-    [
-        (b"", "the file is empty."),
-        (b"a,b\n1,2\n", "not a Parquet file: looks like text. Accepted: a Parquet file. Did you mean the suffix .csv?"),
-        (b"PK\x03\x04 xl/", "looks like an Excel workbook (.xlsx)."),
-        (b"PAR1", "the file is cut off"),
-    ],
-)
-def test_what_is_no_parquet_file_is_told_by_its_bytes(raw: bytes, said: str):
-    assert said in faults_of(raw)[0]
 
 
 def test_a_file_that_is_cut_off_anywhere_is_refused():
@@ -260,13 +215,3 @@ def test_any_list_of_names_comes_back_from_its_text(lists: list[list[str]], data
     at = data.draw(st.integers(0, len(lists) - 1))
     after = rewritten_parquet([column.with_text(0, column[at])], source, np.arange(len(lists)))
     assert frame(after)["a"].to_list() == [lists[at], *lists[1:]]
-
-
-def test_texts_and_names_that_no_parquet_file_can_hold_are_refused():
-    for columns, said in [
-        ([TextColumn.of("a", ["\ud800"])], "half a surrogate pair"),
-        ([TextColumn.of("a", ["x"]), TextColumn.of("a", ["y"])], "appears twice"),
-        ([], "no columns"),
-    ]:
-        with pytest.raises(TableError, match=said):
-            rewritten_parquet(columns, None, np.array([-1]))

@@ -5,13 +5,11 @@ import csv
 import io
 
 import numpy as np
-import pytest
 from csv_files import CELLS, CsvFile, csv_files, raw_lines, strict_records
 from hypothesis import given
 from hypothesis import strategies as st
 
 from contextdb.columns import TextColumn
-from contextdb.errors import TableError
 from contextdb.files.csv_rewrite import rewritten
 from contextdb.files.csv_source import Source, read_csv
 
@@ -170,34 +168,3 @@ def test_a_renamed_column_keeps_the_fields_of_the_header_beside_it():
 
 def test_rows_can_be_added_to_a_header_alone():
     assert written_after("\ufeffa,b\r\n", lambda cs: [c.with_inserted(0, ["1"]) for c in cs], [-1]) == "\ufeffa,b\r\n1,1\r\n"
-
-
-@pytest.mark.parametrize(
-    ("text", "found"),
-    [
-        ("x\0y", r'row 2, column "b": the text "x\x00y" has a NUL character. Accepted: text in UTF-8.'),
-        ("ab\ud800", 'row 2, column "b": the text has half a surrogate pair as character 3. Accepted: text in UTF-8.'),
-        ("x" * 65_537, 'row 2, column "b": the text has 65,537 characters, more than 65,536. Accepted: text in UTF-8.'),
-    ],
-)
-def test_a_text_that_could_not_be_read_again_is_not_written(text: str, found: str):
-    source, (a, b) = read_csv(b"a,b\n1,2\n3,4\n", "t.csv")
-    with pytest.raises(TableError) as caught:
-        rewritten([a, b.with_text(1, text)], source, same(source))
-    assert str(caught.value) == found
-
-
-def test_names_that_could_not_be_read_again_are_not_written():
-    columns = [TextColumn.of(name, []) for name in ("a", "", "a", "x\0")]
-    with pytest.raises(TableError) as caught:
-        rewritten(columns, None, np.array([], np.int64))
-    assert [f.found for f in caught.value.faults] == [
-        "field 2 of 4 column names is empty.",
-        'the column name "a" appears twice, in fields 1 and 3.',
-        r'the column name "x\x00" has a NUL character.',
-    ]
-
-
-def test_a_table_without_columns_is_not_written():
-    with pytest.raises(TableError, match="no columns"):
-        rewritten([], None, np.array([], np.int64))

@@ -1,7 +1,5 @@
 """Tables: edits give new ones that share what did not change, and every cell that cannot be read is kept and told."""
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,7 +8,7 @@ from hypothesis import strategies as st
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import NUMBER
 from contextdb.columns import TextColumn
-from contextdb.errors import NoSuchPlace, NoSuchRow, SchemaError, TableError
+from contextdb.errors import TableError
 from contextdb.schema.settings import EMPTY, TableSettings
 from contextdb.tables.condition_column import MOST_MENDS
 from contextdb.tables.table import Table
@@ -25,10 +23,6 @@ def faulty(columns: dict[str, list[str]], settings: TableSettings | None = None)
     """A table as an editor opens it, with the cells that cannot be read."""
     schema = type(EMPTY)(conditions={name: Condition(name, NUMBER) for name in columns if name.startswith("n")})
     return Table.build("t", [TextColumn.of(name, texts) for name, texts in columns.items()], schema, settings)
-
-
-def told(error: pytest.ExceptionInfo[TableError]) -> list[str]:
-    return str(error.value).split("\n")
 
 
 # ---- what a table holds
@@ -165,41 +159,7 @@ def test_a_table_after_any_edits_is_the_table_of_its_texts(edits):
             assert edited.compile().query(context) == anew.compile().query(context)
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        lambda table: table.with_cell(2, "n", "5"),
-        lambda table: table.with_cell(-1, "n", "5"),
-        lambda table: table.with_cells([(0, "n", "5"), (99, "n", "5")]),
-        lambda table: table.with_rows(3, [{}]),
-        lambda table: table.with_rows_taken([0, 2]),
-    ],
-)
-def test_a_row_that_is_not_there_cannot_be_changed_and_is_an_index_error_too(change: Callable[[Table], Table]):
-    with pytest.raises(NoSuchRow, match="there is no row") as caught:
-        change(faulty({"Asset": ["a", "b"], "n": ["1", "5"]}))
-    assert isinstance(caught.value, IndexError)
-    assert isinstance(caught.value, TableError)
-    assert isinstance(caught.value, NoSuchPlace)
-
-
 # ---- faults
-
-
-def test_all_cells_that_cannot_be_read_are_told_together_in_the_order_of_rows():
-    table = faulty({"Asset": ["a", "b"], "n1": ["x", "5"], "n2": ["1;2", "y"]})
-    with pytest.raises(TableError) as caught:
-        table.compile()
-    assert [line.split(":")[0] for line in told(caught)] == ['row 1, column "n1"', 'row 1, column "n2"', 'row 2, column "n2"']
-
-
-def test_from_columns_refuses_cells_that_cannot_be_read():
-    with pytest.raises(TableError) as caught:
-        Table.from_columns({"Asset": ["a"], "speed": ["20; 9"]}, DECLARED)
-    assert told(caught) == [
-        'row 1, column "speed": cannot read "20; 9" as a number. '
-        'Accepted: "20, 9.99" (centre, tolerance), "10..30", "<=5", "0..5 | 10..15", "Any". Did you mean "20, 9"?'
-    ]
 
 
 def test_a_cell_that_cannot_be_read_stands_in_every_row_that_holds_it():
@@ -232,44 +192,3 @@ def test_a_priority_is_a_whole_number_that_can_be_kept(text):
 
 
 # ---- what is refused
-
-
-@pytest.mark.parametrize(
-    ("ask", "message"),
-    [
-        (
-            lambda: TABLE.with_cell(0, "sped", "5"),
-            'there is no column "sped". Accepted: "Asset", "speed", "state". Did you mean "speed"?',
-        ),
-        (lambda: TABLE.text(0, "Speed"), 'Did you mean "speed"?'),
-        (lambda: TABLE.condition("stat"), 'there is no condition "stat". Accepted: "speed", "state". Did you mean "state"?'),
-        (lambda: TABLE.with_cell(3, "speed", "5"), "there is no row 3. Accepted: rows 0 to 2."),
-        (lambda: TABLE.with_cell(-1, "speed", "5"), "there is no row -1. Accepted: rows 0 to 2."),
-        (lambda: TABLE.with_rows_taken([]).with_cell(0, "speed", "5"), "there is no row 0."),
-        (lambda: TABLE.with_rows(0, [{"sped": "5"}]), 'there is no column "sped".'),
-        (lambda: TABLE.with_rows(4, [{"Asset": "x"}]), "there is no row 4."),
-        (lambda: TABLE.with_rows(-1, [{"Asset": "x"}]), "there is no row -1."),
-        (lambda: TABLE.with_rows_taken([0, 3]), "there is no row 3."),
-        (lambda: TABLE.with_rows_taken([-1]), "there is no row -1."),
-        (lambda: TABLE.save(), 'the table "table" has no file yet. Accepted: save(path).'),
-        (lambda: Table.from_columns({"Asset": ["a", "b"], "speed": ["5"]}, DECLARED), "the columns are not equally long"),
-        (lambda: Table.from_columns({"A": ["a"]}, settings=TableSettings("t", asset="Asst")), 'there is no column "Asst"'),
-        (
-            lambda: Table.from_columns({"Asset": ["a"], "Weight": ["1"]}, settings=TableSettings("t", weight="Wieght")),
-            'there is no column "Wieght", which [tables.t] names as weight. Accepted: "Asset", "Weight". Did you mean "Weight"?',
-        ),
-        (
-            lambda: Table.build("t", [TextColumn.of("Asset", "a"), TextColumn.of("Asset", "b")]),
-            'the column name "Asset" appears twice. Accepted: each name once.',
-        ),
-    ],
-)
-def test_what_a_table_cannot_do_is_refused_with_what_it_can(ask, message):
-    with pytest.raises(TableError) as caught:
-        ask()
-    assert message in str(caught.value)
-
-
-def test_a_schema_that_cannot_be_meant_is_refused():
-    with pytest.raises(SchemaError, match='"numbr"'):
-        Table.from_columns({"Asset": ["a"], "speed": ["5"]}, {"speed": {"type": "numbr"}})

@@ -19,10 +19,10 @@ from dataclasses import replace
 from functools import lru_cache
 
 from contextdb.cells import intervals
-from contextdb.cells.angles import wrap_angle
 from contextdb.cells.conditions import Condition, Mirror, Swaps
 from contextdb.cells.domains import Domain
 from contextdb.cells.facts import Fact, read_fact
+from contextdb.cells.intervals import wrap_angle
 from contextdb.cells.sets import Accepted, Cell, NumberSet, TagSet, ValueSet
 from contextdb.errors import ContextError, in_quotes
 

@@ -34,13 +34,12 @@ from contextdb.columns import TextColumn
 from contextdb.compiled.classes import ColumnMasks, NumberMasks, WideMasks
 from contextdb.compiled.codes import CodeSlots
 from contextdb.compiled.core_table import UNKNOWN, core_table
-from contextdb.compiled.mask_bits import bits_of, nbytes
+from contextdb.compiled.layers import SoftMasks, bits_of, nbytes
 from contextdb.compiled.matches import Answering, Matches, with_mirrored, with_penalties, with_widened
 from contextdb.compiled.memory import Memory
 from contextdb.compiled.number_cells import NumberCells, number_cells
 from contextdb.compiled.outputs import NO_OUTPUTS, Outputs
 from contextdb.compiled.pick_columns import NOTHING, PickColumns
-from contextdb.compiled.soft import SoftMasks
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.compiled.versions import said_by, version_of
 from contextdb.compiled.watcher import Watcher

@@ -16,11 +16,9 @@ from itertools import islice
 
 from contextdb.columns import TextColumn
 from contextdb.errors import Fault, Place, TableError, in_quotes, plural
-from contextdb.exchange.conflicts import require_no_conflicts
-from contextdb.exchange.decimal_commas import with_points
 from contextdb.exchange.grid import MOST_ABOVE, Block, columns_of, is_header
-from contextdb.exchange.reading import Reading, Remark
-from contextdb.files.csv_faults import MOST_CHARACTERS
+from contextdb.exchange.reading import Reading, Remark, require_no_conflicts, with_points
+from contextdb.files.csv_source import MOST_CHARACTERS
 
 DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "vertical bars"}
 SAMPLE = 100

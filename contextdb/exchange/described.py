@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from contextdb.files.toml_text import as_toml, dotted
+from contextdb.files.toml_shapes import as_toml, dotted
 from contextdb.schema.sections import condition_to_dict, settings_to_dict
 from contextdb.tables.table import Table
 

@@ -15,10 +15,9 @@ from contextdb.cells.kinds import KINDS
 from contextdb.columns import TextColumn
 from contextdb.edits.edits import check_cell
 from contextdb.errors import ContextDBError, Fault, in_quotes, mend_for, nearest, plural, some
-from contextdb.exchange.decimal_commas import DECIMAL_COMMA, pair_in
 from contextdb.exchange.everyday import JOB_WORDS, as_truths, counts_rows
 from contextdb.exchange.proposals import as_cells, n_unreadable, names_of, propose_type, rewritten
-from contextdb.exchange.reading import Reading
+from contextdb.exchange.reading import DECIMAL_COMMA, Reading, pair_in
 from contextdb.schema.sections import condition_to_dict
 from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict, settings_renamed
 from contextdb.schema.table_settings import PLAIN_JOBS

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from contextdb.cells.angles import wrap_angle, wrap_angles
+from contextdb.cells.intervals import wrap_angle, wrap_angles
 from contextdb.expressions import trigonometry
 from contextdb.expressions.trigonometry import Doubles, Value
 

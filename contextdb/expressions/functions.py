@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from contextdb.cells.angles import wrap_angles
+from contextdb.cells.intervals import wrap_angles
 from contextdb.expressions import arithmetic
 
 Gives = Literal["whole if whole", "whole", "number", "angle"]

@@ -1,7 +1,7 @@
 """Compute a plan for one context: a function of the facts, made once.
 
 Facts are in canonical form, a missing number as NaN, any other missing fact as None. The same answers, bit by bit, as
-`contextdb.expressions.frame` gives for many contexts.
+`contextdb.expressions.columns` gives for many contexts.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from functools import singledispatch
 from typing import Any
 
-from contextdb.cells.angles import wrap_angle
+from contextdb.cells.intervals import wrap_angle
 from contextdb.expressions.plan import Apply, Compare, Const, Given, Held, Link, Logic, Negation, Part, Select
 
 Value = float | bool | str | frozenset[str] | None

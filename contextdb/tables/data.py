@@ -28,6 +28,7 @@ from contextdb.cells.arguments import (
 from contextdb.cells.conditions import Condition
 from contextdb.cells.notebook import as_html, one_line
 from contextdb.columns import Framed, TextColumn, frame_of
+from contextdb.columns import polars as pl
 from contextdb.compiled.outputs import Outputs
 from contextdb.compiled.pick_columns import PickColumns, specificities
 from contextdb.compiled.unchanging import Unchanging
@@ -43,8 +44,6 @@ from contextdb.tables.output_columns import OutputColumn, output_columns, output
 from contextdb.tables.plain_columns import PlainColumns
 
 if TYPE_CHECKING:
-    import polars as pl
-
     from contextdb.expressions.rules import WhenColumn
 
 AnyTable = TypeVar("AnyTable", bound="TableData")

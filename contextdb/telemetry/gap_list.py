@@ -14,8 +14,7 @@ from contextdb.covering.count import uncovered_share
 from contextdb.covering.engine import SAMPLES
 from contextdb.covering.gaps import SHARE_WORK, Measure, share_of
 from contextdb.covering.report import CoverageReport, Gap
-from contextdb.covering.sample import Sampler, samples_of
-from contextdb.covering.sampled_shares import SampledShares
+from contextdb.covering.sample import SampledShares, Sampler, samples_of
 from contextdb.covering.space import Box, Sides, Space
 from contextdb.telemetry.observed import Observed
 

@@ -2,7 +2,6 @@
 
 import pytest
 
-from contextdb.errors import TableError
 from contextdb.exchange.formats import ReadOptions, read
 from contextdb.exchange.importing import decimal_commas_reported
 from contextdb.exchange.mapping import propose
@@ -16,12 +15,6 @@ def texts(reading: Reading) -> dict[str, list[str]]:
 
 def told(reading: Reading) -> str:
     return "\n".join(map(str, reading.remarks))
-
-
-def refused(raw: bytes, name: str = "x.csv", **options: object) -> str:
-    with pytest.raises(TableError) as caught:
-        read(raw, name, ReadOptions(**options))  # type: ignore[arg-type]
-    return str(caught.value)
 
 
 @pytest.mark.parametrize(("mark", "named"), [(";", "semicolons"), ("\t", "tabs"), ("|", "vertical bars")])
@@ -49,14 +42,6 @@ def test_text_of_old_windows_programs_is_read_and_said_to_be_a_guess():
     assert texts(reading)["a"] == ["grün"]
     assert 'line 2: byte 0xFC is not UTF-8; the file is read as Windows-1252: "a;b\\ngrün;1"' in told(reading)
     assert any(remark.is_loss for remark in reading.remarks)
-
-
-def test_a_wrong_encoding_is_refused_with_its_line_and_an_unknown_one_with_the_nearest():
-    assert refused("a;b\nü;1\n".encode(), encoding="ascii").startswith(
-        "x.csv, line 2: byte 0xC3 on this line is not text in ascii."
-    )
-    assert 'Did you mean "cp1252"?' in refused(b"a;b\n1;2\n", encoding="cp1253x")
-    assert "NUL bytes" in refused(b"a;b\n1;\x00\x01\x02\x03\x04\n")
 
 
 @pytest.mark.parametrize(
@@ -119,52 +104,6 @@ def test_missing_fields_at_the_end_of_a_line_are_empty_and_told():
     reading = read(b"a;b;c\nx;1\ny;1;2\n", "x.csv")
     assert texts(reading)["c"] == ["", "2"]
     assert "line 2: 1 line with fewer than 3 fields" in told(reading)
-
-
-def test_a_line_with_too_many_fields_is_refused_with_its_number():
-    assert refused(b'a;b\n"x\ny";2\nx;1;2\n').startswith("x.csv, line 4: found 3 fields, the first line has 2.")
-
-
-def test_quotes_that_do_not_close_are_refused_with_the_line_they_open_on():
-    assert refused(b'a;b\nx;1\ny;"2\nz;3\n').startswith("x.csv, line 3: a quoted field is never closed")
-
-
-@pytest.mark.parametrize("raw", [b"", b"\n\n", b"\xef\xbb\xbf", b"\xff\xfe"])
-def test_an_empty_file_is_said_to_be_empty(raw: bytes):
-    assert "there is nothing to read" in refused(raw)
-
-
-@pytest.mark.parametrize(
-    ("raw", "name", "said"),
-    [
-        (b"\x1f\x8b\x08xxxxxxxxxx", "x.csv", "not a text file: looks like a gzip archive."),
-        (b"PK\x03\x04\x14\0\x08\0", "x.tsv", "not a text file: looks like a ZIP archive."),
-        (b"version https://git-lfs.github.com/spec/v1\noid sha256:ab\nsize 12\n", "x.csv", "this is a Git LFS pointer"),
-        (b"version https://git-lfs.github.com/spec/v1\noid sha256:ab\nsize 12\n", "x.xlsx", "this is a Git LFS pointer"),
-        (b"\xef\xbb\xbf<!DOCTYPE html>\n<html>\n<p>Sign in</p>\n</html>\n", "x.csv", "looks like HTML or XML."),
-    ],
-)
-def test_a_file_of_another_kind_is_named_and_never_read_as_rows(raw: bytes, name: str, said: str):
-    assert said in refused(raw, name)
-
-
-def test_columns_without_a_name_and_names_that_stand_twice_are_refused():
-    assert 'column B has no name; it holds "2".' in refused(b"a;;c\n1;2;3\n")
-    assert 'the column name "a" appears twice' in refused(b"a;b;a\n1;2;3\n")
-
-
-@pytest.mark.parametrize("mark", ["<<<<<<< ours", ">>>>>>> theirs"])
-@pytest.mark.parametrize("name", ["x.csv", "x.tsv", "x.jsonl"])
-def test_a_git_conflict_is_named_with_its_line_and_never_read_as_rows(mark: str, name: str):
-    raw = f"a;b\n1;2\n{mark}\n3;4\n=======\n5;6\n".encode()
-    said = refused(raw, name)
-    assert said.startswith(f"{name}, line 3: ")
-    assert "git" in said
-    assert "to keep one side" in said
-
-
-def test_what_is_left_of_a_conflict_is_named_in_a_csv_of_one_column_too():
-    assert "this line is a conflict mark of git" in refused(b"A\njog\n=======\nrun\n>>>>>>> theirs\n")
 
 
 def test_a_line_of_equal_signs_alone_is_no_conflict():

@@ -20,13 +20,13 @@ from test_output_ground import slope
 
 import contextdb as cdb
 from contextdb import motion
-from contextdb.commands.motion_bundle import file_of
+from contextdb.commands.compile_command import c_motion_header
+from contextdb.commands.motion_build_command import file_of
 from contextdb.compiled.c_header import c_header_of
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.output.bank import moving_alike
 from contextdb.motion.selection.chooser import N_DECISION
 from contextdb.motion.storage.bundle import Played, bundle_of
-from contextdb.motion.storage.c_header import c_motion_header
 
 pytestmark = pytest.mark.skipif(os.name == "nt" or not all_compilers(), reason="no gcc or clang was found")
 MOCAP = Path(os.environ.get("CONTEXTDB_MOCAP", Path(__file__).parents[2].parent / "shared" / "data" / "mocap"))

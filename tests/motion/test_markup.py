@@ -5,12 +5,11 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from strategies import for_each
 
-from contextdb.errors import FileError, MotionError
+from contextdb.errors import MotionError
 from contextdb.motion.markup.markup import MOST_FAULTS, Markup
 from contextdb.motion.markup.reserved import ReservedTag
-from contextdb.motion.markup.spans import Span, fits
+from contextdb.motion.markup.span_faults import Span, fits
 
 HEADER = "asset,tag,from,to,value\n"
 
@@ -87,34 +86,6 @@ def test_a_file_is_read_with_or_without_bom(tmp_path):
 # ---- files that are no markup
 
 
-@pytest.mark.parametrize(
-    ("raw", "said"),
-    [
-        (b"", "the file is empty"),
-        (b"\xef\xbb\xbf", "the file is empty"),
-        (b"\n \n", "blank lines only"),
-        ((HEADER + "jog,Move,,,").encode("utf-16"), "UTF-16"),
-        ((HEADER + "jog,Move,,,").encode("utf-16-le"), "UTF-16"),
-        (HEADER.encode() + b"jog\0,Move,,,", "line 2: not a text file: it contains a NUL byte"),
-        (HEADER.encode() + b"\nj\xf6g,Move,,,", "line 3: byte 0xF6 on this line is not UTF-8"),
-        (b"asset;tag;from;to\n", "the header has no comma but 3 semicolons"),
-        (b"<<<<<<< HEAD\nasset,tag,from,to\n", "line 1: an unresolved git conflict"),
-    ],
-)
-def test_a_file_that_is_no_markup_is_refused_with_the_reason(tmp_path, raw, said):
-    (tmp_path / "marks.csv").write_bytes(raw)
-    with pytest.raises(MotionError, match=r"marks\.csv") as caught:
-        Markup.load(tmp_path / "marks.csv")
-    assert len(caught.value.faults) == 1
-    assert said in str(caught.value)
-
-
-def test_a_missing_file_is_refused_with_the_nearest_name(tmp_path):
-    (tmp_path / "marks.csv").write_text(HEADER)
-    with pytest.raises(FileError, match=r"Did you mean .*marks\.csv"):
-        Markup.load(tmp_path / "mark.csv")
-
-
 @given(st.binary(max_size=80) | st.text(max_size=80).map(str.encode) | st.text(',"\n*.aA01-', max_size=80).map(str.encode))
 def test_any_bytes_are_markup_or_a_motion_error(tmp_path_factory, raw):
     path = tmp_path_factory.getbasetemp() / "any.csv"
@@ -136,106 +107,6 @@ def outcome(path):
 # ---- faults of the header and of lines
 
 
-def test_unknown_missing_and_doubled_columns_are_told_together():
-    assert faults("asset,Tga,to,to,\nx\n") == [
-        'marks.csv, line 1, column "Tga": there is no column "Tga". Accepted: "asset", "tag", "from", "to", "value". '
-        'Did you mean "tag"?',
-        'marks.csv, line 1, column "to": the column "to" appears twice. Accepted: each column once.',
-        'marks.csv, line 1: a column has no name. Accepted: "asset", "tag", "from", "to", "value".',
-        'marks.csv, line 1: the columns "tag", "from" are missing. Accepted: "asset", "tag", "from", "to", "value".',
-    ]
-
-
-def test_below_an_unknown_column_the_rows_are_read_all_the_same():
-    told = faults("asset,tag,from,to,note\njog,Move,x,,hello\n")
-    assert ['column "note"' in told[0], 'column "from"' in told[1], len(told)] == [True, True, 2]
-
-
-def test_a_line_of_another_length_gets_a_mend():
-    short = fault("jog,Move,0,1")
-    assert "found 4 fields, the header has 5. Accepted: one field for each of asset, tag, from, to, value." in short
-    assert short.endswith('Did you mean "jog,Move,0,1,"?')
-    assert "decimal point" in fault("jog,CostModifier,0,1,0,5")
-    assert "the file has no comments" in fault("# a comment")
-
-
-def test_wrong_quotes_spoil_their_own_line_alone():
-    told = faults(HEADER + 'jog,"Move,,,\njog,"Mo"ve,,,\njog,Move,x,,\n')
-    assert [line.partition(":")[0] for line in told] == [
-        "marks.csv, line 2",
-        "marks.csv, line 3",
-        'marks.csv, line 4, column "from"',
-    ]
-    assert "never closed" in told[0]
-    assert "continues after its closing quote" in told[1]
-
-
-@for_each(
-    [
-        ("jog,Move,abc,,", "from", '"abc" is not a finite number', ""),
-        ("jog,Move,nan,,", "from", '"nan" is not a finite number', ""),
-        ("jog,Move,,inf,", "to", '"inf" is not a finite number', ""),
-        ("jog,Move,,1e999,", "to", '"1e999" is not a finite number', ""),
-        ('jog,Move,"0,5",,', "from", '"0,5" is not a finite number', 'Did you mean "0.5"?'),
-        ("jog,Move,,1.5 s,", "to", '"1.5 s" is not a finite number', 'Did you mean "1.5"?'),
-        ("jog,Move,-1,,", "from", "-1 is not a time in a clip", ""),
-        ("jog,Move,,1e10,", "to", "1e+10 is not a time in a clip", ""),
-        ("jog,Move,2,1,", "from", "the span ends before it starts", "Did you mean from 1 to 2?"),
-        ("jog,Move,,,1", "value", 'the plain tag "Move" takes no value, but this is 1', "leave it empty"),
-        ("jog,DoNotChoose,,,1", "value", 'the reserved tag "DoNotChoose" takes no value', "leave it empty"),
-        ("jog,CostModifier,,,", "value", "CostModifier has no value", ""),
-        ("jog,CostModifier,,,1e31", "value", "1e+31 is out of range for CostModifier", ""),
-        ("jog,RootMotionWeight,,,", "value", "RootMotionWeight has no value", ""),
-        ("jog,RootMotionWeight,,,1.5", "value", "1.5 is out of range for RootMotionWeight", ""),
-        ("jog,NextNaturalOnly,,,-1", "value", "-1 is out of range for NextNaturalOnly", ""),
-        ("jog,NextNaturalOnly,1,2,3", "value", "the entry zone of 3 s is longer than its span, 1 s", 'Did you mean "1"?'),
-        ("jog,Looping,0.5,,", "from", "Looping holds for the whole asset", "leave both empty"),
-        ("jog,Looping,,2,", "to", "Looping holds for the whole asset", "leave both empty"),
-        (",Move,,,", "asset", "there is no asset", ""),
-        ("jog,,1,,", "tag", "there is no tag", ""),
-        ("jog,Bad Name,,,", "tag", '"Bad Name" cannot be the name of a tag', 'Did you mean "Bad_Name"?'),
-        ("jog,Move..Run,,,", "tag", '"Move..Run" cannot be the name of a tag', 'Did you mean "Move.Run"?'),
-    ]
-)
-def test_a_fault_names_its_column_what_was_found_and_the_mend(line, column, said, mend):
-    told = fault(line)
-    assert told.startswith(f'marks.csv, line 2, column "{column}": {said}')
-    assert mend in told
-
-
-@for_each(
-    [
-        ("Do Not Choose", "DoNotChoose"),
-        ("do_not_choose", "DoNotChoose"),
-        ("DoNotChose", "DoNotChoose"),
-        ("DontChoose", "DoNotChoose"),
-        ("DoNtoChoose", "DoNotChoose"),
-        ("DoNotChoose.Feet", "DoNotChoose"),
-        ("BlockTransition", "DoNotChoose"),
-        ("Exclude", "Excluded"),
-        ("Exluded", "Excluded"),
-        ("NextNatural", "NextNaturalOnly"),
-        ("NextNatrualOnly", "NextNaturalOnly"),
-        ("Match-Range", "MatchRange"),
-        ("Warp.Position", "WarpPosition"),
-        ("WarpPostion", "WarpPosition"),
-        ("WarpRotaton", "WarpRotation"),
-        ("CostModifer", "CostModifier"),
-        ("ModifyCost", "CostModifier"),
-        ("RootMotionWieght", "RootMotionWeight"),
-        ("Root Motion Weight", "RootMotionWeight"),
-        ("Loooping", "Looping"),
-        ("Loopign", "Looping"),
-        ("Exculded", "Excluded"),
-        ("Loop", "Looping"),
-    ]
-)
-def test_a_misspelt_reserved_tag_does_not_become_a_plain_one(name, meant):
-    told = fault(f"jog,{name},,,")
-    assert f'the tag "{name}" is too like the reserved tag "{meant}"' in told
-    assert told.endswith(f'Did you mean "{meant}"?')
-
-
 @pytest.mark.parametrize(
     "name",
     ["Looking", "Looting", "Included", "Match", "Natural", "LoopStart", "Gait.Loping", "Läuft", "move:fast", "_x-7", "7", "Any"],
@@ -247,42 +118,14 @@ def test_other_names_are_plain_tags(name):
 # ---- faults of several spans together
 
 
-def test_the_same_span_twice_is_told_however_it_is_written():
-    told = fault("jog,DoNotChoose,1,2,", "jog,donotchoose,1.0,2.00,")
-    assert "line 3" in told
-    assert "this span is the same as line 2" in told
-    assert "the same as line 2" in fault("jog,Looping,,,", "jog,Looping,,,")
-
-
-def test_a_tag_in_two_cases_would_be_two_tags_and_is_refused():
-    told = fault("jog,Move,,,", "run,move,,,", "walk,move,,,")
-    assert 'the tag "move" differs in case only from "Move" of line 2' in told
-
-
 @pytest.mark.parametrize("tag", ["WarpPosition", "WarpRotation"])
 def test_an_asset_has_one_warp_of_each_sort(tag):
     assert f'line 2 gives "jog" a {tag} too' in fault(f"jog,{tag},0,1,", f"jog,{tag},2,3,")
     assert len(spans("jog,WarpPosition,0,1,", "jog,WarpRotation,0,1,", "walk,WarpPosition,2,3,", "*,WarpPosition,0,1,")) == 4
 
 
-@pytest.mark.parametrize(
-    "pair",
-    [("0,1", "0.5,2"), ("0.5,2", "0,1"), (",", "1,1"), ("0,1", "1,1"), ("1,1", "1,2"), ("0,2", "1,"), ("0,3", "1,2")],
-)
-def test_overlapping_root_motion_weights_that_differ_are_refused(pair):
-    told = fault(*(f"jog,RootMotionWeight,{times},{value}" for times, value in zip(pair, ("0.25", "0.75"), strict=True)))
-    assert "line 3" in told
-    assert "on some frames line 2 says 0.25 and this 0.75" in told
-
-
 def test_root_motion_weights_may_touch_or_overlap_with_one_value():
     assert len(spans("jog,RootMotionWeight,0,1,0.2", "jog,RootMotionWeight,1,2,0.4", "jog,RootMotionWeight,1.5,3,0.4")) == 3
-
-
-def test_every_fault_of_a_file_is_told_in_the_order_of_its_lines():
-    told = faults(HEADER + "jog,Move,2,1,\njog,Looping,,,\nshort\njog,Looping,,,\njog,Loop,x,,\n")
-    places = [line.partition(":")[0].removeprefix("marks.csv, ") for line in told]
-    assert places == ['line 2, column "from"', "line 4", 'line 5, column "tag"', 'line 6, column "from"', 'line 6, column "tag"']
 
 
 def test_of_very_many_faults_the_first_are_told_and_the_rest_counted():

@@ -86,55 +86,6 @@ def test_a_star_may_stand_anywhere_in_a_name():
     assert partners_of(skeleton, (("*_L", "*_R"), ("rig:l*", "rig:r*"))).tolist() == [0, 2, 1, 4, 3]
 
 
-REFUSED = {
-    "a bone that is missing": (
-        (("LeftFoot", "RightFot"),),
-        r'mirror: \["LeftFoot", "RightFot"\] names the bone "RightFot", which does not exist\..*Did you mean "RightFoot"\?',
-    ),
-    "a pattern with half its bones": ((("*Hand", "*Palm"),), r'mirror: \["\*Hand", "\*Palm"\] names the bone "LeftPalm"'),
-    "a pattern that fits nothing": ((("L_*", "R_*"),), r'mirror: no bone fits \["L_\*", "R_\*"\]'),
-    "a bone in two pairs": ((*SIDES, ("LeftHand", "RightFoot")), 'mirror: the bone "LeftHand" is in two pairs'),
-    "a pair twice": ((*SIDES, *SIDES), 'mirror: the bone "LeftArm" is in two pairs'),
-    "unlike parents": (
-        (("LeftHand", "RightForeArm"),),
-        'mirror: "RightForeArm" is mirrored to "LeftHand", but their parents|'
-        'mirror: "LeftHand" is mirrored to "RightForeArm", but their parents',
-    ),
-    "a limb without its end": (
-        (("LeftUpLeg", "RightUpLeg"), ("LeftLeg", "RightLeg"), ("LeftFoot", "RightFoot")),
-        'mirror: "LeftToe" is mirrored to "LeftToe", but their parents do not change places as they do. '
-        'Accepted: a bone below "RightFoot" as the partner of "LeftToe"',
-    ),
-    "a star on one side": ((("Left*", "RightFoot"),), "one name has a \\* and the other has none"),
-    "two stars": ((("L*ft*", "R*ght*"),), "a name has more than one \\*"),
-}
-
-
-@pytest.mark.parametrize(("pairs", "message"), REFUSED.values(), ids=REFUSED)
-def test_pairs_that_do_not_fit_a_skeleton_are_refused(pairs, message):
-    with pytest.raises(MotionError, match=message):
-        partners_of(MADE, pairs)
-
-
-def test_all_missing_bones_are_told_together():
-    with pytest.raises(MotionError) as error:
-        partners_of(MADE, (("LeftEar", "RightEar"), ("A*", "B*"), ("LeftHand", "RightHnd")))
-    assert len(error.value.faults) == 4
-
-
-def test_a_clip_is_mirrored_only_by_declared_pairs():
-    schema = FeatureSchema("loco", 30.0, (Channel("position", 1.0, "Head"),))
-    with pytest.raises(MotionError, match=r"walk: \[features\.loco\] declares no bone pairs to mirror by\..*LeftArm"):
-        clip_features(make_clip("walk").clip, schema, mirrored=True)
-
-
-def test_pairs_that_leave_out_the_bones_of_the_facing_are_refused():
-    arms = (("LeftArm", "RightArm"), ("LeftForeArm", "RightForeArm"), ("LeftHand", "RightHand"))
-    schema = FeatureSchema("loco", 30.0, (Channel("position", 1.0, "Head"),), mirror=arms)
-    with pytest.raises(MotionError, match='the body faces across "LeftUpLeg" and "RightUpLeg", which are not a pair'):
-        clip_features(make_clip("walk").clip, schema, mirrored=True)
-
-
 @st.composite
 def even_bodies(draw):
     """A body that is even at rest, each bone of it then turned to axes of its own, in poses of any rotations.

@@ -22,9 +22,9 @@ from contextdb.motion.clips.poses import forward_kinematics, local_poses
 from contextdb.motion.clips.steering import steered_path
 from contextdb.motion.features.extraction import clip_features, clip_permutations, features_of
 from contextdb.motion.features.path_features import with_paths
-from contextdb.motion.made.joint import make_joint_clip, write_joint_clips
+from contextdb.motion.made.game import make_joint_clip, write_joint_clips
 from contextdb.motion.made.recipes import descriptions, make_clip
-from contextdb.motion.measuring.wanted import ClipContexts
+from contextdb.motion.measuring.moves import ClipContexts
 from contextdb.motion.nodes.pose_match import pose_schema
 from contextdb.motion.output.track import clip_of_poses, pose_arrays
 from contextdb.motion.search.database import build_databases

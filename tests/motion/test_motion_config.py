@@ -1,10 +1,7 @@
 """The sections features, databases and selectors of contextdb.toml, from reading to a search."""
 
-import copy
-
 import pytest
 from made_once import make_clip
-from strategies import for_each
 
 from contextdb.errors import ClipError, MotionError, SchemaError
 from contextdb.motion import MotionConfig, PoseSettings, query_from, steady_path, write_bvh
@@ -136,128 +133,6 @@ def test_an_unknown_name_is_refused_with_the_nearest(folder):
         config.selector("locomotive", {})
 
 
-def with_change(path, value):
-    """The sections with one value changed, or taken out when it is None."""
-    sections = copy.deepcopy(SECTIONS)
-    part = sections
-    for key in path[:-1]:
-        part = part[key]
-    if value is None:
-        del part[path[-1]]
-    else:
-        part[path[-1]] = value
-    return sections
-
-
-CHANNEL_NAMES = (
-    "LeftFoot position",
-    "Hips velocity",
-    "trajectory position at 0.33 0.67 1 s",
-    "trajectory direction along 0.5 1 2 m",
-)
-OTHER = {"rate": 60.0, "channels": [{"type": "velocity", "bone": "Hips"}]}
-REFUSED = {
-    "a section that is not a table": (("databases",), 3, "databases is a number, not a table."),
-    "a database that is not a table": (("databases", "x"), 3, "databases.x = 3: this is a number, not a table."),
-    "a misspelt key": (("databases", "jog", "clip"), "a", '[databases.jog] has no key "clip".'),
-    "clips elsewhere": (("databases", "jog", "clips"), "../clips/*.bvh", "it leaves the folder of contextdb.toml."),
-    "clips on one machine": (("databases", "jog", "clips"), "/clips/*.bvh", "it names a place on one machine"),
-    "clips of another format": (("databases", "jog", "clips"), "clips/*.c3d", "its ending is that of no file of clips."),
-    "an unknown table": (("databases", "jog", "table"), "locomotoin", 'Did you mean table = "locomotion"?'),
-    "an unknown axis": (
-        ("databases", "jog", "up"),
-        "Y",
-        'up = "Y": there is no such axis. Accepted: "y", "z", "x". Did you mean up = "y"?',
-    ),
-    "markup of another format": (
-        ("databases", "jog", "markup"),
-        "marks.toml",
-        'markup = "marks.toml": its ending is that of no CSV file.',
-    ),
-    "markup elsewhere": (("databases", "jog", "markup"), "../marks.csv", 'Did you mean markup = "marks.csv"?'),
-    "clips below another folder": (("databases", "jog", "clips"), "..\\clips\\*.bvh", 'Did you mean clips = "clips/*.bvh"?'),
-    "a flag in quotes": (
-        ("databases", "jog", "mirror"),
-        "yes",
-        'mirror = "yes": this is text, neither true nor false. Accepted: true or false. Did you mean mirror = true?',
-    ),
-    "a flag that is a number": (("databases", "jog", "mirror"), 0, "Did you mean mirror = false?"),
-    "a bias in quotes": (("databases", "jog", "base_bias"), "0.5", "Did you mean base_bias = 0.5?"),
-    "weights that are not a table": (("databases", "jog", "weights"), 2.0, "weights = 2.0: this is a number, not a table."),
-    "a weight of no channel": (
-        ("databases", "jog", "weights"),
-        {"Hips velocty": 2.0},
-        '[databases.jog] weights has no key "Hips velocty". Accepted: "LeftFoot position", "Hips velocity", ',
-    ),
-    "a weight below 0": (
-        ("databases", "jog", "weights"),
-        {"Hips velocity": -1},
-        "weights Hips velocity = -1: this is out of range.",
-    ),
-    "weights that leave nothing": (
-        ("databases", "jog", "weights"),
-        dict.fromkeys(CHANNEL_NAMES, 0.0),
-        "[databases.jog] weights: the weight of every channel is 0. Accepted: at least one above 0",
-    ),
-    "an order that is not a list": (("selectors", "locomotion", "order"), "jog", "this is text, not a list."),
-    "an empty order": (("selectors", "locomotion", "order"), [], "the list is empty."),
-    "a step that is not a table": (
-        ("selectors", "locomotion", "order", 1),
-        "jog",
-        '[selectors.locomotion] order 2 is "jog": this is text, not a table. Accepted: { database = "jog" }.',
-    ),
-    "an unknown database": (
-        ("selectors", "locomotion", "order", 1, "database"),
-        "jgo",
-        '[selectors.locomotion] order 2 database = "jgo": there is no such database. Accepted: "jog", "jog_tired". '
-        'Did you mean database = "jog"?',
-    ),
-    "a database twice": (("selectors", "locomotion", "order", 0, "database"), "jog", 'names the database "jog" 2 times.'),
-    "no threshold before the last": (
-        ("selectors", "locomotion", "order", 0, "threshold"),
-        None,
-        '[selectors.locomotion] order 1 has no "threshold". Accepted: a cost, such as 0.1: under it this database wins outright',
-    ),
-    "a threshold on the last": (
-        ("selectors", "locomotion", "order", 1, "threshold"),
-        1.0,
-        "nothing follows that it could spare a search.",
-    ),
-}
-
-
-@for_each(REFUSED.values())
-def test_a_fault_is_told_with_what_is_accepted(path, value, message):
-    with pytest.raises(SchemaError) as error:
-        MotionConfig.from_dict(with_change(path, value), tables=["locomotion"], file="contextdb.toml")
-    assert str(error.value).startswith("contextdb.toml: ")
-    assert message in str(error.value)
-
-
-def test_faults_of_all_sections_are_reported_together():
-    sections = with_change(("features", "loco", "rate"), "fast")
-    sections["databases"]["jog"]["features"] = "lco"
-    sections["selectors"]["locomotion"]["order"][0] = {"database": "jgo_tired"}
-    with pytest.raises(SchemaError) as error:
-        MotionConfig.from_dict(sections)
-    assert len(error.value.faults) == 4
-
-
-def test_databases_of_different_features_cannot_stand_in_one_selector():
-    sections = with_change(("features", "other"), OTHER)
-    sections["databases"]["jog"]["features"] = "other"
-    with pytest.raises(SchemaError, match='has databases of different features: "jog_tired" "loco", "jog" "other"'):
-        MotionConfig.from_dict(sections)
-
-
-def test_weights_of_a_schema_with_faults_are_not_held_against_the_database():
-    sections = with_change(("features", "loco", "rate"), "fast")
-    sections["databases"]["jog"]["weights"] = {"Hips velocity": 2.0}
-    with pytest.raises(SchemaError) as error:
-        MotionConfig.from_dict(sections)
-    assert len(error.value.faults) == 1
-
-
 def test_a_controller_has_its_selector_and_settings():
     sections = SECTIONS | {"controllers": {"player": {"selector": "locomotion", "search_every_s": 0.2}}}
     config = MotionConfig.from_dict(sections)
@@ -268,25 +143,8 @@ def test_a_controller_has_its_selector_and_settings():
         config.controller("playr", {})
 
 
-def test_a_controller_of_a_selector_that_is_not_there_is_told_beside_other_faults():
-    sections = SECTIONS | {"controllers": {"player": {"selector": "locomotoin", "history_s": -1}}}
-    with pytest.raises(SchemaError) as error:
-        MotionConfig.from_dict(sections)
-    assert len(error.value.faults) == 2
-    assert 'Did you mean selector = "locomotion"?' in str(error.value)
-
-
 def test_the_output_of_a_controller_is_read_and_default_without_a_section():
     sections = SECTIONS | {"output": {"player": {"root": "code", "halflife_s": 0.2}}}
     config = MotionConfig.from_dict(sections)
     assert config.output_of("player") == PoseSettings(root="code", halflife_s=0.2)
     assert config.output_of("npc") == PoseSettings()
-
-
-def test_the_faults_of_outputs_are_told_beside_others():
-    sections = SECTIONS | {"output": {"player": {"root": "cod"}}, "controllers": {"player": {"selector": "locomotoin"}}}
-    with pytest.raises(SchemaError) as error:
-        MotionConfig.from_dict(sections, file="contextdb.toml")
-    assert len(error.value.faults) == 2
-    assert '[output.player] root = "cod"' in str(error.value)
-    assert 'Did you mean root = "code"?' in str(error.value)

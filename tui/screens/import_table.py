@@ -21,9 +21,8 @@ from textual.worker import get_current_worker
 from contextdb.disk import read_bytes
 from contextdb.errors import ContextDBError, Fault, safe_text
 from contextdb.exchange.formats import FORMATS, ReadOptions, format_of, grid_of, sheet_names
-from contextdb.exchange.importing import NAMES
+from contextdb.exchange.importing import NAMES, Choices, choices_of, remember
 from contextdb.exchange.reading import SheetWanted, TableWanted
-from contextdb.exchange.remembered import Choices, choices_of, remember
 from contextdb.tables.table import Table
 
 from ..model.importing import DECIMAL_COMMA, MODES, Choice, Draft, Import, Mode, suffixes_read, why_not

@@ -10,10 +10,9 @@ from numpy.typing import ArrayLike
 
 from contextdb.motion.characters.tables import Facts
 from contextdb.motion.characters.walks import Onward, WishedPaths, body_of
-from contextdb.motion.clips.many_paths import ManyTrajectories
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.steering import Steered
-from contextdb.motion.clips.trajectory import Trajectory
+from contextdb.motion.clips.trajectory import ManyTrajectories, Trajectory
 from contextdb.motion.output.stream import Pose
 from contextdb.motion.records import quickly_made
 from contextdb.motion.selection.decision import Decision, plays

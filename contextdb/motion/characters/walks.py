@@ -15,10 +15,9 @@ import numpy as np
 from contextdb.cells.sequences import Made
 from contextdb.core import Ways
 from contextdb.errors import Fault, MotionError, plural
-from contextdb.motion.clips.many_paths import ManyTrajectories
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.steering import N_NUMBERS, Steered
-from contextdb.motion.clips.trajectory import Trajectory
+from contextdb.motion.clips.trajectory import ManyTrajectories, Trajectory
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.output.samples import Flags, Place3
 from contextdb.motion.search.database import MotionDatabase

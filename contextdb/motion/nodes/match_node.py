@@ -32,7 +32,7 @@ from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.clips.trajectory import to_own_frame
 from contextdb.motion.features.channels import require_weight
-from contextdb.motion.markup.spans import TOLERANCE_S
+from contextdb.motion.markup.span_faults import TOLERANCE_S
 from contextdb.motion.nodes.stitching import shortest_part
 from contextdb.motion.nodes.warping import Target, WarpedPath, WarpShare, Window, warped, wrapped
 from contextdb.motion.search.candidates import Candidates

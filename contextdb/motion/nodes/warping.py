@@ -30,7 +30,7 @@ from contextdb.errors import Fault, QueryError
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.trajectory import STANDING_MPS, to_own_frame
 from contextdb.motion.features.extraction import FARTHEST_M
-from contextdb.motion.markup.spans import TOLERANCE_S
+from contextdb.motion.markup.span_faults import TOLERANCE_S
 from contextdb.motion.selection.root_motion import RootMotion
 
 STANDING_RADPS = 0.1

@@ -21,9 +21,8 @@ from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.features.normalisation import Normalisation
 from contextdb.motion.search import cost
-from contextdb.motion.search.filters import Filter
+from contextdb.motion.search.filters import Filter, ManyFilters
 from contextdb.motion.search.layout import Layout
-from contextdb.motion.search.many_filters import ManyFilters
 
 REFUSED = -2
 """The range of a query that cannot be compared."""

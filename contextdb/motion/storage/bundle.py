@@ -37,43 +37,27 @@ Part = NDArray[Any] | bytes | None
 
 @dataclass(frozen=True, eq=False)
 class Played:
-    """A controller to put into a bundle, with what its characters play.
-
-    Attributes
-    ----------
-    controller : Controller
-    schema : FeatureSchema
-    banks : mapping of database to PoseBank, or None
-        None for characters without poses.
-    output : PoseSettings
-    """
+    """A controller to put into a bundle, with what its characters play."""
 
     controller: Controller
     schema: FeatureSchema
     banks: Mapping[str, PoseBank] | None
+    """None for characters without poses."""
     output: PoseSettings
 
 
 @dataclass(frozen=True, eq=False)
 class TableFile:
-    """A table to put into a bundle.
-
-    Attributes
-    ----------
-    octets : bytes
-        Its compiled file.
-    assets : sequence of str
-        Those of its rows.
-    own_facts : mapping of condition to letter
-        The facts that a character adds: "s" its speed, "d" the direction of its stick, "t" its turn.
-    mirror : mapping of condition to text
-        How facts change in a mirror: "n" negated, "p=NAME" that of another condition, "v=1 0" enum values by their numbers.
-    """
+    """A table to put into a bundle."""
 
     octets: bytes
+    """Its compiled file."""
     assets: Sequence[str]
+    """Those of its rows."""
     own_facts: Mapping[str, str] = field(default_factory=dict)
+    """The facts that a character adds: "s" its speed, "d" the direction of its stick, "t" its turn."""
     mirror: Mapping[str, str] = field(default_factory=dict)
+    """How facts change in a mirror: "n" negated, "p=NAME" that of another condition, "v=1 0" enum values by their numbers."""
 
     @property
     def parts(self) -> list[bytes]:
@@ -112,20 +96,9 @@ class Bundle:
 
 
 def bundle_of(players: Mapping[str, Played], table_of: Mapping[str, str], tables: Mapping[str, TableFile]) -> bytes:
-    """The bytes of a bundle.
+    """The bytes of a bundle of controllers by their names, the table of each database that has one, and the tables.
 
-    Parameters
-    ----------
-    players : mapping of str to Played
-        The controllers by their names.
-    table_of : mapping of str to str
-        The table of each database, of those that have one.
-    tables : mapping of str to TableFile
-
-    Raises
-    ------
-    MotionError
-        What a bundle cannot hold yet; all faults together.
+    Raises MotionError for what a bundle cannot hold yet; all faults together.
     """
     _check(players)
     bundle, numbers, names = Bundle(), {name: i for i, name in enumerate(tables)}, list[str]()

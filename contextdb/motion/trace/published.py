@@ -13,8 +13,8 @@ from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.choice import Choice
 from contextdb.motion.selection.decision import Decision
 from contextdb.motion.selection.worked_out import WorkedOut
+from contextdb.motion.trace.cost_views import as_plain, decision_json
 from contextdb.motion.trace.filter_rows import fingerprint, markup_digest
-from contextdb.motion.trace.json_form import as_plain, decision_json
 from contextdb.motion.trace.rows import row_of
 
 _digests: WeakKeyDictionary[MotionDatabase, dict[str, str]] = WeakKeyDictionary()

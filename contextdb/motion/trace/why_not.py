@@ -34,38 +34,24 @@ from contextdb.motion.trace.winning_changes import (
 
 @dataclass(frozen=True, slots=True)
 class WhyNot:
-    """Why an asset was not chosen.
-
-    Attributes
-    ----------
-    asset : str
-    database : str
-    frame : int
-        Its best frame, counted over the database; one that may be chosen before all that may not.
-    time_s : float or None
-        Seconds since the start of the asset.
-    rank : int
-        How many frames that may be chosen cost less, and one.
-    cost : float
-    winner : str or None
-        The asset that was chosen.
-    winner_cost : float or None
-    reasons : tuple of str
-        In the order of the way to a choice; empty for the asset that was chosen.
-    changes : tuple of Change
-        The smallest first of each kind; empty for the asset that was chosen.
-    """
+    """Why an asset was not chosen."""
 
     asset: str
     database: str
     frame: int
+    """Its best frame, counted over the database; one that may be chosen before all that may not."""
     time_s: float | None
+    """Seconds since the start of the asset."""
     rank: int
+    """How many frames that may be chosen cost less, and one."""
     cost: float
     winner: str | None
+    """The asset that was chosen."""
     winner_cost: float | None
     reasons: tuple[str, ...]
+    """In the order of the way to a choice; empty for the asset that was chosen."""
     changes: tuple[Change, ...]
+    """The smallest first of each kind; empty for the asset that was chosen."""
 
     def to_json(self) -> dict[str, object]:
         """The keys that scripts rely on."""

@@ -21,9 +21,8 @@ from contextdb.errors import ContextDBError, Fault, MotionError, in_quotes, row_
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.search.filters import Filter
 from contextdb.motion.selection.choice import Choice
-from contextdb.motion.trace.other_filters import filter_by_table
+from contextdb.motion.trace.other_filters import ReaskedSearch, filter_by_table
 from contextdb.motion.trace.reasked_decision import ReaskedDecision
-from contextdb.motion.trace.reasked_search import ReaskedSearch
 from contextdb.motion.trace.stock import Edited, Row, failing_rows
 
 DIGITS = 4
@@ -35,22 +34,15 @@ AND = " + "
 
 
 class ChangePart(NamedTuple):
-    """One thing that is changed.
-
-    Attributes
-    ----------
-    kind : str
-        "cell", "cells", "mask" (its range is let in, where no table says why it was not), "mark", "tags", "setting", "event",
-        "bias", "weight" or "threshold".
-    what : str
-        What is changed: the cell, the mark, the channel.
-    to : str or float
-        To what.
-    """
+    """One thing that is changed."""
 
     kind: str
+    """"cell", "cells", "mask" (its range is let in, where no table says why it was not), "mark", "tags", "setting", "event",
+    "bias", "weight" or "threshold"."""
     what: str
+    """What is changed: the cell, the mark, the channel."""
     to: str | float
+    """To what."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -70,6 +70,13 @@ public:
         cdbm_steer_one(Crowd.get(), Character, 0.0 - Y / 100.0, X / 100.0, static_cast<double>(NAN));
     }
 
+    /** What is to happen in so many seconds, such as "Contact.Left": to be set before each update until then, and nullptr behind it. The
+     * text stays where it is. False where no database has such an event. */
+    bool Expect(std::size_t Character, const char* Event, double Seconds)
+    {
+        return cdbm_event_one(Crowd.get(), Character, Event, Seconds) != 0;
+    }
+
     /** Set a fact in each table of the bundle that asks for it: a text, such as "Walk", or a number. False where none takes it. */
     bool SetFact(std::size_t Character, const char* Fact, const char* Value)
     {

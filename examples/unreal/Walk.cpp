@@ -24,6 +24,7 @@ int main(int Count, char** Words)
     if (Why) return std::fprintf(stderr, "%s\n", Why), 1;
     std::FILE *Poses = std::fopen(Words[2], "wb"), *InUnreal = std::fopen(Words[3], "wb");
     if (!Poses || !InUnreal || Crowd.SetFact(0, "no such", 1.0) || !Crowd.SetFact(0, "style", "normal")) return 3;
+    if (Crowd.Expect(0, "no such", 1.0) || !Crowd.Expect(0, "Contact.Left", 1.0) || !Crowd.Expect(0, nullptr, 0.0)) return 4;
     const std::size_t NumJoints = Crowd.Num(CDBM_N_JOINTS);
     for (int Tick = 0; Tick < 5 * 90; Tick++)
     {

@@ -179,6 +179,15 @@ def test_what_an_event_leaves_out_is_recorded_and_read_and_the_session_runs_agai
     assert [(each.playing, each.play_rate) for each in run_again(reasked)] == [(each.playing, each.play_rate) for each in trace]
 
 
+def test_what_plays_and_does_not_lead_to_an_event_is_left_and_says_so():
+    database = made({"p": [3.0] * 8, "q": [3.5] * 8}, {"p": set(), "q": {5}}, set(), dict.fromkeys("pq", ()))
+    one = Controller(Selector([Entry("a", database)]), FEW)
+    assert one.update(DT, [3.0]).playing.asset == "p"
+    decision = one.update(DT, [3.0], event=("Hit", 0.2))
+    assert decision.why == "p does not lead to Hit in 0.2 s: q at 0.20 s costs 0.25."
+    assert one.update(DT, [3.5], force=True, event=("Hit", 0.1)).why.startswith("A search was forced: ")
+
+
 def test_a_crowd_is_asked_for_events_as_its_characters_are():
     def characters(n):
         settings = ControllerSettings(search_every_s=0.1)

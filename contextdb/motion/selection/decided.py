@@ -111,10 +111,13 @@ def _rest(updates: Updates, i: int, row: list[float], before: Playing | None, qu
         filters = tuple((name, updates.filter_of(i, d)) for d, (name, own, is_in) in enumerate(each) if own is not None and is_in)
         if filters:
             candidates = WorkedOut(chooser.selector.databases, query, filters, choice, by.n_candidates)
+    why, event = _why(updates, i, numbers, cause, before, choice), question.event[by.number]
+    if event is not None and cause is Trigger.FORCED and before is not None and not question.force[by.number]:
+        why = trigger.astray(why, before, event)
     return {
         "tick": int(numbers.tick),
         "time_s": numbers.time_s,
-        "why": _why(updates, i, numbers, cause, before, choice),
+        "why": why,
         "searched": cause is not None,
         "cost": numbers.cost,
         "choice": choice,

@@ -39,6 +39,11 @@ def checked(event: object) -> Event:
     return name, number
 
 
+def not_led_to(event: Event) -> str:
+    """That something does not lead to an event in time, behind its name."""
+    return f"does not lead to {event[0]} in {event[1]:.3g} s"
+
+
 def seconds_to(database: MotionDatabase, name: str, rate: float) -> Floats:
     """How far it is from each frame to the next event of a name, in seconds of its clip: float64 [N], NaN where playing on does not
     come there. Raises QueryError for a tag that the markup does not have, with the nearest."""

@@ -6,6 +6,7 @@ from enum import StrEnum
 
 from contextdb.motion.selection.choice import Choice, Reason
 from contextdb.motion.selection.decision import Playing
+from contextdb.motion.selection.events import Event, not_led_to
 
 
 class Trigger(StrEnum):
@@ -56,6 +57,11 @@ def held(before: Playing, reason: str) -> str:
 def by_hysteresis(why: str, before: Playing) -> str:
     """The same of an asset that hysteresis alone keeps valid."""
     return f"{why.removesuffix('.')}; {before.asset} is valid by hysteresis alone."
+
+
+def astray(why: str, before: Playing, event: Event) -> str:
+    """The same where what plays does not lead to an event in time."""
+    return why.replace(Trigger.FORCED, f"{before.asset} {not_led_to(event)}", 1)
 
 
 def waiting(before: Playing, playing: Playing, cost: float, bar: float, left_s: float) -> str:

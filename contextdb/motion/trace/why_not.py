@@ -15,6 +15,7 @@ from contextdb.cells.arguments import require_text
 from contextdb.errors import Fault, MotionError, row_name
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.selection.choice import Choice, Reason
+from contextdb.motion.selection.events import not_led_to
 from contextdb.motion.selection.inputs import Inputs
 from contextdb.motion.trace.cost_views import cost_text
 from contextdb.motion.trace.reasked_decision import ReaskedDecision
@@ -114,10 +115,7 @@ def _reasons(decision: ReaskedDecision, at: Place, choice: Choice) -> Iterator[s
 
 def _astray(inputs: Inputs | None) -> str:
     """That a frame does not lead to the event of the moment."""
-    if inputs is None or inputs.event is None:
-        return LeftOut.EVENT.text
-    name, in_s = inputs.event
-    return f"does not lead to {name} in {in_s:.3g} s"
+    return LeftOut.EVENT.text if inputs is None or inputs.event is None else not_led_to(inputs.event)
 
 
 def _invalid(decision: ReaskedDecision, at: Place) -> Iterator[str]:

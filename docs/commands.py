@@ -40,6 +40,8 @@ Some accept these, as the last line of their section says:
 OPTION = re.compile(r"\[-[^]|]*\] ?")
 """An optional argument of the usage that excludes no other one."""
 NAME = re.compile(r"--[\w-]+")
+WIDTH = 90
+"""What the site shows of a line without cutting it."""
 MANY = 5
 """Options that as many commands have alike are at the top."""
 COMMON = ("limits", "project")
@@ -48,7 +50,7 @@ COMMON = ("limits", "project")
 
 def page() -> str:
     """The page as it should be now."""
-    with mock.patch.dict(os.environ, {"COLUMNS": "100", "NO_COLOR": "1"}):
+    with mock.patch.dict(os.environ, {"COLUMNS": str(WIDTH), "NO_COLOR": "1"}):
         helps = list(_helps(Group((), COMMANDS)))
     owners: dict[str, list[str]] = {}
     for name, _, lines, _ in helps:
@@ -100,7 +102,7 @@ def _line(parser: argparse.ArgumentParser, action: argparse.Action) -> str:
     """An argument or an option with its help."""
     form = parser._get_formatter()
     line = f"{form._format_action_invocation(action):20}  {' '.join(form._expand_help(action).split())}"
-    return textwrap.fill(line, 118, subsequent_indent=22 * " ", break_on_hyphens=False)
+    return textwrap.fill(line, WIDTH, subsequent_indent=22 * " ", break_on_hyphens=False)
 
 
 def _without_usage(text: str) -> str:

@@ -1,11 +1,14 @@
 """Wrong arguments: no public call ends in an error that does not say what was wrong."""
 
 import contextlib
+import inspect
 import operator
 import random
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -72,37 +75,17 @@ FUNCTIONS = ("prefer)", "on_change)", "on_error)", "progress)", "should_stop)")
 """Arguments that are functions: what goes wrong in one that the caller gave is not ours to tell."""
 Call = Callable[[object], object]
 CALLS: dict[str, Call] = {
-    "load(path)": cdb.load,
-    "Project.load(path)": cdb.Project.load,
-    "watch(path)": lambda x: cdb.watch(x, poll_s=None),  # type: ignore[arg-type]
-    "link(name)": lambda x: cdb.link(x).close(),
     "link(record)": lambda x: cdb.link("arguments", record=[x]).close(),  # type: ignore[arg-type]
-    "link(per_second)": lambda x: cdb.link("arguments", per_second=x).close(),
     "link.watch(what)": lambda x: linked(lambda link: link.watch(x)),
     "link.watch(who)": lambda x: linked(lambda link: link.watch(COMPILED, x)),
-    "live_many(facts)": lambda x: COMPILED.live_many(x),  # type: ignore[arg-type]
-    "live_many(unknown)": lambda x: COMPILED.live_many(MANY, unknown=x),  # type: ignore[arg-type]
-    "crowd.set(name)": lambda x: COMPILED.live_many(MANY).set(x, 0, 1.0),  # type: ignore[arg-type]
-    "crowd.set(who)": lambda x: COMPILED.live_many(MANY).set("speed", x, 1.0),  # type: ignore[arg-type]
-    "crowd.set(values)": lambda x: COMPILED.live_many(MANY).set("speed", [0], x),
-    "crowd.update(facts)": lambda x: COMPILED.live_many(MANY).update(x),  # type: ignore[arg-type]
     "link.picked(table)": lambda x: linked(lambda link: link.picked(x, "a", 0)),
     "link.picked(who)": lambda x: linked(lambda link: link.picked(COMPILED, x, 0)),
     "link.picked(row)": lambda x: linked(lambda link: link.picked(COMPILED, "a", x)),
+    "link.pose(pose)": lambda x: linked(lambda link: link.pose("a", x, None)),
     "link.tell(decision)": lambda x: linked(lambda link: link.tell("a", x)),
-    "watch(poll_s)": lambda x: cdb.watch(SAMPLES, poll_s=x).close(),  # type: ignore[arg-type]
-    "watch(settle_s)": lambda x: cdb.watch(SAMPLES, poll_s=None, settle_s=x).close(),  # type: ignore[arg-type]
-    "watch(on_change)": lambda x: cdb.watch(SAMPLES, on_change=x, poll_s=None).close(),  # type: ignore[arg-type]
-    "watch(on_error)": lambda x: cdb.watch(SAMPLES, on_error=x, poll_s=None).close(),  # type: ignore[arg-type]
     "project[name]": lambda x: PROJECT[x],  # type: ignore[index]
     "watch[name]": lambda x: WATCH[x],  # type: ignore[index]
     "snapshot[name]": lambda x: WATCH.snapshot()[x],  # type: ignore[index]
-    "schema.settings_for(file)": lambda x: PROJECT.schema.settings_for(x),  # type: ignore[arg-type]
-    "settings.output(name)": lambda x: TABLE.settings.output(x),  # type: ignore[arg-type]
-    "table.text_column(name)": lambda x: TABLE.text_column(x),  # type: ignore[arg-type]
-    "table.condition(name)": lambda x: TABLE.condition(x),  # type: ignore[arg-type]
-    "table.place(row)": lambda x: TABLE.place(x),  # type: ignore[arg-type]
-    "project.with_table(table)": lambda x: PROJECT.with_table(x),  # type: ignore[arg-type]
     "from_columns(columns)": lambda x: Table.from_columns(x),  # type: ignore[arg-type]
     "from_columns(schema)": lambda x: Table.from_columns({"A": ["a"], "speed": ["1"]}, x),  # type: ignore[arg-type]
     "from_columns(settings)": lambda x: Table.from_columns({"A": ["a"]}, {}, x),  # type: ignore[arg-type]
@@ -120,67 +103,22 @@ CALLS: dict[str, Call] = {
     "from_columns(settings), outputs of the fallback": lambda x: fallback_with(x),
     "from_columns(settings), an output of the fallback": lambda x: fallback_with({"n": x}),
     "from_columns(name)": lambda x: Table.from_columns({"A": ["a"]}, name=x),  # type: ignore[arg-type]
-    "text(row)": lambda x: TABLE.text(x, "speed"),  # type: ignore[arg-type]
-    "text(column)": lambda x: TABLE.text(0, x),  # type: ignore[arg-type]
-    "condition(name)": lambda x: TABLE.condition(x),  # type: ignore[arg-type]
-    "place(row)": lambda x: TABLE.place(x),  # type: ignore[arg-type]
-    "with_cell(row)": lambda x: TABLE.with_cell(x, "speed", "1"),  # type: ignore[arg-type]
-    "with_cell(column)": lambda x: TABLE.with_cell(0, x, "1"),  # type: ignore[arg-type]
-    "with_cell(text)": lambda x: TABLE.with_cell(0, "speed", x),  # type: ignore[arg-type]
-    "with_cells(edits)": lambda x: TABLE.with_cells(x),  # type: ignore[arg-type]
     "with_cells(edits), one": lambda x: TABLE.with_cells([x]),  # type: ignore[list-item]
-    "with_rows(at)": lambda x: TABLE.with_rows(x, [{"Asset": "new"}]),  # type: ignore[arg-type]
-    "with_rows(rows)": lambda x: TABLE.with_rows(0, x),  # type: ignore[arg-type]
     "with_rows(rows), one": lambda x: TABLE.with_rows(0, [x]),  # type: ignore[list-item]
     "with_rows(rows), a cell": lambda x: TABLE.with_rows(0, [{"Asset": x}]),  # type: ignore[dict-item]
-    "with_rows_taken(rows)": lambda x: TABLE.with_rows_taken(x),  # type: ignore[arg-type]
     "with_rows_taken(rows), one": lambda x: TABLE.with_rows_taken([x]),  # type: ignore[list-item]
     "compile(tables)": lambda x: Table.from_columns({"A": ["@inner"]}).compile(x),  # type: ignore[arg-type]
     "compile(tables), one": lambda x: Table.from_columns({"A": ["@inner"]}).compile({"inner": x}),  # type: ignore[dict-item]
     "flat(tables)": lambda x: Table.from_columns({"A": ["@inner"]}).flat(x),  # type: ignore[arg-type]
     "flat(tables), one": lambda x: Table.from_columns({"A": ["@inner"]}).flat({"inner": x}),  # type: ignore[dict-item]
-    "open(path)": lambda x: cdb.CompiledTable.open(x),  # type: ignore[arg-type]
     "save(path)": lambda x: isinstance(x, (str, Path)) or TABLE.save(x),  # type: ignore[arg-type]
     "save(path), compiled": lambda x: isinstance(x, (str, Path)) or COMPILED.save(x),  # type: ignore[arg-type]
-    "way(row)": lambda x: COMPILED.way(x),  # type: ignore[arg-type]
-    "query(context)": lambda x: COMPILED.query(x),  # type: ignore[arg-type]
-    "query(unknown)": lambda x: COMPILED.query({}, unknown=x),  # type: ignore[arg-type]
-    "query(actors)": lambda x: COMPILED.query(PLAIN, actors=x),  # type: ignore[arg-type]
-    "query(prefer)": lambda x: COMPILED.query(PLAIN, actors=ACTORS, prefer=x),  # type: ignore[arg-type]
-    "query_many(contexts)": lambda x: list(COMPILED.query_many(x)),  # type: ignore[arg-type]
-    "query_many(unknown)": lambda x: COMPILED.query_many(MANY, unknown=x),  # type: ignore[arg-type]
-    "query_many(actors)": lambda x: COMPILED.query_many({n: [f] for n, f in PLAIN.items()}, actors=x),  # type: ignore[arg-type]
     "query_many(actors), one": lambda x: COMPILED.query_many({n: [f] for n, f in PLAIN.items()}, actors=[x]),  # type: ignore[list-item]
-    "live(facts)": lambda x: COMPILED.live(x).matches(),  # type: ignore[arg-type]
-    "live(unknown)": lambda x: COMPILED.live({}, unknown=x),  # type: ignore[arg-type]
     "live[name]": lambda x: COMPILED.live(FACTS)[x],  # type: ignore[index]
     "live[name] =": lambda x: COMPILED.live(FACTS).__setitem__(x, 1.0),  # type: ignore[arg-type]
-    "live.update(facts)": lambda x: COMPILED.live(FACTS).update(x),  # type: ignore[arg-type]
     "live.actors(actors)": lambda x: live_with(x).matches(),
     "live.actors(prefer)": lambda x: live_with(ACTORS, x).matches(),
-    "explain(context)": lambda x: COMPILED.explain(x),  # type: ignore[arg-type]
-    "explain(actors)": lambda x: COMPILED.explain(PLAIN, actors=x),  # type: ignore[arg-type]
-    "explain(unknown)": lambda x: COMPILED.explain({}, unknown=x),  # type: ignore[arg-type]
-    "pick(context)": lambda x: COMPILED.pick(x),  # type: ignore[arg-type]
-    "pick(rng)": lambda x: COMPILED.pick(FACTS, x),  # type: ignore[arg-type]
-    "pick(last)": lambda x: COMPILED.pick(FACTS, last=x),  # type: ignore[arg-type]
-    "pick(unknown)": lambda x: COMPILED.pick({}, unknown=x),  # type: ignore[arg-type]
-    "pick(actors)": lambda x: COMPILED.pick(PLAIN, actors=x),  # type: ignore[arg-type]
-    "pick(prefer)": lambda x: COMPILED.pick(PLAIN, actors={}, prefer=x),  # type: ignore[arg-type]
-    "picker(seed)": lambda x: COMPILED.picker(x),  # type: ignore[arg-type]
-    "picker(memory)": lambda x: COMPILED.picker(memory=x),  # type: ignore[arg-type]
-    "picker.pick(matches)": lambda x: COMPILED.picker().pick(x),  # type: ignore[arg-type]
-    "picker.pick(time_s)": lambda x: COMPILED.picker().pick(COMPILED.query(FACTS), time_s=x),  # type: ignore[arg-type]
-    "picker.pick(who)": lambda x: COMPILED.picker().pick(COMPILED.query(FACTS), who=x),  # type: ignore[arg-type]
-    "picker.pick_many(many)": lambda x: COMPILED.picker().pick_many(x),  # type: ignore[arg-type]
-    "picker.pick_many(time_s)": lambda x: COMPILED.picker().pick_many(ANSWERS, time_s=x),  # type: ignore[arg-type]
-    "picker.pick_many(who)": lambda x: COMPILED.picker().pick_many(ANSWERS, who=x),  # type: ignore[arg-type]
-    "picker.forget(who)": lambda x: COMPILED.picker().forget(x),  # type: ignore[arg-type]
-    "penalties(context)": lambda x: COMPILED.penalties(x),  # type: ignore[arg-type]
-    "penalties(unknown)": lambda x: COMPILED.penalties({}, unknown=x),  # type: ignore[arg-type]
     "cell(text)": lambda x: COMPILED.query({**FACTS, "speed": cdb.cell(x)}),  # type: ignore[arg-type]
-    "matches.casting(row)": lambda x: CAST.casting(x),  # type: ignore[arg-type]
-    "matches.castings(row)": lambda x: CAST.castings(x),  # type: ignore[arg-type]
     "matches.casting(row) without actors": lambda x: COMPILED.query(FACTS).casting(x),  # type: ignore[arg-type]
     "matches[place]": lambda x: CAST[x],  # type: ignore[call-overload]
     **{
@@ -188,40 +126,13 @@ CALLS: dict[str, Call] = {
         for kind, one in {"matches": CAST, "many": ANSWERS, "many with actors": CAST_ANSWERS}.items()
         for sign, join in {"&": operator.and_, "|": operator.or_, "-": operator.sub, "^": operator.xor}.items()
     },
-    "matches.only(rows)": lambda x: CAST.only(x),  # type: ignore[arg-type]
-    "many.only(rows)": lambda x: ANSWERS.only(x),  # type: ignore[arg-type]
-    "live.pick(rng)": lambda x: COMPILED.live(FACTS).pick(x),  # type: ignore[arg-type]
-    "live.pick(last)": lambda x: COMPILED.live(FACTS).pick(last=x),  # type: ignore[arg-type]
-    "matches.outputs(name)": lambda x: GIVING.query({}).outputs(x),  # type: ignore[arg-type]
-    "outputs.column(name)": lambda x: GIVING.outputs.column(x),  # type: ignore[arg-type]
-    "outputs.of(rows)": lambda x: GIVING.outputs.of(x, "n"),  # type: ignore[arg-type]
-    "outputs.of(name)": lambda x: GIVING.outputs.of([0], x),  # type: ignore[arg-type]
-    "outputs.of_row(row)": lambda x: GIVING.outputs.of_row(x),  # type: ignore[arg-type]
     "in matches(row)": lambda x: x in CAST,
     "many[context]": lambda x: ANSWERS[x],  # type: ignore[call-overload]
     "many[context] with actors": lambda x: CAST_ANSWERS[x],  # type: ignore[call-overload]
     "explanation[place]": lambda x: EXPLAINED[x],  # type: ignore[index]
-    "explanation.row(row)": lambda x: EXPLAINED.row(x),  # type: ignore[arg-type]
     "explanation.row(row) with actors": lambda x: EXPLAINED_CAST.row(x),  # type: ignore[arg-type]
     "explanation.roles(row) with actors": lambda x: EXPLAINED_CAST.roles(x),  # type: ignore[arg-type]
-    "explanation.asset(asset)": lambda x: EXPLAINED.asset(x),  # type: ignore[arg-type]
-    "explanation.nearest(most)": lambda x: EXPLAINED.nearest(x),  # type: ignore[arg-type]
-    "coverage(table)": lambda x: cdb.coverage(x),  # type: ignore[arg-type]
-    "coverage(seed)": lambda x: cdb.coverage(TABLE, seed=x, work=9, samples=9),  # type: ignore[arg-type]
-    "coverage(work)": lambda x: cdb.coverage(TABLE, work=x, samples=9),  # type: ignore[arg-type]
-    "coverage(samples)": lambda x: cdb.coverage(TABLE, samples=x, work=9),  # type: ignore[arg-type]
-    "coverage(max_gaps)": lambda x: cdb.coverage(TABLE, max_gaps=x, work=9, samples=9),  # type: ignore[arg-type]
-    "coverage(progress)": lambda x: cdb.coverage(TABLE, progress=x, work=9, samples=9),  # type: ignore[arg-type]
-    "coverage(should_stop)": lambda x: cdb.coverage(TABLE, should_stop=x, work=9, samples=9),  # type: ignore[arg-type]
-    "coverage(weights)": lambda x: cdb.coverage(TABLE, weights=x, work=9, samples=9),  # type: ignore[arg-type]
-    "coverage(impossible)": lambda x: cdb.coverage(TABLE, impossible=x, work=9, samples=9),  # type: ignore[arg-type]
-    "observe(table)": lambda x: telemetry.observe(x, RECORDED),  # type: ignore[arg-type]
-    "observe(files)": lambda x: telemetry.observe(TABLE, x),  # type: ignore[arg-type]
     "observe(files), one": lambda x: telemetry.observe(TABLE, [x]),  # type: ignore[list-item]
-    "observe(count)": lambda x: telemetry.observe(TABLE, RECORDED, count=x),  # type: ignore[arg-type]
-    "observe(engine)": lambda x: telemetry.observe(TABLE, RECORDED, engine=x),  # type: ignore[arg-type]
-    "observe(max_gaps)": lambda x: telemetry.observe(TABLE, RECORDED, max_gaps=x),  # type: ignore[arg-type]
-    "observe(resume)": lambda x: telemetry.observe(TABLE, RECORDED, resume=x),  # type: ignore[arg-type]
     **{f"a fact of {name}": lambda x, name=name: COMPILED.query({**FACTS, name: x}) for name in FACTS},  # type: ignore[misc]
     **{f"a live fact of {name}": lambda x, name=name: COMPILED.live({**FACTS, name: x}).matches() for name in FACTS},  # type: ignore[misc]
     **{f"many facts of {name}": lambda x, name=name: list(COMPILED.query_many({**MANY, name: [x]})) for name in FACTS},  # type: ignore[misc]
@@ -242,6 +153,69 @@ def live_with(actors: object, prefer: object = None) -> cdb.LiveContext:
     live = COMPILED.live(PLAIN)
     live.actors(actors, prefer=prefer)  # type: ignore[arg-type]
     return live
+
+
+ALONE = [
+    cdb.load, cdb.Project.load, cdb.CompiledTable.open, PROJECT.with_table, PROJECT.schema.settings_for, TABLE.settings.output,
+    TABLE.text_column, TABLE.condition, TABLE.place, TABLE.with_cells, TABLE.with_rows_taken, COMPILED.way, COMPILED.picker,
+    COMPILED.picker().forget, COMPILED.live_many(MANY).update, COMPILED.live(FACTS).update, COMPILED.live(FACTS).pick,
+    CAST.casting, CAST.castings, CAST.only, ANSWERS.only, GIVING.query({}).outputs, GIVING.outputs.column,
+    GIVING.outputs.of_row, EXPLAINED.row, EXPLAINED.asset, EXPLAINED.nearest,
+    COMPILED.query, COMPILED.query_many, COMPILED.live, COMPILED.explain, COMPILED.pick,
+]  # fmt: skip
+VALID = [
+    *map(partial, ALONE),
+    partial(cdb.watch, SAMPLES, poll_s=None),
+    partial(cdb.link, "arguments"),
+    partial(Table.from_columns, {"A": ["a"], "speed": ["1"]}),
+    partial(TABLE.text, 0, "speed"),
+    partial(TABLE.with_cell, 0, "speed", "1"),
+    partial(TABLE.with_rows, 0, [{"Asset": "new"}]),
+    partial(COMPILED.query, PLAIN, actors=ACTORS),
+    partial(COMPILED.query_many, {n: [f] for n, f in PLAIN.items()}, actors=ACTORS),
+    partial(COMPILED.live, FACTS),
+    partial(COMPILED.live_many, MANY),
+    partial(COMPILED.explain, PLAIN, actors=ACTORS),
+    partial(COMPILED.pick, PLAIN, actors=ACTORS),
+    partial(COMPILED.picker().pick, COMPILED.query(FACTS)),
+    partial(COMPILED.picker().pick_many, ANSWERS),
+    partial(COMPILED.penalties, {}),
+    partial(COMPILED.live_many(MANY).set, "speed", [0], 1.0),
+    partial(GIVING.outputs.of, [0], "n"),
+    partial(cdb.coverage, TABLE, work=9, samples=9),
+    partial(telemetry.observe, TABLE, RECORDED),
+]
+"""Calls of which each argument is asked for with what is wrong."""
+
+
+def replaced(valid: partial[Any], name: str, value: object) -> None:
+    bound = inspect.signature(valid.func).bind_partial(*valid.args, **valid.keywords)
+    bound.arguments[name] = value
+    given = valid.func(*bound.args, **bound.kwargs)
+    if isinstance(given, cdb.LiveContext):
+        given.matches()
+    elif hasattr(given, "close"):
+        given.close()
+    elif isinstance(given, Sequence):
+        list(given)
+
+
+def asked(valid: partial[Any]) -> list[str]:
+    """The arguments of a call whose others are given."""
+    signature = inspect.signature(valid.func)
+    plain = [each for each in signature.parameters.values() if each.kind is not each.VAR_KEYWORD]
+    given = signature.bind_partial(*valid.args, **valid.keywords).arguments
+    missing = {each.name for each in plain if each.default is each.empty} - given.keys()
+    return [each.name for each in plain if missing <= {each.name}]
+
+
+CALLS |= {
+    f"{len(valid.args)}: {valid.func.__qualname__}({name})": partial(replaced, valid, name)
+    for valid in VALID
+    for name in asked(valid)
+    if name not in ("strict", "slips", "clock", "assume") and (name != "column" or valid.func != TABLE.place)
+}
+"""Without switches and what only our own modules give."""
 
 
 @pytest.mark.parametrize("name", CALLS)

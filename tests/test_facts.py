@@ -174,59 +174,6 @@ def test_a_text_with_signs_is_a_set_of_tag_sets():
 # ---- what is refused, and in which words
 
 
-@for_each(
-    [
-        ("True", BOOL, 'column "x": str "True" is not a fact of type bool. Accepted: True or False. Did you mean True?'),
-        ("off", BOOL, 'str "off" is not a fact of type bool. Accepted: True or False.'),
-        (2, BOOL, 'int "2" is not a fact of type bool. Accepted: True or False.'),
-        (0.5, BOOL, 'float "0.5" is not a fact of type bool. Accepted: True or False.'),
-        ([True], BOOL, "is not a fact of type bool. Accepted: True or False."),
-        (np.timedelta64(1, "D"), BOOL, 'timedelta64 "1 days" is not a fact of type bool. Accepted: True or False.'),
-        (4.6, INT, 'float "4.6" is not a fact of type int. Accepted: a whole number. Did you mean 5?'),
-        (np.float32(4.5), INT, "is not a fact of type int. Accepted: a whole number."),
-        ("many", INT, 'column "x": cannot read "many" as an int.'),
-        ("fast", NUMBER, 'column "x": cannot read "fast" as a number. Accepted: "20, 9.99" (centre, tolerance)'),
-        ("10-30", NUMBER, 'Did you mean "10..30"?'),
-        ([1.0], NUMBER, 'list "[1.0]" is not a fact of type number. Accepted: a number.'),
-        ({}, NUMBER, 'dict "{}" is not a fact of type number. Accepted: a number.'),
-        (1j, NUMBER, 'complex "1j" is not a fact of type number. Accepted: a number.'),
-        (np.complex64(1 + 2j), NUMBER, "is not a fact of type number. Accepted: a number."),
-        (np.array([1.0, 2.0]), NUMBER, "is not a fact of type number. Accepted: a number."),
-        (10**400, NUMBER, "is not a fact of type number. Accepted: a number that a double can hold."),
-        (object, NUMBER, "is not a fact of type number. Accepted: a number."),
-        (math.inf, ANGLE, 'float "inf" is not a fact of type angle. Accepted: a finite number of degrees.'),
-        ("-inf", ANGLE, "is too large for a number"),
-        ("CV", DEPTH, '"CV" is not a declared value. Accepted: "CB", "FS", "Half Back", "5".'),
-        ("cb", DEPTH, 'column "x": "cb" is not a declared value. Accepted: "CB", "FS", "Half Back", "5". Did you mean "CB"?'),
-        ("half back", DEPTH, 'Did you mean "Half Back"?'),
-        (5, DEPTH, 'int "5" is not a fact of type enum. Accepted: one of its declared values.'),
-        (True, DEPTH, 'bool "True" is not a fact of type enum.'),
-        ([], DEPTH, 'list "[]" is not a fact of type enum.'),
-        (["CB", "FX"], DEPTH, '"FX" is not a declared value.'),
-        (["CB", 5], DEPTH, 'int "5" is not a fact of type enum.'),
-        (5, TEXT, 'int "5" is not a fact of type text. Accepted: a text.'),
-        (b"left", TEXT, "is not a fact of type text. Accepted: a text."),
-        ("InAr", STATE, '"InAr" is not a declared value. Accepted: "InAir", "Stunned", "Move.Run". Did you mean "InAir"?'),
-        ({"Move.Walk"}, STATE, '"Move.Walk" is not a declared value.'),
-        (["InAir", 5], STATE, 'int "5" is not a fact of type tags. Accepted: a set of texts.'),
-        (5, STATE, 'int "5" is not a fact of type tags. Accepted: a set of tags.'),
-        ({"InAir": True}, STATE, "is not a fact of type tags. Accepted: a set of tags."),
-        ("InAir,Stunned", STATE, "has characters that need quotes"),
-        (cell("0..5 ~2"), NUMBER, 'Accepted: a set without a penalty ("~").'),
-        (cell("5..3"), NUMBER, "Accepted: a set that holds at least one value."),
-        (cell("not Any"), BOOL, "Accepted: a set that holds at least one value."),
-        (cell("2.5"), INT, "Accepted: a set that holds at least one value."),
-        (cell("+Move.Run -Move"), STATE, "Accepted: a set that holds at least one value."),
-        (cell("20; 5"), NUMBER, 'Did you mean "20, 5"?'),
-        (cell("CB FX"), DEPTH, '"FX" is not a declared value.'),
-    ]
-)
-def test_a_fact_that_cannot_be_taken_is_refused_by_name_with_what_is_accepted(value, domain, message):
-    said = refused(value, domain)
-    assert message in said
-    assert said.startswith('column "x": ')
-
-
 def taken(value: object, domain: Domain) -> bool:
     """Whether a value is taken, as one of the things that a fact can be, and not refused as a wrong fact."""
     try:
@@ -250,15 +197,6 @@ ANYTHING = (
 @given(strategies.domains(), ANYTHING)
 def test_any_value_whatsoever_is_taken_or_refused(domain, value):
     assert taken(value, domain) in (True, False)
-
-
-def test_a_cell_of_another_type_is_refused_as_a_fact():
-    assert "is not a fact of type number" in refused(parse_cell("CB", DEPTH), NUMBER)
-    assert "is not a fact of type enum" in refused(parse_cell("0..5", NUMBER), DEPTH)
-
-
-def test_a_long_fact_is_shown_short():
-    assert len(refused("x" * 100_000, DEPTH)) < 400
 
 
 # ---- facts as texts, from a command line or a file

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from running import run
-from strategies import examples, for_each
+from strategies import examples
 
 import contextdb as cdb
 from contextdb.commands.check_command import check_path
@@ -350,28 +350,6 @@ def test_all_wrong_cells_of_a_file_are_said_together(tmp_path: Path):
 # ---- what is asked wrongly
 
 
-def test_an_output_that_does_not_exist_is_said_with_the_nearest():
-    matches = table_of("damage", "3").compile().query({})
-    with pytest.raises(cdb.NoSuchOutput, match=r'there is no output "damge".*Did you mean "damage"'):
-        matches.outputs("damge")
-    with pytest.raises(KeyError):
-        Table.from_columns({"Asset": ["A"]}).compile().outputs.column("damage")
-
-
-@pytest.mark.parametrize("rows", [[-2], [1], [[0], [7]]])
-def test_a_row_that_does_not_exist_is_refused(rows: list):
-    outputs = table_of("damage", "3").compile().outputs
-    with pytest.raises(cdb.NoSuchPlace, match="there is no row"):
-        outputs.of(rows, "damage")
-    with pytest.raises(IndexError):
-        outputs.of_row(1)
-
-
-def test_rows_that_are_no_numbers_are_refused():
-    with pytest.raises(cdb.ContextError, match="rows are of type bool"):
-        table_of("damage", "3").compile().outputs.of([True], "damage")
-
-
 def test_outputs_are_shown_in_one_line():
     said = "<Outputs: damage (int), scale (number), loud (bool), element (enum), at (numbers)>"
     assert repr(table_of("damage", "3").compile().outputs) == said
@@ -476,49 +454,6 @@ def test_contextdb_toml_declares_outputs_in_both_forms():
 def test_settings_come_back_from_what_the_file_says_of_them(drawn):
     settings = drawn[0].settings
     assert settings_with(TableSettings("t"), settings_to_dict(settings)) == settings
-
-
-@for_each(
-    [
-        ('outputs = { a = { type = "itn" } }', 'output "a" type = "itn": there is no such type.*Did you mean type = "int"'),
-        ('outputs = { a = { type = "float" } }', 'Did you mean type = "number"'),
-        ('outputs = { a = { type = "int", mim = 1 } }', 'output "a" has no key "mim".*Did you mean "min"'),
-        ("outputs = { a = { default = 1 } }", 'output "a" has no type.*Did you mean type = "int"'),
-        ('outputs = { a = "int" }', 'a = "int": this is text, not a table.*Did you mean a = { type = "int" }'),
-        ('outputs = { a = { type = "enum" } }', 'is of type "enum" and has no values.*Accepted: values ='),
-        ('outputs = { a = { type = "numbers" } }', 'is of type "numbers" and has no size.*Accepted: size = 3'),
-        ('outputs = { a = { type = "bool", max = 1 } }', 'max = 1 has no place here: its type is "bool"'),
-        ('outputs = { a = { type = "int", min = 2, max = 1 } }', "min = 2 is above max = 1.*Did you mean min = 1 and max = 2"),
-        ('outputs = { a = { type = "number", min = inf } }', "min = inf leaves no number"),
-        ('outputs = { a = { type = "int", min = 0.5 } }', "an int has whole bounds.*Did you mean min = 1"),
-        ('outputs = { a = { type = "int", default = 1.5 } }', "default = 1.5: this is not a whole number"),
-        ('outputs = { a = { type = "int", default = true } }', "default = true: this is not a number"),
-        ('outputs = { a = { type = "int", max = 3, default = 4 } }', "default = 4: this is outside the declared bounds"),
-        ('outputs = { a = { type = "number", default = nan } }', "NaN is not a value"),
-        ('outputs = { a = { type = "numbers", size = 2, default = [1] } }', "this has 1 number, not 2"),
-        ('outputs = { a = { type = "enum", values = ["X"], default = "Y" } }', "this is not one of the values"),
-        ('outputs = { Mandatory_Slots = { type = "int" } }', "says which roles a row fills"),
-        ('fallback = { assets = "a" }', 'fallback has no key "assets".*Did you mean "asset"'),
-        ('fallback = { outputs = { a = 1 } }\noutputs = { a = { type = "int" } }', "fallback names no asset"),
-        ('fallback = { asset = "i", outputs = { b = 1 } }\noutputs = ["a"]', 'fallback gives "b", which is not an output'),
-        ('fallback = { asset = "i", outputs = { a = 1 } }\noutputs = ["a"]', "fallback a = 1: this is not a text"),
-        ('fallback = { asset = "i", outputs = 3 }', "fallback outputs = 3: this is a number, not a table"),
-        ("outputs = { ' a' = { type = 'int' } }", "a space is before or after it"),
-    ]
-)
-def test_a_wrong_declaration_is_said_with_its_line(said: str, message: str):
-    with pytest.raises(cdb.SchemaError, match=message) as error:
-        read_schema(f"[tables.t]\n{said}\n", "contextdb.toml")
-    assert all(fault.place.line in (2, 3) for fault in error.value.faults)
-
-
-def test_every_fault_of_the_outputs_is_said_at_once():
-    text = (
-        '[tables.t.outputs.a]\ntype = "x"\nmim = 3\n[tables.t.outputs.b]\ntype = "enum"\n[tables.t]\nfallback = { assets = "i" }\n'
-    )
-    with pytest.raises(cdb.SchemaError) as error:
-        read_schema(text, "contextdb.toml")
-    assert [fault.place.line for fault in error.value.faults] == [2, 3, 4, 7, 7]
 
 
 # ---- other faces

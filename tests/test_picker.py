@@ -369,26 +369,6 @@ def test_a_pick_in_a_table_inside_says_where_its_policy_chose():
 # ---- what is given
 
 
-def test_a_strange_table_is_refused_in_a_sentence():
-    picker, other = (
-        table_of(x=["Any"]).picker(),
-        oracle.Rows("other", "collect", (oracle.Row("a", dict.fromkeys(oracle.CELLS, "Any")),)),
-    )
-    compiled = other.table().compile()
-    facts = {"flag": True, "gait": "Walk", "speed": 1.0}
-    said = 'the answer is of the table "other", and this picker is of "t". Accepted: an answer of its table, in any version.'
-    for ask in (lambda: picker.pick(compiled.query(facts)), lambda: picker.pick_many(compiled.query_many(columns_of([facts])))):
-        with pytest.raises(ContextError) as caught:
-            ask()
-        assert str(caught.value) == said
-
-
-def test_an_answer_out_of_a_pickle_has_no_table_to_pick_by():
-    table = table_of(x=["Any"])
-    with pytest.raises(ContextError, match="the answer comes out of a pickle, without its table"):
-        table.picker().pick(pickle.loads(pickle.dumps(table.query({"x": True}))))
-
-
 def test_the_time_is_asked_for_where_rows_rest_for_seconds():
     table = table_of(x=["Any"], cooldown_s=["1"])
     picker = table.picker()
@@ -418,37 +398,6 @@ def test_a_time_that_goes_back_is_refused_where_rows_rest_for_seconds():
     assert then.pick(matches, time_s=12.0), "the copy from then goes on from then"
     picker.forget()
     assert picker.pick(matches, time_s=0.0)
-
-
-def test_a_character_that_is_named_twice_is_refused_in_many_picks():
-    table = table_of(x=["Any"])
-    with pytest.raises(ContextError, match=r"who names the character 7 more than once\. Accepted: whole numbers"):
-        table.picker().pick_many(table.query_many({"x": [True, True]}), who=[7, 7])
-
-
-@pytest.mark.parametrize(
-    ("ask", "said"),
-    [
-        (lambda t: t.picker("x"), "seed is str"),
-        (lambda t: t.picker(1.5), "seed is float"),
-        (lambda t: t.picker(memory=-1), "memory is -1"),
-        (lambda t: t.picker(memory=10**6), "a number of picks, from 0 to 1000"),
-        (lambda t: t.picker().pick({"x": True}), "matches is of type dict"),
-        (lambda t: t.picker().pick(t.query({"x": True}), who="me"), "who is str"),
-        (lambda t: t.picker().pick(t.query({"x": True}), who=2**70), "a whole number of 64 bits"),
-        (lambda t: t.picker().pick_many(t.query({"x": True})), "many is of type Matches"),
-        (lambda t: t.picker().pick_many(t.query_many({"x": [True] * 2}), who=[1]), "who names 1 character, for 2 contexts"),
-        (lambda t: t.picker().pick_many(t.query_many({"x": [True] * 2}), who=[5, 5]), "who names the character 5 more than once"),
-        (lambda t: t.picker().pick_many(t.query_many({"x": [True] * 2}), who=[0.5, 1]), "who has shape"),
-        (lambda t: t.picker().pick_many(t.query_many({"x": [True]}), who=["a"]), "who has shape"),
-        (lambda t: t.picker().pick_many(t.query_many({"x": [True]}), who=np.array([2**63], np.uint64)), "64 bits"),
-        (lambda t: t.picker().forget("all"), "who has shape"),
-        (lambda t: t.pick(t.query({"x": True}), actors={}), "actors are for a query"),
-    ],
-)
-def test_wrong_arguments_are_named(ask, said: str):
-    with pytest.raises(ContextError, match=said):
-        ask(table_of(x=["Any"]))
 
 
 def test_a_refused_pick_counts_for_nobody():

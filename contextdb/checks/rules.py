@@ -139,7 +139,7 @@ RULES: dict[str, Rule] = {
         "error",
         "An output has different types in a table and in a table inside it.",
         "Declare the output in the same way in both tables.",
-        ("tables.nesting.flat_texts",),
+        ("tables.nesting.expansion",),
     ),
     "too-many-rows": Rule(
         "error",

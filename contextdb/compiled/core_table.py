@@ -22,8 +22,8 @@ from contextdb.core import FLAT, SLOTS, VALUE, WIDE, Table
 from contextdb.errors import ContextError
 
 if TYPE_CHECKING:
-    from contextdb.compiled.programs import Programs
     from contextdb.expressions import Derivation
+    from contextdb.expressions.programs import Programs
     from contextdb.expressions.rules import WhenRules
 
 

@@ -30,7 +30,7 @@ class Table:
     those of an enum from 0, of declared tags from 1, behind ""; `numbers` is the number of each; `read` makes a plain fact of
     another one. A column is (kind, shift, arrays, texts, negated), its arrays (masks,), (bounds, masks) or (bounds, low, high,
     any_mask), as in `contextdb.compiled.classes`; `soft` is (column, penalties), with the rows of each depth one after the other.
-    Programs are (texts, facts, types, numbers, code, starts, derived, of_row), as in `contextdb.compiled.programs`. Raises
+    Programs are (texts, facts, types, numbers, code, starts, derived, of_row), as in `contextdb.expressions.programs`. Raises
     ValueError where parts do not go together, or a text cannot be one of C. Of a table with such texts `enabled` is None and
     `conditions` are names alone: the careful way then answers everything.
     """
@@ -211,6 +211,12 @@ class PoseFrames:
         /,
     ) -> None:
         """Write how much the joint that accelerates most does so in each frame of a range, over steps of some frames."""
+
+class Program:
+    """An expression as a program; see python_programs.h. Raises ValueError for one that C cannot compute."""
+
+    def __init__(self, code: NDArray[np.int32], numbers: NDArray[np.float64], texts: tuple[str, ...], types: str) -> None: ...
+    def run(self, values: tuple[object, ...]) -> float | bool | str | frozenset[str] | None: ...
 
 class Ways:
     """How far the paths of characters are looked at; see walk.h. Raises ValueError where a feature is not there."""

@@ -138,8 +138,7 @@ def grid_of(raw: bytes, name: str, options: ReadOptions) -> tuple[str, Sequence[
         return grid_of_workbook(raw, name, options.sheet)
     if kind not in ("csv", "tsv"):
         raise TableError(Fault(f"{FORMATS[kind].about} has no rows to choose from.", "a workbook or CSV", place=Place(name)))
-    from contextdb.exchange.delimited import records
-    from contextdb.exchange.encodings import decoded
+    from contextdb.exchange.delimited import decoded, records
 
     return "", records(decoded(raw, name, options.encoding)[0], name, options.delimiter or ("\t" if kind == "tsv" else None))
 
@@ -200,8 +199,7 @@ def _is_parted_otherwise(column: TextColumn) -> bool:
 
 def _read_text(kind: str, raw: bytes, name: str, options: ReadOptions, block: Block | None) -> Reading:
     from contextdb.exchange import unreal
-    from contextdb.exchange.delimited import read_delimited
-    from contextdb.exchange.encodings import decoded
+    from contextdb.exchange.delimited import decoded, read_delimited
     from contextdb.exchange.json_rows import read_json
 
     text, remarks = decoded(raw, name, options.encoding)

@@ -88,7 +88,7 @@ class Expression:
     @cached_property
     def run(self) -> Run:
         """Computes the value from facts in canonical form: NaN for a missing number, None for another missing fact."""
-        return runner(self.plan)
+        return runner(self.plan, self.conditions)
 
     def run_frame(self, columns: Mapping[str, Any], n_contexts: int) -> Column:
         """`evaluate_frame`, as a column that can be computed with."""

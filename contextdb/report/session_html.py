@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 
 from contextdb.console import __version__, printable
-from contextdb.report.html_parts import embedded, page
+from contextdb.report.document_html import embedded, page
 from contextdb.report.session_data import Detail, SessionView, document_of
 
 BYTES_A_MINUTE = 1_000_000

@@ -40,8 +40,7 @@ from contextdb.schema.settings import EMPTY, Schema, TableSettings, plain_names,
 from contextdb.schema.table_settings import PLAIN_JOBS, missing_job
 from contextdb.tables.condition_column import ConditionColumn
 from contextdb.tables.nesting.names import inner_name
-from contextdb.tables.output_columns import OutputColumn, output_columns, outputs_of
-from contextdb.tables.plain_columns import PlainColumns
+from contextdb.tables.plain_columns import OutputColumn, PlainColumns, output_columns, outputs_of
 
 if TYPE_CHECKING:
     from contextdb.expressions.rules import WhenColumn

@@ -34,12 +34,11 @@ from contextdb.disk.engines import ENGINES, Engine, with_dask
 from contextdb.errors import ContextDBError, ContextError, Fault, FileError, no_such
 from contextdb.tables.table import EitherTable
 from contextdb.telemetry.contexts import context_files
-from contextdb.telemetry.gap_list import box_of
 from contextdb.telemetry.keys import estimated
 from contextdb.telemetry.observe_file import observe_file
 from contextdb.telemetry.observed import BadFile, FactNote, Observed, SeenGap
 from contextdb.telemetry.parts import MOST_HASHES, MOST_OPEN, Part, Plan, added, nothing
-from contextdb.telemetry.seen_gaps import seen_gaps
+from contextdb.telemetry.seen_gaps import box_of, seen_gaps
 
 MOST_GAPS = 20
 MOST_THREADS = 4

@@ -323,7 +323,7 @@ class ImportDialog(PathDialog[Import]):
             rows = self._value("rows")
             self._offer_rows([rows] if rows else [])
         self._show_columns()
-        self._show_keys("F6 import · Enter change a column · F4 choose rows · F2 another file · Esc cancel")
+        self._show_keys("F6 import · Enter a column · F4 rows · F2 another file · Esc cancel")
         self.set_focus(self.query_one("#import-columns", LineList))  # before it is painted: a key then goes there
         if result.comma_doubts and not self._asked_commas:
             self._asked_commas = True

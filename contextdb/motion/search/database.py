@@ -54,9 +54,8 @@ from contextdb.motion.search.cost import weights_of_features
 from contextdb.motion.search.filtering import FilterMaker, Penalties, SearchOptions, Tags
 from contextdb.motion.search.filters import NO_BIAS, Biases, Filter, ManyFilters, together
 from contextdb.motion.search.hit import NOTHING, Hit
-from contextdb.motion.search.inputs import as_features, check_finite, check_permutations, parts_of
 from contextdb.motion.search.layout import Layout
-from contextdb.motion.search.searcher import Searcher
+from contextdb.motion.search.searcher import Searcher, as_features, check_finite, check_permutations, parts_of
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -15,9 +15,6 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    import polars as pl
-
 Codes = NDArray[np.int32]
 Made = TypeVar("Made")
 
@@ -29,7 +26,10 @@ class _Late(ModuleType):
         return getattr(import_module(self.__name__), name)
 
 
-polars = _Late("polars")
+if TYPE_CHECKING:
+    import polars as polars
+else:
+    polars = _Late("polars")
 """A quarter of a second of CPU, which those who ask one question of a small CSV table need not pay."""
 
 
@@ -38,7 +38,7 @@ class Framed:
 
     __slots__ = ()
 
-    def to_polars(self) -> pl.DataFrame:
+    def to_polars(self) -> polars.DataFrame:
         """The same as a DataFrame of polars."""
         raise NotImplementedError
 
@@ -46,9 +46,9 @@ class Framed:
         return self.to_polars().__arrow_c_stream__(requested_schema)
 
 
-def frame_of(columns: Mapping[str, object], texts: Iterable[str]) -> pl.DataFrame:
+def frame_of(columns: Mapping[str, object], texts: Iterable[str]) -> polars.DataFrame:
     """A DataFrame of columns; those named in `texts` are texts also where they are empty."""
-    frame: pl.DataFrame = polars.DataFrame(columns, schema_overrides=dict.fromkeys(texts, polars.String))
+    frame: polars.DataFrame = polars.DataFrame(columns, schema_overrides=dict.fromkeys(texts, polars.String))
     return frame
 
 

@@ -5,10 +5,11 @@ python docs/commands.py
 
 from __future__ import annotations
 
+import argparse
 import os
 import re
 import sys
-from collections import Counter
+import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 from unittest import mock
@@ -20,91 +21,94 @@ from contextdb.cli import COMMANDS, Group
 PAGE = Path(__file__).parent / "commands.md"
 HEAD = """# Commands
 
-Every command with its arguments and options, as `contextdb COMMAND --help` prints them; options that several commands have
-alike are written once. [Recipes](recipes.md) show the commands at work, [messages](messages.md) explain what they report, and
-[ci](ci.md#exit-codes) lists their exit codes. `make docs` writes this page. Each command also accepts:
+Every command, as `contextdb COMMAND --help` prints it, an option a line; what several commands have alike is written once.
+[Recipes](recipes.md) show the commands at work, [messages](messages.md) explain what they report, [ci](ci.md#exit-codes) lists
+exit codes. `make docs` writes this page.
+
+Every command accepts:
 
 ```text
 {common}
 ```
 
-Many commands have some of these, as the last line of their section says:
+Some accept these, as the last line of their section says:
 
 ```text
-options:
 {shared}
 ```
 """
-HELP = re.compile(r"^  -h, --help .*\n?", re.M)
-COMMON = re.compile(r"\n\n(limits:\n.*?\n\nproject:\n.*?)(?=\n\n|\Z)", re.S)
-USAGE = re.compile(r"\Ausage: .*?(?=\n\n)", re.S)
 OPTION = re.compile(r"\[-[^]|]*\] ?")
 """An optional argument of the usage that excludes no other one."""
-ENTRY = re.compile(r"^  (-\S.*(?:\n   .*)*)\n?", re.M)
-"""An option with its help."""
 NAME = re.compile(r"--[\w-]+")
-EMPTY = re.compile(r"\n\n[a-z ]+:\n?(?=\n\n|\Z)")
-"""The heading of options that are all written elsewhere."""
+WIDTH = 90
+"""What the site shows of a line without cutting it."""
 MANY = 5
-"""Options that as many commands have alike are at the top; where a command has as many of another one, they are only named."""
+"""Options that as many commands have alike are at the top."""
+COMMON = ("limits", "project")
+"""The groups of options that every command has."""
 
 
 def page() -> str:
     """The page as it should be now."""
-    with mock.patch.dict(os.environ, {"COLUMNS": "100", "NO_COLOR": "1"}):
+    with mock.patch.dict(os.environ, {"COLUMNS": str(WIDTH), "NO_COLOR": "1"}):
         helps = list(_helps(Group((), COMMANDS)))
-    common = next(part[1] for _, text in reversed(helps) if (part := COMMON.search(text)))
-    short = {name: _short(text) for name, text in helps}
     owners: dict[str, list[str]] = {}
-    for name, text in short.items():
-        for entry in ENTRY.findall(text):
-            owners.setdefault(_line(entry), []).append(name)
-    shared = [line for line, names in owners.items() if len(names) >= MANY]
-    head = HEAD.format(common=common, shared="\n".join(f"  {line}" for line in shared))
-    return "\n".join([head, *(_section(name, text, owners) for name, text in short.items())])
+    for name, _, lines, _ in helps:
+        for line in lines:
+            owners.setdefault(line, []).append(name)
+    shared = [line for line, names in owners.items() if line.startswith("-") and len(names) >= MANY]
+    common = next(lines for *_, lines in helps if lines)
+    head = HEAD.format(common="\n".join(common), shared="\n".join(shared))
+    return "\n".join([head, *(_section(name, text, lines, owners) for name, text, lines, _ in helps)])
 
 
-def _line(entry: str) -> str:
-    """An option with its help on one line: the same of every command, however wide its columns are."""
-    option, text = re.split(r"\n +|  +", entry.strip(), maxsplit=1)
-    return f"{option:30}  {' '.join(text.split())}"
-
-
-def _section(name: str, text: str, owners: dict[str, list[str]]) -> str:
+def _section(name: str, text: str, lines: list[str], owners: dict[str, list[str]]) -> str:
     """The section of a command, without the options that the top of the page or an earlier command has alike."""
-    firsts = Counter(owners[_line(entry)][0] for entry in ENTRY.findall(text))
     elsewhere: dict[str, list[str]] = {}
-
-    def written(match: re.Match[str]) -> str:
-        first, *others = owners[_line(match[1])]
-        if len(others) < MANY - 1 and (first == name or firsts[first] < MANY):
-            return match[0]
-        place = "above" if len(others) >= MANY - 1 else f"in [{first}](#contextdb-{first.replace(' ', '-')})"
-        elsewhere.setdefault(place, []).extend(f"`{option}`" for option in NAME.findall(match[1])[:1])
-        return ""
-
-    own = EMPTY.sub("", ENTRY.sub(written, text).strip())
+    own = []
+    for line in lines:
+        first, *others = owners[line]
+        if line.startswith("-") and (len(others) >= MANY - 1 or first != name):
+            place = "above" if len(others) >= MANY - 1 else f"in [{first}](#contextdb-{first.replace(' ', '-')})"
+            elsewhere.setdefault(place, []).extend(f"`{option}`" for option in NAME.findall(line)[:1])
+        else:
+            own.append(line)
+    body = "\n\n".join(part for part in (text, "\n".join(own)) if part)
     also = "; ".join(f"as {place} {', '.join(options)}" for place, options in sorted(elsewhere.items()))
-    return f"## contextdb {name}\n\n```text\n{own}\n```\n" + (f"\nAlso {also}.\n" if also else "")
+    return f"## contextdb {name}\n\n```text\n{body}\n```\n" + (f"\nAlso {also}.\n" if also else "")
 
 
-def _helps(group: Group) -> Iterator[tuple[str, str]]:
-    """The name of each command, and its help."""
+def _helps(group: Group) -> Iterator[tuple[str, str, list[str], list[str]]]:
+    """The name of each command; its usage, words and examples; its own arguments and options, and those of every command."""
     for name in group.commands:
         command = group.command(name)
         words = (*group.words, name)
         if hasattr(command, "COMMANDS"):
             inner = Group(words, command.COMMANDS, command.__doc__)
-            yield " ".join(words), inner.overview.partition("\ncommands:\n")[0].strip()
+            yield " ".join(words), _without_usage(inner.overview.partition("\ncommands:\n")[0].strip()), [], []
             yield from _helps(inner)
         else:
-            yield " ".join(words), group.parser(name, command).format_help().strip()
+            parser = group.parser(name, command)
+            lines: list[list[str]] = [[], []]
+            for part in parser._action_groups:
+                for action in part._group_actions:
+                    if action.dest != "help":
+                        lines[part.title in COMMON].append(_line(parser, action))
+            text = parser.format_help().partition("\n\npositional arguments:")[0].partition("\n\noptions:")[0]
+            yield " ".join(words), _without_usage(text.strip()), *lines
 
 
-def _short(text: str) -> str:
-    """A help without the options of every command, and with its own listed once."""
-    own = EMPTY.sub("", COMMON.sub("", HELP.sub("", text))).strip()
-    return USAGE.sub(lambda usage: " ".join(OPTION.sub("", f"{usage[0]} ").split()), own)
+def _line(parser: argparse.ArgumentParser, action: argparse.Action) -> str:
+    """An argument or an option with its help."""
+    form = parser._get_formatter()
+    line = f"{form._format_action_invocation(action):20}  {' '.join(form._expand_help(action).split())}"
+    return textwrap.fill(line, WIDTH, subsequent_indent=22 * " ", break_on_hyphens=False)
+
+
+def _without_usage(text: str) -> str:
+    """A help whose usage names only what must be given."""
+    usage, _, rest = text.partition("\n\n")
+    return f"{' '.join(OPTION.sub('', f'{usage} ').split()).removeprefix('usage: ')}\n\n{rest}"
 
 
 if __name__ == "__main__":

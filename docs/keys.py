@@ -86,6 +86,14 @@ arrows.
 SAME = {"Up", "Down", "Left", "Right", "Page up", "Page down", "First", "Last", "Cancel", "Close", "OK", "Choose"}
 """What keys do wherever they do anything: said once, with the keys of every list and dialog."""
 EVERYWHERE = ("Every list", "Every dialog")
+WAYS = {
+    "one cell": ("up", "down", "left", "right"),
+    "to the first or last cell of the row": ("home", "end"),
+    "to the first or last cell of all": ("first", "last"),
+    "a page": ("page-up", "page-down"),
+}
+"""The directions in which commands go and select: those of one kind stand on one line."""
+TABS = "## In tabs and dialogs\n\n| where | keys |\n| --- | --- |"
 
 
 def page() -> str:
@@ -93,7 +101,7 @@ def page() -> str:
     groups = dict.fromkeys(command.group for command in COMMANDS)
     named = [(title, names) for title, names in SECTIONS.items() if _is_listed(names)]
     others = [_of_widgets(title, [rows for name in names for rows in rows_of(name)]) for title, names in named]
-    return "\n".join([HEAD, *(_section(group) for group in groups), _debugger(), "## In tabs and dialogs\n", *others, _sent()])
+    return "\n".join([HEAD, *(_section(group) for group in groups), _debugger(), TABS, *filter(None, others), "", _sent()])
 
 
 def _is_listed(names: tuple[str, ...]) -> bool:
@@ -151,8 +159,21 @@ def _below(widget: type[DOMNode]) -> Iterator[type[DOMNode]]:
 
 
 def _section(group: str) -> str:
-    lines = [_line(command) for command in COMMANDS if command.group == group]
+    families: dict[str, list[Command]] = {}
+    for command in COMMANDS:
+        if command.group == group:
+            families.setdefault(_does(command), []).append(command)
+    lines = [_line(does, family) for does, family in families.items()]
     return "\n".join([f"## {group}", "", "| keys | name | does |", "| --- | --- | --- |", *lines, ""])
+
+
+def _does(command: Command) -> str:
+    """What a command does, the same for those that differ only in their direction."""
+    verb, _, rest = command.id.partition("-")
+    is_end = rest.endswith("-end")
+    where = next((where for where, names in WAYS.items() if rest.removesuffix("-end") in names), "")
+    where = "to the end of the filled cells" if is_end else where
+    return f"{verb.capitalize()} {where}." if where and verb in ("go", "select") else command.about
 
 
 def _debugger() -> str:
@@ -164,13 +185,14 @@ def _debugger() -> str:
 
 
 def _of_widgets(title: str, rows: list[tuple[str, str]]) -> str:
+    """The keys of some widgets on one line, without those that do what they do everywhere."""
     merged: dict[str, list[str]] = {}
     for keys, about in rows:
-        shown = ", ".join(dict.fromkeys(terminals.name(key) for key in keys.split(",")))
-        merged.setdefault(shown, []).append(about[:1].upper() + about[1:])
-    own = {keys: [about for about in abouts if title in EVERYWHERE or about not in SAME] for keys, abouts in merged.items()}
-    lines = [f"| {keys} | {'; '.join(dict.fromkeys(abouts))} |" for keys, abouts in own.items() if abouts]
-    return "\n".join([f"### {title}", "", "| keys | does |", "| --- | --- |", *lines, ""])
+        about = about[:1].upper() + about[1:]
+        if title in EVERYWHERE or about not in SAME:
+            merged.setdefault(about, []).extend(terminals.name(key) for key in keys.split(","))
+    parts = [f"**{', '.join(dict.fromkeys(names))}** {about}" for about, names in merged.items()]
+    return f"| {title} | {'; '.join(parts)} |" if parts else ""
 
 
 def _sent() -> str:
@@ -182,8 +204,9 @@ def _shown(keys: str) -> str:
     return ", ".join(f"`{name}`" for name in names_of(keys).split("  "))
 
 
-def _line(command: Command) -> str:
-    return f"| {', '.join(key_names(command.keys))} | `{command.id}` | {command.about} |"
+def _line(does: str, family: list[Command]) -> str:
+    keys = ", ".join(name for command in family for name in key_names(command.keys))
+    return f"| {keys} | {' '.join(f'`{command.id}`' for command in family)} | {does} |"
 
 
 if __name__ == "__main__":

@@ -12,8 +12,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
 from contextdb.files.settings import Setting, Settings, settings_of
-from contextdb.motion.features.channels import CHANNEL
-from contextdb.motion.features.permutations import PERMUTATIONS
+from contextdb.motion.features.channels import CHANNEL, PERMUTATIONS
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.output.settings import PoseSettings
 from contextdb.motion.selection.controller_settings import CONTROLLER

@@ -39,13 +39,12 @@ from hypothesis import strategies as st
 from nested_tables import Nest, nests
 from strategies import IS_FULL, contexts, examples, tables
 
-from contextdb.cells.angles import wrap_angle
 from contextdb.cells.conditions import Condition
+from contextdb.cells.intervals import wrap_angle
 from contextdb.cells.outputs import Output
 from contextdb.compiled.c_header import c_header_of
 from contextdb.compiled.c_header.face import reader_names
-from contextdb.compiled.c_header.naming import Names
-from contextdb.compiled.c_header.spelling import Wanted, distinct
+from contextdb.compiled.c_header.naming import Names, Wanted, distinct
 from contextdb.compiled.table import CompiledTable, data_of
 from contextdb.errors import ContextDBError
 from contextdb.schema.settings import TableSettings

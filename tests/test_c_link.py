@@ -195,3 +195,32 @@ def test_compile_writes_it_beside_the_header(tmp_path: Path):
     assert (alone.code, alone.err) == (2, "contextdb: --c-link goes with the header. Accepted: --c-header FILE with it.\n")
     wrong = run("compile", tables, "-o", tmp_path, "--c-header", tmp_path / "t.h", "--c-link", tmp_path / "x.txt")
     assert wrong.code == 2
+
+
+def test_a_game_in_c_publishes_poses_and_bones_to_each_who_comes(game: Path, meeting: Path, tmp_path: Path):
+    for name in ("tables.h", "cdb_link.h"):
+        (tmp_path / name).write_text((game.parent / name).read_text(encoding="ascii"), encoding="ascii")
+    program = built(PROGRAMS / "posing.c", tmp_path / "posing.exe", C, *sanitizers(compiler_for(C)))
+    with subprocess.Popen([str(program), "game", "100000"], stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert named(process) == "game"
+            path = meeting / "game.sock"
+            for _ in range(2):
+                with hear(path, Wanted(poses=True)) as hearing:
+                    lines = [line for batch, _ in zip(hearing.batches(), range(8), strict=False) for _, line in batch]
+                bones, pose = lines[:2]
+                assert {"t": 0} | bones == {
+                    "line": "bones", "t": bones["t"], "who": "player", "names": ["Hips", "Head"], "parents": [-1, 0],
+                    "moving": [0, 1], "offsets": [[0.0] * 3] * 2,
+                }  # fmt: skip
+                assert pose["root"][1:] == [1.5, -0.25]
+                assert pose["translations"] == [[0.0, 0.9, 0.0], [0.0, 0.7, 0.33333]]
+                assert {line["line"] for line in lines[1:]} == {"pose"}
+                assert all(line["asset"] in (None, "walk") for line in lines[1:])
+                assert {line["rotations"][1][0] for line in lines[1:]} <= {0.0, 0.5}
+            with hear(path, Wanted()) as silent, hear(path, Wanted(poses=True)) as hearing:
+                next(hearing.batches())
+                process.kill()
+                assert [line for batch in silent.batches() for _, line in batch] == []
+        finally:
+            process.kill()

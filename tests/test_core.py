@@ -68,7 +68,7 @@ for number in range(n_tables):
         if answer is not None and number < 9:
             assert answer == data_of(compiled).query_with_care(facts, unknown)
 import contextdb, made_boxes
-from contextdb.covering.questions import Questions
+from contextdb.covering.points import Questions
 report = contextdb.coverage(asking_c.random_table(rng, 90, list(asking_c.SCHEMA)[:6]), work=100_000, samples=2000, max_gaps=5)
 print(report.to_json(), report.hits, report.work)
 boxes, full, _ = made_boxes.made(150, 18, 0)

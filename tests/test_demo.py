@@ -7,8 +7,7 @@ import pytest
 from running import run
 
 from contextdb.commands.demo_command import sample_folder
-from contextdb.commands.demo_teams import CATCH, cast_lines, players
-from contextdb.commands.demo_world import DOWN_M, N_STEPS, RISE_M, SLOPE_M, STAIRS_M, ground
+from contextdb.commands.demo_world import CATCH, DOWN_M, N_STEPS, RISE_M, SLOPE_M, STAIRS_M, cast_lines, ground, players
 from contextdb.motion import Markup, load_bvh
 from contextdb.motion.made.recipes import RECIPES
 from contextdb.tables.project import Project

@@ -6,6 +6,7 @@
 import re
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,11 @@ from tui.app import EditorApp
 from tui.editor_settings import read_settings
 from tui.themes import LIGHT
 
+UNRUN = {
+    "programmers.md": "a program in C, which tests/test_c_header.py compiles and runs",
+    "live.md": "seconds of a running game; tests/test_live_command.py asks the sample table for what they say",
+}
+"""Pages with output under a block of the shell or of C, which no session of a page can run, and what holds it instead."""
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 
 
@@ -28,6 +34,18 @@ def test_a_document_shows_what_its_commands_print(document: Path):
     with session(IS_FULL, document.parent == TRANSCRIPTS) as now:
         for step in steps(lines):
             assert now.run(step) == shown(lines, step), f"{document.name}, line {step.first}: {step.source}"
+
+
+def test_output_stands_under_what_a_page_runs_or_another_test_holds_it():
+    unrun = set()
+    for page in DOCUMENTS:
+        lines = page.read_text(encoding="utf-8").splitlines()
+        found = list(blocks(lines))
+        for block, after in pairwise(found):
+            between = "".join(lines[block.stop + 1 : after.first - 1]).strip()
+            if block.language in ("sh", "c", "py") and after.language == "text" and not between:
+                unrun.add(page.name)
+    assert unrun == set(UNRUN)
 
 
 def test_an_update_writes_the_real_output_under_each_command():

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from strategies import examples, for_each, tables
 
-from contextdb.authoring.selectors import set_selector
+from contextdb.authoring.weights import set_selector
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
 from contextdb.edits import edits

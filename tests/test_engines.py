@@ -16,10 +16,10 @@ from c_compilers import CXX, C, built, compiler_for, ran, sanitizers
 import contextdb as cdb
 from contextdb import motion
 from contextdb.cli import main as run_contextdb
+from contextdb.commands.compile_command import c_motion_header
 from contextdb.compiled.c_header import c_header_of
 from contextdb.compiled.engine_facts import csharp_of, godot_of, unreal_of
 from contextdb.motion.made.body import made_skeleton
-from contextdb.motion.storage.c_header import c_motion_header
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 LIBRARY = ["-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off", "-O0"]

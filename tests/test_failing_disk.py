@@ -254,9 +254,9 @@ ALLOWED = {
     "contextdb/commands/limits.py": {"os.open", "open"},  # nowhere, and a second number of standard error
     "contextdb/telemetry/evaluate_file.py": {"write_parquet"},  # into the folder of what is not finished
     "contextdb/commands/evaluate_command.py": {"sink_csv", "sink_parquet"},  # into the same
-    "contextdb/edits/diffing/lines.py": {"TemporaryDirectory", "write_bytes"},  # into a temporary folder, for git to read
+    "contextdb/edits/diffing/markers.py": {"TemporaryDirectory", "write_bytes"},  # into a temporary folder, for git to read
     "contextdb/commands/ci_command.py": {"TemporaryDirectory"},  # into a temporary folder
-    "contextdb/commands/motion_bundle.py": {"TemporaryDirectory"},  # into a temporary folder
+    "contextdb/commands/motion_build_command.py": {"TemporaryDirectory"},  # into a temporary folder
     "contextdb/commands/demo_command.py": {"TemporaryDirectory", "shutil.copyfile"},  # into a folder that nobody has yet
     "contextdb/commands/play_command.py": {"shutil.copytree"},  # into a folder that nobody has yet
     "contextdb/motion/clips/parser_process.py": {"TemporaryDirectory"},  # what the child writes, away with it

@@ -1,5 +1,7 @@
 """Answers, tables and gaps as DataFrames."""
 
+from pathlib import Path
+
 import polars as pl
 
 import contextdb as cdb
@@ -52,3 +54,10 @@ def test_in_a_notebook_a_table_says_its_conditions_and_answers_their_assets():
     assert "<td>0</td><td>2</td><td>run, walk</td>" in many._repr_html_()
     assert "<p>and 10 more</p>" in many._repr_html_()
     assert "<td>speed</td><td>5.0</td>" in live._repr_html_()
+
+
+def test_in_a_notebook_an_explanation_marks_valid_rows_and_says_whole_reasons():
+    moves = cdb.load(Path(__file__).parent.parent / "tables" / "locomotion.csv").compile()
+    shown = moves.explain({"gait": "Walk", "speed": 1.3, "direction": 65.0, "style": "normal"})._repr_html_()
+    assert "<td>walk_turn_left_45</td><td>valid</td>" in shown
+    assert "characters)" not in shown

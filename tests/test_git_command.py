@@ -331,9 +331,7 @@ def driven(driver: str) -> None:
     if driver == "without contextdb":
         assert run("git", "install", "--command", "no-such-contextdb").code == 0
     if driver == "without git merge-file":
-        in_a_process_of_its_own(
-            "import contextdb.edits.diffing.lines as lines\nlines.subprocess.run = lambda *a, **b: (_ for _ in ()).throw(OSError())"
-        )
+        in_a_process_of_its_own("import subprocess\nsubprocess.run = lambda *a, **b: (_ for _ in ()).throw(OSError())")
 
 
 @pytest.mark.parametrize(("driver", "way", "is_ours"), some(CASES))

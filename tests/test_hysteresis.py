@@ -17,7 +17,7 @@ import contextdb as cdb
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import ANGLE, INT, NUMBER
 from contextdb.cells.facts import read_fact
-from contextdb.cells.hysteresis import widened_fact
+from contextdb.cells.mirroring import widened_fact
 from contextdb.errors import SchemaError
 from contextdb.schema.sections import condition_to_dict
 from contextdb.schema.settings import EMPTY, read_schema

@@ -14,7 +14,7 @@ HEAVY = {"numba", "textual", "tui", "rich", "scipy", "dask", "safetensors", "pyt
 IN_COMPILED = ("batch", "casting", "explain", "failing_rules", "live", "many", "picker", "programs", "stack")
 IN_CONTEXTDB = (
     "commands.diff_backtest",
-    "commands.diff_sessions",
+    "commands.diff_backtest",
     "expressions",
     "tables.merging",
     "report",

@@ -9,8 +9,20 @@ import strategies
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contextdb.cells.angles import wrap_angle
-from contextdb.cells.intervals import CIRCLE, EVERYTHING, Span, Spans, above, arc, below, complement, holds, union, whole
+from contextdb.cells.intervals import (
+    CIRCLE,
+    EVERYTHING,
+    Span,
+    Spans,
+    above,
+    arc,
+    below,
+    complement,
+    holds,
+    union,
+    whole,
+    wrap_angle,
+)
 
 EDGES = [-math.inf, -1.0, -5e-324, -0.0, 0.0, 5e-324, 0.1 + 0.2, 1.0, 5.0, 2.0**53, 1e308, math.inf]
 LINE = st.sampled_from(EDGES) | st.floats(-9.0, 9.0)

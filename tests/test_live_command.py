@@ -80,6 +80,17 @@ def test_a_line_says_who_asked_what_was_picked_and_which_facts_changed(meeting: 
     assert asked.json["count"] == int(first[3])
 
 
+def test_the_page_shows_lines_as_they_are_printed_with_what_the_sample_table_answers():
+    page = (ROOT / "docs" / "live.md").read_text(encoding="utf-8").replace("npc 7", "npc")
+    lines = [match for text in page.splitlines() if (match := LINE.fullmatch(text))]
+    assert len(lines) == 4
+    for line in lines:
+        if "gait=" in line[4]:
+            asked = run("query", LOCOMOTION, *shlex.split(line[4]), "--json").json
+            assert asked["count"] == int(line[3])
+            assert line[2] in [f"{row['asset']} (row {row['row'] + 1})" for row in asked["matches"]]
+
+
 def test_filters_by_character_and_table(meeting: Path):
     with game():
         done = run("live", "--who", "npc", "--table", "locomotion", "--most", "4")

@@ -14,7 +14,7 @@ from running import Result, run
 import contextdb as cdb
 from contextdb.files.reports import sealed, with_marks
 from contextdb.motion import write_bvh
-from contextdb.motion.made.joint import make_joint_clip
+from contextdb.motion.made.game import make_joint_clip
 from contextdb.motion.measuring.moves import MAPS
 from contextdb.report.render_json import as_json
 

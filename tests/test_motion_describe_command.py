@@ -13,7 +13,7 @@ from running import Result, run
 from strategies import some
 
 from contextdb.motion import write_bvh
-from contextdb.motion.made.joint import make_joint_clip
+from contextdb.motion.made.game import make_joint_clip
 
 NAMES = ("idle", "walk", "walk_turn_left_90", "walk_turn_right_90", "jog", "start_walk", "stop_walk")
 COLUMNS = ["Asset Name", "gait", "speed", "direction", "turn", "style", "duration_s", "start", "end"]

@@ -154,6 +154,22 @@ def test_a_session_without_bars_is_one_passed_case():
     assert (suites.get("tests"), suites.get("failures")) == ("2", "0")
 
 
+def test_a_report_opens_with_what_to_do_in_every_case(tmp_path: Path):
+    lines = {
+        "To do first: let a build hold what is reached: --max-skate ": ("poses.npz", "--project", "game"),
+        "Nothing to do: every measure is within its bar.": ("poses.npz", "--project", "game", "--max-skate", "99"),
+        "To do first: ": ("session.parquet", "--max-skate", "0.0001"),
+    }
+    for opening, arguments in lines.items():
+        code = int("0.0001" in arguments)
+        assert measured(*arguments, code=code).lines[1].startswith(opening)
+        assert session_of(*arguments, code=code)["to_do"].startswith(opening)
+        for form in ("markdown", "html"):
+            file = tmp_path / f"report.{form}"
+            measured(*arguments, "--format", form, "-o", str(file), code=code)
+            assert opening[:-1].strip() in file.read_text(encoding="utf-8").replace("&#x27;", "'")
+
+
 def test_the_same_session_is_no_worse_than_its_baseline():
     session = session_of("session.parquet", "--baseline", "before.json")
     assert session["bars"]

@@ -13,7 +13,7 @@ from test_outputs import declarations, default_of
 from contextdb.edits import edits
 from contextdb.edits.diffing.toml_merging import merge_toml
 from contextdb.errors import SchemaError
-from contextdb.files.toml_text import as_toml, dotted
+from contextdb.files.toml_shapes import as_toml, dotted
 from contextdb.schema.sections import settings_to_dict, settings_with
 from contextdb.schema.settings import TableSettings, read_schema
 from contextdb.tables.changes import Edit

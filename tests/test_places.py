@@ -112,6 +112,11 @@ def test_a_table_that_is_like_no_other_is_refused_without_a_guess(here: Path):
     )
 
 
+def test_a_sample_table_that_is_not_here_is_offered_where_no_checkout_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    assert refused("locomotion").endswith("Try to make the sample tables with contextdb demo --keep FOLDER.")
+
+
 def test_a_name_that_two_files_have_is_refused(here: Path):
     (here / "tables" / "walking.csv").write_text(CSV, encoding="utf-8")
     assert refused("walking", TableError) == (

@@ -208,6 +208,16 @@ def test_who_turns_back_plays_a_turn_about(game: Game, run: bool, clip: str):
     assert seen.count(clip) > 20
 
 
+def test_who_turns_and_stops_stands_with_the_hips_over_the_feet(game: Game):
+    push(game, 2.0, Stick(0.0, 1.0))
+    push(game, 0.4, Stick(math.sin(2.1), math.cos(2.1)))
+    push(game, 4.0, REST)
+    pose, names = game.player.moved.pose, list(game.player.stock.banks["moves"].skeleton.names)
+    left, right, hips = (pose.positions[names.index(name)][[0, 2]] for name in ("LeftFoot", "RightFoot", "Hips"))
+    assert math.dist(hips, (left + right) / 2.0) < 0.06
+    assert math.dist(left, right) < 0.35
+
+
 def test_who_runs_too_long_is_tired_and_plays_tired_clips(game: Game):
     put(game, -10.0, -15.0)
     game.player.stamina = 0.06
@@ -406,6 +416,41 @@ def test_the_picture_shows_the_player_and_what_is_said_without_a_screen(window: 
     assert abs(warm[:, 1].mean() - 320) < 120
     words = (picture[:120, :300].min(axis=2) > 200).mean()
     assert 0.002 < words < 0.3
+
+
+def test_few_pictures_a_second_do_not_make_the_play_slow(window: Any):
+    from panda3d.core import ClockObject
+
+    clock = ClockObject.getGlobalClock()
+    clock.setMode(ClockObject.M_non_real_time)
+    clock.setDt(0.2)
+    window.begin()
+    window.base.taskMgr.step()
+    before_s = window.game.time_s
+    for _ in range(5):
+        window.base.taskMgr.step()
+    assert window.game.time_s - before_s == pytest.approx(1.0)
+
+
+def test_where_the_pointer_comes_from_is_no_look(window: Any, monkeypatch: pytest.MonkeyPatch):
+    places, looks = iter([(900, 20), (330, 180)]), []
+
+    def pointer(_: int) -> SimpleNamespace:
+        x, y = next(places)
+        return SimpleNamespace(getX=lambda: x, getY=lambda: y)
+
+    front = SimpleNamespace(getForeground=lambda: True)
+    seen = SimpleNamespace(
+        getProperties=lambda: front, getPointer=pointer, getXSize=lambda: 640, getYSize=lambda: 360, movePointer=lambda *_: True
+    )
+    window.is_offscreen = False
+    monkeypatch.setattr(window.base, "win", seen)
+    monkeypatch.setattr(window.scene, "look", lambda *turn: looks.append(turn))
+    window._look(0.1)
+    assert not looks
+    window._look(0.1)
+    assert len(looks) == 1
+    monkeypatch.undo()
 
 
 def test_a_crowd_is_drawn_in_many_colours(tables: Path):

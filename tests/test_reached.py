@@ -12,11 +12,10 @@ from strategies import examples
 
 from contextdb.cells.domains import ANGLE, BOOL, DATE, INT, NUMBER, TAGS, TEXT, Domain
 from contextdb.cells.grammar import format_cell, parse_cell
-from contextdb.cells.mutated import mutated
 from contextdb.checks import case_contexts
 from contextdb.checks.cases import Case, check_cases, judge
-from contextdb.checks.reached import reached_by, with_names
-from contextdb.checks.slips import Slips
+from contextdb.checks.slips import Slips, mutated
+from contextdb.commands.cases_command import reached_by, with_names
 from contextdb.compiled.table import data_of
 from contextdb.tables.table import Table
 

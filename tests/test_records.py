@@ -81,22 +81,27 @@ def test_a_subclass_with_more_fields_is_made_too():
     assert type(Wider("a", 1)) is Wider
 
 
-def test_what_is_not_known_yet_is_worked_out_once_when_it_is_read():
+def test_what_is_not_known_yet_is_worked_out_once_when_it_is_read_and_what_may_wait_waits():
     n_asked = []
 
     def rest():
-        n_asked.append(1)
+        n_asked.append("rest")
         return {"start": 2, "share": 0.5}
 
-    late, whole = Late.begun(rest, name="a"), Late("a", 2, 0.5)
-    assert (late.name, n_asked) == ("a", [])
+    def first():
+        n_asked.append("first")
+        return {"name": "a", "_rest": rest}
+
+    late, whole = Late.begun(first), Late("a", 2, 0.5)
     assert not hasattr(late, "other")
-    assert (late.share, late.start, n_asked) == (0.5, 2, [1])
+    assert (late.name, n_asked) == ("a", ["first"])
+    assert (late.share, late.start, n_asked) == (0.5, 2, ["first", "rest"])
     with pytest.raises(FrozenInstanceError):
         late.start = 3
     for made in (copy.copy, replace, lambda one: pickle.loads(pickle.dumps(one)), lambda one: one):
-        assert made(Late.begun(rest, name="a")) == whole
-    assert (hash(Late.begun(rest, name="a")), repr(Late.begun(rest, name="a"))) == (hash(whole), repr(whole))
+        assert made(Late.begun(first)) == whole
+    assert (hash(Late.begun(first)), repr(Late.begun(first))) == (hash(whole), repr(whole))
+    assert Late.begun(first).share == 0.5
     assert not hasattr(whole, "other")
 
 

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from strategies import examples
 
-from contextdb.authoring.selectors import set_selector
+from contextdb.authoring.weights import set_selector
 from contextdb.edits import edits
 from contextdb.edits.schema_file import schema_change
 from contextdb.errors import FileError, SchemaError

@@ -11,10 +11,10 @@ from strategies import for_each
 from contextdb.errors import ContextDBError, SchemaError
 from contextdb.files.settings import Section, Setting, settings_of
 from contextdb.motion import Channel, ControllerSettings, FeatureSchema, PoseSettings, Variation
-from contextdb.motion.features.permutations import Permutations
+from contextdb.motion.features.channels import Permutations
 from contextdb.motion.storage.database_settings import DatabaseSettings
 from contextdb.motion.walking.walker import WalkSettings
-from contextdb.schema.parts import SECTIONS
+from contextdb.schema.contracts import SECTIONS
 from contextdb.schema.settings import read_schema
 from contextdb.schema.table_settings import TableSettings
 from docs.settings import DECLARED, PAGE, page

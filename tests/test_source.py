@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 
 from contextdb.errors import TableError
 from contextdb.files import csv_source
-from contextdb.files.csv_faults import MOST_CHARACTERS, MOST_FAULTS
-from contextdb.files.csv_source import Source, read_csv
+from contextdb.files.csv_source import MOST_CHARACTERS, MOST_FAULTS, Source, read_csv
 
 
 def as_python_reads(text: str) -> list[list[str]]:

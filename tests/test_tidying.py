@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from running import run
 from strategies import examples
 
-from contextdb.checks.tidying import tidied
-from contextdb.commands.tidy_command import n_cells
+from contextdb.commands.tidy_command import n_cells, tidied
 from contextdb.compiled.choosing import Choosing
 from contextdb.compiled.table import data_of
 from contextdb.tables.table import Table

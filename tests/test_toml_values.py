@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contextdb.files.toml_text import as_toml, dotted
-from contextdb.schema.toml_values import merged
+from contextdb.files.toml_shapes import as_toml, dotted
+from contextdb.schema.toml_edit import merged
 
 NAMES = st.sampled_from(["a", "b", "Defender.Tags", "", 'a "b"', "é", "x y"])
 PLAIN = st.one_of(

@@ -123,7 +123,7 @@ def test_files_that_are_touched_or_saved_without_an_edit_change_nothing(folder: 
 
 
 def test_a_change_that_the_file_times_do_not_show_is_found_while_they_are_coarse(folder: Folder, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("contextdb.tables.watching.stamps._stamp", lambda path: (1, 2, 3, 4))
+    monkeypatch.setattr("contextdb.tables.watching.rest._stamp", lambda path: (1, 2, 3, 4))
     folder.jog("one,1..3,Any")
     assert [folder.look(4), folder.assets()] == [1, ["one"]]
     folder.jog("two,1..3,Any")

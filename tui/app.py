@@ -132,10 +132,17 @@ class EditorApp(Editor):
         labels += [command.label for command in COMMANDS if command.group == group and command.is_listed]
         return {label: place for place, label in enumerate(dict.fromkeys(labels))}
 
+    def on_resize(self) -> None:
+        """In a browser, what the letters leave of the window has the colour of the keys' line. Each window that opens resizes."""
+        panel = self.get_css_variables()["panel"]
+        if self.is_web and self._driver is not None and panel.startswith("#"):
+            self._driver.write(f"\x1b]11;{panel[:7]}\x07")
+
     def search_themes(self) -> None:
         self.push_screen(Palette("Theme", [ThemeProvider]))
 
     def on_mount(self) -> None:
+        self.theme_changed_signal.subscribe(self, lambda _: self.on_resize())
         if self.workspace.beginning is not None:
             Begin(self, self.workspace, self.workspace.beginning).ask()
         else:

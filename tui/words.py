@@ -75,7 +75,7 @@ WORDS: Mapping[str, str] = {
     "history": "versions, undo list, steps, changes, track changes",
     "git-history": "who changed this, blame, log, commits, previous version, track changes, compare with yesterday, show changes",
     "autofill": "fill from clips, animation data, guess, suggestions",
-    "add-column": "new column, insert column, condition, parameter, new condition",
+    "add-column": "new column, insert column, condition, parameter, new condition, rule, formula, expression, weight, priority",
     "rename-role": "change role",
     "rename-asset": "change name, rename animation, rename clip",
     "column-sheet": "type, data type, unit, format cells, allowed values, validation, number format, min, max, bounds, range",

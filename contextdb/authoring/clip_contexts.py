@@ -31,8 +31,7 @@ from contextdb.covering.sample import Sampler
 from contextdb.covering.space import Box, Sides, Space
 from contextdb.covering.witness import BoxSet, OutOfSteps, Steps
 from contextdb.errors import some
-from contextdb.motion.measuring.moves import DIRECTION, SPEED, TURN
-from contextdb.motion.measuring.wanted import ClipContexts
+from contextdb.motion.measuring.moves import DIRECTION, SPEED, TURN, ClipContexts
 from contextdb.schema.settings import derivation_of
 from contextdb.tables.data import TableData
 from contextdb.tables.nesting.flat import FlatTable

@@ -22,12 +22,11 @@ from contextdb.motion.clips.doubts import LEAST_BODY_M, LYING_SHARE
 from contextdb.motion.clips.skeleton import Skeleton
 from contextdb.motion.clips.source import ENDINGS, clip_name, takes_of
 from contextdb.motion.preparing.clip_facts import ClipFacts
-from contextdb.motion.preparing.meeting import Meeting
+from contextdb.motion.preparing.look import Meeting
 from contextdb.motion.preparing.proposal import ClipHead, KeptClip
-from contextdb.motion.storage.clip_files import named_takes
+from contextdb.motion.storage.clip_files import Rig, named_takes
 from contextdb.motion.storage.config import MotionConfig
 from contextdb.motion.storage.database_settings import DatabaseSettings
-from contextdb.motion.storage.rigs import Rig
 from contextdb.tables.project import SCHEMA_FILE, folder_of, read_folder_schema
 
 MARKUP = "marks.csv"

@@ -19,7 +19,7 @@ from contextdb.motion.clips.source import ClipSource, clip_name
 from contextdb.motion.preparing.clip_facts import ClipFacts, facts_of
 from contextdb.motion.preparing.proposal import ClipHead, KeptClip, Kind, key_of
 from contextdb.motion.preparing.proposals import look_for
-from contextdb.motion.storage.rigs import Rig
+from contextdb.motion.storage.clip_files import Rig
 
 CHUNK = 16
 """So many of many clips are looked at together."""

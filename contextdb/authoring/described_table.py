@@ -29,7 +29,7 @@ from contextdb.edits.schema_file import schema_change
 from contextdb.errors import ContextDBError, Fault, FileError, Place, TableError, row_name, some
 from contextdb.files.file_names import require_new_table_name
 from contextdb.files.texts import new_source
-from contextdb.files.toml_text import Path as KeyPath
+from contextdb.files.toml_shapes import Path as KeyPath
 from contextdb.motion.characters.facts import UNITS
 from contextdb.motion.clips.clip import Up
 from contextdb.motion.clips.doubts import doubts, grouped
@@ -47,7 +47,7 @@ from contextdb.motion.preparing.describing import (
     table_section,
 )
 from contextdb.motion.preparing.describing import Sections as TomlSections
-from contextdb.motion.preparing.meeting import notes_of
+from contextdb.motion.preparing.look import notes_of
 from contextdb.schema.sections import settings_to_dict
 from contextdb.schema.toml_edit import absent, add_sections
 from contextdb.tables.changes import Cells, Change, Columns, Edit, Rows, Sections

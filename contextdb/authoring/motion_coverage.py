@@ -16,8 +16,7 @@ from contextdb.covering.space import require_counts
 from contextdb.errors import ContextError, Fault, MotionError, in_quotes, mend_for, some
 from contextdb.motion.measuring.coverage import ContextCoverage, MotionCoverage, coverage
 from contextdb.motion.measuring.moves import DIRECTION, MAPS, SPEED, TURN
-from contextdb.motion.measuring.near_clips import NEAR_COST
-from contextdb.motion.measuring.transition_names import PATTERN
+from contextdb.motion.measuring.usage import NEAR_COST, PATTERN
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.storage.building import open_or_build
 from contextdb.motion.storage.clip_files import unmatched

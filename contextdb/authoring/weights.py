@@ -8,17 +8,19 @@ from __future__ import annotations
 
 import copy
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from contextdb.disk import read_bytes
 from contextdb.edits.schema_file import SchemaChange
-from contextdb.errors import Fault, Place, SchemaError, in_quotes, mend_for, some
-from contextdb.files.toml_text import Path as KeyPath
+from contextdb.errors import Fault, Place, SchemaError, in_quotes, mend_for, safe_text, some
+from contextdb.files.toml_shapes import Path as KeyPath
 from contextdb.motion.storage.config import MotionConfig
 from contextdb.schema import toml_edit
+from contextdb.tables.changes import Edit, Sections
 from contextdb.tables.project import schema_of
+from contextdb.tables.table import Table
 
 _BOM = b"\xef\xbb\xbf"
 
@@ -77,3 +79,21 @@ def _set(text: str, document: dict[str, Any], path: KeyPath, place: int, key: st
         return text
     item[key] = value
     return toml_edit.set_in_list(text, path, place, key, value)
+
+
+# ---- edits of `[selectors.NAME]`: priority databases and their thresholds, as the editor's Priorities tab changes them
+
+
+def set_selector(table: Table, name: str, order: Sequence[tuple[str, float | None]] | None, what: str = "") -> Edit:
+    """Set a selector's databases in order, each with its threshold (the last: None), or with None take the selector away.
+
+    Raises SchemaError for an order that `[selectors.NAME]` could not hold, with what is accepted.
+    """
+    steps = [{"database": one} | ({} if threshold is None else {"threshold": threshold}) for one, threshold in order or ()]
+    part = None if order is None else {**table.schema.selectors.get(name, {}), "order": steps}
+    if table.schema.selectors.get(name) == part:
+        return Edit(what, ())
+    edit = Edit(what or f"Change the selector {safe_text(name)}", (Sections(parts={"selectors": {name: part}}),))
+    changed = edit.apply(table.with_rows_taken([]))
+    MotionConfig.from_dict(changed.schema.motion, file=changed.schema.file)
+    return edit

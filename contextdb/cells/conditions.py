@@ -33,7 +33,7 @@ class Condition:
     owner: str = ""
     """Who answers for it."""
     hysteresis: float = 0.0
-    """How far beyond the edges of its cells a row that plays stays valid. See `contextdb.cells.hysteresis`."""
+    """How far beyond the edges of its cells a row that plays stays valid. See `contextdb.cells.mirroring`."""
 
     @property
     def role(self) -> str | None:

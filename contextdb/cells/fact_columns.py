@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 import sys
-from typing import TYPE_CHECKING, Any, TypeGuard
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +13,8 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import Fact, read_fact
 from contextdb.cells.kinds import Kind
 from contextdb.cells.sets import Cell
+from contextdb.columns import polars as pl
 from contextdb.errors import ContextError, Fault, Place
-
-if TYPE_CHECKING:
-    import polars as pl
-else:
-    from contextdb.columns import polars as pl
 
 _PLAIN: dict[str, tuple[type, ...]] = {
     "Boolean": (bool, np.bool_),

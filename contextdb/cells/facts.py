@@ -15,12 +15,11 @@ from typing import Literal
 
 import numpy as np
 
-from contextdb.cells.angles import wrap_angle
 from contextdb.cells.arguments import require_text, text_of
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
 from contextdb.cells.grammar import parse_cell, parse_tags
-from contextdb.cells.intervals import EVERYTHING
+from contextdb.cells.intervals import EVERYTHING, wrap_angle
 from contextdb.cells.sets import SET_OF, Cell, NumberSet, ValueSet, covers
 from contextdb.cells.words import quoted, truth_of
 from contextdb.errors import (

@@ -12,7 +12,8 @@ from bisect import bisect_right
 from collections.abc import Iterable
 from fractions import Fraction
 
-from contextdb.cells.angles import wrap_angle
+import numpy as np
+from numpy.typing import NDArray
 
 Span = tuple[float, float]
 Spans = tuple[Span, ...]
@@ -103,3 +104,23 @@ def _ceil(value: float) -> float:
 
 def _floor(value: float) -> float:
     return value if math.isinf(value) else float(math.floor(value))
+
+
+# ---- angles on the circle: degrees in [-180, 180), exactly, one at a time and many at once
+
+
+def wrap_angle(degrees: float) -> float:
+    """The same angle in [-180, 180), exactly: both steps lose no bit."""
+    rest = math.fmod(degrees, 360.0)
+    if rest >= 180.0:
+        return rest - 360.0
+    return rest + 360.0 if rest < -180.0 else rest + 0.0
+
+
+def wrap_angles(degrees: NDArray[np.float64]) -> NDArray[np.float64]:
+    """As `wrap_angle`, of an array; NaN for what is not finite. Angles that are wrapped already come back as the same array."""
+    if not ((degrees < -180.0) | (degrees >= 180.0)).any():
+        return degrees
+    with np.errstate(invalid="ignore"):
+        rest = np.fmod(degrees, 360.0)
+    return np.where(rest >= 180.0, rest - 360.0, np.where(rest < -180.0, rest + 360.0, rest + 0.0))

@@ -32,5 +32,5 @@ def as_html(caption: str, heads: Sequence[str], rows: Iterable[Sequence[object]]
 def _line(tag: str, cells: Sequence[object]) -> str:
     from html import escape
 
-    texts = [safe_text(str(cell)) for cell in cells[:MOST_COLUMNS]] + (["…"] if len(cells) > MOST_COLUMNS else [])
+    texts = [safe_text(str(cell), MOST_CHARACTERS) for cell in cells[:MOST_COLUMNS]] + (["…"] if len(cells) > MOST_COLUMNS else [])
     return f"<tr>{''.join(f'<{tag}>{escape(cell)}</{tag}>' for cell in texts)}</tr>"

@@ -13,21 +13,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, overload
+from typing import overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.cells.angles import wrap_angle, wrap_angles
 from contextdb.cells.domains import Domain
 from contextdb.cells.grammar import parse_cell
-from contextdb.cells.intervals import CIRCLE, Spans
+from contextdb.cells.intervals import CIRCLE, Spans, wrap_angle, wrap_angles
 from contextdb.cells.sets import Cell, NumberSet
-
-if TYPE_CHECKING:
-    import polars as pl
-else:
-    from contextdb.columns import polars as pl
+from contextdb.columns import polars as pl
 
 FEW = 500
 """So many texts are read one by one: it takes no longer than to load polars."""

@@ -38,21 +38,13 @@ BLEND, START, LEAST, MOST, MIRROR, LOOP, ROOT, UNTIL = range(N_PLAY)
 
 @dataclass(frozen=True, slots=True)
 class RowPlay:
-    """How a row plays. None: as the settings say.
-
-    Attributes
-    ----------
-    blend_s, start_s : float
-    min_rate, max_rate : float
-        Both, or none.
-    mirror, root, until : str
-    loop : bool
-    """
+    """How a row plays. None: as the settings say."""
 
     blend_s: float | None = None
     start_s: float | None = None
     min_rate: float | None = None
     max_rate: float | None = None
+    """`min_rate`, `max_rate`: both, or none."""
     mirror: Mirror | None = None
     loop: bool | None = None
     root: Root | None = None

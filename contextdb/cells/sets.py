@@ -19,9 +19,8 @@ from itertools import product
 from operator import add
 
 from contextdb.cells import intervals
-from contextdb.cells.angles import wrap_angle
 from contextdb.cells.domains import Domain
-from contextdb.cells.intervals import EVERYTHING, Spans
+from contextdb.cells.intervals import EVERYTHING, Spans, wrap_angle
 from contextdb.cells.kinds import Family
 
 

@@ -16,7 +16,7 @@ from contextdb.covering.contracts import Proof, Witness, prove
 from contextdb.covering.progress import Stops, Tell
 from contextdb.errors import TableError, in_quotes, mend_for, plural, some
 from contextdb.findings import Finding, Level
-from contextdb.schema.parts import header
+from contextdb.schema.contracts import header
 from contextdb.schema.settings import Schema
 from contextdb.schema.toml_lines import Path
 from contextdb.tables.table import Table

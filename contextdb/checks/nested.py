@@ -12,13 +12,13 @@ import numpy as np
 
 from contextdb.errors import ContextDBError, Fault, in_quotes, plural
 from contextdb.findings import Finding
-from contextdb.tables.alike import finding_at
 from contextdb.tables.data import TableData
+from contextdb.tables.nesting.expansion import FlatColumn
 from contextdb.tables.nesting.flat import FlatTable
-from contextdb.tables.nesting.flat_columns import FlatColumn
 from contextdb.tables.nesting.links import inner_rows, is_nested, nesting_faults, require_sound
 from contextdb.tables.table import flat_of
 from contextdb.tables.variants import WholeTable, whole_of
+from contextdb.tables.variety import finding_at
 
 
 def whole_faults(whole: WholeTable, told: Sequence[Finding]) -> Iterator[Finding]:

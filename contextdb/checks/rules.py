@@ -23,7 +23,7 @@ RULES: dict[str, Rule] = {
         "error",
         "A file is not in the expected format.",
         "Correct the line that the message names; nothing in the file is used until all of it can be read.",
-        ("errors", "expressions.faults", "schema.faults"),
+        ("errors", "expressions.tokens", "schema.faults"),
     ),
     "no-such-path": Rule(
         "error",
@@ -103,7 +103,7 @@ RULES: dict[str, Rule] = {
         "error",
         "A row says that its clip plays otherwise than the markup of its database says.",
         "Correct the cell, or the markup of the clip.",
-        ("authoring.rows_against_markup",),
+        ("commands.check_command",),
     ),
     "no-asset": Rule(
         "error",
@@ -139,7 +139,7 @@ RULES: dict[str, Rule] = {
         "error",
         "An output has different types in a table and in a table inside it.",
         "Declare the output in the same way in both tables.",
-        ("tables.nesting.flat_texts",),
+        ("tables.nesting.expansion",),
     ),
     "too-many-rows": Rule(
         "error",
@@ -163,7 +163,7 @@ RULES: dict[str, Rule] = {
         "warning",
         "Every condition of a row is the same as in another row, and the policy, or the asset, leaves no choice between the two.",
         "Distinguish the rows by a condition, delete one of them, or set the policy collect if the game should have a choice.",
-        ("tables.alike",),
+        ("tables.variety",),
     ),
     "undeclared-condition": Rule(
         "warning",
@@ -313,7 +313,7 @@ RULES: dict[str, Rule] = {
         "info",
         "Angles are negated for clips that are played mirrored, although contextdb.toml does not declare it.",
         'No action needed; declare `mirror = "negate"`, or `mirror = "none"` for an angle that is the same in a mirror.',
-        ("checks.mirrored",),
+        ("checks.run",),
     ),
     "undeclared-mirror": Rule(
         "info",
@@ -321,13 +321,13 @@ RULES: dict[str, Rule] = {
         " how its facts change, or the condition of the other side is not a column.",
         'Declare `mirror = { Left = "Right" }`, with both conditions as columns, or `mirror = "none"` if its facts are the same in'
         " a mirror.",
-        ("checks.mirrored",),
+        ("checks.run",),
     ),
     "uneven-mirror": Rule(
         "warning",
         "A number is negated for clips that are played mirrored, but its min is not the opposite of its max.",
         'Correct `min` or `max`; if the number has no side, as a speed, remove `mirror = "negate"`.',
-        ("checks.mirrored",),
+        ("checks.run",),
     ),
     "undecided-rows": Rule(
         "info",

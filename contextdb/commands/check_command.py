@@ -13,13 +13,13 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 from contextdb import report
-from contextdb.authoring.rows_against_markup import check_against_markup
+from contextdb.cells.row_play import RowPlay
 from contextdb.checks.cases import CaseBar, check_cases, read_cases
 from contextdb.checks.contracts import contract_findings, proofs_of, strayed
 from contextdb.checks.rows import check_rows, unused_conditions
@@ -28,13 +28,21 @@ from contextdb.commands import add_format_arguments, deliver, is_coloured
 from contextdb.commands.numbers import percent, whole_type
 from contextdb.commands.progress import Bar, has_many_cells, log_of
 from contextdb.console import ExitCode, printable, progress, terminal_width
-from contextdb.covering.contracts import Proof
+from contextdb.covering.contracts import Proof, prove
 from contextdb.disk import CASES_SUFFIX, TABLE_SUFFIXES, path_in_quotes, read_bytes
+from contextdb.disk.boundary import inside
 from contextdb.errors import ContextDBError, Fault, in_quotes, nearest
+from contextdb.expressions.tokens import written_name, written_text
 from contextdb.files.file_names import alike, composed, confusable, why_unportable
 from contextdb.files.texts import read_texts
+from contextdb.files.toml_shapes import as_toml
 from contextdb.findings import LEVELS, Finding, Level
+from contextdb.motion.markup.markup import Markup
+from contextdb.motion.markup.reserved import ReservedTag, reserved_of
+from contextdb.motion.markup.span_faults import Span
+from contextdb.motion.storage.config import MotionConfig
 from contextdb.report.results import CheckReport, TableSummary
+from contextdb.schema.contracts import Contract, header, keys_of
 from contextdb.schema.settings import Schema
 from contextdb.schema.toml_lines import key_lines
 from contextdb.tables import project
@@ -43,6 +51,7 @@ from contextdb.tables.gap_work import GapWork
 from contextdb.tables.other_files import cases_path, notes_path
 from contextdb.tables.places import table_path
 from contextdb.tables.table import Table
+from contextdb.tables.variety import finding_at
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -99,7 +108,6 @@ def failing_levels(fail_on: str) -> tuple[Level, ...]:
 
 def _propose(arguments: argparse.Namespace) -> ExitCode:
     """Print the contracts of tables that can be read which hold and are likely meant."""
-    from contextdb.checks.proposals import proposal_toml, proposals
     from contextdb.report.render_json import as_json
 
     path = arguments.path
@@ -277,3 +285,106 @@ def _is_table(path: Path) -> bool:
 
 def _as_findings(error: ContextDBError, table: str | None) -> list[Finding]:
     return [Finding.of(fault if isinstance(fault, Fault) else Fault(str(fault)), "error", table) for fault in error.faults]
+
+
+# ---- contracts that hold of a table today and are likely meant: what `contextdb check --propose` lists
+
+
+ANY_ROW = "asset like '*'"
+MOST_VALUES = 20
+"""Of an enum with more values none is proposed for each."""
+
+
+def proposals(table: Table) -> Iterator[Proof]:
+    """Contracts of a table that hold and that contextdb.toml does not have: some row always plays, so that a fallback is never
+    reached; else one plays for each value of an enum; and never two are valid at once."""
+    known = {replace(contract, name="", why="") for contract in table.schema.contracts.values()}
+    always = prove(_contract(table, "always_a_row", some=ANY_ROW), table)
+    held = [always] if _is_meant(always) else [p for c in _of_values(table) if _is_meant(p := prove(c, table))]
+    single = prove(_contract(table, "one_at_a_time", at_most=1), table)
+    held += [single] if table.n_rows > 1 and _is_meant(single) else []
+    yield from (proof for proof in held if replace(proof.contract, name="", why="") not in known)
+
+
+def proposal_toml(contract: Contract) -> str:
+    """A contract as contextdb.toml has it."""
+    keys = ((key, getattr(contract, key)) for key in keys_of("contracts"))
+    given = ((key, value[0] if key == "at_most" and value else value) for key, value in keys)
+    lines = [f"{key} = {as_toml(value)}" for key, value in given if value not in (None, "")]
+    return "\n".join([header(("contracts", contract.name)), *lines, ""])
+
+
+def _contract(table: Table, name: str, when: str | None = None, **demand: object) -> Contract:
+    return Contract(f"{table.name}_{name}", table=table.name, when=when, **demand)  # type: ignore[arg-type]
+
+
+def _of_values(table: Table) -> Iterator[Contract]:
+    """That some row plays for each value of an enum."""
+    for column in table.conditions:
+        condition = column.condition
+        values = condition.domain.values if condition.domain.type.needs_values else None
+        for value in values if values is not None and len(values) <= MOST_VALUES else ():
+            text = written_text(value) if "'" in value else f"'{value}'"
+            when = f"{written_name(condition.name)} == {text}"
+            yield _contract(table, f"{condition.name}_{value}_has_a_row", when, some=ANY_ROW)
+
+
+def _is_meant(proof: Proof) -> bool:
+    return proof.holds is True and not proof.is_vacuous
+
+
+# ---- where a row says that its clip plays otherwise than the markup of its database says; clips are not read
+
+
+def check_against_markup(tables: Iterable[Table], folder: Path) -> Iterator[Finding]:
+    """The contradictions of some tables of a project. Motion settings and markup that cannot be read are reported by
+    `contextdb motion check`."""
+    saying = [table for table in tables if table.outputs.plays is not None and table.schema.motion]
+    for table in saying:
+        try:
+            config = MotionConfig.from_dict(table.schema.motion, tables=[table.name], file=table.schema.file)
+        except ContextDBError:
+            continue
+        for database in (each for each in config.databases.values() if each.table == table.name):
+            try:
+                markup = Markup() if database.markup is None else Markup.load(inside(folder / database.markup, folder))
+            except ContextDBError:
+                continue
+            has_mirror = bool(config.features[database.features].mirror)
+            yield from _of_table(table, markup, database.markup is not None, has_mirror, database.name)
+
+
+def _of_table(table: Table, markup: Markup, is_marked: bool, has_mirror: bool, database: str) -> Iterator[Finding]:
+    plays = table.outputs.plays
+    assert plays is not None, "only tables that say how rows play are looked at"
+    for row, asset in enumerate(table.assets):
+        how = RowPlay.of(plays[row].tolist())
+        if how is None:
+            continue
+        for column, message in _contradictions(how, markup.spans_of(asset), is_marked):
+            yield finding_at(table, row, "row-against-markup", "error", message, column)
+        if how.mirror == "always" and not has_mirror:
+            message = f"mirror is always, but the features of [databases.{database}] have no `mirror`: the row never plays."
+            yield finding_at(table, row, "row-against-markup", "error", message, "mirror")
+
+
+def _contradictions(how: RowPlay, spans: Iterable[Span], is_marked: bool) -> Iterator[tuple[str, str]]:
+    """The column and what is wrong with it, for each part that the markup of the asset contradicts."""
+    tags: dict[ReservedTag, list[Span]] = {}
+    for span in spans:
+        if (tag := reserved_of(span.tag)) is not None:
+            tags.setdefault(tag, []).append(span)
+    looping = ReservedTag.LOOPING in tags
+    if how.loop is not None and is_marked and how.loop != looping:
+        yield "loop", f"loop is {how.loop}, but the markup {'marks' if looping else 'does not mark'} the clip as Looping."
+    if how.until == "any" and ReservedTag.NEXT_NATURAL_ONLY in tags:
+        yield "until", "until is any, but the markup has NextNaturalOnly, which is left at natural transitions alone."
+    weights = {span.value for span in tags.get(ReservedTag.ROOT_MOTION_WEIGHT, ())}
+    if (how.root == "code" and weights - {0.0}) or (how.root == "animation" and weights - {1.0}):
+        listed = ", ".join(f"{weight:g}" for weight in sorted(weight for weight in weights if weight is not None))
+        yield "root", f"root is {how.root}, but the markup gives RootMotionWeight {listed}."
+    for tag in (ReservedTag.EXCLUDED, ReservedTag.DO_NOT_CHOOSE):
+        for span in tags.get(tag, ()):
+            if how.start_s is not None and span.from_s <= how.start_s < span.to_s:
+                where = f"from {span.from_s:g} to {span.to_s:g} s"
+                yield "start_s", f"start_s is {how.start_s:g}, where nothing can be entered: {in_quotes(str(tag))} {where}."

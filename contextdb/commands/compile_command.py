@@ -21,11 +21,11 @@ from contextdb.compiled.engine_facts import csharp_of, godot_of, unreal_of
 from contextdb.compiled.stubs import stubs_of
 from contextdb.compiled.table import CompiledTable
 from contextdb.console import ExitCode, output, printable, progress
+from contextdb.core import motion_text
 from contextdb.disk import make_folder, path_in_quotes, write_atomic
 from contextdb.disk.boundary import inside
 from contextdb.errors import ContextDBError, Fault, FileError, Place, plural
 from contextdb.files.tensors import SUFFIX
-from contextdb.motion.storage.c_header import c_motion_header
 from contextdb.tables.places import table_path
 from contextdb.tables.project import SCHEMA_FILE, Project, load_table
 from contextdb.tables.table import Table
@@ -181,3 +181,38 @@ def _require_different(targets: list[Path]) -> None:
         raise ContextDBError(
             *(Fault("two tables would be written to one file.", "one file for each table", place=Place(t)) for t in twice)
         )
+
+
+# ---- the header by which a game in C or C++ plays the characters of a bundle: the core's parts for motion, as they are
+
+
+_TEXT = """
+/* Motion. Written by `contextdb compile --c-motion`: do not edit.
+ *
+ * Characters in C99 or C++17: open a bundle of `contextdb motion build --bundle`, then see "Characters of a bundle" below. Compile
+ * with -ffp-contract=off (MSVC: /fp:precise), so that all machines have the same bits. */
+
+#ifndef CDB_MOTION_H
+#define CDB_MOTION_H
+
+#ifdef __cplusplus
+extern "C" {{
+#endif
+#if defined(__clang__)
+#pragma clang diagnostic push
+#endif
+{motion}
+#if defined(__clang__)
+#pragma clang diagnostic pop
+#endif
+#ifdef __cplusplus
+}}
+#endif
+
+#endif /* CDB_MOTION_H */
+"""
+
+
+def c_motion_header(reader: str) -> str:
+    """The text of the header, ASCII with line feeds; `reader` is that of the tables' parts, which it begins with."""
+    return reader + _TEXT.format(motion=motion_text())

@@ -83,7 +83,7 @@ def ranked(arguments: argparse.Namespace, measured: Measured, table: EitherTable
     if measured.telemetry is None:
         return measured
     from contextdb.covering.assumed import opened
-    from contextdb.telemetry.gap_list import ranked as by_moments
+    from contextdb.telemetry.seen_gaps import ranked as by_moments
 
     report = by_moments(measured.report, opened(table), measured.telemetry, arguments.work, arguments.samples)
     return replace(measured, report=report)

@@ -20,8 +20,7 @@ import contextdb
 from contextdb import motion
 from contextdb.cells.facts import Context
 from contextdb.commands import add_page_arguments, take_page_arguments
-from contextdb.commands.demo_teams import cast_lines
-from contextdb.commands.demo_world import world
+from contextdb.commands.demo_world import cast_lines, world
 from contextdb.commands.motion_page import page_file
 from contextdb.compiled.matches import Matches
 from contextdb.compiled.table import CompiledTable

@@ -29,8 +29,7 @@ from contextdb.tables.project import load_table
 from contextdb.tables.table import Table
 
 if TYPE_CHECKING:
-    from contextdb.commands.diff_backtest import Replayed
-    from contextdb.commands.diff_sessions import RepeatedSession
+    from contextdb.commands.diff_backtest import RepeatedSession, Replayed
 
 ENGINES = ("local", "dask")
 FORMATS = ("text", "markdown", "json", "html")
@@ -77,7 +76,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
 def _sessions(arguments: argparse.Namespace, before: Table, after: Table) -> list[RepeatedSession]:
     if not arguments.session:
         return []
-    from contextdb.commands.diff_sessions import repeated_sessions
+    from contextdb.commands.diff_backtest import repeated_sessions
 
     return repeated_sessions(arguments.session, arguments.project, before, after)
 

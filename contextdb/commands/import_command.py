@@ -31,10 +31,9 @@ from contextdb.disk import TABLE_SUFFIXES, is_stream, path_in_quotes, read_bytes
 from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, mend_for, nearest, plural, row_name
 from contextdb.exchange import importing
 from contextdb.exchange.formats import FORMATS, ReadOptions, read
+from contextdb.exchange.importing import Choices, choices_of, chosen_columns, remember
 from contextdb.exchange.mapping import JOBS, Mapped, as_job, as_type, propose
-from contextdb.exchange.pairs import with_intervals
-from contextdb.exchange.reading import Reading, listed
-from contextdb.exchange.remembered import Choices, choices_of, chosen_columns, remember
+from contextdb.exchange.reading import Reading, listed, with_intervals
 from contextdb.files.file_names import require_new_table_name
 from contextdb.schema.shapes import KIND_SYNONYMS
 from contextdb.tables.project import SCHEMA_FILE

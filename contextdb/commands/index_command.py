@@ -16,8 +16,9 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from contextdb.columns import polars as pl
 from contextdb.commands.projects_below import extend_up_to, project_folders
 from contextdb.console import ExitCode, note, output, printable, progress
 from contextdb.disk import write_atomic
@@ -27,11 +28,6 @@ from contextdb.errors import ContextDBError, Fault, FileError, Place, plural
 from contextdb.tables.project import Project
 from contextdb.tables.table import Table
 from contextdb.tables.variants import known_whole
-
-if TYPE_CHECKING:
-    import polars as pl
-else:
-    from contextdb.columns import polars as pl
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -23,9 +23,7 @@ from pathlib import Path
 from contextdb.console import ExitCode, note
 from contextdb.disk import GAPS_SUFFIX, NOTES_SUFFIX, names_a_table, read_bytes, write_atomic
 from contextdb.edits.diffing import diff
-from contextdb.edits.diffing.lines import merged_lines
-from contextdb.edits.diffing.markers import with_markers
-from contextdb.edits.diffing.notes_merging import merge_notes
+from contextdb.edits.diffing.markers import merge_notes, merged_lines, with_markers
 from contextdb.edits.diffing.toml_merging import merge_toml
 from contextdb.errors import ContextDBError, Fault, Place, SchemaError, TableError, in_quotes, plural, safe_text
 from contextdb.files.parquet import ParquetSource

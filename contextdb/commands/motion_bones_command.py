@@ -20,7 +20,7 @@ from contextdb.commands.numbers import unit_of
 from contextdb.console import ExitCode, aligned, output, printable
 from contextdb.errors import plural
 from contextdb.motion.clips.clip import CENTIMETRE, UPS, Clip
-from contextdb.motion.clips.rig import Rig
+from contextdb.motion.clips.foot_bones import Rig
 from contextdb.motion.clips.source import clips_by_file
 from contextdb.report.render_json import as_json
 

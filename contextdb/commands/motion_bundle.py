@@ -13,6 +13,7 @@ from contextdb.compiled.table import CompiledTable
 from contextdb.disk import make_folder, path_in_quotes, write_atomic
 from contextdb.errors import ContextDBError, Fault, FileError, MotionError, Place, in_quotes
 from contextdb.motion.characters.facts import FACTS, is_asked
+from contextdb.motion.nodes.match_node import MatchNode
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.storage.bundle import Played, TableFile, bundle_of
 from contextdb.motion.storage.config import MotionConfig
@@ -54,7 +55,9 @@ def bundled(tables: Mapping[str, Table], config: MotionConfig, databases: Mappin
         names = config.databases_of(config.selector_of(name))
         schema = config.features[config.databases[names[0]].features]
         own = {each: banks[each] for each in names if each in banks}
-        players[name] = Played(config.controller(name, databases, rng=Random(0)), schema, own or None, config.output_of(name))
+        ends = {each: MatchNode(databases[each]).ends for each in own}
+        controller = config.controller(name, databases, rng=Random(0))
+        players[name] = Played(controller, schema, own or None, config.output_of(name), ends)
     return bundle_of(players, table_of, compiled)
 
 

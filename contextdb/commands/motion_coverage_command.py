@@ -30,8 +30,7 @@ from contextdb.commands.progress import building_bar
 from contextdb.console import ExitCode, note, terminal_width
 from contextdb.covering.declared import NOTHING, declared, differences
 from contextdb.errors import ContextError, Fault, in_quotes, mend_for, some
-from contextdb.motion.measuring.near_clips import NEAR_COST
-from contextdb.motion.measuring.transition_names import PATTERN
+from contextdb.motion.measuring.usage import NEAR_COST, PATTERN
 from contextdb.motion.storage.building import open_or_build
 from contextdb.report import formats, render
 from contextdb.report.coverage_results import table_new

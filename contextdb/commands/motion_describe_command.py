@@ -32,7 +32,7 @@ from contextdb.commands.engine_options import engines_of
 from contextdb.commands.motion_clips import add_clip_arguments, progress_of
 from contextdb.console import ExitCode, note, output, printable
 from contextdb.errors import ContextDBError, Fault, plural, some
-from contextdb.files.toml_text import as_toml
+from contextdb.files.toml_shapes import as_toml
 from contextdb.motion.preparing.describing import COLUMNS, Described
 from contextdb.report.render_json import as_json
 from contextdb.tables.nesting.names import asset_text

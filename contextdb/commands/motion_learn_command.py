@@ -25,8 +25,7 @@ from contextdb.disk.boundary import real_path
 from contextdb.errors import Fault, MotionError, Place, QueryError, plural
 from contextdb.motion import open_or_build
 from contextdb.motion.trace.answer_views import what_if_lines
-from contextdb.motion.trace.choice_pairs import ChoiceSession
-from contextdb.motion.trace.choices import choices_path, read_choices
+from contextdb.motion.trace.choice_pairs import ChoiceSession, choices_path, read_choices
 from contextdb.motion.trace.learning import Learned, learn
 from contextdb.motion.trace.session import Trace
 from contextdb.motion.trace.stock import Stock

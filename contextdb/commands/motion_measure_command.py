@@ -31,8 +31,8 @@ from contextdb.errors import ContextDBError, ContextError, Fault, Place, in_quot
 from contextdb.motion import Measures, MotionDatabase, PoseBank, PoseSettings, measure, open_or_build, open_or_build_poses
 from contextdb.motion.storage.written_poses import NPZ
 from contextdb.motion.trace.filter_rows import fingerprint
-from contextdb.motion.trace.forced_by import forced_by
 from contextdb.motion.trace.session import Trace
+from contextdb.motion.trace.stats import forced_by
 from contextdb.report.measure_results import BASELINE, Bar, MeasureResults, SessionMeasures, compared, held_to, read_baseline
 from contextdb.report.results import Gate, as_path
 

@@ -27,7 +27,7 @@ from contextdb.errors import ContextDBError, Fault, FileError, Place, plural, so
 from contextdb.motion import Character, Measures, Pose, Trace, measure
 from contextdb.motion.characters.drives import Drive, drives, steered
 from contextdb.motion.characters.probing import Plan, Scene, plan_of
-from contextdb.motion.trace.forced_by import ForcedBy, forced_by, together
+from contextdb.motion.trace.stats import ForcedBy, forced_by, together
 from contextdb.report.render_json import as_json
 
 _SPEED = number_type("a speed to drive at. Accepted: 0.1 to 100 m/s, such as 1.3.", 0.1, 100.0)

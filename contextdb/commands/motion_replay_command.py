@@ -44,14 +44,13 @@ from contextdb.motion.storage.pose_files import saved_poses
 from contextdb.motion.storage.stored import open_database
 from contextdb.motion.trace.answer_views import diff_lines, stats_lines, what_if_lines, why_lines
 from contextdb.motion.trace.chrome_trace import chrome_trace
-from contextdb.motion.trace.cost_views import Ranked, View
+from contextdb.motion.trace.cost_views import Ranked, View, decision_json, ranked_json
 from contextdb.motion.trace.filter_rows import is_recorded
-from contextdb.motion.trace.json_form import decision_json, ranked_json
 from contextdb.motion.trace.reasked import Changes, Reasked, require_known, why_not_asked
 from contextdb.motion.trace.session import Trace
 from contextdb.motion.trace.status import Status, status_of
 from contextdb.motion.trace.stock import Stock
-from contextdb.motion.trace.views import decision_lines, look_first, session_lines, summary_line
+from contextdb.motion.trace.views import NOTHING_FORCED, decision_lines, look_first, session_lines, summary_line
 from contextdb.motion.trace.what_if import what_if
 from contextdb.motion.trace.why_not import WhyNot
 from contextdb.report.render_json import as_json
@@ -221,8 +220,7 @@ def place_of(text: str, trace: Trace, file: str) -> int:
 
 def _heading(trace: Trace) -> list[str]:
     """A session in a line, and where to look first."""
-    first = look_first(trace.brief())
-    return [summary_line(trace.brief()), *([first] if first else [])]
+    return [summary_line(trace.brief()), look_first(trace.brief()) or NOTHING_FORCED]
 
 
 def _session(replay: Replay) -> Part:

@@ -7,6 +7,9 @@ poses are made. Exits with 1 if nothing ever plays.
 
   contextdb motion run game/ player stick.csv --out session.parquet --poses session.bvh
   contextdb motion replay session.parquet
+
+With --link NAME it plays at its own speed and publishes what it plays, poses too, as a running game does: see `contextdb live`,
+`motion debug --live` and examples/web.
 """
 
 from __future__ import annotations
@@ -18,10 +21,12 @@ import random
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from time import monotonic, sleep
 
 import numpy as np
 
 from contextdb import motion
+from contextdb.authoring.game_link import link
 from contextdb.cells.facts import UNKNOWN_MODES, Unknown
 from contextdb.commands.motion_stage import Stage, reach_s
 from contextdb.commands.motion_stick import Stick, conditions_of, read_moments
@@ -51,6 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--capsules", action="store_true", help="put a body of capsules on the joints of a .glb, as engines want one"
     )
+    parser.add_argument("--link", metavar="NAME", help="play at its own speed, and let programs of this machine listen")
     parser.add_argument("--rate", metavar="HZ", type=rate_of, help="updates per second (default: the rate of the features)")
     parser.add_argument("--k", metavar="N", type=_COUNT, default=12, help=K_HELP)
     parser.add_argument("--seed", metavar="N", type=_SEED, default=0, help="seed of the controller's variation (default: 0)")
@@ -84,7 +90,8 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     rate = character.schema.rate if arguments.rate is None else arguments.rate
     if poses_out is not None and character.stream is None:
         raise ContextDBError(Fault("there is no clip to take poses of.", "a database with a clip"))
-    poses = [updated.pose for updated in steer(character, stick, moments, rate)]
+    updates = steer(character, stick, moments, rate)
+    poses = [each.pose for each in (updates if arguments.link is None else published(updates, character, arguments.link, rate))]
     trace.save(out, timings=False)
     if poses_out is not None and character.stream is not None:
         motion.write_poses(
@@ -96,6 +103,18 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         else:
             print(summary_line(trace.brief()))
     return ExitCode.OK if any(decision.playing is not None for decision in trace.brief()) else ExitCode.FOUND
+
+
+def published(updates: Iterator[motion.Updated], character: motion.Character, name: str, per_s: float) -> Iterator[motion.Updated]:
+    """The updates in their time, with what they play on a link, under the link's name."""
+    with link(name) as game:
+        game.watch(character, game.name)
+        began_s = monotonic()
+        for i, updated in enumerate(updates):
+            if updated.pose is not None and character.stream is not None:
+                game.pose(game.name, updated.pose, character.stream.rig)
+            yield updated
+            sleep(max(0.0, began_s + (i + 1) / per_s - monotonic()))
 
 
 def say_where(trace: motion.Trace, stage: Stage, controller: str, out: Path) -> None:

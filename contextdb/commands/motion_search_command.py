@@ -23,8 +23,7 @@ from contextdb.errors import in_quotes, plural
 from contextdb.motion import MotionDatabase
 from contextdb.motion.features.extraction import Features
 from contextdb.motion.search.candidates import Candidates
-from contextdb.motion.trace.cost_views import Ranked, View, candidate_lines
-from contextdb.motion.trace.json_form import candidates_json
+from contextdb.motion.trace.cost_views import Ranked, View, candidate_lines, candidates_json
 from contextdb.motion.trace.views import left_out_text
 from contextdb.report.render_json import as_json
 

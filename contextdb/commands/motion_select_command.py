@@ -16,8 +16,7 @@ from contextdb.console import ExitCode, output, terminal_width
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.selection.controller import Controller
 from contextdb.motion.selection.decision import Decision
-from contextdb.motion.trace.cost_views import View
-from contextdb.motion.trace.json_form import decision_json
+from contextdb.motion.trace.cost_views import View, decision_json
 from contextdb.motion.trace.session import Trace
 from contextdb.motion.trace.views import decision_lines
 from contextdb.report.render_json import as_json

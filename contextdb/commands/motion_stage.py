@@ -31,8 +31,8 @@ from contextdb.motion import (
 from contextdb.motion.clips.source import ClipSource, take_at
 from contextdb.motion.features.extraction import Features
 from contextdb.motion.markup.reserved import MOST_COST
+from contextdb.motion.storage.clip_files import Rig
 from contextdb.motion.storage.config import JOINTLY
-from contextdb.motion.storage.rigs import Rig
 from contextdb.motion.trace.cost_views import View
 from contextdb.tables.project import SCHEMA_FILE, Project
 

@@ -16,8 +16,7 @@ from contextdb.disk import TABLE_SUFFIXES
 from contextdb.errors import ContextDBError
 from contextdb.motion.clips.source import ENDINGS
 from contextdb.tables.project import SCHEMA_FILE, folder_of
-from contextdb.tables.watching.rest import Rest
-from contextdb.tables.watching.stamps import Stamps, look
+from contextdb.tables.watching.rest import Rest, Stamps, look
 from contextdb.tables.watching.watcher import POLL_S, SETTLE_S, SHORTEST_WAIT_S
 
 SUFFIXES = (*ENDINGS, *TABLE_SUFFIXES)

@@ -25,7 +25,7 @@ Tensors, R rows, W = ceil(R / 64) words, C conditions; every integer and double 
     when.texts
     CCC.soft.FIELD         the same for soft cells, and CCC.soft.penalties float64 [R]
     CCC.soft.per           float64 [K], starts int64 [K + 1], ends float64 [S, 2] and which int32 [R]: where penalties grow with the
-                           distance of a fact, see contextdb.compiled.soft
+                           distance of a fact, see contextdb.compiled.layers
 
 Value R of an output is what there is without a row: what `fallback` gives, else the default, else False, 0, NaN or "". Infinite
 defaults are "inf" and "-inf" in the JSON. What knows no outputs passes all of these over: they change no answer.
@@ -73,6 +73,7 @@ from contextdb.cells.sets import TagMeet, TagSet
 from contextdb.columns import TextColumn
 from contextdb.compiled.classes import ColumnMasks, NumberMasks, TagMasks, ValueMasks, WideMasks
 from contextdb.compiled.data import CompiledData
+from contextdb.compiled.layers import GROWTH, Growth, SoftMasks
 from contextdb.compiled.outputs_stored import (
     known_policy,
     outputs_from,
@@ -83,7 +84,6 @@ from contextdb.compiled.outputs_stored import (
     ways_to_tensors,
 )
 from contextdb.compiled.pick_columns import PickColumns
-from contextdb.compiled.soft import GROWTH, Growth, SoftMasks
 from contextdb.files.tensors import (
     FileKind,
     Tensors,

@@ -22,8 +22,16 @@ from contextdb.bitmask import Rows, Words, read_only
 from contextdb.cells.fact_columns import as_series, is_series, listed, read_each
 from contextdb.cells.facts import Unknown, check_mode, missing_error, misspelt
 from contextdb.cells.mirroring import in_mirror
-from contextdb.compiled.batch_columns import Contexts, common_length, facts_of, holds_sets, kept_columns, mirrored_columns
-from contextdb.compiled.batch_costs import CostsOfPairs, costs_of_pairs
+from contextdb.compiled.batch_columns import (
+    Contexts,
+    CostsOfPairs,
+    common_length,
+    costs_of_pairs,
+    facts_of,
+    holds_sets,
+    kept_columns,
+    mirrored_columns,
+)
 from contextdb.compiled.codes import Codes
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.many import BLOCK, ManyMatches, one_by_one

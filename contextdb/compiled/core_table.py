@@ -16,14 +16,14 @@ from contextdb.cells.facts import UNKNOWN_MODES, Unknown, read_fact
 from contextdb.cells.kinds import KINDS, Kind
 from contextdb.cells.sets import TagMeet, TagSet
 from contextdb.compiled.classes import ColumnMasks, NumberMasks, ValueMasks, WideMasks
+from contextdb.compiled.layers import SoftMasks
 from contextdb.compiled.matches import Answering, Matches
-from contextdb.compiled.soft import SoftMasks
 from contextdb.core import FLAT, SLOTS, VALUE, WIDE, Table
 from contextdb.errors import ContextError
 
 if TYPE_CHECKING:
-    from contextdb.compiled.programs import Programs
     from contextdb.expressions import Derivation
+    from contextdb.expressions.programs import Programs
     from contextdb.expressions.rules import WhenRules
 
 

@@ -26,21 +26,19 @@ from contextdb.cells.arguments import require_row
 from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import Context, Fact, Unknown, check_mode, missing_error, misspelt, read_fact, require_context
 from contextdb.cells.grammar import parse_cell, reads
-from contextdb.cells.hysteresis import widened_fact, with_hysteresis
-from contextdb.cells.mirroring import changed_in_mirror, frozen_facts, in_mirror, mirrored_facts
+from contextdb.cells.mirroring import changed_in_mirror, frozen_facts, in_mirror, mirrored_facts, widened_fact, with_hysteresis
 from contextdb.cells.notebook import one_line
 from contextdb.cells.sets import ANY, Cell
 from contextdb.columns import TextColumn
 from contextdb.compiled.classes import ColumnMasks, NumberMasks, WideMasks
 from contextdb.compiled.codes import CodeSlots
 from contextdb.compiled.core_table import UNKNOWN, core_table
-from contextdb.compiled.mask_bits import bits_of, nbytes
+from contextdb.compiled.layers import SoftMasks, bits_of, nbytes
 from contextdb.compiled.matches import Answering, Matches, with_mirrored, with_penalties, with_widened
 from contextdb.compiled.memory import Memory
 from contextdb.compiled.number_cells import NumberCells, number_cells
 from contextdb.compiled.outputs import NO_OUTPUTS, Outputs
 from contextdb.compiled.pick_columns import NOTHING, PickColumns
-from contextdb.compiled.soft import SoftMasks
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.compiled.versions import said_by, version_of
 from contextdb.compiled.watcher import Watcher
@@ -229,7 +227,7 @@ class CompiledData(Unchanging):
         return with_hysteresis(self.conditions)
 
     def query_widened(self, context: Context, unknown: Unknown = "error") -> Matches:
-        """The answer to a context with its facts widened, see `contextdb.cells.hysteresis`. What is derived is computed from the
+        """The answer to a context with its facts widened, see `contextdb.cells.mirroring`. What is derived is computed from the
         facts themselves and then widened; rules see no widened facts."""
         bits, always = self._bits_widened(context, unknown) or self._bits_carefully(context, unknown, widened_fact)
         answer = self.matches(bits, always)

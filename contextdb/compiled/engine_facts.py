@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.kinds import Kind
-from contextdb.compiled.c_header.spelling import literal as c_literal
+from contextdb.compiled.c_header.naming import literal as c_literal
 from contextdb.compiled.core_table import values_of
 from contextdb.compiled.stubs import Names
 from contextdb.compiled.table import CompiledTable

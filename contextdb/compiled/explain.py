@@ -31,8 +31,7 @@ from contextdb.cells.sets import Accepted, Cell, NumberSet, TagSet, ValueSet, co
 from contextdb.cells.words import NUMBER_TEXT
 from contextdb.compiled.classes import ColumnMasks, NumberMasks, WideMasks, column_masks
 from contextdb.compiled.data import CompiledData
-from contextdb.compiled.layers import Layers
-from contextdb.compiled.mask_bits import bits_of
+from contextdb.compiled.layers import Layers, bits_of
 from contextdb.compiled.matches import Matches
 from contextdb.compiled.ways import Step
 from contextdb.errors import plural
@@ -198,7 +197,7 @@ class Explanation:
         return one_line("Explanation", self.compiled.name, f"{len(self.matches):,} of {plural(self.compiled.n_rows, 'row')} valid")
 
     def _repr_html_(self) -> str:
-        rows = ((r.asset, "" if r.is_valid else str(r).removeprefix(f"{r.asset}: ")) for r in self)
+        rows = ((r.asset, "valid" if r.is_valid else str(r).removeprefix(f"{r.asset}: ")) for r in self)
         return as_html(repr(self), ("asset", "why not"), rows, len(self))
 
     @cached_property

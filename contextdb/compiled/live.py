@@ -15,7 +15,7 @@ from contextdb.cells.facts import NAMES, Unknown, alike, as_context, no_conditio
 from contextdb.cells.notebook import as_html, one_line
 from contextdb.compiled.casting.explaining import explain_with_actors
 from contextdb.compiled.casting.facts import Actors, Ask, Prefer
-from contextdb.compiled.casting.live import LiveActors
+from contextdb.compiled.casting.many import LiveActors
 from contextdb.compiled.core_table import UNKNOWN
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.explain import Explanation, explain

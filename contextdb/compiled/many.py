@@ -22,16 +22,14 @@ from contextdb.cells.arguments import require_place
 from contextdb.cells.notebook import MOST_COLUMNS, MOST_ROWS, as_html, one_line
 from contextdb.cells.sequences import Made
 from contextdb.columns import Framed
+from contextdb.columns import polars as pl
 from contextdb.compiled.answered_table import SaidRows
-from contextdb.compiled.batch_costs import CostsOfPairs
+from contextdb.compiled.batch_columns import CostsOfPairs
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.matches import Join, Matches, layered_penalties, minus, rows_frame
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.core import list_rows
 from contextdb.errors import ContextError, Fault, Place, WrongType, plural
-
-if TYPE_CHECKING:
-    import polars as pl
 
 BLOCK = 2048
 """Contexts whose masks are worked out together."""

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import copy
 from functools import partial
 from operator import and_, or_, xor
-from typing import TYPE_CHECKING, Any, Protocol, Self, TypeVar, overload
+from typing import Any, Protocol, Self, TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +16,10 @@ from contextdb.bitmask import Flags, Words, read_only
 from contextdb.cells.arguments import require_place
 from contextdb.cells.notebook import as_html, one_line
 from contextdb.columns import Framed, frame_of
+from contextdb.columns import polars as pl
 from contextdb.compiled.answered_table import AnsweredTable, SaidRows, bits_said
 from contextdb.core import Answer
 from contextdb.errors import ContextError, Fault, WrongType, plural
-
-if TYPE_CHECKING:
-    import polars as pl
 
 Bits = TypeVar("Bits", int, Words)
 Join = Callable[[Any, Any], Any]

@@ -19,14 +19,14 @@ from numpy.typing import NDArray
 from contextdb import bitmask
 from contextdb.bitmask import Rows, Words, read_only
 from contextdb.cells.arguments import require_kind, require_real, require_whole
-from contextdb.compiled.batch_costs import CostsOfPairs
+from contextdb.compiled.batch_columns import CostsOfPairs
 from contextdb.compiled.casting.stage import CastMatches
 from contextdb.compiled.choosing import Choosing
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.many import ManyMatches
 from contextdb.compiled.matches import Matches, answering_of
+from contextdb.compiled.pick import Left, why
 from contextdb.compiled.picked import Picked
-from contextdb.compiled.why_picked import Left, why
 from contextdb.core import Choices
 from contextdb.errors import ContextError, Fault, Place, PolicyError, in_quotes, plural
 

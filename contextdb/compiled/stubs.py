@@ -21,8 +21,7 @@ from contextdb.cells.domains import Domain
 from contextdb.cells.outputs import Output
 from contextdb.cells.words import format_number
 from contextdb.compiled.core_table import values_of
-from contextdb.compiled.stub_contexts import NUMBERS, accepted, contexts_of, roles_of
-from contextdb.compiled.stub_tables import matches_of, table_of
+from contextdb.compiled.stub_tables import NUMBERS, accepted, contexts_of, matches_of, roles_of, table_of
 from contextdb.compiled.table import CompiledTable
 from contextdb.errors import safe_text
 

@@ -19,6 +19,7 @@ from contextdb.cells.arguments import require_path
 from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import Context, Unknown, check_mode, require_context
 from contextdb.cells.notebook import as_html
+from contextdb.columns import polars as pl
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.matches import Matches
 from contextdb.compiled.memory import Rng
@@ -30,8 +31,6 @@ from contextdb.errors import ContextError, Fault, WrongType, in_quotes
 from contextdb.schema.policies import Policy
 
 if TYPE_CHECKING:
-    import polars as pl
-
     from contextdb.compiled.casting.facts import Actors, Prefer
     from contextdb.compiled.explain import Explanation
     from contextdb.compiled.live import LiveContext

@@ -16,6 +16,7 @@
 #include "python_steps.h"
 #include "python_table.h"
 #include "python_live.h"
+#include "python_programs.h"
 #include "python_count.h"
 #include "python_poses.h"
 #include "python_legs.h"
@@ -24,6 +25,7 @@
 #include "python_joint.h"
 #include "python_controller.h"
 #include "python_walk.h"
+#include "python_nodes.h"
 #include "batch.h"
 #include "python_batch.h"
 #include "fact_columns.h"
@@ -37,8 +39,8 @@
 /* Make the types, and put them into the module. */
 static int cdbp_exec(PyObject *module)
 {
-    static PyType_Spec *const specs[] = {&cdbp_shared_spec, &cdbp_answer_spec, &cdbp_table_spec, &cdbp_live_spec, &cdbp_boxes_spec, &cdbp_pose_frames_spec, &cdbp_poses_spec, &cdbp_frames_spec, &cdbp_batch_spec, &cdbp_choices_spec, &cdbp_controller_spec, &cdbp_ways_spec};
-    static const char *const names[] = {"Shared", "Answer", "Table", "Live", "Boxes", "PoseFrames", "Poses", "Frames", "Batch", "Choices", "Controllers", "Ways"};
+    static PyType_Spec *const specs[] = {&cdbp_shared_spec, &cdbp_answer_spec, &cdbp_table_spec, &cdbp_live_spec, &cdbp_boxes_spec, &cdbp_pose_frames_spec, &cdbp_poses_spec, &cdbp_frames_spec, &cdbp_batch_spec, &cdbp_choices_spec, &cdbp_controller_spec, &cdbp_ways_spec, &cdbp_program_spec};
+    static const char *const names[] = {"Shared", "Answer", "Table", "Live", "Boxes", "PoseFrames", "Poses", "Frames", "Batch", "Choices", "Controllers", "Ways", "Program"};
     size_t i;
     for (i = 0; i < sizeof specs / sizeof *specs; i++) {
         PyObject *type = PyType_FromModuleAndSpec(module, specs[i], NULL);
@@ -57,6 +59,7 @@ static PyMethodDef cdbp_functions[] = {
     CDBP_JOINT_FUNCTIONS
     CDBP_CONTROLLER_FUNCTIONS
     CDBP_WALK_FUNCTIONS
+    CDBP_NODE_FUNCTIONS
     {"group_keys", CDBP_CALL(cdbp_group_keys), METH_FASTCALL, "The distinct keys of many contexts; see contextdb.telemetry.keys."},
     {"hash_keys", CDBP_CALL(cdbp_hash_keys), METH_FASTCALL, "A hash of each key."},
     {"list_rows", CDBP_CALL(cdbp_list_rows), METH_FASTCALL, "The rows of masks, one mask after the other."},

@@ -30,7 +30,7 @@ class Table:
     those of an enum from 0, of declared tags from 1, behind ""; `numbers` is the number of each; `read` makes a plain fact of
     another one. A column is (kind, shift, arrays, texts, negated), its arrays (masks,), (bounds, masks) or (bounds, low, high,
     any_mask), as in `contextdb.compiled.classes`; `soft` is (column, penalties), with the rows of each depth one after the other.
-    Programs are (texts, facts, types, numbers, code, starts, derived, of_row), as in `contextdb.compiled.programs`. Raises
+    Programs are (texts, facts, types, numbers, code, starts, derived, of_row), as in `contextdb.expressions.programs`. Raises
     ValueError where parts do not go together, or a text cannot be one of C. Of a table with such texts `enabled` is None and
     `conditions` are names alone: the careful way then answers everything.
     """
@@ -121,6 +121,43 @@ class Boxes:
 def direction_of(x: float, z: float, heading: float, /) -> float:
     """Where a stick points against the way a body faces, degrees."""
 
+def motion_then(
+    left: float, ahead: float, turn: float, then_left: float, then_ahead: float, then_turn: float, /
+) -> tuple[float, float, float]:
+    """A movement over the ground, and another one after it."""
+
+def motion_from(
+    left: float, ahead: float, turn: float, to_left: float, to_ahead: float, to_turn: float, /
+) -> tuple[float, float, float]:
+    """The movement that leads from one place of a body to another one."""
+
+def warp(
+    times: NDArray[np.float64],
+    path: NDArray[np.float64],
+    windows: NDArray[np.float64],
+    target: NDArray[np.float64],
+    knots: NDArray[np.float64],
+    own: NDArray[np.float64],
+    places: NDArray[np.float64],
+    shares: NDArray[np.float64],
+    /,
+) -> int:
+    """Write a path that is warped to a target, into arrays for four more knots than it has frames; how many it has. The path is
+    unwrapped."""
+
+def row_at(times: NDArray[np.float64], rows: NDArray[np.float64], time_s: float, to: NDArray[np.float64], /) -> None:
+    """Write the row between two times."""
+
+def aim(
+    ends: NDArray[np.float64],
+    target: NDArray[np.float64],
+    weights: NDArray[np.float64],
+    distances: NDArray[np.float64],
+    rotations: NDArray[np.float64],
+    /,
+) -> None:
+    """Write what a target adds to the costs of frames, from where each brings the body by itself."""
+
 def count_holders(
     codes: NDArray[np.int32],
     starts: NDArray[np.int64],
@@ -175,6 +212,12 @@ class PoseFrames:
     ) -> None:
         """Write how much the joint that accelerates most does so in each frame of a range, over steps of some frames."""
 
+class Program:
+    """An expression as a program; see python_programs.h. Raises ValueError for one that C cannot compute."""
+
+    def __init__(self, code: NDArray[np.int32], numbers: NDArray[np.float64], texts: tuple[str, ...], types: str) -> None: ...
+    def run(self, values: tuple[object, ...]) -> float | bool | str | frozenset[str] | None: ...
+
 class Ways:
     """How far the paths of characters are looked at; see walk.h. Raises ValueError where a feature is not there."""
 
@@ -183,16 +226,25 @@ class Ways:
     ) -> None: ...
     @property
     def width(self) -> int: ...
-    def move(
+    def go_on(
         self,
+        controllers: Controllers,
         before: NDArray[np.float64],
         goals: NDArray[np.float64],
         bodies: NDArray[np.float64] | None,
         dt_s: float,
+        rows: NDArray[np.float64],
+        poses: NDArray[np.float64] | None,
         after: NDArray[np.float64],
+        moved: NDArray[np.float64],
+        queries: NDArray[np.float64],
+        places: NDArray[np.float64],
+        facts: NDArray[np.float64],
         /,
     ) -> None:
-        """Write walks as they are some time later; a body that is NaN follows its goal."""
+        """Write walks as they are some time later, what plays, the queries that ask for the paths that are wished for, where bodies
+        are, and their speed, the direction of their sticks and their turn. A body that is NaN follows its goal, a pose that is NaN
+        is that of what plays."""
     def n_frames(self, walks: NDArray[np.float64], goals: NDArray[np.float64], /) -> int:
         """How many frames the longest of their paths has."""
     def n_behind(self, rate: float, /) -> int:
@@ -211,7 +263,7 @@ class Ways:
         """Write the paths that are wished for, and queries; without goals the frames from now on are there."""
     def rest(self, walks: NDArray[np.float64], mean: NDArray[np.float64], poses: NDArray[np.float64], /) -> None:
         """Write the poses of characters that play nothing."""
-    def settle(self, walks: NDArray[np.float64], roots: NDArray[np.float64], moves_body: int, /) -> None:
+    def settle(self, walks: NDArray[np.float64], roots: NDArray[np.float64], moves_body: NDArray[np.bool_], /) -> None:
         """Put walks where poses are displayed."""
 
 class Poses:
@@ -243,9 +295,11 @@ class Poses:
         dt_s: float,
         given: NDArray[np.float64],
         seams: NDArray[np.float64],
+        displayed: NDArray[np.float64],
         /,
     ) -> int:
-        """Write what happens to characters by what was decided; gives how many moments at seams there are, two for each."""
+        """Write what happens to characters by what was decided, and what is displayed then; gives how many moments at seams there
+        are, two for each."""
     def update(
         self,
         before: NDArray[np.float64],
@@ -438,6 +492,19 @@ def fill_ranges(*arguments: NDArray[Any] | int | None) -> None:
     """fill_ranges(starts, rows, mirrored, at, masks, in_mirror, costs, costs_in_mirror, own_biases, ranges, biases, plays, chosen):
     which ranges each of some answers lets play, into columns from `at` on, and by which row; `rows` from `starts[r]` on are those
     of range r."""
+
+def fill_plays(
+    decisions: NDArray[np.float64],
+    starts: NDArray[np.int64],
+    banks: NDArray[np.int64],
+    ranges: NDArray[np.int64],
+    displayed: NDArray[np.float64],
+    gives: NDArray[np.bool_],
+    plays: NDArray[np.float64],
+    /,
+) -> bool:
+    """Write what poses are made of, by what was decided; gives whether the banks have all that plays. `banks` is that of each
+    database, `ranges` from `starts[d]` on the range there of each of its ranges, below 0 for none."""
 
 def search_joint(*arguments: NDArray[Any]) -> None:
     """search_joint(blocks, rank, boxes, lows, highs, channels, weights, ranges, firsts, relative, relative_lows, relative_highs,

@@ -243,7 +243,7 @@ static inline double cdbi_wrapped(double degrees)
     return rest >= 180 ? rest - 360 : rest;
 }
 
-/* The angle in radians whose tangent is x, from -0.4143 to 0.4143: the sums of contextdb's trigonometry.py, in their order. */
+/* The angle in radians whose tangent is x, from -0.4143 to 0.4143: the sums of contextdb's arithmetic.py, in their order. */
 static inline double cdbi_arc(double x)
 {
     double z = cdbi_product(x, x), w = cdbi_product(z, z), even, odd;

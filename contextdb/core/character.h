@@ -23,20 +23,22 @@ typedef struct cdbm_player {
     cdbm_frames frames[CDBM_MOST_DATABASES];
     cdbm_table_ranges tables[CDBM_MOST_DATABASES]; /* the rows that name the ranges of each database, where it has a table */
     int64_t table_of[CDBM_MOST_DATABASES], bank_of[CDBM_MOST_DATABASES], database_of[CDBM_MOST_DATABASES]; /* in the bundle; -1: none */
+    cdbm_events events[CDBM_MOST_DATABASES];
     const int64_t *pose_ranges[CDBM_MOST_DATABASES]; /* [R] the range of poses of each range */
+    const double *warps[CDBM_MOST_DATABASES], *ends[CDBM_MOST_DATABASES]; /* [R, 2, 2] and [N, 3], for match nodes; or NULL */
     cdbm_ways ways;
     cdbo_poses poses;
     cdbo_frames banks[CDBM_MOST_DATABASES];
     const cdbo_frames *bank_list[CDBM_MOST_DATABASES];
     const double *range_biases, *kind_biases;
     const uint8_t *allowed, *playable;
-    size_t n_ranges, n_kinds;
+    size_t n_ranges, n_kinds, n_frames;
     double velocity_halflife_s, heading_halflife_s;
     int has_poses, has_costs;
     cdb_any *opened[CDBM_MOST_TABLES];
     cdb_row_play *plays;            /* of the rows of all tables, one after the other; NULL where none says */
     int64_t plays_at[CDBM_MOST_TABLES]; /* where those of each table begin; -1 where it says nothing */
-    size_t n_tables, n_most_rows;
+    size_t n_tables, n_most_rows, n_longest; /* the longest range that a match node may enter */
     cdbm_bundle bundle;
     size_t number;                  /* of the controller */
 } cdbm_player;
@@ -58,7 +60,10 @@ typedef struct cdbm_input {
     cdbm_ground ground;             /* or NULL, where all is flat */
     void *user;                     /* what the ground is asked with */
     int force, interrupt;           /* search now; and leave what plays */
+    const char *event;              /* a tag of the markup, "Contact.Left" and "Contact.Right" too, that is to begin; or NULL */
+    double event_s;                 /* in so many seconds, 0 or more: to be given in each update until then */
     int is_copy;                    /* it plays what its owner does, on another machine: it neither asks tables nor searches */
+    cdbm_one_off *one_off;          /* what it plays in place of that, and is moved by, see match.h; or NULL */
     const uint8_t *packet;          /* what cdbm_pack of the owner gave; of no bytes where nothing arrived */
     size_t n_packet;
 } cdbm_input;
@@ -122,6 +127,21 @@ static inline void cdbm_read_rows(cdbm_bundle *bundle, size_t number, size_t n_r
         if (of->rows[i] < 0 || (uint64_t)of->rows[i] >= n_table_rows) cdbm_refuse(bundle, "a row of a table is not there");
 }
 
+/* What match nodes know of a database, where there is any. */
+static inline void cdbm_read_ends(cdbm_bundle *bundle, size_t number, size_t at, cdbm_player *player)
+{
+    const cdbm_clips *clips = &player->clips[at];
+    size_t n, r;
+    if (!cdbm_find(bundle, CDBM_P_ENDS, number, 1, &n)) return;
+    player->ends[at] = CDBM_TAKE(double, CDBM_P_ENDS, 3 * clips->frames->n_frames);
+    player->warps[at] = CDBM_TAKE(double, CDBM_P_WARPS, 4 * clips->n_ranges);
+    if (!clips->root) cdbm_refuse(bundle, "a database for match nodes does not say where its clips go");
+    for (r = 0; r < clips->n_ranges; r++) {
+        size_t length = (size_t)(clips->stops[r] - clips->starts[r]);
+        if (length > player->n_longest) player->n_longest = length;
+    }
+}
+
 static inline void cdbm_read_entry(cdbm_bundle *bundle, cdbm_player *player, size_t i, const int64_t *entry, double threshold, double bar)
 {
     cdbm_clips *clips = &player->clips[i];
@@ -129,18 +149,20 @@ static inline void cdbm_read_entry(cdbm_bundle *bundle, cdbm_player *player, siz
     cdbo_frames *bank;
     cdbm_read_database(bundle, number, &player->frames[i], clips);
     clips->threshold = threshold, clips->bar = bar;
-    clips->range_at = player->n_ranges, clips->kind_at = player->n_kinds;
+    clips->range_at = player->n_ranges, clips->kind_at = player->n_kinds, clips->frame_at = player->n_frames;
     player->database_of[i] = entry[0], player->table_of[i] = entry[2];
     if (bundle->why) return;
     if (i == 0) player->controller.n_features = clips->frames->n_features;
     if (clips->frames->n_features != player->controller.n_features) cdbm_refuse(bundle, "two databases have other features");
-    player->n_ranges += clips->n_ranges, player->n_kinds += clips->n_kinds;
+    player->n_ranges += clips->n_ranges, player->n_kinds += clips->n_kinds, player->n_frames += clips->frames->n_frames;
+    cdbm_read_events(bundle, number, clips->frames->n_frames, &player->events[i]);
     if (entry[2] >= (int64_t)player->n_tables) cdbm_refuse(bundle, "a database has a table that is not there");
     else if (entry[2] >= 0) {
         cdbm_read_rows(bundle, number, clips->n_ranges, player->opened[entry[2]]->table.n_rows, &player->tables[i]);
         player->tables[i].plays = player->opened[entry[2]]->table.plays;
     }
     player->tables[i].at = clips->range_at;
+    cdbm_read_ends(bundle, number, i, player);
     if (!player->has_poses || entry[1] < 0) {
         if (player->has_poses && clips->n_ranges > 0) cdbm_refuse(bundle, "a database has no poses");
         return;
@@ -273,7 +295,9 @@ static inline size_t cdbm_room_size(const cdbm_player *player, size_t n)
         + cdbm_rounded(player->controller.n_databases * (sizeof(cdbm_found) + 1)) + cdbm_rounded(sizeof(cdbm_decision))
         + cdbm_rounded(sizeof(cdbm_followed));
     return n * each + cdbm_rounded((4 * n_frames + 3 * n_features) * sizeof(double)) + cdbm_choice_room(&player->controller, n)
-        + cdbm_rounded((player->has_poses ? cdbo_pose_room(&player->poses) : 0) * sizeof(double)) + cdbm_answer_room(player) + 256;
+        + cdbm_rounded(player->n_frames * sizeof(double)) + cdbm_rounded(player->n_frames)
+        + cdbm_rounded((player->has_poses ? cdbo_pose_room(&player->poses) : 0) * sizeof(double)) + cdbm_answer_room(player)
+        + cdbm_path_room(player->n_longest) + 256;
 }
 
 /* A character that stands at a place and has not done anything yet. */
@@ -359,9 +383,7 @@ static inline void cdbm_add_own(const cdbm_player *player, size_t table, size_t 
     if (condition->expr || !cdbi_is_missing(condition, fact)) return;
     if (!cdbi_is_double(condition->type)) return;
     if (!cdbm_said_of(player, CDBM_P_OWN_FACTS, table, condition->name, &letter)) return;
-    if (letter == 's') fact->number = cdbo_flat_length(walk->body.velocity[0], walk->body.velocity[1]);
-    if (letter == 'd') fact->number = cdbm_direction(goal->velocity, walk->body.heading);
-    if (letter == 't') fact->number = walk->body.turn_rate * (180.0 / CDBO_PI);
+    fact->number = cdbm_own_fact(walk, goal, letter);
 }
 
 /* The facts as a mirror shows them; whether any is another. */
@@ -482,12 +504,10 @@ static inline int cdbm_query_of(const cdbm_player *player, const cdbm_input *inp
     float *narrow;
     if (!positions) return 0;
     headings = positions + 2 * n_most, lengths = headings + n_most, pose = lengths + n_most, narrow = (float *)(void *)(pose + ways->n_features);
-    cdbm_walk_on(ways, before, &input->goal, input->body, dt_s, state);
     memcpy(cdbm_played_part(player, state), cdbm_played_part(player, (double *)(uintptr_t)before),
         (cdbm_state_width(player) - cdbm_walk_width(ways)) * sizeof(double));
-    cdbm_move(&player->controller, cdbm_played_part(player, state), dt_s, moved);
-    if (moved->to.database < 0.0) cdbm_rest_pose(ways, state, player->frames[0].offset, pose);
-    else cdbm_features(player->clips[(size_t)moved->to.database].frames, (int64_t)moved->to.frame, pose);
+    cdbm_move_on(ways, &player->controller, player->frames[0].offset, before, cdbm_played_part(player, state), &input->goal, input->body, dt_s,
+        state, moved, pose);
     if (input->positions) {
         rate = input->path_rate, n_behind = rate > 0.0 ? cdbm_n_behind(ways, rate) : n_most;
         if (input->n_path == 0 || n_behind >= n_most) return 0;
@@ -511,11 +531,52 @@ static inline cdbo_instant cdbm_instant_of(const cdbm_player *player, const cdbm
     return at;
 }
 
-/* The pose of one, by what was decided. */
-static inline void cdbm_pose_of(const cdbm_player *player, const cdbm_input *input, double dt_s, const double *before, double *state,
-    cdbm_pose *pose, double *room)
+/* Where a one-off brings the body in an update. 1; 0 with too little room; -5 for one of another bundle. */
+static inline int cdbm_bring(const cdbm_player *player, const double *state, double dt_s, const cdbm_one_off *one, cdbo_body *body,
+    cdbm_room room)
 {
-    const cdbm_decision *decision = &pose->decision;
+    cdbm_playing entered;
+    cdbm_warped path;
+    double place[3], was[2];
+    size_t k;
+    entered.database = one->database, entered.range = one->range, entered.frame = one->frame, entered.at_s = one->time_s;
+    if (!(one->database >= 0.0) || !cdbm_is_playing(&player->controller, &entered) || !player->ends[(size_t)one->database]) return -5;
+    entered.frame = one->last;
+    if (!cdbm_is_playing(&player->controller, &entered) || !(one->last >= one->frame && one->rate > 0.0)) return -5;
+    if (!cdbm_path_of(&player->clips[(size_t)one->database], one, &path, room)) return 0;
+    *body = ((const cdbm_walk *)(const void *)state)->body;
+    memcpy(was, body->position, sizeof was);
+    cdbm_place_at(&path, one->time_s + dt_s, place);
+    cdbm_then(one->origin, place, place);
+    body->heading = place[2];
+    for (k = 0; k < 2; k++) {
+        body->position[k] = place[k], body->acceleration[k] = 0.0;
+        if (dt_s > 0.0) body->velocity[k] = (place[k] - was[k]) / dt_s;
+    }
+    return 1;
+}
+
+/* What it then shows, in place of what was decided. 0 with too little room. */
+static inline int cdbm_decision_of(const cdbm_player *player, const cdbm_one_off *before, double dt_s, cdbm_decision *decision,
+    cdbm_room room)
+{
+    const cdbm_clips *clips = &player->clips[(size_t)before->database];
+    cdbm_one_off one = *before;
+    cdbm_warped path;
+    memset(decision, 0, sizeof *decision);
+    if (!cdbm_path_of(clips, before, &path, room)) return 0;
+    cdbm_advance(clips, &one, dt_s);
+    decision->action = one.since_s == 0.0 ? CDBM_JUMPS : CDBM_PLAYS_ON;
+    decision->playing = cdbm_playing_of(clips, &one), decision->before.database = CDBM_NO_DATABASE;
+    decision->rate = one.rate, decision->play = one.play;
+    cdbm_motion_of(&path, &one, decision->motion);
+    return 1;
+}
+
+/* The pose of one, by what was decided. */
+static inline void cdbm_pose_of(const cdbm_player *player, const cdbm_input *input, const cdbm_decision *decision, double dt_s,
+    const double *before, double *state, cdbm_pose *pose, double *room)
+{
     const cdbo_rig *rig = &player->poses.rig;
     const cdbm_walk *walk = (const cdbm_walk *)(const void *)state;
     cdbo_instant *displayed = cdbm_displayed(player, state);
@@ -525,13 +586,9 @@ static inline void cdbm_pose_of(const cdbm_player *player, const cdbm_input *inp
     cdbo_given given;
     cdbo_seam seams[2];
     cdbo_posed one;
-    memset(&play, 0, sizeof play);
     memset(&one, 0, sizeof one);
-    play.playing = cdbm_instant_of(player, &decision->playing), play.before = cdbm_instant_of(player, &decision->before);
-    play.displayed = *displayed, play.action = decision->action, play.rate = decision->rate, play.weight = decision->root_weight;
-    play.gives_ground = input->ground ? 1.0 : 0.0;
-    memcpy(play.motion, decision->motion, sizeof play.motion);
-    play.blend_s = decision->play.blend_s, play.root = decision->play.root;
+    play = cdbm_pose_play(decision, cdbm_instant_of(player, &decision->playing), cdbm_instant_of(player, &decision->before), *displayed,
+        input->ground != NULL);
     one.poses = &player->poses, one.before = cdbm_pose_part(player, (double *)(uintptr_t)before), one.row = cdbm_pose_part(player, state);
     cdbo_receive(&player->poses, one.before, &play, dt_s, &given, seams, &n_seams);
     place[0] = walk->body.position[0], place[1] = walk->body.position[1], place[2] = walk->body.heading;
@@ -558,8 +615,78 @@ static inline int cdbm_moves_body(const cdbm_player *player, const cdbm_decision
     return (root == root ? root : player->poses.settings[CDBO_ROOT]) == CDBO_BY_ANIMATION;
 }
 
+/* Whether some database has an event of a name; its name there, or NULL. */
+static inline const char *cdbm_event_name(const cdbm_player *player, const char *name)
+{
+    const int64_t *begins;
+    size_t d, n;
+    for (d = 0; d < player->controller.n_databases; d++)
+        if (cdbm_find_event(&player->bundle, (size_t)player->database_of[d], &player->events[d], name, &begins, &n)) return name;
+    return NULL;
+}
+
+/* Whether one searches for an event; a copy does what its owner does. */
+static inline int cdbm_seeks_event(const cdbm_input *input)
+{
+    return input->event != NULL && !input->is_copy;
+}
+
+/* Put an event into what one is given: how far it is from each frame, and which lead there. 0 with too little room. */
+static inline int cdbm_give_event(const cdbm_player *player, const cdbm_input *input, const int64_t *play_of, cdbm_given *given, cdbm_room *room)
+{
+    double *to_event = (double *)cdbm_part(room, player->n_frames * sizeof(double));
+    uint8_t *leads = (uint8_t *)cdbm_part(room, player->n_frames);
+    const int64_t *begins;
+    size_t d, f, n;
+    if (!to_event || !leads) return 0;
+    for (f = 0; f < player->n_frames; f++) to_event[f] = NAN, leads[f] = 0;
+    for (d = 0; d < player->controller.n_databases; d++) {
+        size_t at = player->clips[d].frame_at;
+        if (cdbm_find_event(&player->bundle, (size_t)player->database_of[d], &player->events[d], input->event, &begins, &n))
+            cdbm_lead_to(&player->controller, &player->clips[d], given->plays, play_of, given->playable, begins, n, input->event_s, to_event + at, leads + at);
+    }
+    given->flags = leads, given->to_event = to_event, given->event_s = input->event_s;
+    return 1;
+}
+
+/* All of an update of one who searches for an event: among the frames that lead there, and at once where what plays does not. As
+ * cdbm_choose. */
+static inline int cdbm_decide_for_event(const cdbm_player *player, const cdbm_input *input, const cdbm_given *given, size_t i, const double *before,
+    double *after, const cdbm_many *many, double *numbers, cdbm_room room)
+{
+    const cdbm_controller *controller = &player->controller;
+    size_t width = cdbm_width(controller);
+    cdbm_given own = *given;
+    cdbm_moved *moved = &many->moved[i];
+    int is_done;
+    if (!cdbm_give_event(player, input, many->play_of + i * player->n_ranges, &own, &room)) return 0;
+    if (moved->to.database >= 0.0 && !own.flags[player->clips[(size_t)moved->to.database].frame_at + (size_t)moved->to.frame])
+        many->urgent[i] |= CDBM_FORCE;
+    cdbm_ask(controller, &own, i, before + i * width, moved, after + i * width, &many->decisions[i], numbers);
+    is_done = cdbm_choose(controller, &own, i, i + 1, after, many->moved, many->decisions, many->found, room);
+    if (is_done != 1) return is_done;
+    cdbm_compare(controller, &own, i, moved, &many->decisions[i], numbers);
+    cdbm_decide(controller, &own, i, before + i * width, moved, after + i * width, &many->decisions[i]);
+    return 1;
+}
+
+/* Search for all who seek no event. As cdbm_choose. */
+static inline int cdbm_choose_others(const cdbm_controller *controller, const cdbm_given *given, const cdbm_input *inputs, const double *after,
+    const cdbm_many *many, cdbm_room room)
+{
+    size_t start, stop;
+    int is_done = 1;
+    for (start = 0; is_done == 1 && start < given->n; start = stop) {
+        for (stop = start; stop < given->n && !cdbm_seeks_event(&inputs[stop]); stop++) {}
+        is_done = cdbm_choose(controller, given, start, stop, after, many->moved, many->decisions, many->found, room);
+        while (stop < given->n && cdbm_seeks_event(&inputs[stop])) stop++;
+    }
+    return is_done;
+}
+
 /* Update characters: `states` are their blocks, one after another. 1; 0 with too little room, or a path that is none; -1 where what is
- * asked for is no finite number; -2 for a fact that a table refuses; -3 for a packet that is none. Where it is not 1 all stand where they stood. */
+ * asked for is no finite number; -2 for a fact that a table refuses; -3 for a packet that is none; -4 for an event that no
+ * database has; -5 for a one-off that is none. Where it is not 1 all stand where they stood. */
 static inline int cdbm_update_all(const cdbm_player *player, size_t n, double *states, double dt_s, const cdbm_input *inputs,
     cdbm_pose *poses, cdbm_room room)
 {
@@ -579,8 +706,16 @@ static inline int cdbm_update_all(const cdbm_player *player, size_t n, double *s
     given.kind_biases = player->kind_biases, given.among = many.among, given.urgent = many.urgent;
     given.among_step = controller->n_databases;
     for (i = 0; i < n; i++) {
+        if (inputs[i].event && !(inputs[i].event_s >= 0.0 && inputs[i].event_s <= 1e6)) return -1;
+        if (inputs[i].event && !cdbm_event_name(player, inputs[i].event)) return -4;
+        cdbm_input input = inputs[i];
+        cdbo_body body;
+        if (input.one_off) {
+            if ((is_done = cdbm_bring(player, states + i * width, dt_s, input.one_off, &body, room)) != 1) return is_done;
+            input.body = &body;
+        }
         many.urgent[i] = (uint8_t)((inputs[i].force ? CDBM_FORCE : 0) | (inputs[i].interrupt ? CDBM_INTERRUPT : 0));
-        if (!cdbm_query_of(player, &inputs[i], dt_s, states + i * width, many.states + i * width, &many.moved[i],
+        if (!cdbm_query_of(player, &input, dt_s, states + i * width, many.states + i * width, &many.moved[i],
                 many.queries + i * n_features, room)) return 0;
         is_done = inputs[i].is_copy ? cdbm_let_follow(player, &inputs[i], &many, i) : cdbm_let_play(player, &inputs[i], many.states + i * width, many.ranges + i * player->n_ranges,
             many.biases + i * player->n_ranges, many.play_of + i * player->n_ranges, room);
@@ -593,32 +728,49 @@ static inline int cdbm_update_all(const cdbm_player *player, size_t n, double *s
     for (i = 0; i < n; i++) {
         cdbm_given own = given;
         memcpy(before + i * played, cdbm_played_part(player, states + i * width), played * sizeof(double));
+        if (cdbm_seeks_event(&inputs[i])) {
+            is_done = cdbm_decide_for_event(player, &inputs[i], &given, i, before, after, &many, numbers, left);
+            if (is_done != 1) return is_done;
+            continue;
+        }
         if (inputs[i].is_copy) own.plays = &many.followed[i].play;
         cdbm_ask(controller, &own, i, before + i * played, &many.moved[i], after + i * played, &many.decisions[i], numbers);
         if (!inputs[i].is_copy) continue;
         cdbm_take_followed(&many.followed[i], &many.decisions[i]);
         memset(many.among + i * controller->n_databases, 0, controller->n_databases); /* it searches none */
     }
-    is_done = cdbm_choose(controller, &given, 0, n, after, many.moved, many.decisions, many.found, left);
+    is_done = cdbm_choose_others(controller, &given, inputs, after, &many, left);
     if (is_done != 1) return is_done;
     for (i = 0; i < n; i++) {
         cdbm_given own = given;
-        if (inputs[i].is_copy) own.plays = &many.followed[i].play;
-        else cdbm_compare(controller, &given, i, &many.moved[i], &many.decisions[i], numbers);
-        cdbm_decide(controller, &own, i, before + i * played, &many.moved[i], after + i * played, &many.decisions[i]);
+        cdbm_room rest = left;
+        if (inputs[i].is_copy && inputs[i].event && !cdbm_give_event(player, &inputs[i], many.play_of + i * player->n_ranges, &own, &rest)) return 0;
+        if (inputs[i].is_copy) own.plays = &many.followed[i].play, own.flags = NULL;
+        else if (!inputs[i].event) cdbm_compare(controller, &given, i, &many.moved[i], &many.decisions[i], numbers);
+        if (!cdbm_seeks_event(&inputs[i]))
+            cdbm_decide(controller, &own, i, before + i * played, &many.moved[i], after + i * played, &many.decisions[i]);
         memcpy(cdbm_played_part(player, many.states + i * width), after + i * played, played * sizeof(double));
         poses[i].decision = many.decisions[i];
     }
     for (i = 0; i < n; i++) {
         double *state = many.states + i * width, *own = states + i * width;
         const cdbm_walk *walk = (const cdbm_walk *)(const void *)state;
-        poses[i].root[0] = walk->body.position[0], poses[i].root[1] = walk->body.position[1], poses[i].root[2] = walk->body.heading;
+        const cdbm_decision *decision = &poses[i].decision;
+        cdbm_decision shown;
+        double place[3];
+        place[0] = walk->body.position[0], place[1] = walk->body.position[1], place[2] = walk->body.heading;
+        memcpy(poses[i].root, place, sizeof place);
+        if (inputs[i].one_off && !cdbm_decision_of(player, inputs[i].one_off, dt_s, &shown, room)) return 0;
+        if (inputs[i].one_off) decision = &shown;
         left = room;
         numbers = (double *)cdbm_part(&left, (player->has_poses ? cdbo_pose_room(&player->poses) : 0) * sizeof(double));
         if (!numbers) return 0;
-        if (player->has_poses) cdbm_pose_of(player, &inputs[i], dt_s, own, state, &poses[i], numbers);
-        cdbm_settle(state, poses[i].root, player->has_poses && cdbm_moves_body(player, &poses[i].decision));
+        if (player->has_poses) cdbm_pose_of(player, &inputs[i], decision, dt_s, own, state, &poses[i], numbers);
+        if (inputs[i].one_off) cdbm_settle(state, place, 0);
+        else cdbm_settle(state, poses[i].root, player->has_poses && cdbm_moves_body(player, decision));
     }
+    for (i = 0; i < n; i++)
+        if (inputs[i].one_off) cdbm_advance(&player->clips[(size_t)inputs[i].one_off->database], inputs[i].one_off, dt_s);
     memcpy(states, many.states, n * width * sizeof(double));
     return 1;
 }

@@ -24,7 +24,7 @@ typedef enum cdbm_action { CDBM_STARTS, CDBM_PLAYS_ON, CDBM_JUMPS, CDBM_LOOPS, C
 typedef enum cdbm_standing { CDBM_IS_VALID, CDBM_IS_WIDENED, CDBM_IS_NOT_VALID } cdbm_standing;
 typedef enum cdbm_why { CDBM_WHY_NOT_VALID = 1, CDBM_WHY_NATURE = 4, CDBM_WHY_JUMP = 8, CDBM_WHY_HISTORY = 9, CDBM_WHY_START = 12, CDBM_WHY_ASSET = 13 }
     cdbm_why;
-enum { CDBM_EXCLUDED = 1, CDBM_NEXT_NATURAL = 8 }; /* flags of a kind of frames */
+enum { CDBM_EXCLUDED = 1, CDBM_NEXT_NATURAL = 8, CDBM_IN_MATCH_RANGE = 32 }; /* flags of a kind of frames */
 enum { CDBM_FORCE = 1, CDBM_INTERRUPT = 2 };
 enum { CDBM_NO_DATABASE = -1, CDBM_GONE = -2, CDBM_GO_ON = -2 };
 
@@ -936,4 +936,19 @@ static inline void cdbm_fill_ranges(const cdbm_table_ranges *of, const uint64_t 
         ranges[of->at + r] = is_valid;
         if (cost) biases[of->at + r] = own[of->at + r] + (is_valid ? least : 0.0);
     }
+}
+
+/* ---- what was decided, for poses */
+
+/* What poses are made of, by a decision and the moments of banks that it names. */
+static inline cdbo_play cdbm_pose_play(const cdbm_decision *decision, cdbo_instant playing, cdbo_instant before, cdbo_instant displayed,
+    int gives_ground)
+{
+    cdbo_play play;
+    play.playing = playing, play.before = before, play.displayed = displayed;
+    play.action = decision->action, play.rate = decision->rate, play.weight = decision->root_weight;
+    play.gives_ground = gives_ground ? 1.0 : 0.0;
+    memcpy(play.motion, decision->motion, sizeof play.motion);
+    play.blend_s = decision->play.blend_s, play.root = decision->play.root;
+    return play;
 }

@@ -5,7 +5,9 @@
  *   cdbm_crowd_size      how many there are of something
  *   cdbm_crowd_table, cdbm_crowd_live   a table of the bundle, and a character's facts for it: set them by cdb_set_number and the others
  *   cdbm_place_one, cdbm_steer_one      put one somewhere, with nothing played yet; and what its stick asks for
+ *   cdbm_event_one       what is to happen, and in how many seconds
  *   cdbm_restore_one     put one where it stood
+ *   cdbm_enter_one       play a one-off that a match node chooses for a target
  *   cdbm_update_crowd    all of them
  *   cdbm_crowd_numbers, cdbm_crowd_text what came of it
  *
@@ -23,12 +25,19 @@ typedef struct cdbm_crowd {
     double *states;
     cdbm_pose *poses;
     cdbm_input *inputs;
+    cdbm_one_off *one_offs;
     cdb_live **lives;               /* [n, tables] */
     const cdb_fact **lists;         /* [n, tables] */
     cdbm_room room;
     void *memory;
     cdb_fault fault;
 } cdbm_crowd;
+
+static inline size_t cdbm_crowd_room(const cdbm_player *player, size_t n)
+{
+    size_t one = cdbm_enter_room(player), all = cdbm_room_size(player, n);
+    return one > all ? one : all;
+}
 
 /* Take all that n characters need out of room; 0 where there is too little. */
 static inline int cdbm_take_crowd(cdbm_crowd *crowd, size_t n, cdb_unknown unknown, cdbm_room *room)
@@ -39,11 +48,12 @@ static inline int cdbm_take_crowd(cdbm_crowd *crowd, size_t n, cdb_unknown unkno
     crowd->states = (double *)cdbm_part(room, n * cdbm_state_size(player));
     crowd->poses = (cdbm_pose *)cdbm_part(room, n * sizeof *crowd->poses);
     crowd->inputs = (cdbm_input *)cdbm_part(room, n * sizeof *crowd->inputs);
+    crowd->one_offs = (cdbm_one_off *)cdbm_part(room, n * sizeof *crowd->one_offs);
     crowd->lives = (cdb_live **)cdbm_part(room, n * n_tables * sizeof *crowd->lives);
     crowd->lists = (const cdb_fact **)cdbm_part(room, n * n_tables * sizeof *crowd->lists);
     of_poses = (char *)cdbm_part(room, n * cdbm_pose_size(player));
-    crowd->room.left = cdbm_room_size(player, n), crowd->room.at = (char *)cdbm_part(room, crowd->room.left);
-    if (!crowd->states || !crowd->poses || !crowd->inputs || !crowd->lives || !crowd->lists || !of_poses || !crowd->room.at) return 0;
+    crowd->room.left = cdbm_crowd_room(player, n), crowd->room.at = (char *)cdbm_part(room, crowd->room.left);
+    if (!crowd->states || !crowd->poses || !crowd->inputs || !crowd->one_offs || !crowd->lives || !crowd->lists || !of_poses || !crowd->room.at) return 0;
     for (i = 0; i < n; i++) {
         cdbm_lay_out(player, &crowd->poses[i], of_poses + i * cdbm_pose_size(player));
         cdbm_begin(player, crowd->states + i * cdbm_state_width(player), 0.0, 0.0, 0.0);
@@ -63,9 +73,10 @@ static inline int cdbm_take_crowd(cdbm_crowd *crowd, size_t n, cdb_unknown unkno
 
 static inline size_t cdbm_crowd_bytes(const cdbm_player *player, size_t n)
 {
-    size_t each = cdbm_rounded(cdbm_state_size(player)) + cdbm_rounded(cdbm_pose_size(player)) + sizeof(cdbm_pose) + sizeof(cdbm_input), t;
+    size_t each = cdbm_rounded(cdbm_state_size(player)) + cdbm_rounded(cdbm_pose_size(player)) + sizeof(cdbm_pose) + sizeof(cdbm_input)
+        + sizeof(cdbm_one_off), t;
     for (t = 0; t < player->n_tables; t++) each += cdbm_rounded(cdb_live_bytes(&player->opened[t]->schema)) + 2 * sizeof(void *);
-    return n * each + cdbm_rounded(cdbm_room_size(player, n)) + 64;
+    return n * each + cdbm_rounded(cdbm_crowd_room(player, n)) + 80;
 }
 
 CDB_API void cdbm_close_crowd(cdbm_crowd *crowd)
@@ -133,7 +144,26 @@ CDB_API int cdbm_place_one(cdbm_crowd *crowd, size_t i, double x, double z, doub
 {
     if (i >= crowd->n) return 0;
     cdbm_begin(&crowd->player, crowd->states + i * cdbm_state_width(&crowd->player), x, z, heading);
+    crowd->inputs[i].one_off = NULL;
     return 1;
+}
+
+/* Let a character play a one-off from the next update on: the animation of a database that costs least for its pose, its facts and a
+ * place in the world where it is to bring the body; heading NaN: as the animation brings it about. Gives what it costs: it plays where
+ * that is at most `most`. Infinite where nothing may play, NaN where there is no such character or database, or a fact is refused. */
+CDB_API double cdbm_enter_one(cdbm_crowd *crowd, size_t i, const char *database, double x, double z, double heading, double most)
+{
+    int number = cdbm_database_number(&crowd->player, database);
+    cdbm_one_off one;
+    cdbm_match match;
+    double *state;
+    if (i >= crowd->n || number < 0) return NAN;
+    state = crowd->states + i * cdbm_state_width(&crowd->player);
+    match.database = (size_t)number, match.target = cdbm_seen_at(state, x, z, heading), match.query = NULL;
+    match.position_weight = match.rotation_weight = 1.0;
+    if (cdbm_enter(&crowd->player, state, &crowd->inputs[i], &match, &one, crowd->room) != 1) return NAN;
+    if (one.range >= 0.0 && one.cost <= most) crowd->one_offs[i] = one, crowd->inputs[i].one_off = &crowd->one_offs[i];
+    return one.cost;
 }
 
 /* Let a character go on from a state, as its CDBM_STATE_NUMBERS were once, here or elsewhere. 0 where it is none of such a character. */
@@ -141,6 +171,7 @@ CDB_API int cdbm_restore_one(cdbm_crowd *crowd, size_t i, const double *state)
 {
     if (i >= crowd->n || !cdbm_is_state(&crowd->player, state)) return 0;
     memcpy(crowd->states + i * cdbm_state_width(&crowd->player), state, cdbm_state_size(&crowd->player));
+    crowd->inputs[i].one_off = NULL;
     return 1;
 }
 
@@ -152,11 +183,23 @@ CDB_API int cdbm_steer_one(cdbm_crowd *crowd, size_t i, double x, double z, doub
     return 1;
 }
 
+/* A tag of the markup that is to begin, and in how many seconds: to be given before each update until then, and NULL behind it. The text
+ * stays where it is while it is asked for. 0 where there is no character of that number, or no database has such an event. */
+CDB_API int cdbm_event_one(cdbm_crowd *crowd, size_t i, const char *event, double in_s)
+{
+    if (i >= crowd->n || (event && !cdbm_event_name(&crowd->player, event))) return 0;
+    crowd->inputs[i].event = event, crowd->inputs[i].event_s = in_s;
+    return 1;
+}
+
 /* Update all; why they stand where they stood, or NULL. A fault names the fact that a table refused, and is else without a name. */
 CDB_API const char *cdbm_update_crowd(cdbm_crowd *crowd, double dt_s, cdb_fault *fault)
 {
+    size_t i;
     int is_done;
     memset(&crowd->fault, 0, sizeof crowd->fault);
+    for (i = 0; i < crowd->n; i++) /* one that is over was displayed to its end */
+        if (crowd->inputs[i].one_off && cdbm_is_over(&crowd->player, crowd->inputs[i].one_off)) crowd->inputs[i].one_off = NULL;
     is_done = cdbm_update_all(&crowd->player, crowd->n, crowd->states, dt_s, crowd->inputs, crowd->poses, crowd->room);
     if (fault) *fault = crowd->fault;
     if (is_done == 1) return NULL;
@@ -176,13 +219,16 @@ CDB_API const double *cdbm_crowd_numbers(const cdbm_crowd *crowd, size_t i, int 
     }
 }
 
-/* What plays, what it did and why, or the name of a joint; "" for none. */
+/* What is displayed, what the character did below and why, or the name of a joint; "" for none. */
 CDB_API const char *cdbm_crowd_text(const cdbm_crowd *crowd, size_t i, int what)
 {
     const char *text = NULL;
     if (what == CDBM_JOINT_TEXT) text = i < crowd->player.poses.rig.n_joints ? cdbm_joint_name(&crowd->player, i) : NULL;
     else if (i >= crowd->n) return "";
-    else if (what == CDBM_ASSET_TEXT) text = cdbm_asset(&crowd->player, &crowd->poses[i].decision.playing);
+    else if (what == CDBM_ASSET_TEXT && crowd->inputs[i].one_off) {
+        cdbm_playing playing = cdbm_playing_of(&crowd->player.clips[(size_t)crowd->one_offs[i].database], &crowd->one_offs[i]);
+        text = cdbm_asset(&crowd->player, &playing);
+    } else if (what == CDBM_ASSET_TEXT) text = cdbm_asset(&crowd->player, &crowd->poses[i].decision.playing);
     else if (what == CDBM_ACTION_TEXT) text = cdbm_action_name(&crowd->poses[i].decision);
     else if (what == CDBM_REASON_TEXT) text = cdbm_reason(&crowd->poses[i].decision);
     return text ? text : "";

@@ -8,3 +8,4 @@
 #include "controller.h"
 #include "follow.h"
 #include "walk.h"
+#include "nodes.h"

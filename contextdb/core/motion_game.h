@@ -1,4 +1,6 @@
 /* The parts of the core for motion in games, behind those of motion.h. */
 #include "bundle.h"
+#include "event.h"
 #include "character.h"
+#include "match.h"
 #include "crowd.h"

@@ -47,12 +47,12 @@ static inline void cdbo_move(const cdbo_body *body, const cdbo_goal *goal, doubl
     to->turn_rate = left * (body->turn_rate - drift * y * t);
 }
 
-/* Make headings go on without a jump by a whole turn. */
-static inline void cdbo_unwrap(double *headings, size_t n)
+/* Make headings, every so many numbers, go on without a jump by a whole turn. */
+static inline void cdbo_unwrap(double *headings, size_t every, size_t n)
 {
     double before = n > 0 ? headings[0] : 0.0, turns = 0.0;
     size_t i;
-    for (i = 1; i < n; i++) {
+    for (i = every; i < every * n; i += every) {
         double step = headings[i] - before;
         before = headings[i];
         if (cdbo_size(step) >= CDBO_PI) turns += cdbo_remainder(step) - step;
@@ -72,7 +72,7 @@ static inline void cdbo_steer(const cdbo_body *body, const cdbo_goal *goal, doub
         cdbo_move(body, &fixed, (double)(i - n_past + 1) / rate, &moved);
         positions[2 * i] = moved.position[0], positions[2 * i + 1] = moved.position[1], headings[i] = moved.heading;
     }
-    cdbo_unwrap(headings, n);
+    cdbo_unwrap(headings, 1, n);
 }
 
 /* ---- points of a path */

@@ -394,8 +394,8 @@ static int cdbp_is_moment(const cdbo_poses *poses, const cdbo_instant *moment)
     return moment->bank < 0.0 || cdbo_is_moment(poses, moment->bank, moment->range);
 }
 
-/* poses.receive(rows, plays, seconds, given, seams): what happens to each in an update, and how many moments at seams, of 2 N at
- * most. */
+/* poses.receive(rows, plays, seconds, given, seams, displayed): what happens to each in an update, what is displayed then, and how many
+ * moments at seams, of 2 N at most. */
 static PyObject *cdbp_poses_receive(PyObject *self, PyObject *const *in, Py_ssize_t n)
 {
     const cdbo_poses *poses = cdbp_made_poses(self);
@@ -404,20 +404,25 @@ static PyObject *cdbp_poses_receive(PyObject *self, PyObject *const *in, Py_ssiz
     const cdbo_play *plays;
     cdbo_given *given;
     cdbo_seam *seams;
-    double dt_s = poses && n == 5 ? PyFloat_AsDouble(in[2]) : 0.0;
+    cdbo_instant *displayed;
+    double dt_s = poses && n == 6 ? PyFloat_AsDouble(in[2]) : 0.0;
     size_t s[3], n_rows = 0, n_seams = 0, i;
     int is_done = 0;
     a.n = 0;
-    if (poses && n == 5 && !PyErr_Occurred() && (rows = cdbp_numbers(&a, in[0], s, 2, CDBP_ANY, poses->width, 0)) && ((n_rows = s[0]), 1)
+    if (poses && n == 6 && !PyErr_Occurred() && (rows = cdbp_numbers(&a, in[0], s, 2, CDBP_ANY, poses->width, 0)) && ((n_rows = s[0]), 1)
         && (plays = (const cdbo_play *)cdbp_numbers(&a, in[1], s, 2, n_rows, sizeof(cdbo_play) / sizeof(double), 0))
         && (given = (cdbo_given *)cdbp_to_numbers(&a, in[3], s, 2, n_rows, sizeof(cdbo_given) / sizeof(double), 0))
-        && (seams = (cdbo_seam *)cdbp_to_numbers(&a, in[4], s, 2, 2 * n_rows, 4, 0))) {
+        && (seams = (cdbo_seam *)cdbp_to_numbers(&a, in[4], s, 2, 2 * n_rows, 4, 0))
+        && (displayed = (cdbo_instant *)cdbp_to_numbers(&a, in[5], s, 2, n_rows, 3, 0))) {
         for (i = 0, is_done = 1; i < n_rows; i++)
             is_done = is_done && cdbp_is_moment(poses, &plays[i].playing) && cdbp_is_moment(poses, &plays[i].before)
                 && cdbp_is_moment(poses, &plays[i].displayed);
-        for (i = 0; is_done && i < n_rows; i++) cdbo_receive(poses, rows + i * poses->width, &plays[i], dt_s, &given[i], seams, &n_seams);
+        for (i = 0; is_done && i < n_rows; i++) {
+            cdbo_receive(poses, rows + i * poses->width, &plays[i], dt_s, &given[i], seams, &n_seams);
+            displayed[i] = plays[i].playing.bank >= 0.0 ? plays[i].playing : plays[i].displayed;
+        }
     }
-    if (!is_done) return cdbp_given_back(&a, 0, "receive takes rows, moments that are there, seconds and two arrays");
+    if (!is_done) return cdbp_given_back(&a, 0, "receive takes rows, moments that are there, seconds and three arrays");
     cdbp_release(&a);
     return PyLong_FromLongLong((long long)n_seams);
 }

@@ -58,31 +58,6 @@ static double *cdbp_walks(const cdbm_ways *ways, cdbp_arrays *a, PyObject *array
     return rows;
 }
 
-/* ways.move(before, goals, bodies or None, seconds, after): each some time later; a body that is NaN follows its goal. */
-static PyObject *cdbp_ways_move(PyObject *self, PyObject *const *in, Py_ssize_t n)
-{
-    const cdbm_ways *ways = cdbp_made_ways(self);
-    cdbp_arrays a;
-    const double *before = NULL;
-    const cdbo_goal *goals;
-    const cdbo_body *bodies = NULL;
-    double *after, dt_s = ways && n == 5 ? PyFloat_AsDouble(in[3]) : 0.0;
-    size_t s[3], n_rows = CDBP_ANY, width = ways ? cdbm_walk_width(ways) : 0, i;
-    int is_done = 0;
-    a.n = 0;
-    if (ways && n == 5 && !PyErr_Occurred() && (before = cdbp_walks(ways, &a, in[0], 0, &n_rows))
-        && (goals = (const cdbo_goal *)cdbp_numbers(&a, in[1], s, 2, n_rows, 3, 0))
-        && (in[2] == Py_None || (bodies = (const cdbo_body *)cdbp_numbers(&a, in[2], s, 2, n_rows, 10, 0)))
-        && (after = cdbp_walks(ways, &a, in[4], 1, &n_rows))) {
-        for (i = 0; i < n_rows; i++) {
-            const cdbo_body *moved = bodies && bodies[i].heading == bodies[i].heading ? &bodies[i] : NULL;
-            cdbm_walk_on(ways, before + i * width, &goals[i], moved, dt_s, after + i * width);
-        }
-        is_done = 1;
-    }
-    return cdbp_given_back(&a, is_done, "move takes walks, goals, bodies, seconds and an array");
-}
-
 /* ways.n_frames(walks, goals): how many frames the longest of their paths has. */
 static PyObject *cdbp_ways_n_frames(PyObject *self, PyObject *const *in, Py_ssize_t n)
 {
@@ -136,6 +111,86 @@ static PyObject *cdbp_ways_ask(PyObject *self, PyObject *const *in, Py_ssize_t n
     return cdbp_given_back(&a, is_done, "ask takes walks, goals, a rate, poses and arrays that hold the present");
 }
 
+/* What an update of some characters begins with. */
+typedef struct cdbp_onward {
+    size_t n;
+    double dt_s;
+    const double *before, *rows, *poses;
+    const cdbo_goal *goals;
+    const cdbo_body *bodies;
+    double *after, *queries, *places, *facts;
+    cdbm_moved *moved;
+} cdbp_onward;
+
+static int cdbp_take_onward(const cdbm_ways *ways, const cdbm_controller *controller, cdbp_arrays *a, PyObject *const *in, cdbp_onward *to)
+{
+    size_t s[3], n = CDBP_ANY;
+    memset(to, 0, sizeof *to);
+    to->dt_s = PyFloat_AsDouble(in[3]);
+    if (PyErr_Occurred() || !(to->before = cdbp_walks(ways, a, in[0], 0, &n))) return 0;
+    to->n = n;
+    return (to->goals = (const cdbo_goal *)cdbp_numbers(a, in[1], s, 2, n, 3, 0)) != NULL
+        && (in[2] == Py_None || (to->bodies = (const cdbo_body *)cdbp_numbers(a, in[2], s, 2, n, 10, 0)))
+        && (to->rows = cdbp_numbers(a, in[4], s, 2, n, cdbm_width(controller), 0)) && cdbp_are_rows(controller, to->rows, n)
+        && (in[5] == Py_None || (to->poses = cdbp_numbers(a, in[5], s, 2, n, ways->n_features, 0)))
+        && (to->after = cdbp_walks(ways, a, in[6], 1, &n))
+        && (to->moved = (cdbm_moved *)cdbp_to_numbers(a, in[7], s, 2, n, sizeof *to->moved / sizeof(double), 0))
+        && (to->queries = cdbp_to_numbers(a, in[8], s, 2, n, ways->n_features, 0))
+        && (to->places = cdbp_to_numbers(a, in[9], s, 2, n, 3, 0)) && (to->facts = cdbp_to_numbers(a, in[10], s, 2, n, 3, 0));
+}
+
+/* One of them: `room` has numbers for its path and three times its features. */
+static void cdbp_go_onward(const cdbm_ways *ways, const cdbm_controller *controller, const double *mean, const cdbp_onward *to, size_t i,
+    double *room)
+{
+    size_t n_features = ways->n_features, width = cdbm_walk_width(ways), n_frames;
+    const cdbo_goal *goal = &to->goals[i];
+    const cdbo_body *body = to->bodies && to->bodies[i].heading == to->bodies[i].heading ? &to->bodies[i] : NULL;
+    double *walk = to->after + i * width, *pose = room, *positions, *headings, *lengths;
+    const cdbm_walk *now = (const cdbm_walk *)(const void *)walk;
+    float *narrow;
+    cdbm_move_on(ways, controller, mean, to->before + i * width, to->rows + i * cdbm_width(controller), goal, body, to->dt_s, walk, &to->moved[i], pose);
+    if (to->poses && to->poses[i * n_features] == to->poses[i * n_features]) memcpy(pose, to->poses + i * n_features, n_features * sizeof *pose);
+    n_frames = cdbm_n_wished(ways, walk, goal);
+    positions = pose + n_features, headings = positions + 2 * n_frames, lengths = headings + n_frames;
+    narrow = (float *)(void *)(lengths + n_frames);
+    cdbm_wish(ways, walk, goal, ways->rate, n_frames, positions, headings);
+    cdbm_ask_path(ways, pose, ways->rate, n_frames, positions, headings, lengths, narrow, to->queries + i * n_features);
+    to->places[3 * i] = now->body.position[0], to->places[3 * i + 1] = now->body.position[1], to->places[3 * i + 2] = now->body.heading;
+    to->facts[3 * i] = cdbm_own_fact(now, goal, 's'), to->facts[3 * i + 1] = cdbm_own_fact(now, goal, 'd');
+    to->facts[3 * i + 2] = cdbm_own_fact(now, goal, 't');
+}
+
+/* ways.go_on(controllers, walks, goals, bodies or None, seconds, rows, poses or None, after, moved, queries, places, facts): characters
+ * some time later, what they play, and the queries that ask for the paths that they wish to take; where their bodies are, and their
+ * speed, the direction of their sticks, and their turn. A body that is NaN follows its goal, a pose that is NaN is that of what plays. */
+static PyObject *cdbp_ways_go_on(PyObject *self, PyObject *const *in, Py_ssize_t n)
+{
+    const cdbm_ways *ways = cdbp_made_ways(self);
+    const cdbm_controller *controller = NULL;
+    cdbp_arrays a;
+    cdbp_onward to;
+    double *room = NULL, *mean;
+    size_t d, i;
+    int is_done = 0;
+    a.n = 0;
+    if (ways && n == 12 && cdbp_is_freed_by(Py_TYPE(in[0]), cdbp_controller_free) && ((cdbp_controller *)in[0])->is_made)
+        controller = &((cdbp_controller *)in[0])->controller;
+    if (controller && cdbp_take_onward(ways, controller, &a, in + 1, &to)
+        && (controller->n_features == 0 || controller->n_features == ways->n_features)) {
+        room = (double *)PyMem_Malloc((4 * cdbm_most_frames(ways) + 3 * ways->n_features + 1) * sizeof(double));
+    }
+    if (room) {
+        mean = room, memset(mean, 0, ways->n_features * sizeof *mean);
+        for (d = controller->n_databases; d-- > 0;)
+            if (controller->databases[d].frames) memcpy(mean, controller->databases[d].frames->offset, ways->n_features * sizeof *mean);
+        for (i = 0; i < to.n; i++) cdbp_go_onward(ways, controller, mean, &to, i, room + ways->n_features);
+        PyMem_Free(room);
+        is_done = 1;
+    }
+    return cdbp_given_back(&a, is_done, "go_on takes controllers of the same features, walks, goals, bodies, seconds, rows, poses and arrays");
+}
+
 /* ways.rest(walks, mean, poses): the poses of characters that play nothing. */
 static PyObject *cdbp_ways_rest(PyObject *self, PyObject *const *in, Py_ssize_t n)
 {
@@ -155,23 +210,23 @@ static PyObject *cdbp_ways_rest(PyObject *self, PyObject *const *in, Py_ssize_t 
     return cdbp_given_back(&a, is_done, "rest takes walks, a pose and an array");
 }
 
-/* ways.settle(walks, roots, moves_body): poses are displayed at roots; NaN for none. */
+/* ways.settle(walks, roots, moves_body): poses are displayed at roots; and whether the clip moved the body of each. */
 static PyObject *cdbp_ways_settle(PyObject *self, PyObject *const *in, Py_ssize_t n)
 {
     const cdbm_ways *ways = cdbp_made_ways(self);
     cdbp_arrays a;
     double *rows = NULL;
     const double *roots;
-    int64_t moves_body = 0;
+    const uint8_t *moves_body;
     size_t s[3], n_rows = CDBP_ANY, i;
     int is_done = 0;
     a.n = 0;
-    if (ways && n == 3 && cdbp_int_of(in[2], &moves_body) && (rows = cdbp_walks(ways, &a, in[0], 1, &n_rows))
-        && (roots = cdbp_numbers(&a, in[1], s, 2, n_rows, 3, 0))) {
-        for (i = 0; i < n_rows; i++) cdbm_settle(rows + i * cdbm_walk_width(ways), roots + 3 * i, moves_body != 0);
+    if (ways && n == 3 && (rows = cdbp_walks(ways, &a, in[0], 1, &n_rows)) && (roots = cdbp_numbers(&a, in[1], s, 2, n_rows, 3, 0))
+        && (moves_body = (const uint8_t *)cdbp_shaped(&a, in[2], 'b', 1, 0, s, 1, n_rows, 0, 0))) {
+        for (i = 0; i < n_rows; i++) cdbm_settle(rows + i * cdbm_walk_width(ways), roots + 3 * i, moves_body[i]);
         is_done = 1;
     }
-    return cdbp_given_back(&a, is_done, "settle takes walks, roots and a number");
+    return cdbp_given_back(&a, is_done, "settle takes walks, roots and a flag for each");
 }
 
 static PyObject *cdbp_ways_width(PyObject *self, void *unused)
@@ -200,7 +255,7 @@ static PyObject *cdbp_direction_of(PyObject *module, PyObject *const *in, Py_ssi
 }
 
 static PyMethodDef cdbp_ways_methods[] = {
-    {"move", CDBP_CALL(cdbp_ways_move), METH_FASTCALL, "Write walks as they are some time later."},
+    {"go_on", CDBP_CALL(cdbp_ways_go_on), METH_FASTCALL, "Write walks as they are some time later, and queries."},
     {"n_frames", CDBP_CALL(cdbp_ways_n_frames), METH_FASTCALL, "How many frames the longest path has."},
     {"n_behind", cdbp_ways_n_behind, METH_O, "How many frames of a path lie behind now."},
     {"ask", CDBP_CALL(cdbp_ways_ask), METH_FASTCALL, "Write the paths that are wished for, and queries."},

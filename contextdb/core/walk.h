@@ -225,7 +225,7 @@ static inline void cdbm_wish(const cdbm_ways *ways, const double *row, const cdb
     cdbm_return(place, rate, CDBM_RETURN_HALFLIFE_S, n - now, at, headings + now);
     if (now == 0) return;
     cdbm_look_back(ways, row, rate, now, positions, headings);
-    cdbo_unwrap(headings, n);
+    cdbo_unwrap(headings, 1, n);
 }
 
 /* Write a query: the features of a pose, rounded as a database's are, and those of a path of n frames. `lengths` has room for n
@@ -258,6 +258,17 @@ static inline void cdbm_rest_pose(const cdbm_ways *ways, const double *row, cons
     }
 }
 
+/* A character some time later: its walk, what plays, and the features of its pose, which are those of what plays, or at rest. `mean` is
+ * the pose of rest. */
+static inline void cdbm_move_on(const cdbm_ways *ways, const cdbm_controller *controller, const double *mean, const double *before,
+    const double *played, const cdbo_goal *goal, const cdbo_body *body, double dt_s, double *walk, cdbm_moved *moved, double *pose)
+{
+    cdbm_walk_on(ways, before, goal, body, dt_s, walk);
+    cdbm_move(controller, played, dt_s, moved);
+    if (moved->to.database < 0.0) cdbm_rest_pose(ways, walk, mean, pose);
+    else cdbm_features(controller->databases[(size_t)moved->to.database].frames, (int64_t)moved->to.frame, pose);
+}
+
 /* ---- what a character knows of itself, for its tables */
 
 /* Where a stick points against the way a body faces: degrees, positive to the left; 0 at rest. */
@@ -265,4 +276,11 @@ static inline double cdbm_direction(const double *stick, double heading)
 {
     if (stick[0] == 0.0 && stick[1] == 0.0) return 0.0;
     return cdbo_remainder(cdbo_atan2(stick[0], stick[1]) - heading) * (180.0 / CDBO_PI);
+}
+
+/* How fast the body goes, m/s; where the stick points; and how fast the body turns, degrees a second. */
+static inline double cdbm_own_fact(const cdbm_walk *walk, const cdbo_goal *goal, char letter)
+{
+    if (letter == 's') return cdbo_flat_length(walk->body.velocity[0], walk->body.velocity[1]);
+    return letter == 'd' ? cdbm_direction(goal->velocity, walk->body.heading) : walk->body.turn_rate * (180.0 / CDBO_PI);
 }

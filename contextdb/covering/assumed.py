@@ -21,8 +21,7 @@ from contextdb.covering.space import CellBox, Space, WeightsOf, comparable_rows,
 from contextdb.expressions import Assumptions, Derivation, Expression
 from contextdb.expressions.assume import WANTS, read_assumptions
 from contextdb.expressions.expression import read_expression
-from contextdb.expressions.faults import ExpressionError
-from contextdb.expressions.tokens import written_name
+from contextdb.expressions.tokens import ExpressionError, written_name
 from contextdb.schema.settings import derivation_of
 from contextdb.tables.data import TableData
 from contextdb.tables.table import EitherTable

@@ -20,8 +20,7 @@ from contextdb import bitmask
 from contextdb.columns import TextColumn
 from contextdb.compiled.table import data_of
 from contextdb.covering.assumed import Opened, assumptions_of, not_boxed, opened
-from contextdb.covering.contract_demand import Demand, Part
-from contextdb.covering.contract_shares import Drawn, Shares
+from contextdb.covering.contract_shares import Demand, Drawn, Part, Shares
 from contextdb.covering.draw import Drawer
 from contextdb.covering.gaps import widened
 from contextdb.covering.moments import Moment, Moments

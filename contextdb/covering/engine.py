@@ -22,8 +22,7 @@ from contextdb.covering.gaps import SHARE_WORK, Gaps, Measure, described, find_g
 from contextdb.covering.judge import Judge
 from contextdb.covering.progress import SILENT, Progress, Stops, Tell
 from contextdb.covering.report import CoverageReport, Crowd, Gap, Method, Overlap
-from contextdb.covering.sample import LITTLE, Counts, Sampler, samples_of
-from contextdb.covering.sampled_shares import SampledShares
+from contextdb.covering.sample import LITTLE, Counts, SampledShares, Sampler, samples_of
 from contextdb.covering.shares import wilson
 from contextdb.covering.space import CellBox, Space, WeightsOf, comparable_rows, require_counts
 from contextdb.tables.table import EitherTable

@@ -27,16 +27,15 @@ from contextdb import bitmask
 from contextdb.compiled.choosing import Choosing
 from contextdb.compiled.data import CompiledData
 from contextdb.covering.draw import Drawer
+from contextdb.covering.points import MANY, Questions
 from contextdb.covering.progress import SILENT, Progress
-from contextdb.covering.questions import MANY, Questions
 from contextdb.covering.space import Box, Space
 from contextdb.covering.witness import BoxSet, OutOfSteps, Steps
 from contextdb.errors import in_quotes, plural, row_name
 from contextdb.findings import Finding, Level
 from contextdb.schema.policies import POLICIES, lets_choose, rank_columns
-from contextdb.tables.alike import identical_rows, named
 from contextdb.tables.table import EitherTable
-from contextdb.tables.variety import NEEDLESS, gathered, needless, softened
+from contextdb.tables.variety import NEEDLESS, gathered, identical_rows, named, needless, softened
 
 AHEAD = 0.2
 """This share of the work, where rows are many, is done for all of them before the first."""

@@ -7,10 +7,14 @@ that say Any accept everything.)
 
 G is the number of parts of all conditions; part p belongs to one condition. A condition with itself has slices too: those of one
 part with itself are that part's own coverage.
+
+A value of a bool, enum or text is a part, of many values those that most rows name, then all others; numbers are cut into eighths
+by weight; a tag is there or not.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -21,9 +25,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import bitmask
+from contextdb.cells.grammar import format_cell
+from contextdb.cells.sets import Cell, TagSet
 from contextdb.compiled.table import CompiledTable
 from contextdb.covering.assumed import opened
-from contextdb.covering.parts import parts_of
+from contextdb.covering.factors import TagFactor, ValueFactor
 from contextdb.covering.progress import Progress, Stops, Tell
 from contextdb.covering.sample import Codes, Sampler, samples_of
 from contextdb.covering.shares import wilson
@@ -294,3 +300,66 @@ def _rows_in_both(flags: NDArray[np.bool_]) -> NDArray[np.int64]:
     """How many columns each two rows of flags have in common."""
     parts = (flags[:, at : at + MOST_AT_ONCE] for at in range(0, max(1, flags.shape[1]), MOST_AT_ONCE))
     return np.rint(sum(_weight_in_both(part, None) for part in parts)).astype(np.int64)
+
+
+# ---- the parts of conditions: each condition's domain cut into a few sets of values, to compare conditions with each other
+
+
+MOST_PARTS = 8
+"""A condition has so many parts at most."""
+
+
+def parts_of(space: Space, at: int) -> list[tuple[str, Sides]]:
+    """The parts of a condition: each as a cell, and as classes of its factors."""
+    numbers = space.of_condition[at]
+    if space.conditions[at].domain.type.is_tags:
+        return _tag_parts(space, at)
+    f = numbers[0]
+    factor = space.factors[f]
+    sides = _value_sides(space, f) if isinstance(factor, ValueFactor) else _span_sides(factor.weights)
+    return [(space.written(at, factor.accepts(side), is_label=True), {f: side}) for side in sides]
+
+
+def _value_sides(space: Space, f: int) -> list[int]:
+    """Each value; of many those that most rows name, then all others."""
+    n = len(space.factors[f].weights)
+    if n <= MOST_PARTS:
+        return [1 << k for k in range(n)]
+    named = np.zeros(n, np.int64)
+    for side, n_boxes in Counter(box[f] for box in space.boxes).items():
+        if side != space.full[f]:
+            named += n_boxes * bitmask.flags_of(side, n)
+    chosen = sorted(np.argsort(-named, kind="stable")[: MOST_PARTS - 1].tolist())
+    sides = [1 << k for k in chosen]
+    return [*sides, space.full[f] & ~sum(sides)]
+
+
+def _span_sides(weights: NDArray[np.float64]) -> list[int]:
+    """Neighbouring spans of numbers; single points go to the span below them, or to the first."""
+    wide = np.flatnonzero(weights > 0.0)
+    starts = [0, *wide[1:].tolist()]
+    if len(wide) > MOST_PARTS:
+        middle = np.cumsum(weights)[wide] - weights[wide] / 2.0
+        eighth = np.minimum((middle * MOST_PARTS).astype(np.int64), MOST_PARTS - 1)
+        starts = [0, *wide[1:][eighth[1:] != eighth[:-1]].tolist()]
+    stops = [*starts[1:], len(weights)]
+    return [(1 << stop) - (1 << start) for start, stop in zip(starts, stops, strict=True)]
+
+
+def _tag_parts(space: Space, at: int) -> list[tuple[str, Sides]]:
+    """With and without each tag that cells name; of many those that most rows restrict."""
+    placed: list[tuple[int, str, Sides, Sides]] = []
+    for f in space.of_condition[at]:
+        factor = space.factors[f]
+        assert isinstance(factor, TagFactor)
+        for tag in factor.tags:
+            side = factor.classes(TagSet(frozenset((tag,)), frozenset()))
+            n_rows = sum(not (box[f] & side and box[f] & ~side) for box in space.boxes)
+            placed.append((n_rows, tag, {f: side}, {f: space.full[f] & ~side}))
+    placed.sort(key=lambda item: -item[0])
+    domain = space.conditions[at].domain
+    parts: list[tuple[str, Sides]] = []
+    for _, tag, with_it, without in placed[: MOST_PARTS // 2]:
+        parts.append((format_cell(Cell(TagSet(frozenset((tag,)), frozenset())), domain), with_it))
+        parts.append((format_cell(Cell(TagSet(frozenset(), frozenset((tag,)))), domain), without))
+    return [(text, sides) for text, sides in parts if all(sides.values())]

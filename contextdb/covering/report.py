@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
 from contextdb.cells.notebook import as_html, one_line
 from contextdb.columns import Framed, frame_of
+from contextdb.columns import polars as pl
 from contextdb.covering.shares import distinct_percents, format_percent
 from contextdb.errors import plural
 from contextdb.findings import Finding
-
-if TYPE_CHECKING:
-    import polars as pl
 
 Method = Literal["exact", "bounds", "estimate"]
 

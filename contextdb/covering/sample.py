@@ -9,8 +9,8 @@ Source: Karp, Luby and Madras, "Monte-Carlo approximation algorithms for enumera
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
@@ -24,7 +24,7 @@ from contextdb.covering.draw import Drawer
 from contextdb.covering.numbered import NumberedBoxes
 from contextdb.covering.progress import SILENT, Progress
 from contextdb.covering.shares import wilson
-from contextdb.covering.space import Space
+from contextdb.covering.space import Sides, Space
 from contextdb.covering.witness import Point
 
 Codes = NDArray[np.int32]
@@ -270,3 +270,43 @@ def _drawn(sums: NDArray[np.float64], uniform: NDArray[np.float64]) -> NDArray[n
     """Where uniform numbers fall among weights whose sums are given; never on one of weight 0."""
     last = int(np.searchsorted(sums, sums[-1], "left"))
     return np.asarray(np.minimum(np.searchsorted(sums, uniform * sums[-1], "right"), last), np.int64)
+
+
+# ---- shares of boxes out of samples, where only samples know what can happen
+
+
+@dataclass(eq=False)
+class SampledShares:
+    """The share of N sampled contexts, all of which can happen, that a box holds and others do not; never exact."""
+
+    space: Space
+    codes: Codes
+    """int32 [N, factors]."""
+    _taken: NDArray[np.bool_] = field(init=False)
+    _n_taken: int = 0
+
+    def __post_init__(self) -> None:
+        self._taken = np.zeros(len(self.codes), np.bool_)
+
+    @classmethod
+    def of(cls, sampler: Sampler, n_samples: int, rng: np.random.Generator) -> SampledShares:
+        """The shares in so many draws."""
+        chunks = [codes[sampler.is_possible(codes)] for codes, _ in sampler.random_contexts(n_samples, rng)]
+        empty = np.zeros((0, len(sampler.space.factors)), np.int32)
+        return cls(sampler.space, np.concatenate([empty, *chunks]))
+
+    def __call__(self, box: Sides, without: Sequence[Sides]) -> tuple[float, bool]:
+        """The share; the boxes of `without` may only grow in number from one call to the next, unless there are none."""
+        held = self._held(box)
+        if without:
+            for other in without[self._n_taken :]:
+                self._taken |= self._held(other)
+            self._n_taken = len(without)
+            held = held & ~self._taken
+        return (float(held.mean()) if len(held) else 0.0), False
+
+    def _held(self, box: Sides) -> NDArray[np.bool_]:
+        flags = np.ones(len(self.codes), np.bool_)
+        for f, side in box.items():
+            flags &= bitmask.flags_of(side, len(self.space.factors[f].weights))[self.codes[:, f]]
+        return flags

@@ -16,7 +16,7 @@ from functools import cached_property
 from pathlib import Path
 
 from contextdb.disk import write_atomic
-from contextdb.edits.diffing.notes_merging import FIELDS, Spot, written
+from contextdb.edits.diffing.markers import FIELDS, Spot, written
 from contextdb.errors import ContextDBError, Fault, FileError, Place
 from contextdb.files.texts import read_texts
 from contextdb.tables.other_files import notes_path

@@ -21,8 +21,7 @@ from contextdb.edits.schema_file import schema_path
 from contextdb.errors import ContextDBError, Fault, Place, SchemaError, TableError, in_quotes
 from contextdb.files.texts import AnySource, read_texts
 from contextdb.schema import toml_edit
-from contextdb.schema.inheriting import resolved
-from contextdb.schema.settings import Schema, TableSettings, extends_of, plain_names
+from contextdb.schema.settings import Schema, TableSettings, extends_of, plain_names, resolved
 from contextdb.tables.project import SCHEMA_FILE, read_folder_schema, schema_of, table_files
 from contextdb.tables.table import Table
 

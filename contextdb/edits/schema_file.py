@@ -16,13 +16,12 @@ from contextdb.disk import read_bytes, real_path, write_atomic
 from contextdb.disk.together import NewFile
 from contextdb.errors import Fault, FileError, Place, SchemaError, safe_text, some
 from contextdb.files.file_names import alike
-from contextdb.files.toml_text import Path as KeyPath
-from contextdb.files.toml_text import as_toml, dotted, plain_numbers
+from contextdb.files.toml_shapes import Path as KeyPath
+from contextdb.files.toml_shapes import as_toml, dotted, plain_numbers
 from contextdb.schema import toml_edit
-from contextdb.schema.inheriting import resolved, without_inherited
-from contextdb.schema.parts import header
+from contextdb.schema.contracts import header
 from contextdb.schema.sections import schema_to_dict, settings_to_dict
-from contextdb.schema.settings import EMPTY, Schema, TableSettings
+from contextdb.schema.settings import EMPTY, Schema, TableSettings, resolved, without_inherited
 from contextdb.tables.project import SCHEMA_FILE, read_folder_schema, schema_of
 from contextdb.tables.table import Table
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from contextdb.columns import TextColumn
 from contextdb.errors import ContextDBError
-from contextdb.schema.inheriting import with_inherited
+from contextdb.schema.settings import with_inherited
 from contextdb.tables.data import AnyTable, TableData
 from contextdb.tables.variants import base_of, base_rows_of, is_variant, occurrences
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 from contextdb.columns import TextColumn
 from contextdb.edits.notes import NO_NOTES, Notes
 from contextdb.errors import Fault, FileError, Place, TableError, in_quotes, nearest, no_such
-from contextdb.exchange.formulas import Formulas
 from contextdb.exchange.reading import Reading, Remark
+from contextdb.exchange.unreal import Formulas
 from contextdb.files.strangers import page, pointer, seems_to_be
 from contextdb.tables.table import Table
 
@@ -108,7 +108,7 @@ def read(raw: bytes, name: str, options: ReadOptions = ReadOptions()) -> Reading
 
         reading = replace(reading, remarks=(*reading.remarks, *doubts(reading.columns)))
     if options.is_decimal_comma and kind.name not in ("csv", "tsv", "unreal-csv"):
-        from contextdb.exchange.decimal_commas import with_points
+        from contextdb.exchange.reading import with_points
 
         columns, remarks = with_points(reading.columns, "", True)
         reading = replace(reading, columns=tuple(columns), remarks=(*reading.remarks, *remarks), source=None)
@@ -138,8 +138,7 @@ def grid_of(raw: bytes, name: str, options: ReadOptions) -> tuple[str, Sequence[
         return grid_of_workbook(raw, name, options.sheet)
     if kind not in ("csv", "tsv"):
         raise TableError(Fault(f"{FORMATS[kind].about} has no rows to choose from.", "a workbook or CSV", place=Place(name)))
-    from contextdb.exchange.delimited import records
-    from contextdb.exchange.encodings import decoded
+    from contextdb.exchange.delimited import decoded, records
 
     return "", records(decoded(raw, name, options.encoding)[0], name, options.delimiter or ("\t" if kind == "tsv" else None))
 
@@ -175,8 +174,8 @@ def _read_parquet(raw: bytes, name: str) -> Reading:
 
 def _own_csv(raw: bytes, name: str, is_ours: bool) -> Reading | None:
     """A CSV that contextdb reads as it is, so that it is written as it is; None for every other, as one with a total below it."""
-    from contextdb.exchange.conflicts import begins_like_a_mark
     from contextdb.exchange.everyday import is_sum
+    from contextdb.exchange.reading import begins_like_a_mark
     from contextdb.exchange.unreal import is_unreal_header
     from contextdb.files.csv_source import read_csv
 
@@ -200,8 +199,7 @@ def _is_parted_otherwise(column: TextColumn) -> bool:
 
 def _read_text(kind: str, raw: bytes, name: str, options: ReadOptions, block: Block | None) -> Reading:
     from contextdb.exchange import unreal
-    from contextdb.exchange.delimited import read_delimited
-    from contextdb.exchange.encodings import decoded
+    from contextdb.exchange.delimited import decoded, read_delimited
     from contextdb.exchange.json_rows import read_json
 
     text, remarks = decoded(raw, name, options.encoding)
@@ -219,7 +217,7 @@ def _read_text(kind: str, raw: bytes, name: str, options: ReadOptions, block: Bl
 
 def write(table: Table, kind: Format, formulas: Formulas = "tell", notes: Notes = NO_NOTES) -> tuple[bytes, tuple[Remark, ...]]:
     """The bytes of a table in a format, and what could not be kept. `formulas` is "tell", "keep" or "quote": what becomes of texts
-    of CSV and TSV that a spreadsheet may compute, see `contextdb.exchange.formulas`; `notes` are kept by a workbook.
+    of CSV and TSV that a spreadsheet may compute, see `contextdb.exchange.unreal`; `notes` are kept by a workbook.
 
     Raises TableError where the table has what the
     format cannot hold, with its place."""
@@ -233,7 +231,7 @@ def _written(table: Table, kind: str, formulas: Formulas, notes: Notes) -> tuple
     columns: Sequence[TextColumn] = table.columns
     remarks: tuple[Remark, ...] = ()
     if kind in ("csv", "tsv"):
-        from contextdb.exchange.formulas import formula_remarks, quoted_formulas
+        from contextdb.exchange.unreal import formula_remarks, quoted_formulas
 
         remarks = formula_remarks(columns) if formulas == "tell" else ()
         columns = quoted_formulas(columns) if formulas == "quote" else columns

@@ -22,8 +22,7 @@ from contextdb.columns import TextColumn
 from contextdb.errors import Fault, Place, TableError, in_quotes, plural
 from contextdb.exchange.everyday import HIGHS, LOWS, is_sum
 from contextdb.exchange.reading import Remark, TableWanted, capped
-from contextdb.files.csv_faults import MOST_CHARACTERS
-from contextdb.files.csv_source import name_faults
+from contextdb.files.csv_source import MOST_CHARACTERS, name_faults
 
 Grid = Sequence[Sequence[str]]
 """Rows of texts; all rows are equally wide."""

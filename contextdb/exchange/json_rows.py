@@ -11,12 +11,10 @@ from numpy.typing import NDArray
 
 from contextdb.columns import TextColumn
 from contextdb.errors import Fault, Place, TableError, in_quotes, row_name
-from contextdb.exchange.conflicts import require_no_conflicts
 from contextdb.exchange.json_shapes import rows_of_shape
-from contextdb.exchange.reading import Reading, Remark, listed, text_of_value
-from contextdb.files.csv_faults import MOST_CHARACTERS
-from contextdb.files.csv_source import name_faults
-from contextdb.files.toml_text import what
+from contextdb.exchange.reading import Reading, Remark, listed, require_no_conflicts, text_of_value
+from contextdb.files.csv_source import MOST_CHARACTERS, name_faults
+from contextdb.files.toml_shapes import what
 
 _ACCEPTED = 'a list of objects, [{"Asset Name": "jog", "speed": "2..4"}], or one object a line'
 _TAG = "TagName"

@@ -16,17 +16,16 @@ from numpy.typing import NDArray
 
 from contextdb.bitmask import Flags
 from contextdb.cells import intervals
-from contextdb.cells.angles import wrap_angle
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
 from contextdb.cells.facts import read_fact_text
 from contextdb.cells.grammar import format_cell
+from contextdb.cells.intervals import wrap_angle
 from contextdb.cells.sets import Accepted, Cell, NumberSet, TagSet, ValueSet
 from contextdb.columns import TextColumn
 from contextdb.covering.shares import wilson
 from contextdb.errors import ContextError, Fault, Place, TableError
-from contextdb.exchange.learned_boxes import LearnedBox, learned_boxes
-from contextdb.exchange.learned_tree import Feature, Ints
+from contextdb.exchange.learned_boxes import Feature, Ints, LearnedBox, learned_boxes
 from contextdb.exchange.mapping import Mapped
 from contextdb.exchange.reading import Reading
 from contextdb.schema.settings import Schema, conditions_from_dict

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,11 +15,11 @@ from contextdb.cells.kinds import KINDS
 from contextdb.columns import TextColumn
 from contextdb.edits.edits import check_cell
 from contextdb.errors import ContextDBError, Fault, in_quotes, mend_for, nearest, plural, some
-from contextdb.exchange.decimal_commas import DECIMAL_COMMA, pair_in
 from contextdb.exchange.everyday import JOB_WORDS, as_truths, counts_rows
 from contextdb.exchange.proposals import as_cells, n_unreadable, names_of, propose_type, rewritten
-from contextdb.exchange.reading import Reading
-from contextdb.schema.sections import condition_to_dict
+from contextdb.exchange.reading import DECIMAL_COMMA, Reading, pair_in
+from contextdb.files.toml_shapes import as_toml, dotted
+from contextdb.schema.sections import condition_to_dict, settings_to_dict
 from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict, settings_renamed
 from contextdb.schema.table_settings import PLAIN_JOBS
 from contextdb.tables.table import Table
@@ -300,3 +300,33 @@ def _fitting(column: TextColumn, names: TextColumn, domain: Domain) -> TextColum
 def _folded(name: str) -> str:
     """A name without what people write in different ways: case, spaces, underscores, hyphens, dots."""
     return re.sub(r"[\s_\-.]+", "", name).casefold()
+
+
+# ---- what contextdb.toml says of one table, as the lines of one: so that a workbook can carry it along on a sheet of its own
+
+
+TYPES_SHEET = "contextdb"
+FIRST_LINE = "# contextdb 1: what contextdb.toml says of this table; contextdb import reads it"
+LONG_LINE = 1_000
+"""A list of more characters has a line for each value: Excel holds so many in a cell, and no more."""
+
+
+def described(table: Table) -> list[str]:
+    """The sections of contextdb.toml that a table needs: its own, and those of the conditions that it has and are declared."""
+    declared = [c.condition for c in table.conditions if c.condition.is_declared]
+    lines = [line for condition in declared for line in _section("conditions", condition.name, condition_to_dict(condition))]
+    own = {key: value for key, value in settings_to_dict(table.settings).items() if key != "file"}
+    return [FIRST_LINE, *lines, *_section("tables", table.name, {"asset": table.asset_column} | own)]
+
+
+def _section(section: str, name: str, values: Mapping[str, object]) -> Iterator[str]:
+    yield f"[{dotted((section, name))}]"
+    for key, value in values.items():
+        line = f"{key} = {as_toml(value)}"
+        if isinstance(value, list) and len(line) > LONG_LINE:
+            yield from (f"{key} = [", *(f"  {as_toml(item)}," for item in value), "]")
+        elif isinstance(value, Mapping) and len(line) > LONG_LINE:
+            yield from (f"{dotted((key, inner))} = {as_toml(item)}" for inner, item in value.items())
+        else:
+            yield line
+    yield ""

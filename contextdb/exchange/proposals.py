@@ -17,9 +17,8 @@ from contextdb.cells.sets import Cell, TagSet, ValueSet
 from contextdb.cells.words import quoted, says_any
 from contextdb.columns import TextColumn
 from contextdb.errors import CellError, in_quotes, plural
-from contextdb.exchange.decimal_commas import DECIMAL_COMMA, pair_in
 from contextdb.exchange.everyday import as_truths, compared, with_any, without_unit
-from contextdb.exchange.reading import ERRORS, listed
+from contextdb.exchange.reading import DECIMAL_COMMA, ERRORS, listed, pair_in
 from contextdb.files.toml_shapes import wrong_name
 from contextdb.tables.condition_column import READABLE_SHARE
 

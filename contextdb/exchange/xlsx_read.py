@@ -16,8 +16,8 @@ import python_calamine as calamine
 
 from contextdb.columns import TextColumn
 from contextdb.errors import ContextDBError, Fault, Place, TableError, in_quotes, mend_for, plural, safe_text, some
-from contextdb.exchange.described import FIRST_LINE, TYPES_SHEET
 from contextdb.exchange.grid import Block, Columns, column_letters, columns_of, parse_block
+from contextdb.exchange.mapping import FIRST_LINE, TYPES_SHEET
 from contextdb.exchange.reading import DATES, ERRORS, Reading, Remark, SheetWanted, capped, listed, text_of_value
 from contextdb.exchange.xlsx_people import comments_and_fills
 from contextdb.exchange.xlsx_scan import Marks, is_old, marks_of, require_workbook

@@ -24,8 +24,8 @@ from contextdb.columns import TextColumn
 from contextdb.console import width_of
 from contextdb.edits.notes import NO_NOTES, Notes
 from contextdb.errors import Fault, Place, TableError, in_quotes, plural
-from contextdb.exchange.described import TYPES_SHEET, described
 from contextdb.exchange.grid import column_letters
+from contextdb.exchange.mapping import TYPES_SHEET, described
 from contextdb.exchange.xlsx_people import FILLS
 from contextdb.tables.table import Table
 

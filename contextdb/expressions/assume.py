@@ -21,9 +21,8 @@ from contextdb.cells.sets import NumberSet, ValueSet
 from contextdb.errors import Fault, in_quotes
 from contextdb.expressions.boxes import Box, NoBoxes, Sets, all_of, false_half_turns
 from contextdb.expressions.expression import Expression, read_expression
-from contextdb.expressions.faults import ExpressionError, Refusal
 from contextdb.expressions.parse import parse
-from contextdb.expressions.tokens import tokens_of
+from contextdb.expressions.tokens import ExpressionError, Refusal, tokens_of
 
 WANTS = Condition("", BOOL)
 

@@ -18,7 +18,7 @@ from contextdb.cells.grammar import parse_cell
 from contextdb.cells.kinds import Kind
 from contextdb.cells.sets import Accepted, Cell, NumberSet, TagSet, ValueSet, complement, meet_plainly, plain_parts, union
 from contextdb.expressions.plan import Apply, Compare, Const, Given, Held, Link, Logic, Negation, Part, Select
-from contextdb.expressions.scalar import runner
+from contextdb.expressions.scalar import constant
 
 MOST_BOXES = 4096
 """With more boxes than this, also on the way, an expression has none."""
@@ -122,7 +122,7 @@ class _Boxes:
             left, right = (self.half_turn if self._is_turned(part) else part for part in (left, right))
             link = replace(link, left_is_high=False, right_is_high=False)
         if isinstance(left, Const) and isinstance(right, Const):
-            return [{}] if runner(Compare((left, right), (link,)))({}) is truth else []
+            return [{}] if constant(Compare((left, right), (link,))) is truth else []
         if _is_truth(left):
             is_alike = (link.sign == "==") is truth
             return any_of([all_of([self.of(left, value), self.of(right, value is is_alike)]) for value in (False, True)])

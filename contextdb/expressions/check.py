@@ -14,12 +14,11 @@ from contextdb.cells.domains import ANGLE, BOOL, INT, NUMBER, TEXT
 from contextdb.cells.kinds import Kind
 from contextdb.cells.words import format_number
 from contextdb.errors import in_quotes, nearest, plural, some
-from contextdb.expressions.faults import Refusal, UnknownName
 from contextdb.expressions.functions import FUNCTIONS, MOST_POWER, NEGATIVE, OPERATORS, Function, power_of
 from contextdb.expressions.membership import SPELT, holding, matching, require_value, spelt, spelt_alike
 from contextdb.expressions.plan import Apply, Compare, Const, Given, Link, Logic, Negation, Part, Select, Type
 from contextdb.expressions.scalar import constant
-from contextdb.expressions.tokens import written_name, written_text
+from contextdb.expressions.tokens import Refusal, UnknownName, written_name, written_text
 from contextdb.expressions.tree import (
     Arithmetic,
     Call,

@@ -19,17 +19,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.cells.angles import wrap_angles
 from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import describe, read_fact
+from contextdb.cells.intervals import wrap_angle, wrap_angles
 from contextdb.cells.sets import ANY, Cell
 from contextdb.errors import ContextError, Fault, Place, in_quotes, plural, safe_text, some
-from contextdb.expressions.arithmetic import settled, wrapped
-from contextdb.expressions.columns import Coded, Column, as_facts, missing_rows, read_column
+from contextdb.expressions.arithmetic import settled
+from contextdb.expressions.columns import Coded, Column, as_facts, missing_rows, read_column, run_frame
 from contextdb.expressions.expression import Expression, check_length, read_expression
-from contextdb.expressions.faults import ExpressionError
-from contextdb.expressions.frame import run_frame
 from contextdb.expressions.scalar import Value, is_missing
+from contextdb.expressions.tokens import ExpressionError
 
 NAN = math.nan
 _GIVE_OTHERS = 'facts that it can be computed with, or unknown="any" or "never"'
@@ -178,7 +177,7 @@ def _fitted(value: Value, condition: Condition) -> Value:
     """A value as a fact of its condition: an angle wrapped."""
     kind = condition.domain.type
     if kind.is_circular and isinstance(value, float):
-        return settled(wrapped(value))
+        return wrap_angle(value) if math.isfinite(value) else NAN
     low, high = kind.limits
     return NAN if isinstance(value, float) and not low <= value <= high else value
 

@@ -17,13 +17,11 @@ from contextdb.cells.sets import Cell
 from contextdb.errors import ContextError, Fault, Place, in_quotes, nearest, plural, some
 from contextdb.expressions.boxes import Box, boxes_of
 from contextdb.expressions.check import Checker
-from contextdb.expressions.columns import UNKNOWN, YES, Column, as_array, read_column
-from contextdb.expressions.faults import ExpressionError, Refusal, fault_of
-from contextdb.expressions.frame import run_frame
+from contextdb.expressions.columns import UNKNOWN, YES, Column, as_array, read_column, run_frame
 from contextdb.expressions.parse import parse
 from contextdb.expressions.plan import Part, Type
 from contextdb.expressions.scalar import Run, Value, is_missing, runner
-from contextdb.expressions.tokens import written_text
+from contextdb.expressions.tokens import ExpressionError, Refusal, fault_of, written_text
 from contextdb.expressions.tree import Node, Number, Text
 
 NAN = float("nan")
@@ -90,7 +88,7 @@ class Expression:
     @cached_property
     def run(self) -> Run:
         """Computes the value from facts in canonical form: NaN for a missing number, None for another missing fact."""
-        return runner(self.plan)
+        return runner(self.plan, self.conditions)
 
     def run_frame(self, columns: Mapping[str, Any], n_contexts: int) -> Column:
         """`evaluate_frame`, as a column that can be computed with."""

@@ -10,16 +10,15 @@ from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 
 from contextdb.cells import intervals
-from contextdb.cells.angles import wrap_angle
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import TEXT, Domain
 from contextdb.cells.grammar import parse_cell
+from contextdb.cells.intervals import wrap_angle
 from contextdb.cells.kinds import KINDS, Kind
 from contextdb.cells.sets import Accepted, Cell, NumberSet, TagSet, ValueSet, covers
 from contextdb.errors import CellError, in_quotes, nearest, some
-from contextdb.expressions.faults import Refusal
 from contextdb.expressions.plan import Const, Given, Held, Part, Type
-from contextdb.expressions.tokens import written_text
+from contextdb.expressions.tokens import Refusal, written_text
 from contextdb.expressions.tree import Likeness, Membership, Node, Text
 
 Choice = tuple[Node, Part, Type]

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Container, Iterator, Mapping
 from itertools import pairwise
 
-from contextdb.expressions.faults import Refusal
-from contextdb.expressions.tokens import RESERVED, Token, tokens_of, written_name
+from contextdb.expressions.tokens import RESERVED, Refusal, Token, tokens_of, written_name
 
 
 def names_in(text: str) -> tuple[str, ...]:

@@ -20,8 +20,7 @@ from __future__ import annotations
 import math
 
 from contextdb.errors import in_quotes
-from contextdb.expressions.faults import Refusal
-from contextdb.expressions.tokens import RESERVED, Token, tokens_of
+from contextdb.expressions.tokens import RESERVED, Refusal, Token, tokens_of
 from contextdb.expressions.tree import (
     Arithmetic,
     Call,

@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 from contextdb.bitmask import Flags
 from contextdb.columns import TextColumn
 from contextdb.errors import Fault, Place, TableError, in_quotes
-from contextdb.files.csv_faults import CONFLICT, MOST_CHARACTERS
 from contextdb.files.csv_records import Positions, as_field, field_bounds, fields_of, needs_quotes
-from contextdb.files.csv_source import NO_SOURCE, Source, name_faults
+from contextdb.files.csv_source import CONFLICT, MOST_CHARACTERS, NO_SOURCE, Source, name_faults
 from contextdb.files.strangers import UTF8_BOM, other_delimiter
 
 Origin = NDArray[np.int64]

@@ -14,7 +14,6 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,17 +21,12 @@ from numpy.typing import NDArray
 from contextdb.bitmask import Flags
 from contextdb.cells.words import NUMBER_TEXT, quoted, says_any, truth_of
 from contextdb.columns import TextColumn
+from contextdb.columns import polars as pl
 from contextdb.errors import Fault, Place, TableError, plural, row_name, safe_text
-from contextdb.files.csv_faults import MOST_CHARACTERS
 from contextdb.files.csv_rewrite import Origin, changed_rows, source_fields
-from contextdb.files.csv_source import name_faults, text_columns
+from contextdb.files.csv_source import MOST_CHARACTERS, name_faults, text_columns
 from contextdb.files.parquet_frame import MAGIC, UNSEALED, DamagedFrame, require_whole, sealed
 from contextdb.files.strangers import seems_to_be
-
-if TYPE_CHECKING:
-    import polars as pl
-else:
-    from contextdb.columns import polars as pl
 
 _ACCEPTED = "strings, categories, bools, numbers, dates, and lists of strings"
 MOST_ROWS, MOST_CELLS = 10_000_000, 100_000_000

@@ -18,8 +18,7 @@ from dataclasses import Field, dataclass, field, fields
 from typing import Any, ClassVar
 
 from contextdb.errors import ContextDBError, Fault, Place, in_quotes, nearest
-from contextdb.files.toml_shapes import FLAG, MOST, Mapped, Shape, between, key_value, no_key, one_of
-from contextdb.files.toml_text import as_toml
+from contextdb.files.toml_shapes import FLAG, MOST, Mapped, Shape, as_toml, between, key_value, no_key, one_of
 
 Settings = Mapping[str, "Setting"]
 REQUIRED: Any = object()

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from contextdb.columns import TextColumn
+from contextdb.columns import polars as pl
 from contextdb.console import announce_file
 from contextdb.disk import TABLE_SUFFIXES, path_in_quotes, read_bytes, write_atomic
 from contextdb.errors import ContextDBError, Fault, FileError, Place, TableError, in_quotes, nearest
@@ -17,11 +17,6 @@ from contextdb.files.csv_rewrite import Origin, rewritten
 from contextdb.files.csv_source import Source, read_csv
 from contextdb.files.parquet import ParquetSource, read_parquet, rewritten_parquet
 from contextdb.files.parquet_frame import MAGIC, DamagedFrame, require_whole_file
-
-if TYPE_CHECKING:
-    import polars as pl
-else:
-    from contextdb.columns import polars as pl
 
 AnySource = Source | ParquetSource
 """What a table's texts came from."""

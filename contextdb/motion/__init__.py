@@ -37,7 +37,7 @@ from contextdb.motion.joint.searcher import JointSearcher
 from contextdb.motion.made.game import write_made_clips
 from contextdb.motion.markup.marks import TagFilter
 from contextdb.motion.markup.markup import Markup
-from contextdb.motion.markup.spans import Span
+from contextdb.motion.markup.span_faults import Span
 from contextdb.motion.measuring.coverage import coverage
 from contextdb.motion.measuring.measure import measure
 from contextdb.motion.measuring.measures import Measures

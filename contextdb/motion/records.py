@@ -28,23 +28,23 @@ class Unfinished:
     __slots__ = ("_rest",)
 
     _rest: Callable[[], Mapping[str, object]] | None
-    """Gives those fields, and all of them at once."""
+    """Gives those fields; where some are to wait longer, all but them and another `_rest`."""
 
     @classmethod
-    def begun(cls, rest: Callable[[], Mapping[str, object]], **known: object) -> Self:
-        """An object of which the fields of `rest` are not known yet."""
+    def begun(cls, rest: Callable[[], Mapping[str, object]]) -> Self:
+        """An object of which no field is known yet."""
         made = cls.__new__(cls)
-        for name, value in (("_rest", rest), *known.items()):
-            object.__setattr__(made, name, value)
+        object.__setattr__(made, "_rest", rest)
         return made
 
     def __getattr__(self, name: str) -> Any:
         """A field that has no value yet; Python asks here for nothing else."""
         rest = self._rest if name in type(self).__slots__ else None
-        if rest is not None:
-            for field, value in (*rest().items(), ("_rest", None)):
-                object.__setattr__(self, field, value)
-        return object.__getattribute__(self, name)  # or say that there is none
+        if rest is None:
+            return object.__getattribute__(self, name)  # says that there is none
+        for field, value in ({"_rest": None} | dict(rest())).items():
+            object.__setattr__(self, field, value)
+        return getattr(self, name)
 
 
 @contextmanager

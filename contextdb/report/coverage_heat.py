@@ -8,7 +8,7 @@ from html import escape
 from contextdb.console import printable
 from contextdb.covering import PairTable, Slice, format_percent
 from contextdb.report.coverage_words import covered_text, slice_cells
-from contextdb.report.html_parts import embedded
+from contextdb.report.document_html import embedded
 
 MOST_CONDITIONS = 24
 """The most conditions in the map: those whose own values are covered least."""

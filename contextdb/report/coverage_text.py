@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 from contextdb.console import aligned, printable, styled
 from contextdb.covering import Gap, format_percent
-from contextdb.covering.inside import facts_inside
+from contextdb.covering.gaps import facts_inside
 from contextdb.errors import plural, row_name
 from contextdb.report.coverage_document import section
 from contextdb.report.coverage_results import CoverageResults, Measured

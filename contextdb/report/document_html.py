@@ -5,14 +5,15 @@ What is in the page is complete without its script, which only sorts tables and 
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from html import escape
+from importlib.resources import files
 from itertools import zip_longest
 
 from contextdb.console import __version__, printable
 from contextdb.report.document import Bar, Block, Document, Folded, Listing, Numbered, Picture, Rows, Section, Table
-from contextdb.report.html_parts import escaped, page
 from contextdb.report.results import Gate
 
 _FIGURE = re.compile(r"(?:≈ |about |at least )?([<>]?)(-?\d[\d,]*(?:\.\d+)?)(?: %|\+| or more)?")
@@ -152,3 +153,32 @@ def _width(share: float) -> str:
     """A width that is full, or nothing, only where the share is."""
     percent = 100.0 * share
     return f"{percent if percent in (0.0, 100.0) else min(max(percent, 0.3), 99.7):.2f}%"
+
+
+# ---- what HTML reports are made of
+
+
+POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
+
+
+def page(title: str, name: str, body: str) -> str:
+    """A document that needs no network, with the style sheet and the script of a name."""
+    css, script = (files("contextdb.report").joinpath(f"{name}.{kind}").read_text(encoding="utf-8") for kind in ("css", "js"))
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{escape(title)}</title>\n<style>\n{css}</style>\n</head>\n<body>\n"
+        f"{body}<script>\n{script}</script>\n</body>\n</html>\n"
+    )
+
+
+def embedded(document: object) -> str:
+    """A JSON document that ends no script."""
+    text = json.dumps(document, ensure_ascii=True, separators=(",", ":"), allow_nan=False)
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def escaped(text: str) -> str:
+    """A text of a table or a file, with nothing in it that a browser would obey."""
+    return escape(printable(text))

@@ -26,7 +26,7 @@ def _section(session: SessionMeasures, shows_all: bool) -> Section:
         *session.not_measured(),
         *([Listing("never played", never)] if never else []),
     ]
-    return Section(session.file, session.headline, [session.to_do] if session.to_do else [], blocks, _gates(session, shows_all))
+    return Section(session.file, session.headline, [session.to_do], blocks, _gates(session, shows_all))
 
 
 def _gates(session: SessionMeasures, shows_all: bool) -> list[Gate]:

@@ -16,7 +16,7 @@ from contextdb.files.reports import baseline_of, with_marks
 from contextdb.findings import Finding
 from contextdb.motion.measuring.measures import Measures
 from contextdb.motion.measuring.parts import NO_CHANGE, NO_FORCED, NO_JUMP, NO_REST
-from contextdb.motion.trace.forced_by import ForcedBy
+from contextdb.motion.trace.stats import ForcedBy
 from contextdb.report.results import CheckReport, Gate, Subject, as_path
 
 NOTHING_TO_EXCEED = (NO_FORCED, NO_JUMP, NO_CHANGE, NO_REST)
@@ -127,14 +127,19 @@ class SessionMeasures:
 
     @property
     def to_do(self) -> str:
-        """What to do first, in a sentence; "" where nothing is over its bar and no column forces jumps."""
+        """What to do first, in a sentence; where no bar is set, which would hold what is measured now."""
         over = [gate for gate in self.gates if not gate.passed]
         if over:
             return f"To do first: {over[0].message}"
-        if not self.forced_by:
-            return ""
-        columns, jumps = " and ".join(self.forced_by[0].columns), plural(self.forced_by[0].jumps, "forced jump")
-        return f"To do first: make the cells of {columns} soft, or Any, where they end what plays: {jumps}."
+        if self.forced_by:
+            columns, jumps = " and ".join(self.forced_by[0].columns), plural(self.forced_by[0].jumps, "forced jump")
+            return f"To do first: make the cells of {columns} soft, or Any, where they end what plays: {jumps}."
+        if self.gates:
+            is_baseline = all(gate.name.startswith("baseline") for gate in self.gates)
+            return f"Nothing to do: {'nothing is worse than before' if is_baseline else 'every measure is within its bar'}."
+        now = {"--max-skate": self.measures.skate_cm_s, "--max-jumps": self.measures.jumps_per_s}
+        bars = " ".join(f"{option} {math.floor(value * 10 + 1) / 10:g}" for option, value in now.items() if value is not None)
+        return f"To do first: let a build hold what is reached: {bars}." if bars else "Nothing to do: no bar is set."
 
     def to_json(self) -> dict[str, object]:
         forced = [each.to_json() for each in self.forced_by]
@@ -142,7 +147,7 @@ class SessionMeasures:
         return {
             "file": as_path(self.file),
             **self.measures.to_json(),
-            "to_do": self.to_do or None,
+            "to_do": self.to_do,
             "forced_by": forced,
             "bars": gates,
         }

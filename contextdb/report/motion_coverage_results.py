@@ -18,7 +18,7 @@ from contextdb.files.reports import baseline_of, with_marks
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.measuring.coverage import ContextCoverage, ToCapture, about_bins
 from contextdb.motion.measuring.moves import DIRECTION, MAPS, Counts, Map
-from contextdb.motion.measuring.near_clips import Near
+from contextdb.motion.measuring.usage import Near
 from contextdb.report.coverage_results import bar
 from contextdb.report.results import CheckReport, Gate, Subject
 

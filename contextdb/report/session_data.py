@@ -117,50 +117,35 @@ class ChangeLine:
 
 @dataclass(frozen=True, eq=False)
 class SessionView:
-    """A session as the page shows it. T updates, J joints, K feet.
-
-    Attributes
-    ----------
-    rate : float
-        Updates a second.
-    bones, parents, feet
-        The rig: names [J], parents [J], the joints of the feet [K].
-    sides : tuple of str, length J
-        "left", "right" or "": which side of the body a joint is of.
-    positions : float array, shape (T, J, 3)
-        Joints in the world, in metres.
-    roots : float array, shape (T, 3)
-        x and z in metres, heading in radians.
-    bodies : float array, shape (T, 3), or None
-        Where the game had the body, likewise.
-    contacts : bool array, shape (T, K)
-    playing : list of (asset or None, seconds in it), length T
-    flags : uint8 array, shape (T,)
-        SEARCHED, JUMPED, FORCED and MIRRORED, added up.
-    strips : mapping of str to float array, shape (T,)
-        What is drawn below the timeline: "cost", "skate", "accel", "error", "valid", as far as known.
-    moments : sequence of Moment
-        In order of time.
-    measures : mapping of str to (str, str)
-        By name: of the session, and of the raw clips.
-    """
+    """A session as the page shows it. T updates, J joints, K feet."""
 
     name: str
     rate: float
+    """Updates a second."""
     bones: Sequence[str]
     parents: Ints
     feet: Sequence[int]
+    """`bones`, `parents`, `feet`: the rig: names [J], parents [J], the joints of the feet [K]."""
     sides: Sequence[str]
+    """"left", "right" or "": which side of the body a joint is of."""
     positions: Floats
+    """Joints in the world, in metres: float [T, J, 3]."""
     roots: Floats
+    """x and z in metres, heading in radians: float [T, 3]."""
     bodies: Floats | None
+    """Where the game had the body, likewise: float [T, 3], or None."""
     contacts: NDArray[np.bool_]
+    """Bool [T, K]."""
     playing: Sequence[tuple[str | None, float]]
     flags: NDArray[np.uint8]
+    """SEARCHED, JUMPED, FORCED and MIRRORED, added up: uint8 [T]."""
     strips: Mapping[str, Floats]
+    """What is drawn below the timeline: "cost", "skate", "accel", "error", "valid", as far as known. Float [T]."""
     moments: Sequence[Moment]
+    """In order of time."""
     changes: Sequence[ChangeLine]
     measures: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    """By name: of the session, and of the raw clips."""
 
     @property
     def seconds(self) -> float:

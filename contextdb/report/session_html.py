@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 
 from contextdb.console import __version__, printable
-from contextdb.report.html_parts import embedded, page
+from contextdb.report.document_html import embedded, page
 from contextdb.report.session_data import Detail, SessionView, document_of
 
 BYTES_A_MINUTE = 1_000_000
@@ -55,9 +55,9 @@ def _page(sessions: Sequence[SessionView], detail: Detail, parting: str) -> str:
 
 
 def _first_look(session: SessionView) -> str:
-    """Where to look first, as a sentence with a link."""
+    """Where to look first, as a sentence with a link where there is a moment for it."""
     time_s, why = session.first_look
-    return f"Look first at {_link(time_s)}: {escape(printable(why))}." if why else ""
+    return f"Look first at {_link(time_s)}: {escape(printable(why))}." if why else "Nothing stands out."
 
 
 def _player(names: Sequence[str]) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from contextdb.motion.selection.decision import Action, Decision
 from contextdb.motion.trace.cost_views import cost_text
-from contextdb.motion.trace.views import look_first
+from contextdb.motion.trace.views import NOTHING_FORCED, look_first
 from contextdb.report.measure_results import SessionMeasures
 from contextdb.report.render_markdown import MOST_BYTES, escaped
 
@@ -20,7 +20,7 @@ def render(sessions: Sequence[SessionMeasures], decisions: Sequence[Sequence[Dec
         f"## Session {' and '.join(map(escaped, names))}",
     ]
     parts += [
-        f"{escaped(s.file)}: {s.headline}{'. ' if (first := look_first(each)) else ''}{escaped(first)}"
+        f"{escaped(s.file)}: {s.headline}. {escaped(look_first(each) or NOTHING_FORCED)}"
         for s, each in zip(sessions, decisions, strict=True)
     ]
     if parting:

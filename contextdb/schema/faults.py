@@ -20,22 +20,23 @@ from contextdb.cells.sets import covers
 from contextdb.disk import TABLE_SUFFIXES
 from contextdb.errors import Fault, in_quotes, mend_for, nearest, no_such, safe_text, some
 from contextdb.files.file_names import alike
-from contextdb.files.toml_shapes import key_value, near_key, no_key, wrong_name
-from contextdb.files.toml_text import as_toml, what
+from contextdb.files.toml_shapes import as_toml, key_value, near_key, no_key, what, wrong_name
 from contextdb.schema import shapes
-from contextdb.schema.contracts import VERBS, limit_of, row_conditions
-from contextdb.schema.outputs import bound_faults, declared_outputs, outputs_faults
-from contextdb.schema.parts import (
+from contextdb.schema.contracts import (
     SECTIONS,
+    VERBS,
     Part,
     condition_of,
     fitting_of,
     header,
     keys_of,
+    limit_of,
     mirror_of,
     number_of,
     parts_of,
+    row_conditions,
 )
+from contextdb.schema.outputs import bound_faults, declared_outputs, outputs_faults
 from contextdb.schema.shapes import CONDITION, KEY_SYNONYMS
 from contextdb.schema.table_settings import JOBS, columns_checked, table_files
 from contextdb.schema.toml_lines import Path

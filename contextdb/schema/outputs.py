@@ -21,8 +21,7 @@ from contextdb.cells.outputs import SLOT_COLUMNS, Output
 from contextdb.cells.row_play import KINDS as PLAY_KINDS
 from contextdb.errors import Fault, in_quotes, mend_for, nearest, some
 from contextdb.files.settings import Setting, Settings
-from contextdb.files.toml_shapes import Shape, between, key_value, near_key, no_key, nothing, one_of, wrong_name
-from contextdb.files.toml_text import dotted, what
+from contextdb.files.toml_shapes import Shape, between, dotted, key_value, near_key, no_key, nothing, one_of, what, wrong_name
 from contextdb.schema.shapes import KEY_SYNONYMS, KIND_SYNONYMS, NUMBER, TEXT, VALUES
 
 PathFault = tuple[tuple[str, ...], Fault]

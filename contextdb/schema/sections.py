@@ -14,10 +14,9 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
 from contextdb.errors import Fault, SchemaError, in_quotes, mend_for, nearest, some
 from contextdb.files.toml_shapes import no_key, wrong_name
-from contextdb.schema.contracts import Contract
+from contextdb.schema.contracts import PLAIN, Contract, keys_of
 from contextdb.schema.faults import section_faults
 from contextdb.schema.outputs import fallback_to_toml, outputs_faults, outputs_to_toml
-from contextdb.schema.parts import PLAIN, keys_of
 from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict, settings_fields
 from contextdb.schema.shapes import CONDITION, NAMES
 from contextdb.schema.table_settings import columns_checked

@@ -19,7 +19,8 @@ from contextdb.cells.notebook import one_line
 from contextdb.columns import TextColumn
 from contextdb.errors import Fault, Place, SchemaError, plural
 from contextdb.files.file_names import composed
-from contextdb.schema.contracts import Contract
+from contextdb.files.settings import settings_of
+from contextdb.schema.contracts import Contract, Part, condition_of, fitting_of, parts_of
 from contextdb.schema.faults import (
     column_faults,
     document_faults,
@@ -28,9 +29,7 @@ from contextdb.schema.faults import (
     part_faults,
     section_faults,
 )
-from contextdb.schema.inheriting import resolved
 from contextdb.schema.outputs import declared_outputs, fallback_of
-from contextdb.schema.parts import Part, condition_of, fitting_of, parts_of
 from contextdb.schema.table_settings import JOBS, TableSettings
 from contextdb.schema.toml_lines import key_lines, line_of, read_toml
 
@@ -262,3 +261,52 @@ def settings_fields(part: Part) -> dict[str, Any]:
     if "fallback" in part:
         fields["fallback"], fields["fallback_outputs"] = fallback_of(part["fallback"], declared)
     return fields
+
+
+# ---- the settings of a variant: those of its base where it says nothing itself, and back
+
+
+OWN = ("file", "base", "remove", "expected", "owner")
+"""The settings that a variant does not inherit."""
+INHERITED = tuple(key for key in settings_of(TableSettings) if key not in (*OWN, "outputs", "fallback"))
+_PLAIN = TableSettings("")
+
+
+def with_inherited(own: TableSettings, base: TableSettings) -> TableSettings:
+    """The settings of a variant of a table with other settings; it has the outputs of both."""
+    given: dict[str, Any] = {key: _first(getattr(own, key), getattr(base, key), getattr(_PLAIN, key)) for key in INHERITED}
+    typed = {output.name: output for output in (*base.typed, *own.typed)}
+    fallback = own if own.fallback is not None else base
+    return replace(
+        own,
+        **given,
+        outputs=tuple(dict.fromkeys((*base.outputs, *own.outputs))),
+        typed=tuple(typed.values()),
+        fallback=fallback.fallback,
+        fallback_outputs=fallback.fallback_outputs,
+    )
+
+
+def without_inherited(settings: TableSettings, base: TableSettings) -> TableSettings:
+    """What a variant itself says, of its settings and those of its base."""
+    own: dict[str, Any] = {key: getattr(_PLAIN, key) for key in INHERITED if getattr(settings, key) == getattr(base, key)}
+    outputs = tuple(name for name in settings.outputs if name not in base.outputs)
+    typed = tuple(output for output in settings.typed if output not in base.typed)
+    if (settings.fallback, settings.fallback_outputs) == (base.fallback, base.fallback_outputs):
+        own |= {"fallback": None, "fallback_outputs": ()}
+    return replace(settings, **own, outputs=outputs, typed=typed)
+
+
+def resolved(settings: TableSettings, tables: Mapping[str, TableSettings]) -> TableSettings:
+    """The settings of a table with what it inherits; `tables` are those that are declared. A cycle of bases is cut."""
+    chain = [settings]
+    while (base := chain[-1].base) is not None and base in tables and all(base != one.name for one in chain):
+        chain.append(tables[base])
+    whole = chain.pop()
+    while chain:
+        whole = with_inherited(chain.pop(), whole)
+    return whole
+
+
+def _first(own: object, base: object, nothing: object) -> object:
+    return base if own == nothing else own

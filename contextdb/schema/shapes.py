@@ -16,8 +16,7 @@ from contextdb.cells.kinds import KINDS, names_where
 from contextdb.disk import TABLE_SUFFIXES
 from contextdb.errors import in_quotes, nearest
 from contextdb.files.settings import Setting, Settings
-from contextdb.files.toml_shapes import Shape, file_below, meant_number, meant_text, one_of, wrong_name, wrong_text
-from contextdb.files.toml_text import as_toml, what
+from contextdb.files.toml_shapes import Shape, as_toml, file_below, meant_number, meant_text, one_of, what, wrong_name, wrong_text
 
 KIND_SYNONYMS = {synonym: name for name, kind in KINDS.items() for synonym in kind.synonyms}
 MIRRORS = ("negate", "none")

@@ -12,7 +12,7 @@ import tomllib
 from collections.abc import Mapping, Sequence
 
 from contextdb.errors import Fault, Place, SchemaError, in_quotes, safe_text
-from contextdb.files.toml_text import Path as Path
+from contextdb.files.toml_shapes import Path as Path
 
 CONFLICT_MARKS = ("<<<<<<<", "|||||||", "=======", ">>>>>>>")
 MOST_PARTS = 256

@@ -20,7 +20,7 @@ from contextdb.cells.sets import ANY, Cell
 from contextdb.cells.words import says_any
 from contextdb.columns import TextColumn
 from contextdb.compiled.classes import ColumnMasks, column_masks
-from contextdb.compiled.soft import SoftMasks
+from contextdb.compiled.layers import SoftMasks
 from contextdb.errors import CellError, Fault
 
 MOST_MENDS = 20

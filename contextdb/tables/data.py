@@ -28,6 +28,7 @@ from contextdb.cells.arguments import (
 from contextdb.cells.conditions import Condition
 from contextdb.cells.notebook import as_html, one_line
 from contextdb.columns import Framed, TextColumn, frame_of
+from contextdb.columns import polars as pl
 from contextdb.compiled.outputs import Outputs
 from contextdb.compiled.pick_columns import PickColumns, specificities
 from contextdb.compiled.unchanging import Unchanging
@@ -39,12 +40,9 @@ from contextdb.schema.settings import EMPTY, Schema, TableSettings, plain_names,
 from contextdb.schema.table_settings import PLAIN_JOBS, missing_job
 from contextdb.tables.condition_column import ConditionColumn
 from contextdb.tables.nesting.names import inner_name
-from contextdb.tables.output_columns import OutputColumn, output_columns, outputs_of
-from contextdb.tables.plain_columns import PlainColumns
+from contextdb.tables.plain_columns import OutputColumn, PlainColumns, output_columns, outputs_of
 
 if TYPE_CHECKING:
-    import polars as pl
-
     from contextdb.expressions.rules import WhenColumn
 
 AnyTable = TypeVar("AnyTable", bound="TableData")

@@ -61,10 +61,10 @@ class GapWork:
         """What the bytes of a file say. Raises FileError with every line that cannot be read."""
         return cls(_read(raw, file))
 
-    def with_work(self, cells: Mapping[str, str], work: Work | None, instead_of: Key | None = None) -> GapWork:
-        """With another state or owner of a gap; None takes its line away. The line `instead_of` goes, too."""
-        key = key_of(cells)
-        lines = {other: own for other, own in self.lines.items() if other not in (key, instead_of)}
+    def with_work(self, cells: Mapping[str, str], work: Work | None, without: Sequence[Key] = ()) -> GapWork:
+        """With another state or owner of a gap; None takes its line away. The lines `without` go, too."""
+        key, gone = key_of(cells), set(without)
+        lines = {other: own for other, own in self.lines.items() if other != key and other not in gone}
         return GapWork(lines if work is None else lines | {key: work})
 
     def to_bytes(self) -> bytes:
@@ -113,13 +113,13 @@ def key_of(cells: Mapping[str, str]) -> Key:
     return tuple(sorted(cells.items()))
 
 
-def write_work(table: Path, cells: Mapping[str, str], work: Work | None, instead_of: Key | None = None) -> GapWork:
+def write_work(table: Path, cells: Mapping[str, str], work: Work | None, without: Sequence[Key] = ()) -> GapWork:
     """Change one line of a table's file as `GapWork.with_work`, whatever others have written into it meanwhile. Raises FileError
     where the file cannot be read, or the disk refuses."""
     path = gaps_path(table)
     while True:
         raw = read_bytes(path) if path.is_file() else None
-        new = (GapWork({}) if raw is None else GapWork.of(raw, str(path))).with_work(cells, work, instead_of)
+        new = (GapWork({}) if raw is None else GapWork.of(raw, str(path))).with_work(cells, work, without)
         if write_atomic(path, new.to_bytes(), was=raw):
             return new
 

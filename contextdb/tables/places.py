@@ -13,6 +13,8 @@ from contextdb.tables.project import SCHEMA_FILE, load_table, read_folder_schema
 
 FOLDERS = (Path(), Path("tables"))
 MOST_NAMED = 6
+SAMPLES = ("contested_catch", "hit_mid_air", "locomotion")
+"""The sample tables, which a checkout has and an installation makes."""
 
 
 def open_compiled(text: str) -> CompiledTable:
@@ -61,8 +63,11 @@ def _no_table(path: Path, known: list[str]) -> FileError:
     files = [str(p) for p in beside if p.name.endswith((*TABLE_SUFFIXES, TENSORS_SUFFIX)) or (p / SCHEMA_FILE).is_file()]
     near = nearest(str(path), [*known, *files])
     accepted = "a file, a folder of one table, or the name of a table of the project"
+    mend = path_in_quotes(near) if near else ""
+    if not near and path.stem in SAMPLES:
+        mend = "to make the sample tables with contextdb demo --keep FOLDER"
     place = Place(safe_text(str(path), most=4096))
-    return FileError(Fault("there is no such table.", accepted, path_in_quotes(near) if near else "", place, "no-such-path"))
+    return FileError(Fault("there is no such table.", accepted, mend, place, "no-such-path"))
 
 
 def _files_in(folder: Path) -> list[str]:

@@ -34,8 +34,7 @@ from contextdb.errors import (
 )
 from contextdb.files import texts as files
 from contextdb.files.file_names import alike, composed, spelled
-from contextdb.schema.inheriting import resolved
-from contextdb.schema.settings import EMPTY, Schema, Studio, TableSettings, extends_of, read_schema
+from contextdb.schema.settings import EMPTY, Schema, Studio, TableSettings, extends_of, read_schema, resolved
 from contextdb.tables.data import require_readable
 from contextdb.tables.nesting.links import Neighbours, inner_tables, is_nested, require_sound
 from contextdb.tables.other_files import other_form, stray_sentence

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from contextdb.cells.arguments import require_kind, require_many, require_mapping, require_path, require_text
 from contextdb.cells.fact_columns import is_frame
 from contextdb.columns import TextColumn
+from contextdb.columns import polars as pl
 from contextdb.compiled.table import CompiledTable
 from contextdb.errors import Fault, SchemaError, TableError, in_quotes
 from contextdb.schema.settings import EMPTY, Schema, TableSettings, conditions_from_dict, expression_faults, settings_from_dict
@@ -22,11 +23,6 @@ from contextdb.tables.data import TableData, require_readable
 from contextdb.tables.nesting.flat import FlatTable, flatten
 from contextdb.tables.nesting.links import inner_rows, is_nested, nesting_faults
 from contextdb.tables.variants import WholeTable, is_variant, variant_faults, whole_of
-
-if TYPE_CHECKING:
-    import polars as pl
-else:
-    from contextdb.columns import polars as pl
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from contextdb.columns import TextColumn
 from contextdb.compiled.table import CompiledTable
 from contextdb.errors import ContextDBError, Fault, Place, TableError, in_quotes, mend_for, some
-from contextdb.schema.inheriting import with_inherited
+from contextdb.schema.settings import with_inherited
 from contextdb.tables.compiling import compile_table
 from contextdb.tables.data import TableData, removed_rows
 

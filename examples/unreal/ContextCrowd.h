@@ -82,6 +82,13 @@ public:
         return SetIn(Character, Fact, [Value](cdb_live* Live, int At) { return cdb_set_number(Live, At, Value); });
     }
 
+    /** Play an animation of a database to a place, in centimetres and degrees, from the next update on: the one that costs least for the
+     * pose and the way, where that is at most MostCost. False where none plays. */
+    bool Enter(std::size_t Character, const char* Database, double X, double Y, double Yaw, double MostCost)
+    {
+        return cdbm_enter_one(Crowd.get(), Character, Database, 0.0 - Y / 100.0, X / 100.0, -CDBO_PI / 180.0 * Yaw, MostCost) <= MostCost;
+    }
+
     /** Update all: nullptr, or what was wrong; all then stand where they stood. */
     const char* Update(double Seconds) { return cdbm_update_crowd(Crowd.get(), Seconds, nullptr); }
 

@@ -6,6 +6,7 @@
 #include "contextdb_motion.h"
 
 static const char *at;
+static const char *const events[] = {"Contact.Left", "Contact.Right", "Hit"};
 
 static const void *take(size_t size, size_t n)
 {
@@ -45,6 +46,8 @@ typedef struct memory {
     cdbm_pose *poses;
     cdbm_input *inputs;
     char *of_poses;
+    cdbm_one_off *one_offs;
+    int *are_playing;
     cdbm_room room;
 } memory;
 
@@ -57,8 +60,9 @@ static void follow(const cdbm_player *player, size_t n, double dt_s, const memor
     for (i = 0; i < n; i++) {
         uint8_t *packet = packets + i * CDBM_MOST_PACKET, n_bytes = (uint8_t)cdbm_pack(player, own->states + i * width, packet);
         copies->inputs[i] = own->inputs[i];
+        if (own->inputs[i].one_off) copies->inputs[i].one_off = &copies->one_offs[i];
         copies->inputs[i].facts = NULL, copies->inputs[i].is_copy = 1, copies->inputs[i].packet = packet, copies->inputs[i].n_packet = n_bytes;
-        if (player->poses.settings[CDBO_ROOT] != (double)CDBO_BY_ANIMATION)
+        if (!cdbm_moves_body(player, &own->poses[i].decision))
             copies->inputs[i].body = (const cdbo_body *)(const void *)(own->states + i * width);
         write_all(out, &n_bytes, 1, 1);
         write_all(out, packet, 1, n_bytes);
@@ -69,7 +73,23 @@ static void follow(const cdbm_player *player, size_t n, double dt_s, const memor
     free(packets);
 }
 
-/* An update: seconds, whether there is a ground, and for each its goal, and the number of its gait, a fact of the one table. */
+/* Enter one-offs: of each who enters, in which database, the target and the two weights. Copies are given what their owners have. */
+static void enter(const cdbm_player *player, int64_t n_entries, const memory *own, const memory *copies, size_t n)
+{
+    for (; n_entries > 0; n_entries--) {
+        const double *numbers = (const double *)take(8, 7);
+        size_t who = (size_t)numbers[0];
+        cdbm_match match = {0, {0.0, 0.0, 0.0}, 0.0, 0.0, NULL};
+        match.database = (size_t)numbers[1], match.position_weight = numbers[5], match.rotation_weight = numbers[6];
+        memcpy(&match.target, numbers + 2, sizeof match.target);
+        if (cdbm_enter(player, own->states + who * cdbm_state_width(player), &own->inputs[who], &match, &own->one_offs[who], own->room) != 1) exit(10);
+        own->are_playing[who] = own->one_offs[who].range >= 0.0;
+    }
+    memcpy(copies->one_offs, own->one_offs, n * sizeof *own->one_offs);
+}
+
+/* An update: seconds, whether there is a ground, how many enter a one-off, and for each its goal, the number of its gait, a fact of the
+ * one table, the number of an event, -1 for none, and in how many seconds that is to happen. */
 static void update(const cdbm_player *player, size_t n, const memory *own, const memory *copies, FILE *out)
 {
     double *states = own->states;
@@ -77,7 +97,7 @@ static void update(const cdbm_player *player, size_t n, const memory *own, const
     cdbm_input *inputs = own->inputs;
     cdbm_room room = own->room;
     double dt_s = *(const double *)take(8, 1);
-    int64_t numbers[2];
+    int64_t numbers[2], n_entries;
     const cdb_schema *schema = player->n_tables > 0 ? &player->opened[0]->schema : NULL;
     int gait = schema ? cdb_condition_number(schema, "gait") : -1;
     const cdb_fact **lists = (const cdb_fact **)calloc(n, sizeof *lists);
@@ -85,6 +105,7 @@ static void update(const cdbm_player *player, size_t n, const memory *own, const
     size_t i, k, width = cdbm_state_width(player), n_joints = player->poses.rig.n_joints;
     if (!lists || !facts || (schema && schema->n_conditions > 8)) exit(1);
     memcpy(numbers, take(8, 2), sizeof numbers);
+    n_entries = numbers[1];
     for (i = 0; i < n; i++) {
         memset(&inputs[i], 0, sizeof inputs[i]);
         memcpy(&inputs[i].goal, take(8, 3), sizeof inputs[i].goal);
@@ -92,9 +113,15 @@ static void update(const cdbm_player *player, size_t n, const memory *own, const
         for (k = 0; schema && k < schema->n_conditions; k++) facts[8 * i + k] = cdbi_missing(&schema->conditions[k]);
         memcpy(&numbers[1], take(8, 1), 8);
         if (gait >= 0) facts[8 * i + (size_t)gait].whole = numbers[1];
+        memcpy(&numbers[1], take(8, 1), 8);
+        memcpy(&inputs[i].event_s, take(8, 1), 8);
+        if (numbers[1] >= 0) inputs[i].event = events[numbers[1]];
         lists[i] = facts + 8 * i;
         inputs[i].facts = lists + i;
     }
+    enter(player, n_entries, own, copies, n);
+    for (i = 0; i < n; i++)
+        if (own->are_playing[i]) inputs[i].one_off = &own->one_offs[i];
     if (cdbm_update_all(player, n, states, dt_s, inputs, poses, room) != 1) exit(5);
     write_all(out, states, sizeof(double), n * width);
     for (i = 0; i < n; i++) {
@@ -103,6 +130,8 @@ static void update(const cdbm_player *player, size_t n, const memory *own, const
         write_all(out, poses[i].rotations, sizeof(double), 10 * n_joints);
     }
     follow(player, n, dt_s, own, copies, out);
+    for (i = 0; i < n; i++)
+        if (own->are_playing[i]) own->are_playing[i] = !cdbm_is_over(player, &own->one_offs[i]);
     free(lists);
     free(facts);
 }
@@ -119,6 +148,8 @@ static void try_out(const cdbm_player *player, double *state, cdbm_pose *pose, c
 {
     cdbm_input input;
     uint8_t packet[CDBM_MOST_PACKET];
+    cdbm_match match = {0, {0.5, 2.0, 0.3}, 1.0, 1.0, NULL};
+    cdbm_one_off one_off;
     float *matrices = (float *)malloc(16 * sizeof(float) * player->poses.rig.n_joints + 1);
     int tick;
     memset(&input, 0, sizeof input);
@@ -127,9 +158,15 @@ static void try_out(const cdbm_player *player, double *state, cdbm_pose *pose, c
     for (tick = 0; tick < 40; tick++) {
         input.goal.velocity[1] = tick < 20 ? 1.2 : -2.0;
         if (tick > 10) input.ground = slope;
+        if (tick == 15 || tick == 25) {
+            match.target.ahead = tick, match.database = drawn(seed) % player->controller.n_databases;
+            input.one_off = cdbm_enter(player, state, &input, &match, &one_off, room) == 1 && one_off.range >= 0.0 ? &one_off : NULL;
+        }
+        if (input.one_off && cdbm_is_over(player, input.one_off)) input.one_off = NULL;
         input.n_packet = cdbm_pack(player, state, packet), input.packet = packet;
         if (input.n_packet > 0 && tick % 2) packet[drawn(seed) % input.n_packet] = (uint8_t)drawn(seed);
         input.is_copy = tick > 30;
+        input.event = tick % 7 > 3 ? events[tick % 2] : NULL, input.event_s = 0.3;
         if (cdbm_update(player, state, 1.0 / 30.0, &input, pose, room) != 1 && !input.is_copy) break;
         if (!cdbm_asset(player, &pose->decision.playing) && pose->decision.playing.database >= 0.0) break;
         if (player->has_poses) cdbm_matrices(player, pose, matrices);
@@ -142,12 +179,15 @@ static memory taken(const cdbm_player *player, size_t n)
     memory own;
     size_t i;
     own.room.left = cdbm_room_size(player, n);
+    if (cdbm_enter_room(player) > own.room.left) own.room.left = cdbm_enter_room(player);
+    own.one_offs = (cdbm_one_off *)calloc(n, sizeof *own.one_offs);
+    own.are_playing = (int *)calloc(n, sizeof *own.are_playing);
     own.room.at = (char *)malloc(own.room.left);
     own.states = (double *)malloc(n * cdbm_state_size(player));
     own.poses = (cdbm_pose *)malloc(n * sizeof *own.poses);
     own.inputs = (cdbm_input *)malloc(n * sizeof *own.inputs);
     own.of_poses = (char *)malloc(n * cdbm_pose_size(player));
-    if (!own.room.at || !own.states || !own.poses || !own.inputs || !own.of_poses) exit(1);
+    if (!own.room.at || !own.states || !own.poses || !own.inputs || !own.of_poses || !own.one_offs || !own.are_playing) exit(1);
     for (i = 0; i < n; i++) {
         cdbm_lay_out(player, &own.poses[i], own.of_poses + i * cdbm_pose_size(player));
         cdbm_begin(player, own.states + i * cdbm_state_width(player), 0.0, 0.0, 0.0);
@@ -159,6 +199,8 @@ static memory taken(const cdbm_player *player, size_t n)
 static void give_back(memory *own)
 {
     free(own->of_poses);
+    free(own->one_offs);
+    free(own->are_playing);
     free(own->inputs);
     free(own->poses);
     free(own->states);

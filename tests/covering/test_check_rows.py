@@ -14,7 +14,7 @@ from contextdb.checks.rows import check_rows
 from contextdb.commands.check_command import check_path
 from contextdb.covering import coverage
 from contextdb.schema.settings import TableSettings
-from contextdb.tables.alike import identical_rows
+from contextdb.tables.variety import identical_rows
 
 TOML = """
 [conditions.speed]

@@ -18,8 +18,8 @@ from strategies import IS_FULL, for_each, some
 
 from contextdb.core import Boxes, count_holders
 from contextdb.covering.count import Bounds, _count, table_of
+from contextdb.covering.points import Questions
 from contextdb.covering.progress import SILENT, Cancelled, Progress
-from contextdb.covering.questions import Questions
 from contextdb.covering.witness import BoxSet
 
 CORE = Path(__file__).parent.parent.parent / "contextdb" / "core"

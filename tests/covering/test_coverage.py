@@ -13,8 +13,7 @@ from contextdb.cells.grammar import parse_cell
 from contextdb.compiled.table import data_of
 from contextdb.covering import coverage
 from contextdb.covering.space import Space
-from contextdb.tables.alike import identical_rows
-from contextdb.tables.variety import NEEDLESS
+from contextdb.tables.variety import NEEDLESS, identical_rows
 
 SEEDS = st.integers(0, 2**32)
 

@@ -13,8 +13,8 @@ from contextdb.checks.rows import check_rows
 from contextdb.covering.count import uncovered_share
 from contextdb.covering.factors import ValueFactor
 from contextdb.covering.judge import AHEAD
+from contextdb.covering.points import MANY, Questions
 from contextdb.covering.progress import Cancelled, Progress
-from contextdb.covering.questions import MANY, Questions
 from contextdb.covering.space import Box, Space
 from contextdb.covering.witness import BoxSet, Steps
 

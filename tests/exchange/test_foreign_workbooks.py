@@ -18,8 +18,7 @@ from test_workbooks import raw_of, told
 from contextdb.commands.import_command import _typed
 from contextdb.exchange.formats import ReadOptions, read
 from contextdb.exchange.mapping import propose
-from contextdb.exchange.pairs import with_intervals
-from contextdb.exchange.reading import Reading
+from contextdb.exchange.reading import Reading, with_intervals
 from contextdb.schema.settings import EMPTY, TableSettings
 
 MOST_CHOICES = 3

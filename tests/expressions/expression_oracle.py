@@ -9,9 +9,9 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from contextdb.cells.angles import wrap_angle
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import ANGLE, BOOL, INT, NUMBER, TEXT, Domain
+from contextdb.cells.intervals import wrap_angle
 
 GAITS = ("Walk", "Run", "Idle")
 TAGS = ("InAir", "Move.Run", "Move.Walk")

@@ -105,7 +105,7 @@ def test_many_contexts_have_the_answers_of_each_alone(case, moments, unknown):
         return
     for few_rows in (-1, 64):  # against whole masks, row by row
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("contextdb.expressions.rules.many.MANY_ROWS", few_rows)
+            patch.setattr("contextdb.expressions.rules.rules.MANY_ROWS", few_rows)
             assert [rows.tolist() for rows in compiled.query_many(columns, unknown=unknown).lists()] == expected
     many = compiled.query_many(columns, unknown=unknown)
     assert [rows.tolist() for rows in many.lists()] == expected

@@ -7,8 +7,8 @@ from made_once import make_clip
 from contextdb.errors import ContextError, FileError, MotionError
 from contextdb.motion.clips.poses import LocalPoses, forward_kinematics
 from contextdb.motion.storage.written_poses import write_arrays
-from contextdb.motion.walking.baked import baked_cycle
 from contextdb.motion.walking.cycle import Cycle
+from contextdb.motion.walking.walked import baked_cycle
 
 CYCLE = Cycle.of(make_clip("walk").clip)
 N = 24

@@ -18,8 +18,7 @@ from contextdb.motion.search.filters import Biases
 from contextdb.motion.storage import extracting
 from contextdb.motion.storage.building import build, build_all, open_or_build, saved_path
 from contextdb.motion.storage.clip_files import unmatched
-from contextdb.motion.storage.feature_cache import EXTRACTION, FeatureCache, file_name, key_of
-from contextdb.motion.storage.stored import save_database
+from contextdb.motion.storage.stored import EXTRACTION, FeatureCache, file_name, key_of, save_database
 
 NAMES = ("idle", "jog", "jog_tired", "walk")
 SECTIONS = {

@@ -160,7 +160,7 @@ def test_the_game_may_move_the_body_and_plan_the_path_itself():
     body = motion.Steered(position=(3.0, 4.0), velocity=(0.0, 1.0), heading=0.5)
     path = motion.Trajectory(30.0, np.linspace((3.0, 4.0), (3.0, 5.0), 40), np.full(40, 0.5))
     updated = one.update(DT, (0.0, 1.0), {"gait": "Walk"}, body=body, path=path)
-    assert one.body is body
+    assert one.body == body
     assert updated.facts["speed"] == 1.0
     assert updated.pose.root == (3.0, 4.0, 0.5)
     np.testing.assert_allclose(updated.path.positions, path.positions, atol=1e-12)

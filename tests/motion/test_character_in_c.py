@@ -20,13 +20,14 @@ from test_output_ground import slope
 
 import contextdb as cdb
 from contextdb import motion
-from contextdb.commands.motion_bundle import file_of
+from contextdb.commands.compile_command import c_motion_header
+from contextdb.commands.motion_build_command import file_of
 from contextdb.compiled.c_header import c_header_of
+from contextdb.core import direction_of
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.output.bank import moving_alike
 from contextdb.motion.selection.chooser import N_DECISION
 from contextdb.motion.storage.bundle import Played, bundle_of
-from contextdb.motion.storage.c_header import c_motion_header
 
 pytestmark = pytest.mark.skipif(os.name == "nt" or not all_compilers(), reason="no gcc or clang was found")
 MOCAP = Path(os.environ.get("CONTEXTDB_MOCAP", Path(__file__).parents[2].parent / "shared" / "data" / "mocap"))
@@ -36,6 +37,7 @@ CAPTURED = (
     "walk_normal", "walk_tired", "walk-turn-left_normal", "run_normal", "walk-turn-right_normal", "run_tired", "walk-back_normal",
     "walk-left_normal", "dash_normal",
 )  # fmt: skip
+EVENTS = ("Contact.Left", "Contact.Right", "Hit")
 AHEAD = [
     {"type": "trajectory", "what": "position", "at": [0.33, 0.67, 1.0]},
     {"type": "trajectory", "what": "direction", "at": [0.33, 0.67, 1.0]},
@@ -58,6 +60,9 @@ process.exitCode = wasi.start(instance)
 """
 MARKS = Markup.parse(
     "asset,tag,from,to,value\nidle,Looping,,,\nwalk,Looping,,,\njog,Looping,,,\nstop_walk,NextNaturalOnly,0,0.5,\n"
+    "stop_walk,MatchRange,0,2.2,\nstop_walk,WarpPosition,0.5,1.7,\nstop_walk,WarpRotation,0.9,4,\njog,Excluded,1.5,1.6,\n"
+    "walk,Contact.Left,0.2,0.5,\nwalk,Contact.Right,0.7,0.9,\njog,Contact.Left,0.1,0.3,\nwalk_turn_left_90,Contact.Right,0.3,0.6,\n"
+    "walk,Excluded,0.55,0.6,\nidle,Hit.Soft,1.0,1.2,\nstart_walk,Hit,0.5,0.6,\nwalk_turn_left_90,Hit,0.2,0.3,\n"
 )
 CAPTURED_GAITS = [{"run": "Run", "dash": "Run"}.get(name.split("_")[0], "Idle Walk") for name in CAPTURED]
 CAPTURED_COLUMNS = {"Asset Name": list(CAPTURED), "gait": CAPTURED_GAITS, "direction": ["Any"] * len(CAPTURED)}
@@ -66,12 +71,21 @@ COLUMNS = {
     "Asset Name": list(NAMES),
     "gait": ["Idle", "Walk", "Walk", "Run", "Walk", "Idle Walk"],
     "direction": ["Any", "-70..70", "20..180", "Any", "Any", "Any"],
+    "play_rate": ["", "0.9..1.2", "", "", "1.1", "1.3..1.5"],
+    "start_s": ["", "", "0.4", "", "", ""],
+    "blend_s": ["", "", "", "0.2", "", "0.1"],
+    "root": ["", "", "", "", "animation", "animation"],
 }
+OUTPUTS = ["play_rate", "start_s", "blend_s", "root"]
 
 
 @cache
 def table(is_captured=False):
-    return cdb.Table.from_columns(CAPTURED_COLUMNS if is_captured else COLUMNS, CONDITIONS).compile()
+    return (
+        cdb.Table.from_columns(CAPTURED_COLUMNS, CONDITIONS)
+        if is_captured
+        else cdb.Table.from_columns(COLUMNS, CONDITIONS, {"outputs": OUTPUTS})
+    ).compile()
 
 
 def captured(name):
@@ -144,10 +158,24 @@ def drawn(rng, is_captured):
     return motion.Controller(motion.Selector(entries), settings), schema, banks, output
 
 
+def entered(rng, one, stick, gait, nodes):
+    """A one-off that a match node gives a character for a target, None where nothing may play, and what C is given for it."""
+    name = rng.choice(list(nodes))
+    node, turn = nodes[name], rng.choice([None, rng.uniform(-4.0, 4.0)])
+    target = motion.Target(rng.uniform(-2.0, 2.0), rng.uniform(-1.0, 4.0), turn)
+    facts = {"gait": gait, "direction": direction_of(*stick, one.body.heading)}
+    play = node.enter(one.features(), target, one.tables.query(facts))
+    weights = node.position_weight, node.rotation_weight
+    given = list(nodes).index(name), target.left_m, target.ahead_m, math.nan if turn is None else turn, *weights
+    return None if play is None else motion.OneOff(one, play, name), given
+
+
 def session(rng, n_ticks, is_captured=False):
     """A bundle, what characters are given in it, and what Python makes of that."""
     controller, schema, banks, output = drawn(rng, is_captured)
-    played = Played(controller, schema, banks, output)
+    databases, weights = controller.selector.databases, rng.choice([(1.0, 1.0), (20.0, 0.0), (0.0, 5.0)])
+    nodes = {name: motion.MatchNode(databases[name], position_weight=weights[0], rotation_weight=weights[1]) for name in databases}
+    played = Played(controller, schema, banks, output, {name: node.ends for name, node in nodes.items()})
     banks = moving_alike(banks)
     bundle = bundle_of({"player": played}, {"turns": "moves", "all": "moves"}, {"moves": file_of("moves", table(is_captured))})
     n, ground = rng.randint(1, 4), rng.choice([None, slope])
@@ -156,19 +184,37 @@ def session(rng, n_ticks, is_captured=False):
         for _ in range(n)
     ]
     crowd, given, expected = motion.Crowd(members), [struct.pack("qq", n, n_ticks)], []
-    sticks, facings = [(0.0, 0.0)] * n, [math.nan] * n
+    sticks, facings, events, once = [(0.0, 0.0)] * n, [math.nan] * n, [None] * n, [None] * n
+    n_events = 2 if is_captured else 3
     for tick in range(n_ticks):
         dt = rng.choice([1 / 30, 1 / 30, 1 / 60, 1 / 144]) if tick else 0.0
         for i in range(n):
             if rng.random() < 0.06:
                 speed, way = rng.choice([0.0, 1.2, 2.6]), rng.uniform(-math.pi, math.pi)
                 sticks[i] = (speed * math.sin(way), speed * math.cos(way))
+            name, left_s = events[i] or (rng.choice(EVENTS[:n_events]), rng.choice([0.2, 0.5, 1.0]))
+            is_going_on = events[i] is not None and left_s > 0.0
+            events[i] = (name, max(left_s - dt, 0.0)) if is_going_on or rng.random() < 0.04 else None
         gaits = ["Idle" if not math.hypot(*stick) else "Walk" if math.hypot(*stick) < 2.0 else "Run" for stick in sticks]
-        updates = crowd.update(dt, sticks, {"gait": gaits})
-        given.append(struct.pack("dqq", dt, ground is not None, 0))
-        for stick, facing, updated in zip(sticks, facings, updates, strict=True):
+        entering = [i for i in range(n) if once[i] is None and rng.random() < 0.03]
+        entries = [(i, *entered(rng, members[i], sticks[i], gaits[i], nodes)) for i in entering]
+        for i, one, _ in entries:
+            once[i] = one
+        events = [None if one else event for one, event in zip(once, events, strict=True)]
+        if any(once):
+            options = [{} if event is None else {"event": event} for event in events]
+            players = [one or each for one, each in zip(once, members, strict=True)]
+            each = zip(players, sticks, gaits, options, strict=True)
+            updates = [one.update(dt, stick, {"gait": gait}, **own) for one, stick, gait, own in each]
+        else:
+            updates = crowd.update(dt, sticks, {"gait": gaits}, event=events)
+        once = [None if one is None or one.is_done else one for one in once]
+        given.append(struct.pack("dqq", dt, ground is not None, len(entries)))
+        for stick, facing, event, updated in zip(sticks, facings, events, updates, strict=True):
             number = CONDITIONS["gait"]["values"].index(updated.facts["gait"])
-            given.append(struct.pack("3dq", *stick, facing, number))
+            event_number, in_s = (-1, 0.0) if event is None else (EVENTS.index(event[0]), event[1])
+            given.append(struct.pack("3dqqd", *stick, facing, number, event_number, in_s))
+        given += [struct.pack("7d", i, *numbers) for i, _, numbers in entries]
         states = b"".join(one.state for one in crowd)
         poses = [updated.pose for updated in updates]
         numbers = [(np.array(pose.root), pose.rotations, pose.translations, pose.positions) for pose in poses]
@@ -225,3 +271,18 @@ def test_a_bundle_is_refused_with_the_reason(programs, tmp_path: Path, at, octet
     bundle[at : at + len(octets)] = octets
     (tmp_path / "bundle").write_bytes(bundle)
     assert ran(programs[0], tmp_path / "bundle", tmp_path / "in", tmp_path / "out").strip() == why
+
+
+def test_a_character_of_a_crowd_in_c_plays_a_one_off_to_a_place(programs, tmp_path: Path):
+    controller, schema, banks, output = drawn(random.Random(1), False)
+    node = motion.MatchNode(controller.selector.databases["all"])
+    bundle = bundle_of({"player": Played(controller, schema, banks, output, {"all": node.ends})}, {}, {})
+    (tmp_path / "bundle").write_bytes(bundle)
+    (tmp_path / "contextdb_motion.h").write_text(header(), encoding="ascii")
+    command = [*all_compilers()[0], "-std=c99", "-ffp-contract=off", *sanitizers(*all_compilers()[0])]
+    program = compiled(command, PROGRAMS / "enter.c", tmp_path / "enter", tmp_path, "-lm")
+    cost, *assets, apart = ran(program, tmp_path / "bundle").splitlines()
+    assert float(cost) > 0.0
+    assert len(set(assets)) == 1
+    assert len(assets) > 5
+    assert math.hypot(*map(float, apart.split())) < 1e-6

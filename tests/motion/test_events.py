@@ -12,9 +12,22 @@ from strategies import examples
 
 from contextdb import Table
 from contextdb.errors import QueryError
-from contextdb.motion import Controller, ControllerGroup, ControllerSettings, Entry, FeatureSchema, MotionDatabase, Selector
+from contextdb.motion import (
+    Character,
+    Controller,
+    ControllerGroup,
+    ControllerSettings,
+    Crowd,
+    Entry,
+    FeatureSchema,
+    MotionDatabase,
+    Selector,
+    Trace,
+)
+from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.selection.events import seconds_to
+from contextdb.motion.trace.what_if import run_again
 
 FEW = ControllerSettings(search_every_s=60.0, history_s=0.0, jump_threshold_s=0.0, min_play_rate=0.8, max_play_rate=1.25, rate=RATE)
 
@@ -146,6 +159,41 @@ def test_one_of_a_crowd_is_asked_for_an_event_and_plays_as_it_does_alone():
         both = together.update(1 / 60, queries, event=[event, None])
         each = [*alone.update(1 / 60, queries[:1], event=event), *other.update(1 / 60, queries[1:])]
         assert [(one.playing, one.play_rate) for one in both] == [(one.playing, one.play_rate) for one in each]
+
+
+def test_what_an_event_leaves_out_is_recorded_and_read_and_the_session_runs_again_with_it():
+    database = made({"p": [3.0] * 8, "q": [3.5] * 8}, {"p": set(), "q": {5}}, set(), dict.fromkeys("pq", ()))
+    selector = Selector([Entry("a", database)])
+    trace = Trace(8, selector.databases)
+    one = Controller(selector, FEW, trace)
+    for tick in range(4):
+        one.update(DT, [3.0], event=("Hit", max(0.2 - tick * DT, 0.0)))
+    loaded = Trace.from_bytes(trace.to_bytes())
+    assert [each.inputs.event for each in loaded] == [("Hit", 0.2), ("Hit", 0.1), ("Hit", 0.0), ("Hit", 0.0)]
+    loaded.use(selector.databases)
+    reasked = loaded.reasked()
+    found = reasked.why_not(0, "p")
+    assert (found.winner, found.reasons[0]) == ("q", "event: does not lead to Hit in 0.2 s")
+    assert [(each.kind, each.what, each.wins) for each in found.changes] == [("event", "Hit", True)]
+    assert {row.left_out for _, own in loaded[0].candidates for row in own} == {LeftOut.NO, LeftOut.EVENT}
+    assert [(each.playing, each.play_rate) for each in run_again(reasked)] == [(each.playing, each.play_rate) for each in trace]
+
+
+def test_a_crowd_is_asked_for_events_as_its_characters_are():
+    def characters(n):
+        settings = ControllerSettings(search_every_s=0.1)
+        return [Character(Controller(Selector([Entry("a", WALKS)]), settings), SCHEMA) for _ in range(n)]
+
+    crowd, alone = Crowd(characters(3)), characters(3)
+    for tick in range(40):
+        events = [("Contact.Right", 1.0 - tick / 60), None, ("Contact.Left", 1.2 - tick / 60)]
+        together = crowd.update(1 / 60, [(0.0, 1.0)] * 3, event=events)
+        each = [one.update(1 / 60, (0.0, 1.0), event=event) for one, event in zip(alone, events, strict=True)]
+        decided = [[(one.decision.playing, one.decision.play_rate, one.decision.why) for one in own] for own in (together, each)]
+        assert decided[0] == decided[1]
+    with pytest.raises(QueryError, match="character 0"):
+        crowd.update(1 / 60, [(0.0, 1.0)] * 3, event=("Hti", 0.2))
+    assert crowd.states == [one.state for one in alone]
 
 
 @pytest.mark.parametrize(

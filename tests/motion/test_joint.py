@@ -34,7 +34,7 @@ from contextdb.motion import (
 )
 from contextdb.motion.joint import searcher as searching
 from contextdb.motion.joint.alignment import aligned
-from contextdb.motion.made.joint import HOLD_S, JOINT_RECIPES, JOINT_ROLES, make_joint_clip, write_joint_clips
+from contextdb.motion.made.game import HOLD_S, JOINT_RECIPES, JOINT_ROLES, make_joint_clip, write_joint_clips
 from contextdb.motion.markup.left_out import LeftOut, Skip
 from contextdb.motion.markup.marks import Mark, Marks
 from contextdb.motion.nodes.pose_match import pose_schema

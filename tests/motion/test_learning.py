@@ -10,12 +10,10 @@ from test_reasked import DATABASES, LOCO
 
 from contextdb.errors import MotionError
 from contextdb.motion import Controller, ControllerSettings, Entry, Selector, Trace
-from contextdb.motion.trace.choice_pairs import ChoiceSession
-from contextdb.motion.trace.choices import Preference, read_choices, write_choices
-from contextdb.motion.trace.learning import learn
+from contextdb.motion.trace.choice_pairs import ChoiceSession, Preference, read_choices, write_choices
+from contextdb.motion.trace.learning import PULL, SURE, fitted_weights, learn
 from contextdb.motion.trace.reasked_decision import asset_of
 from contextdb.motion.trace.stock import Stock
-from contextdb.motion.trace.weight_fit import PULL, SURE, fitted_weights
 
 N_PAIRS = 60
 

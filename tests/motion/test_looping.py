@@ -5,7 +5,7 @@ import pytest
 from made_once import make_clip
 
 from contextdb.motion import FeatureSchema, Markup, MotionDatabase, poses_of, root_trajectory
-from contextdb.motion.clips.looping import three_rounds
+from contextdb.motion.clips.contacts import three_rounds
 from contextdb.motion.features.extraction import clip_features
 
 SCHEMA = FeatureSchema.from_dict(

@@ -8,7 +8,7 @@ from strategies import examples
 
 from contextdb.errors import QueryError
 from contextdb.motion import FeatureSchema, Trajectory, with_path
-from contextdb.motion.clips.many_paths import ManyTrajectories
+from contextdb.motion.clips.trajectory import ManyTrajectories
 from contextdb.motion.features.extraction import trajectory_features
 from contextdb.motion.features.path_features import with_paths, write_paths
 

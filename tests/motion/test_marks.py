@@ -14,7 +14,7 @@ from contextdb.motion.markup.marking import marks_of
 from contextdb.motion.markup.marks import ANY_TAGS, Mark, Marks, TagFilter, covers
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.markup.reserved import ReservedTag
-from contextdb.motion.markup.spans import TOLERANCE_S, Span, fits
+from contextdb.motion.markup.span_faults import TOLERANCE_S, Span, fits
 
 # ---- the oracle: one frame and one span at a time
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from contextdb.errors import MotionError
 from contextdb.motion.markup.markup import MOST_FAULTS, Markup
 from contextdb.motion.markup.reserved import ReservedTag
-from contextdb.motion.markup.spans import Span, fits
+from contextdb.motion.markup.span_faults import Span, fits
 
 HEADER = "asset,tag,from,to,value\n"
 

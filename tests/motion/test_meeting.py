@@ -9,7 +9,7 @@ from made_once import make_clip
 from running import run
 
 from contextdb import motion
-from contextdb.motion.preparing.meeting import Meeting, meetings, notes_of
+from contextdb.motion.preparing.look import Meeting, meetings, notes_of
 
 UNREAL = {"Hips": "pelvis", "Spine": "spine_01", "Chest": "spine_02", "Neck": "neck_01", "Head": "head"}
 

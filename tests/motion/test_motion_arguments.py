@@ -22,9 +22,9 @@ from contextdb.motion.clips.poses import forward_kinematics, local_poses
 from contextdb.motion.clips.steering import steered_path
 from contextdb.motion.features.extraction import clip_features, clip_permutations, features_of
 from contextdb.motion.features.path_features import with_paths
-from contextdb.motion.made.joint import make_joint_clip, write_joint_clips
+from contextdb.motion.made.game import make_joint_clip, write_joint_clips
 from contextdb.motion.made.recipes import descriptions, make_clip
-from contextdb.motion.measuring.wanted import ClipContexts
+from contextdb.motion.measuring.moves import ClipContexts
 from contextdb.motion.nodes.pose_match import pose_schema
 from contextdb.motion.output.track import clip_of_poses, pose_arrays
 from contextdb.motion.search.database import build_databases
@@ -33,12 +33,11 @@ from contextdb.motion.storage.building import build_all, saved_path
 from contextdb.motion.storage.pose_files import open_poses, poses_path, save_poses
 from contextdb.motion.storage.stored import inputs_of, open_database, save_database
 from contextdb.motion.storage.written_poses import write_arrays
-from contextdb.motion.walking.baked import baked_cycle
 from contextdb.motion.walking.blending import Gait
 from contextdb.motion.walking.cycle import Cycle
 from contextdb.motion.walking.stances import Stances
 from contextdb.motion.walking.transitions import Transitions
-from contextdb.motion.walking.walked import walked_clips
+from contextdb.motion.walking.walked import baked_cycle, walked_clips
 from contextdb.motion.walking.walker import Walker
 
 

@@ -13,9 +13,8 @@ from made_once import make_clip
 from contextdb.errors import ContextError, MotionError
 from contextdb.motion import FeatureSchema, Markup, MotionDatabase, coverage, load_clips
 from contextdb.motion.measuring.coverage import MotionCoverage
-from contextdb.motion.measuring.moves import DIRECTION, LEAST_FRAMES, MAPS, TURN
-from contextdb.motion.measuring.transition_names import transitions_of
-from contextdb.motion.measuring.wanted import ClipContexts, _between, _straightest
+from contextdb.motion.measuring.moves import DIRECTION, LEAST_FRAMES, MAPS, TURN, ClipContexts, _between, _straightest
+from contextdb.motion.measuring.usage import transitions_of
 
 SCHEMA = FeatureSchema.from_dict(
     "loco",

@@ -13,9 +13,8 @@ from test_output_glb import made, numbers
 from contextdb import motion
 from contextdb.errors import FileError
 from contextdb.motion import poses_of, write_poses
-from contextdb.motion.storage.capsules import capsules_of
-from contextdb.motion.storage.usda import _paths
-from contextdb.motion.storage.written_poses import glb_of_poses
+from contextdb.motion.storage.glb import capsules_of
+from contextdb.motion.storage.written_poses import _paths, glb_of_poses
 
 VALIDATE = """
 const validator = require('gltf-validator'), fs = require('fs');

@@ -18,7 +18,7 @@ from contextdb.motion import (
     write_bvh,
     write_poses,
 )
-from contextdb.motion.features.schema_dict import schema_to_dict
+from contextdb.motion.features.schema import schema_to_dict
 from contextdb.motion.output.track import pose_arrays
 from contextdb.motion.storage.building import build_all
 from contextdb.motion.storage.pose_files import ARRAYS, open_poses, poses_path, save_poses

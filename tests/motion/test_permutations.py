@@ -36,11 +36,11 @@ from contextdb.motion import (
 )
 from contextdb.motion.clips.clip import parse_bvh
 from contextdb.motion.clips.poses import local_poses
+from contextdb.motion.features.channels import Permutations
 from contextdb.motion.features.extraction import clip_features, clip_permutations
-from contextdb.motion.features.permutations import Permutations
-from contextdb.motion.made.joint import make_joint_clip
+from contextdb.motion.made.game import make_joint_clip
 from contextdb.motion.measuring.coverage import coverage
-from contextdb.motion.measuring.near_clips import near_clips
+from contextdb.motion.measuring.usage import near_clips
 from contextdb.motion.storage.building import build_all
 from contextdb.motion.trace.views import decision_lines
 

@@ -68,7 +68,8 @@ def test_poses_are_those_of_the_oracle(seed):
     for i, (decision, place) in enumerate(play_of(rng, step)):
         dt, below = step if i else 0.0, None if i >= leaves_at else ground
         rows, at = stream._place
-        given, seams, *_ = stream._pipeline._given(rows.row(at), [decision], dt, None if below is None else [below])
+        own, row = stream._pipeline, rows.row(at)
+        given, seams, _ = own.given(row, own.plays_of(row, [decision], None if below is None else [below]), dt)
         expected, state = pose_oracle.posed(list(banks.values()), settings, state, given[0], seams, dt, place, below)
         pose = stream.update(decision, dt, place, below)
         displayed = pose.rotations, pose.translations, pose.positions, pose.root, pose.contacts

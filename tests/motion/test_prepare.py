@@ -11,7 +11,7 @@ from strategies import in_full_runs
 from contextdb import motion
 from contextdb.errors import ContextDBError
 from contextdb.motion.markup.reserved import ReservedTag
-from contextdb.motion.markup.spans import TOLERANCE_S
+from contextdb.motion.markup.span_faults import TOLERANCE_S
 from contextdb.motion.preparing.look import span_of_frames
 from contextdb.motion.preparing.proposal import KINDS, Proposal
 from contextdb.motion.walking.blending import Gait

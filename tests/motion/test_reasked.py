@@ -27,15 +27,18 @@ SCHEMA = FeatureSchema.from_dict(
         ],
     },
 )
-MARKUP = Markup.parse("asset,tag,from,to,value\nwalk,Fast,0.2,0.6,\njog,DoNotChoose,0.1,0.4,\nidle,CostModifier,0,0.5,0.5\n")
+MARKUP = Markup.parse(
+    "asset,tag,from,to,value\nwalk,Fast,0.2,0.6,\nwalk,Contact.Left,0.4,0.7,\nrun,Contact.Left,0.2,0.3,\njog,DoNotChoose,0.1,0.4,\nidle,CostModifier,0,0.5,0.5\n"
+)
+LANDINGS = Markup.parse("asset,tag,from,to,value\nwalk_tired,Contact.Left,0.2,0.5,\n")
 LOCO = MotionDatabase.build([make_clip(name).clip for name in ("walk", "jog", "idle", "run")], SCHEMA, markup=MARKUP)
-TIRED = MotionDatabase.build([make_clip(name).clip for name in ("walk_tired", "jog_tired")], SCHEMA)
+TIRED = MotionDatabase.build([make_clip(name).clip for name in ("walk_tired", "jog_tired")], SCHEMA, markup=LANDINGS)
 DATABASES = {"tired": TIRED, "loco": LOCO}
 
 
 @pytest.fixture(scope="module")
 def trace() -> Trace:
-    """A session in which facts, tags, penalties and biases change; saved and read again."""
+    """A session in which facts, tags, penalties, biases and events change; saved and read again."""
     rng = random.Random(5)
     selector = Selector([Entry("tired", TIRED, 0.4), Entry("loco", LOCO)])
     trace = Trace(8, selector.databases)
@@ -47,7 +50,8 @@ def trace() -> Trace:
         tags = TagFilter(("Fast",)) if i % 7 == 0 else TagFilter(prefer={"Fast": 0.3}) if i % 2 else None
         penalties = {"walk": rng.random()} if i % 4 == 0 else None
         bias = {"loco": np.array([rng.choice([0.0, 0.1, np.inf]) for _ in range(LOCO.n_frames)])} if i % 5 == 0 else None
-        controller.update(1 / 30, query, valid, tags, {"i": i}, penalties=penalties, bias=bias, force=i % 2 == 0)
+        event = ("Contact.Left", rng.uniform(0.1, 0.6)) if i % 6 == 4 else None
+        controller.update(1 / 30, query, valid, tags, {"i": i}, penalties=penalties, bias=bias, force=i % 2 == 0, event=event)
     loaded = Trace.from_bytes(trace.to_bytes())
     assert all(decision.candidates == () for decision in loaded)
     assert loaded.use(DATABASES) == ""

@@ -15,7 +15,7 @@ from test_search import marked_databases, questions
 
 from contextdb.core import Frames
 from contextdb.motion.search.database import MotionDatabase
-from contextdb.motion.search.many_filters import ManyFilters, together
+from contextdb.motion.search.filters import ManyFilters, together
 
 CORE = Path(__file__).parents[2] / "contextdb" / "core"
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="the options are those of gcc and clang")

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from contextdb.motion.trace.answer_views import diff_lines, stats_lines, what_if_lines, why_lines
-from contextdb.motion.trace.json_form import as_plain
+from contextdb.motion.trace.cost_views import as_plain
 from contextdb.motion.trace.session_diff import Parting, SessionDiff
 from contextdb.motion.trace.stats import SessionStats
 from contextdb.motion.trace.what_if import ChangedChoice, WhatIf

@@ -17,10 +17,10 @@ from strategies import examples
 
 from contextdb.errors import ArtefactError, FileError, MotionError
 from contextdb.motion import Channel, FeatureSchema, MotionDatabase
-from contextdb.motion.features.schema_dict import schema_to_dict
+from contextdb.motion.features.schema import schema_to_dict
 from contextdb.motion.markup.marks import TagFilter
 from contextdb.motion.markup.markup import Markup
-from contextdb.motion.markup.spans import Span
+from contextdb.motion.markup.span_faults import Span
 from contextdb.motion.search.filters import Biases
 from contextdb.motion.storage.stored import inputs_of, open_database, save_database
 from contextdb.tables.table import Table

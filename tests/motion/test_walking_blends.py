@@ -13,7 +13,7 @@ from made_once import make_clip
 from contextdb.motion import MotionError
 from contextdb.motion.walking.blending import Gait, Mix
 from contextdb.motion.walking.cycle import Cycle
-from contextdb.motion.walking.gaits import GaitState, advanced, wanted_gait
+from contextdb.motion.walking.walker import GaitState, advanced, wanted_gait
 
 SPEEDS = st.floats(0.0, 8.0)
 AXES = st.floats(-1.5, 1.5)

@@ -10,6 +10,7 @@ import contextdb as cdb
 from contextdb.motion import Controller, ControllerSettings, Entry, Selector, TagFilter, Trace
 from contextdb.motion.trace.stock import Stock
 from contextdb.motion.trace.why_not import why_not
+from contextdb.tables.project import Project
 
 WALKS = range(20)
 
@@ -132,3 +133,14 @@ def test_a_mirrored_range_needs_the_cell_for_mirrored_facts():
     assert found.reasons == ("table: row 1 of t, with mirrored facts: turn is -70, the cell says 60..90",)
     (change,) = found.changes
     assert (change.kind, change.what, change.wins) == ("cell", "row 1 of t: turn", True)
+
+
+def test_the_table_of_a_database_that_names_none_is_the_only_one_that_has_its_assets(tmp_path):
+    for name, text in {
+        "contextdb.toml": '[conditions.speed]\ntype = "number"\n',
+        "moves.csv": "Asset,speed\nwalk,0..2\nrun,2..9\n",
+        "ends.csv": "Asset,speed\nstop,0..2\nrun,9\n",
+    }.items():
+        (tmp_path / name).write_text(text)
+    databases = {"moves": line(walk=WALKS, jog=WALKS), "none": line(jog=WALKS), "two": line(run=WALKS)}
+    assert Stock.with_tables(databases, Project.load(tmp_path)).table_of == {"moves": "moves"}

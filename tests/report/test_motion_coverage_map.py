@@ -5,7 +5,7 @@ import re
 import numpy as np
 
 from contextdb.motion.measuring.moves import MAPS
-from contextdb.report.motion_coverage_map import html_map
+from contextdb.report.motion_coverage_document import html_map
 
 ROUND, TURNS = MAPS["direction"], MAPS["turn"]
 LEFT = [column.name for column in ROUND.columns].index("left")

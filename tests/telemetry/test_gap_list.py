@@ -18,7 +18,7 @@ from contextdb.report.coverage_results import CoverageResults, Measured
 from contextdb.schema.settings import TableSettings
 from contextdb.tables.table import Table
 from contextdb.telemetry import observe
-from contextdb.telemetry.gap_list import ranked
+from contextdb.telemetry.seen_gaps import ranked
 
 SCHEMA = {
     "steps": {"type": "int", "min": 0, "max": 5},

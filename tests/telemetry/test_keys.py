@@ -7,8 +7,8 @@ from contextdb import bitmask
 from contextdb.compiled.many import rows_of
 from contextdb.core import pack_codes, unpack_codes
 from contextdb.telemetry import keys
+from contextdb.telemetry.observe_file import SmallestHashes, SmallestKeys
 from contextdb.telemetry.parts import MOST_HASHES
-from contextdb.telemetry.smallest import SmallestHashes, SmallestKeys
 
 
 @pytest.fixture

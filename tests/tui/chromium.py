@@ -22,6 +22,7 @@ PROGRAM = next((path for name in ("chromium", "chromium-browser", "google-chrome
 DEADLINE_S = 20.0
 _CODES = re.compile(r"\x1b(?:\[[0-?]*[ -/]*[@-~]|\][^\x07]*\x07|.)")
 ALT, CTRL, SHIFT = 1, 2, 8
+SIGNS = {".": ("Period", 190), "<": ("Comma", 188), " ": ("Space", 32)}
 NAMED = {"Enter": 13, "Escape": 27, "Tab": 9, "ArrowDown": 40, "ArrowUp": 38, "ArrowLeft": 37, "ArrowRight": 39, "F6": 117}
 
 
@@ -42,8 +43,8 @@ class Window:
 
     async def key(self, key: str, held: int = 0) -> None:
         """Press a key as the keyboard does."""
-        code = NAMED.get(key) or ord(key.upper())
         name = key if key in NAMED else f"Digit{key}" if key.isdigit() else f"Key{key.upper()}"
+        name, code = SIGNS.get(key) or (name, NAMED.get(key) or ord(key.upper()))
         press = {"key": key, "code": name, "windowsVirtualKeyCode": code, "modifiers": held}
         text = {"text": key} if key not in NAMED and held & ~SHIFT == 0 else {}
         if key == "v" and held == CTRL:

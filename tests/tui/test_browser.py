@@ -84,6 +84,48 @@ def test_keys_pastes_and_colours_arrive_as_in_a_terminal(folder: Path) -> None:
     in_browser(folder, script)
 
 
+@needs_browser
+@pytest.mark.parametrize("width", [390, 760])
+def test_a_narrow_window_in_light_colours_imports_and_builds_a_rule_by_keys(folder: Path, width: int) -> None:
+    rows = b"Asset,rule,speed\nclip_00,,0..2\n"
+    (folder / "t.csv").write_bytes(rows)
+    (folder / "contextdb.toml").write_text(
+        '[conditions.speed]\ntype = "number"\nmin = 0\nmax = 9\n[tables.t]\nwhen = "rule"\n', encoding="utf-8"
+    )
+    (folder / "t.cases.csv").write_text("Case,Expected,speed\nslow,clip_00,0.5\n", encoding="utf-8")
+    (folder / "week.csv").write_text("Asset,rule,speed\nclip_01,,0.5\nclip_02,,1.5\n", encoding="utf-8")
+
+    async def script(browser: Browser, address: str, process: subprocess.Popen[str]) -> None:
+        window = await browser.open(address, width, 700)
+        await window.call("Emulation.setDeviceMetricsOverride", width=width, height=700, deviceScaleFactor=1, mobile=False)
+        await window.wait("clip_00", "F2 Edit")
+
+        async def shows(*keys: tuple[str, int], then: str) -> None:
+            window.forget()
+            for key, held in keys:
+                await window.key(key, held)
+            await window.wait(then)
+
+        await shows(("6", ALT), then=" Contracts ")  # its tab, too, where there is no room for all
+        await window.wait("proved for every", "Such as: Whenever")
+        ground = "getComputedStyle(document.querySelector('.xterm-viewport')).backgroundColor"
+        assert await window.value(ground) == "rgb(232, 236, 241)"  # of the edges of the window
+        assert await window.value("document.documentElement.scrollWidth <= innerWidth")
+        await shows(("1", ALT), *((key, 0) for key in ("ArrowRight", *"spe")), then="speed")
+        await shows(("Enter", 0), *((key, 0) for key in " < 1"), then="true now")
+        await shows(("Enter", 0), ("s", CTRL), then="Saved")
+        await shows(("p", CTRL), *((key, 0) for key in "import"), then="Read rows")
+        await shows(("Enter", 0), then="Import into t")
+        await shows(*((key, 0) for key in "week.csv"), ("Enter", 0), then="2 rows in the file")
+        await shows(("F6", 0), then="Import week.csv.")
+        await shows(("s", CTRL), then="Saved")
+
+    in_browser(folder, script, "--theme", "contextdb-light")
+    assert (folder / "t.csv").read_text().splitlines() == [
+        "Asset,rule,speed", "clip_00,speed < 1,0..2", "clip_01,,0.5", "clip_02,,1.5",
+    ]  # fmt: skip
+
+
 @in_full_runs
 @needs_browser
 def test_a_second_window_follows_the_first_and_has_the_keyboard_when_that_is_closed(folder: Path) -> None:

@@ -173,13 +173,13 @@ def test_a_table_open_on_this_machine_can_be_read_but_not_taken():
     dialog = HeldDialog("t", Holder(812, "x"))
     answers, seen = answer(dialog, "t", "r")
     assert answers == ["read-only"]
-    assert "process 812" in seen
+    assert "another editor (process 812)" in seen
     assert "Take over" not in seen
 
 
 def test_a_table_open_on_another_machine_can_be_taken_over():
     answers, seen = answer(HeldDialog("t", Holder(812, "x", "workstation-7")), "t")
     assert answers == ["take-over"]
-    assert "process 812 on workstation-7" in seen
+    assert "another editor on workstation-7 (process 812)" in " ".join(seen.replace("│", " ").split())
     assert "Take over" in seen
     assert answer(HeldDialog("t", Holder(812, "x", "workstation-7")), "escape")[0] == [None]

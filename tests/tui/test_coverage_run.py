@@ -7,7 +7,7 @@ import pytest
 import contextdb as cdb
 from contextdb.cells.facts import read_fact_text
 from contextdb.covering import Cancelled
-from contextdb.covering.inside import facts_inside
+from contextdb.covering.gaps import facts_inside
 from contextdb.schema.settings import TableSettings
 from tui.model.coverage_lines import about_text
 from tui.model.coverage_run import CoverageRun, Result, is_quick, measured

@@ -8,7 +8,7 @@ from made_once import make_clip
 from test_motion_measure_command import here, made
 
 from contextdb.motion import Channel, Controller, Entry, FeatureSchema, MotionDatabase, PoseBank, Selector, Trace, open_or_build
-from contextdb.motion.features.permutations import Permutations
+from contextdb.motion.features.channels import Permutations
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.storage.config import MotionConfig
 from contextdb.motion.storage.pose_files import poses_path, save_poses

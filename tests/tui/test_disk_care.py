@@ -222,6 +222,6 @@ def test_who_has_the_table_and_what_was_left_of_it_is_told_as_it_changes(path):
         app.looks(3)
 
     assert run(path, script).said == [
-        f"process {os.getpid()} has opened this table: it can be read here, and saved under another name.",
+        f"another editor (process {os.getpid()}) has opened this table: it can be read here, and saved under another name.",
         "The other editor has ended and left edits that are not saved. Save yours under another name; then open this table again.",
     ]

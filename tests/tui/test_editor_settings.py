@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from terminal import press, screen_text, with_editor
 
-from contextdb.files.toml_text import as_toml
+from contextdb.files.toml_shapes import as_toml
 from tui.app import EditorApp
 from tui.editor_settings import EditorSettings, SettingsError, read_settings, settings_path
 

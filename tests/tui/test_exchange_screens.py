@@ -23,9 +23,9 @@ import contextdb as cdb
 from contextdb.columns import TextColumn
 from contextdb.errors import ContextDBError
 from contextdb.exchange.formats import FORMATS, ReadOptions, write
+from contextdb.exchange.importing import Choices
 from contextdb.exchange.mapping import as_job
 from contextdb.exchange.reading import Reading
-from contextdb.exchange.remembered import Choices
 from contextdb.tables.table import Table
 from tui.model.importing import Draft, Import, Mode
 from tui.model.sheet import Sheet

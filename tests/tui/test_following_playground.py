@@ -85,4 +85,6 @@ def test_the_editor_sees_the_gap_live_makes_its_row_and_the_game_plays_it(tables
     assert "direction: (100..-100), strafe: True" in gaps
     assert asked == "A new row fills the gap: enter its asset."
     assert saved == "Saved moves.csv."
+    assets = [line.partition(",")[0] for line in (tables / "moves.csv").read_text(encoding="utf-8").splitlines()]
+    assert assets[assets.index("walk_back") - 1] == "walk_strafe", "the new row is below the row nearest to it"
     assert number == 2

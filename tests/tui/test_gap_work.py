@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from running import run
-from terminal import press, screen_text, settled, with_editor
+from terminal import alone, drive, press, said, screen_text, settled, with_editor
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
@@ -18,6 +18,9 @@ from contextdb.edits.renaming_values import value_renaming
 from contextdb.errors import FileError
 from contextdb.tables.gap_work import STATES, GapWork, Work, gaps_path, key_of, merge_gap_work, write_work
 from contextdb.tables.project import load_table
+from tui.app import EditorApp
+from tui.model.sheet import READS_ONLY
+from tui.model.workspace import Workspace
 
 CELLS = st.dictionaries(
     st.sampled_from(["gait", "speed", "State", 'a "b"', "é,"]), st.sampled_from(["Walk", "2..7", '"x, y"', "(1..3]"])
@@ -131,9 +134,10 @@ def test_the_editor_gives_states_and_owners_in_the_tab_and_writes_what_others_wr
     assert works == ["animating Ana"]  # the second gap was part of Bo's, was taken on as animating, and then off the list
 
 
-def test_a_gap_that_a_saved_change_has_closed_leaves_the_list_and_one_that_is_closed_in_part_stays(path: Path):
+def test_opening_the_tab_writes_nothing_and_the_next_change_takes_what_a_saved_change_has_closed_off_the_list(path: Path):
     for cells, owner in (({"gait": "Walk", "speed": "(4..10]"}, "Ana"), ({"gait": "Run", "speed": "[0..2)"}, "Bo")):
         write_work(path, cells, Work("animating", owner))
+    raw = gaps_path(path).read_bytes()
 
     async def script(app, pilot):
         async def measured() -> str:
@@ -143,21 +147,43 @@ def test_a_gap_that_a_saved_change_has_closed_leaves_the_list_and_one_that_is_cl
             await settled(pilot)
             return screen_text(app)
 
-        await press(pilot, "right", "right", *"Any", "enter")  # walk plays at any speed
-        unsaved = await measured(), len(GapWork.beside(path).lines)
-        await press(pilot, "ctrl+s")
-        await settled(pilot)
-        await press(pilot, "alt+1", *"1..10", "enter")  # and run from 1 on
+        await press(pilot, "right", "right", *"Any", "enter", "alt+1", *"1..10", "enter")  # walk at any speed, run from 1 on
         await measured()
+        await press(pilot, "s")
+        unsaved = said(app), sorted(work.text for work in GapWork.beside(path).lines.values())
+        gaps_path(path).write_bytes(raw)
         await press(pilot, "ctrl+s")
-        await settled(pilot)
-        return unsaved, screen_text(app)
+        opened, is_as_it_was = await measured(), gaps_path(path).read_bytes() == raw
+        await press(pilot, "s")
+        return unsaved, opened, is_as_it_was, said(app)
 
-    (before, n_before), after = with_editor(path, script, (120, 30))
-    assert n_before == 2
-    assert "Closed, and off the list of work" not in before
-    assert [work.text for work in GapWork.beside(path).lines.values()] == ["animating Bo"]
-    assert "animating Bo" in after
+    unsaved, opened, is_as_it_was, message = with_editor(path, script, (120, 30))
+    assert unsaved == ("The gap is done Bo.", ["animating Ana", "done Bo"])
+    assert "animating Bo" in opened
+    assert "Ana" not in opened
+    assert is_as_it_was
+    assert message == "The gap is done Bo. Closed, and off the list, too: gait: Walk, speed: (4..10]."
+    assert [work.text for work in GapWork.beside(path).lines.values()] == ["done Bo"]
+
+
+def test_who_only_reads_changes_no_work(path: Path):
+    async def script(app, pilot):
+        await press(pilot, "alt+4")
+        app.main.coverage.join(20)
+        await settled(pilot)
+        await press(pilot, "s")
+        by_state = said(app)
+        await press(pilot, "w")
+        return by_state, said(app)
+
+    app = EditorApp(Workspace(path, reads_only=True))
+    with alone(path.parent):
+        try:
+            messages = drive(app, lambda pilot: script(app, pilot), (120, 30))
+        finally:
+            app.workspace.close()
+    assert messages == (READS_ONLY, READS_ONLY)
+    assert not gaps_path(path).exists()
 
 
 @given(st.lists(st.tuples(st.integers(0, 5), st.integers(0, 5)), max_size=3), st.tuples(st.integers(0, 5), st.integers(0, 5)))

@@ -114,6 +114,27 @@ def test_the_row_for_a_gap_is_named_where_it_stands_also_when_one_was_in_the_tes
     assert with_editor(path, script) == ("new", "False", {"hit": "True"})
 
 
+def test_the_other_cells_of_a_row_for_a_gap_say_any_as_their_columns_do(path):
+    path.write_text("Asset,speed,hit,gait\na,0..2,Any,\nb,Any,True,Walk\n")
+
+    async def script(app, pilot):
+        app.main.post_message(FillGap({"speed": "(2..3]"}, below=0))
+        await press(pilot, *"new", "enter", "ctrl+s")
+        return path.read_text().splitlines()[2]
+
+    assert with_editor(path, script) == "new,(2..3],Any,"
+
+
+def test_a_table_that_cannot_be_saved_says_so_beside_its_name_after_edits_too(path):
+    path.chmod(0o444)
+
+    async def script(app, pilot):
+        await press(pilot, *"new", "enter")
+        return screen_text(app)
+
+    assert with_editor(path, script).startswith(f" {path.stem} * (read-only) ")
+
+
 def test_the_row_for_a_gap_comes_below_the_one_that_is_nearest_to_it(path):
     async def script(app, pilot):
         last = app.main.session.sheet.table.n_rows - 1

@@ -44,6 +44,18 @@ def test_a_new_table_is_made_from_a_blueprint_and_opens(folder: Path):
     assert "+    new row" in text
 
 
+def test_where_there_is_no_blueprint_none_is_asked_for(folder: Path):
+    (folder / "contextdb.toml").write_text(TOML.partition("[blueprints")[0])
+
+    async def script(pilot: Pilot[Any]) -> str:
+        await pilot.app.main.run_command("new-table")
+        await pilot.press(*"swim", "enter")
+        await pilot.pause()
+        return screen_text(pilot.app)
+
+    assert drive(EditorApp(Workspace(folder)), script).startswith(" swim ")
+
+
 def test_saving_as_another_table_leaves_the_old_file_and_goes_on_with_the_new_one(folder: Path):
     before = (folder / "jog.csv").read_bytes()
 

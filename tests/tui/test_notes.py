@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from terminal import press, said, screen_text, with_editor
+from terminal import press, said, screen_text, settled, with_editor
 
 from contextdb.edits.notes import Notes
 from contextdb.edits.renaming_assets import asset_renaming
@@ -179,7 +179,12 @@ def test_the_handle_at_the_corner_is_dragged_down(path):
         layout = app.main.assets.grid.look.layout
         x, y = place(app, 1, 1)
         corner = x - 1 + layout.widths[1], y
-        await drag(pilot, corner, (corner[0], y + 2))
+        await pilot.mouse_down(offset=corner)
+        await pilot.hover(offset=(corner[0], y + 2))
+        preview = app.main.session.sheet.block.shape, app.main.session.sheet.is_modified
+        await pilot.mouse_up(offset=(corner[0], y + 2))
+        await settled(pilot)
+        assert preview == ((4, 1), False)  # what would be filled is selected
         return shows_handle, app.main.session.sheet.table.text_column("speed").to_list(), app.main.session.sheet.block.shape
 
     assert with_editor(path, script) == (True, ["1", "2", "3", "4"], (4, 1))

@@ -8,8 +8,7 @@ import pytest
 from terminal import press, said, screen_text, with_editor
 
 from contextdb.checks.run import check
-from contextdb.edits.renaming_assets import asset_renaming, asset_uses
-from contextdb.edits.renaming_roles import role_renaming, role_uses
+from contextdb.edits.renaming_assets import asset_renaming, asset_uses, role_renaming, role_uses
 from contextdb.errors import ContextDBError
 from contextdb.tables.project import load, load_table
 

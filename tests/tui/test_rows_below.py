@@ -70,6 +70,16 @@ def test_a_row_with_a_cell_that_cannot_be_read_or_switched_off_is_not_near(path)
     assert near == {3: (), 0: ("speed", "hit")}
 
 
+NEAR = (("(5..8)", "True"), ("(5..8)", "False"), ("2..3", "Any"))
+
+
+def test_of_rows_with_equally_many_cells_to_change_those_come_first_that_name_what_the_gap_names(path):
+    path.write_text("Asset,speed,hit\nidle,Any,True\nstrafe,0..9,False\nback,4..9,False\nstop,Any,True\n")
+    assert [list(rows_near(cdb.load(path), {"speed": speed, "hit": hit}, 9)) for speed, hit in NEAR] == [
+        [0, 3, 1, 2], [1, 2, 0, 3], [1, 0, 3, 2],
+    ]  # fmt: skip
+
+
 def test_rows_are_ranked_at_once_by_how_many_different_cells_there_are_and_not_by_how_many_rows():
     many = cdb.Table.from_columns({"Asset": ["a"] * 5_000, "speed": ["0..5"] * 5_000})
     different = cdb.Table.from_columns({"Asset": ["a"] * 5_000, "speed": [f"0..{n}" for n in range(1, 5_001)]})

@@ -17,8 +17,8 @@ from contextdb.disk.folder_lock import temporary_name
 from contextdb.edits import edits
 from contextdb.errors import ContextDBError, FileError, TableError
 from contextdb.files.csv_source import read_csv
-from contextdb.files.journal_lines import line_of
 from contextdb.files.parquet import rewritten_parquet
+from contextdb.files.scratch import line_of
 from contextdb.tables.project import load
 from contextdb.tables.table import Table
 from tui.model import session as session_module
@@ -558,7 +558,7 @@ def test_an_editor_from_which_the_table_was_taken_is_told_and_saves_no_more(path
     other = Holder(1, "abc", "workstation-7")
     session.lock.path.write_text('{"pid": 1, "id": "abc", "host": "workstation-7"}')
     assert polled(session).taken_by == other
-    with pytest.raises(FileError, match="workstation-7 has this table open"):
+    with pytest.raises(FileError, match=r"another editor on workstation-7 \(process 1\) has this table open"):
         session.save()
     session.close(keep_journal=True)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from contextdb.errors import ContextDBError, plural
-from contextdb.motion.trace.choices import choices_path, read_choices, write_choices
+from contextdb.motion.trace.choice_pairs import choices_path, read_choices, write_choices
 
 from .landscape import Row
 from .recording import Moment

@@ -1,6 +1,6 @@
 """What every frame of every asset cost in a search, as rows of bars: a row a range, the taller a bar the cheaper.
 
-R ranges of all databases that were searched. Costs are those of `contextdb.motion.trace.reasked_search`.
+R ranges of all databases that were searched. Costs are those of `contextdb.motion.trace.other_filters`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.markup.left_out import LeftOut
-from contextdb.motion.trace.reasked_search import ReaskedSearch
+from contextdb.motion.trace.other_filters import ReaskedSearch
 
 ORDERS = ("best", "name", "use")
 LEVELS = 8

@@ -23,11 +23,10 @@ from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.source import ClipSource, clip_name, takes_of
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.output.bank import PoseBank
-from contextdb.motion.storage.clip_files import ClipFile, named_takes, read_clip
+from contextdb.motion.storage.clip_files import ClipFile, Rig, named_takes, read_clip
 from contextdb.motion.storage.config import MotionConfig
 from contextdb.motion.storage.database_settings import DatabaseSettings
 from contextdb.motion.storage.pose_files import open_poses, poses_path
-from contextdb.motion.storage.rigs import Rig
 from contextdb.tables.table import Table
 
 MOST_KEPT = 64

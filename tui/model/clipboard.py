@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from contextdb.cells.conditions import Condition
-from contextdb.exchange.decimal_commas import DECIMAL_COMMA, PAIR, as_pair
+from contextdb.exchange.reading import DECIMAL_COMMA, PAIR, as_pair
 from contextdb.tables.table import Table
 
 from .selection import Block

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from contextdb.errors import ContextDBError
-from contextdb.tables.gap_work import MOST_OWNER, STATES, GapWork, Work, write_work
+from contextdb.tables.gap_work import MOST_OWNER, STATES, GapWork, Key, Work, write_work
 from contextdb.tables.table import Table
 
 from .coverage_lines import cells_text
@@ -25,13 +25,17 @@ class GapDesk:
         self.problem = ""
         """Why the file cannot be read."""
         self.last_owner = ""
+        self._closed: list[Key] = []
 
-    def read(self, table: Table) -> None:
-        """Read the file as it is now."""
+    def read(self, table: Table, every: Sequence[Mapping[str, str]] | None = None) -> None:
+        """Read the file as it is now. `every`: all gaps of the saved table, where they are known; the next change takes the lines
+        off the list that none of them meets."""
         try:
             self._work, self.problem = GapWork({}) if table.path is None else GapWork.beside(table.path), ""
         except ContextDBError as error:
             self._work, self.problem = GapWork({}), str(error.faults[0])
+        conditions = [column.condition for column in table.conditions]
+        self._closed = [] if every is None or not self._work.lines else self._work.closed(every, conditions)
 
     def of(self, table: Table, gaps: Sequence[Mapping[str, str]]) -> list[Work | None]:
         """The work on each of some gaps."""
@@ -52,23 +56,18 @@ class GapDesk:
         work, self.last_owner = self.of(table, gaps)[at], owner.strip() or self.last_owner
         return self._write(table, gaps, at, Work(work.state if work else STATES[0], owner.strip()))
 
-    def close(self, table: Table, gaps: Sequence[Mapping[str, str]]) -> str:
-        """Take the closed ones off the list, where these are all the gaps; gives what was done. Raises FileError."""
-        closed = self._work.closed(gaps, [column.condition for column in table.conditions]) if self._work.lines else []
-        if table.path is None or not closed:
-            return ""
-        for key in closed:
-            self._work = write_work(table.path, dict(key), None)
-        first = cells_text(dict(closed[0]))
-        return f"Closed, and off the list of work: {first}{f', and {len(closed) - 1} more' if closed[1:] else ''}."
-
     def _write(self, table: Table, gaps: Sequence[Mapping[str, str]], at: int, work: Work | None) -> str:
         if table.path is None:
             return "The table has no file yet: Ctrl+S saves it."
         sources = self._work.sources(gaps, [column.condition for column in table.conditions])
-        source = sources[at] if sources.count(sources[at]) == 1 else None  # else it is another gap's, too
-        self._work = write_work(table.path, gaps[at], work, source)
-        return "The gap is off the list of work." if work is None else f"The gap is {work.text}."
+        source = [key for key in sources if key is not None and key == sources[at]]
+        replaced = source if len(source) == 1 else []  # else it is another gap's, too
+        self._work = write_work(table.path, gaps[at], work, [*replaced, *self._closed])
+        done = "The gap is off the list of work." if work is None else f"The gap is {work.text}."
+        if not self._closed:
+            return done
+        first, n_more = cells_text(dict(self._closed[0])), len(self._closed) - 1
+        return f"{done} Closed, and off the list, too: {first}{f', and {n_more} more' if n_more else ''}."
 
 
 def owner_fault(text: str) -> str:

@@ -18,14 +18,20 @@ from contextdb.columns import TextColumn
 from contextdb.edits.edits import edit_between
 from contextdb.edits.notes import Notes
 from contextdb.errors import ContextDBError, Fault, TableError, nearest, plural, safe_text
-from contextdb.exchange.decimal_commas import PAIR, as_pair
 from contextdb.exchange.formats import FORMATS, ReadOptions, read
-from contextdb.exchange.importing import NAMES, decimal_commas_reported, has_whole_names, notes_of, whole_names_sentence
+from contextdb.exchange.importing import (
+    NAMES,
+    NOTHING_CHOSEN,
+    Choices,
+    chosen_columns,
+    decimal_commas_reported,
+    has_whole_names,
+    notes_of,
+    whole_names_sentence,
+)
 from contextdb.exchange.mapping import COLUMN_JOBS, Mapped, as_condition, as_job, as_type, propose
-from contextdb.exchange.pairs import with_intervals
 from contextdb.exchange.proposals import names_of
-from contextdb.exchange.reading import Reading, listed
-from contextdb.exchange.remembered import NOTHING_CHOSEN, Choices, chosen_columns
+from contextdb.exchange.reading import PAIR, Reading, as_pair, listed, with_intervals
 from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict
 from contextdb.tables.changes import CameFrom, Edit
 from contextdb.tables.table import Table

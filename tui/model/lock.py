@@ -38,8 +38,8 @@ class Holder:
         return not self.host
 
     def __str__(self) -> str:
-        process = f"process {self.pid}" if self.pid else "another process"
-        return f"{process} on {self.host}" if self.host else process
+        where = [f"on {self.host}"] if self.host else []
+        return " ".join(["another editor", *where, *([f"(process {self.pid})"] if self.pid else [])])
 
 
 class Lock:

@@ -13,7 +13,7 @@ from contextdb.cells.mends import candidates
 from contextdb.cells.sets import Cell, TagSet, ValueSet
 from contextdb.cells.words import format_number
 from contextdb.errors import CellError, ContextError, Fault, Place, plural, safe_text
-from contextdb.exchange.decimal_commas import PAIR, as_pair
+from contextdb.exchange.reading import PAIR, as_pair
 
 from .interval_picture import number_words
 

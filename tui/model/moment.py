@@ -9,7 +9,7 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.grammar import parse_cell
 from contextdb.cells.sets import Cell
 from contextdb.cells.words import format_number
-from contextdb.covering.inside import facts_inside
+from contextdb.covering.gaps import facts_inside
 from contextdb.errors import ContextError, Fault, safe_text
 from contextdb.telemetry.recordings import fact_text
 

@@ -16,10 +16,9 @@ from contextdb.cells.facts import Fact
 from contextdb.compiled.explain import describe_fact
 from contextdb.errors import ContextDBError, safe_text
 from contextdb.expressions.expression import read_expression
-from contextdb.expressions.faults import ExpressionError, Refusal
 from contextdb.expressions.functions import FUNCTIONS
 from contextdb.expressions.parse import parse
-from contextdb.expressions.tokens import RESERVED, Token, tokens_of, written_name, written_text
+from contextdb.expressions.tokens import RESERVED, ExpressionError, Refusal, Token, tokens_of, written_name, written_text
 from contextdb.expressions.tree import Logic, Node, Unary
 
 from .chooser import Chooser, Offer, Row

@@ -59,7 +59,7 @@ class ContractsPane(Pane):
     DEFAULT_CSS = """
     ContractsPane {
         layout: vertical; height: 1fr; background: $surface;
-        & > #contracts-summary { height: 1; padding: 0 2; text-style: bold; }
+        & > #contracts-summary { height: auto; max-height: 3; padding: 0 2; text-style: bold; }
         & > LineList { height: 1fr; }
         & > #contracts-says { height: auto; min-height: 2; max-height: 40%; padding: 0 2; border-top: solid $panel; }
         & > Input { height: 1; border: none; padding: 0 2; background: $panel; }
@@ -90,7 +90,7 @@ class ContractsPane(Pane):
         columns = [ListColumn("", 8), ListColumn("Contract", 30, 1)]
         yield ContractList(columns, empty="No contract. N writes one.", id="contract-list")
         yield Static(id="contracts-says", markup=False)
-        yield Input(placeholder=f"N writes a contract, such as: {EXAMPLE}", id="contract-sentence", select_on_focus=False)
+        yield Input(placeholder="N writes a contract", id="contract-sentence", select_on_focus=False)
 
     def on_mount(self) -> None:
         self.show()
@@ -160,7 +160,7 @@ class ContractsPane(Pane):
         if self._edited is None:
             contract = self._chosen
             proof = self.proofs.get(contract.name) if contract is not None else None
-            self._say(proof)
+            self._say(proof, "" if self.contracts else f"Such as: {EXAMPLE}.")
 
     def _say(self, proof: Proof | None, problem: str = "") -> None:
         words = problem or ("" if proof is None else _verdict(proof))

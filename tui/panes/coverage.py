@@ -28,7 +28,7 @@ from ..model.moment import moment_inside
 from ..model.moments import Moment
 from ..model.played_run import Played, PlayedRun, moment_in
 from ..model.rows_near import is_near_at_once, rows_near
-from ..model.sheet import Sheet
+from ..model.sheet import READS_ONLY, Sheet
 from ..screens.ask import AskDialog
 from ..widgets.choice_line import ChoiceLine
 from ..widgets.line_list import LineList
@@ -163,7 +163,6 @@ class CoveragePane(Pane):
         self._show_bar()
         if run.result is not self._displayed:
             self._displayed = run.result
-            self._close_gaps()
             if run.result is not None:
                 self._fill(run.result)
         unknown = lines.unknown_text(run)
@@ -217,27 +216,23 @@ class CoveragePane(Pane):
         self.desk.read(self.sheet.table)
         if self.desk.problem and self.desk.problem != before:
             self.post_message(Notice(self.desk.problem, "warning"))
-        self._close_gaps()
         for section in OF_GAPS:
             if self._gaps_of(section):
                 self._list_gaps(section, self._at(section))
 
-    def _close_gaps(self) -> None:
-        """Take gaps off the list that the saved table has closed, as all its gaps prove."""
-        result, sheet = self.run.result, self.sheet
-        if result is None or self.run.state != "done" or not result.report.gaps_complete or sheet.is_modified or sheet.reads_only:
-            return
-        try:
-            if message := self.desk.close(sheet.table, [gap.cells for gap in result.report.gaps]):
-                self.post_message(Notice(message))
-        except ContextDBError as error:
-            self.post_message(Notice(str(error.faults[0]), "error"))
+    @property
+    def _every_gap(self) -> list[Mapping[str, str]] | None:
+        """The gaps of the table as it is saved; None where not all are known."""
+        result = self.run.result
+        if result is None or self.run.state != "done" or not result.report.gaps_complete or self.sheet.is_modified:
+            return None
+        return [gap.cells for gap in result.report.gaps]
 
     def _work_on(self, change: Callable[[Table, Sequence[Mapping[str, str]], int], str]) -> None:
         """Change the work on the gap of the cursor, as it is in the file now."""
         if not self._is_on_gap():
             return
-        self.desk.read(self.sheet.table)
+        self.desk.read(self.sheet.table, self._every_gap)
         try:
             gaps = [gap.cells for gap in self._gaps_of(SECTIONS[self.section])]
             message = change(self.sheet.table, gaps, self._at(SECTIONS[self.section]))
@@ -249,6 +244,10 @@ class CoveragePane(Pane):
             self._list_gaps(each, max(0, self._at(each)))
 
     def _is_on_gap(self) -> bool:
+        """Whether the cursor is on a gap whose work may be changed; says why where it is not."""
+        if self.sheet.reads_only:
+            self.post_message(Notice(READS_ONLY, "warning"))
+            return False
         is_gap = bool(self._gaps_of(SECTIONS[self.section])) and self._at_or_none is not None
         if not is_gap:
             self.post_message(Notice("There is no gap here.", "warning"))

@@ -16,7 +16,7 @@ from textual.widget import Widget
 from textual.widgets import Button, Input, OptionList, Select, Static
 from textual.widgets.option_list import Option
 
-from contextdb.authoring.selectors import set_selector
+from contextdb.authoring.weights import set_selector
 from contextdb.errors import ContextDBError, Fault, plural, safe_text
 
 from ..messages import Edited, Notice

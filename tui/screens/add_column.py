@@ -44,7 +44,7 @@ class AddColumn(Dialog[Insertion]):
     DEFAULT_CSS = """
     AddColumn {
         & #dialog-body { overflow-y: auto; }
-        & #column-list { height: auto; max-height: 6; border: none; padding: 0; margin: 1 0 0 0; background: $surface; }
+        & #column-list { height: auto; max-height: 25vh; border: none; padding: 0; margin: 1 0 0 0; background: $surface; }
         & #column-list { text-wrap: nowrap; text-overflow: ellipsis; }
         & #column-about { height: auto; color: $text-muted; margin: 1 0 0 0; }
         & #column-form, & #field-where { margin: 1 0 0 0; }
@@ -62,7 +62,7 @@ class AddColumn(Dialog[Insertion]):
 
     def __init__(self, table: Table, column: int) -> None:
         """`column` is that of the cursor."""
-        super().__init__()
+        super().__init__(classes="-broad")
         self.table = table
         self.places = places(table, column)
         self.matching: list[Choice | None] = []

@@ -75,7 +75,7 @@ class Blueprints(Dialog[BlueprintAnswer]):
 
     def __init__(self, table: Table, selected: Sequence[str], column: int) -> None:
         """`selected` are the names of the selected columns, `column` is that of the cursor."""
-        super().__init__()
+        super().__init__(classes="-broad")
         self.table = table
         self.selected = conditions_of(table, selected)
         self.at = min(column + 1, len(table.columns))

@@ -70,7 +70,7 @@ class ConflictsDialog(Dialog[Mapping[int, Side]]):
     }
     """
     title_text = "The file was changed on disk"
-    keys_text = "← mine · → on disk · M D all · Enter merge · Esc cancel"
+    keys_text = "← mine · → on disk · M D for all · Enter merge · Esc cancel"
 
     def __init__(self, conflicts: Sequence[Conflict], file: str = "", sides: tuple[str, str] | None = None) -> None:
         """`sides`: what the two sides of a merge of git are called; None: the sheet and the disk."""
@@ -79,7 +79,7 @@ class ConflictsDialog(Dialog[Mapping[int, Side]]):
         self._is_git = sides is not None
         if self._is_git:
             self.title_text = "The file holds a merge conflict"
-            self.keys_text = "← ours · → theirs · M D all · Enter merge · Esc cancel"
+            self.keys_text = "← ours · → theirs · M D for all · Enter merge · Esc cancel"
         self.conflicts = tuple(conflicts)
         self.sides: dict[int, Side] = {}
         self._file = file

@@ -86,7 +86,11 @@ class KeepDialog(Dialog[SavedCase]):
         yield Field(
             "Name", Input(self.case.name, id="keep-name", compact=True), "Says in messages which context fails.", key="name"
         )
-        labels = ("Nothing: only to be looked at", f"Exactly the assets that are valid now ({len(self.valid)})", "As written below")
+        labels = (
+            "Nothing: only to be looked at",
+            f"Exactly the assets that can be valid now ({len(self.valid)})",
+            "As written below",
+        )
         yield Field(
             "Expected",
             RadioSet(*(Choice(label, compact=True) for label in labels), id="keep-choice"),

@@ -49,6 +49,7 @@ class Dialog(ModalScreen[Answer | None], Generic[Answer]):
             background: $surface; border: round $primary; border-title-color: $text; border-title-style: bold;
             border-subtitle-color: $text-muted; padding: 1 2;
         }
+        &.-broad > #dialog { width: 70%; min-width: 76; }
         &.-wide > #dialog { width: 90%; min-width: 76; height: 90%; }
         & > #dialog > #dialog-body { height: auto; max-height: 100%; }
         &.-wide > #dialog > #dialog-body { height: 1fr; }

@@ -36,10 +36,12 @@ MARKS = (
     ("–", "the row is disabled"),
     ("*", "the table has edits that are not saved"),
 )
+FIRST = ("edit", "choose", "undo", "save", "test-row", "why", "contexts", "coverage", "palette")
+"""The commands that a first hour needs, in the order in which they are read."""
 
 
 class HelpDialog(HelpPage):
-    """How cells are written, what the marks mean, and every command with its keys."""
+    """The first keys, how cells are written, what the marks mean, and every command with its keys."""
 
     def __init__(self, keys: Mapping[str, str]) -> None:
         """`keys` are those of a keymap file: command to keys."""
@@ -47,7 +49,9 @@ class HelpDialog(HelpPage):
         self._keys = keys
 
     def sections(self) -> Iterator[tuple[str, Lines]]:
-        """Cells, marks, and the commands by their groups."""
+        """The first keys, cells, marks, and the commands by their groups."""
+        first = {command.id: command for command in COMMANDS if command.id in FIRST}
+        yield "To begin with", [(self._keys_of(first[name]), first[name].about) for name in FIRST]
         yield "How a cell is written", CELLS
         yield "What the marks mean", MARKS
         for group in dict.fromkeys(command.group for command in COMMANDS):

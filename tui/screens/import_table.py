@@ -21,9 +21,8 @@ from textual.worker import get_current_worker
 from contextdb.disk import read_bytes
 from contextdb.errors import ContextDBError, Fault, safe_text
 from contextdb.exchange.formats import FORMATS, ReadOptions, format_of, grid_of, sheet_names
-from contextdb.exchange.importing import NAMES
+from contextdb.exchange.importing import NAMES, Choices, choices_of, remember
 from contextdb.exchange.reading import SheetWanted, TableWanted
-from contextdb.exchange.remembered import Choices, choices_of, remember
 from contextdb.tables.table import Table
 
 from ..model.importing import DECIMAL_COMMA, MODES, Choice, Draft, Import, Mode, suffixes_read, why_not
@@ -324,7 +323,7 @@ class ImportDialog(PathDialog[Import]):
             rows = self._value("rows")
             self._offer_rows([rows] if rows else [])
         self._show_columns()
-        self._show_keys("F6 import · Enter change a column · F4 choose rows · F2 another file · Esc cancel")
+        self._show_keys("F6 import · Enter a column · F4 rows · F2 another file · Esc cancel")
         self.set_focus(self.query_one("#import-columns", LineList))  # before it is painted: a key then goes there
         if result.comma_doubts and not self._asked_commas:
             self._asked_commas = True

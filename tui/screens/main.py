@@ -9,6 +9,7 @@ from typing import ClassVar, Protocol
 from textual import on
 from textual.binding import BindingType
 
+from contextdb.cells.words import says_any
 from contextdb.disk import write_atomic
 from contextdb.edits.schema_file import schema_path
 from contextdb.errors import in_quotes, plural
@@ -98,8 +99,12 @@ class MainScreen(TableScreen):
         workspace = self.workspace
 
         def named(name: str | None) -> None:
-            if name is not None:
+            if name is None:
+                return
+            if self.session.sheet.table.schema.blueprints:
                 self._choose_blueprint(name)
+            else:
+                self.try_to(lambda: self._make_table(name.strip(), ()))
 
         question = "The name of the table and its file"
         check = partial(name_fault, workspace.folder, taken=workspace.files)
@@ -402,7 +407,9 @@ class MainScreen(TableScreen):
         sheet = self.session.sheet
         if event.below is not None and event.below < sheet.table.n_rows:
             self.go_to_cell(GoToCell(event.below, sheet.table.asset_column))
-        done = sheet.insert_rows(below=True, texts=[dict(event.cells)])
+        spellings = {c.condition.name: [text for text in c.texts.texts if says_any(text)] for c in sheet.table.conditions}
+        others = {name: max(texts, key=len, default="") for name, texts in spellings.items()}  # "Any" as the column writes it
+        done = sheet.insert_rows(below=True, texts=[others | dict(event.cells)])
         self.edited(Edited(done))
         self.go_to_cell(GoToCell(sheet.row_number(sheet.cursor[0]) - 1, sheet.table.asset_column))
         self.say("A new row fills the gap: enter its asset.")

@@ -6,8 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 
 from contextdb.edits.renaming import Renaming, Uses, renaming, uses_of
-from contextdb.edits.renaming_assets import asset_renaming, asset_uses
-from contextdb.edits.renaming_roles import facts_of, role_renaming, role_uses
+from contextdb.edits.renaming_assets import asset_renaming, asset_uses, facts_of, role_renaming, role_uses
 from contextdb.edits.renaming_values import ValueUses, value_renaming, value_uses
 from contextdb.errors import some
 from contextdb.files.toml_shapes import wrong_name

@@ -151,7 +151,8 @@ class TableScreen(Screen[None]):
 
     def _show_bars(self) -> None:
         mark = " *" if self.session.sheet.is_modified else ""
-        items = [Item("open", f"{self.table_name}{mark}", is_strong=True)]
+        reads = " (read-only)" if self.session.is_read_only else ""
+        items = [Item("open", f"{self.table_name}{mark}{reads}", is_strong=True)]
         items += [Item(tab, BY_ID[tab].label, is_on=tab == self.tab, is_spare=self._is_spare(tab)) for tab in self.tabs]
         has_tools = self.size.height >= WITH_TOOLS
         self.query_one("#tools", Bar).display = has_tools

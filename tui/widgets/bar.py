@@ -32,7 +32,8 @@ class Item:
 
 
 class Bar(Widget):
-    """Items from the left, one text at the right. What does not fit is left out: the text, then spare items, then the last ones."""
+    """Items from the left, one text at the right. What does not fit is left out: the text, then spare items, then the last ones,
+    and for the chosen one those before it but the first."""
 
     ALLOW_SELECT = False
     COMPONENT_CLASSES: ClassVar[set[str]] = {"bar--item", "bar--on", "bar--strong", "bar--text", "bar--hover"}
@@ -78,6 +79,9 @@ class Bar(Widget):
         items, fitting, used = self._items, list[Item](), 0
         if sum(cell_len(item.label) + 2 for item in items) > self.size.width:
             items = tuple(item for item in items if not item.is_spare)
+        chosen = next((at for at, item in enumerate(items) if item.is_on), 0)
+        while chosen > 1 and sum(cell_len(item.label) + 2 for item in items[: chosen + 1]) > self.size.width:
+            items, chosen = items[:1] + items[2:], chosen - 1
         for item in items:
             used += cell_len(item.label) + 2
             if used > self.size.width and fitting:

@@ -88,6 +88,8 @@ class Pointer:
         self._timer: Timer | None = None
         self._is_moved = False
         """The mouse has moved since it took something."""
+        self._source = Selection()
+        """What was selected when it took something."""
 
     def press(self, event: events.MouseDown) -> None:
         """The button goes down: go there, select, or begin to drag."""
@@ -134,9 +136,10 @@ class Pointer:
         grid, look = self.grid, self.grid.look
         if self._dragged == "width":
             grid.set_width(self._column, max(NARROWEST, event.x - look.layout.place(self._column, look.left)))
-        elif self._dragged in TAKEN:
+        elif self._dragged in TAKEN and self._dragged != "fill":
             self._is_moved = True
         elif self._dragged is not None:
+            self._is_moved = True
             self._at = (event.x, event.y)
             self.pull()
             self._pull_on(self._edge() != (0, 0))
@@ -166,6 +169,9 @@ class Pointer:
         dragged, grid = self._dragged, self.grid
         row, column = self._place_at(event.x, event.y)
         column = min(column, grid.sheet.shape[1] - 1)
+        if dragged == "fill" and self._is_moved:
+            row, column = grid.sheet.selection.far
+            grid.sheet.select(lambda *_: self._source)
         if dragged in TAKEN and self._is_moved:
             grid.put_down(dragged, row, column)
         elif dragged == "move rows":
@@ -220,7 +226,7 @@ class Pointer:
         return "fill" if at_corner else None
 
     def _begin(self, what: Dragged) -> None:
-        self._dragged = what
+        self._dragged, self._source = what, self.grid.sheet.selection
         self.grid.capture_mouse()
 
     def _edge(self) -> tuple[int, int]:
@@ -242,6 +248,11 @@ class Pointer:
 
     def _drag_to(self, row: int, column: int, kind: str) -> None:
         sheet = self.grid.sheet
+        if self._dragged == "fill":  # what would be filled is selected
+            block, shape = self._source.block(sheet.shape), sheet.shape
+            to = (row, block.right - 1) if row >= block.bottom else (block.bottom - 1, max(column, block.right - 1))
+            sheet.select(lambda *_: self._source.at(block.top, block.left, shape).at(*to, shape, extend=True))
+            return
         sheet.go(row, column, True)
         if kind == "rows":
             sheet.select(Selection.rows)

@@ -15,8 +15,7 @@ from textwrap import wrap
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
 from contextdb.cells.kinds import Kind
-from contextdb.compiled.c_header.naming import Choices, Names, TableFace, conditions_of
-from contextdb.compiled.c_header.spelling import comment, literal
+from contextdb.compiled.c_header.naming import Choices, Names, TableFace, comment, conditions_of, literal
 from contextdb.compiled.c_header.watching import WATCH
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.table import CompiledTable, data_of

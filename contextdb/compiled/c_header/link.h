@@ -3,6 +3,7 @@
  *   cdbl_open        listens on a Unix socket that only programs of the same user can connect to
  *   cdbl_listeners   once a frame: takes connections, and says how many listen; while none does, tell nothing
  *   ..._tell         one function for each table, further down: sends one question, its valid rows and the pick
+ *   cdbl_pose        sends a pose of a character
  *   cdbl_close       listens no more
  *
  * Nothing here ever waits, and nothing takes memory: what a listener does not read in time is lost, and it is told how many lines.
@@ -20,6 +21,13 @@
 #endif
 #define CDBL_LISTENERS 4    /* who connects when there are so many is sent away */
 #define CDBL_GAMES 99
+
+typedef struct cdbl_bones { /* of a character */
+    const char *const *names;
+    const int64_t *parents; /* each before those that it moves; -1: none */
+    size_t n;
+    uint64_t welcomed;      /* 0 at first: how many had come when they were sent last */
+} cdbl_bones;
 
 #ifdef _WIN32
 
@@ -39,6 +47,12 @@ static inline int cdbl_listeners(cdbl_link *link)
 {
     (void)link;
     return 0;
+}
+
+static inline void cdbl_pose(cdbl_link *link, const char *who, cdbl_bones *bones, const char *asset, const double *root,
+    const double *rotations, const double *translations)
+{
+    (void)link, (void)who, (void)bones, (void)asset, (void)root, (void)rotations, (void)translations;
 }
 
 static inline void cdbl_close(cdbl_link *link)
@@ -79,6 +93,7 @@ typedef struct cdbl_link {
     char folder[128];
     char path[108];
     uint64_t lost;          /* lines that did not fit into CDBL_LINE */
+    uint64_t welcomed;      /* how many have come to listen */
     size_t used;
     int is_long;
     char line[CDBL_LINE];
@@ -303,16 +318,44 @@ static inline void cdbl_offer(cdbl_listener *listener, const char *line, size_t 
     cdbl_push(listener);
 }
 
-/* Begin a line: what it is, when, who and about which table. */
-static inline void cdbl_begin(cdbl_link *link, const char *who, const char *table)
+/* A number with some digits behind the point; 0 for what is no number. */
+static inline void cdbl_rounded(cdbl_link *link, double number, int n_digits)
 {
-    char text[64], *comma;
+    char text[400], *comma;
+    snprintf(text, sizeof text, "%.*f", n_digits, number - number == 0.0 ? number : 0.0);
+    if ((comma = strchr(text, ',')) != NULL) *comma = '.';
+    cdbl_say(link, text);
+}
+
+/* Begin a line: what it is, when, and who. */
+static inline void cdbl_begin_line(cdbl_link *link, const char *what, const char *who)
+{
     link->used = 0;
     link->is_long = 0;
-    snprintf(text, sizeof text, "{\"line\":\"ask\",\"t\":%.6f,\"who\":", cdbl_now() - link->began);
-    if ((comma = strchr(text + 14, ',')) != NULL && comma[1] != '"') *comma = '.';
-    cdbl_say(link, text);
+    cdbl_say(link, "{\"line\":\"");
+    cdbl_say(link, what);
+    cdbl_say(link, "\",\"t\":");
+    cdbl_rounded(link, cdbl_now() - link->began, 6);
+    cdbl_say(link, ",\"who\":");
     cdbl_text_of(link, who);
+}
+
+/* End a line, and send it. */
+static inline void cdbl_send(cdbl_link *link)
+{
+    size_t i;
+    cdbl_say(link, "}\n");
+    if (link->is_long) link->lost++;
+    for (i = 0; i < CDBL_LISTENERS; i++) {
+        if (link->is_long) link->listeners[i].lost += link->listeners[i].socket >= 0;
+        else cdbl_offer(&link->listeners[i], link->line, link->used);
+    }
+}
+
+/* Begin a line about a table. */
+static inline void cdbl_begin(cdbl_link *link, const char *who, const char *table)
+{
+    cdbl_begin_line(link, "ask", who);
     cdbl_say(link, ",\"table\":");
     cdbl_text_of(link, table);
     cdbl_say(link, ",\"facts\":{");
@@ -339,12 +382,51 @@ static inline void cdbl_end(cdbl_link *link, const cdb_table *table, const uint6
         cdbl_text_of(link, cdb_asset(table, picked));
         cdbl_say(link, "}");
     }
-    cdbl_say(link, "}\n");
-    if (link->is_long) link->lost++;
-    for (i = 0; i < CDBL_LISTENERS; i++) {
-        if (link->is_long) link->listeners[i].lost += link->listeners[i].socket >= 0;
-        else cdbl_offer(&link->listeners[i], link->line, link->used);
+    cdbl_send(link);
+}
+
+/* A list of so many rows of numbers; all 0 where there are none. */
+static inline void cdbl_rows(cdbl_link *link, const char *name, const double *numbers, size_t n, size_t width)
+{
+    size_t i;
+    cdbl_say(link, ",\"");
+    cdbl_say(link, name);
+    cdbl_say(link, "\":[");
+    for (i = 0; i < n * width; i++) {
+        cdbl_say(link, i == 0 ? width > 1 ? "[" : "" : i % width == 0 ? width > 1 ? "],[" : "," : ",");
+        cdbl_rounded(link, numbers ? numbers[i] : 0.0, 5);
     }
+    cdbl_say(link, n > 0 && width > 1 ? "]]" : "]");
+}
+
+/* Send a pose: the asset that plays, or NULL; the root's x, z and heading; of each joint its turn against its parent, w, x, y, z, and its
+ * place, x, y, z. The bones go before it where somebody has come to listen since. */
+static inline void cdbl_pose(cdbl_link *link, const char *who, cdbl_bones *bones, const char *asset, const double *root,
+    const double *rotations, const double *translations)
+{
+    size_t i, list;
+    if (bones->welcomed != link->welcomed) {
+        cdbl_begin_line(link, "bones", who);
+        for (list = 0; list < 3; list++) {
+            cdbl_say(link, list == 0 ? ",\"names\":[" : list == 1 ? ",\"parents\":[" : ",\"moving\":[");
+            for (i = 0; i < bones->n; i++) {
+                if (i > 0) cdbl_say(link, ",");
+                if (list == 0) cdbl_text_of(link, bones->names[i]);
+                else cdbl_int(link, list == 1 ? bones->parents[i] : (int64_t)i);
+            }
+            cdbl_say(link, "]");
+        }
+        cdbl_rows(link, "offsets", NULL, bones->n, 3);
+        cdbl_send(link);
+        bones->welcomed = link->welcomed;
+    }
+    cdbl_begin_line(link, "pose", who);
+    cdbl_say(link, ",\"asset\":");
+    cdbl_text_of(link, asset);
+    cdbl_rows(link, "root", root, 3, 1);
+    cdbl_rows(link, "rotations", rotations, bones->n, 4);
+    cdbl_rows(link, "translations", translations, bones->n, 3);
+    cdbl_send(link);
 }
 
 /* ---- who listens */
@@ -480,6 +562,7 @@ static inline void cdbl_welcome(cdbl_link *link, int connection)
     link->listeners[i].socket = connection;
     link->listeners[i].n_pending = 0;
     link->listeners[i].lost = 0;
+    link->welcomed++;
     snprintf(head, sizeof head, "{\"line\":\"header\",\"format\":1,\"game\":\"%s\",\"pid\":%ld,\"contextdb\":\"C\",\"began\":%lld,\"tables\":",
         link->game, (long)getpid(), (long long)time(NULL) - (long long)(cdbl_now() - link->began));
     link->used = 0;

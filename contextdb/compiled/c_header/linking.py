@@ -11,8 +11,7 @@ from pathlib import PurePosixPath
 
 from contextdb.cells.conditions import Condition
 from contextdb.compiled.c_header.face import given_conditions, plain_of, reader_names
-from contextdb.compiled.c_header.naming import Choices, Names, TableFace
-from contextdb.compiled.c_header.spelling import Wanted, comment, distinct, literal
+from contextdb.compiled.c_header.naming import Choices, Names, TableFace, Wanted, comment, distinct, literal
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.table import CompiledTable, data_of
 

@@ -22,14 +22,12 @@ from numpy.typing import NDArray
 
 from contextdb.cells.arguments import require_whole
 from contextdb.cells.facts import Context, Fact, Unknown, check_mode, require_context
-from contextdb.cells.hysteresis import widened_fact
-from contextdb.cells.mirroring import frozen_facts, in_mirror, mirrored_facts
-from contextdb.compiled.casting.assigning import Chosen, Holds, Part, best, every
+from contextdb.cells.mirroring import frozen_facts, in_mirror, mirrored_facts, widened_fact
+from contextdb.compiled.casting.assigning import CastRows, Chosen, Holds, Part, best, casts_of, every
 from contextdb.compiled.casting.facts import Actor, Actors, Ask, Offer, mirrored_offers, read_offers
 from contextdb.compiled.casting.plain import PlainRoles, offers_of
 from contextdb.compiled.casting.roles import roles_of_table
 from contextdb.compiled.casting.rules import CastRules
-from contextdb.compiled.casting.together import CastRows, casts_of
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.matches import Answering, SetMatches, Stages, with_mirrored, with_penalties, with_widened
 from contextdb.errors import ContextError, Fault, in_quotes, no_such, some

@@ -13,8 +13,8 @@ from contextdb.errors import plural
 from contextdb.tables.changes import CameFrom, Edit
 from contextdb.tables.merging.alignment import Alignment, align, inverse, moved
 from contextdb.tables.merging.building import edit_under
+from contextdb.tables.merging.conflicts import Places, Shared
 from contextdb.tables.merging.meaning import is_same, meaning_of
-from contextdb.tables.merging.shared import Places, Shared
 from contextdb.tables.table import EitherTable
 
 FORMAT = 1

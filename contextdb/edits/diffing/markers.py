@@ -11,14 +11,22 @@ Only rows that the sides disagree about are between marks, each with what it was
     >>>>>>> theirs
 
 Where a column itself is in question the whole file is between them. Nothing here touches the disk.
+
+Nothing here touches the disk.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import csv
+import io
+import subprocess
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from contextdb.errors import Fault, FileError, Place, in_quotes
 from contextdb.files.csv_rewrite import rewritten
 from contextdb.files.csv_source import Source
 from contextdb.tables.merging.conflicts import Conflict
@@ -163,3 +171,81 @@ def block(versions: Sequence[bytes], end: bytes) -> bytes:
 
 def _ended(text: bytes, end: bytes) -> bytes:
     return text if not text or text.endswith((b"\n", b"\r")) else text + end
+
+
+# ---- a three-way merge of lines, as git does it: for files whose meaning cannot be merged. An edge: this runs git
+
+
+NAMES = ("ours", "base", "theirs")
+MOST_CONFLICTS = 127
+"""What `git merge-file` exits with where there are at least so many conflicts; more is an error of its own."""
+
+
+def merged_lines(base: bytes, ours: bytes, theirs: bytes) -> tuple[bytes, int]:
+    """The merged bytes, and how many places are between marks in them. Where git cannot tell, the whole files are there."""
+    versions = (ours, base, theirs)
+    try:
+        with TemporaryDirectory(prefix="contextdb-") as folder:
+            for name, raw in zip(NAMES, versions, strict=True):
+                (Path(folder) / name).write_bytes(raw)
+            labels = [word for name in NAMES for word in ("-L", name)]
+            done = subprocess.run(
+                ["git", "merge-file", "-p", "--diff3", *labels, *NAMES], cwd=folder, capture_output=True, check=False
+            )
+    except OSError:  # there is no git, or no room for what it is to read
+        return _whole(versions), 1
+    if 0 <= done.returncode <= MOST_CONFLICTS:
+        return done.stdout, done.returncode
+    return _whole(versions), 1
+
+
+def _whole(versions: tuple[bytes, bytes, bytes]) -> bytes:
+    end = b"\r\n" if b"\r\n" in versions[0] else b"\n"
+    return block([raw if not raw or raw.endswith(b"\n") else raw + end for raw in versions], end)
+
+
+# ---- a three-way merge of the notes by a table, `NAME.notes.csv`: each line is of one place, an asset and a column
+
+
+FIELDS = ("Asset", "Column", "Note", "Colour")
+Spot = tuple[str, str]
+"""An asset, and a column; none for the note of the row."""
+Lines = Mapping[Spot, Sequence[str]]
+"""Of each spot its note and its colour."""
+
+
+def merge_notes(raws: Sequence[bytes], files: Sequence[str], takes: str | None = None) -> bytes:
+    """Merge base, ours and theirs; `files` are their names in messages, `takes` the side that holds where both changed a spot.
+    Raises FileError for a file that is none of notes, or a spot that both sides changed."""
+    base, ours, theirs = (_read(raw, file) for raw, file in zip(raws, files, strict=True))
+    merged = {spot: [_merged(spot, i, base, ours, theirs, files[1], takes) for i in (0, 1)] for spot in {**base, **ours, **theirs}}
+    return written({spot: note for spot, note in merged.items() if any(note)})
+
+
+def written(lines: Lines) -> bytes:
+    """The file, sorted, so that two versions differ in few places."""
+    out = io.StringIO()
+    csv.writer(out, lineterminator="\n").writerows([FIELDS, *([*spot, *note] for spot, note in sorted(lines.items()))])
+    return out.getvalue().encode()
+
+
+def _merged(spot: Spot, at: int, base: Lines, ours: Lines, theirs: Lines, file: str, takes: str | None) -> str:
+    was, mine, yours = (lines.get(spot, ("", ""))[at] for lines in (base, ours, theirs))
+    if mine in (was, yours) or (yours != was and takes == "theirs"):
+        return yours
+    if yours == was or takes == "ours":
+        return mine
+    problem = f"the {FIELDS[2 + at].lower()} of {in_quotes(' '.join(spot).strip())} changed on both sides."
+    raise FileError(Fault(problem, place=Place(file)))
+
+
+def _read(raw: bytes, file: str) -> Lines:
+    """The lines of a file; an empty one has none."""
+    try:
+        header, *rows = list(csv.reader(io.StringIO(raw.decode("utf-8-sig"), newline=""), strict=True)) or [list(FIELDS)]
+    except (UnicodeDecodeError, csv.Error):
+        header, rows = [], []
+    lines = {(row[0], row[1]): row[2:] for row in rows if len(row) == len(FIELDS)}
+    if tuple(header) != FIELDS or len(lines) != len(rows):
+        raise FileError(Fault("this is not a file of notes.", f"the columns {', '.join(FIELDS)}, a place once", place=Place(file)))
+    return lines

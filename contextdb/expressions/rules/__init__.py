@@ -14,7 +14,6 @@ that of `contextdb.expressions`, whose third truth, missing, is treated as a mis
 """
 
 from contextdb.expressions.rules.column import WhenColumn, check_rule
-from contextdb.expressions.rules.many import ManyRules
-from contextdb.expressions.rules.rules import Rule, WhenRules, facts_text
+from contextdb.expressions.rules.rules import ManyRules, Rule, WhenRules, facts_text
 
 __all__ = ["ManyRules", "Rule", "WhenColumn", "WhenRules", "check_rule", "facts_text"]

@@ -12,8 +12,9 @@ A character reads no clock: the same calls give the same poses.
 
 from __future__ import annotations
 
+import math
 import random
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from typing import Unpack
 
@@ -29,9 +30,9 @@ from contextdb.motion.characters import walks
 from contextdb.motion.characters.facts import FACTS, FactOf, Ground, Moment
 from contextdb.motion.characters.played import Played
 from contextdb.motion.characters.project import HasTables, Parts
-from contextdb.motion.characters.tables import Facts, Tables, Unknown
+from contextdb.motion.characters.tables import Facts, OwnFacts, Tables, Unknown
 from contextdb.motion.characters.updates import UNKNOWN, Options, Paths, Step, Updated
-from contextdb.motion.clips.ground_place import place_of
+from contextdb.motion.characters.walks import WishedPaths
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.steering import Steered
 from contextdb.motion.clips.trajectory import Trajectory
@@ -39,10 +40,11 @@ from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.nodes.warping import Target
 from contextdb.motion.output.bank import PoseBank
 from contextdb.motion.output.ground import Ground as HeightOf
-from contextdb.motion.output.stream import PoseStream, root_of
-from contextdb.motion.selection.controller import Clock, Controller
+from contextdb.motion.output.stream import PoseStream
+from contextdb.motion.selection.controller import Asked, Clock, Controller, Decided, update_all
 from contextdb.motion.selection.controller import Place as ControllerPlace
-from contextdb.motion.selection.decision import Decision, Playing, plays
+from contextdb.motion.selection.decision import Playing, plays
+from contextdb.motion.selection.events import Event
 from contextdb.motion.selection.followed import follow
 from contextdb.motion.selection.root_motion import RootMotion
 from contextdb.motion.selection.search_options import OfValid
@@ -50,7 +52,10 @@ from contextdb.motion.selection.variation import Rng
 from contextdb.motion.trace.session import MOST, Trace
 
 AT_REST = Steered()
-N_DISPLAYED = 3
+STAYS = np.zeros(1, np.bool_)
+"""The clip does not move the body of a character without poses."""
+NOTHING_DISPLAYED = np.array((-1.0, 0.0, 0.0))
+N_DISPLAYED = len(NOTHING_DISPLAYED)
 NO_STATE = Fault("this is no state of such a character.", "what its `state` gives")
 PoseOf = Callable[["Character", float], ArrayLike]
 """Gives the pose features of a query, as all features of the schema: of a character and the seconds since its last update."""
@@ -121,7 +126,7 @@ class Character:
         self.controller, self.schema, self.stream, self.pose = controller, schema, stream, pose
         self.own_facts, self.unknown, self.ground = dict(own_facts), unknown, ground
         self.tables = tables
-        self._own: tuple[object, object, Mapping[str, FactOf]] = (None, None, {})
+        self._own = OwnFacts.of(None, {})
         self._body: Steered | None = None
         self._stand(walks.begun(schema.ways, body), body)
 
@@ -199,11 +204,13 @@ class Character:
     @property
     def asked_facts(self) -> Mapping[str, FactOf]:
         """The character's own facts that its tables ask for, as functions of the moment."""
-        tables, functions, fact_functions = self._own
-        if tables is not self._tables or functions is not self.own_facts:
-            fact_functions = asking.own_facts_of(self._tables, self.own_facts)
-            self._own = self._tables, self.own_facts, fact_functions
-        return fact_functions
+        return self._own_facts.functions
+
+    @property
+    def _own_facts(self) -> OwnFacts:
+        if self._own.tables is not self._tables or self._own.own is not self.own_facts:
+            self._own = OwnFacts.of(self._tables, self.own_facts)
+        return self._own
 
     @property
     def body(self) -> Steered:
@@ -250,7 +257,7 @@ class Character:
         One flat block, which a game in C goes on from (the core's character.h); behind it, where the settings vary what is
         played, where that stands. Equal states have equal futures. The facts of live contexts are the game's and not in it.
         """
-        displayed = np.array((-1.0, 0.0, 0.0) if self.stream is None else self.stream.displayed, np.float64)
+        displayed = NOTHING_DISPLAYED if self.stream is None else self.stream.displayed
         pose = b"" if self.stream is None else self.stream.state.row.tobytes()
         return b"".join((self._row.tobytes(), self.controller.row.tobytes(), displayed.tobytes(), pose, self.controller.varied))
 
@@ -308,13 +315,13 @@ class Character:
         ContextDBError
             Facts that a table refuses, or an argument that cannot be used. The character then stands where it stood.
         """
-        step = self._step(dt, stick, facts, facing, body)
-        paths, query = self._wished(step, path)
+        step = self._step(dt, stick, facts, facing, body, path)
         if "valid" not in options:
             options["valid"] = self._valid(step.facts)
-        before = self.controller.place
-        decision = self.controller.update(step.dt_s, query, context=step.facts or None, body=step.body, **options)
-        return self._answer(step, paths, decision, before)
+        on, own, before = step.on, [self.controller], self.controller.place
+        asked, contexts = Asked.of_one(**options), [step.facts or None]
+        decided = update_all(own, step.dt_s, on.queries, asked, contexts, on.places, on.moved)
+        return self._answer(step, decided, before)
 
     # ---- over a network
 
@@ -332,11 +339,12 @@ class Character:
         *,
         body: Steered | None = None,
         path: Trajectory | None = None,
+        event: Event | None = None,
     ) -> Updated:
         """An update of a copy: in place of asking tables and searching it plays what its owner packed after this update.
 
-        With the same databases, and the same `dt`, stick and body as the owner had, poses are the owner's to the bit; so they
-        are without a body where the clip alone moves it (`root = "animation"`). Where nothing arrived, give b"": it plays on.
+        With the same databases, and the same `dt`, stick, body and event as the owner had, poses are the owner's to the bit; so
+        they are without a body where the clip alone moves it (`root = "animation"`). Where nothing arrived, give b"": it plays on.
         The next packet puts it right; where that tells of an entry that is past, the copy is at most a frame off until the next
         one.
 
@@ -344,7 +352,7 @@ class Character:
         ----------
         data : bytes
             What `pack` gave. One that comes late must be left out.
-        dt, stick, facing, body, path
+        dt, stick, facing, body, path, event
             As for `update`.
 
         Raises
@@ -352,44 +360,43 @@ class Character:
         ContextError
             The bytes are none of such a character. It then stands where it stood; so it does after any other error of `update`.
         """
-        step = self._step(dt, stick, None, facing, body)
-        paths, query = self._wished(step, path)
-        before = self.controller.place
-        decision = follow(self.controller, step.dt_s, query, data, place_of(step.body))
-        return self._answer(step, paths, decision, before)
+        step = self._step(dt, stick, None, facing, body, path)
+        before, (x, z, heading) = self.controller.place, step.on.places[0].tolist()
+        return self._answer(step, follow(self.controller, step.dt_s, step.on.queries[0], data, (x, z, heading), event), before)
 
     # ---- the parts of an update, for a crowd
 
-    def _wished(self, step: Step, path: Trajectory | None) -> tuple[Paths, Floats]:
-        """The path that is wished for, of a game that plans it or from the stick, and the query that asks for it."""
-        pose = self._features(step)[None]
-        if path is None:
-            paths, queries = walks.wished(self.schema, step.walk, step.goal, pose)
-        else:
-            require_kind(path, Trajectory, "path", "a Trajectory over the ground")
-            paths, queries = walks.wished_along(self.schema, step.walk, path, pose)
-        return paths, queries[0]
-
-    def _step(self, dt: float, stick: Ground, facts: Facts | None, facing: float | None, body: Steered | None) -> Step:
+    def _step(
+        self, dt: float, stick: Ground, facts: Facts | None, facing: float | None, body: Steered | None, path: Trajectory | None
+    ) -> Step:
         dt = require_real(dt, "dt", 0.0)
         stick = require_point(stick, "stick", "two numbers, x and z in metres a second")
         given = {} if facts is None else require_mapping(facts, "facts", "a mapping of names to facts")
         require_kind(body, (Steered, type(None)), "body", "a Steered")
+        require_kind(path, (Trajectory, type(None)), "path", "a Trajectory over the ground")
         if facing is not None:
             require_real(facing, "facing")
-        goals = walks.goals_of([stick], [facing])
-        rows = walks.moved(self.schema.ways, self._row, goals, dt, [body])
-        return self._step_of(dt, stick, given, facing, rows, goals, body or walks.body_of(rows))
+        goal = *stick, walks.UNKNOWN if facing is None else facing
+        goals, pose = np.array([goal], np.float64), None if self.pose is None else self._given_pose(dt)[None]
+        on = walks.onward(self.schema, self.controller.chooser, self._row, goals, dt, self.controller.row, pose, body)
+        paths: Paths = WishedPaths(self.schema, on.walks, goals)
+        if path is not None:
+            paths, queries = walks.wished_along(self.schema, on.walks, path, on.queries)
+            on = on._replace(queries=queries)
+        return Step(dt, on, self._with_own(given, dt, goal, on.facts[0].tolist(), on.walks, 0), paths)
 
-    def _step_of(
-        self, dt: float, stick: Ground, given: Facts, facing: float | None, row: Floats, goal: Floats, body: Steered
-    ) -> Step:
-        """The same where the body has moved."""
-        own, facts = self.asked_facts, given
-        if any(name not in given for name in own):
-            moment = Moment(dt, stick, facing, body, self.playing, self._played())
-            facts = {**{name: of(moment) for name, of in own.items() if name not in given}, **given}
-        return Step(dt, row, goal, body, facts)
+    def _with_own(
+        self, given: Facts, dt: float, goal: tuple[float, float, float], numbers: Sequence[float], rows: Floats, i: int
+    ) -> Facts:
+        """The facts of the game and the character's own, whose walk is one of some rows."""
+        asked = self._own_facts
+        own: dict[str, object] = {name: numbers[at] for name, at in asked.of_body.items()}
+        if asked.others and any(name not in given for name in asked.others):
+            x, z, heading = goal
+            facing, body = None if math.isnan(heading) else heading, walks.body_of(rows, i)
+            moment = Moment(dt, (x, z), facing, body, self.playing, self._played())
+            own |= {name: of(moment) for name, of in asked.others.items() if name not in given}
+        return {**own, **given} if own else given
 
     def _played(self) -> Played | None:
         """What plays, with what it is of."""
@@ -402,18 +409,15 @@ class Character:
 
     def features(self) -> Floats:
         """The features of the pose as it is now, which a query begins with, such as for `MatchNode.enter`. Never fails."""
-        return self._features_after(0.0, self._row)
-
-    def _features(self, step: Step) -> Floats:
-        """The features of the pose that a query begins with."""
-        return self._features_after(step.dt_s, step.walk)
-
-    def _features_after(self, dt_s: float, row: Floats) -> Floats:
-        """Those of the frame that plays next, or of rest where nothing plays."""
         if self.pose is not None:
-            return query_of(self.pose(self, dt_s), self.schema.feature_names)
-        features = self.controller.upcoming_features(dt_s)
-        return walks.resting(self.schema, row, self.controller.selector.databases)[0] if features is None else features
+            return self._given_pose(0.0)
+        features = self.controller.upcoming_features(0.0)
+        return walks.resting(self.schema, self._row, self.controller.selector.databases)[0] if features is None else features
+
+    def _given_pose(self, dt_s: float) -> Floats:
+        """The features of the pose that the game's own function gives."""
+        assert self.pose is not None, "asked where there is one"
+        return query_of(self.pose(self, dt_s), self.schema.feature_names)
 
     def _valid(self, facts: Facts) -> OfValid | None:
         """What the tables allow with some facts."""
@@ -422,17 +426,15 @@ class Character:
         }
         return asking.valid_of(self._tables, answers)
 
-    def _answer(self, step: Step, paths: Paths, decision: Decision, before: ControllerPlace) -> Updated:
+    def _answer(self, step: Step, decided: Decided, before: ControllerPlace) -> Updated:
         """The pose after a decision; `before` is where the controller stood."""
-        if self.stream is None:
-            roots = np.array([(*step.body.position, step.body.heading)])
-            self._stand(walks.settled(self.schema.ways, step.walk, roots, False), step.body)
-            return Updated(step.body, step.facts, paths, decision)
-        try:
-            poses = self.stream.posed(decision, step.dt_s, np.array([place_of(step.body)]), self.ground)
-        except Exception:
-            self.controller.put_back(before)
-            raise
-        moves_body = root_of(decision, self.stream.settings) == "animation"
-        self._stand(walks.settled(self.schema.ways, step.walk, poses.roots, moves_body), None if moves_body else step.body)
-        return Updated(self.body, step.facts, paths, decision, poses)
+        on, ways, poses, roots, moves_body = step.on, self.schema.ways, None, step.on.places, STAYS
+        if self.stream is not None:
+            try:
+                poses, moves_body = self.stream.posed(decided, step.dt_s, on.places, self.ground)
+            except Exception:
+                self.controller.put_back(before)
+                raise
+            roots = poses.roots
+        self._stand(walks.settled(ways, on.walks, roots, moves_body), None)
+        return Updated(self._rows, step.facts, step.paths, decided.decisions[0], poses or ())

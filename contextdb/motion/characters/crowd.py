@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from operator import eq
+from operator import eq, is_
 from typing import Any, TypeVar
 
 import numpy as np
@@ -20,14 +20,17 @@ from contextdb.motion.characters import tables as asking
 from contextdb.motion.characters import walks
 from contextdb.motion.characters.character import Character
 from contextdb.motion.characters.tables import Facts, Table
-from contextdb.motion.characters.updates import Step, Updated
+from contextdb.motion.characters.updates import Updated
+from contextdb.motion.characters.walks import Onward, WishedPaths
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.output.pose import Pose
-from contextdb.motion.output.stream import PoseStream, root_of
+from contextdb.motion.output.samples import Flags
+from contextdb.motion.output.stream import PoseStream
 from contextdb.motion.output.streams import PoseStreams
 from contextdb.motion.records import collector_at_rest
+from contextdb.motion.selection.controller import Decided, rows_of
 from contextdb.motion.selection.controller_group import ControllerGroup
-from contextdb.motion.selection.decision import Decision
+from contextdb.motion.selection.events import Event
 from contextdb.motion.selection.search_options import OfValid
 
 T = TypeVar("T")
@@ -88,7 +91,13 @@ class Crowd(ListSequence[Character]):
 
     @collector_at_rest()
     def update(
-        self, dt: float, sticks: ArrayLike, facts: FactsOfMany | None = None, facing: ArrayLike | None = None
+        self,
+        dt: float,
+        sticks: ArrayLike,
+        facts: FactsOfMany | None = None,
+        facing: ArrayLike | None = None,
+        *,
+        event: Event | Sequence[Event | None] | None = None,
     ) -> list[Updated]:
         """Update every character as `Character.update` does; what each gave, in order. Python's garbage collector rests meanwhile.
 
@@ -102,6 +111,8 @@ class Crowd(ListSequence[Character]):
             What the game knows: what is no list, tuple or array is the same for all.
         facing : float array, shape (Q,), optional
             The headings that are requested, radians. Default: where the bodies go.
+        event : (str, float), or sequence of Q of them or None, optional
+            What is to happen and in how many seconds, as for `Character.update`: for all, or for each.
 
         Raises
         ------
@@ -115,76 +126,77 @@ class Crowd(ListSequence[Character]):
         if any(character.schema is not schema and character.schema != schema for character in self):
             raise MotionError(Fault("the characters have different features.", "characters of one feature schema"))
         goals, given = _goals(sticks, facing, len(self)), _facts_of_each(facts, len(self))
-        rows = walks.moved(schema.ways, np.concatenate([character._row for character in self]), goals, dt)
-        steps, each = [], zip(self, given, walks.bodies_of(rows), goals.tolist(), strict=True)
-        for i, (character, own, body, (x, z, heading)) in enumerate(each):
-            wanted = None if math.isnan(heading) else heading
-            steps.append(character._step_of(dt, (x, z), own, wanted, rows[i : i + 1], goals[i : i + 1], body))
+        on = self._onward(dt, goals)
+        each = zip(self, given, goals.tolist(), on.facts.tolist(), strict=True)
+        facts_of = [one._with_own(own, dt, goal, numbers, on.walks, i) for i, (one, own, goal, numbers) in enumerate(each)]
         group = ControllerGroup(character.controller for character in self)
-        paths, queries = walks.wished(schema, rows, goals, self._features(dt, group, steps))
-        places = np.array([(*step.body.position, step.body.heading) for step in steps])
-        valid = self._valid(steps)
+        valid = self._valid(facts_of)
         before = [controller.place for controller in group]
-        decisions = group.update(
-            dt, queries, valid, contexts=[step.facts or None for step in steps], body=[step.body for step in steps]
-        )
+        decided = group.decided(dt, on.queries, valid, event, [own or None for own in facts_of], on.places, on.moved)
         try:
-            poses, roots = self._poses_and_roots(dt, decisions, places)
+            poses, roots, moves_body = self._posed(dt, decided, on.places)
         except Exception:
             for controller, place in zip(group, before, strict=True):
                 controller.put_back(place)
             raise
-        moves = [_moves_body(character, decision) for character, decision in zip(self, decisions, strict=True)]
-        for moves_body in set(moves):
-            numbers = [i for i, own in enumerate(moves) if own is moves_body]
-            rows[numbers] = walks.settled(schema.ways, rows[numbers], roots[numbers], moves_body)
-        updated = []
-        for i, (character, step, decision) in enumerate(zip(self, steps, decisions, strict=True)):
-            character._stand(rows, None if moves[i] else step.body, i)
-            updated.append(Updated(character.body, step.facts, paths, decision, poses, i))
+        rows = walks.settled(schema.ways, on.walks, roots, moves_body)
+        paths, updated = WishedPaths(schema, on.walks, goals), []
+        for i, (character, own, decision) in enumerate(zip(self, facts_of, decided.decisions, strict=True)):
+            character._stand(rows, None, i)
+            updated.append(Updated(rows, own, paths, decision, poses, i))
         return updated
 
-    def _features(self, dt: float, group: ControllerGroup, steps: list[Step]) -> Floats:
-        """The features of the pose that each query begins with."""
-        features = np.asarray(group.poses(dt))
-        for i, character in enumerate(self):
-            if character.pose is not None or character.playing is None:
-                features[i] = character._features(steps[i])
-        return features
+    def _onward(self, dt: float, goals: Floats) -> Onward:
+        """All some time later: those of each chooser together."""
+        schema, rows, poses = self[0].schema, np.concatenate([character._row for character in self]), None
+        if any(character.pose is not None for character in self):
+            plain = np.full(schema.n_features, math.nan)
+            poses = np.array([plain if character.pose is None else character._given_pose(dt) for character in self])
+        parts = []
+        for numbers in _alike({i: character.controller.chooser for i, character in enumerate(self)}, is_):
+            own, chooser = [self[i].controller for i in numbers], self[numbers[0]].controller.chooser
+            given = None if poses is None else poses[numbers]
+            part = walks.onward(schema, chooser, rows[numbers], goals[numbers], dt, rows_of(own), given)
+            if len(numbers) == len(self):
+                return part
+            parts.append((numbers, part))
+        order = np.argsort([i for numbers, _ in parts for i in numbers])
+        return Onward(*(np.concatenate(arrays)[order] for arrays in zip(*(part for _, part in parts), strict=True)))
 
-    def _poses_and_roots(self, dt: float, decisions: list[Decision], places: Floats) -> tuple[Sequence[Pose | None], Floats]:
-        """The poses of all, None without a stream, and their roots, the body's without one; those of equal streams are worked out
-        together."""
-        groups = []
-        for numbers in self._equal_streams():
-            streams = PoseStreams(stream for i in numbers if (stream := self[i].stream) is not None)
-            grounds = [self[i].ground for i in numbers]
-            below = grounds if any(grounds) else None
-            groups.append((numbers, streams, *streams.updated([decisions[i] for i in numbers], dt, places[numbers], below)))
-        for _, streams, _, rows in groups:
+    def _posed(self, dt: float, decided: Decided, places: Floats) -> tuple[Sequence[Pose | None], Floats, Flags]:
+        """The poses of all, None without a stream; their roots, the body's without one; and whether the clip moves the body. Those
+        of equal streams and of the same updates are worked out together."""
+        groups, posed, roots, moves_body = [], list[Pose | None]([None] * len(self)), places.copy(), np.zeros(len(self), np.bool_)
+        decisions, grounds = decided.decisions, [character.ground for character in self]
+        for of_updates, updates in decided.updates:
+            for alike in self._equal_streams(of_updates):
+                numbers = [of_updates[k] for k in alike]
+                part = updates if len(alike) == len(of_updates) else updates._replace(decisions=updates.decisions[alike])
+                streams = PoseStreams(stream for i in numbers if (stream := self[i].stream) is not None)
+                below = [grounds[i] for i in numbers]
+                own = decisions if len(numbers) == len(self) else [decisions[i] for i in numbers]
+                groups.append((numbers, streams, *streams.updated(part, own, dt, places[numbers], below if any(below) else None)))
+        for numbers, streams, poses, rows, moves in groups:
             streams.go_on(rows)
-        if groups and len(groups[0][0]) == len(self):
-            return groups[0][2], groups[0][2].roots
-        displayed: list[Pose | None] = [None] * len(self)
-        roots = places.copy()
-        for numbers, _, poses, _ in groups:
-            roots[numbers] = poses.roots
+            if len(numbers) == len(self):
+                return poses, poses.roots, moves
+            roots[numbers], moves_body[numbers] = poses.roots, moves
             for i, pose in zip(numbers, poses, strict=True):
-                displayed[i] = pose
-        return displayed if groups else (), roots
+                posed[i] = pose
+        return posed if groups else (), roots, moves_body
 
-    def _equal_streams(self) -> list[list[int]]:
-        """The numbers of the characters with a stream, those together that have the same banks and settings."""
-        streams = {i: own for i, character in enumerate(self) if (own := character.stream) is not None}
+    def _equal_streams(self, numbers: Sequence[int]) -> list[list[int]]:
+        """Of some characters the places of those with a stream, those together that have the same banks and settings."""
+        streams = {k: own for k, i in enumerate(numbers) if (own := self[i].stream) is not None}
         return _alike(streams, PoseStream.is_like)
 
-    def _valid(self, steps: list[Step]) -> Any:
+    def _valid(self, facts_of: list[Facts]) -> Any:
         """What may play of each: every table is asked once with the facts of all who have the same tables."""
         asked = {i: (character.tables, character.unknown) for i, character in enumerate(self)}
         valid: list[OfValid | None] = [None] * len(self)
         for numbers in _alike(asked, eq):
             tables, unknown = asked[numbers[0]]
-            facts = [steps[i].facts for i in numbers]
+            facts = [facts_of[i] for i in numbers]
             answers: dict[int, Any] = {id(table): _answers(table, facts, unknown) for table in asking.each_of(tables)}
             if len(numbers) == len(self):
                 return asking.valid_of(tables, answers)
@@ -211,11 +223,6 @@ def _answers(table: Table, facts: Sequence[Facts], unknown: Any) -> Any:
         columns = {name: [each.get(name) for each in facts] for name in table.asked}
         return table.query_many(columns, unknown=unknown)
     return [asking.answer(table, each, unknown) for each in facts]
-
-
-def _moves_body(character: Character, decision: Decision) -> bool:
-    """Whether the animation moves the body of a character."""
-    return character.stream is not None and root_of(decision, character.stream.settings) == "animation"
 
 
 def _goals(sticks: ArrayLike, facing: ArrayLike | None, n: int) -> Floats:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Any, Literal, Protocol, TypeAlias, TypeGuard, cast
+from typing import Any, Literal, NamedTuple, Protocol, TypeAlias, TypeGuard, cast
 
 from contextdb.cells.conditions import Condition
 from contextdb.errors import ContextError, Fault
 from contextdb.motion.answers import Answer
-from contextdb.motion.characters.facts import FactOf, fact_of_played, is_asked
+from contextdb.motion.characters.facts import FACTS, FactOf, fact_of_played, is_asked
 from contextdb.motion.selection.search_options import OfValid
 
 Facts = Mapping[str, object]
@@ -84,15 +84,30 @@ def checked(tables: object) -> Tables:
 
 
 def each_of(tables: Tables) -> list[Table]:
+    """All tables that were `checked`, each once."""
     if tables is None:
         return []
-    if is_one(tables):
-        return [tables]
-    return list({id(table): table for table in _by_database(tables).values()}.values())
+    if not isinstance(tables, dict):
+        return [cast("Table", tables)]
+    return list({id(table): table for table in tables.values()}.values())
 
 
-def _by_database(tables: Tables) -> Mapping[str, Table]:
-    return cast("Mapping[str, Table]", tables)
+class OwnFacts(NamedTuple):
+    """What a character knows of itself, as far as its tables ask for it: all as functions, and apart those of the body, which the
+    core has computed already, with their columns there."""
+
+    tables: Tables
+    own: Mapping[str, FactOf]
+    functions: Mapping[str, FactOf]
+    of_body: Mapping[str, int]
+    others: Mapping[str, FactOf]
+
+    @classmethod
+    def of(cls, tables: Tables, own: Mapping[str, FactOf]) -> OwnFacts:
+        """Those of some functions."""
+        functions, columns = own_facts_of(tables, own), {function: i for i, function in enumerate(FACTS.values())}
+        of_body = {name: columns[function] for name, function in functions.items() if function in columns}
+        return cls(tables, own, functions, of_body, {name: of for name, of in functions.items() if name not in of_body})
 
 
 def own_facts_of(tables: Tables, functions: Mapping[str, FactOf]) -> dict[str, FactOf]:
@@ -107,11 +122,9 @@ def own_facts_of(tables: Tables, functions: Mapping[str, FactOf]) -> dict[str, F
 
 def valid_of(tables: Tables, answers: Mapping[int, Answer]) -> OfValid | None:
     """What may play, for a controller: the answers of the tables, by their ids."""
-    if tables is None:
-        return None
-    if is_one(tables):
-        return answers[id(tables)]
-    return {database: answers[id(table)] for database, table in _by_database(tables).items()}
+    if isinstance(tables, dict):
+        return {database: answers[id(table)] for database, table in tables.items()}
+    return None if tables is None else answers[id(tables)]
 
 
 def answer(table: Table, facts: Facts, unknown: Unknown) -> Answer:

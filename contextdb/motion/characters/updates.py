@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypedDict
+from typing import NamedTuple, TypedDict
 
 from numpy.typing import ArrayLike
 
 from contextdb.motion.characters.tables import Facts
-from contextdb.motion.clips.many_paths import ManyTrajectories
+from contextdb.motion.characters.walks import Onward, WishedPaths, body_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.steering import Steered
-from contextdb.motion.clips.trajectory import Trajectory
+from contextdb.motion.clips.trajectory import ManyTrajectories, Trajectory
 from contextdb.motion.output.stream import Pose
 from contextdb.motion.records import quickly_made
 from contextdb.motion.selection.decision import Decision, plays
@@ -20,7 +20,7 @@ from contextdb.motion.selection.events import Event
 from contextdb.motion.selection.search_options import Among, OfPenalties, OfTags, OfValid
 
 UNKNOWN = ("error", "any", "never")
-Paths = ManyTrajectories | Sequence[Trajectory]
+Paths = ManyTrajectories | WishedPaths
 
 
 class Options(TypedDict, total=False):
@@ -47,18 +47,18 @@ class Updated:
 
     Attributes
     ----------
-    body : Steered
-        Where the game has the body.
+    walks : float64 array, shape (Q, W)
+        Where the characters of the crowd that is updated together are, as the core has it.
     facts : mapping of str to object
         Those of the game and the character's own.
     paths, poses : sequence of Trajectory, of Pose
-        Those of the crowd that is updated together.
+        Those of the crowd.
     decision : Decision
     at : int
         Which of them are this one's.
     """
 
-    body: Steered
+    walks: Floats
     facts: Facts
     paths: Paths
     decision: Decision
@@ -67,6 +67,11 @@ class Updated:
 
     def __repr__(self) -> str:
         return f"<Updated: tick {self.decision.tick:,}, {plays(self.decision.playing)}, {_at(self.body)}>"
+
+    @property
+    def body(self) -> Steered:
+        """Where the game has the body."""
+        return body_of(self.walks, self.at)
 
     @property
     def path(self) -> Trajectory:
@@ -79,13 +84,10 @@ class Updated:
         return self.poses[self.at] if self.poses else None
 
 
-@quickly_made
-@dataclass(frozen=True, eq=False, slots=True)
-class Step:
+class Step(NamedTuple):
     """Half an update: what a character is about to ask."""
 
     dt_s: float
-    walk: Floats
-    goal: Floats
-    body: Steered
+    on: Onward
     facts: Facts
+    paths: Paths

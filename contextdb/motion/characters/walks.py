@@ -6,18 +6,22 @@ Q characters, W numbers in a row, F features; see `contextdb/core/walk.h`. Nothi
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
+from contextdb.cells.sequences import Made
 from contextdb.core import Ways
-from contextdb.motion.clips.many_paths import ManyTrajectories
+from contextdb.errors import Fault, MotionError, plural
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.clips.steering import N_NUMBERS, Ground, Steered
-from contextdb.motion.clips.trajectory import Trajectory
+from contextdb.motion.clips.steering import N_NUMBERS, Steered
+from contextdb.motion.clips.trajectory import ManyTrajectories, Trajectory
 from contextdb.motion.features.schema import FeatureSchema
-from contextdb.motion.output.samples import Place3
+from contextdb.motion.output.samples import Flags, Place3
 from contextdb.motion.search.database import MotionDatabase
+from contextdb.motion.selection.chooser import N_MOVED, Chooser
 from contextdb.motion.selection.root_motion import RootMotion
 
 N_WALK = N_NUMBERS + 4
@@ -48,14 +52,9 @@ def with_body(row: Floats, body: Steered) -> Floats:
     return changed
 
 
-def body_of(row: Floats) -> Steered:
-    """The body of a row [1, W]."""
-    return Steered.of_numbers(row[0, :N_NUMBERS].tolist())
-
-
-def bodies_of(rows: Floats) -> list[Steered]:
-    """The bodies of rows [Q, W]."""
-    return [Steered.of_numbers(each) for each in rows[:, :N_NUMBERS].tolist()]
+def body_of(rows: Floats, i: int = 0) -> Steered:
+    """The body of one of some rows [Q, W]."""
+    return Steered.of_numbers(rows[i, :N_NUMBERS].tolist())
 
 
 def apart_of(row: Floats) -> RootMotion:
@@ -63,38 +62,63 @@ def apart_of(row: Floats) -> RootMotion:
     return RootMotion(*row[0, N_NUMBERS : N_NUMBERS + 3].tolist())
 
 
-def goals_of(sticks: Sequence[Ground], facings: Sequence[float | None]) -> Floats:
-    """What sticks and facings ask for, as the core takes it: [Q, 3]."""
-    each = zip(sticks, facings, strict=True)
-    return np.array([(*stick, UNKNOWN if facing is None else facing) for stick, facing in each], np.float64)
+class Onward(NamedTuple):
+    """Characters some time later, before their poses are displayed: their walks [Q, W]; what has moved [Q, 16] and the queries that
+    ask for what they wish [Q, F], as their controllers take them; where their bodies are [Q, 3]; and their own facts [Q, 3]."""
+
+    walks: Floats
+    moved: Floats
+    queries: Floats
+    places: Floats
+    facts: Floats
 
 
-def moved(ways: Ways, rows: Floats, goals: Floats, dt_s: float, bodies: Sequence[Steered | None] = ()) -> Floats:
-    """Characters some time later, where the game has not put their bodies itself."""
-    after, given = np.empty_like(rows), None
-    if any(bodies):
-        given = np.array([(UNKNOWN,) * N_NUMBERS if body is None else body.numbers for body in bodies])
-    ways.move(rows, goals, given, dt_s, after)
-    return after
+def onward(
+    schema: FeatureSchema, chooser: Chooser, walks: Floats, goals: Floats, dt_s: float, rows: Floats, poses: Floats | None = None,
+    body: Steered | None = None,
+) -> Onward:  # fmt: skip
+    """Characters of one chooser, whose rows these are, some time later. `poses` [Q, F] are given where they are not those of what
+    plays, NaN where they are; and the `body` of one where the game puts it. Raises MotionError for databases of other features."""
+    n = len(walks)
+    if chooser.n_features not in (0, schema.n_features):
+        problem = f"the databases have {plural(chooser.n_features, 'feature')}, the schema {schema.n_features}."
+        raise MotionError(Fault(problem, "databases of one schema"))
+    bodies = None if body is None else np.array([body.numbers])
+    made = np.empty_like(walks), np.empty((n, N_MOVED)), np.empty((n, schema.n_features)), np.empty((n, 3)), np.empty((n, 3))
+    schema.ways.go_on(chooser.core, walks, goals, bodies, dt_s, rows, poses, *made)
+    return Onward(*made)
 
 
-def wished(schema: FeatureSchema, rows: Floats, goals: Floats, poses: Floats) -> tuple[ManyTrajectories, Floats]:
-    """The paths that characters wish to take if their sticks stay as they are, and the queries that ask for them."""
-    ways = schema.ways
-    n, n_frames = len(rows), ways.n_frames(rows, goals)
-    positions, headings, queries = np.empty((n, n_frames, 2)), np.empty((n, n_frames)), np.empty((n, schema.n_features))
-    ways.ask(rows, goals, schema.rate, poses, positions, headings, queries)
-    return ManyTrajectories(schema.rate, positions, headings, ways.n_behind(schema.rate)), queries
+class WishedPaths(Made[Trajectory]):
+    """The paths that characters wish to take if their sticks stay as they are: worked out when one is requested."""
+
+    def __init__(self, schema: FeatureSchema, walks: Floats, goals: Floats) -> None:
+        self._schema, self._walks, self._goals = schema, walks, goals
+
+    def __len__(self) -> int:
+        return len(self._walks)
+
+    def _at(self, i: int) -> Trajectory:
+        return self.together[i]
+
+    @cached_property
+    def together(self) -> ManyTrajectories:
+        """All of them."""
+        ways, walks, n_features = self._schema.ways, self._walks, self._schema.n_features
+        n, n_frames = len(walks), ways.n_frames(walks, self._goals)
+        positions, headings, poses = np.empty((n, n_frames, 2)), np.empty((n, n_frames)), np.zeros((n, n_features))
+        ways.ask(walks, self._goals, self._schema.rate, poses, positions, headings, np.empty_like(poses))
+        return ManyTrajectories(self._schema.rate, positions, headings, ways.n_behind(self._schema.rate))
 
 
-def wished_along(schema: FeatureSchema, row: Floats, path: Trajectory, pose: Floats) -> tuple[ManyTrajectories, Floats]:
-    """The same of one character whose path the game plans: from its present on."""
+def wished_along(schema: FeatureSchema, row: Floats, path: Trajectory, query: Floats) -> tuple[ManyTrajectories, Floats]:
+    """The path of one character which the game plans, from its present on, and its query [1, F] with that path."""
     now = schema.ways.n_behind(path.rate)
     ahead, turns = path.positions[path.now :], path.headings[path.now :]
     positions, headings = np.zeros((1, now + len(turns), 2)), np.zeros((1, now + len(turns)))
-    positions[0, now:], headings[0, now:], query = ahead, turns, np.empty((1, schema.n_features))
-    schema.ways.ask(row, None, path.rate, pose, positions, headings, query)
-    return ManyTrajectories(path.rate, positions, headings, now), query
+    positions[0, now:], headings[0, now:], asked = ahead, turns, np.empty_like(query)
+    schema.ways.ask(row, None, path.rate, query, positions, headings, asked)
+    return ManyTrajectories(path.rate, positions, headings, now), asked
 
 
 def resting(schema: FeatureSchema, rows: Floats, databases: Mapping[str, MotionDatabase]) -> Floats:
@@ -107,10 +131,11 @@ def resting(schema: FeatureSchema, rows: Floats, databases: Mapping[str, MotionD
     return poses
 
 
-def settled(ways: Ways, rows: Floats, roots: Floats, moves_body: bool) -> Floats:
-    """Rows whose poses are displayed at some roots [Q, 3]."""
-    ways.settle(rows, roots, int(moves_body))
-    return rows
+def settled(ways: Ways, walks: Floats, roots: Floats, moves_body: Flags) -> Floats:
+    """The walks of characters whose poses are displayed at some roots [Q, 3], whether the clip moved the body of each."""
+    after = walks.copy()
+    ways.settle(after, roots, moves_body)
+    return after
 
 
 def place_of(row: Floats) -> Place3:

@@ -37,18 +37,12 @@ LONGEST_STEP_S = 1.5
 
 @dataclass(frozen=True, eq=False)
 class Footfalls:
-    """When each foot is down within a clip.
-
-    Attributes
-    ----------
-    duration_s : float
-        Seconds from the clip's first frame to its last.
-    down : mapping of foot to float64 array, shape (n, 2)
-        Seconds at which the foot comes down and goes up, ascending, from 0 to `duration_s`.
-    """
+    """When each foot is down within a clip."""
 
     duration_s: float
+    """Seconds from the clip's first frame to its last."""
     down: Mapping[str, Floats]
+    """Seconds at which the foot comes down and goes up, ascending, from 0 to `duration_s`: float64 [n, 2]."""
 
     @property
     def feet(self) -> tuple[str, ...]:

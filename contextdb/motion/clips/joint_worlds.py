@@ -26,28 +26,20 @@ LEAST_MATRIX = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class JointWorlds:
-    """Joints as a file has them.
-
-    Attributes
-    ----------
-    names : list of str, length J
-        Not always unique.
-    parents : int64 array, shape (J,)
-        -1 of each joint without one.
-    rest, frames : float64 arrays, shapes (J, 4, 4) and (F, J, 4, 4)
-        Where each joint is in the world, as matrices whose last column is its place.
-    deforms : bool array, shape (J,)
-        Whether a skin hangs on it; all False where nothing is known of skins.
-    rate : float
-        Frames a second.
-    """
+    """Joints as a file has them."""
 
     names: Sequence[str]
+    """Not always unique."""
     parents: Ints
+    """-1 of each joint without one: int64 [J]."""
     rest: Floats
     frames: Floats
+    """`rest`, `frames`: where each joint is in the world, as matrices whose last column is its place: float64 [J, 4, 4] and [F, J,
+    4, 4]."""
     deforms: NDArray[np.bool_]
+    """Whether a skin hangs on it; all False where nothing is known of skins: bool [J]."""
     rate: float
+    """Frames a second."""
 
     def clip(self, name: str) -> Clip:
         """The clip of its body. Raises ClipError where there is none, or numbers are not finite."""

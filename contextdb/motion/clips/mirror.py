@@ -77,13 +77,8 @@ def mirrored(moved: Moved, pairs: Pairs) -> Moved:
 def partners_of(skeleton: Skeleton, pairs: Pairs) -> Ints:
     """The joint with which each changes places, its own number for one without a partner: int64 [J].
 
-    Raises
-    ------
-    MotionError
-        A bone that the skeleton lacks (the nearest is reported), a pattern that fits no bone, a bone in two pairs, or bones whose
-        parents do not change places as they do.
-    ContextError
-        `skeleton` is none, or `pairs` are no pairs of names.
+    Raises MotionError for a bone that the skeleton lacks (the nearest is reported), a pattern that fits no bone, a bone in two
+    pairs, or bones whose parents do not change places as they do; ContextError where `skeleton` is none, or `pairs` are none.
     """
     require_kind(skeleton, Skeleton, "skeleton", "a Skeleton")
     accepted = 'pairs of names, such as ("LeftFoot", "RightFoot")'

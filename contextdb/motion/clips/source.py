@@ -34,34 +34,22 @@ ONE_TAKE: tuple[str, ...] = ()
 
 @dataclass(frozen=True)
 class Format:
-    """A format of clips.
-
-    Attributes
-    ----------
-    name : str
-    endings : tuple of str
-    is_format : function of bytes
-        Whether the bytes begin as such a file does.
-    takes : function of bytes and the file's name
-        The names of its animations; none where the file is one clip.
-    read : function of ClipSource, the clip's name, the take, a unit and an axis
-        The clip.
-    states_unit : bool
-        Whether a file says its unit and which axis points up, so that settings of both are about other files.
-    whole : function of bytes and the file
-        The bytes with those of other files that it needs.
-    version : int
-        One more whenever the same file would give another clip.
-    """
+    """A format of clips."""
 
     name: str
     endings: tuple[str, ...]
     is_format: Callable[[bytes], bool]
+    """Whether the bytes begin as such a file does."""
     takes: Callable[[bytes, str], tuple[str, ...]]
+    """The names of its animations; none where the file is one clip."""
     read: Callable[[ClipSource, str, str, float, Up], Clip]
+    """The clip."""
     states_unit: bool = True
+    """Whether a file says its unit and which axis points up, so that settings of both are about other files."""
     whole: Callable[[bytes, Path], bytes] = lambda content, path: content
+    """The bytes with those of other files that it needs."""
     version: int = 1
+    """One more whenever the same file would give another clip."""
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ body's axes; a direction or an orientation is seen from that bone, in its own ax
 metres further on the path; negative ones before and behind. A pose channel `at` other moments is what it is at the nearest frame,
 in the body's frame of that moment, and stays what it was beyond the clip's ends.
 
-A bone's channel that is `permuted` looks ahead by the seconds of the permutation, see `contextdb.motion.features.permutations`: it
+A bone's channel that is `permuted` looks ahead by the seconds of the permutation, see `contextdb.motion.features.channels`: it
 holds the bone as it is then, seen from the body, or from the bone that it is relative to, as that is now. A velocity is the
 difference of both bones then. Beyond the clip's end it stays what it was, too.
 
@@ -30,15 +30,20 @@ rotation, and angles leap from 180 to -180. Two axes are continuous, so frames t
 
 Source: Zhou et al., "On the Continuity of Rotation Representations in Neural Networks", CVPR 2019 (orientation); Remedy, "Control",
 GDC (sampling by distance, direction to velocity).
+
+So a query can say what shall be when: a hand at the ball in 0.4 s. Permutation i looks from_s + i x step_s ahead.
+
+Source: NumberOfPermutations, PermutationsSampleRate and PermutationsTimeOffset of Unreal's PoseSearch.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal, TypeGuard, get_args
 
-from contextdb.errors import MotionError, in_quotes, safe_text
+from contextdb.errors import ContextError, MotionError, in_quotes, safe_text
 from contextdb.files.settings import (
     Declared,
     Section,
@@ -50,8 +55,7 @@ from contextdb.files.settings import (
     settings_with,
     word,
 )
-from contextdb.files.toml_shapes import Shape, between, filled, numbers_within
-from contextdb.files.toml_text import as_toml, what
+from contextdb.files.toml_shapes import Shape, as_toml, between, filled, numbers_within, what
 
 ChannelType = Literal[
     "position", "velocity", "trajectory", "direction", "orientation", "angular_velocity", "phase", "custom", "permutation_time"
@@ -288,3 +292,60 @@ def check_together(section: Section, channels: Sequence[Channel], *, is_whole: b
             section.add(f"{section.where} has the channel {in_quotes(name)} {names.count(name)} times.", "each channel once")
     if is_whole and not any(channel.weight for channel in channels):
         section.add(f"{section.where}: the weight of every channel is 0.", "at least one above 0, else all frames are alike")
+
+
+# ---- permutations: each clip is searched several times over, each time with its permuted channels so many seconds ahead of
+# its frame
+
+
+ACCEPTED = "{ count = 5, step_s = 0.1 }"
+LEAST_STEP_S = 1e-3
+
+
+@dataclass(frozen=True)
+class Permutations(Declared, error=ContextError):
+    """How often each clip is searched, and how far ahead the permuted channels look each time.
+
+    Raises
+    ------
+    ContextError
+        A number out of range.
+    """
+
+    count: int = number("How often each clip is searched.", least=1, most=100, unit="a whole number", such_as=5, is_whole=True)
+    step_s: float = number(
+        "Seconds between one permutation and the next.",
+        0.0,
+        0.0,
+        MOST_SECONDS,
+        "seconds",
+        0.1,
+        without="required where `count` is above 1",
+    )
+    from_s: float = number("Seconds that the first looks ahead.", 0.0, 0.0, MOST_SECONDS, "seconds", 0.2)
+
+    @cached_property
+    def seconds(self) -> tuple[float, ...]:
+        """How far ahead each permutation looks."""
+        return tuple(round(self.from_s + i * self.step_s, 9) for i in range(self.count))
+
+
+PERMUTATIONS = settings_of(Permutations)
+
+
+def read_permutations(parent: Section, value: Mapping[str, object]) -> Permutations | None:
+    """Those of `[features.NAME]`; None when a fault is left behind."""
+    n_faults = len(parent.faults)
+    section = parent.inside("permutations", value, PERMUTATIONS)
+    values = section.values(PERMUTATIONS)
+    accepted = f"seconds from {LEAST_STEP_S:g} to {MOST_SECONDS:g}, such as 0.1"
+    if values.get("count", 1) > 1 and "step_s" not in value:
+        section.add(f'{section.where} has no "step_s".', accepted)
+    if values.get("step_s", 1.0) < LEAST_STEP_S:
+        section.wrong("step_s", "this is out of range", accepted)
+    if len(parent.faults) > n_faults:
+        return None
+    permutations = Permutations(**values)
+    if permutations.seconds[-1] > MOST_SECONDS:
+        section.add(f"{section.where}: the last looks {permutations.seconds[-1]:g} s ahead.", f"at most {MOST_SECONDS:g} s")
+    return permutations

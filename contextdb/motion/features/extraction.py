@@ -15,14 +15,21 @@ from contextdb.cells.arguments import require_kind, require_whole
 from contextdb.errors import Fault, MotionError, Place, QueryError, in_quotes, mend_for, plural, some
 from contextdb.motion.clips import mirror, own_axes, quaternions
 from contextdb.motion.clips.clip import Clip
+from contextdb.motion.clips.contacts import three_rounds
 from contextdb.motion.clips.feet import NO_MARKS, ContactMarks, footfalls_of, phases, rounds_of
 from contextdb.motion.clips.foot_bones import feet_of
-from contextdb.motion.clips.looping import three_rounds
-from contextdb.motion.clips.many_paths import ManyTrajectories
 from contextdb.motion.clips.poses import Poses, poses_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints, Skeleton
-from contextdb.motion.clips.trajectory import Trajectory, after_seconds, along_path, rates_of_change, to_own_frame, unbroken
+from contextdb.motion.clips.trajectory import (
+    ManyTrajectories,
+    Trajectory,
+    after_seconds,
+    along_path,
+    rates_of_change,
+    to_own_frame,
+    unbroken,
+)
 from contextdb.motion.features.channels import DEFAULT_AXIS, Channel
 from contextdb.motion.features.path_features import point_features, write_paths
 from contextdb.motion.features.schema import CustomFunction, FeatureSchema
@@ -35,23 +42,15 @@ LARGEST_CUSTOM = 1e12
 
 @dataclass(frozen=True, eq=False)
 class ClipFeatures:
-    """What a clip, as it is or mirrored, gives to a database.
-
-    Attributes
-    ----------
-    asset : str
-        The clip's name, mirrored or not.
-    mirrored : bool
-    features : float32 array, shape (F, N)
-        In the schema's units.
-    root : float32 array, shape (F, 3)
-        Where the body is on the ground and which way it faces: x and z in metres, heading in radians, unwrapped.
-    """
+    """What a clip, as it is or mirrored, gives to a database."""
 
     asset: str
+    """The clip's name, mirrored or not."""
     mirrored: bool
     features: Features
+    """In the schema's units: float32 [F, N]."""
     root: Features
+    """Where the body is on the ground and which way it faces: x and z in metres, heading in radians, unwrapped. Float32 [F, 3]."""
 
 
 def clip_features(
@@ -69,24 +68,13 @@ def clip_permutations(
 ) -> list[ClipFeatures]:
     """The features of every frame of a clip in each permutation of the schema, one where it has none, in order.
 
-    Parameters
-    ----------
-    clip : Clip
-    schema : FeatureSchema
-    mirrored : bool
-        Take the clip in a mirror, left and right bones exchanged by the schema's `mirror`.
-    looping : bool
-        The clip continues at its start when it ends: its path continues too, and does not run out straight.
-    contacts : (left, right)
-        When each foot of the clip is down, as marks say it: see `Markup.contacts_of`. Default: this is detected.
+    `mirrored` takes the clip in a mirror, left and right bones exchanged by the schema's `mirror`. A `looping` clip continues at
+    its start when it ends: its path continues too, and does not run out straight. `contacts` are when each foot of the clip is
+    down, as marks say it, see `Markup.contacts_of`; without them this is detected.
 
-    Raises
-    ------
-    MotionError
-        The skeleton lacks a bone of the schema (the nearest is named) or cannot be mirrored by its pairs, the clip's numbers are
-        too large to be a body, or a custom channel has no function or one that does not give what it should.
-    ContextError
-        `clip` or `schema` is none.
+    Raises MotionError where the skeleton lacks a bone of the schema (the nearest is named) or cannot be mirrored by its pairs, the
+    clip's numbers are too large to be a body, or a custom channel has no function or one that does not give what it should;
+    ContextError where `clip` or `schema` is none.
     """
     require_kind(clip, Clip, "clip", "a Clip")
     require_kind(schema, FeatureSchema, "schema", "a FeatureSchema")

@@ -14,9 +14,8 @@ from contextdb import core
 from contextdb.cells.arguments import require_kind
 from contextdb.errors import Fault, QueryError, plural
 from contextdb.motion import arguments
-from contextdb.motion.clips.many_paths import ManyTrajectories
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.clips.trajectory import PathPoints, Trajectory, heading_vectors, to_own_frame
+from contextdb.motion.clips.trajectory import ManyTrajectories, PathPoints, Trajectory, heading_vectors, to_own_frame
 from contextdb.motion.features.channels import What
 from contextdb.motion.features.schema import FeatureSchema
 

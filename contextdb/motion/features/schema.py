@@ -6,8 +6,8 @@ channel holds.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -18,8 +18,7 @@ from contextdb.cells.notebook import one_line
 from contextdb.core import Ways
 from contextdb.errors import Fault, MotionError, SchemaError, in_quotes, mend_for, plural, some
 from contextdb.files.settings import Declared, Section, number, setting, settings_of
-from contextdb.files.toml_shapes import Mapped, Shape, filled, listed, nothing
-from contextdb.files.toml_text import what
+from contextdb.files.toml_shapes import Mapped, Shape, filled, listed, nothing, what
 from contextdb.motion.clips.foot_bones import FootBones, Pair
 from contextdb.motion.clips.mirror import Pairs, pattern_fault
 from contextdb.motion.clips.poses import Poses
@@ -27,8 +26,19 @@ from contextdb.motion.clips.prepared_root import prepared_path
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints, Skeleton
 from contextdb.motion.clips.trajectory import Trajectory, root_trajectory
-from contextdb.motion.features.channels import FEET, WHATS, Channel, bone_pair, check_together, is_pair, read_channel
-from contextdb.motion.features.permutations import ACCEPTED, Permutations, read_permutations
+from contextdb.motion.features.channels import (
+    ACCEPTED,
+    FEET,
+    KEYS,
+    WHATS,
+    Channel,
+    Permutations,
+    bone_pair,
+    check_together,
+    is_pair,
+    read_channel,
+    read_permutations,
+)
 
 __all__ = ["Channel", "CustomFunction", "FeatureSchema"]
 
@@ -275,3 +285,42 @@ def _check_permuted(section: Section, channels: Sequence[Channel], permutations:
         section.add(
             f"{section.where} has permutations, but no channel looks ahead by them.", "permuted = true in a channel of a bone"
         )
+
+
+# ---- a feature schema as plain data, as `[features.NAME]` of contextdb.toml holds it: what `FeatureSchema.from_dict` reads
+# back
+
+
+WEIGHING = ("weight", "group")
+"""The keys of a channel that change no feature, only what a difference costs."""
+
+
+def schema_to_dict(schema: FeatureSchema) -> dict[str, object]:
+    """The keys of a schema, and their values as JSON and TOML have them; its name and its functions are not among them."""
+    given = {key: _plain(value) for key, value in _given(schema) if key in SCHEMA}
+    return {**given, "channels": [_channel_to_dict(channel) for channel in schema.channels]}
+
+
+def unweighted(schema: FeatureSchema) -> dict[str, object]:
+    """The part of a schema that features in raw units depend on."""
+    channels = [_channel_to_dict(channel) for channel in schema.channels]
+    bare = [{key: value for key, value in channel.items() if key not in WEIGHING} for channel in channels]
+    return {**schema_to_dict(schema), "channels": bare}
+
+
+def _channel_to_dict(channel: Channel) -> dict[str, object]:
+    return {key: _plain(value) for key, value in _given(channel) if key in KEYS[channel.type]}
+
+
+def _given(part: FeatureSchema | Channel) -> Iterator[tuple[str, object]]:
+    """The fields that are not left at their default."""
+    for each in fields(part):
+        value = getattr(part, each.name)
+        if value != each.default:
+            yield each.name, value
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, Permutations):
+        return asdict(value)
+    return [_plain(item) for item in value] if isinstance(value, (list, tuple)) else value

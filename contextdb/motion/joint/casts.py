@@ -19,7 +19,7 @@ from contextdb.motion import arguments
 from contextdb.motion.answers import Answer, has_casts, is_answer
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.joint.database import JointDatabase
-from contextdb.motion.search.table_ranges import TableRanges
+from contextdb.motion.search.filtering import TableRanges
 
 Cast = tuple[Hashable, ...]
 """The actors of the roles, in their order."""

@@ -65,31 +65,23 @@ class MadeClip:
 
 @dataclass(frozen=True)
 class Description:
-    """What a table of assets says of a clip. All numbers are measured from its root motion; angles are positive to the left.
-
-    Attributes
-    ----------
-    asset, gait, style, change
-        `change`: "steady", "start" (from a stand), "stop" (to one) or "turn" (about, on the way).
-    speed_mps, start_mps, end_mps : float
-        Over the ground: mean of the whole clip, of its first and of its last 0.2 s.
-    direction_deg : float
-        Of travel, against the facing: 0 is ahead.
-    turn_dps, heading_change_deg : float
-        How fast the facing turns on the mean, and how far in all.
-    duration_s : float
-    """
+    """What a table of assets says of a clip. All numbers are measured from its root motion; angles are positive to the left."""
 
     asset: str
     gait: Gait
     style: Style
     change: Change
+    """`asset`, `gait`, `style`, `change`: `change`: "steady", "start" (from a stand), "stop" (to one) or "turn" (about, on the
+    way)."""
     speed_mps: float
     start_mps: float
     end_mps: float
+    """`speed_mps`, `start_mps`, `end_mps`: over the ground: mean of the whole clip, of its first and of its last 0.2 s."""
     direction_deg: float
+    """Of travel, against the facing: 0 is ahead."""
     turn_dps: float
     heading_change_deg: float
+    """`turn_dps`, `heading_change_deg`: how fast the facing turns on the mean, and how far in all."""
     duration_s: float
 
 

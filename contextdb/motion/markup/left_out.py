@@ -25,6 +25,7 @@ class LeftOut(IntEnum):
     FORBIDDEN = 11
     START = 12
     ASSET = 13
+    EVENT = 14
 
     @property
     def text(self) -> str:
@@ -47,6 +48,7 @@ _TEXTS = {
     LeftOut.FORBIDDEN: "forbidden by bias",
     LeftOut.START: "not the start_s of its row",
     LeftOut.ASSET: "asset played lately",
+    LeftOut.EVENT: "does not lead to the event in time",
 }
 
 

@@ -23,7 +23,7 @@ from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.markup.marks import Mark, Marks
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.markup.reserved import CONTACTS, MOST_SECONDS, ReservedTag
-from contextdb.motion.markup.spans import TOLERANCE_S, Span
+from contextdb.motion.markup.span_faults import TOLERANCE_S, Span
 from contextdb.motion.ranges import check_ranges
 
 MOST_RATE = 1e5
@@ -79,39 +79,18 @@ def marks_of(
     *,
     n_frames: int | None = None,
 ) -> Marks:
-    """The markup of some ranges. Frame i of a range is at i / rate seconds, in a mirrored one too.
+    """The markup of some ranges, or of none but for their ends; each range is that of one asset, frames `starts[i]` up to, not
+    including, `stops[i]`, and they do not overlap. Frame i of a range is at i / rate seconds, in a mirrored one too.
 
-    Parameters
-    ----------
-    markup : Markup or None
-        None: there is no markup, but for the ends of ranges.
-    assets : sequence of str, length R
-        The asset of each range.
-    starts, stops : integer arrays, shape (R,)
-        Range i is the frames from starts[i] up to, not including, stops[i]. They do not overlap.
-    rate : float
-        Frames a second.
-    end_s : float
-        Frames less than so many seconds before the last one of a range cannot be entered, unless the range loops. Its first
-        frame always can: a shorter clip could never play otherwise.
-    n_frames : int, optional
-        Frames of the database. Default: up to the last range's end. Frames between ranges are of kind 0.
+    Kind 0 is that of which there is no markup, also between ranges, in as many frames as the database has; the others follow in
+    the order in which they are met. Frames less than `end_s` before the last one of a range cannot be entered, unless the range
+    loops; its first frame always can: a shorter clip could never play otherwise.
 
-    Returns
-    -------
-    Marks
-        Kind 0 is that of which there is no markup; the others follow in the order in which they are met in the ranges.
-
-    Raises
-    ------
-    MotionError
-        Ranges that do not fit, a wrong rate or end, or patterns that fit one asset and contradict each other.
-
-    Notes
-    -----
     A span holds the frames from `from` to `to`, both within, to a millionth of a second. Cost modifiers add up. Of root motion
     weights, and of warps, one that names the asset is stronger than one with a pattern. A warp ends with its range; one that
     starts after the end has no effect.
+
+    Raises MotionError for ranges that do not fit, a wrong rate or end, or patterns that fit one asset and contradict each other.
     """
     per_second = _number(rate, "the rate", "frames a second, more than 0", 1.0 / MOST_SECONDS, MOST_RATE)
     end = _number(end_s, "end_s", "seconds, 0 or more", 0.0, MOST_SECONDS)

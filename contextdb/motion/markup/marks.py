@@ -55,38 +55,28 @@ class Mark(IntFlag):
 
 @dataclass(frozen=True, eq=False)
 class Marks:
-    """The markup of a database's frames. Make it with `of`; its arrays are read-only.
-
-    Attributes
-    ----------
-    tags : tuple of str, length T
-        All tags that the markup knows, also those that no frame of this database has.
-    kinds : uint16 or int32 array, shape (N,)
-        The kind of each frame.
-    kind_tags : bool array, shape (K, T)
-    kind_marks : uint8 array, shape (K,)
-        `Mark` flags.
-    kind_biases : float64 array, shape (K,)
-        Cost modifiers: added to the cost.
-    kind_root_weights : float64 array, shape (K,)
-        How much of the movement comes from the animation: 1 all of it, 0 none (then the game's own model moves the body).
-    looping : bool array, shape (R,)
-        Whether the range continues at its start when it ends.
-    warps : float64 array, shape (R, 2, 2)
-        For position and rotation, from and to in seconds since the range's start: where a match node may warp. NaN: anywhere.
-    touches : uint8 array, shape (N,)
-        Where the markup has a foot come down: 1 the left, 2 the right, 3 both.
-    """
+    """The markup of a database's frames. Make it with `of`; its arrays are read-only."""
 
     tags: tuple[str, ...]
+    """All tags that the markup knows, also those that no frame of this database has."""
     kinds: NDArray[np.integer]
+    """The kind of each frame: int32 [N]."""
     kind_tags: Flags
+    """Bool [K, T]."""
     kind_marks: NDArray[np.uint8]
+    """`Mark` flags: uint8 [K]."""
     kind_biases: Floats
+    """Cost modifiers: added to the cost. Float64 [K]."""
     kind_root_weights: Floats
+    """How much of the movement comes from the animation: 1 all of it, 0 none (then the game's own model moves the body). Float64
+    [K]."""
     looping: Flags
+    """Whether the range continues at its start when it ends: bool [R]."""
     warps: Floats
+    """For position and rotation, from and to in seconds since the range's start: where a match node may warp. NaN: anywhere.
+    Float64 [R, 2, 2]."""
     touches: NDArray[np.uint8]
+    """Where the markup has a foot come down: 1 the left, 2 the right, 3 both. Uint8 [N]."""
 
     def __post_init__(self) -> None:
         for field in fields(self):

@@ -33,8 +33,17 @@ from contextdb.motion.clips.feet import ContactMark, ContactMarks
 from contextdb.motion.markup import file as markup_file
 from contextdb.motion.markup.file import Row
 from contextdb.motion.markup.reserved import CONTACTS, VALUE_RULES, ReservedTag, reserved_of
-from contextdb.motion.markup.span_faults import SECONDS, conflicts, faults_alone, faults_together, listed
-from contextdb.motion.markup.spans import TOLERANCE_S, WILDCARD, Span, fits
+from contextdb.motion.markup.span_faults import (
+    SECONDS,
+    TOLERANCE_S,
+    WILDCARD,
+    Span,
+    conflicts,
+    faults_alone,
+    faults_together,
+    fits,
+    listed,
+)
 
 MOST_FAULTS = 100
 """A file's first faults are reported one by one, the rest counted."""

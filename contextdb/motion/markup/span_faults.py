@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 from itertools import groupby
 
 from contextdb.cells.arguments import as_number
 from contextdb.errors import Fault, in_quotes
 from contextdb.motion.markup.reserved import MOST_SECONDS, VALUE_RULES, ReservedTag, name_fault, reserved_of
-from contextdb.motion.markup.spans import TOLERANCE_S, Span
 
 SpanFault = tuple[int, str, Fault]
 """Which span, in which column, is at fault, and how."""
@@ -166,3 +166,64 @@ def listed(numbers: Sequence[int]) -> str:
     """Numbers with runs of neighbours drawn together: "3-5, 9"."""
     runs = [[n for _, n in run] for _, run in groupby(enumerate(numbers), key=lambda pair: pair[1] - pair[0])]
     return ", ".join(f"{run[0]}-{run[-1]}" if len(run) > 1 else f"{run[0]}" for run in runs)
+
+
+# ---- spans of markup: what is said of one asset, or of those whose name fits a pattern, from one time to another
+
+
+TOLERANCE_S = 1e-6
+"""A frame this near to an end of a span, in seconds, is within it: a third of a second need not be typed to the last digit."""
+
+WILDCARD = "*"
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """One row of markup.
+
+    Attributes
+    ----------
+    asset : str
+        The name of an asset, or a pattern: `*` matches any text, so `jog_*` holds for `jog_left`, and `*` for every asset.
+    tag : str
+        A reserved tag, in its own spelling, or a plain one.
+    from_s, to_s : float
+        Seconds since the start of the clip, both within; infinite `to_s`: up to the end.
+    value : float or None
+        What some reserved tags need.
+    line : int or None
+        Where it is in a file; spans that differ in this alone are equal.
+    """
+
+    asset: str
+    tag: str
+    from_s: float = 0.0
+    to_s: float = math.inf
+    value: float | None = None
+    line: int | None = field(default=None, compare=False)
+
+    def __post_init__(self) -> None:
+        reserved = reserved_of(self.tag) if isinstance(self.tag, str) else None
+        if reserved:
+            object.__setattr__(self, "tag", str(reserved))
+
+    @property
+    def is_pattern(self) -> bool:
+        """Whether `asset` is a pattern. A span that names its asset is stronger than one with a pattern."""
+        return WILDCARD in self.asset
+
+
+def fits(pattern: str, asset: str) -> bool:
+    """Whether an asset has the name, or a name that fits the pattern. `*` alone has a meaning; case counts."""
+    if WILDCARD not in pattern:
+        return pattern == asset
+    first, *middle, last = pattern.split(WILDCARD)
+    at, stop = len(first), len(asset) - len(last)
+    if stop < at or not asset.startswith(first) or not asset.endswith(last):
+        return False
+    for part in middle:
+        position = asset.find(part, at, stop)
+        if position < 0:
+            return False
+        at = position + len(part)
+    return True

@@ -26,11 +26,8 @@ import numpy as np
 from contextdb.cells.arguments import require_kind, require_many, require_mapping, require_real, require_text
 from contextdb.errors import Fault, MotionError, in_quotes
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.measuring.moves import LEAST_FRAMES, MAPS, TURN, WINDOW_S, Counts, Moves
-from contextdb.motion.measuring.near_clips import NEAR_COST, Near, Tell, near_clips
-from contextdb.motion.measuring.transition_names import PATTERN, TransitionCoverage, transitions_of
-from contextdb.motion.measuring.usage import usable
-from contextdb.motion.measuring.wanted import Bools, ClipContexts, wanted_bins
+from contextdb.motion.measuring.moves import LEAST_FRAMES, MAPS, TURN, WINDOW_S, Bools, ClipContexts, Counts, Moves, wanted_bins
+from contextdb.motion.measuring.usage import NEAR_COST, PATTERN, Near, Tell, TransitionCoverage, near_clips, transitions_of, usable
 from contextdb.motion.search.database import MotionDatabase
 
 MOST_ELSEWHERE = 3
@@ -86,26 +83,18 @@ class ContextCoverage:
 
 @dataclass(frozen=True)
 class ToCapture:
-    """A bin that a clip should be captured for.
-
-    Attributes
-    ----------
-    map, row, column : str, int, int
-    fills : float
-        The share of all wanted bins, each weighed by its contexts, that a clip with it would fill; with the opposite bin where the
-        clip would be played mirrored too.
-    contexts : float
-        The share of the contexts in which it is missing.
-    elsewhere : tuple of str
-        Clips that move so, and are not valid where it is missing: a cell of the table may be all that is wrong.
-    """
+    """A bin that a clip should be captured for."""
 
     map: str
     row: int
     column: int
     fills: float
+    """The share of all wanted bins, each weighed by its contexts, that a clip with it would fill; with the opposite bin where the
+    clip would be played mirrored too."""
     contexts: float
+    """The share of the contexts in which it is missing."""
     elsewhere: tuple[str, ...]
+    """Clips that move so, and are not valid where it is missing: a cell of the table may be all that is wrong."""
     is_both_sides: bool
 
     @property
@@ -128,28 +117,17 @@ class ToCapture:
 
 @dataclass(frozen=True, eq=False)
 class MotionCoverage:
-    """What the clips of one table, or of databases without one, have of motion. Shares are of all contexts.
-
-    Attributes
-    ----------
-    table : str or None
-    databases : tuple of str
-    clips : tuple of ClipFrames
-    contexts : tuple of ContextCoverage
-        The largest share first.
-    transitions : TransitionCoverage
-    near : tuple of Near
-    never_valid : tuple of str
-        Clips that no context lets play.
-    """
+    """What the clips of one table, or of databases without one, have of motion. Shares are of all contexts."""
 
     table: str | None
     databases: tuple[str, ...]
     clips: tuple[ClipFrames, ...]
     contexts: tuple[ContextCoverage, ...]
+    """The largest share first."""
     transitions: TransitionCoverage
     near: tuple[Near, ...]
     never_valid: tuple[str, ...]
+    """Clips that no context lets play."""
 
     @property
     def n_frames(self) -> int:

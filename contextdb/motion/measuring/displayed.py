@@ -28,43 +28,32 @@ PoseArrays: TypeAlias = Mapping[str, NDArray[Any]]
 
 @dataclass(frozen=True, eq=False)
 class Displayed:
-    """Moments of a character.
-
-    Attributes
-    ----------
-    times_s : float64 array, shape (T,)
-    playing : list of At or None, length T
-    entered, jumped, forced : bool arrays, shape (T,)
-        Whether something else begins to play; by a jump; and because what played could not play on.
-    before : list of At or None, length T
-        At a jump: what would have played on.
-    costs : float64 array, shape (T,)
-        At a forced jump what it cost; NaN elsewhere, and where it is not known.
-    bodies : float64 array, shape (T, 3), or None
-        Where the game had the body: x, z and heading. NaN where it is not known.
-    positions : float64 array, shape (T, J, 3), or None
-    roots : float64 array, shape (T, 3), or None
-    feet : int64 array, shape (K,), or None
-        The joints that are planted.
-    contacts : bool array, shape (T, K), or None
-        Which feet are down in the clip.
-    sources : list of (RawClips, int) or None, length T, or None
-        The clips that each moment is from, and its nearest frame there.
-    """
+    """Moments of a character."""
 
     times_s: Floats
+    """Float64 [T]."""
     playing: Sequence[At | None]
     entered: Flags
     jumped: Flags
     forced: Flags
+    """`entered`, `jumped`, `forced`: whether something else begins to play; by a jump; and because what played could not play on:
+    bool [T]."""
     before: Sequence[At | None]
+    """At a jump: what would have played on."""
     costs: Floats
+    """At a forced jump what it cost; NaN elsewhere, and where it is not known: float64 [T]."""
     bodies: Floats | None = None
+    """Where the game had the body: x, z and heading. NaN where it is not known. Float64 [T, 3], or None."""
     positions: Floats | None = None
+    """Float64 [T, J, 3], or None."""
     roots: Floats | None = None
+    """Float64 [T, 3], or None."""
     feet: Ints | None = None
+    """The joints that are planted: int64 [K], or None."""
     contacts: Flags | None = None
+    """Which feet are down in the clip: bool [T, K], or None."""
     sources: Sequence[tuple[RawClips, int] | None] | None = None
+    """The clips that each moment is from, and its nearest frame there."""
 
     @property
     def seconds(self) -> float:

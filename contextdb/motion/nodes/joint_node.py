@@ -24,7 +24,7 @@ from contextdb.motion.clips.ground_place import GroundPlace
 from contextdb.motion.joint.database import JointDatabase
 from contextdb.motion.joint.hit import JointHit
 from contextdb.motion.joint.searcher import JointOptions, JointSearcher, Places, Queries, places_of
-from contextdb.motion.markup.spans import TOLERANCE_S
+from contextdb.motion.markup.span_faults import TOLERANCE_S
 from contextdb.motion.nodes.match_node import MatchCosts, MatchPlay
 from contextdb.motion.nodes.warping import Target, Window, warped
 from contextdb.motion.search.hit import Hit

@@ -25,6 +25,7 @@ from numpy.typing import ArrayLike
 
 from contextdb.cells.arguments import as_number, require_kind, require_text
 from contextdb.cells.row_play import RowPlay
+from contextdb.core import aim
 from contextdb.errors import Fault, MotionError, QueryError, in_quotes
 from contextdb.motion.answers import is_answer
 from contextdb.motion.arguments import Valid, ValidRanges
@@ -32,9 +33,9 @@ from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.clips.trajectory import to_own_frame
 from contextdb.motion.features.channels import require_weight
-from contextdb.motion.markup.spans import TOLERANCE_S
+from contextdb.motion.markup.span_faults import TOLERANCE_S
 from contextdb.motion.nodes.stitching import shortest_part
-from contextdb.motion.nodes.warping import Target, WarpedPath, WarpShare, Window, warped, wrapped
+from contextdb.motion.nodes.warping import Target, WarpedPath, WarpShare, Window, warped
 from contextdb.motion.search.candidates import Candidates
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.filtering import Penalties, Tags
@@ -256,7 +257,7 @@ class MatchNode:
         costs = self._costs(hit, query, target, self._valid(valid, ranges), **options)
         frames = np.arange(hit.frame, self._last[hit.frame] + 1)
         position, rotation = (Window(*each) for each in (self._windows(frames[:1])[0] / rate).tolist())
-        path = warped((frames - hit.frame) / (self.rate * rate), _path(self._root, frames), position, rotation, target)
+        path = warped((frames - hit.frame) / (self.rate * rate), self._root[frames], position, rotation, target)
         return MatchPlay(hit, target, costs, path, Playhead(self.database, hit.range, self.rate), how=how, play_rate=rate)
 
     def stitch(
@@ -333,7 +334,7 @@ class MatchNode:
         """What distance and rotation add to the cost of each frame: two float64 arrays [N], 0 between ranges."""
         if not isinstance(target, Target):
             raise QueryError(Fault(f"the target is {target!r}.", "a Target"))
-        return self._distance_costs(self.ends, target), self._rotation_costs(self.ends, target)
+        return self._target_costs(self.ends, target)
 
     @cached_property
     def ends(self) -> Floats:
@@ -378,14 +379,10 @@ class MatchNode:
         stops = np.where(goes_on, n_frames, np.arange(n_frames))
         return np.asarray(np.minimum.accumulate(stops[::-1])[::-1])
 
-    def _distance_costs(self, ends: Floats, target: Target) -> Floats:
-        away = ends[..., :2] - np.array((target.left_m, target.ahead_m))
-        return np.asarray(self.position_weight * (away[..., 0] ** 2 + away[..., 1] ** 2))
-
-    def _rotation_costs(self, ends: Floats, target: Target) -> Floats:
-        if target.turn_rad is None:
-            return np.zeros(ends.shape[:-1])
-        return np.asarray(self.rotation_weight * wrapped(ends[..., 2] - target.turn_rad) ** 2)
+    def _target_costs(self, ends: Floats, target: Target) -> tuple[Floats, Floats]:
+        distances, rotations = np.empty(len(ends)), np.empty(len(ends))
+        aim(ends, target.numbers, np.array((self.position_weight, self.rotation_weight)), distances, rotations)
+        return distances, rotations
 
     def _target_bias(self, target: Target) -> Floats:
         distance, rotation = self.target_costs(target)
@@ -396,11 +393,11 @@ class MatchNode:
     ) -> MatchCosts:
         motion = self.database.channel_costs(hit, query)
         chosen = self.database.filter(valid, in_match_range=True, **options)
-        end = self.ends[hit.frame]
+        distances, rotations = self._target_costs(self.ends[hit.frame : hit.frame + 1], target)
         return MatchCosts(
             motion,
-            float(self._distance_costs(end, target)),
-            float(self._rotation_costs(end, target)),
+            float(distances[0]),
+            float(rotations[0]),
             float(chosen.range_biases[hit.range] + chosen.kinds.biases[self.database.marks.kinds[hit.frame]]),
         )
 

@@ -29,7 +29,7 @@ from contextdb.motion.clips.mirror import Pairs
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Skeleton, sided_pairs
 from contextdb.motion.features.schema import FeatureSchema
-from contextdb.motion.markup.spans import TOLERANCE_S
+from contextdb.motion.markup.span_faults import TOLERANCE_S
 from contextdb.motion.markup.tag_filter import TagFilter
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.filtering import Penalties

@@ -4,7 +4,7 @@ A target, and every placement here, is seen by the body as it stands and faces w
 metres ahead, radians to the left. Within the warp window of position (or rotation) the difference between the target and the
 animation is blended in; the share of it that is blended in goes from 0 where the window opens to 1 where it closes. There the body
 is at the target (or faces as it shall), and from there on it follows the animation, in the direction it now faces. Outside the
-windows nothing is warped.
+windows nothing is warped. The loops are the core's nodes.h, which games play one-offs with.
 
     placement(t) = natural path, each step turned by rotation share x turn still missing
                    + position share x way still missing after those turns
@@ -26,20 +26,15 @@ from typing import NamedTuple
 import numpy as np
 
 from contextdb.cells.arguments import as_number
+from contextdb.core import motion_from, row_at, warp
 from contextdb.errors import Fault, QueryError
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.clips.trajectory import STANDING_MPS, to_own_frame
 from contextdb.motion.features.extraction import FARTHEST_M
-from contextdb.motion.markup.spans import TOLERANCE_S
+from contextdb.motion.markup.span_faults import TOLERANCE_S
 from contextdb.motion.selection.root_motion import RootMotion
 
-STANDING_RADPS = 0.1
-"""A body that turns slower does not turn; one that moves slower than `STANDING_MPS` stands."""
-LEAST_MOVED_M = 0.1
-LEAST_TURNED_RAD = 0.15
-"""An animation that covers or turns less within a window does not carry a warp: a few steps of it would take all of it at once."""
-MOST_TIMES = 4.0
-"""Nor does one of which a warp would add more than so many times its own movement."""
+N_MORE = 4
+"""So many knots a path has at most beside its frames: where two windows open and close."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +63,11 @@ class Target:
         return math.hypot(self.left_m, self.ahead_m)
 
     @property
+    def numbers(self) -> Floats:
+        """As the core has it: float64 [3], NaN for no heading."""
+        return np.array((self.left_m, self.ahead_m, math.nan if self.turn_rad is None else self.turn_rad))
+
+    @property
     def direction_deg(self) -> float:
         """In which direction it is seen: degrees, 0 ahead, positive to the left."""
         return math.degrees(math.atan2(self.left_m, self.ahead_m))
@@ -89,11 +89,13 @@ class Target:
         In the world x is to the left and z ahead of a heading of 0, as in `MotionDatabase.root`: a body's place is the movement to
         it from the origin, and `body.then(placement)` puts a placement back into the world.
         """
-        here = [_number(value, "the body's place", "three numbers") for value in (body.left_m, body.ahead_m, body.turn_rad)]
-        there = [_number(value, "the target's place", "metres") for value in (x_m, z_m)]
-        way = to_own_frame(np.array(there) - np.array(here[:2]), np.array(here[2]))
-        heading = None if heading_rad is None else _number(heading_rad, "the target's heading", "radians, or None") - here[2]
-        return cls(float(way[0]), float(way[1]), heading)
+        left, ahead, facing = (
+            _number(each, "the body's place", "three numbers") for each in (body.left_m, body.ahead_m, body.turn_rad)
+        )
+        x, z = (_number(value, "the target's place", "metres") for value in (x_m, z_m))
+        turn = None if heading_rad is None else _number(heading_rad, "the target's heading", "radians, or None") - facing
+        way = motion_from(left, ahead, facing, x, z, 0.0)
+        return cls(way[0], way[1], turn)
 
 
 class Window(NamedTuple):
@@ -133,13 +135,16 @@ class WarpedPath:
 
     def at(self, time_s: float) -> RootMotion:
         """Where the body is some seconds after the entry; before it and behind the end, as there."""
-        left, ahead, turn = (float(np.interp(time_s, self.times_s, column)) for column in self.placements.T)
-        return RootMotion(left, ahead, turn)
+        return RootMotion(*self._row_at(self.placements, time_s))
 
     def share_at(self, time_s: float) -> WarpShare:
         """How much of the warp is blended in by then."""
-        position, rotation = (float(np.interp(time_s, self.times_s, column)) for column in self.shares.T)
-        return WarpShare(position, rotation)
+        return WarpShare(*self._row_at(self.shares, time_s))
+
+    def _row_at(self, rows: Floats, time_s: float) -> list[float]:
+        row = np.empty(rows.shape[1])
+        row_at(self.times_s, rows, time_s, row)
+        return row.tolist()
 
 
 def warped(times_s: Floats, path: Floats, position: Window, rotation: Window, target: Target) -> WarpedPath:
@@ -150,68 +155,17 @@ def warped(times_s: Floats, path: Floats, position: Window, rotation: Window, ta
     times_s : float64 array, shape (n,)
         Ascending from 0, the entry.
     path : float64 array, shape (n, 3)
-        As the animation has it: x and z in metres and the heading in radians, unwrapped.
+        As the animation has it: x and z in metres and the heading in radians.
     position, rotation : Window
         Within `times_s`, in seconds since the entry. Nothing is warped in one that is not open.
     target : Target
     """
-    windows = [window for window in (position, rotation) if window.is_open]
-    knots = np.unique(np.concatenate([times_s, *map(np.array, windows)]))
-    natural = np.stack([np.interp(knots, times_s, column) for column in path.T], axis=-1)
-    steps = to_own_frame(np.diff(natural[:, :2], axis=0), path[0, 2])
-    turns = natural[:, 2] - path[0, 2]
-    way, turning = _movements(knots, steps, turns)
-
-    rotation_s = rotation.to_s if rotation.is_open and target.turn_rad is not None else None
-    missing_turn = 0.0
-    if rotation_s is not None and target.turn_rad is not None:
-        missing_turn = math.remainder(target.turn_rad - turns[np.searchsorted(knots, rotation_s)], math.tau)
-    turn_share = _share(knots, rotation, (turning, way), abs(missing_turn))
-    added = missing_turn * turn_share
-    places = _summed(to_own_frame(steps, -(added[1:] + added[:-1]) / 2.0))
-
+    n = len(times_s) + N_MORE
+    knots, own, places, shares = np.empty(n), np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 2))
+    n = warp(times_s, np.array(path, np.float64), np.array((position, rotation)), target.numbers, knots, own, places, shares)
     position_s = position.to_s if position.is_open else None
-    missing = np.zeros(2)
-    if position_s is not None:
-        missing = np.array((target.left_m, target.ahead_m)) - places[np.searchsorted(knots, position_s)]
-    way_share = _share(knots, position, (way, turning), float(np.linalg.norm(missing)))
-    placements = np.column_stack((places + way_share[:, None] * missing, turns + added))
-    return WarpedPath(knots, placements, np.column_stack((way_share, turn_share)), position_s, rotation_s)
-
-
-def wrapped(radians: Floats) -> Floats:
-    """Angles as the shortest way round, from -π to π."""
-    return np.asarray(radians - math.tau * np.rint(radians / math.tau))
-
-
-class _Movement(NamedTuple):
-    """What an animation does from knot to knot, [K-1], in metres or radians; `least` of it within a window can carry a warp."""
-
-    amounts: Floats
-    least: float
-
-
-def _movements(knots: Floats, steps: Floats, turns: Floats) -> tuple[_Movement, _Movement]:
-    """How far the animation goes and how far it turns; standing still is 0."""
-    seconds, lengths, angles = np.diff(knots), np.linalg.norm(steps, axis=-1), np.abs(np.diff(turns))
-    moved = np.where(lengths > STANDING_MPS * seconds, lengths, 0.0)
-    turned = np.where(angles > STANDING_RADPS * seconds, angles, 0.0)
-    return _Movement(moved, LEAST_MOVED_M), _Movement(turned, LEAST_TURNED_RAD)
-
-
-def _share(knots: Floats, window: Window, movements: tuple[_Movement, ...], missing: float) -> Floats:
-    """The share of a warp at each knot, [K]: by the first movement of which there is enough for what is missing, or by time."""
-    if not window.is_open:
-        return np.zeros(len(knots))
-    inside = (knots[:-1] >= window.from_s) & (knots[1:] <= window.to_s)
-    enough = (each.amounts for each in movements if each.amounts[inside].sum() >= max(each.least, missing / MOST_TIMES))
-    passed = _summed(np.where(inside, next(enough, np.diff(knots)), 0.0))
-    return np.asarray(passed / passed[-1])
-
-
-def _summed(amounts: Floats) -> Floats:
-    """What has come together at each knot, 0 at the first: [K-1, ...] to [K, ...]."""
-    return np.concatenate((np.zeros((1, *amounts.shape[1:])), np.cumsum(amounts, axis=0)))
+    rotation_s = rotation.to_s if rotation.is_open and target.turn_rad is not None else None
+    return WarpedPath(knots[:n].copy(), places[:n].copy(), shares[:n].copy(), position_s, rotation_s)
 
 
 def _number(value: object, what: str, accepted: str) -> float:

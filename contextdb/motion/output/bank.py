@@ -153,10 +153,14 @@ class PoseBank:
 
     def range_of(self, asset: str, mirrored: bool = False) -> int:
         """The range of an asset. Raises MotionError when there is none, with the nearest name."""
-        number = self._ranges.get((asset, bool(mirrored)))
-        if number is None:
+        number = self.number_of(asset, mirrored)
+        if number < 0:
             raise MotionError(self._unknown(asset))
         return number
+
+    def number_of(self, asset: str, mirrored: bool) -> int:
+        """The same; -1 when there is none."""
+        return self._ranges.get((asset, bool(mirrored)), -1)
 
     def last_s(self, range_number: int) -> float:
         """Seconds from the first frame of a range to its last."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from contextdb.cells.arguments import require_kind, require_mapping
 from contextdb.cells.row_play import ROOTS, RowPlay
-from contextdb.core import Poses, pose_columns
+from contextdb.core import Poses, fill_plays, pose_columns
 from contextdb.errors import Fault, MotionError, in_quotes, no_such
 from contextdb.files.settings import settings_of
 from contextdb.motion.clips.quaternions import Floats
@@ -22,8 +22,10 @@ from contextdb.motion.output.clip_parts import tops_of
 from contextdb.motion.output.ground import Grounds, below_all
 from contextdb.motion.output.legs import hinges_of, legs_of
 from contextdb.motion.output.pose import CrowdPoses
+from contextdb.motion.output.samples import Flags
 from contextdb.motion.output.settings import PoseSettings
 from contextdb.motion.records import quickly_made
+from contextdb.motion.selection.chooser import Chooser, Updates
 from contextdb.motion.selection.decision import Action, Decision, Playing
 
 ADDED_SHARE = 0.75
@@ -33,26 +35,39 @@ NUMBERS = {action: float(number) for number, action in enumerate(Action)}
 COLUMNS = pose_columns()
 """Where each single number of a row is."""
 PLAY_RATE, CLIP_RATE = COLUMNS["play_rate"], COLUMNS["clip_rate"]
-N_GIVEN, IS_AHEAD, LOST = 16, 10, 12
-"""So many numbers the core is given of a character, and two of their places; see `cdbo_given` in pose.h."""
+N_GIVEN, N_PLAY, ROOT = 16, 18, 17
+"""So many numbers the core is given of a character, see `cdbo_given` in pose.h; and so many that this comes from, with the place of
+what moves the root, see `cdbo_play` in receive.h."""
+BY_ANIMATION, MOST_CHOOSERS = float(ROOTS.index("animation")), 16
 Moment = tuple[int, int, float]
 NO_MOMENT: Moment = (-1, 0, 0.0)
 """A moment of a bank: its number, a range and a second; nothing."""
 
 
+Displayed = Decision | Playing | None
+
+
 @quickly_made
 @dataclass(frozen=True, eq=False, slots=True)
 class Rows:
-    """Where N characters are: a row of numbers each [N, W], and what each showed last. Never changed, so it may be stored."""
+    """Where N characters are: a row of numbers each [N, W]; what each displayed last, as the core has it [N, 3]; and the same as
+    objects, or the decisions that say it. Never changed, so it may be stored."""
 
     numbers: Floats
-    playing: list[Playing | None]
+    displayed: Floats
+    last: list[Displayed]
 
     def __len__(self) -> int:
-        return len(self.playing)
+        return len(self.last)
 
     def row(self, i: int) -> Rows:
-        return self if len(self) == 1 else Rows(self.numbers[i : i + 1], self.playing[i : i + 1])
+        each = slice(i, i + 1)
+        return self if len(self) == 1 else Rows(self.numbers[each], self.displayed[each], self.last[each])
+
+    def playing(self, i: int) -> Playing | None:
+        """What one displayed last."""
+        last = self.last[i]
+        return last.playing if isinstance(last, Decision) else last
 
 
 class Pipeline:
@@ -65,6 +80,7 @@ class Pipeline:
         self.all: list[PoseBank] = [self.only] if self.only is not None else list(self.banks.values())
         self.rig = self.all[0]
         self._numbers = {name: i for i, name in enumerate(self.banks)}
+        self._places: dict[Chooser, tuple[Ints, Ints, Ints]] = {}
 
     def is_like(self, other: Pipeline) -> bool:
         """Whether another one is of the same banks and settings."""
@@ -94,28 +110,45 @@ class Pipeline:
         """One character that has not displayed anything yet: the rig at rest."""
         row = np.empty(self.width)
         self._flat.begin(row)
-        return Rows(row[None], [None])
+        return self.rows_at(row, None)
+
+    def rows_at(self, row: Floats, playing: Playing | None) -> Rows:
+        """One character, with a row, that displayed something last. Raises MotionError where no bank has that."""
+        return Rows(row[None], np.array([self.moment_of(playing)], np.float64), [playing])
 
     def update(
-        self, rows: Rows, decisions: Sequence[Decision], dt: float, places: Floats | None, grounds: Grounds | None
+        self, rows: Rows, decisions: list[Decision], plays: Floats, dt: float, places: Floats | None, grounds: Grounds | None
     ) -> tuple[Rows, CrowdPoses]:
-        """The rows and the poses of all after a decision for each; `places` [N, 3] are those of the bodies, NaN for none."""
-        given, seams, playing, jumps, forced = self._given(rows, decisions, dt, grounds)
+        """The rows and the poses of all after a decision for each, and what `plays` by it; `places` [N, 3] are those of the bodies,
+        NaN for none."""
+        given, seams, displayed = self.given(rows, plays, dt)
         n, n_joints, n_feet = len(rows), self.rig.n_joints, len(self.rig.feet)
         after, roots, contacts = np.empty((n, self.width)), np.empty((n, 3)), np.empty((n, n_feet), np.bool_)
         rotations, translations, positions = np.empty((n, n_joints, 4)), np.empty((n, n_joints, 3)), np.empty((n, n_joints, 3))
-        moments = seams if len(seams) else None
         bodies = None if places is None else np.ascontiguousarray(places)
-        arrays = rows.numbers, given, bodies, moments, dt, after, roots, rotations, translations, positions, contacts
+        arrays = rows.numbers, given, bodies, seams, dt, after, roots, rotations, translations, positions, contacts
         if grounds is None:
             self._flat.update(*arrays, None, None)
         else:
             points = np.empty((n, max(n_feet, 1), 2))
             self._grounded.update(*arrays, points, None)
             self._grounded.update(*arrays, None, below_all(grounds, points))
-        displayed = [now or last for now, last in zip(playing, rows.playing, strict=True)]
-        poses = CrowdPoses(playing, jumps, forced, roots, rotations, translations, positions, contacts, after[:, PLAY_RATE])
-        return Rows(after, displayed), poses
+        each = zip(plays[:, 0].tolist(), decisions, rows.last, strict=True)
+        last = [was if bank < 0.0 else decision for bank, decision, was in each]
+        poses = CrowdPoses(decisions, given, roots, rotations, translations, positions, contacts, after[:, PLAY_RATE])
+        return Rows(after, displayed, last), poses
+
+    def given(self, rows: Rows, plays: Floats, dt: float) -> tuple[Floats, Floats | None, Floats]:
+        """What happens in this update, a row each; the moments at seams, two for each, or None; and what is displayed then."""
+        n = len(rows)
+        given, moments, displayed = np.empty((n, N_GIVEN)), np.empty((2 * n, 4)), np.empty((n, 3))
+        n_seams = self._flat.receive(rows.numbers, plays, dt, given, moments, displayed)
+        return given, moments[:n_seams] if n_seams else None, displayed
+
+    def moves_body(self, plays: Floats) -> Flags:
+        """Whether the clip alone moves the body of each, as the row of what plays or the settings say: bool [N]."""
+        by_settings = self.settings.root == "animation"
+        return np.array([by_settings if root != root else root == BY_ANIMATION for root in plays[:, ROOT].tolist()], np.bool_)
 
     def find(self, playing: Playing) -> tuple[int, int]:
         """The number of the bank of what plays, and its range there."""
@@ -136,47 +169,60 @@ class Pipeline:
         frame = int(bank.starts[int(at)]) + round(time_s * bank.rate)
         return Playing(name, bank.assets[int(at)], int(at), frame, time_s, bool(bank.mirrored[int(at)]))
 
-    def _given(
-        self, rows: Rows, decisions: Sequence[Decision], dt: float, grounds: Grounds | None
-    ) -> tuple[Floats, Floats, list[Playing | None], list[bool], list[bool]]:
-        """What happens in this update, a row each, and the moments at seams, two for each; what plays; which jump, and had to."""
+    def plays_of(self, rows: Rows, decisions: Sequence[Decision], grounds: Grounds | None) -> Floats:
+        """What poses are made of, by decisions from anywhere: float64 [N, 18]. Raises MotionError where no bank has what plays."""
         plays: list[float] = []
-        all_playing = [decision.playing for decision in decisions]
-        for decision, displayed, ground in zip(decisions, rows.playing, _gives(grounds, len(rows)), strict=True):
+        each = zip(decisions, rows.displayed.tolist(), _gives(grounds, len(rows)).tolist(), strict=True)
+        for decision, displayed, ground in each:
             motion, playing, before = decision.root_motion, decision.playing, decision.before
-            now = self.moment_of(playing)
             plays += (
-                *now, *(now if before is playing else self.moment_of(before)), *self.moment_of(displayed),
+                *self.moment_of(playing), *self.moment_of(before), *displayed,
                 NUMBERS[decision.action], decision.play_rate,
                 motion.left_m, motion.ahead_m, motion.turn_rad, decision.root_weight, ground,
-                *_said(decision.play),
+                *_numbers_of(decision.play),
             )  # fmt: skip
-        n = len(rows)
-        given, moments = np.empty((n, N_GIVEN)), np.empty((2 * n, 4))
-        n_seams = self._flat.receive(rows.numbers, np.array(plays, np.float64).reshape(n, -1), dt, given, moments)
-        jumps = [
-            seam >= 0.0 and (decision.action is Action.JUMP or (decision.action is not Action.START and is_ahead != 0.0))
-            for decision, (is_ahead, seam) in zip(decisions, given[:, IS_AHEAD:LOST].tolist(), strict=True)
-        ]
-        forced = [jump and decision.continuing_cost is None for jump, decision in zip(jumps, decisions, strict=True)]
-        return given, moments[:n_seams], all_playing, jumps, forced
+        return np.array(plays, np.float64).reshape(len(rows), N_PLAY)
+
+    def plays_in(self, rows: Rows, updates: Updates, decisions: Sequence[Decision], grounds: Grounds | None) -> Floats:
+        """The same of the decisions of some updates, which the core has already."""
+        places = self._places.get(updates.chooser)
+        if places is None:
+            if len(self._places) >= MOST_CHOOSERS:
+                self._places.clear()
+            places = self._places[updates.chooser] = self._places_of(updates.chooser)
+        plays = np.empty((len(rows), N_PLAY))
+        is_whole = fill_plays(updates.decisions, *places, rows.displayed, _gives(grounds, len(rows)), plays)
+        return plays if is_whole else self.plays_of(rows, decisions, grounds)
+
+    def _places_of(self, chooser: Chooser) -> tuple[Ints, Ints, Ints]:
+        """Where the ranges of each database begin, the bank of each, and the range there of each of their ranges; -1 for none."""
+        starts, banks, ranges = [0], list[int](), list[int]()
+        for name, database in zip(chooser.names, chooser.databases, strict=True):
+            number = 0 if self.only is not None else self._numbers.get(name, -1)
+            banks.append(number)
+            if database is not None:
+                bank, each = self.all[number], zip(database.assets, database.mirrored.tolist(), strict=True)
+                ranges += [bank.number_of(asset, mirrored) for asset, mirrored in each]
+            starts.append(len(ranges))
+        return np.array(starts, np.int64), np.array(banks, np.int64), np.array(ranges, np.int64)
 
     def moment_of(self, playing: Playing | None) -> Moment:
         """What plays as the core has it: its bank, range and second."""
         return NO_MOMENT if playing is None else (*self.find(playing), playing.time_s)
 
 
-def _said(play: RowPlay | None) -> tuple[float, float]:
+def _numbers_of(play: RowPlay | None) -> tuple[float, float]:
     """How long the row of what plays is blended, and what moves the root, as the core has it; NaN where it does not say."""
     if play is None:
         return math.nan, math.nan
     return math.nan if play.blend_s is None else play.blend_s, math.nan if play.root is None else float(ROOTS.index(play.root))
 
 
-def _gives(grounds: Grounds | None, n: int) -> Sequence[bool]:
+def _gives(grounds: Grounds | None, n: int) -> Flags:
+    """Who stands on a ground."""
     if isinstance(grounds, Sequence):
-        return [each is not None for each in grounds]
-    return [grounds is not None] * n
+        return np.array([each is not None for each in grounds], np.bool_)
+    return np.full(n, grounds is not None)
 
 
 def _poses(banks: Sequence[PoseBank], settings: PoseSettings, *, feels_ground: bool) -> Poses:

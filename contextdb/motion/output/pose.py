@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from contextdb.cells.sequences import Made
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.output.samples import Flags, Place3
 from contextdb.motion.records import quickly_made
-from contextdb.motion.selection.decision import Playing
+from contextdb.motion.selection.decision import Action, Decision, Playing
+
+IS_AHEAD, LOST = 10, 12
+"""Where a `cdbo_given` of the core's pose.h has whether what is entered has moved the body already, and the seam."""
 
 
 @quickly_made
@@ -54,8 +58,10 @@ class CrowdPoses(Made[Pose]):
 
     Attributes
     ----------
-    playing : list of N Playing or None
-    is_jump, is_forced : list of N bool
+    decisions : sequence of N Decision
+        What they are poses of.
+    given : float64 array
+        What happened to each, as the core has it; see `cdbo_given` in pose.h.
     roots : float64 array, shape (N, 3)
         x, z and heading of each.
     rotations : float64 array, shape (N, J, 4)
@@ -64,9 +70,8 @@ class CrowdPoses(Made[Pose]):
     play_rates : float64 array, shape (N,)
     """
 
-    playing: list[Playing | None]
-    is_jump: list[bool]
-    is_forced: list[bool]
+    decisions: Sequence[Decision]
+    given: Floats
     roots: Floats
     rotations: Floats
     translations: Floats
@@ -75,9 +80,13 @@ class CrowdPoses(Made[Pose]):
     play_rates: Floats
 
     def __len__(self) -> int:
-        return len(self.playing)
+        return len(self.decisions)
 
     def _at(self, i: int) -> Pose:
-        x, z, heading = self.roots[i].tolist()
+        decision, (x, z, heading) = self.decisions[i], self.roots[i].tolist()
+        is_ahead, seam = self.given[i, IS_AHEAD:LOST].tolist()
+        action = decision.action
+        is_jump = seam >= 0.0 and (action is Action.JUMP or (action is not Action.START and is_ahead != 0.0))
+        is_forced = is_jump and decision.continuing_cost is None
         arrays = self.rotations[i], self.translations[i], self.positions[i], self.contacts[i]
-        return Pose(self.playing[i], self.is_jump[i], self.is_forced[i], (x, z, heading), *arrays, float(self.play_rates[i]))
+        return Pose(decision.playing, is_jump, is_forced, (x, z, heading), *arrays, float(self.play_rates[i]))

@@ -21,7 +21,9 @@ from contextdb.motion.output.bank import PoseBank
 from contextdb.motion.output.ground import A_GROUND, Ground
 from contextdb.motion.output.pipeline import COLUMNS, Pipeline, Rows
 from contextdb.motion.output.pose import CrowdPoses, Pose
+from contextdb.motion.output.samples import Flags
 from contextdb.motion.output.settings import PoseSettings, RootMode
+from contextdb.motion.selection.controller import Decided
 from contextdb.motion.selection.decision import Decision, Playing, plays
 
 __all__ = ["Pose", "PoseState", "PoseStream"]
@@ -110,24 +112,26 @@ class PoseStream:
     def state(self) -> PoseState:
         """Where the stream is, to come back to with `restore`."""
         if self._state is None:
-            row, playing = self._rows.numbers[self._at].copy(), self._rows.playing[self._at]
+            row, playing = self._rows.numbers[self._at].copy(), self._rows.playing(self._at)
             self._state = PoseState(self.settings, self.rig.n_joints, playing, row)
         return self._state
 
     def restore(self, state: PoseState) -> None:
         """Go on from a state of this stream, or of another one with the same banks and settings.
 
-        Raises ContextError for what is no state, or one of another rig or other settings.
+        Raises ContextError for what is no state, or one of another rig or other settings; MotionError where no bank has what it
+        displayed.
         """
         require_kind(state, PoseState, "state", "a PoseState, what `state` gives")
         if state.settings != self.settings or state.n_joints != self.rig.n_joints or len(state.row) != self._pipeline.width:
             raise ContextError(OTHER_STATE)
-        self._rows, self._at, self._state = Rows(state.row[None], [state.playing]), 0, state
+        self._rows, self._at, self._state = self._pipeline.rows_at(state.row, state.playing), 0, state
 
     @property
-    def displayed(self) -> tuple[int, int, float]:
+    def displayed(self) -> Floats:
         """What was displayed last, as the core has it: the number of a bank, -1 for none, its range and second."""
-        return self._pipeline.moment_of(self._rows.playing[self._at])
+        displayed: Floats = self._rows.displayed[self._at]
+        return displayed
 
     @property
     def width(self) -> int:
@@ -141,7 +145,7 @@ class PoseStream:
             playing = self._pipeline.playing_at(displayed.tolist())
             if playing is None:
                 return False
-        self._rows, self._at, self._state = Rows(row[None], [playing]), 0, None
+        self._rows, self._at, self._state = Rows(row[None], displayed[None], [playing]), 0, None
         return True
 
     @property
@@ -185,14 +189,22 @@ class PoseStream:
         if ground is not None and not callable(ground):
             raise ContextError(Fault(f"ground is {ground!r}.", A_GROUND))
         place = checked_place(body, root_of(decision, self.settings))
-        return self.posed(decision, dt, None if place is None else np.array([place]), ground)[0]
-
-    def posed(self, decision: Decision, dt: float, places: Floats | None, ground: Ground | None) -> CrowdPoses:
-        """The same unchecked, of one, with the place of its body [1, 3], whose `Pose` is made when it is requested."""
         grounds = None if ground is None else [ground]
-        rows, poses = self._pipeline.update(self._rows.row(self._at), [decision], dt, places, grounds)
+        rows, own = self._rows.row(self._at), self._pipeline
+        places, plays = None if place is None else np.array([place]), own.plays_of(rows, [decision], grounds)
+        rows, poses = own.update(rows, [decision], plays, dt, places, grounds)
         self._go_on(rows, 0)
-        return poses
+        return poses[0]
+
+    def posed(self, decided: Decided, dt: float, places: Floats, ground: Ground | None) -> tuple[CrowdPoses, Flags]:
+        """The same unchecked, of one, with the place of its body [1, 3], whose `Pose` is made when it is requested; and whether the
+        clip alone moves the body [1]."""
+        grounds, (((_, updates),), decisions) = None if ground is None else [ground], (decided.updates, decided.decisions)
+        rows, own = self._rows.row(self._at), self._pipeline
+        plays = own.plays_in(rows, updates, decisions, grounds)
+        rows, poses = own.update(rows, decisions, plays, dt, places, grounds)
+        self._go_on(rows, 0)
+        return poses, own.moves_body(plays)
 
 
 def root_of(decision: Decision, settings: PoseSettings) -> RootMode:

@@ -19,7 +19,9 @@ from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.output.ground import MANY_GROUND, Ground, Grounds, ManyGround
 from contextdb.motion.output.pipeline import Rows
 from contextdb.motion.output.pose import CrowdPoses
+from contextdb.motion.output.samples import Flags
 from contextdb.motion.output.stream import PoseState, PoseStream, checked_place, root_of
+from contextdb.motion.selection.chooser import Updates
 from contextdb.motion.selection.decision import Decision
 
 UNKNOWN = (math.nan, math.nan, math.nan)
@@ -99,16 +101,20 @@ class PoseStreams(ListSequence[PoseStream]):
         dt = require_real(dt, "dt", 0.0)
         if len(decided) != len(self):
             raise ContextError(Fault(f"{plural(len(decided), 'decision')} for {plural(len(self), 'character')}.", "one for each"))
-        poses, rows = self.updated(decided, dt, self._places(bodies, decided), self._grounds(ground))
+        places, grounds, rows = self._places(bodies, decided), self._grounds(ground), self._rows()
+        rows, poses = self._pipeline.update(rows, decided, self._pipeline.plays_of(rows, decided, grounds), dt, places, grounds)
         self.go_on(rows)
         return poses
 
     def updated(
-        self, decisions: Sequence[Decision], dt: float, places: Floats | None, grounds: Grounds | None = None
-    ) -> tuple[CrowdPoses, Rows]:
-        """The same unchecked, with the places [N, 3] of bodies, NaN for none; the streams stand where they stood until `go_on`."""
-        rows, poses = self._pipeline.update(self._rows(), decisions, dt, places, grounds)
-        return poses, rows
+        self, updates: Updates, decisions: list[Decision], dt: float, places: Floats, grounds: Grounds | None
+    ) -> tuple[CrowdPoses, Rows, Flags]:
+        """The poses after the decisions of some updates, unchecked; the streams stand where they stood until `go_on` is given the
+        rows. And whether the clip alone moves the body of each."""
+        rows, own = self._rows(), self._pipeline
+        plays = own.plays_in(rows, updates, decisions, grounds)
+        after, poses = own.update(rows, decisions, plays, dt, places, grounds)
+        return poses, after, own.moves_body(plays)
 
     def go_on(self, rows: Rows) -> None:
         """Go on from some rows, one for each."""
@@ -121,7 +127,8 @@ class PoseStreams(ListSequence[PoseStream]):
         first = each[0][0]
         if len(first) == len(each) and all(rows is first and at == i for i, (rows, at) in enumerate(each)):
             return first
-        return Rows(np.array([rows.numbers[at] for rows, at in each]), [rows.playing[at] for rows, at in each])
+        numbers, displayed = (np.array([getattr(rows, name)[at] for rows, at in each]) for name in ("numbers", "displayed"))
+        return Rows(numbers, displayed, [rows.last[at] for rows, at in each])
 
     def _places(self, bodies: OfBodies | None, decisions: Sequence[Decision]) -> Floats | None:
         """Where all bodies are, [N, 3]; None where none is given."""

@@ -78,39 +78,25 @@ class Spread:
 
 @dataclass(frozen=True, slots=True)
 class ClipFacts:
-    """What a clip shows.
-
-    Attributes
-    ----------
-    asset : str
-    gaits : tuple of str
-        Of "Idle", "Walk" and "Run" those in which it is of use: one, and "Idle" too of a clip that comes to a stand.
-    style : str
-        From the clip's name; "normal" where it says none.
-    speed_mps : Spread
-    direction_deg : Spread or None
-        Of movement, against the facing; None where the body does not move. Unwrapped: `high` may be above 180.
-    turn_dps : Spread
-    duration_s : float
-    start, end : str
-        "Idle", or the gait and which foot is down: "Walk.Left", "Walk.Right", "Walk.Both", "Run.None".
-    step_s : float
-        How long a step with each foot takes.
-    on_the_spot_mps : float
-        How fast the body of a clip that runs on the spot would go, by its standing feet, though its hips show "Idle"; else 0.
-    """
+    """What a clip shows."""
 
     asset: str
     gaits: tuple[str, ...]
+    """Of "Idle", "Walk" and "Run" those in which it is of use: one, and "Idle" too of a clip that comes to a stand."""
     style: str
+    """From the clip's name; "normal" where it says none."""
     speed_mps: Spread
     direction_deg: Spread | None
+    """Of movement, against the facing; None where the body does not move. Unwrapped: `high` may be above 180."""
     turn_dps: Spread
     duration_s: float
     start: str
     end: str
+    """`start`, `end`: "Idle", or the gait and which foot is down: "Walk.Left", "Walk.Right", "Walk.Both", "Run.None"."""
     step_s: float
+    """How long a step with each foot takes."""
     on_the_spot_mps: float = 0.0
+    """How fast the body of a clip that runs on the spot would go, by its standing feet, though its hips show "Idle"; else 0."""
 
     @property
     def gait(self) -> str:

@@ -17,11 +17,11 @@ from contextdb.cells.arguments import require_callable, require_kind, require_ma
 from contextdb.disk import MOST_PATTERNS
 from contextdb.errors import ContextError, Fault, MotionError, in_quotes
 from contextdb.motion.clips.clip import BY_SIZE, Clip
+from contextdb.motion.clips.foot_bones import Rig
 from contextdb.motion.clips.mirror import partners_of
-from contextdb.motion.clips.rig import Rig
 from contextdb.motion.preparing.cells_of_clips import CONDITIONS, OUTPUTS, cells_of
 from contextdb.motion.preparing.clip_facts import GAITS, NORMAL, ClipFacts, common_words, facts_of, style_of
-from contextdb.motion.preparing.meeting import Meeting, meetings
+from contextdb.motion.preparing.look import Meeting, meetings
 
 RATE = 30.0
 MOST_TURN_DPS = 1080.0
@@ -33,20 +33,13 @@ Tell = Callable[[int, int, str], None]
 
 @dataclass(frozen=True, slots=True)
 class Described:
-    """A clip as a row of a table.
-
-    Attributes
-    ----------
-    asset : str
-    cells : mapping of str to str
-        Of the columns `gait`, `speed`, `direction`, `turn`, `style`, and the outputs `duration_s`, `start` and `end`.
-    facts : ClipFacts
-        What was measured; of joint clips on the actor of the first role.
-    """
+    """A clip as a row of a table."""
 
     asset: str
     cells: Mapping[str, str]
+    """Of the columns `gait`, `speed`, `direction`, `turn`, `style`, and the outputs `duration_s`, `start` and `end`."""
     facts: ClipFacts
+    """What was measured; of joint clips on the actor of the first role."""
 
     def to_json(self) -> dict[str, Any]:
         return {"asset": self.asset, "cells": dict(self.cells), "facts": self.facts.to_json()}

@@ -29,31 +29,20 @@ PREPARING = 2
 
 @dataclass(frozen=True, slots=True)
 class Proposal:
-    """A mark that is proposed; or a cut of the clip's file or a path of its own for its root, which are no marks.
-
-    Attributes
-    ----------
-    asset : str
-    kind : str
-        One of `KINDS`.
-    tag : str or None
-        None for a cut and for a root.
-    from_s, to_s : float or None
-        Seconds since the clip's start; None is its start or its end.
-    value : float or None
-    reason : str
-    measure : float
-        The number that the reason is about.
-    """
+    """A mark that is proposed; or a cut of the clip's file or a path of its own for its root, which are no marks."""
 
     asset: str
     kind: Kind
+    """One of `KINDS`."""
     tag: str | None
+    """None for a cut and for a root."""
     from_s: float | None
     to_s: float | None
+    """`from_s`, `to_s`: seconds since the clip's start; None is its start or its end."""
     value: float | None
     reason: str
     measure: float
+    """The number that the reason is about."""
 
     def to_json(self) -> dict[str, Any]:
         return asdict(self)

@@ -49,16 +49,13 @@ from contextdb.motion.markup.marks import Marks
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.ranges import check_ranges
 from contextdb.motion.search import candidates, cost
-from contextdb.motion.search.candidates import Candidates
+from contextdb.motion.search.candidates import Candidates, Searched
 from contextdb.motion.search.cost import weights_of_features
 from contextdb.motion.search.filtering import FilterMaker, Penalties, SearchOptions, Tags
-from contextdb.motion.search.filters import NO_BIAS, Biases, Filter
+from contextdb.motion.search.filters import NO_BIAS, Biases, Filter, ManyFilters, together
 from contextdb.motion.search.hit import NOTHING, Hit
-from contextdb.motion.search.inputs import as_features, check_finite, check_permutations, parts_of
 from contextdb.motion.search.layout import Layout
-from contextdb.motion.search.many_filters import ManyFilters, together
-from contextdb.motion.search.searched import Searched
-from contextdb.motion.search.searcher import Searcher
+from contextdb.motion.search.searcher import Searcher, as_features, check_finite, check_permutations, parts_of
 
 
 @dataclass(frozen=True, eq=False, repr=False)

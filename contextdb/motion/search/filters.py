@@ -7,10 +7,13 @@ off one `Filter`, so that they cannot disagree.
 
 A range's bias is the database's base and looping bias and what the table's soft cells cost; a kind's is what the markup says and
 what the tag filter prefers; a frame's own is what the caller gives.
+
+Q searches, N frames, R ranges, S skips.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -27,77 +30,52 @@ NO_FLAGS: Flags = np.empty(0, np.bool_)
 
 @dataclass(frozen=True, slots=True)
 class Biases:
-    """What is added to the cost of frames, whatever the query; negative favours them.
-
-    Attributes
-    ----------
-    base : float
-        For every frame of the database.
-    looping : float
-        For frames of looping ranges.
-    continuing : float
-        For the frame that would play on, so that a character does not jump for a trifle.
-    """
+    """What is added to the cost of frames, whatever the query; negative favours them."""
 
     base: float = 0.0
+    """For every frame of the database."""
     looping: float = 0.0
+    """For frames of looping ranges."""
     continuing: float = 0.0
+    """For the frame that would play on, so that a character does not jump for a trifle."""
 
 
 NO_BIAS = Biases()
 
 
 class Kinds(NamedTuple):
-    """What a tag filter says of frames of each kind.
-
-    Attributes
-    ----------
-    allowed : bool array, shape (K,)
-        Whether they may be chosen.
-    biases : float64 array, shape (K,)
-    playable : bool array, shape (K,)
-        Whether they may play on.
-    left_out : uint8 array, shape (K,)
-        Why they may not be chosen, as `LeftOut`.
-    """
+    """What a tag filter says of frames of each kind."""
 
     allowed: Flags
+    """Whether they may be chosen: bool [K]."""
     biases: Floats
+    """Float64 [K]."""
     playable: Flags
+    """Whether they may play on: bool [K]."""
     left_out: NDArray[np.uint8]
+    """Why they may not be chosen, as `LeftOut`: uint8 [K]."""
 
 
 class Filter(NamedTuple):
-    """One search's masks and biases.
-
-    Attributes
-    ----------
-    ranges : bool array, shape (R,)
-        The ranges whose asset is valid.
-    is_whole : bool
-        Whether that is all of them.
-    range_biases : float64 array, shape (R,)
-    kinds : Kinds
-    frames : bool array, shape (N,) or (0,)
-        The frames that the caller lets pass; empty: all.
-    frame_biases : float64 array, shape (N,) or (0,)
-    skips : tuple of Skip
-    current : int
-        The frame that would play on; -1 for none. It may be chosen whatever tags and skips say, if its asset is valid, it is not
-        excluded, and it is among `frames`.
-    continuing : float
-        What is added to its cost alone.
-    """
+    """One search's masks and biases."""
 
     ranges: Flags
+    """The ranges whose asset is valid: bool [R]."""
     is_whole: bool
+    """Whether that is all of them."""
     range_biases: Floats
+    """Float64 [R]."""
     kinds: Kinds
     frames: Flags
+    """The frames that the caller lets pass; empty: all. Bool [N] or [0]."""
     frame_biases: Floats
+    """Float64 [N] or [0]."""
     skips: tuple[Skip, ...]
     current: int
+    """The frame that would play on; -1 for none. It may be chosen whatever tags and skips say, if its asset is valid, it is not
+    excluded, and it is among `frames`."""
     continuing: float
+    """What is added to its cost alone."""
 
     @property
     def skip_spans(self) -> Ints | None:
@@ -146,3 +124,49 @@ class Filter(NamedTuple):
         if playing >= 0:
             added[playing] += self.continuing
         return np.asarray(added)
+
+
+# ---- what many searches may choose from: what each has of its own in arrays, and what they share once
+
+
+class ManyFilters(NamedTuple):
+    """The filters of many searches."""
+
+    shared: Filter
+    """Its kinds, frames, biases of frames and continuing bias are those of all."""
+    ranges: Flags
+    """One for all, or one for each: bool [1, R] or [Q, R]."""
+    range_biases: Floats
+    """Float64 [1, R] or [Q, R]."""
+    currents: Ints
+    """Int64 [Q]."""
+    skips: tuple[tuple[Skip, ...], ...] = ()
+
+    @classmethod
+    def of(cls, filters: Sequence[Filter]) -> ManyFilters:
+        """At least one filter; all share what `together` compares."""
+        are_equal = all(each.range_biases is filters[0].range_biases for each in filters)
+        return cls(
+            filters[0],
+            np.array([each.ranges for each in filters]),
+            np.array([each.range_biases for each in (filters[:1] if are_equal else filters)]),
+            np.array([each.current for each in filters], np.int64),
+            tuple(each.skips for each in filters) if any(each.skips for each in filters) else (),
+        )
+
+    @property
+    def skip_spans(self) -> tuple[Ints, Ints] | tuple[None, None]:
+        """All skips as spans, int64 [S, 2], and where those of each search begin and end among them, int64 [Q + 1]; None where
+        nobody skips anything."""
+        if not self.skips:
+            return None, None
+        spans = [(skip.start, skip.stop) for skips in self.skips for skip in skips]
+        return np.array(spans, np.int64).reshape(-1, 2), np.cumsum([0, *map(len, self.skips)])
+
+
+def together(filters: Sequence[Filter]) -> Iterable[list[int]]:
+    """The numbers of filters that differ in their ranges, current frames and skips alone, so that they can be searched at once."""
+    groups: dict[tuple[int, ...], list[int]] = {}
+    for i, each in enumerate(filters):
+        groups.setdefault((id(each.kinds), id(each.frames), id(each.frame_biases)), []).append(i)
+    return groups.values()

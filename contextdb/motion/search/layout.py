@@ -33,31 +33,21 @@ N_FRAMES, N_BOXES = 32, 2048
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """The features of a database in boxes.
-
-    Attributes
-    ----------
-    n_frames : int
-        N; frames between ranges are counted, but not kept.
-    blocks : float32 array, shape (B, F, L)
-        The features of each box's frames.
-    order : int64 array, shape (F,)
-        Which feature is at each place.
-    box_starts : int64 array, shape (B,)
-        The first frame of each box, ascending.
-    box_sizes, box_ranges : int32 array, shape (B,)
-        How many frames it has, and of which range they are.
-    range_boxes : int64 array, shape (R, 2)
-        The boxes of each range: from the first up to, not including, the second.
-    """
+    """The features of a database in boxes."""
 
     n_frames: int
+    """N; frames between ranges are counted, but not kept."""
     blocks: Features
+    """The features of each box's frames: float32 [B, F, L]."""
     order: Ints
+    """Which feature is at each place: int64 [F]."""
     box_starts: Ints
+    """The first frame of each box, ascending: int64 [B]."""
     box_sizes: NDArray[np.int32]
     box_ranges: NDArray[np.int32]
+    """`box_sizes`, `box_ranges`: how many frames it has, and of which range they are: int32 [B]."""
     range_boxes: Ints
+    """The boxes of each range: from the first up to, not including, the second. Int64 [R, 2]."""
 
     @classmethod
     def of(cls, features: Features, starts: Ints, stops: Ints, feature_weights: Floats) -> Layout:

@@ -33,7 +33,7 @@ from contextdb.motion.selection.choice import Choice
 from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.controller_state import ControllerState, Played
 from contextdb.motion.selection.decision import Playing
-from contextdb.motion.selection.events import Event, checked, leads, seconds_to
+from contextdb.motion.selection.events import Event, astray, checked, leads, seconds_to
 from contextdb.motion.selection.search_options import Among, OfPenalties, OfTags, OfValidForMany, SearchOptions
 from contextdb.motion.selection.selector import Selector, choice_of
 
@@ -60,12 +60,6 @@ class Shared(NamedTuple):
     flags: Flags | None
     frame_biases: Floats | None
     filters: dict[str, Filter]
-
-    def among_frames(self, frames: Flags, frames_at: Sequence[slice], names: Sequence[str]) -> Shared:
-        """The same of some frames alone, bool [N]."""
-        flags = frames if self.flags is None else self.flags & frames
-        own = {name: flags[at] for name, at in zip(names, frames_at, strict=True) if name in self.filters}
-        return self._replace(flags=flags, filters={name: each._replace(frames=own[name]) for name, each in self.filters.items()})
 
     @classmethod
     def of(cls, chooser: Chooser, inputs: SearchOptions) -> Shared:
@@ -138,6 +132,7 @@ class Given(NamedTuple):
     plays: Plays | None = None
     to_event: Floats | None = None
     event_s: float = 1.0
+    leading: Flags | None = None
 
 
 class Updates(NamedTuple):
@@ -185,6 +180,10 @@ class Updates(NamedTuple):
         if current >= 0 and decision[STANDING] == WIDENED and given.wide is not None:
             ranges[int(moved[1])], biases[int(moved[1])] = True, given.wide[i]
         skips = tuple(self._skips(i, d))
+        if given.leading is not None:
+            leading = given.leading[chooser.frames_at[d]]
+            current = current if current >= 0 and leading[current] else -1
+            skips += tuple(astray(leading))
         chosen = given.shared.filters[chooser.names[d]]
         return chosen._replace(ranges=ranges, is_whole=bool(ranges.all()), range_biases=biases, skips=skips, current=current)
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -51,7 +51,7 @@ from contextdb.motion.selection.chooser import (
 )
 from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.controller_state import ControllerState
-from contextdb.motion.selection.decided import Told, decision_of
+from contextdb.motion.selection.decided import Asker, Question, decision_of
 from contextdb.motion.selection.decision import Action, Decision, Playing, Recorder, Watcher, plays
 from contextdb.motion.selection.events import Event
 from contextdb.motion.selection.search_options import Among, OfPenalties, OfTags, OfValid, OfValidForMany, SearchOptions
@@ -77,12 +77,40 @@ class Asked:
     interrupt: Sequence[bool]
     event: Sequence[Event | None]
 
+    @classmethod
+    def of_one(
+        cls,
+        valid: OfValid | None = None,
+        tags: OfTags | None = None,
+        bias: Mapping[str, ArrayLike] | None = None,
+        penalties: OfPenalties | None = None,
+        among: Among | None = None,
+        force: bool = False,
+        interrupt: bool = False,
+        event: Event | None = None,
+    ) -> Asked:
+        """What one is asked with."""
+        return cls(valid, [tags], [bias], [among], [penalties], [force], [interrupt], [event])
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether nothing but `valid` is given."""
+        given = self.tags, self.bias, self.among, self.penalties, self.event
+        return not (any(self.force) or any(self.interrupt) or any(one is not None for each in given for one in each))
+
     def options(self, i: int) -> SearchOptions:
         """Those of one, checked."""
         return SearchOptions(None, self.tags[i], None, self.bias[i], self.among[i], None, self.penalties[i])
 
 
-DEFAULT_SETTINGS = ControllerSettings()
+class Decided(NamedTuple):
+    """The decisions of some controllers; and the updates that they are of, each with the numbers of its controllers."""
+
+    decisions: list[Decision]
+    updates: list[tuple[list[int], Updates]]
+
+
+DEFAULT_SETTINGS, NOTHING_MORE = ControllerSettings(), SearchOptions()
 
 
 class Controller:
@@ -127,7 +155,6 @@ class Controller:
         """The link that watches the controller."""
         self._playing: Playing | None = None
         self._is_decoded = False
-        self._moved: tuple[Floats, int, float, Floats] | None = None
         self._stand(Chooser.of(selector, settings), ControllerState())
 
     @property
@@ -152,7 +179,6 @@ class Controller:
     def upcoming_features(self, dt_s: float) -> Floats | None:
         """The features of that frame, in the schema's units: float64 [F]; None where nothing plays. For a time that is checked."""
         moved, poses = self.chooser.move(self._row, dt_s, poses=True)
-        self._moved = self._rows, self._at, dt_s, moved
         return None if poses is None or moved[0, 0] < 0.0 else poses[0]
 
     @property
@@ -164,7 +190,7 @@ class Controller:
 
     def _stand(self, chooser: Chooser, state: ControllerState) -> None:
         """Stand where a state says."""
-        self._chooser, self._settings, self._moved = chooser, self.settings, None
+        self._chooser, self._settings = chooser, self.settings
         self._rows, self._at = chooser.encode(state), 0
         self._playing, self._recent, self._is_decoded = state.playing, state.recent, False
 
@@ -194,7 +220,7 @@ class Controller:
         recent = variation.unpacked(varied, self._rng)
         if recent is None:
             return False
-        self._rows, self._at, self._moved = row, 0, None
+        self._rows, self._at = row, 0
         self._playing, self._recent, self._is_decoded = None, recent, False
         return True
 
@@ -285,8 +311,8 @@ class Controller:
             `body` is none.
         """
         wanted = self._checked(query)
-        asked = Asked(valid, [tags], [bias], [among], [penalties], [force], [interrupt], [event])
-        return update_all([self], seconds_of(dt_s), wanted[None], asked, [context], [place_of(body)])[0]
+        asked = Asked.of_one(valid, tags, bias, penalties, among, force, interrupt, event)
+        return update_all([self], seconds_of(dt_s), wanted[None], asked, [context], [place_of(body)]).decisions[0]
 
     def _checked(self, query: ArrayLike) -> Floats:
         """The query as float64 [F], checked as long as any database is there to say how long it must be."""
@@ -308,10 +334,16 @@ class Controller:
         n_recorded = 0 if self.recorder is None else self.recorder.n_candidates
         return n_recorded if self._watcher is None else max(n_recorded, self._watcher.n_candidates)
 
+    def asker(self, asked: Asked, i: int) -> Asker:
+        """Itself as the one of a number who is asked."""
+        if self.recorder is None and self._watcher is None and self._clock is None:
+            return Asker(i, self._playing)
+        n_candidates = self._n_candidates
+        return Asker(i, self._playing, n_candidates, asked.options(i) if n_candidates > 0 else None, self._clock is not None)
+
     def take(self, updates: Updates, at: int, decision: Decision) -> None:
         """Go on from one of some updates, and hand its decision over."""
-        self._rows, self._at = updates.after, at
-        self._playing, self._is_decoded = decision.playing, True
+        self._rows, self._at, self._is_decoded = updates.after, at, False
         if self.settings.variation is not None and decision.action in (Action.START, Action.JUMP):
             self._recent = self.settings.variation.remember(self._recent, str(decision.playing and decision.playing.asset))
         if self.recorder is not None:
@@ -333,26 +365,27 @@ def update_all(
     queries: Floats,
     asked: Asked,
     contexts: Sequence[Mapping[str, object] | None],
-    bodies: Sequence[GroundPlace | None],
-) -> list[Decision]:
-    """The decision of each of some controllers, with checked queries [Q, F]. If it raises, all stand where they stood."""
+    bodies: Sequence[GroundPlace | None] | Floats,
+    moved: Floats | None = None,
+) -> Decided:
+    """What is decided for each of some controllers, with checked queries [Q, F], and what has `moved` [Q, 16] where that is known.
+    If it raises, all stand where they stood."""
     decisions: list[Any] = [None] * len(controllers)
     made = []
     for numbers in _together(controllers, asked):
-        own = [controllers[i] for i in numbers]
-        updates = prepared(own, dt_s, queries if len(own) == len(controllers) else queries[numbers], asked, numbers)
+        is_all = len(numbers) == len(controllers)
+        own = controllers if is_all else [controllers[i] for i in numbers]
+        parts = (queries, moved) if is_all else (queries[numbers], None if moved is None else moved[numbers])
+        updates = prepared(own, dt_s, parts[0], asked, numbers, parts[1])
         search_us = _run(updates, own)
         made.append((numbers, updates))
+        question = Question(queries, contexts, bodies, asked.force, asked.interrupt, asked.event, search_us)
         for k, i in enumerate(numbers):
-            one = own[k]
-            options = asked.options(i) if one._n_candidates > 0 else None
-            how = (contexts[i], bodies[i], search_us if one._clock else None, one._n_candidates, options)
-            told = Told(queries[i], *how, bool(asked.force[i]), bool(asked.interrupt[i]))
-            decisions[i] = decision_of(updates, k, one.playing, told)
+            decisions[i] = decision_of(updates, k, question, own[k].asker(asked, i))
     for numbers, updates in made:
         for k, i in enumerate(numbers):
             controllers[i].take(updates, k, decisions[i])
-    return decisions
+    return Decided(decisions, made)
 
 
 def _together(controllers: Sequence[Controller], asked: Asked) -> list[list[int]]:
@@ -367,35 +400,47 @@ def _together(controllers: Sequence[Controller], asked: Asked) -> list[list[int]
     return list(groups.values())
 
 
-def prepared(own: Sequence[Controller], dt_s: float, queries: Floats, asked: Asked, numbers: Sequence[int]) -> Updates:
-    """The updates of controllers that go together, whose numbers among all are these, before their first step."""
-    chooser, n, first = own[0].chooser, len(own), asked.options(numbers[0])
-    rows = rows_of(own)
-    moved = _moved_of(own, rows, dt_s)
-    is_all = len(numbers) == len(asked.tags)
-    valid: Any = asked.valid if is_all or asked.valid is None else [own_valid(asked.valid, i) for i in numbers]
-    chooser.check_names(first, valid)
-    ranges, biases, plays = chooser.ranges(valid, n)
-    penalties = [asked.penalties[i] for i in numbers]
-    if any(each is not None for each in penalties):
-        biases = chooser.penalised(biases, [asked.options(i).penalties for i in numbers])
-    among = [asked.among[i] for i in numbers]
-    is_one = all(each is None for each in among)
-    flags = chooser.among(None) if is_one else np.concatenate([chooser.among(each) for each in among])
-    urgent = np.zeros(n, np.uint8)
-    if any(asked.force) or any(asked.interrupt):
-        urgent[:] = [FORCE * bool(asked.force[i]) + INTERRUPT * bool(asked.interrupt[i]) for i in numbers]
-    wide = _wide(chooser, moved, ranges, valid, penalties) if widens(valid) else None
-    wanted, shared, event = np.ascontiguousarray(queries[:, : chooser.n_features]), chooser.shared(first.tags, first.bias), None
-    if (asked_event := asked.event[numbers[0]]) is not None:
-        event = chooser.to_event(asked_event), asked_event[1]
-        leading = chooser.leading(asked_event, plays)
-        shared = shared.among_frames(leading, chooser.frames_at, chooser.names)
-        d, _, frame = moved[0, :3].astype(np.int64).tolist()
-        urgent[0] |= FORCE * (d >= 0 and not leading[chooser.frames_at[d].start + frame])
-    given = Given(wanted, dt_s, ranges, biases, shared, flags, urgent, wide, plays, *(event or ()))
+def prepared(
+    own: Sequence[Controller], dt_s: float, queries: Floats, asked: Asked, numbers: Sequence[int], moved: Floats | None = None
+) -> Updates:
+    """The updates of controllers that go together, whose numbers among all are these, before their first step; with what has
+    `moved` where that is known."""
+    chooser, n, rows, is_plain = own[0].chooser, len(own), rows_of(own), asked.is_plain
+    if moved is None:
+        moved = chooser.move(rows, dt_s)[0]
+    valid: Any = asked.valid
+    if valid is not None and n < len(asked.tags):
+        valid = [own_valid(valid, i) for i in numbers]
+    chooser.check_names(NOTHING_MORE if is_plain else asked.options(numbers[0]), valid)
+    flags, biases, plays = chooser.ranges(valid, n)
+    wide = _wide(chooser, moved, flags, valid, asked, numbers) if widens(valid) else None
+    wanted = np.ascontiguousarray(queries[:, : chooser.n_features])
+    shared, among, urgent = chooser.shared(None, None), chooser.among(None), np.zeros(n, np.uint8)
+    given = Given(wanted, dt_s, flags, biases, shared, among, urgent, wide, plays)
+    if not is_plain:
+        given = _with_more(given, chooser, moved, asked, numbers)
     found = np.empty((n, len(chooser.names), 3))
     return Updates(chooser, rows, moved, given, np.empty_like(rows), np.empty((n, N_DECISION)), found)
+
+
+def _with_more(given: Given, chooser: Chooser, moved: Floats, asked: Asked, numbers: Sequence[int]) -> Given:
+    """The same with all that is asked beside `valid`."""
+    first, biases = asked.options(numbers[0]), given.range_biases
+    if any(asked.penalties[i] is not None for i in numbers):
+        biases = chooser.penalised(biases, [asked.options(i).penalties for i in numbers])
+    among, among_each = chooser.among(None), [asked.among[i] for i in numbers]
+    if any(each is not None for each in among_each):
+        among = np.concatenate([chooser.among(each) for each in among_each])
+    urgent = np.array([FORCE * bool(asked.force[i]) + INTERRUPT * bool(asked.interrupt[i]) for i in numbers], np.uint8)
+    shared, event = chooser.shared(first.tags, first.bias), asked.event[numbers[0]]
+    given = given._replace(range_biases=biases, shared=shared, among=among, urgent=urgent)
+    if event is None:
+        return given
+    leading = chooser.leading(event, given.plays)
+    d, _, frame = moved[0, :3].astype(np.int64).tolist()
+    urgent[0] |= FORCE * (d >= 0 and not leading[chooser.frames_at[d].start + frame])
+    shared = shared._replace(flags=leading if shared.flags is None else shared.flags & leading)
+    return given._replace(shared=shared, to_event=chooser.to_event(event), event_s=event[1], leading=leading)
 
 
 def _run(updates: Updates, own: Sequence[Controller]) -> float:
@@ -414,15 +459,6 @@ def _run(updates: Updates, own: Sequence[Controller]) -> float:
     return search_us
 
 
-def _moved_of(own: Sequence[Controller], rows: Floats, dt_s: float) -> Floats:
-    """What has moved: of one mostly what its query was made of."""
-    known = own[0]._moved if len(own) == 1 else None
-    if known is not None and known[0] is own[0]._rows and known[1:3] == (own[0]._at, dt_s):
-        own[0]._moved = None  # an update changes it
-        return known[3]
-    return own[0].chooser.move(rows, dt_s)[0]
-
-
 def rows_of(controllers: Sequence[Controller]) -> Floats:
     """The rows of controllers of one selector and settings: [Q, W]."""
     first = controllers[0]._rows
@@ -431,7 +467,7 @@ def rows_of(controllers: Sequence[Controller]) -> Floats:
     return np.concatenate([each._row for each in controllers])
 
 
-def _wide(chooser: Chooser, moved: Floats, ranges: Flags, valid: Any, penalties: Sequence[OfPenalties | None]) -> Floats:
+def _wide(chooser: Chooser, moved: Floats, ranges: Flags, valid: Any, asked: Asked, numbers: Sequence[int]) -> Floats:
     """The bias of what plays by hysteresis alone, NaN where that does not hold: float64 [Q]."""
     wide = np.full(len(moved), np.nan)
     for i, (d, at) in enumerate(moved[:, :2].astype(np.int64).tolist()):
@@ -441,7 +477,7 @@ def _wide(chooser: Chooser, moved: Floats, ranges: Flags, valid: Any, penalties:
         own = own_valid(valid, i)
         widened = arguments.widened_of(own.get(chooser.names[d]) if isinstance(own, Mapping) else own)
         if widened is not None and database.ranges_of(widened)[at]:
-            penalty = SearchOptions(penalties=penalties[i]).of(chooser.names[d])["penalties"]
+            penalty = asked.options(numbers[i]).of(chooser.names[d])["penalties"]
             wide[i] = database.filter(widened, penalties=penalty).range_biases[at]
     return wide
 

@@ -22,7 +22,7 @@ from contextdb.motion.clips.ground_place import GroundPlace, OfBody, place_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.records import collector_at_rest
 from contextdb.motion.selection.chooser import are_mappings
-from contextdb.motion.selection.controller import Asked, Controller, rows_of, seconds_of, update_all
+from contextdb.motion.selection.controller import Asked, Controller, Decided, rows_of, seconds_of, update_all
 from contextdb.motion.selection.controller_state import ControllerState
 from contextdb.motion.selection.decision import Decision, Playing
 from contextdb.motion.selection.events import Event
@@ -167,7 +167,7 @@ class ControllerGroup(ListSequence[Controller]):
             _each(penalties, n, "penalty"),
             _each_flag(force, n, "flag to force"),
             _each_flag(interrupt, n, "flag to interrupt"),
-            each_of(event, n, "event", is_one=event is None or isinstance(event, tuple)),
+            _each_event(event, n),
         )
         facts, places = _each(contexts, n, "context"), _each_place(body, n)
         if not self._have_width(wanted.shape[1]) or not arguments.are_finite(wanted):
@@ -177,10 +177,31 @@ class ControllerGroup(ListSequence[Controller]):
         with _of_character(0):
             seconds = seconds_of(dt_s)
         if any(each is not None for each in (tags, bias, among, penalties, event)):
-            for i, controller in enumerate(self):
-                with _of_character(i):
-                    controller.check(asked, i)
-        return update_all(self, seconds, wanted, asked, facts, places)
+            self._check(asked)
+        return update_all(self, seconds, wanted, asked, facts, places).decisions
+
+    def decided(
+        self,
+        dt_s: float,
+        queries: Floats,
+        valid: OfValidForMany | None,
+        event: Event | Sequence[Event | None] | None,
+        contexts: Sequence[Mapping[str, object] | None],
+        places: Floats,
+        moved: Floats,
+    ) -> Decided:
+        """The same where all but `event` is known to be right, with the places of bodies [Q, 3] and what has moved [Q, 16]."""
+        nothing, no, events = [None] * len(self), [False] * len(self), _each_event(event, len(self))
+        asked = Asked(valid, nothing, nothing, nothing, nothing, no, no, events)
+        if event is not None:
+            self._check(asked)
+        return update_all(self, dt_s, queries, asked, contexts, places, moved)
+
+    def _check(self, asked: Asked) -> None:
+        """Refuse what a controller cannot be asked with, with its number."""
+        for i, controller in enumerate(self):
+            with _of_character(i):
+                controller.check(asked, i)
 
     def _have_width(self, n_features: int) -> bool:
         """Whether queries of so many features fit all databases."""
@@ -206,6 +227,11 @@ def _each_among(among: object, n: int) -> Sequence[Any]:
     """Names are for all, lists of names and many answers of a table one for each."""
     is_for_each = are_answers(among) or (isinstance(among, (list, tuple)) and not all(isinstance(name, str) for name in among))
     return each_of(among, n, "choice of databases", is_one=not is_for_each)
+
+
+def _each_event(event: Event | Sequence[Event | None] | None, n: int) -> Sequence[Event | None]:
+    """An event is for all, a list of them is one for each."""
+    return each_of(event, n, "event", is_one=event is None or isinstance(event, tuple))
 
 
 def _each_place(body: OfBodies | None, n: int) -> Sequence[GroundPlace | None]:

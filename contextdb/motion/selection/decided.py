@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import NamedTuple
 
+import numpy as np
+
 from contextdb.cells.row_play import RowPlay
 from contextdb.motion.clips.ground_place import GroundPlace
 from contextdb.motion.clips.quaternions import Floats
@@ -14,8 +16,9 @@ from contextdb.motion.search.candidates import Candidates
 from contextdb.motion.search.filters import Filter
 from contextdb.motion.selection import trigger
 from contextdb.motion.selection.choice import Choice
-from contextdb.motion.selection.chooser import ENTERED, Updates
+from contextdb.motion.selection.chooser import ENTERED, GONE, Updates
 from contextdb.motion.selection.decision import Action, Decision, Playing
+from contextdb.motion.selection.events import Event
 from contextdb.motion.selection.guards import Held
 from contextdb.motion.selection.inputs import Inputs
 from contextdb.motion.selection.root_motion import RootMotion
@@ -28,17 +31,27 @@ CAUSES, HELD, ACTIONS = (None, *Trigger), tuple(Held), tuple(Action)
 VALID, WIDENED = 0, 1
 
 
-class Told(NamedTuple):
-    """What a decision is made of beside the numbers of an update."""
+class Question(NamedTuple):
+    """What some controllers are asked with beside the numbers of their updates; of each the same number."""
 
-    query: Floats
-    context: Mapping[str, object] | None
-    body: GroundPlace | None
-    search_us: float | None
-    n_candidates: int
-    options: SearchOptions | None
-    force: bool
-    interrupt: bool
+    queries: Floats
+    contexts: Sequence[Mapping[str, object] | None]
+    bodies: Sequence[GroundPlace | None] | Floats
+    force: Sequence[bool]
+    interrupt: Sequence[bool]
+    event: Sequence[Event | None]
+    search_us: float | None = None
+
+
+class Asker(NamedTuple):
+    """Who asks: its number among all, what it plays where the core does not know that any more, and how many candidates it records,
+    with what else it is asked with."""
+
+    number: int
+    gone: Playing | None = None
+    n_candidates: int = 0
+    options: SearchOptions | None = None
+    has_clock: bool = False
 
 
 class Numbers(NamedTuple):
@@ -62,36 +75,42 @@ class Numbers(NamedTuple):
         return cls._make((*row[:5], cost, continuing, row[18:22], *row[27:29]))
 
 
-def decision_of(updates: Updates, i: int, was: Playing | None, asked: Told) -> Decision:
-    """The decision of one of some updates; `was` is what played before it. What poses are made of it knows at once."""
+def decision_of(updates: Updates, i: int, question: Question, by: Asker) -> Decision:
+    """The decision of one of some updates. Its fields are worked out when one of them is first read: what poses are made of first,
+    then the others."""
+    return Decision.begun(partial(_fields, updates, i, question, by))
+
+
+def _fields(updates: Updates, i: int, question: Question, by: Asker) -> dict[str, object]:
+    """What poses are made of, and how to work out the other fields."""
     row, chooser = updates.decisions[i].tolist(), updates.chooser
-    before = chooser.playing(row[10:14]) or was
-    return Decision.begun(
-        partial(_rest, updates, i, row, before, asked),
-        action=ACTIONS[int(row[2])],
-        playing=before if row[6:10] == row[10:14] else chooser.playing(row[6:10]),
-        before=before,
-        continuing_cost=None if row[15] != row[15] else row[15],
-        root_motion=RootMotion(*row[22:25]),
-        root_weight=row[25],
-        play_rate=row[26],
-        play=RowPlay.of(row[31:39]),
-    )
+    before = by.gone if row[10] == GONE else chooser.playing(row[10:14])
+    return {
+        "action": ACTIONS[int(row[2])],
+        "playing": before if row[6:10] == row[10:14] else chooser.playing(row[6:10]),
+        "before": before,
+        "continuing_cost": None if row[15] != row[15] else row[15],
+        "root_motion": RootMotion(*row[22:25]),
+        "root_weight": row[25],
+        "play_rate": row[26],
+        "play": RowPlay.of(row[31:39]),
+        "_rest": partial(_rest, updates, i, row, before, question, by),
+    }
 
 
-def _rest(updates: Updates, i: int, row: list[float], before: Playing | None, asked: Told) -> dict[str, object]:
+def _rest(updates: Updates, i: int, row: list[float], before: Playing | None, question: Question, by: Asker) -> dict[str, object]:
     """The other fields of a decision."""
-    numbers, chooser = Numbers.of(row), updates.chooser
-    cause = CAUSES[int(numbers.cause)]
+    numbers, chooser, query = Numbers.of(row), updates.chooser, question.queries[by.number]
+    cause, body = CAUSES[int(numbers.cause)], question.bodies[by.number]
     choice = None if cause is None else updates.choice(i)
     filters: tuple[tuple[str, Filter], ...] = ()
     candidates: Sequence[tuple[str, Candidates]] = ()
-    if choice is not None and asked.n_candidates > 0:
+    if choice is not None and by.n_candidates > 0:
         among = updates.given.among[i if len(updates.given.among) > 1 else 0].tolist()
         each = zip(chooser.names, chooser.databases, among, strict=True)
         filters = tuple((name, updates.filter_of(i, d)) for d, (name, own, is_in) in enumerate(each) if own is not None and is_in)
         if filters:
-            candidates = WorkedOut(chooser.selector.databases, asked.query, filters, choice, asked.n_candidates)
+            candidates = WorkedOut(chooser.selector.databases, query, filters, choice, by.n_candidates)
     return {
         "tick": int(numbers.tick),
         "time_s": numbers.time_s,
@@ -99,28 +118,30 @@ def _rest(updates: Updates, i: int, row: list[float], before: Playing | None, as
         "searched": cause is not None,
         "cost": numbers.cost,
         "choice": choice,
-        "context": asked.context,
-        "query": asked.query,
+        "context": question.contexts[by.number],
+        "query": query,
         "candidates": candidates,
-        "search_us": None if cause is None else asked.search_us,
-        "body": asked.body,
+        "search_us": question.search_us if by.has_clock and cause is not None else None,
+        "body": tuple(body.tolist()) if isinstance(body, np.ndarray) else body,
         "held": str(HELD[int(numbers.held)]),
         "filters": filters,
-        "inputs": _inputs(updates, asked) if asked.n_candidates > 0 else None,
+        "inputs": _inputs(updates, question, by) if by.n_candidates > 0 else None,
         "together": None,
     }
 
 
-def _inputs(updates: Updates, asked: Told) -> Inputs:
+def _inputs(updates: Updates, question: Question, by: Asker) -> Inputs:
     """For a recorder, what else an update was given."""
-    chooser, options = updates.chooser, asked.options
+    chooser, options, given = updates.chooser, by.options, updates.given
     assert options is not None, "they are handed over where somebody records"
     among = None if options.among is None else tuple(sorted(chooser.selector.among(options.among)))
     tags = options.tags
-    if tags is not None and not isinstance(tags, TagFilter):  # flags of frames are in the filters
+    if tags is None or isinstance(tags, TagFilter):
+        named: TagFilter | Mapping[str, TagFilter] | None = tags
+    else:  # flags of frames are in the filters
         named = {name: each for name, each in tags.items() if isinstance(each, TagFilter)}
-        return Inputs(updates.given.dt_s, asked.force, asked.interrupt, among, named, chooser.settings)
-    return Inputs(updates.given.dt_s, asked.force, asked.interrupt, among, tags, chooser.settings)
+    force, interrupt = bool(question.force[by.number]), bool(question.interrupt[by.number])
+    return Inputs(given.dt_s, force, interrupt, among, named, chooser.settings, question.event[by.number])
 
 
 def _why(updates: Updates, i: int, numbers: Numbers, cause: Trigger | None, before: Playing | None, choice: Choice | None) -> str:

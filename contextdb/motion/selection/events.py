@@ -9,6 +9,7 @@ N frames. Source: the event searches of Unreal's PoseSearch (a tag, the time to 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TypeAlias
 
 import numpy as np
@@ -17,6 +18,8 @@ from contextdb.cells.arguments import as_number
 from contextdb.errors import Fault, QueryError, no_such, some
 from contextdb.motion.arguments import Flags
 from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.clips.skeleton import Ints
+from contextdb.motion.markup.left_out import LeftOut, Skip
 from contextdb.motion.markup.marks import Marks
 from contextdb.motion.markup.reserved import CONTACTS, reserved_of
 from contextdb.motion.search.database import MotionDatabase
@@ -59,6 +62,20 @@ def leads(seconds: Floats, in_s: float, rates: tuple[Floats, Floats], rate: floa
     half = 0.5 / rate
     with np.errstate(invalid="ignore"):
         return np.asarray((seconds >= rates[0] * in_s - half) & (seconds <= rates[1] * in_s + half))
+
+
+def astray(leading: Flags) -> Iterator[Skip]:
+    """The spans of frames that do not lead there, [N] of the frames of a database."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([True], leading, [True]))))
+    for start, stop in edges.reshape(-1, 2).tolist():
+        yield Skip(start, stop, LeftOut.EVENT)
+
+
+def events_of(database: MotionDatabase) -> dict[str, Ints]:
+    """The frames at which each event of a database begins, by its name: plain tags, those above them, and contacts."""
+    above = [".".join(tag.split(".")[:n]) for tag in database.marks.tags for n in range(1, tag.count(".") + 2)]
+    names = dict.fromkeys((*above, *CONTACTS))
+    return {name: np.flatnonzero(_begins(database, database.marks, name)).astype(np.int64) for name in names}
 
 
 def _begins(database: MotionDatabase, marks: Marks, name: str) -> Flags:

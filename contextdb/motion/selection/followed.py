@@ -11,9 +11,9 @@ from contextdb.errors import ContextError, Fault
 from contextdb.motion.clips.ground_place import GroundPlace
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.selection.chooser import ASK, CAUSE, CHOSEN, DECIDE, WINNER, Plays
-from contextdb.motion.selection.controller import Asked, Controller, prepared
-from contextdb.motion.selection.decided import CAUSES, Told, decision_of
-from contextdb.motion.selection.decision import Decision
+from contextdb.motion.selection.controller import Asked, Controller, Decided, prepared
+from contextdb.motion.selection.decided import CAUSES, Asker, Question, decision_of
+from contextdb.motion.selection.events import Event
 from contextdb.motion.selection.trigger import Trigger
 
 N_FOLLOWED, ENTERS, PLAY = 13, 4, slice(5, 13)
@@ -23,14 +23,17 @@ NOT_SEARCHED = (-1.0, -2.0, 0.0)
 NO_PACKET = Fault("these bytes tell nothing that a character of these databases plays.", "what its owner's `pack` gives, or none")
 
 
-def follow(controller: Controller, dt_s: float, query: Floats, packet: bytes, body: GroundPlace | None) -> Decision:
+def follow(
+    controller: Controller, dt_s: float, query: Floats, packet: bytes, body: GroundPlace | None, event: Event | None = None
+) -> Decided:
     """Move what plays on by some time and enter what another controller plays, unless that plays here too; no bytes let it play on.
-    The query, which only the play rate goes by, and the time are checked. Raises ContextError for what is no packet."""
+    The query and the time are checked; by the query and the event only the play rate goes. Raises ContextError for what is no
+    packet, QueryError for what is no event."""
     chooser, followed = controller.chooser, np.empty(N_FOLLOWED)
     if not isinstance(packet, bytes) or not chooser.core.read_packet(packet, chooser.move(controller.row, dt_s)[0], followed):
         raise ContextError(NO_PACKET)
     enters, (d, at, frame) = bool(followed[ENTERS]), (int(number) for number in followed[:3].tolist())
-    asked = Asked(None, [None], [None], [None], [None], [enters], [False], [None])
+    asked = Asked.of_one(force=enters)
     updates = prepared([controller], dt_s, query[None], asked, [0])
     updates.found[:] = NOT_SEARCHED
     row = updates.decisions[0]
@@ -38,6 +41,8 @@ def follow(controller: Controller, dt_s: float, query: Floats, packet: bytes, bo
         of = np.full((1, chooser.n_ranges), -1, np.int64)
         of[0, chooser.ranges_at[d].start + at] = 0
         updates = updates._replace(given=updates.given._replace(plays=Plays(followed[None, PLAY], of)))
+    if event is not None:
+        updates = updates._replace(given=updates.given._replace(to_event=chooser.to_event(event), event_s=event[1]))
     updates.run(ASK)
     if enters:
         row[WINNER], row[CHOSEN] = d, (d, at, frame, 0.0)
@@ -45,6 +50,7 @@ def follow(controller: Controller, dt_s: float, query: Floats, packet: bytes, bo
     elif CAUSES[int(row[CAUSE])] is Trigger.DUE:
         row[CAUSE] = 0.0
     updates.run(DECIDE)
-    decision = decision_of(updates, 0, controller.playing, Told(query, None, body, None, 0, None, enters, False))
+    question = Question(query[None], [None], [body], asked.force, asked.interrupt, asked.event)
+    decision = decision_of(updates, 0, question, Asker(0, controller.playing))
     controller.take(updates, 0, decision)
-    return decision
+    return Decided([decision], [([0], updates)])

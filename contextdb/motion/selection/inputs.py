@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from contextdb.motion.markup.tag_filter import TagFilter
 from contextdb.motion.selection.controller_settings import ControllerSettings
+from contextdb.motion.selection.events import Event
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +25,8 @@ class Inputs:
     tags : TagFilter, or mapping of database name to TagFilter, or None
         Flags of frames are not among them.
     settings : ControllerSettings
+    event : (str, float) or None
+        What was to happen, and in how many seconds.
     """
 
     dt_s: float
@@ -32,6 +35,7 @@ class Inputs:
     among: tuple[str, ...] | None
     tags: TagFilter | Mapping[str, TagFilter] | None
     settings: ControllerSettings
+    event: Event | None = None
 
     def tags_of(self, database: str) -> TagFilter | None:
         """The tag filter of one database."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from contextdb.core import motion_from, motion_then
 from contextdb.motion.records import quickly_made
 from contextdb.motion.search.layout import Features
 
@@ -26,12 +27,7 @@ class RootMotion:
 
     def then(self, other: RootMotion) -> RootMotion:
         """This movement and after it another one, which begins where this one ends."""
-        sin, cos = math.sin(self.turn_rad), math.cos(self.turn_rad)
-        return RootMotion(
-            self.left_m + cos * other.left_m + sin * other.ahead_m,
-            self.ahead_m - sin * other.left_m + cos * other.ahead_m,
-            self.turn_rad + other.turn_rad,
-        )
+        return RootMotion(*motion_then(self.left_m, self.ahead_m, self.turn_rad, other.left_m, other.ahead_m, other.turn_rad))
 
     def repeated(self, times: int) -> RootMotion:
         """This movement some times, one after the other."""
@@ -51,9 +47,7 @@ NO_MOTION = RootMotion()
 
 def between(body: RootMotion, later: RootMotion) -> RootMotion:
     """The movement that leads from one place of a body to a later one, both seen from the same place."""
-    sin, cos = math.sin(body.turn_rad), math.cos(body.turn_rad)
-    left, ahead = later.left_m - body.left_m, later.ahead_m - body.ahead_m
-    return RootMotion(cos * left - sin * ahead, sin * left + cos * ahead, later.turn_rad - body.turn_rad)
+    return RootMotion(*motion_from(body.left_m, body.ahead_m, body.turn_rad, later.left_m, later.ahead_m, later.turn_rad))
 
 
 def motion_between(path: Features, from_frame: float, to_frame: float) -> RootMotion:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from contextdb.disk.boundary import inside
 from contextdb.errors import ClipError, ContextDBError, Fault, FileError, MotionError, Place, plural
-from contextdb.motion.features.schema_dict import schema_to_dict
+from contextdb.motion.features.schema import schema_to_dict
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.storage import stored
 from contextdb.motion.storage.clip_files import ClipFile, clip_files

@@ -30,7 +30,7 @@ from contextdb.motion.storage.clip_files import Extracted, named_takes
 from contextdb.motion.storage.config import MotionConfig
 from contextdb.motion.storage.database_settings import DatabaseSettings
 from contextdb.motion.storage.extracting import Progress, extract_all
-from contextdb.motion.storage.feature_cache import FeatureCache, file_name
+from contextdb.motion.storage.stored import FeatureCache, file_name
 
 CACHE_FOLDER = ".contextdb-cache"
 SAVED_SUFFIX = ".motion.safetensors"
@@ -40,33 +40,22 @@ MOST_BONES = 4
 
 @dataclass(frozen=True, eq=False)
 class Built:
-    """A database and how it came about.
-
-    Attributes
-    ----------
-    database : MotionDatabase
-    digest : str
-        Of all that it was made of; empty for a schema with functions, of which that cannot be reported.
-    computed, cached : tuple of str
-        The clips whose features were computed, and those whose features came from the cache.
-    markup_faults : tuple of Fault
-        What of its markup does nothing; see `Markup.faults_for`.
-    mirror_faults : tuple of Fault
-        That its mirrored poses do not fit the rig, whose two sides differ.
-    scale_faults : tuple of Fault
-        Which channels of its features vary so little that their scale is a floor; see `Normalisation.raised`.
-    doubts : tuple of ClipFinding
-        What is doubtful about its clips, such as their unit; see `contextdb.motion.clips.doubts`. None stops a build.
-    """
+    """A database and how it came about."""
 
     database: MotionDatabase
     digest: str
+    """Of all that it was made of; empty for a schema with functions, of which that cannot be reported."""
     computed: tuple[str, ...]
     cached: tuple[str, ...]
+    """`computed`, `cached`: the clips whose features were computed, and those whose features came from the cache."""
     markup_faults: tuple[Fault, ...] = ()
+    """What of its markup does nothing; see `Markup.faults_for`."""
     mirror_faults: tuple[Fault, ...] = ()
+    """That its mirrored poses do not fit the rig, whose two sides differ."""
     scale_faults: tuple[Fault, ...] = ()
+    """Which channels of its features vary so little that their scale is a floor; see `Normalisation.raised`."""
     doubts: tuple[ClipFinding, ...] = ()
+    """What is doubtful about its clips, such as their unit; see `contextdb.motion.clips.doubts`. None stops a build."""
 
 
 def build(

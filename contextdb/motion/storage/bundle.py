@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.errors import Fault, MotionError, Place, in_quotes
+from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.steering import Steered
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.output.bank import PoseBank, moving_alike
@@ -21,6 +22,7 @@ from contextdb.motion.output.pipeline import numbers_of, rig_parts
 from contextdb.motion.output.settings import PoseSettings
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.controller import Controller
+from contextdb.motion.selection.events import events_of
 
 MAGIC = b"CDBMOTN1"
 DATABASE, BANK, CONTROLLER, TABLE = 1, 40, 60, 90
@@ -36,43 +38,29 @@ Part = NDArray[Any] | bytes | None
 
 @dataclass(frozen=True, eq=False)
 class Played:
-    """A controller to put into a bundle, with what its characters play.
-
-    Attributes
-    ----------
-    controller : Controller
-    schema : FeatureSchema
-    banks : mapping of database to PoseBank, or None
-        None for characters without poses.
-    output : PoseSettings
-    """
+    """A controller to put into a bundle, with what its characters play."""
 
     controller: Controller
     schema: FeatureSchema
     banks: Mapping[str, PoseBank] | None
+    """None for characters without poses."""
     output: PoseSettings
+    ends: Mapping[str, Floats] = field(default_factory=dict)
+    """`MatchNode.ends`, float64 [N, 3], of the databases whose animations can be entered as one-offs."""
 
 
 @dataclass(frozen=True, eq=False)
 class TableFile:
-    """A table to put into a bundle.
-
-    Attributes
-    ----------
-    octets : bytes
-        Its compiled file.
-    assets : sequence of str
-        Those of its rows.
-    own_facts : mapping of condition to letter
-        The facts that a character adds: "s" its speed, "d" the direction of its stick, "t" its turn.
-    mirror : mapping of condition to text
-        How facts change in a mirror: "n" negated, "p=NAME" that of another condition, "v=1 0" enum values by their numbers.
-    """
+    """A table to put into a bundle."""
 
     octets: bytes
+    """Its compiled file."""
     assets: Sequence[str]
+    """Those of its rows."""
     own_facts: Mapping[str, str] = field(default_factory=dict)
+    """The facts that a character adds: "s" its speed, "d" the direction of its stick, "t" its turn."""
     mirror: Mapping[str, str] = field(default_factory=dict)
+    """How facts change in a mirror: "n" negated, "p=NAME" that of another condition, "v=1 0" enum values by their numbers."""
 
     @property
     def parts(self) -> list[bytes]:
@@ -111,20 +99,9 @@ class Bundle:
 
 
 def bundle_of(players: Mapping[str, Played], table_of: Mapping[str, str], tables: Mapping[str, TableFile]) -> bytes:
-    """The bytes of a bundle.
+    """The bytes of a bundle of controllers by their names, the table of each database that has one, and the tables.
 
-    Parameters
-    ----------
-    players : mapping of str to Played
-        The controllers by their names.
-    table_of : mapping of str to str
-        The table of each database, of those that have one.
-    tables : mapping of str to TableFile
-
-    Raises
-    ------
-    MotionError
-        What a bundle cannot hold yet; all faults together.
+    Raises MotionError for what a bundle cannot hold yet; all faults together.
     """
     _check(players)
     bundle, numbers, names = Bundle(), {name: i for i, name in enumerate(tables)}, list[str]()
@@ -175,10 +152,11 @@ def _add_database(bundle: Bundle, number: int, player: Played, name: str, bank: 
         row_starts, row_numbers, mirrored, _ = chooser.rows_of(name, table.assets)
         rows = mirrored, row_starts, row_numbers
     measures = kinds, offset, scale, channels, channel_weights, roots
+    nodes = (database.marks.warps, player.ends[name]) if name in player.ends else ()
     played = starts, stops, same, looping, root, marks, weights, own
-    bundle.add(
-        DATABASE, number, [*arrays, *measures, *played, ranges, _texts(database.assets), *rows, _texts([name]), *_levels(database)]
-    )
+    texts = _texts(database.assets), *rows, _texts([name])
+    levels, events = _levels(database), _events(database)
+    bundle.add(DATABASE, number, [*arrays, *measures, *played, ranges, *texts, *levels, *events, *nodes])
     if bank is not None:
         *frames, bank_rate = bank.frame_parts(bank.steps)
         bundle.add(BANK, number, [*frames, np.array([bank_rate])])
@@ -219,6 +197,13 @@ def _levels(database: MotionDatabase) -> list[NDArray[Any]]:
     step, levels = np.empty(1), [np.empty(size, np.int16) for size in sizes]
     database.frames.levels(step, *levels)
     return [step, *levels]
+
+
+def _events(database: MotionDatabase) -> list[Part]:
+    """The names of events, where the frames of each begin, and at which frames they happen."""
+    events = events_of(database)
+    starts = np.cumsum([0, *map(len, events.values())], dtype=np.int64)
+    return [_texts(list(events)), starts, np.concatenate(list(events.values()))]
 
 
 def _clips(database: MotionDatabase) -> list[tuple[str, bool]]:

@@ -33,8 +33,7 @@ from contextdb.errors import (
     some,
 )
 from contextdb.files.settings import Section, Setting
-from contextdb.files.toml_shapes import Mapped, between, filled, listed, nothing, one_of
-from contextdb.files.toml_text import as_toml, what
+from contextdb.files.toml_shapes import Mapped, as_toml, between, filled, listed, nothing, one_of, what
 from contextdb.motion.clips.clip import Clip
 from contextdb.motion.features.schema import CustomFunction, FeatureSchema
 from contextdb.motion.joint.database import JointDatabase

@@ -16,7 +16,7 @@ from contextdb.errors import FileError, MotionError
 from contextdb.files.scratch import Pile
 from contextdb.motion.storage.build_inputs import Faults
 from contextdb.motion.storage.clip_files import ClipFile, Extracted, extract
-from contextdb.motion.storage.feature_cache import FeatureCache
+from contextdb.motion.storage.stored import FeatureCache
 
 CHUNK = 16
 """So many of many clips are worked out at once."""

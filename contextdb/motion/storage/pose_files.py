@@ -50,7 +50,7 @@ from contextdb.motion.storage.clip_files import read_clip
 from contextdb.motion.storage.config import MotionConfig
 from contextdb.motion.storage.database_settings import DatabaseSettings
 from contextdb.motion.storage.extracting import CHUNK, MANY, Chunk, named_chunk
-from contextdb.motion.storage.feature_cache import file_name
+from contextdb.motion.storage.stored import file_name
 
 STORED_POSES = FileKind(
     "contextdb.poses",

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 
 from contextdb.motion.selection.decision import Action, Decision
-from contextdb.motion.trace.json_form import as_plain
+from contextdb.motion.trace.cost_views import as_plain
 
 PLAYS, SEARCHES = 1, 2
 """The tracks: what plays, and the searches."""

@@ -1,4 +1,4 @@
-"""Decisions as the live link of a game publishes them: plain JSON, and for who debugs a row of a recorded session.
+"""Decisions and poses as the live link of a game publishes them: plain JSON, and for who debugs a row of a recorded session.
 
 The link is handed this module; neither imports the other.
 """
@@ -9,12 +9,14 @@ import json
 from collections.abc import Mapping
 from weakref import WeakKeyDictionary
 
+from contextdb.motion.output.bank import PoseBank
+from contextdb.motion.output.pose import Pose
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.choice import Choice
 from contextdb.motion.selection.decision import Decision
 from contextdb.motion.selection.worked_out import WorkedOut
+from contextdb.motion.trace.cost_views import as_plain, decision_json
 from contextdb.motion.trace.filter_rows import fingerprint, markup_digest
-from contextdb.motion.trace.json_form import as_plain, decision_json
 from contextdb.motion.trace.rows import row_of
 
 _digests: WeakKeyDictionary[MotionDatabase, dict[str, str]] = WeakKeyDictionary()
@@ -44,3 +46,33 @@ def digests(decision: object) -> Mapping[str, Mapping[str, str]]:
         if database not in _digests:
             _digests[database] = {"digest": fingerprint(database), "markup": markup_digest(database)}
     return {name: _digests[database] for name, database in databases.items()}
+
+
+def is_pose(pose: object, rig: object) -> bool:
+    """Whether it is a pose of a rig."""
+    return isinstance(pose, Pose) and isinstance(rig, PoseBank) and len(pose.rotations) == rig.n_joints
+
+
+def bones(rig: object) -> dict[str, object]:
+    """What poses of a rig have in common: names, parents (-1: none), offsets from them in metres, and which joints move against
+    their parents."""
+    assert isinstance(rig, PoseBank), "see is_pose"
+    parents, offsets, _ = rig.joints
+    return {
+        "names": list(rig.skeleton.names),
+        "parents": parents.tolist(),
+        "offsets": offsets.round(5).tolist(),
+        "moving": rig.moving.tolist(),
+    }
+
+
+def pose(pose: object, rig: object) -> dict[str, object]:
+    """A pose: what plays, the root, the turn of each joint against its parent (w, x, y, z), and where those are that move."""
+    assert isinstance(pose, Pose), "see is_pose"
+    assert isinstance(rig, PoseBank), "see is_pose"
+    return {
+        "asset": None if pose.playing is None else pose.playing.asset,
+        "root": [round(number, 5) for number in pose.root],
+        "rotations": pose.rotations.round(5).tolist(),
+        "translations": pose.translations[rig.moving].round(5).tolist(),
+    }

@@ -24,9 +24,8 @@ from contextdb.motion.search.filters import Biases, Filter
 from contextdb.motion.selection.decision import Decision
 from contextdb.motion.selection.selector import Entry
 from contextdb.motion.trace.filter_rows import is_recorded
-from contextdb.motion.trace.other_filters import filter_by_table, moved_to, with_biases
+from contextdb.motion.trace.other_filters import ReaskedSearch, filter_by_table, moved_to, with_biases
 from contextdb.motion.trace.reasked_decision import ReaskedDecision, chosen_of
-from contextdb.motion.trace.reasked_search import ReaskedSearch
 from contextdb.motion.trace.stock import Edited, Stock, require_name
 from contextdb.motion.trace.why_not import WhyNot, why_not
 

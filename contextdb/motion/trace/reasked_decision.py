@@ -21,7 +21,7 @@ from contextdb.motion.selection.choice import Choice, Status
 from contextdb.motion.selection.decision import Decision
 from contextdb.motion.selection.selector import Entry, choice_of
 from contextdb.motion.trace.cost_views import Ranked
-from contextdb.motion.trace.reasked_search import ReaskedSearch
+from contextdb.motion.trace.other_filters import ReaskedSearch
 from contextdb.motion.trace.stock import Stock
 from contextdb.motion.trace.views import role_of
 
@@ -31,27 +31,18 @@ Chosen = tuple[str, str | None, int] | None
 
 @dataclass(frozen=True, eq=False)
 class ReaskedDecision:
-    """A recorded decision repeated.
-
-    Attributes
-    ----------
-    decision : Decision
-        As it was recorded.
-    entries : tuple of Entry
-        The databases in order, with their thresholds.
-    searches : mapping of database name to ReaskedSearch
-        All that could be searched, in order; empty for an update without a search.
-    stock : Stock
-        Where the tables are.
-    was : Chosen
-        The recorded choice.
-    """
+    """A recorded decision repeated."""
 
     decision: Decision
+    """As it was recorded."""
     entries: tuple[Entry, ...]
+    """The databases in order, with their thresholds."""
     searches: Mapping[str, ReaskedSearch]
+    """All that could be searched, in order; empty for an update without a search."""
     stock: Stock
+    """Where the tables are."""
     was: Chosen = None
+    """The recorded choice."""
 
     @cached_property
     def choice(self) -> Choice | None:

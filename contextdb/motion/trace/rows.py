@@ -30,6 +30,7 @@ from contextdb.motion.search.hit import NOTHING, Hit
 from contextdb.motion.selection.choice import Choice, Reason, Search, Status
 from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.decision import Action, Decision, Playing, Together
+from contextdb.motion.selection.events import checked
 from contextdb.motion.selection.inputs import Inputs
 from contextdb.motion.selection.root_motion import RootMotion
 from contextdb.motion.selection.variation import Variation
@@ -350,6 +351,7 @@ def inputs_json(inputs: Inputs) -> str:
         "among": None if inputs.among is None else list(inputs.among),
         "tags": _tags_row(tags) if isinstance(tags, TagFilter) else None,
         "tags_of": of_each,
+        **({} if inputs.event is None else {"event": list(inputs.event)}),
     }
     return f'{json.dumps(document)[:-1]}, "settings": {_settings_json(inputs.settings)}}}'
 
@@ -363,7 +365,8 @@ def inputs_of(text: str) -> Inputs:
     of_each = None if row["tags_of"] is None else {name: _tags(each) for name, each in row["tags_of"].items()}
     among = None if row["among"] is None else tuple(row["among"])
     settings = _settings(json.dumps(row["settings"]))
-    return Inputs(float(row["dt_s"]), bool(row["force"]), bool(row["interrupt"]), among, tags or of_each, settings)
+    event = None if row.get("event") is None else checked(tuple(row["event"]))
+    return Inputs(float(row["dt_s"]), bool(row["force"]), bool(row["interrupt"]), among, tags or of_each, settings, event)
 
 
 def _tags_row(tags: TagFilter) -> Json:

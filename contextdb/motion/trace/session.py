@@ -25,10 +25,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from itertools import islice
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import Any, Unpack
 
 from contextdb.cells.arguments import require_kind, require_many, require_mapping, require_path, require_place, require_text
 from contextdb.cells.sequences import Made
+from contextdb.columns import polars as pl
 from contextdb.disk import read_bytes, write_atomic
 from contextdb.errors import (
     ContextDBError,
@@ -72,9 +73,6 @@ from contextdb.motion.trace.session_file import (
 from contextdb.motion.trace.stats import SessionStats, stats_of
 from contextdb.motion.trace.stock import Stock
 from contextdb.motion.trace.what_if import WhatIf, what_if
-
-if TYPE_CHECKING:
-    import polars as pl
 
 CHUNK = 512
 """So many decisions become Parquet at a time."""

@@ -24,29 +24,20 @@ class Parting:
 
 @dataclass(frozen=True)
 class SessionDiff:
-    """Two sessions, update by update.
-
-    Attributes
-    ----------
-    updates : int
-        How many updates both have.
-    longer : int
-        How many updates the first has beyond them; negative where the other has.
-    other_frames, other_assets : int
-        At how many updates another frame, another asset plays.
-    parting : Parting or None
-        None where both play the same all along.
-    one, other : dict of str to float or None
-        Their measures.
-    """
+    """Two sessions, update by update."""
 
     updates: int
+    """How many updates both have."""
     longer: int
+    """How many updates the first has beyond them; negative where the other has."""
     other_frames: int
     other_assets: int
+    """`other_frames`, `other_assets`: at how many updates another frame, another asset plays."""
     parting: Parting | None
+    """None where both play the same all along."""
     one: Mapping[str, float | None]
     other: Mapping[str, float | None]
+    """`one`, `other`: their measures."""
 
     def to_json(self) -> dict[str, object]:
         parting = None if self.parting is None else vars(self.parting)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from contextdb.columns import polars as pl
 from contextdb.errors import (
     ArtefactError,
     Fault,
@@ -16,9 +17,6 @@ from contextdb.errors import (
 )
 from contextdb.files.parquet_frame import MAGIC, DamagedFrame, require_whole
 from contextdb.motion.trace.rows import LATER, Row, columns
-
-if TYPE_CHECKING:
-    import polars as pl
 
 FORMAT = 2
 FORMAT_KEY, ABOUT_KEY, SHOWN_KEY = "contextdb.trace", "about", "candidates"

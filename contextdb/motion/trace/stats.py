@@ -1,4 +1,7 @@
-"""A session in figures: how often it jumps and for how much, why it searched, how long a clip stays, what never plays."""
+"""A session in figures: how often it jumps and for how much, why it searched, how long a clip stays, what never plays.
+
+Of the asset's rows the one with the fewest failing cells counts. A jump because an animation ended is forced by no column.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +16,7 @@ import numpy as np
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.selection.decision import Action, Decision, Playing
 from contextdb.motion.trace.rows import PERMUTATION_S
+from contextdb.motion.trace.stock import Queryable, failing_rows
 from contextdb.motion.trace.views import cause_of
 
 SMALL_GAIN = 0.2
@@ -27,31 +31,7 @@ About = Mapping[str, Mapping[str, Any]]
 
 @dataclass(frozen=True)
 class SessionStats:
-    """The figures of a session.
-
-    Attributes
-    ----------
-    seconds : float
-    updates, searches, jumps, forced_jumps, loops : int
-        A forced jump is one for which nothing could play on.
-    jumps_per_s : float
-    causes : dict of str to int
-        How many searches there were for each cause.
-    gain_median : float or None
-        What a jump spares of the cost of playing on, as a share; None without a jump from what could play on. Negative for a jump
-        that costs more: one that variation drew, or to a database that wins outright under its threshold. See `gains_of`.
-    gain_small_share : float or None
-        The share of such jumps that spare less than a fifth.
-    gains : tuple of int
-        How many spare up to 5, 10, 20, 50 and 100 %.
-    stay_s : float or None
-        How long an animation plays until a jump, in the mean.
-    assets_used : int
-    assets_never_used : tuple of str, or None
-        None where the session does not say what its databases hold.
-    frames_used_share : float or None
-        How much of the databases is played: at each moment a frame, and those passed since the moment before.
-    """
+    """The figures of a session."""
 
     seconds: float
     updates: int
@@ -59,15 +39,24 @@ class SessionStats:
     jumps: int
     forced_jumps: int
     loops: int
+    """`updates`, `searches`, `jumps`, `forced_jumps`, `loops`: a forced jump is one for which nothing could play on."""
     jumps_per_s: float
     causes: dict[str, int] = field(default_factory=dict)
+    """How many searches there were for each cause."""
     gain_median: float | None = None
+    """What a jump spares of the cost of playing on, as a share; None without a jump from what could play on. Negative for a jump
+    that costs more: one that variation drew, or to a database that wins outright under its threshold. See `gains_of`."""
     gain_small_share: float | None = None
+    """The share of such jumps that spare less than a fifth."""
     gains: tuple[int, ...] = ()
+    """How many spare up to 5, 10, 20, 50 and 100 %."""
     stay_s: float | None = None
+    """How long an animation plays until a jump, in the mean."""
     assets_used: int = 0
     assets_never_used: tuple[str, ...] | None = None
+    """None where the session does not say what its databases hold."""
     frames_used_share: float | None = None
+    """How much of the databases is played: at each moment a frame, and those passed since the moment before."""
 
     def to_json(self) -> dict[str, object]:
         document = asdict(self)
@@ -166,3 +155,50 @@ def _frames_used(decisions: Sequence[Decision], about: About) -> float | None:
         used.update((database, at) for at in passed)
         last = place
     return len(used) / every if every else None
+
+
+# ---- which columns of the tables force jumps: what played was not valid any more, and which of its cells do not accept the
+# facts
+
+
+@dataclass(frozen=True, slots=True)
+class ForcedBy:
+    """Columns that together forced jumps: how many, and what the most expensive of these cost."""
+
+    columns: tuple[str, ...]
+    jumps: int
+    cost: float | None
+
+    def sentence(self, n_forced: int) -> str:
+        """It as people read it; of so many forced jumps."""
+        cost = "" if self.cost is None else f", at a cost of up to {self.cost:.3g}"
+        return f"forced by {' and '.join(self.columns)}: {self.jumps:,} of {n_forced:,} forced jumps{cost}"
+
+    def to_json(self) -> dict[str, object]:
+        return {"columns": list(self.columns), "jumps": self.jumps, "cost": self.cost}
+
+
+def forced_by(decisions: Iterable[Decision], tables: Mapping[str, Queryable]) -> list[ForcedBy]:
+    """The columns that forced jumps, those of most jumps first. `tables` is the compiled table of each database."""
+    forced = []
+    for decision in decisions:
+        before = decision.before
+        if before is None or not decision.is_forced or before.database not in tables or decision.context is None:
+            continue
+        rows = failing_rows(tables[before.database], before.asset, decision.context, before.mirrored)
+        columns = min((tuple(each.condition for each in row.failures) for row in rows), key=len, default=())
+        if columns:
+            forced.append(ForcedBy(columns, 1, decision.cost))
+    return together(forced)
+
+
+def together(parts: Iterable[ForcedBy]) -> list[ForcedBy]:
+    """Those of the same columns in one, those of most jumps first."""
+    of_columns: dict[tuple[str, ...], list[ForcedBy]] = {}
+    for each in parts:
+        of_columns.setdefault(each.columns, []).append(each)
+    forced = [
+        ForcedBy(columns, sum(each.jumps for each in own), max((each.cost for each in own if each.cost is not None), default=None))
+        for columns, own in of_columns.items()
+    ]
+    return sorted(forced, key=lambda each: -each.jumps)

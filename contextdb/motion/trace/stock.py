@@ -102,7 +102,15 @@ class Stock:
     @classmethod
     def with_tables(cls, databases: Mapping[str, MotionDatabase], project: Described) -> Stock:
         config = MotionConfig.from_dict(project.schema.motion, tables=project.tables)
-        table_of = {name: table for name in databases if name in config.databases and (table := config.databases[name].table)}
+        """The tables of the databases: what contextdb.toml names, else the only table that has assets of a database, as a game that
+        hands its characters a table does not name it there."""
+        assets = {name: {*table.compile().leaves} for name, table in project.tables.items()}
+        table_of: dict[str, str] = {}
+        for name, database in databases.items():
+            named = config.databases[name].table if name in config.databases else None
+            having = [named] if named else [table for table, own in assets.items() if not own.isdisjoint(database.assets)]
+            if len(having) == 1:
+                table_of[name] = having[0]
         return cls(databases, project.tables, table_of)
 
     def table(self, database: str) -> Edited | None:

@@ -27,41 +27,32 @@ READ = ("tick", "time_s", "action", "searched", "playing", "cost", "continuing_c
 
 @dataclass(frozen=True, eq=False)
 class Timeline:
-    """The updates of a session.
-
-    Attributes
-    ----------
-    ticks : int64 array, shape (T,)
-    times_s : float64 array, shape (T,)
-    assets : tuple of str
-        What plays anywhere, in the order in which it first does.
-    playing : int64 array, shape (T,)
-        Which of `assets` plays; -1 for nothing.
-    mirrored, searched, jumped, forced : bool arrays, shape (T,)
-        `jumped` where something begins to play, by a jump or at the start; `forced` where it had to jump: nothing could play on.
-    new_facts : bool array, shape (T,)
-        Whether the context is another than one update before.
-    costs, continuing : float64 arrays, shape (T,)
-        Of the last search: the chosen frame, and playing on; NaN where there was none.
-    n_valid : float64 array, shape (T,)
-        How many ranges could play at the last search; NaN where the session does not say.
-    roots : float64 array, shape (T, 3)
-        x, z and heading of the body: the game's, or, where the session does not say it, what the animations moved.
-    """
+    """The updates of a session."""
 
     ticks: Ints
+    """Int64 [T]."""
     times_s: Floats
+    """Float64 [T]."""
     assets: tuple[str, ...]
+    """What plays anywhere, in the order in which it first does."""
     playing: Ints
+    """Which of `assets` plays; -1 for nothing: int64 [T]."""
     mirrored: Flags
     searched: Flags
     jumped: Flags
     forced: Flags
+    """`mirrored`, `searched`, `jumped`, `forced`: `jumped` where something begins to play, by a jump or at the start; `forced`
+    where it had to jump: nothing could play on. Bool [T]."""
     new_facts: Flags
+    """Whether the context is another than one update before: bool [T]."""
     costs: Floats
     continuing: Floats
+    """`costs`, `continuing`: of the last search: the chosen frame, and playing on; NaN where there was none. Float64 [T]."""
     n_valid: Floats
+    """How many ranges could play at the last search; NaN where the session does not say: float64 [T]."""
     roots: Floats
+    """x, z and heading of the body: the game's, or, where the session does not say it, what the animations moved. Float64 [T, 3].
+    """
 
     def __len__(self) -> int:
         return len(self.ticks)

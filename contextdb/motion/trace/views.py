@@ -62,6 +62,10 @@ def look_first(decisions: Iterable[Decision]) -> str:
     return f"Look first at {worst.time_s:.2f} s: {nothing_fits('' if worst.playing is None else worst.playing.asset, cost)}."
 
 
+NOTHING_FORCED = "Nothing to look at first: no jump is forced."
+"""What a report opens with where `look_first` has nothing."""
+
+
 def nothing_fits(asset: str | None, cost: float) -> str:
     """What is wrong with a forced jump."""
     return f"what plays ends there and nothing fits well: {asset} costs {cost:.3g}"

@@ -49,28 +49,19 @@ class ChangedChoice:
 
 @dataclass(frozen=True)
 class WhatIf:
-    """What a change makes of a session.
-
-    Attributes
-    ----------
-    searches : int
-        How many recorded searches were repeated.
-    other_frames : int
-        How many of them choose another frame.
-    other_assets : tuple of ChangedChoice
-        Those that choose another asset.
-    before, after : dict of str to float or None
-        Measures of the session run again without and with the change.
-    is_reproduced : bool
-        Whether the session run again without the change plays what was recorded.
-    """
+    """What a change makes of a session."""
 
     searches: int
+    """How many recorded searches were repeated."""
     other_frames: int
+    """How many of them choose another frame."""
     other_assets: tuple[ChangedChoice, ...]
+    """Those that choose another asset."""
     before: Mapping[str, float | None]
     after: Mapping[str, float | None]
+    """`before`, `after`: measures of the session run again without and with the change."""
     is_reproduced: bool
+    """Whether the session run again without the change plays what was recorded."""
 
     def to_json(self) -> dict[str, object]:
         return {
@@ -187,6 +178,7 @@ class _Runner:
             among=asked.among,
             force=inputs.force,
             interrupt=inputs.interrupt,
+            event=inputs.event,
         )
 
     def _inputs_of(self, recorded: Decision, inputs: Inputs) -> SearchOptions:

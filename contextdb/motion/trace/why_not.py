@@ -15,6 +15,7 @@ from contextdb.cells.arguments import require_text
 from contextdb.errors import Fault, MotionError, row_name
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.selection.choice import Choice, Reason
+from contextdb.motion.selection.inputs import Inputs
 from contextdb.motion.trace.cost_views import cost_text
 from contextdb.motion.trace.reasked_decision import ReaskedDecision
 from contextdb.motion.trace.stock import require_name
@@ -33,38 +34,24 @@ from contextdb.motion.trace.winning_changes import (
 
 @dataclass(frozen=True, slots=True)
 class WhyNot:
-    """Why an asset was not chosen.
-
-    Attributes
-    ----------
-    asset : str
-    database : str
-    frame : int
-        Its best frame, counted over the database; one that may be chosen before all that may not.
-    time_s : float or None
-        Seconds since the start of the asset.
-    rank : int
-        How many frames that may be chosen cost less, and one.
-    cost : float
-    winner : str or None
-        The asset that was chosen.
-    winner_cost : float or None
-    reasons : tuple of str
-        In the order of the way to a choice; empty for the asset that was chosen.
-    changes : tuple of Change
-        The smallest first of each kind; empty for the asset that was chosen.
-    """
+    """Why an asset was not chosen."""
 
     asset: str
     database: str
     frame: int
+    """Its best frame, counted over the database; one that may be chosen before all that may not."""
     time_s: float | None
+    """Seconds since the start of the asset."""
     rank: int
+    """How many frames that may be chosen cost less, and one."""
     cost: float
     winner: str | None
+    """The asset that was chosen."""
     winner_cost: float | None
     reasons: tuple[str, ...]
+    """In the order of the way to a choice; empty for the asset that was chosen."""
     changes: tuple[Change, ...]
+    """The smallest first of each kind; empty for the asset that was chosen."""
 
     def to_json(self) -> dict[str, object]:
         """The keys that scripts rely on."""
@@ -115,12 +102,22 @@ def _reasons(decision: ReaskedDecision, at: Place, choice: Choice) -> Iterator[s
         yield "tags: its frames do not have the tags that were requested"
     elif inner in OF_TIME:
         yield f"history: {inner.text}"
+    elif inner is LeftOut.EVENT:
+        yield f"event: {_astray(decision.decision.inputs)}"
     elif inner is LeftOut.FORBIDDEN:
         yield "bias: an infinite one forbids it"
     if at.name not in decision.searched and choice.reason is Reason.UNDER_THRESHOLD:
         yield f"threshold: {choice.database} won outright, {at.name} was not searched"
     if choice and at.cost >= choice.hit.cost:
         yield f"cost: {cost_text(at.cost)}, {cost_text(at.cost - choice.hit.cost)} more than {choice.hit.asset}"
+
+
+def _astray(inputs: Inputs | None) -> str:
+    """That a frame does not lead to the event of the moment."""
+    if inputs is None or inputs.event is None:
+        return LeftOut.EVENT.text
+    name, in_s = inputs.event
+    return f"does not lead to {name} in {in_s:.3g} s"
 
 
 def _invalid(decision: ReaskedDecision, at: Place) -> Iterator[str]:

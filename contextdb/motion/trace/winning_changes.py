@@ -21,9 +21,8 @@ from contextdb.errors import ContextDBError, Fault, MotionError, in_quotes, row_
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.search.filters import Filter
 from contextdb.motion.selection.choice import Choice
-from contextdb.motion.trace.other_filters import filter_by_table
+from contextdb.motion.trace.other_filters import ReaskedSearch, filter_by_table
 from contextdb.motion.trace.reasked_decision import ReaskedDecision
-from contextdb.motion.trace.reasked_search import ReaskedSearch
 from contextdb.motion.trace.stock import Edited, Row, failing_rows
 
 DIGITS = 4
@@ -35,22 +34,15 @@ AND = " + "
 
 
 class ChangePart(NamedTuple):
-    """One thing that is changed.
-
-    Attributes
-    ----------
-    kind : str
-        "cell", "cells", "mask" (its range is let in, where no table says why it was not), "mark", "tags", "setting", "bias",
-        "weight" or "threshold".
-    what : str
-        What is changed: the cell, the mark, the channel.
-    to : str or float
-        To what.
-    """
+    """One thing that is changed."""
 
     kind: str
+    """"cell", "cells", "mask" (its range is let in, where no table says why it was not), "mark", "tags", "setting", "event",
+    "bias", "weight" or "threshold"."""
     what: str
+    """What is changed: the cell, the mark, the channel."""
     to: str | float
+    """To what."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +90,7 @@ def _wins(decision: ReaskedDecision, asset: str) -> bool:
 
 def _free(decision: ReaskedDecision, at: Place) -> Iterator[Step]:
     """What lets the asset be chosen: each step goes on from the one before."""
-    for step in (_valid, _unmarked, *[_in_time] * len(OF_TIME), _in_turn):
+    for step in (_valid, _unmarked, *[_in_time] * len(OF_TIME), _at_any_time, _in_turn):
         done = step(decision, at)
         if done is not None:
             decision = done[1]
@@ -188,6 +180,17 @@ def _in_time(decision: ReaskedDecision, at: Place) -> Step | None:
     chosen = decision.searches[at.name].chosen
     skips = tuple(skip for skip in chosen.skips if skip.why is not at.left_out)
     return ChangePart("setting", setting, 0.0), _with(decision, at, chosen._replace(skips=skips))
+
+
+def _at_any_time(decision: ReaskedDecision, at: Place) -> Step | None:
+    """The best frame whatever is to happen."""
+    at = _place_in(decision, at)
+    if at.left_out is not LeftOut.EVENT:
+        return None
+    chosen, inputs = decision.searches[at.name].chosen, decision.decision.inputs
+    skips = tuple(skip for skip in chosen.skips if skip.why is not LeftOut.EVENT)
+    name = "event" if inputs is None or inputs.event is None else inputs.event[0]
+    return ChangePart("event", name, "without"), _with(decision, at, chosen._replace(skips=skips))
 
 
 def _in_turn(decision: ReaskedDecision, at: Place) -> Step | None:

@@ -2,7 +2,7 @@
 
 A weight is the product of four columns that each sum to one:
 
-    gait            by `contextdb.motion.walking.gaits`
+    gait            by `contextdb.motion.walking.walker`
     speed           the nearest two steady cycles of the gait; the slowest below it, the fastest above it
     acceleration    slowing down, steady, speeding up
     turn            to the right, none, to the left
@@ -38,14 +38,6 @@ CORNERS = ("speeding_up", "slowing_down", "turning_left", "turning_right")
 class Gait:
     """The cycles of one gait, such as walking.
 
-    Attributes
-    ----------
-    name : str
-    steady : sequence of Cycle
-        At least one; given in any order, kept from the slowest to the fastest.
-    speeding_up, slowing_down, turning_left, turning_right : Cycle, optional
-        How a body holds itself at the full of each. They go straight on, at a middle speed.
-
     Raises
     ------
     MotionError
@@ -56,10 +48,13 @@ class Gait:
 
     name: str
     steady: Sequence[Cycle]
+    """At least one; given in any order, kept from the slowest to the fastest."""
     speeding_up: Cycle | None = None
     slowing_down: Cycle | None = None
     turning_left: Cycle | None = None
     turning_right: Cycle | None = None
+    """`speeding_up`, `slowing_down`, `turning_left`, `turning_right`: how a body holds itself at the full of each. They go
+    straight on, at a middle speed."""
 
     def __post_init__(self) -> None:
         require_text(self.name, "name")

@@ -46,32 +46,20 @@ A_LOOP = "a clip whose left foot stands at least twice within it, from down to u
 
 @dataclass(frozen=True, eq=False)
 class Cycle:
-    """One gait cycle. Made by `Cycle.of`.
-
-    Attributes
-    ----------
-    name : str
-        The clip's.
-    skeleton : Skeleton
-    feet : (str, str)
-        The bones of the left and the right foot.
-    duration_s : float
-    movement : (left, ahead, turn)
-        How far the body comes in one cycle: metres along its path, and radians.
-    rotations : float64 array, shape (n, J, 4)
-        Each joint against its parent, the first against the body, evenly spread over the cycle.
-    positions : float64 array, shape (n, J, 3)
-        Likewise, metres.
-    stances : Stances
-    """
+    """One gait cycle. Made by `Cycle.of`."""
 
     name: str
+    """The clip's."""
     skeleton: Skeleton
     feet: tuple[str, str]
+    """The bones of the left and the right foot."""
     duration_s: float
     movement: Place3
+    """How far the body comes in one cycle: metres along its path, and radians."""
     rotations: Floats
+    """Each joint against its parent, the first against the body, evenly spread over the cycle: float64 [n, J, 4]."""
     positions: Floats
+    """Likewise, metres: float64 [n, J, 3]."""
     stances: Stances
 
     @classmethod

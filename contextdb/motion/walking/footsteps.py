@@ -30,22 +30,15 @@ LEAST_MPS = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Footstep:
-    """Where a foot stands.
-
-    Attributes
-    ----------
-    foot : int
-        0 is the left one, 1 the right one.
-    x, z : float
-        Of the toe, metres.
-    heading : float
-        That of the body when it is over the foot, radians.
-    """
+    """Where a foot stands."""
 
     foot: int
+    """0 is the left one, 1 the right one."""
     x: float
     z: float
+    """`x`, `z`: of the toe, metres."""
     heading: float
+    """That of the body when it is over the foot, radians."""
 
 
 Adjust = Callable[[Footstep], Footstep | None]

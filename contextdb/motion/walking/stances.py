@@ -29,13 +29,6 @@ A_CURVE = "one number from 0 to 1 for each foot at moments that are evenly sprea
 class Stances:
     """When each foot of a cycle is down.
 
-    Attributes
-    ----------
-    down, up : (left, right)
-        The phases at which a foot comes down and goes up.
-    holds : (left, right)
-        How much each foot is held where it came down.
-
     Raises
     ------
     MotionError
@@ -44,7 +37,9 @@ class Stances:
 
     down: Pair
     up: Pair
+    """`down`, `up`: the phases at which a foot comes down and goes up."""
     holds: Pair = (1.0, 1.0)
+    """How much each foot is held where it came down."""
 
     def __post_init__(self) -> None:
         for name in ("down", "up", "holds"):

@@ -22,33 +22,19 @@ A_PATTERN = 'a text with {from} and {to}, such as "{from}_to_{to}"'
 
 @dataclass(frozen=True)
 class Missing:
-    """A pair of states without a transition.
-
-    Attributes
-    ----------
-    from_state, to_state : str
-    wanted : tuple of str
-        The names of clips that would be one.
-    near : str
-        A clip of nearly such a name, "" for none: perhaps it is misspelt.
-    """
+    """A pair of states without a transition."""
 
     from_state: str
     to_state: str
     wanted: tuple[str, ...]
+    """The names of clips that would be one."""
     near: str = ""
+    """A clip of nearly such a name, "" for none: perhaps it is misspelt."""
 
 
 @dataclass(frozen=True)
 class Transitions:
     """Finds transitions among the names of clips.
-
-    Attributes
-    ----------
-    clips : sequence of str
-        The names of all clips, or of the assets of a table.
-    patterns : sequence of str
-        How a transition's clip is named; the first that has a clip counts.
 
     Raises
     ------
@@ -59,7 +45,9 @@ class Transitions:
     """
 
     clips: Iterable[str]
+    """The names of all clips, or of the assets of a table."""
     patterns: Iterable[str] = (USUAL_PATTERN,)
+    """How a transition's clip is named; the first that has a clip counts."""
 
     def __post_init__(self) -> None:
         for name in ("clips", "patterns"):

@@ -13,7 +13,7 @@ from contextdb.schema.settings import Schema, TableSettings
 from contextdb.schema.table_settings import JOB_KEYS
 from contextdb.tables.changes import CameFrom, Cells, Change, Columns, Edit, Rows, Sections
 from contextdb.tables.data import TableData
-from contextdb.tables.merging.shared import Shared
+from contextdb.tables.merging.conflicts import Shared
 
 _EMPTY = TextColumn("", ("",), np.zeros(1, np.int32))
 

@@ -27,10 +27,9 @@ from contextdb.tables.changes import CameFrom, Edit
 from contextdb.tables.data import AnyTable, TableData
 from contextdb.tables.merging.alignment import Alignment, align, inverse, row_twins
 from contextdb.tables.merging.building import edit_under
-from contextdb.tables.merging.cells import changed_in, merge_column, new_cells
-from contextdb.tables.merging.conflicts import Conflict, Decided, LostCell, Side
+from contextdb.tables.merging.conflicts import Conflict, Decided, LostCell, Places, Shared, Side
+from contextdb.tables.merging.meaning import changed_in, merge_column, new_cells
 from contextdb.tables.merging.order import Origins, Sides, merged_order
-from contextdb.tables.merging.shared import Places, Shared
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,9 +24,18 @@ from contextdb.schema.settings import Schema, TableSettings
 from contextdb.tables.compiling import compile_table
 from contextdb.tables.condition_column import ConditionColumn
 from contextdb.tables.data import TableData, picking_of
-from contextdb.tables.nesting.expansion import NO_ROWS, Expansion, expand
-from contextdb.tables.nesting.flat_columns import FlatColumn
-from contextdb.tables.nesting.flat_texts import declared_of, flat_outputs, free_name, outputs_of, paths_and_leaves, rules_of
+from contextdb.tables.nesting.expansion import (
+    NO_ROWS,
+    Expansion,
+    FlatColumn,
+    declared_of,
+    expand,
+    flat_outputs,
+    free_name,
+    outputs_of,
+    paths_and_leaves,
+    rules_of,
+)
 from contextdb.tables.nesting.links import Neighbours, require_sound
 from contextdb.tables.plain_columns import PlainColumns
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from contextdb.tables.watching.sharing import table_like
-from contextdb.tables.watching.snapshot import Snapshot
+from contextdb.tables.watching.snapshot import Snapshot, table_like
 from contextdb.tables.watching.watcher import Watch, watch
 
 __all__ = ["Snapshot", "Watch", "table_like", "watch"]

@@ -2,6 +2,9 @@
 
 `next_snapshot` makes a version from the one before: files whose bytes are the same are not read again, and of the others only the
 columns that changed are compiled. The disk is touched only to say why a file that is missing could not be read.
+
+Columns are compared by what they say. One that says the same is taken from the older table, with its cells and masks; of one that
+changed, only texts that are new are read. So a reload costs the columns that changed. Nothing here touches the disk.
 """
 
 from __future__ import annotations
@@ -10,13 +13,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from contextdb.cells.notebook import one_line
+from contextdb.columns import TextColumn
 from contextdb.compiled.table import CompiledTable, data_of
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.disk import read_bytes
 from contextdb.errors import ContextDBError, Fault, FileError, Place, TableError, plural
-from contextdb.files.texts import texts_of
-from contextdb.schema.settings import EMPTY, Schema
+from contextdb.files.texts import AnySource, texts_of
+from contextdb.schema.settings import EMPTY, Schema, TableSettings
 from contextdb.tables.data import require_readable
 from contextdb.tables.nesting.links import sources
 from contextdb.tables.project import (
@@ -30,8 +36,7 @@ from contextdb.tables.project import (
     twice_named,
 )
 from contextdb.tables.table import Table
-from contextdb.tables.watching.sharing import table_like
-from contextdb.tables.watching.stamps import Digests, digests_of
+from contextdb.tables.watching.rest import Digests, digests_of
 
 Contents = Mapping[Path, bytes]
 NamedFiles = Sequence[tuple[str, Path]]
@@ -133,3 +138,22 @@ def _compiled(table: Table, older: CompiledTable | None) -> CompiledTable:
         data_of(compiled).remember_as(data_of(older))
     compiled.query({}, unknown="any")
     return compiled
+
+
+# ---- a table read again that keeps what its older version had worked out
+
+
+def table_like(
+    old: Table | None, columns: Sequence[TextColumn], schema: Schema, settings: TableSettings, path: Path, source: AnySource
+) -> Table:
+    """The table that `Table.build` gives, and its errors; equal columns of `old` are shared. Cells that cannot be read are in the
+    table's `faults`."""
+    texts = [_shared_texts(c, old) for c in columns] if old else columns
+    known = {c.condition.name: c for c in old.conditions} if old else {}
+    return Table.build(settings.name, texts, schema, settings, path, source, known)
+
+
+def _shared_texts(column: TextColumn, old: Table) -> TextColumn:
+    match = next((c for c in old.columns if c.name == column.name), None)
+    is_same = match is not None and match.texts == column.texts and np.array_equal(match.codes, column.codes)
+    return match if match is not None and is_same else column

@@ -4,7 +4,7 @@ The files are read when they have rested (`contextdb.tables.watching.rest`), so 
 delete or rename on their way are passed over. A version is swapped in by one assignment: whoever asks in another thread has the old
 one or the new one. A version with a fault is not swapped in; its faults are reported once.
 
-Equal stamps (`contextdb.tables.watching.stamps`) are believed when the last change lies `COARSEST_TICK_S` back; until then the
+Equal stamps (`contextdb.tables.watching.rest`) are believed when the last change lies `COARSEST_TICK_S` back; until then the
 bytes are read and their digests compared.
 """
 
@@ -24,9 +24,8 @@ from contextdb.compiled.table import CompiledTable
 from contextdb.errors import ContextDBError, Fault, FileError, Place, plural
 from contextdb.schema.settings import Schema
 from contextdb.tables.project import SCHEMA_FILE, ByName, Project, folder_of, table_files
-from contextdb.tables.watching.rest import Rest
+from contextdb.tables.watching.rest import COARSEST_TICK_S, Digests, Rest, Stamps, digests_of, look, read_all
 from contextdb.tables.watching.snapshot import Contents, Snapshot, next_snapshot, schema_from, shared_files
-from contextdb.tables.watching.stamps import COARSEST_TICK_S, Digests, Stamps, digests_of, look, read_all
 
 POLL_S = 0.25
 SETTLE_S = 0.1

@@ -17,7 +17,7 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import Context
 from contextdb.compiled.casting.facts import Actors
 from contextdb.compiled.matches import Matches
-from contextdb.telemetry.link.lines import ASK, DATABASES, DECISION, PICK, Line, cut_name, dumped, sent_facts
+from contextdb.telemetry.link.lines import ASK, BONES, DATABASES, DECISION, PICK, POSE, Line, cut_name, dumped, sent_facts
 
 MOST_ENTRIES = 1 << 13
 """Entries that wait for the link's thread at most."""
@@ -36,6 +36,12 @@ class Decisions(Protocol):
     def plain(self, decision: object, /) -> object: ...
 
     def row(self, decision: object, /) -> str | None: ...
+
+    def is_pose(self, pose: object, rig: object, /) -> bool: ...
+
+    def bones(self, rig: object, /) -> Mapping[str, object]: ...
+
+    def pose(self, pose: object, rig: object, /) -> Mapping[str, object]: ...
 
     def digests(self, decision: object, /) -> Mapping[str, Mapping[str, str]]: ...
 
@@ -61,8 +67,15 @@ class Picked(NamedTuple):
     asset: str | None
 
 
+class Posed(NamedTuple):
+    """A pose, and the rig that it is of."""
+
+    pose: object
+    rig: object
+
+
 Entry = tuple[float, object, Source | None, object, Matches | None, Actors | None]
-"""Seconds, who, the table, what (facts, `Picked` or a decision), the answer, the actors that were offered."""
+"""Seconds, who, the table, what (facts, `Picked`, `Posed` or a decision), the answer, the actors that were offered."""
 
 
 class Feed:
@@ -73,6 +86,7 @@ class Feed:
         """Whether somebody listens."""
         self.wants_filters = False
         """Whether somebody debugs: decisions then say what could be chosen."""
+        self.wants_poses = False
         self.entries: deque[Entry] = deque()
         self._most = most
         self._n_dropped = 0
@@ -153,7 +167,7 @@ _UNNAMED = object()
 
 @dataclass(eq=False)
 class Moment:
-    """What becomes one line: a question, with the pick of its answer; a pick alone; or a decision."""
+    """What becomes one line: a question, with the pick of its answer; a pick alone; a decision, or a pose."""
 
     time_s: float
     who: str | None
@@ -170,6 +184,10 @@ class Moment:
         return None if self.source is None else self.source.name
 
     @property
+    def is_pose(self) -> bool:
+        return isinstance(self.decision, Posed)
+
+    @property
     def is_sent(self) -> bool:
         """Whether its line was made, so that a pick comes too late for it."""
         return self._line is not None
@@ -180,8 +198,13 @@ class Moment:
         return self._line
 
     def in_full(self, decisions: Decisions) -> Iterator[tuple[object, bytes]]:
-        """The lines of a decision for who debugs it: its databases, which need be sent only once, and its row; each with a mark of
-        its content, None for what is always sent."""
+        """The lines of a decision for who debugs it: its databases, which need be sent only once, and its row; those of a pose: its
+        bones, only once too, and itself. Each with a mark of its content, None for what is always sent."""
+        if isinstance(self.decision, Posed):
+            bones = dumped({"line": BONES, "who": self.who, **decisions.bones(self.decision.rig)})
+            yield bones, bones
+            yield None, self.line(decisions)
+            return
         if digests := decisions.digests(self.decision):
             mark = self.who, tuple((name, *each.values()) for name, each in digests.items())
             yield mark, dumped({"line": DATABASES, "who": self.who, "databases": digests})
@@ -190,6 +213,8 @@ class Moment:
 
     def _content(self, decisions: Decisions | None) -> Line:
         head: Line = {"t": round(self.time_s, 6), "who": self.who}
+        if isinstance(self.decision, Posed):
+            return {"line": POSE, **head, **(decisions.pose(*self.decision) if decisions else {})}
         if self.source is None:
             return {"line": DECISION, **head, "decision": decisions.plain(self.decision) if decisions else {}}
         line: Line = {"line": PICK if self.facts is None else ASK, **head, "table": self.source.name}
@@ -220,8 +245,8 @@ class Moments:
         self._began_s = began_s
         self._questions: dict[int, Moment] = {}
         """The latest questions by the identity of their answers, which they hold."""
-        self._newest: dict[tuple[str | None, str | None, bool], Moment] = {}
-        """By who, table, and whether it has a pick."""
+        self._newest: dict[tuple[str | None, str | None, bool, bool], Moment] = {}
+        """By who, table, whether it has a pick, and whether it is a pose."""
 
     def of(self, entries: Iterable[Entry]) -> list[Moment]:
         """The moments of some entries, in their order."""
@@ -232,25 +257,25 @@ class Moments:
             if source is None:
                 moment.decision = what
             elif isinstance(what, Picked):
-                newest = self._newest.get((name, source.name, False))
+                newest = self._newest.get((name, source.name, False, False))
                 question = newest if answer is None else self._questions.get(id(answer))
                 if question is None and label is _UNNAMED:
                     continue
                 if question is not None and not (question.is_sent or question.pick):
                     question.pick = what
-                    self._newest[question.who, question.table, True] = question
+                    self._newest[question.who, question.table, True, False] = question
                     continue
                 moment.pick, moment.answer, moment.who = what, answer, name if question is None else question.who
             else:
                 moment.facts, moment.answer, moment.actors = what, answer, actors  # type: ignore[assignment]
                 self._questions[id(answer)] = moment
-            self._newest[moment.who, moment.table, moment.pick is not None] = moment
+            self._newest[moment.who, moment.table, moment.pick is not None, moment.is_pose] = moment
             moments.append(moment)
         return moments
 
     def newest(self) -> list[Moment]:
         """Of each character and table the newest question, and the newest that was picked from; of each character the newest
-        decision; since the last call."""
+        decision and pose; since the last call."""
         newest = {id(moment): moment for moment in self._newest.values()}
         self._newest.clear()
         self._questions = dict(list(self._questions.items())[-MOST_BEFORE:])

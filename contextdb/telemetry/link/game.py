@@ -14,7 +14,7 @@ from contextdb.cells.arguments import require_number, require_path, require_row,
 from contextdb.compiled.table import CompiledTable
 from contextdb.errors import ContextError, Fault, FileError, Place
 from contextdb.telemetry.link import doors
-from contextdb.telemetry.link.feed import Decisions, Feed, Picked, Watcher, Who
+from contextdb.telemetry.link.feed import Decisions, Feed, Picked, Posed, Watcher, Who
 from contextdb.telemetry.link.folder import require_name
 from contextdb.telemetry.link.lines import cut_name
 from contextdb.telemetry.link.listeners import FileListener
@@ -131,6 +131,28 @@ class Link:
             with self._writer.lock:
                 source = self._watched.source_of(table)
             self._feed.put(who, source, Picked(at, table.fallback if at is None else table.assets[at]))
+
+    def pose(self, who: str | None, pose: object, rig: object) -> None:
+        """Publish a pose to those who listen for poses: the bones once, then where they are.
+
+        Parameters
+        ----------
+        who : str or None
+        pose : Pose
+            Such as `updated.pose` of a character; the newest is sent.
+        rig : PoseBank
+            What it is a pose of: `character.stream.rig`.
+
+        Raises
+        ------
+        ContextError
+            An argument of another type.
+        """
+        if not self._load_decisions().is_pose(pose, rig):
+            problem = f"a link cannot publish {type(pose).__name__} of {type(rig).__name__}."
+            raise ContextError(Fault(problem, "a Pose, and the PoseBank of its rig"))
+        if self._feed.wants_poses:
+            self._feed.put(None if who is None else cut_name(require_text(who, "who")), None, Posed(pose, rig))
 
     def close(self) -> None:
         """Publish no more. What was watched is what it was before."""

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from contextdb.errors import ContextDBError, Fault, Place, in_quotes, mend_for, some
 from contextdb.telemetry.link.doors import connected, doors, token_of
-from contextdb.telemetry.link.lines import FORMAT, HEADER, MOST_BYTES, Line, dumped, read_line
+from contextdb.telemetry.link.lines import BONES, FORMAT, HEADER, MOST_BYTES, POSE, Line, dumped, read_line
 
 PIECE = 1 << 16
 HEADER_S = 5.0
@@ -28,11 +28,15 @@ class Wanted:
     """Every question, not only the newest of each character and table."""
     trace: bool = False
     """Every decision in full, as a row of a recorded session, and nothing else."""
+    poses: bool = False
+    """Poses too, of a game that publishes them."""
 
     def takes(self, line: Line) -> bool:
         """Whether a line is requested: a game written in C sends all of them."""
         if self.who and "who" in line and line["who"] not in self.who:
             return False
+        if line["line"] in (BONES, POSE):
+            return self.poses
         return not self.tables or "table" not in line or line["table"] in self.tables
 
 
@@ -128,6 +132,7 @@ def _request(wanted: Wanted, token: str) -> bytes:
     request |= {"who": list(wanted.who)} if wanted.who else {}
     request |= {"tables": list(wanted.tables)} if wanted.tables else {}
     request |= {"trace": True} if wanted.trace else {}
+    request |= {"poses": True} if wanted.poses else {}
     return dumped(request)
 
 

@@ -25,7 +25,7 @@ FORMAT = 1
 """Raised when a reader of the old format would read the new one wrongly. More keys, and more kinds of lines, are no new format."""
 
 HEADER, TABLES, ASK, PICK, DECISION, LOST, END = "header", "tables", "ask", "pick", "decision", "lost", "end"
-DATABASES = "databases"
+DATABASES, BONES, POSE = "databases", "bones", "pose"
 """What a line is: the value of its key "line"."""
 
 MOST_BYTES = 1 << 20
@@ -85,6 +85,8 @@ _KEYS: Mapping[str, Mapping[str, tuple[type, ...]]] = {
     PICK: {"t": (int, float), "who": (str, type(None)), "table": (str,), "pick": (dict,)},
     DECISION: {"t": (int, float), "who": (str, type(None)), "decision": (dict,)},
     DATABASES: {"who": (str, type(None)), "databases": (dict,)},
+    BONES: {"who": (str, type(None)), "names": (list,), "parents": (list,), "offsets": (list,), "moving": (list,)},
+    POSE: {"t": (int, float), "who": (str, type(None)), "root": (list,), "rotations": (list,), "translations": (list,)},
     LOST: {"count": (int,)},
 }
 

@@ -2,10 +2,11 @@
 
 A listener may send one line of JSON, and again whenever it wants other lines:
 
-    {"format": 1, "token": "…", "every": true, "who": ["player"], "tables": ["locomotion"], "trace": true}
+    {"format": 1, "token": "…", "every": true, "who": ["player"], "tables": ["locomotion"], "trace": true, "poses": true}
 
-`every`: every question, not only the newest of each character and table. `trace`: every decision in full, and nothing else. Lines
-that a listener does not read in time are dropped, and the link sends their number; nothing here ever waits for a listener.
+`every`: every question, not only the newest of each character and table. `trace`: every decision in full, and nothing else.
+`poses`: poses too. Lines that a listener does not read in time are dropped, and the link sends their number; nothing here ever
+waits for a listener.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ class Listener:
     """Takes lines, all of every moment unless it wants fewer; drops are counted, and reported before the next line."""
 
     wants_every = True
-    wants_trace = False
+    wants_trace = wants_poses = False
 
     def __init__(self) -> None:
         self.n_lost = 0
@@ -53,7 +54,7 @@ class Listener:
 
     def wants(self, moment: Moment) -> bool:
         """Whether a moment is among those that it wants."""
-        return True
+        return not moment.is_pose
 
     def take(self, moment: Moment, decisions: Decisions | None) -> None:
         """Take the line of a moment, or drop it."""
@@ -103,12 +104,14 @@ class SocketListener(Listener):
     def wants(self, moment: Moment) -> bool:
         if self._who is not None and moment.who not in self._who:
             return False
+        if moment.is_pose:
+            return self.wants_poses
         if self.wants_trace:
             return moment.decision is not None
         return self._tables is None or moment.table is None or moment.table in self._tables
 
     def take(self, moment: Moment, decisions: Decisions | None) -> None:
-        if not self.wants_trace or decisions is None or not self.has_room:
+        if not (self.wants_trace or moment.is_pose) or decisions is None or not self.has_room:
             super().take(moment, decisions)
             return
         for mark, line in moment.in_full(decisions):
@@ -150,7 +153,7 @@ class SocketListener(Listener):
         if not isinstance(request, dict) or not self._has_token(request):
             self.is_gone = True
             return
-        self.wants_trace = request.get("trace") is True
+        self.wants_trace, self.wants_poses = request.get("trace") is True, request.get("poses") is True
         self.wants_every = request.get("every") is True or self.wants_trace
         self._who, self._tables = _names(request.get("who")), _names(request.get("tables"))
         if not self.is_let_in:

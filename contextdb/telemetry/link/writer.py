@@ -169,6 +169,7 @@ class Writer:
             listeners.append(self.file)
         self.feed.is_open = bool(listeners) and not self._is_closing
         self.feed.wants_filters = any(one.wants_trace for one in listeners)
+        self.feed.wants_poses = any(one.wants_poses for one in listeners)
         if not listeners:
             self._published = None if not self._listeners else self._published
             self._moments.newest()

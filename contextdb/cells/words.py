@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from functools import lru_cache
 
 NUMBER_TEXT = r"[+-]?(?:inf|(?:\d+(?:\.(?!\.)\d*)?|(?<!\.)\.\d+)(?:[eE][+-]?\d+)?)"
@@ -16,6 +17,23 @@ _NAME = re.compile(r"[\w.:/\-]+")
 _RESERVED = re.compile(rf"any|not|-|nan|{NUMBER_TEXT}", re.IGNORECASE)
 _SLOT = re.compile(r'"((?:[^"]|"")*)"|[^\s,;|"]+')
 _TRUTH = {"true": True, "t": True, "yes": True, "1": True, "false": False, "f": False, "no": False, "0": False}
+
+
+class InCells:
+    """The base of what is a box of contexts, told by cells."""
+
+    __slots__ = ()
+    cells: Mapping[str, str]
+
+    @property
+    def text(self) -> str:
+        """The cells on one line."""
+        return cells_text(self.cells)
+
+
+def cells_text(cells: Mapping[str, str]) -> str:
+    """Cells on one line, each with the name of its condition."""
+    return ", ".join(f"{name}: {cell}" for name, cell in cells.items()) or "every context"
 
 
 def says_any(text: str) -> bool:

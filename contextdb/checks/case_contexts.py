@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.bitmask import Flags
-from contextdb.checks.slips import Slips, bits_of, flags_of
+from contextdb.checks.slips import Slips, flags_of
 from contextdb.covering.assumed import Opened, opened
 from contextdb.covering.fewest import fewest
 from contextdb.covering.moments import Moment, Moments
@@ -156,7 +156,7 @@ class _Search:
             bits = self.slips.compiled.query(moment).bits
         except ContextDBError:  # a rule or a derived fact has no value there
             return 0
-        return bits_of(self.slips.hits(flags_of([bits], self.slips.slipped.n_rows))[0])
+        return bitmask.to_int(bitmask.pack(self.slips.hits(flags_of([bits], self.slips.slipped.n_rows))[0]))
 
     def _draw(self) -> None:
         """Contexts that can happen, at random, then in the boxes of what none of these reaches."""

@@ -19,6 +19,7 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.grammar import format_cell, parse_cell
 from contextdb.cells.plain_ends import cuts_of, plain
 from contextdb.cells.sets import Accepted, Cell, TagSet, meet_plainly, plain_parts
+from contextdb.cells.words import InCells
 from contextdb.checks.effects_space import Cells, Rows, Shared, shared_space
 from contextdb.covering import CoverageReport, coverage, format_percent
 from contextdb.covering.ruled import without_rules
@@ -48,15 +49,11 @@ OVERLAP_RULES = ("policy-overlap",)
 
 
 @dataclass(frozen=True, slots=True)
-class Box:
+class Box(InCells):
     """Contexts, as cells of the conditions that they restrict, and their share of all contexts."""
 
     cells: Cells
     share: float
-
-    @property
-    def text(self) -> str:
-        return ", ".join(f"{name}: {cell}" for name, cell in self.cells.items()) or "every context"
 
     def to_json(self) -> dict[str, object]:
         return {"share": self.share, "cells": self.cells}

@@ -177,11 +177,6 @@ def flags_of(bits: Sequence[int], n_rows: int) -> Flags:
     return np.unpackbits(packed, axis=1, bitorder="little", count=n_rows).astype(np.bool_)
 
 
-def bits_of(flags: Flags) -> int:
-    """Flags as bits."""
-    return int.from_bytes(np.packbits(flags, bitorder="little").tobytes(), "little")
-
-
 # ---- cells as they would be after a slip: an end of a range moved, a bool flipped, a value or a tag left out
 
 

@@ -19,7 +19,7 @@ from contextdb import bitmask
 from contextdb.cells.facts import fact_text
 from contextdb.checks.case_contexts import Reach, contexts_for
 from contextdb.checks.cases import Case, exactly, judge, keep_cases, question_of, read_cases
-from contextdb.checks.slips import LEFT_OUT, PICKED, VALID, Slip, Slips, bits_of, flags_of
+from contextdb.checks.slips import LEFT_OUT, PICKED, VALID, Slip, Slips, flags_of
 from contextdb.commands.progress import has_many_cells, log_of
 from contextdb.compiled.table import data_of
 from contextdb.console import ExitCode, aligned, output, printable
@@ -226,7 +226,7 @@ def _targets(slips: Slips, case: Case) -> int:
     """What a case reaches: rows that are valid, and slips after which it does not hold."""
     expected, facts, _ = question_of(slips.compiled, case)
     bits = slips.compiled.query(facts, unknown="any").bits
-    targets = bits_of(slips.hits(flags_of([bits], slips.slipped.n_rows))[0])
+    targets = bitmask.to_int(bitmask.pack(slips.hits(flags_of([bits], slips.slipped.n_rows))[0]))
     if expected.is_exact:
         return targets
     named = expected.wanted | expected.banned

@@ -6,6 +6,7 @@ import argparse
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
+from contextdb.cells.words import cells_text
 from contextdb.checks.effects import Box, Effects
 from contextdb.checks.effects_space import shared_space
 from contextdb.commands.motion_replay_command import databases_of, project_of
@@ -138,7 +139,7 @@ def _words(box: ChangedBox) -> str:
 
 
 def _cells(box: ChangedBox) -> str:
-    return safe_text(", ".join(f"{name}: {cell}" for name, cell in box.items) or "every context", 400)
+    return safe_text(cells_text(dict(box.items)), 400)
 
 
 def _both(gains: int, loses: int, moments: int) -> str:

@@ -16,6 +16,7 @@ from typing import Any
 from contextdb.cells.domains import Domain
 from contextdb.cells.grammar import parse_cell
 from contextdb.cells.sets import Cell
+from contextdb.cells.words import InCells
 from contextdb.covering.assumed import Opened
 from contextdb.covering.declared import Declared, require_declared
 from contextdb.covering.report import CoverageReport, Gap
@@ -32,16 +33,12 @@ ACCEPTED = 'the document that "contextdb coverage --format json" writes'
 
 
 @dataclass(frozen=True)
-class EarlierGap:
+class EarlierGap(InCells):
     """A gap of an earlier report."""
 
     id: str
     cells: dict[str, str]
     share: float
-
-    @property
-    def text(self) -> str:
-        return ", ".join(f"{name}: {cell}" for name, cell in self.cells.items()) or "every context"
 
     def to_json(self) -> dict[str, object]:
         return {"id": self.id, "share": self.share, "cells": self.cells}

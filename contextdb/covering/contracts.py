@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import bitmask
+from contextdb.cells.words import InCells
 from contextdb.columns import TextColumn
 from contextdb.compiled.table import data_of
 from contextdb.covering.assumed import Opened, assumptions_of, not_boxed, opened
@@ -49,7 +50,7 @@ MOST_WITNESSES = 12
 
 
 @dataclass(frozen=True, slots=True)
-class Witness:
+class Witness(InCells):
     """A counterexample."""
 
     cells: Mapping[str, str]
@@ -59,11 +60,6 @@ class Witness:
     rows: tuple[int, ...]
     """The rows that are valid there."""
     assets: tuple[str, ...]
-
-    @property
-    def text(self) -> str:
-        """The box on one line."""
-        return ", ".join(f"{name}: {cell}" for name, cell in self.cells.items()) or "every context"
 
     def to_json(self) -> dict[str, object]:
         valid = [{"row": row, "asset": asset} for row, asset in zip(self.rows, self.assets, strict=True)]

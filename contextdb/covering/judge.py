@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import bitmask
+from contextdb.cells.words import cells_text
 from contextdb.compiled.choosing import Choosing
 from contextdb.compiled.data import CompiledData
 from contextdb.covering.draw import Drawer
@@ -224,9 +225,8 @@ class Judge:
             others = list(islice(self._joint(i, bitmask.rows_of(self._meeting(box) & ((1 << i) - 1))), MOST_JOINT))
             if others:
                 cells = self.space.cells(self.space.sides_of(self._shared(i, others[0])), is_label=True)
-                cells_text = ", ".join(f"{name}: {cell}" for name, cell in cells.items()) or "every context"
                 other = self._named(others[0], i)
-                message = f'the policy is "{self._refusing}", and {other} can be valid at the same time: {cells_text}.'
+                message = f'the policy is "{self._refusing}", and {other} can be valid at the same time: {cells_text(cells)}.'
                 yield self._at(i, "policy-overlap", "error", message, bitmask.int_of(others))
 
     @property

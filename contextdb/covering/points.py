@@ -2,8 +2,6 @@
 
 A search decides few boxes, and what it does not finish in a few hundred steps the core decides. Exact, single points too, within a
 budget; what it leaves undecided is marked by `is_cut`.
-
-The answers are those of `witness`, which is quicker where boxes are few. Single points count.
 """
 
 from __future__ import annotations
@@ -119,6 +117,8 @@ def _lower_half(side: int) -> int:
 
 
 # ---- questions about many boxes, answered by the core: whether some hold all of another, and which lies within which
+#
+# The answers are those of `witness`, which is quicker where boxes are few. Single points count.
 
 
 MANY = 1000

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from contextdb.cells.notebook import as_html, one_line
+from contextdb.cells.words import InCells
 from contextdb.columns import Framed, frame_of
 from contextdb.columns import polars as pl
 from contextdb.covering.shares import distinct_percents, format_percent
@@ -46,7 +47,7 @@ class Nearest:
 
 
 @dataclass(frozen=True, slots=True)
-class Gap:
+class Gap(InCells):
     """A box of contexts without a valid row. `cells` leaves out the conditions that it does not restrict."""
 
     id: str
@@ -60,11 +61,6 @@ class Gap:
     """False where a share needed too much work: it is then the middle of certain bounds."""
     telemetry: float | None = None
     """The share of the recorded moments that lie in it; None where none were observed."""
-
-    @property
-    def text(self) -> str:
-        """The cells on one line."""
-        return ", ".join(f"{name}: {cell}" for name, cell in self.cells.items()) or "every context"
 
     def to_json(self) -> dict[str, object]:
         nearest = None if self.nearest is None else self.nearest.to_json()

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from contextdb import bitmask
 from contextdb.bitmask import Flags
 from contextdb.covering.fewest import fewest
 
@@ -81,7 +82,7 @@ def _of_label(label: int, leaves: Sequence[Leaf], features: Sequence[Feature], l
             if key not in known:
                 known.add(key)
                 candidates.append(sides)
-                bits.append(_bits(mine.inside(sides)))
+                bits.append(bitmask.to_int(bitmask.pack(mine.inside(sides))))
     numbers, _ = fewest(bits, STEPS)
     for sides in (candidates[i] for i in numbers):
         inside = mine.inside(sides)
@@ -165,10 +166,6 @@ def _further(side: Flags, blocked: Flags, feature: Feature) -> Flags:
     if feature.is_circular and last == n - 1 and first > 0:
         wider[: int(before[0])] = True
     return wider
-
-
-def _bits(flags: NDArray[np.bool_]) -> int:
-    return int.from_bytes(np.packbits(flags, bitorder="little").tobytes(), "little")
 
 
 # ---- a tree of questions that tells which asset was recorded: what pairs say first, before their boxes are merged into rows

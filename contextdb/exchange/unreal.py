@@ -4,8 +4,6 @@ Unreal's CSV begins with a header whose first name is "---" or empty; its JSON i
 column there is a C++ identifier, so a dot becomes two underscores and back.
 
 Source: Unreal Engine documentation, "Data Driven Gameplay Elements": CSV and JSON of a DataTable.
-
-Source: OWASP, "CSV Injection": = + - @, tab and carriage return at the start of a field.
 """
 
 from __future__ import annotations
@@ -169,6 +167,8 @@ def _identifier(name: str) -> str:
 
 
 # ---- texts that a spreadsheet takes for formulas when it opens a CSV: named, or written with an apostrophe before them
+#
+# Source: OWASP, "CSV Injection": = + - @, tab and carriage return at the start of a field.
 
 
 Formulas = Literal["tell", "keep", "quote"]

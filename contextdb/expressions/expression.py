@@ -17,7 +17,7 @@ from contextdb.cells.sets import Cell
 from contextdb.errors import ContextError, Fault, Place, in_quotes, nearest, plural, some
 from contextdb.expressions.boxes import Box, boxes_of
 from contextdb.expressions.check import Checker
-from contextdb.expressions.columns import UNKNOWN, YES, Column, as_array, read_column, run_frame
+from contextdb.expressions.columns import UNKNOWN, YES, Column, read_column, run_frame
 from contextdb.expressions.parse import parse
 from contextdb.expressions.plan import Part, Type
 from contextdb.expressions.scalar import Run, Value, is_missing, runner
@@ -59,16 +59,6 @@ class Expression:
         value = self.run({c.name: canonical(facts.get(c.name), c) for c in self.conditions})
         return None if is_missing(value) else value
 
-    def evaluate_frame(self, columns: Mapping[str, Any], n_contexts: int) -> NDArray[Any]:
-        """The value in each of many contexts, the same to the last bit as `evaluate` gives: float64 [n_contexts], NaN where
-        missing, for int, number and angle; else objects, None where missing.
-
-        `columns` are lists, flat arrays or Series [n_contexts] of facts by the name of the condition. One that is absent is
-        missing; others are ignored. Raises ContextError where a fact is of the wrong type or outside the domain, or a column has
-        another length.
-        """
-        return as_array(self.run_frame(columns, n_contexts))
-
     def flags(self, columns: Mapping[str, Any], n_contexts: int, missing: bool = False) -> NDArray[np.bool_]:
         """Whether a bool expression holds in each context: bool [N]; `missing` where that is not known."""
         truths = self.run_frame(columns, n_contexts)
@@ -91,7 +81,12 @@ class Expression:
         return runner(self.plan, self.conditions)
 
     def run_frame(self, columns: Mapping[str, Any], n_contexts: int) -> Column:
-        """`evaluate_frame`, as a column that can be computed with."""
+        """The value in each of many contexts, the same to the last bit as `evaluate` gives.
+
+        `columns` are lists, flat arrays or Series [n_contexts] of facts by the name of the condition. One that is absent is
+        missing; others are ignored. Raises ContextError where a fact is of the wrong type or outside the domain, or a column has
+        another length.
+        """
         read: dict[str, Column] = {}
         for condition in self.conditions:
             given = columns.get(condition.name)

@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from contextdb.authoring.motion_coverage import TableMotion
+from contextdb.cells.words import cells_text
 from contextdb.covering import format_percent
 from contextdb.covering.declared import NOTHING, Declared, require_declared
 from contextdb.errors import ContextError, Fault, Place, in_quotes, plural, some
@@ -276,7 +277,7 @@ def worst_contexts(measured: MotionMeasured) -> list[ContextCoverage]:
 
 
 def context_words(each: ContextCoverage) -> str:
-    return ", ".join(f"{name}: {cell}" for name, cell in each.contexts.cells.items()) or "every context"
+    return cells_text(each.contexts.cells)
 
 
 def hole_words(each: ContextCoverage) -> list[str]:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from contextdb.cells.words import InCells
 from contextdb.covering.report import Nearest
 from contextdb.covering.shares import format_percent
 from contextdb.errors import Fault
 
 
 @dataclass(frozen=True, slots=True)
-class SeenGap:
+class SeenGap(InCells):
     """A box of contexts without a valid row that the game was in. `cells` leaves out the conditions that it does not restrict."""
 
     id: str
@@ -25,11 +26,6 @@ class SeenGap:
     nearest: Nearest | None
     is_exact: bool = True
     """False where there were too many different contexts without a row to keep them all: shares are then those of a sample."""
-
-    @property
-    def text(self) -> str:
-        """The cells on one line."""
-        return ", ".join(f"{name}: {cell}" for name, cell in self.cells.items()) or "every context"
 
     def to_json(self) -> dict[str, object]:
         return {

@@ -172,7 +172,7 @@ def test_any_text_is_an_expression_or_refused_with_a_place_in_it(text):
         assert "^" in fault.pointed
     else:
         expression.evaluate({})
-        expression.evaluate_frame({}, 2)
+        expression.run_frame({}, 2)
         expression.as_boxes()
 
 

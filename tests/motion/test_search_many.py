@@ -59,7 +59,7 @@ def test_soft_cells_and_answers_of_different_tables_count_for_each_character(dat
 
 @pytest.mark.parametrize("n_cores", [1, 2, 3])
 def test_blocks_and_cores_change_no_answer(n_cores, monkeypatch):
-    monkeypatch.setattr(searcher, "_n_cores", lambda: n_cores)
+    monkeypatch.setattr(searcher, "n_cores", lambda: n_cores)
     monkeypatch.setattr(searcher, "BLOCK_QUERIES", 40)
     rng = np.random.default_rng(3)
     lengths = rng.integers(1, 300, 90)

@@ -1,12 +1,4 @@
-"""What of the clips is played, and what never can be.
-
-A state is what some clip's name has in the place of `{from}` or `{to}`. Names say nothing more: a state that no transition names is
-none, and one way of going from a state to another is enough. Source of the pattern: the transitions of Forsyth's talk, seed 003.
-
-Of a clip some frames a second are compared with every frame of every other clip, mirrored ones too, at the cost of a search without
-biases. What 95 % of them cost at most, each with the nearest frame of one other clip, says how far the clip lies from that clip.
-Of the permutations of a clip the first is compared.
-"""
+"""What of the clips is played, and what never can be."""
 
 from __future__ import annotations
 
@@ -121,6 +113,10 @@ def _reached(enters: Flags, plays: Flags) -> Flags:
 
 # ---- transitions between states that have no clip, by the names of clips: a pattern such as `{from}_to_{to}` says which they
 # are
+#
+# A state is what some clip's name has in the place of `{from}` or `{to}`. Names say nothing more: a state that no transition
+# names is none, and one way of going from a state to another is enough. Source of the pattern: the transitions of Forsyth's talk,
+# seed 003.
 
 
 PATTERN = "{from}_to_{to}"
@@ -170,6 +166,10 @@ def _expression(pattern: str) -> str:
 
 
 # ---- clips that lie within a bar of another clip, so that they add little: near-duplicates
+#
+# Of a clip some frames a second are compared with every frame of every other clip, mirrored ones too, at the cost of a search
+# without biases. What 95 % of them cost at most, each with the nearest frame of one other clip, says how far the clip lies from
+# that clip. Of the permutations of a clip the first is compared.
 
 
 NEAR_COST = 0.02

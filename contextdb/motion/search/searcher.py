@@ -5,7 +5,6 @@ N frames, F features, R ranges.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Collection, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property, partial
@@ -17,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from contextdb.cells.arguments import require_kind, require_many, require_text
 from contextdb.core import Frames
+from contextdb.disk.engines import n_cores
 from contextdb.errors import Fault, MotionError, in_quotes
 from contextdb.motion import arguments
 from contextdb.motion.arguments import Flags
@@ -123,7 +123,7 @@ def shared_parts(chosen: Filter) -> tuple[NDArray[np.bool_] | Floats | None, ...
 
 def in_blocks(n: int, work: Callable[[int, int], object]) -> None:
     """Do some work for 0 … n - 1 in blocks, on as many cores as this process may use."""
-    n_threads = max(1, min(_n_cores(), n // THREAD_QUERIES))
+    n_threads = max(1, min(n_cores(), n // THREAD_QUERIES))
     n_blocks = n_threads * max(1, -(-n // (n_threads * BLOCK_QUERIES)))
     cuts = [n * i // n_blocks for i in range(n_blocks + 1)]
     if n_threads == 1:
@@ -132,10 +132,6 @@ def in_blocks(n: int, work: Callable[[int, int], object]) -> None:
         return
     with ThreadPoolExecutor(n_threads) as pool:
         list(pool.map(work, cuts[:-1], cuts[1:]))
-
-
-def _n_cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 # ---- what a motion database is made of, checked: the features of clips, or features as they are

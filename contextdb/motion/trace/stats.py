@@ -1,7 +1,4 @@
-"""A session in figures: how often it jumps and for how much, why it searched, how long a clip stays, what never plays.
-
-Of the asset's rows the one with the fewest failing cells counts. A jump because an animation ended is forced by no column.
-"""
+"""A session in figures: how often it jumps and for how much, why it searched, how long a clip stays, what never plays."""
 
 from __future__ import annotations
 
@@ -159,6 +156,8 @@ def _frames_used(decisions: Sequence[Decision], about: About) -> float | None:
 
 # ---- which columns of the tables force jumps: what played was not valid any more, and which of its cells do not accept the
 # facts
+#
+# Of the asset's rows the one with the fewest failing cells counts. A jump because an animation ended is forced by no column.
 
 
 @dataclass(frozen=True, slots=True)

@@ -151,8 +151,9 @@ class Link:
         if not self._load_decisions().is_pose(pose, rig):
             problem = f"a link cannot publish {type(pose).__name__} of {type(rig).__name__}."
             raise ContextError(Fault(problem, "a Pose, and the PoseBank of its rig"))
+        name = None if who is None else cut_name(require_text(who, "who"))
         if self._feed.wants_poses:
-            self._feed.put(None if who is None else cut_name(require_text(who, "who")), None, Posed(pose, rig))
+            self._feed.put(name, None, Posed(pose, rig))
 
     def close(self) -> None:
         """Publish no more. What was watched is what it was before."""

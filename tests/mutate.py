@@ -24,17 +24,19 @@ ROOT = Path(__file__).resolve().parent.parent
 ENGINES = {
     "contextdb/core/[!p_]*.h": "test_core.py test_compiled.py test_c_rules.py test_picker.py test_batch.py covering motion",
     "contextdb/bitmask.py": "test_bitmask.py test_compiled.py",
-    "contextdb/cells/*.py": "test_cells.py test_facts.py test_compiled.py",
+    "contextdb/cells/*.py": "test_cells.py test_facts.py test_compiled.py refused_facts.md refused_compiled.md",
     "contextdb/expressions/*.py": "expressions test_when.py",
-    "contextdb/compiled/*.py": "test_compiled.py test_explain.py test_batch.py test_picker.py test_outputs.py test_artefact.py",
+    "contextdb/compiled/*.py": "test_compiled.py test_explain.py test_batch.py test_picker.py test_outputs.py test_artefact.py "
+    "refused_compiled.md refused_batch.md refused_picker.md refused_outputs.md",
     "contextdb/covering/*.py": "covering",
     "contextdb/edits/*.py": "test_edits.py",
     "contextdb/tables/merging/*.py": "test_merge.py",
-    "contextdb/motion/search/*.py": "motion/test_search.py motion/test_search_many.py",
+    "contextdb/motion/search/*.py": "motion/test_search.py motion/test_search_many.py refused_motion_database.md",
     "contextdb/motion/selection/*.py": "motion",
     "contextdb/motion/output/*.py": "motion",
 }
-"""Files, and the tests that are to notice a change of them."""
+"""Files, and the tests and transcripts that are to notice a change of them."""
+PAGE = "test_docs.py::test_a_document_shows_what_its_commands_print[tests/transcripts/{}]"
 TURNED = {"<": "<=", "<=": "<", ">": ">=", ">=": ">", "==": "!=", "!=": "==", "+": "-", "-": "+", "and": "or", "or": "and"}
 TURNED |= {"&&": "||", "||": "&&"}
 IN_C = re.compile(
@@ -93,7 +95,7 @@ def python_places(text: str) -> Iterator[tuple[int, str]]:
 
 def fails(folder: Path, tests: str, most_s: float | None) -> bool:
     """Whether a test fails, or does not end."""
-    names = [f"tests/{name}" for name in tests.split()]
+    names = [f"tests/{PAGE.format(name) if name.endswith('.md') else name}" for name in tests.split()]
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "--hypothesis-seed=1", *names]
     environment = os.environ | {"PYTHONPATH": str(folder), "TMPDIR": str(folder)}
     try:

@@ -68,27 +68,6 @@ def test_effects_are_those_that_trying_every_context_finds(old, new):
     assert inside(found.closed, after) == without(holding(after), holding(before))
 
 
-def test_an_asset_gains_what_its_cell_holds_more():
-    found = effects(table(("a", "True", "N", "Any")), table(("a", "True", "N E", "Any")))
-    (reach,) = found.assets
-    assert [box.cells for box in reach.gained] == [{"air": "True", "way": "E"}]
-    assert (reach.lost, reach.share_lost) == ((), 0.0)
-    assert reach.share_gained == pytest.approx(1 / 6)
-    assert (reach.before, reach.after) == (pytest.approx(1 / 6), pytest.approx(2 / 6))
-
-
-def test_an_asset_in_two_rows_loses_only_what_neither_holds_any_more():
-    rows = (("a", "True", "Any", "Any"), ("a", "Any", "N", "Any"))
-    (reach,) = effects(table(*rows), table(rows[1])).assets
-    assert reach.share_lost == pytest.approx(2 / 6)
-    assert [box.cells for box in reach.lost] == [{"air": "True", "way": "E S"}]
-
-
-def test_a_renamed_asset_with_the_same_cells_gains_and_loses_nothing():
-    rows = (("a", "True", "N", "Any"), ("b", "False", "S", "True"))
-    assert not effects(table(*rows), table(("new", *rows[0][1:]), rows[1]))
-
-
 def test_a_column_of_another_type_is_refused_with_its_name():
     before = Table.from_columns({"Asset": ["a"], "x": ["True"]}, schema={"x": {"type": "bool"}})
     after = Table.from_columns({"Asset": ["a"], "x": ["5"]}, schema={"x": {"type": "number"}})
@@ -123,12 +102,6 @@ def test_a_merge_tells_the_contexts_that_both_sides_covered():
     found = merge_effects(ours, theirs, merged)
     assert inside(found.opened, merged) == without(holding(ours), holding(merged))
     assert not merge_effects(ours, merged, merged)
-
-
-def test_two_boxes_meet_in_the_cells_that_both_hold():
-    conditions = {column.condition.name: column.condition for column in table(("a", "", "", "")).conditions}
-    assert meet({"way": "N E"}, {"way": "E S", "on": "True"}, conditions) == [{"way": "E", "on": "True"}]
-    assert meet({"way": "N"}, {"way": "E"}, conditions) == []
 
 
 def test_tags_that_no_single_cell_holds_are_told_in_several():

@@ -236,13 +236,6 @@ def test_a_set_of_facts_is_added_as_a_whole():
     assert mend_of("number", "5..3", cell("Any")) == "Any"
 
 
-def test_only_any_accepts_a_missing_fact():
-    assert mend_of("number", "0..5", None, "never") == "Any"
-    assert mend_of("text", "run", None, "never") == "Any"
-    (failure,) = table_of("number", "0..5").explain({}, unknown="never").row(0).failures
-    assert str(failure) == "x is (missing), the cell says 0..5"
-
-
 # ---- the words, and asking for one row
 
 
@@ -313,10 +306,6 @@ def test_a_disabled_row_is_not_valid_and_says_so():
     assert str(explanation.row(2)) == "c: x is 1, the cell says 3; the row is disabled"
     assert explanation._order.tolist() == [0, 1, 2]
     assert explanation._n_failures.tolist() == [1, 1, 2]
-
-
-def test_a_soft_cell_never_fails():
-    assert table_of("number", "1 ~2.5", "5..3 ~1").explain({"x": 9})._n_failures.tolist() == [0, 0]
 
 
 def test_a_fact_that_cannot_be_used_is_refused_as_in_a_query():

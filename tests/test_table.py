@@ -42,11 +42,6 @@ def test_the_first_column_names_the_assets_unless_the_settings_say_otherwise():
     assert Table.from_columns({"Anim": ["run"], "speed": ["0..5"]}, DECLARED).assets == ["run"]
 
 
-def test_two_rows_may_name_the_same_asset():
-    table = Table.from_columns({"Asset": ["run", "run"], "speed": ["0..5", "3..9"]}, DECLARED)
-    assert table.compile().query({"speed": 4}).assets == ["run", "run"]
-
-
 def test_outputs_and_settings_columns_are_no_conditions():
     settings = TableSettings("t", outputs=("Slots",), enabled="On", priority="P", weight="W")
     columns = {"Asset": ["run"], "Slots": ["a"], "On": ["True"], "P": ["1"], "W": ["2"], "speed": ["0..5"]}
@@ -99,40 +94,12 @@ def test_an_edit_to_a_text_that_the_column_has_reads_no_cell_anew():
     assert edited.compile().query({"speed": 9, "state": "Air"}).assets == []
 
 
-def test_an_edited_asset_or_setting_is_seen():
-    settings = TableSettings("t", enabled="On")
-    table = Table.from_columns({"Asset": ["a", "b"], "On": ["True", "True"]}, settings=settings)
-    assert table.compile().query({}).assets == ["a", "b"]
-    assert table.with_cells([(0, "Asset", "c"), (1, "On", "no")]).compile().query({}).assets == ["c"]
-
-
-def test_many_cells_are_edited_at_once_and_the_last_one_wins():
-    edited = TABLE.with_cells([(0, "speed", "1"), (2, "state", "Air"), (0, "speed", "2")])
-    assert edited.text_column("speed").to_list() == ["2", "Any", "0..3"]
-    assert edited.text_column("state").to_list() == ["Ground", "Air", "Air"]
-
-
-def test_an_edit_that_cannot_be_read_is_kept_and_told_and_can_be_mended():
-    edited = TABLE.with_cell(2, "state", "Grond")
-    assert edited.text(2, "state") == "Grond"
-    (fault,) = edited.faults
-    assert str(fault) == 'row 3, column "state": "Grond" is not a declared value. Accepted: "Ground", "Air". Did you mean "Ground"?'
-    assert edited.with_cell(2, "state", "Ground").faults == []
-    assert edited.with_rows_taken([0, 1]).faults == []
-
-
 def test_new_rows_are_any_where_nothing_is_said():
     table = TABLE.with_rows(1, [{"Asset": "idle"}, {"Asset": "dive", "speed": "9.."}])
     assert table.assets == ["run", "idle", "dive", "jump", "fall"]
     assert table.text_column("speed").to_list() == ["3..6", "", "9..", "Any", "0..3"]
     assert table.origin.tolist() == [0, -1, -1, 1, 2]
     assert table.compile().query({"speed": 20, "state": "Air"}).assets == ["idle", "dive", "jump"]
-
-
-def test_new_rows_may_stand_at_either_end():
-    assert TABLE.with_rows(0, [{"Asset": "x"}]).assets == ["x", "run", "jump", "fall"]
-    assert TABLE.with_rows(3, [{"Asset": "x"}]).assets == ["run", "jump", "fall", "x"]
-    assert TABLE.with_rows(1, []).assets == TABLE.assets
 
 
 def test_taken_rows_come_in_the_order_given_and_know_where_they_came_from():

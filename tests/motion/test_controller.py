@@ -5,7 +5,6 @@ import random
 from itertools import pairwise
 
 import numpy as np
-import played
 import pytest
 from lines import DT, RATE, line
 from made_once import make_clip
@@ -43,32 +42,6 @@ def at(decision):
 
 
 # ---- starting, playing on, jumping
-
-
-def test_the_first_update_starts_the_best_frame():
-    one = controller(line(walk=range(10)))
-    decision = one.update(DT, [4.2])
-    assert (decision.action, decision.searched, at(decision)) == (Action.START, True, ("walk", 0.4))
-    assert (decision.tick, decision.before) == (0, None)
-    assert decision.cost == pytest.approx(0.04)
-    assert decision.why == "Nothing was playing: walk at 0.40 s costs 0.04."
-
-
-def test_playing_on_moves_as_fast_as_time_passes_whatever_the_size_of_the_steps():
-    one, other = controller(line(walk=range(30)), search_every_s=60.0), controller(line(walk=range(30)), search_every_s=60.0)
-    for each, step in ((one, 0.01), (other, 0.25)):
-        each.update(0.0, [0.0])
-        for _ in range(round(2.0 / step)):
-            decision = each.update(step, [0.0])
-        assert decision.action is Action.CONTINUE
-        assert decision.playing.time_s == pytest.approx(2.0)
-        assert decision.playing.frame == 20
-
-
-def test_a_moment_between_two_frames_counts_as_the_nearer_one():
-    one = controller(line(walk=range(10)), search_every_s=60.0)
-    one.update(0.0, [0.0])
-    assert [one.update(0.04, [0.0]).playing.frame for _ in range(6)] == [0, 1, 1, 2, 2, 2]
 
 
 def test_the_continuing_pose_wins_though_another_frame_is_a_little_better_and_loses_when_it_is_much_better():
@@ -114,15 +87,6 @@ def test_the_cost_of_playing_on_is_exact_in_a_database_of_many_channels():
 # ---- when to search
 
 
-def test_between_two_searches_it_plays_on_whatever_the_query():
-    one = controller(line(walk=range(30), run=range(100, 130)), search_every_s=0.3)
-    decisions = [one.update(DT, [place]) for place in (0.0, 100.0, 100.0, 100.0, 101.0)]
-    assert [decision.searched for decision in decisions] == [True, False, False, True, False]
-    assert [at(decision)[0] for decision in decisions] == ["walk", "walk", "walk", "run", "run"]
-    assert decisions[1].why == "The next search is due in 0.2 s."
-    assert (decisions[1].choice, decisions[1].cost, decisions[1].continuing_cost) == (None, None, None)
-
-
 def test_a_forced_search_does_not_wait_and_what_plays_may_win_it():
     one = controller(line(walk=range(30), run=range(100, 130)), search_every_s=60.0)
     one.update(DT, [0.0])
@@ -154,13 +118,6 @@ def test_frames_within_the_jump_threshold_of_the_playing_one_are_no_candidates()
     assert at(one.update(0.0, [10.0], valid("walk"))) == ("walk", 1.0)
 
 
-def test_tags_that_no_longer_fit_let_it_play_on():
-    one = controller(line("walk,Calm,,,\nrun,Fast,,,", walk=range(10), run=range(50, 60)))
-    one.update(DT, [0.0], tags=TagFilter("Calm"))
-    assert at(one.update(DT, [1.0], tags=TagFilter("Fast"))) == ("walk", 0.1)
-    assert at(one.update(DT, [30.0], tags=TagFilter("Fast"))) == ("run", 0.0)
-
-
 # ---- ends
 
 
@@ -185,34 +142,7 @@ def test_a_clip_that_has_ended_is_held_when_nothing_else_may_play():
         assert decision.why == "stop has ended and nothing else may play: its last frame is held."
 
 
-def test_a_looping_range_goes_on_at_its_start_without_a_search():
-    one = controller(line("walk,Looping,,,", walk=[0, 1, 2, 3, 0]), search_every_s=1e6)
-    one.update(DT, [0.0])
-    decisions = [one.update(DT, [0.0]) for _ in range(5)]
-    assert [at(decision)[1] for decision in decisions] == [0.1, 0.2, 0.3, 0.4, 0.1]
-    assert [decision.action for decision in decisions] == [Action.CONTINUE] * 4 + [Action.LOOP]
-    assert not any(decision.searched for decision in decisions)
-    assert one.update(0.4 * 1000 + 0.1, [0.0]).playing.time_s == pytest.approx(0.2)
-
-
-def test_an_excluded_frame_ahead_ends_the_clip():
-    one = controller(line("walk,Excluded,0.3,0.4,", walk=range(8)), search_every_s=60.0)
-    one.update(DT, [1.0])
-    assert at(one.update(DT, [1.0])) == ("walk", 0.2)
-    decision = one.update(DT, [1.0])
-    assert decision.why.startswith("walk has ended: ")
-    assert decision.before.frame == 2
-
-
 # ---- what the table says
-
-
-def test_an_asset_that_is_no_longer_valid_is_left_at_once():
-    one = controller(line(walk=range(10), run=range(50, 60)), search_every_s=60.0)
-    one.update(DT, [0.0])
-    decision = one.update(DT, [1.0], valid("run"))
-    assert (decision.action, at(decision)) == (Action.JUMP, ("run", 0.0))
-    assert decision.why.startswith("walk is not valid any more: run at 0.00 s")
 
 
 def test_an_asset_that_is_no_longer_valid_plays_on_when_nothing_else_may_and_says_so():
@@ -222,14 +152,6 @@ def test_an_asset_that_is_no_longer_valid_plays_on_when_nothing_else_may_and_say
     assert (decision.action, at(decision), decision.searched) == (Action.CONTINUE, ("walk", 0.1), True)
     assert decision.why == "walk is not valid any more, but nothing else may play: walk plays on."
     assert not decision.choice
-
-
-def test_with_nothing_valid_nothing_plays_and_the_next_update_tries_again():
-    one = controller(line(walk=range(10)), search_every_s=60.0)
-    decision = one.update(DT, [0.0], valid("swim"))
-    assert (decision.action, decision.playing, decision.cost) == (Action.NOTHING, None, None)
-    assert decision.why == "Nothing was playing, and nothing may play."
-    assert one.update(DT, [0.0]).action is Action.START
 
 
 # ---- several databases
@@ -402,13 +324,6 @@ def test_a_recorder_is_handed_every_decision_with_the_candidates_it_wants():
     assert candidates.rows[0].cost == decisions[1].cost
 
 
-def test_recording_changes_no_decision():
-    asked = [[math.sin(i) * 5.0 + 5.0] for i in range(40)]
-    database = line(walk=range(10), run=range(2, 12))
-    plain, recorded = controller(database), controller(database, recorder=Recorder(3))
-    assert [told(plain.update(DT, place)) for place in asked] == [told(recorded.update(DT, place)) for place in asked]
-
-
 def test_a_decision_that_is_read_late_says_what_it_said_at_once():
     asked = [[math.sin(i) * 5.0 + 5.0] for i in range(40)]
     database = line(walk=range(10), run=range(2, 12))
@@ -432,24 +347,6 @@ def test_what_was_entered_just_now_is_left_for_a_large_gain_alone_and_says_so():
     later = [one.update(DT, [float(tick)]) for tick in range(2, 10)][-1]
     assert later.playing.asset == "walk"
     assert one.update(DT, [7.5]).action is Action.JUMP
-
-
-def test_an_asset_that_was_played_lately_is_entered_again_in_none_of_its_forms_until_its_time_is_over():
-    one, rng = Controller(Selector([Entry("a", played.database())]), ControllerSettings(asset_history_s=2.0)), random.Random(3)
-    last, entered = {}, []
-    for tick in range(1200):
-        decision = one.update(1 / 30, [rng.gauss(0.0, 0.2) for _ in range(3)], interrupt=tick % 40 == 0)
-        if decision.action is Action.JUMP:
-            entered.append((decision.playing.mirrored, tick - last.get(decision.playing.asset, -99)))
-        last[decision.playing.asset] = tick
-    assert 60 <= min(ticks for _, ticks in entered) < 64
-    assert {is_mirrored for is_mirrored, _ in entered} == {False, True}
-
-
-def test_where_nothing_else_may_play_an_asset_that_is_barred_is_held():
-    one = controller(line(walk=range(3)), asset_history_s=0.5)
-    actions = [one.update(DT, [0.0]).action for _ in range(8)]
-    assert actions == [Action.START, Action.CONTINUE, Action.CONTINUE, *[Action.HOLD] * 4, Action.JUMP]
 
 
 def test_what_was_entered_just_now_is_left_at_once_when_the_body_is_to_stand():

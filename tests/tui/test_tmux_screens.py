@@ -134,7 +134,7 @@ SCREENS = (
     Screen(xterm("f9") + xterm("delete"), "It cannot be undone", "SureDialog Dialog", leaves=ESC + ESC),
     Screen(
         "\r",
-        "names the assets",
+        "type to filter",
         "ChooseDialog",
         leaves=ESC + ESC,
         before=((named("import"), "Enter read"), ("../cells.csv\r", "Becomes")),

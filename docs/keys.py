@@ -62,7 +62,7 @@ SECTIONS = {
     "Save the test row": ("KeepDialog",),
     "Open a file of contexts": ("OpenDialog",),
     "Follow a game": ("LiveDialog",),
-    "Import": ("ImportDialog", "RowsDialog", "ChoiceDialog"),
+    "Import": ("ImportDialog", "RowsDialog"),
     "Remarks of an import": ("RemarksDialog",),
     "Export": ("ExportDialog",),
     "Unsaved edits": ("LeavingDialog",),

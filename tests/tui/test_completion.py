@@ -315,6 +315,7 @@ def test_what_a_cell_means(text, domain, said):
         ("Half Back", CHART, "is Half Back"),
         ("CB FS", CHART, "may be 2 of 5 declared values"),
         ("InAir Stunned", MOVES, "has InAir Stunned"),
+        ("+InAir -Stunned", MOVES, "has InAir, has not Stunned; it may have others"),
         ("3", SPEED, "exactly 3"),
         ("1..2", SPEED, "may be 1 to 2, ends included"),
     ],

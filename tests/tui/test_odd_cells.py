@@ -11,6 +11,7 @@ from terminal import press, screen_text, with_editor
 from contextdb.checks.run import check
 from contextdb.tables.table import Table
 from tui.model.sheet import Sheet
+from tui.model.window import Window
 
 RULES = ("outside-domain", "empty-cell", "duplicate-asset")
 
@@ -23,6 +24,10 @@ def test_a_cell_is_marked_where_check_warns_of_it(table: Table):
     warned = {(finding.row, finding.column) for finding in findings}
     first = {(finding.by[0], finding.column) for finding in findings if finding.rule == "duplicate-asset"}
     assert marked == warned | first
+    window = Window(sheet, 0, max(table.n_rows, 1))
+    assert not [
+        place for place in marked if window.cell(place[0], names.index(place[1]))[1] == "any"
+    ]  # so that it is not asked there
 
 
 def test_the_sheet_marks_it_and_the_line_of_the_cell_says_why_also_after_an_edit(tmp_path: Path):

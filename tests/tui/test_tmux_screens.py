@@ -134,8 +134,8 @@ SCREENS = (
     Screen(xterm("f9") + xterm("delete"), "It cannot be undone", "SureDialog Dialog", leaves=ESC + ESC),
     Screen(
         "\r",
-        "Esc as it was",
-        "ChoiceDialog LineList Dialog",
+        "type to filter",
+        "ChooseDialog",
         leaves=ESC + ESC,
         before=((named("import"), "Enter read"), ("../cells.csv\r", "Becomes")),
     ),

@@ -57,7 +57,8 @@ def _fact_meaning(text: str, condition: Condition) -> Meaning:
     if fact is None:
         return Meaning("not given")
     if isinstance(fact, Cell):
-        return Meaning(f"may be {_words_of(text, fact, condition)}", cell=fact)
+        words = _words_of(text, fact, condition)
+        return Meaning(f"{words}; it may have others" if domain.type.is_tags else f"may be {words}", cell=fact)
     description = describe(fact, domain)
     if domain.type.is_numeric:
         return Meaning(f"exactly {description} {condition.unit}".rstrip(), cell=parse_cell(description, domain))

@@ -392,11 +392,9 @@ class AssetsPane(SheetView):
         event.stop()
         doubt = event.doubt
 
-        def chosen(at: int | None) -> None:
-            if at is not None:
-                event.paste(doubt.ways[at][1], True)
-
-        self.app.push_screen(ChooseDialog(doubt.question, [label for label, _ in doubt.ways]), chosen)
+        ChooseDialog(doubt.question, [label for label, _ in doubt.ways]).ask(
+            self.app, lambda at: event.paste(doubt.ways[at][1], True)
+        )
 
     async def action_insert_copied(self) -> None:
         """Put what was copied into new rows above the cursor's."""
@@ -462,12 +460,12 @@ class AssetsPane(SheetView):
         asset, name = sheet.text(row, sheet.asset_at), sheet.table.columns[column].name
         before = sheet.marks.texts.get((asset, name), "")
 
-        def noted(text: str | None) -> None:
-            if text is not None and text.strip() != before:
+        def noted(text: str) -> None:
+            if text.strip() != before:
                 self.mark(lambda marks: marks.with_note(asset, name, text), "Note saved." if text.strip() else "Note removed.")
 
         question = f"A note on {name} of {asset}, for people; empty takes it away"
-        self.app.push_screen(AskDialog("Note", question, before, lambda _: ""), noted)
+        AskDialog("Note", question, before, lambda _: "").ask(self.app, noted)
 
     def action_colour_rows(self) -> None:
         """Ask for a colour of the selected rows."""
@@ -475,15 +473,14 @@ class AssetsPane(SheetView):
         assets = [sheet.table.columns[sheet.asset_at][row] for row in sheet.selected_rows]
         words = [*COLOURS, "none"]
 
-        def chosen(at: int | None) -> None:
-            if at is not None:
-                colour = "" if words[at] == "none" else words[at]
-                message = f"{plural(len(assets), 'row')} {f'marked {colour}' if colour else 'without a colour'}."
-                self.mark(lambda marks: marks.with_colour(assets, colour), message)
+        def chosen(at: int) -> None:
+            colour = "" if words[at] == "none" else words[at]
+            message = f"{plural(len(assets), 'row')} {f'marked {colour}' if colour else 'without a colour'}."
+            self.mark(lambda marks: marks.with_colour(assets, colour), message)
 
         if assets:
             now = sheet.marks.colours.get(assets[0], "none")
-            self.app.push_screen(ChooseDialog("Colour of the rows", words, words.index(now)), chosen)
+            ChooseDialog("Colour of the rows", words, words.index(now)).ask(self.app, chosen)
 
     def mark(self, change: Callable[[Notes], Notes], message: str) -> None:
         """Change the notes as they are on the disk now, so that nobody else's are lost."""
@@ -505,7 +502,7 @@ class AssetsPane(SheetView):
         """Ask for a row, by its number or its asset, or for a column."""
         question = "A row's number, or the beginning of the name of an asset or a column"
         dialog = AskDialog("Go to", question, "", self._check_place)
-        self.app.push_screen(dialog, self._went)
+        dialog.ask(self.app, self._went)
 
     def _check_place(self, text: str) -> str:
         if text.strip().isdigit():
@@ -528,9 +525,7 @@ class AssetsPane(SheetView):
         beginning = (row for name, row in names if word and name.startswith(word))
         return next(beginning, next((row for name, row in names if word and word in name), None))
 
-    def _went(self, text: str | None) -> None:
-        if text is None:
-            return
+    def _went(self, text: str) -> None:
         row = int(text) - 1 if text.strip().isdigit() else self._row_named(text)
         column = self._column_named(text, is_whole=True) or (self._column_named(text) if row is None else None)
         if column is not None:
@@ -542,11 +537,11 @@ class AssetsPane(SheetView):
         """Ask for another name of the cursor's column."""
         name = self.sheet.table.columns[self.sheet.selection.column].name
 
-        def renamed(text: str | None) -> None:
-            if text is not None and text != name:
+        def renamed(text: str) -> None:
+            if text != name:
                 self.post_message(RenameWanted(name, text))
 
-        self.app.push_screen(AskDialog("Rename the column", f"Another name for {name}", name, self._check_name), renamed)
+        AskDialog("Rename the column", f"Another name for {name}", name, self._check_name).ask(self.app, renamed)
 
     def _check_name(self, text: str) -> str:
         others = {c.name for c in self.sheet.table.columns} - {self.sheet.table.columns[self.sheet.selection.column].name}

@@ -262,12 +262,10 @@ class CoveragePane(Pane):
         if not self._is_on_gap():
             return
 
-        def named(text: str | None) -> None:
-            if text is not None:
-                self._work_on(lambda table, gaps, at: self.desk.give(table, gaps, at, text))
-
         question = "Who makes the animation for this gap? Empty: nobody yet"
-        self.app.push_screen(AskDialog("Owner", question, self.desk.last_owner, owner_fault), named)
+        AskDialog("Owner", question, self.desk.last_owner, owner_fault).ask(
+            self.app, lambda text: self._work_on(lambda table, gaps, at: self.desk.give(table, gaps, at, text))
+        )
 
     def _show_section(self) -> None:
         name = SECTIONS[self.section]
@@ -382,14 +380,14 @@ class CoveragePane(Pane):
     def action_read_files(self) -> None:
         """Ask for recorded moments: a file, or a pattern of files."""
 
-        def named(text: str | None) -> None:
-            if text is not None and text.strip():
+        def named(text: str) -> None:
+            if text.strip():
                 path = self.folder / Path(text.strip()).expanduser()
                 self.played.start(self.sheet.table, str(path), text.strip(), self._tell)
                 self.action_section(SECTIONS.index("played"))
 
         question = "A file of recorded moments, or a pattern: session.jsonl, telemetry/*.parquet"
-        self.app.push_screen(AskDialog("Recorded moments", question, "", lambda _: ""), named)
+        AskDialog("Recorded moments", question, "", lambda _: "").ask(self.app, named)
 
     def action_read_live(self) -> None:
         """Take the moments of the game that the test row follows."""

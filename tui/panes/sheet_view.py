@@ -50,9 +50,7 @@ class SheetView(Pane):
 
         column = self.sheet.selection.column
 
-        def decided(answer: ValuesAnswer | None) -> None:
-            if answer is None:
-                return
+        def decided(answer: ValuesAnswer) -> None:
             if answer.act == "mend":
                 self._try(lambda: self.sheet.mend_all(answer.texts), SLOW * len(answer.texts))
             elif answer.act in ("only", "without"):
@@ -60,7 +58,7 @@ class SheetView(Pane):
             else:
                 self._ask_value(answer.act == "rename", answer.texts)
 
-        self.app.push_screen(ValuesDialog(self.sheet, column), decided)
+        ValuesDialog(self.sheet, column).ask(self.app, decided)
 
     def _show_only(self, column: int, texts: Sequence[str], is_without: bool) -> None:
         name, wanted = self.sheet.table.columns[column].name, self.sheet.filter
@@ -80,8 +78,8 @@ class SheetView(Pane):
             else "The text to write instead"
         )
 
-        def named(text: str | None) -> None:
-            if text is None or text == old:
+        def named(text: str) -> None:
+            if text == old:
                 return
             if is_rename:
                 name = self.sheet.table.columns[self.sheet.selection.column].name
@@ -89,7 +87,7 @@ class SheetView(Pane):
             else:
                 self._try(lambda: self.sheet.replace_value(texts, text))
 
-        self.app.push_screen(AskDialog("Rename the value" if is_rename else "Replace everywhere", what, old, lambda _: ""), named)
+        AskDialog("Rename the value" if is_rename else "Replace everywhere", what, old, lambda _: "").ask(self.app, named)
 
     def action_hide_columns(self) -> None:
         self.sheet.hide_columns()
@@ -133,7 +131,7 @@ class SheetView(Pane):
             if answer.wants_sheet:
                 self.call_later(self.run_action, "screen.column_sheet")
 
-        self.app.push_screen(ColumnsDialog(self.sheet), decided)
+        ColumnsDialog(self.sheet).ask(self.app, decided)
 
     def go_to_column(self, name: str) -> None:
         """Put the cursor on a column, which is displayed if it was hidden."""

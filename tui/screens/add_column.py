@@ -44,8 +44,9 @@ class AddColumn(Dialog[Insertion]):
     DEFAULT_CSS = """
     AddColumn {
         & #dialog-body { overflow-y: auto; }
-        & #column-list { height: auto; max-height: 25vh; border: none; padding: 0; margin: 1 0 0 0; background: $surface; }
+        & #column-list { height: auto; max-height: 6; border: none; padding: 0; margin: 1 0 0 0; background: $surface; }
         & #column-list { text-wrap: nowrap; text-overflow: ellipsis; }
+        &.-tall #column-list { max-height: 12; }
         & #column-about { height: auto; color: $text-muted; margin: 1 0 0 0; }
         & #column-form, & #field-where { margin: 1 0 0 0; }
         & #field-where.-tight { margin: 0; }

@@ -79,13 +79,12 @@ class TestRow:
     def contexts(self) -> None:
         """Look through saved or recorded contexts."""
 
-        def loaded(answer: Loaded | None) -> None:
-            if answer is not None:
-                self.list = answer.contexts
-                self._load()
+        def loaded(answer: Loaded) -> None:
+            self.list = answer.contexts
+            self._load()
 
         sheet = self.session.sheet
-        self.screen.app.push_screen(ContextsDialog(sheet.table, sheet.query.texts, self.list, bool(sheet.query.actors)), loaded)
+        ContextsDialog(sheet.table, sheet.query.texts, self.list, bool(sheet.query.actors)).ask(self.screen.app, loaded)
 
     def step(self, by: int) -> None:
         """Load the next context, or the one before; of the saved ones where none were looked at yet."""
@@ -118,13 +117,12 @@ class TestRow:
             self.screen.say("This table has no roles: a condition of one is named like Defender.DepthChart.")
             return
 
-        def decided(teams: Teams | None) -> None:
-            if teams is not None:
-                sheet.ask("the actors", actors=teams.offered)
-                self.screen.assets.refresh_valid()
-                self.screen.show()
+        def decided(teams: Teams) -> None:
+            sheet.ask("the actors", actors=teams.offered)
+            self.screen.assets.refresh_valid()
+            self.screen.show()
 
-        self.screen.app.push_screen(ActorsDialog(sheet.table, self._teams(), self.screen.clipboard), decided)
+        ActorsDialog(sheet.table, self._teams(), self.screen.clipboard).ask(self.screen.app, decided)
 
     def _teams(self) -> Teams:
         """The actors for the table as it is; at first those of the file next to it."""
@@ -144,11 +142,7 @@ class TestRow:
 
         dialog = NextPicksDialog(sheet.query.answer, sheet.table.asset_column)
 
-        def chosen(answer: GoToCell | None) -> None:
-            if answer is not None:
-                self.screen.go_to_cell(answer)
-
-        self.screen.app.push_screen(dialog, chosen)
+        dialog.ask(self.screen.app, self.screen.go_to_cell)
 
     def why(self) -> None:
         """Why the row of the cursor is not valid, and which rows are nearest."""
@@ -157,11 +151,9 @@ class TestRow:
             self.screen.say(NO_FACTS)
             return
         row = int(sheet.view.rows[sheet.cursor[0]]) if len(sheet.view) else None
-        self.screen.app.push_screen(NearestDialog(sheet.query, sheet.table, row), self._answered)
+        NearestDialog(sheet.query, sheet.table, row).ask(self.screen.app, self._answered)
 
-    def _answered(self, answer: CellAnswer | None) -> None:
-        if answer is None:
-            return
+    def _answered(self, answer: CellAnswer) -> None:
         self.screen.go_to_cell(GoToCell(answer.row, answer.column))
         if answer.text is not None:
             self.screen.apply(set_cells(self.session.sheet.table, [(answer.row, answer.column, answer.text)]))

@@ -315,7 +315,7 @@ class ContextsDialog(Dialog[Loaded]):
         self._show_all()
 
     def action_keep(self) -> None:
-        self.app.push_screen(KeepDialog(self.contexts, self.facts, has_actors=self.has_actors), self._keep)
+        KeepDialog(self.contexts, self.facts, has_actors=self.has_actors).ask(self.app, self._keep)
 
     def action_update(self) -> None:
         """Save the test row in the place of the chosen case."""
@@ -323,13 +323,11 @@ class ContextsDialog(Dialog[Loaded]):
         if i is None or not self.contexts.cases:
             return
         case = self.contexts.cases[i]
-        self.app.push_screen(
-            KeepDialog(self.contexts, self.facts, SavedCase(case.name, case.expected, case.note), self.has_actors), self._keep
+        KeepDialog(self.contexts, self.facts, SavedCase(case.name, case.expected, case.note), self.has_actors).ask(
+            self.app, self._keep
         )
 
-    def _keep(self, case: SavedCase | None) -> None:
-        if case is None:
-            return
+    def _keep(self, case: SavedCase) -> None:
         self._change(
             lambda: self.contexts.keep(case.name, self.facts, case.expected, case.note), f"{in_quotes(case.name)} is saved."
         )

@@ -5,10 +5,10 @@ A dialog is given what it shows, and gives back what was decided, or None. It ch
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, ClassVar, Generic, TypeVar
 
-from textual.app import ComposeResult
+from textual.app import App, ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Vertical
 from textual.content import Content
@@ -67,6 +67,15 @@ class Dialog(ModalScreen[Answer | None], Generic[Answer]):
             yield from self.compose_body()
         box.border_title = self.title_text
         box.border_subtitle = self.keys_text
+
+    def ask(self, app: App[Any], then: Callable[[Answer], object]) -> None:
+        """Show the box, and go on with its answer; it may be left without one."""
+
+        def left(answer: Answer | None) -> None:
+            if answer is not None:
+                then(answer)
+
+        app.push_screen(self, left)
 
     def compose_body(self) -> ComposeResult:
         """What is in the box."""

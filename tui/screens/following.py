@@ -203,16 +203,15 @@ class Following:
         sheet = self.session.sheet
         contexts, facts, actors = ContextList.beside(sheet.table), dict(sheet.query.texts), bool(sheet.query.actors)
 
-        def save(answer: SavedCase | None) -> None:
-            if answer is not None:
-                try:
-                    contexts.keep(answer.name, facts, answer.expected, answer.note)
-                except ContextDBError as error:
-                    self.screen.say(str(error), "error")
-                else:
-                    self.screen.say(f"{answer.name} is saved. F9 shows the saved contexts.")
+        def save(answer: SavedCase) -> None:
+            try:
+                contexts.keep(answer.name, facts, answer.expected, answer.note)
+            except ContextDBError as error:
+                self.screen.say(str(error), "error")
+            else:
+                self.screen.say(f"{answer.name} is saved. F9 shows the saved contexts.")
 
-        self.screen.app.push_screen(KeepDialog(contexts, facts, has_actors=actors), save)
+        KeepDialog(contexts, facts, has_actors=actors).ask(self.screen.app, save)
 
     def _hold(self, at: int) -> None:
         self.at, self.is_paused = at, True

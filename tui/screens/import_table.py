@@ -25,14 +25,15 @@ from contextdb.exchange.importing import NAMES, Choices, choices_of, remember
 from contextdb.exchange.reading import SheetWanted, TableWanted
 from contextdb.tables.table import Table
 
-from ..model.importing import DECIMAL_COMMA, MODES, Choice, Draft, Import, Mode, suffixes_read, why_not
+from ..model.importing import DECIMAL_COMMA, MODES, Draft, Import, Mode, suffixes_read, why_not
 from ..model.paths import resolved
 from ..widgets.cursor_lines import UP_DOWN
 from ..widgets.field import Field
 from ..widgets.line_list import LineList, ListCell, ListColumn
 from ..widgets.pick import Pick
+from .ask import ChooseDialog
 from .choose_rows import RowsDialog, first_header
-from .dialog import Dialog, buttons
+from .dialog import buttons
 from .path_dialog import PathDialog
 
 BY_ITSELF = "by its content"
@@ -42,35 +43,6 @@ THE_USUAL = "names as usual"
 DECIMALS = [("0,5 as usual", ""), (DECIMAL_COMMA, "comma"), ("0,5 is 0 ± 5", "point")]
 PAIRS = [("min, max joined", ""), ("min, max apart", "apart")]
 COLUMNS = (ListColumn("Column", 18, 2, is_name=True), ListColumn("First cells", 12, 3), ListColumn("Becomes", 20, 3))
-
-
-class ChoiceDialog(Dialog[Choice]):
-    """What one column of the file becomes."""
-
-    DEFAULT_CSS = """
-    ChoiceDialog { & LineList { height: 14; } }
-    """
-    keys_text = "Enter choose · ↑↓ · Esc as it was"
-
-    def __init__(self, column: str, choices: Sequence[Choice], becomes: str) -> None:
-        super().__init__()
-        self.title_text = f"What {column} becomes"
-        self.choices = choices
-        self.becomes = becomes
-
-    def compose_body(self) -> ComposeResult:
-        yield LineList([ListColumn("Becomes", 24, 1), ListColumn("", 20, 1)], id="choice-lines")
-
-    def on_mount(self) -> None:
-        """Stand on what it becomes now."""
-        here = next((at for at, choice in enumerate(self.choices) if choice.label == self.becomes), 0)
-        lines = self.query_one(LineList)
-        lines.show(len(self.choices), lambda at: (self.choices[at].label, (self.choices[at].about, "muted")), here)
-        lines.focus()
-
-    @on(LineList.Chosen)
-    def _chosen(self, event: LineList.Chosen) -> None:
-        self.dismiss(self.choices[event.index])
 
 
 class ImportDialog(PathDialog[Import]):
@@ -371,13 +343,17 @@ class ImportDialog(PathDialog[Import]):
         if draft is None:
             return
 
-        def decided(choice: Choice | None) -> None:
-            if choice is not None:
-                draft.choose(at, choice.mapped)
-                self._columns = draft.choices.columns
-                self._show_columns(at)
+        choices, now = draft.choices_for(at), draft.label(at)
+        width = max(len(choice.label) for choice in choices)
+        here = next((place for place, choice in enumerate(choices) if choice.label == now), 0)
 
-        self.app.push_screen(ChoiceDialog(draft.columns[at].source, draft.choices_for(at), draft.label(at)), decided)
+        def decided(place: int) -> None:
+            draft.choose(at, choices[place].mapped)
+            self._columns = draft.choices.columns
+            self._show_columns(at)
+
+        lines = [f"{choice.label:<{width}}  {choice.about}" for choice in choices]
+        ChooseDialog(f"What {draft.columns[at].source} becomes", lines, here).ask(self.app, decided)
 
     @on(Select.Changed, "#import-mode")
     def _mode(self, event: Select.Changed) -> None:

@@ -153,12 +153,12 @@ class LiveDialog(Dialog[Followed]):
         self.dismiss(Followed(key, Listening(game.game, game.path, wanted)))
 
     def action_open_file(self) -> None:
-        def named(text: str | None) -> None:
-            if text is not None and text.strip():
+        def named(text: str) -> None:
+            if text.strip():
                 self._open(self.folder / Path(text.strip()).expanduser())
 
         dialog = AskDialog("Open a recording", "A file of `contextdb live --record` (.jsonl)", "", lambda _: "")
-        self.app.push_screen(dialog, named)
+        dialog.ask(self.app, named)
 
     @work(thread=True, exclusive=True)
     def _open(self, path: Path) -> None:

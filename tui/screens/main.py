@@ -17,7 +17,7 @@ from contextdb.tables.changes import Edit
 from contextdb.tables.table import Table
 
 from ..commands import ASSETS, BY_ID, SCREEN, bindings, key_names
-from ..messages import Edited, FillGap, GoToCell, RenameWanted, SetContext, ValueRenameWanted
+from ..messages import Edited, FillGap, GoToCell, RenameWanted, ValueRenameWanted
 from ..model.importing import Import
 from ..model.new_table import make_table, name_fault
 from ..panes.why import WIDE
@@ -71,11 +71,11 @@ class MainScreen(TableScreen):
         names = list(self.workspace.files)
         lines = [f"{name}{' *' if name in self.workspace.unsaved else ''}" for name in names]
 
-        def chosen(at: int | None) -> None:
-            if at is not None and names[at] != self.table_name:
+        def chosen(at: int) -> None:
+            if names[at] != self.table_name:
                 self.app.open_table(names[at])
 
-        self.app.push_screen(ChooseDialog("Tables", lines, names.index(self.table_name)), chosen)
+        ChooseDialog("Tables", lines, names.index(self.table_name)).ask(self.app, chosen)
 
     @on(Grid.OpenWanted)
     def _open_row(self, event: Grid.OpenWanted) -> None:
@@ -98,9 +98,7 @@ class MainScreen(TableScreen):
         """Ask for a name and a blueprint, and make a table."""
         workspace = self.workspace
 
-        def named(name: str | None) -> None:
-            if name is None:
-                return
+        def named(name: str) -> None:
             if self.session.sheet.table.schema.blueprints:
                 self._choose_blueprint(name)
             else:
@@ -108,18 +106,17 @@ class MainScreen(TableScreen):
 
         question = "The name of the table and its file"
         check = partial(name_fault, workspace.folder, taken=workspace.files)
-        self.app.push_screen(AskDialog("New table", question, "", check), named)
+        AskDialog("New table", question, "", check).ask(self.app, named)
 
     def _choose_blueprint(self, name: str) -> None:
         blueprints = self.session.sheet.table.schema.blueprints
         lines = ["only the assets", *(f"{one}: {', '.join(names)}" for one, names in blueprints.items())]
 
-        def chosen(at: int | None) -> None:
-            if at is not None:
-                conditions = [(), *blueprints.values()][at]
-                self.try_to(lambda: self._make_table(name.strip(), conditions))
+        def chosen(at: int) -> None:
+            conditions = [(), *blueprints.values()][at]
+            self.try_to(lambda: self._make_table(name.strip(), conditions))
 
-        self.app.push_screen(ChooseDialog("With the columns of a blueprint", lines), chosen)
+        ChooseDialog("With the columns of a blueprint", lines).ask(self.app, chosen)
 
     def _make_table(self, name: str, conditions: Sequence[str]) -> None:
         make_table(self.workspace.folder, name, conditions)
@@ -151,15 +148,14 @@ class MainScreen(TableScreen):
         """Ask for a name, write the table to a file of it, and go on with that one."""
         workspace = self.workspace
 
-        def named(name: str | None) -> None:
-            if name is not None:
-                suffix = self.session.path.suffix
-                self.try_to(lambda: workspace.save_as(self.table_name, name.strip(), suffix))
-                if name.strip() in workspace.files:
-                    self.app.open_table(name.strip())
+        def named(name: str) -> None:
+            suffix = self.session.path.suffix
+            self.try_to(lambda: workspace.save_as(self.table_name, name.strip(), suffix))
+            if name.strip() in workspace.files:
+                self.app.open_table(name.strip())
 
         check = partial(name_fault, workspace.folder, taken=workspace.files)
-        self.app.push_screen(AskDialog("Save as", "The name of the other table and its file", "", check), named)
+        AskDialog("Save as", "The name of the other table and its file", "", check).ask(self.app, named)
 
     def action_import(self) -> None:
         """Bring rows in from another file."""
@@ -168,11 +164,7 @@ class MainScreen(TableScreen):
     def _import(self, text: str | None = None) -> None:
         from .import_table import ImportDialog
 
-        def chosen(answer: Import | None) -> None:
-            if answer is not None:
-                self.take_import(answer)
-
-        self.app.push_screen(ImportDialog(self.session.sheet.table, self.workspace.folder, text), chosen)
+        ImportDialog(self.session.sheet.table, self.workspace.folder, text).ask(self.app, self.take_import)
 
     def take_import(self, answer: Import) -> None:
         """Put the rows of another file into the table, and fit the columns to them."""
@@ -193,13 +185,9 @@ class MainScreen(TableScreen):
         keys = {name: key_names(self.app.settings.keys.get(name, BY_ID[name].keys)) for name in names}
         lines = [f"{BY_ID[name].label:<18}{keys[name][0] if keys[name] else ''}" for name in names]
 
-        def chosen(at: int | None) -> None:
-            if at is not None:
-                self.call_later(self.run_command, names[at])
-
         sheet = self.session.sheet
         title = sheet.table.columns[sheet.selection.column].name if event.of_column else "Cells"
-        self.app.push_screen(ChooseDialog(title, lines), chosen)
+        ChooseDialog(title, lines).ask(self.app, lambda at: self.call_later(self.run_command, names[at]))
 
     @on(Grid.ImportWanted)
     def _import_text(self, event: Grid.ImportWanted) -> None:
@@ -210,11 +198,9 @@ class MainScreen(TableScreen):
         """Write the table for another program."""
         from .export_table import ExportDialog
 
-        def chosen(answer: Export | None) -> None:
-            if answer is not None:
-                self.try_to(lambda: self._export(answer))
-
-        self.app.push_screen(ExportDialog(self.session.sheet.table, self.workspace.folder, self.session.sheet.marks), chosen)
+        ExportDialog(self.session.sheet.table, self.workspace.folder, self.session.sheet.marks).ask(
+            self.app, lambda answer: self.try_to(lambda: self._export(answer))
+        )
 
     def _export(self, answer: Export) -> None:
         write_atomic(answer.path, answer.raw)
@@ -227,19 +213,17 @@ class MainScreen(TableScreen):
         from .add_column import AddColumn
 
         sheet = self.session.sheet
-        self.app.push_screen(AddColumn(sheet.table, sheet.selection.column), self._answered)
+        AddColumn(sheet.table, sheet.selection.column).ask(self.app, self._answered)
 
     def action_autofill(self) -> None:
         """Show what the clips give to the table, and fill it."""
-        from .autofill import Autofill, AutofillDialog  # loads what reads clips
+        from .autofill import AutofillDialog  # loads what reads clips
 
         table = self.session.sheet.table
 
-        def decided(answer: Autofill | None) -> None:
-            if answer is not None:
-                self.try_to(lambda: self.edited(Edited(answer.fill(self.session.sheet))))
-
-        self.app.push_screen(AutofillDialog(table, schema_path(table).parent), decided)
+        AutofillDialog(table, schema_path(table).parent).ask(
+            self.app, lambda answer: self.try_to(lambda: self.edited(Edited(answer.fill(self.session.sheet))))
+        )
 
     def action_column_sheet(self) -> None:
         """Change what contextdb.toml says of all columns, in a sheet; as one step."""
@@ -247,11 +231,7 @@ class MainScreen(TableScreen):
 
         sheet = self.session.sheet
 
-        def decided(edit: Edit | None) -> None:
-            if edit is not None:
-                self.apply(edit)
-
-        self.app.push_screen(ColumnSheetDialog(sheet.table, sheet.selection.column, self.clipboard), decided)
+        ColumnSheetDialog(sheet.table, sheet.selection.column, self.clipboard).ask(self.app, self.apply)
 
     @on(RenameWanted)
     def _rename(self, event: RenameWanted) -> None:
@@ -278,12 +258,10 @@ class MainScreen(TableScreen):
         from .blueprints import Blueprints
 
         sheet = self.session.sheet
-        self.app.push_screen(Blueprints(sheet.table, sheet.selected_columns, sheet.selection.column), self._answered)
+        Blueprints(sheet.table, sheet.selected_columns, sheet.selection.column).ask(self.app, self._answered)
 
-    def _answered(self, answer: Answer | None) -> None:
+    def _answered(self, answer: Answer) -> None:
         """Make the edit; the cursor goes to the column that is new, so that the next one comes behind it."""
-        if answer is None:
-            return
         sheet = self.session.sheet
         before = {column.name for column in sheet.table.columns}
         self.try_to(lambda: self.apply(answer.edit(sheet.table)))
@@ -295,12 +273,11 @@ class MainScreen(TableScreen):
         """Find a text in all tables of the folder, and go to one of its places."""
         from .find_everywhere import FindEverywhere, FoundCell
 
-        def chosen(answer: FoundCell | None) -> None:
-            if answer is not None:
-                self.app.open_table(answer.table)
-                self.app.go_to_cell(GoToCell(answer.row, answer.column))
+        def chosen(answer: FoundCell) -> None:
+            self.app.open_table(answer.table)
+            self.app.go_to_cell(GoToCell(answer.row, answer.column))
 
-        self.app.push_screen(FindEverywhere(self.workspace, self.table_name), chosen)
+        FindEverywhere(self.workspace, self.table_name).ask(self.app, chosen)
 
     # ---- the test row
 
@@ -325,23 +302,18 @@ class MainScreen(TableScreen):
         """Which moments play something else since the last save; Enter loads one into the test row."""
         from .changes import ChangesDialog
 
-        def chosen(answer: SetContext | None) -> None:
-            if answer is not None:
-                self.post_message(answer)
-
         session = self.session
-        self.app.push_screen(ChangesDialog(session.saved_table, session.sheet.table, self.workspace.folder), chosen)
+        ChangesDialog(session.saved_table, session.sheet.table, self.workspace.folder).ask(self.app, self.post_message)
 
     def action_live(self) -> None:
         """Let the test row follow a game, or a recording."""
         from .live import LiveDialog
 
-        def chosen(answer: Followed | None) -> None:
-            if answer is not None:
-                self._switch_to("assets")
-                self.following.start(answer)
+        def chosen(answer: Followed) -> None:
+            self._switch_to("assets")
+            self.following.start(answer)
 
-        self.app.push_screen(LiveDialog(self.table_name, self.workspace.folder), chosen)
+        LiveDialog(self.table_name, self.workspace.folder).ask(self.app, chosen)
 
     def action_live_pause(self) -> None:
         """Hold the moment of the game, or go on."""

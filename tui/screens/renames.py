@@ -88,11 +88,11 @@ class Renames:
             self.screen.say("This column belongs to no role: those of one are called like Defender.DepthChart.", "warning")
             return
 
-        def named(new: str | None) -> None:
-            if new is not None and new.strip() != old:
+        def named(new: str) -> None:
+            if new.strip() != old:
                 self.screen.try_to(lambda: self._role(old, new.strip()))
 
-        self.screen.app.push_screen(AskDialog("Rename the role", f"Another name for {old}", old, _wrong_role), named)
+        AskDialog("Rename the role", f"Another name for {old}", old, _wrong_role).ask(self.screen.app, named)
 
     def _role(self, old: str, new: str) -> None:
         table = self.screen.session.sheet.table
@@ -114,7 +114,7 @@ class Renames:
             if new is not None and new.strip() != old:
                 self.screen.try_to(lambda: self._asset(old, new.strip()))
 
-        self.screen.app.push_screen(AskDialog("Rename the asset", f"Another name for {old}", old, _wrong_asset), named)
+        AskDialog("Rename the asset", f"Another name for {old}", old, _wrong_asset).ask(self.screen.app, named)
 
     def _asset(self, old: str, new: str) -> None:
         sheet = self.screen.session.sheet
@@ -161,8 +161,8 @@ class Renames:
         """Ask whether a name is changed everywhere or only here; `step` renames it here without a word to the files."""
         lines = ["Rename everywhere: in all that uses it", *([here] if here else []), "Cancel"]
 
-        def chosen(at: int | None) -> None:
-            if at is None or at == len(lines) - 1:
+        def chosen(at: int) -> None:
+            if at == len(lines) - 1:
                 return
             if at == 1 and step is not None:
                 step()
@@ -174,7 +174,7 @@ class Renames:
             where = "here" if only_here else "everywhere"
             self._written(f"Renamed {old} to {new} {where}, in {some(files)}. Ctrl+Z takes it back.")
 
-        self.screen.app.push_screen(ChooseDialog(f"Rename {old} to {new}", lines, about=f"{about}\n{WRITTEN}"), chosen)
+        ChooseDialog(f"Rename {old} to {new}", lines, about=f"{about}\n{WRITTEN}").ask(self.screen.app, chosen)
 
     def _written(self, message: str) -> None:
         row, column = self.screen.session.sheet.cursor

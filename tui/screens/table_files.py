@@ -50,13 +50,11 @@ class TableFiles:
         screen = self.screen
         workspace, old = screen.workspace, screen.table_name
 
-        def named(answer: str | None) -> None:
-            if answer is not None:
-                screen.try_to(lambda: self._write(write, answer.strip(), leaves))
-
         check = partial(name_fault, workspace.folder, taken=workspace.files)
         text = old if leaves else f"{old}_copy"
-        screen.app.push_screen(AskDialog(title, "The name of the table and its file", text, check), named)
+        AskDialog(title, "The name of the table and its file", text, check).ask(
+            screen.app, lambda answer: screen.try_to(lambda: self._write(write, answer.strip(), leaves))
+        )
 
     def _write(self, write: Callable[[Path, str, str], Path], new: str, leaves: bool) -> None:
         screen = self.screen

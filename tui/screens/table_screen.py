@@ -308,11 +308,9 @@ class TableScreen(Screen[None]):
     def action_history(self) -> None:
         history = self.session.sheet.history
 
-        def chosen(position: int | None) -> None:
-            if position is not None:
-                self.edited(Edited(self.session.sheet.go_to_step(position)))
-
-        self.app.push_screen(StepsDialog(history.names, history.position), chosen)
+        StepsDialog(history.names, history.position).ask(
+            self.app, lambda position: self.edited(Edited(self.session.sheet.go_to_step(position)))
+        )
 
     def apply(self, edit: Edit, notes: Sequence[str] = ()) -> None:
         """Make an edit, show it and say what was done; what cannot be done is reported."""

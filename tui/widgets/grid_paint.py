@@ -303,6 +303,7 @@ class Painter:
 
         n_columns = len(self.sheet.table.columns)
         noted, colours, names = self.sheet.marks.texts, self.sheet.marks.colours, [c.name for c in self.sheet.table.columns]
+        clips = self.sheet.clips.cells
         name = self.sheet.text(row, asset) if noted or colours else ""
 
         def cell(column: int) -> Iterator[Segment]:
@@ -322,7 +323,8 @@ class Painter:
             note, width = window.note(row, column), look.layout.widths[column] - 1
             mark = OPENS if note is not None and column == asset and kind == "text" else MARKS[kind]
             if mark == " ":
-                mark = NOTED if (name, names[column]) in noted else self.sheet.clip_mark(row, column)
+                tells = kind != "any" or clips  # Any is never odd
+                mark = NOTED if (name, names[column]) in noted else self.sheet.clip_mark(row, column) if tells else " "
             n_shared = self.sheet.shared_end if column == asset else None
             room = width - cell_len(note) - 1 if note else width
             if note and room >= min(cell_len(text), LEAST_BESIDE):

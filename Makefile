@@ -17,6 +17,8 @@ endif
 PY := $(BIN)/python
 STAMP = @$(PY) -c "import pathlib; pathlib.Path('$@').touch()"
 INSTALL = $(PY) -m pip install --quiet --disable-pip-version-check --editable
+# For the first minute: a module is compiled when it is first imported, not each of them before.
+LAZY = $(patsubst --editable,--no-compile --editable,$(INSTALL))
 
 # What pip builds and installs: the core in C is compiled again when one of its files changed.
 PACKAGE := pyproject.toml build_core.py $(wildcard contextdb/core/*.[ch])
@@ -42,6 +44,7 @@ help:
 	@$(info make clean    remove what was made, .venv and .venv-bench too)
 	@cd .
 
+demo play edit: export PYTHONDONTWRITEBYTECODE :=
 demo: $(VENV)/.runtime
 	@$(PY) -m contextdb demo
 
@@ -118,11 +121,11 @@ $(VENV)/pyvenv.cfg:
 	@$(PYTHON) -m venv $(VENV) || (echo "'$(PYTHON) -m venv' failed. On Debian and Ubuntu: apt install python3-venv"; exit 1)
 
 $(VENV)/.runtime: $(PACKAGE) | $(VENV)/pyvenv.cfg
-	$(INSTALL) .
+	$(LAZY) .
 	$(STAMP)
 
 $(VENV)/.playground: $(PACKAGE) | $(VENV)/pyvenv.cfg
-	$(INSTALL) ".[playground]"
+	$(LAZY) ".[playground]"
 	$(STAMP)
 
 $(VENV)/.dev: $(PACKAGE) | $(VENV)/pyvenv.cfg

@@ -81,9 +81,8 @@ CALLS: dict[str, Call] = {
     "link.picked(table)": lambda x: linked(lambda link: link.picked(x, "a", 0)),
     "link.picked(who)": lambda x: linked(lambda link: link.picked(COMPILED, x, 0)),
     "link.picked(row)": lambda x: linked(lambda link: link.picked(COMPILED, "a", x)),
-    "link.pose(pose)": lambda x: linked(lambda link: link.pose("a", x, None)),
-    "link.tell(decision)": lambda x: linked(lambda link: link.tell("a", x)),
     "link.pose(pose)": lambda x: linked(lambda link: link.pose("a", x, x)),
+    "link.tell(decision)": lambda x: linked(lambda link: link.tell("a", x)),
     "project[name]": lambda x: PROJECT[x],  # type: ignore[index]
     "watch[name]": lambda x: WATCH[x],  # type: ignore[index]
     "snapshot[name]": lambda x: WATCH.snapshot()[x],  # type: ignore[index]

@@ -403,6 +403,7 @@ def window(game: Game) -> Iterator[Any]:
     window = Window(game, is_offscreen=True, size=(640, 360))
     yield window
     ClockObject.getGlobalClock().setMode(ClockObject.M_normal)
+    window.base.taskMgr.remove("game")
     window.base.destroy()
 
 

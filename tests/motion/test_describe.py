@@ -15,7 +15,7 @@ from contextdb.motion.clips.feet import Footfalls
 from contextdb.motion.clips.poses import poses_of
 from contextdb.motion.clips.trajectory import Trajectory, root_trajectory
 from contextdb.motion.made.recipes import MadeClip
-from contextdb.motion.preparing.cells_of_clips import cells_of
+from contextdb.motion.preparing.cells_of_clips import cells_of, reason
 from contextdb.motion.preparing.clip_facts import Moments, Spread, common_words, gait_of, is_moving, style_of
 from contextdb.motion.preparing.describing import Described, condition_sections, patterns_of, table_section
 
@@ -213,6 +213,19 @@ def test_a_normal_clip_serves_styles_without_one_of_its_gait():
     clips = [make_clip(name).clip for name in ("idle", "walk", "walk_tired")]
     styles = {row.asset: row.cells["style"] for row in motion.describe(clips)}
     assert styles == {"idle": "Any", "walk": "normal", "walk_tired": "tired"}
+
+
+def test_each_cell_has_the_reason_of_its_clip():
+    def why(asset: str, column: str) -> str:
+        return reason(ROWS[asset].facts, column, ROWS[asset].cells[column])
+
+    assert why("stop_walk", "gait") == "it goes at 1.3 m/s (0.64 to 1.3), and comes to a stand"
+    assert why("idle", "direction") == "it stands, and goes to no side"
+    assert why("walk_fast", "direction") == "it goes to 0°; no other clip of its gait and style differs in direction"
+    assert why("walk_fast", "speed").endswith("the cell ends a little past the middle to the next clip of its gait, style and turn")
+    assert why("start_walk", "speed").endswith("the cell is what it passes through, and a little more")
+    assert why("walk_tired", "style") == "its name says tired"
+    assert all(why(asset, column) for asset in ROWS for column in ROWS[asset].cells)
 
 
 def test_a_description_does_not_depend_on_the_order_of_clips():

@@ -72,12 +72,17 @@ def test_autofill_writes_the_same_bytes_as_the_command_line(game: Path, key: str
 
 
 def test_the_preview_shows_what_would_be_filled_or_changed_by_asset_and_column(game: Path):
-    async def then(app: EditorApp, pilot: Pilot[Any]) -> tuple[list[tuple[str, ...]], str]:
+    async def then(app: EditorApp, pilot: Pilot[Any]) -> tuple[list[tuple[str, ...]], str, str]:
         dialog = app.screen
         assert isinstance(dialog, AutofillDialog)
-        return [(line.what, line.asset, line.column) for line in dialog.lines], screen_text(app)
+        screen = screen_text(app)
+        await press(pilot, "end")
+        return [(line.what, line.asset, line.column) for line in dialog.lines], screen, screen_text(app)
 
-    lines, screen = in_dialog(game, then)
+    lines, screen, at_end = in_dialog(game, then)
+    assert "duration_s: so long is the clip." in screen
+    assert "gait: it goes at 2.5 m/s" in at_end
+    assert "turn: it turns by 0°/s; no other clip of its gait and style differs in turn" in at_end
     assert lines[0] == ("differs", "walk", "duration_s")
     assert ("fill", "walk", "gait") in lines
     assert [line for line in lines if line[2] == "style"] == [

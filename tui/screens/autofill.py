@@ -6,7 +6,7 @@ Nothing is changed here: the dialog gives back an `Autofill`, whose edit the she
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -22,6 +22,8 @@ from textual.worker import Worker, get_current_worker
 from contextdb.authoring.clip_folder import Tell
 from contextdb.authoring.described_table import ClipRows, Difference, Filling, filling, rows_for
 from contextdb.errors import ContextDBError, plural, some
+from contextdb.motion.preparing.cells_of_clips import CONDITIONS, reason
+from contextdb.motion.preparing.clip_facts import ClipFacts
 from contextdb.tables.table import Table
 
 from ..model.clip_cells import ClipCells
@@ -68,6 +70,7 @@ class Line:
     column: str
     now: str
     clip: str
+    why: str
 
 
 class AutofillDialog(Dialog[Autofill]):
@@ -84,6 +87,7 @@ class AutofillDialog(Dialog[Autofill]):
         &.-refused > #dialog, &.-refused > #dialog > #dialog-body { height: auto; }
         & #autofill-about { height: auto; max-height: 4; }
         & #autofill-lines { height: 1fr; margin: 1 0; }
+        & #autofill-why { height: auto; max-height: 5; }
         & #autofill-detail { height: auto; max-height: 4; color: $text-muted; }
     }
     """
@@ -108,6 +112,7 @@ class AutofillDialog(Dialog[Autofill]):
         ]
         columns += [ListColumn("Now", 12, 1), ListColumn("Clip", 14, 1, is_name=True)]
         yield LineList(columns, empty="", id="autofill-lines")
+        yield Static(id="autofill-why", markup=False)
         yield Static(id="autofill-detail", markup=False)
 
     def on_mount(self) -> None:
@@ -153,10 +158,15 @@ class AutofillDialog(Dialog[Autofill]):
             return
         self.clips = result
         fills = filling(self.table, result.rows)
-        self.lines = list(_lines(fills))
+        self.lines = list(_lines(fills, {row.asset: row.facts for row in result.rows}))
         self._about(_summary(fills))
         self.query_one("#autofill-detail", Static).update("\n".join(_notes(result, fills)))
         self.query_one(LineList).show(len(self.lines), lambda at: _cells(self.lines[at]), 0)
+
+    @on(LineList.Moved)
+    def _moved(self, event: LineList.Moved) -> None:
+        event.stop()
+        self.query_one("#autofill-why", Static).update(self.lines[event.index].why if self.lines else "")
 
     # ---- the answer
 
@@ -170,14 +180,17 @@ class AutofillDialog(Dialog[Autofill]):
             self.dismiss(Autofill(self.clips, updates))
 
 
-def _lines(fills: Filling) -> Iterator[Line]:
+def _lines(fills: Filling, facts: Mapping[str, ClipFacts]) -> Iterator[Line]:
     """What differs first, then what is empty, row by row, then the rows that are new."""
     by_row: Callable[[Difference], int] = lambda each: each.row  # noqa: E731
-    for what, cells in (("differs", fills.differences), ("fill", fills.empty)):
-        for each in sorted(cells, key=by_row):
-            yield Line(what, f"{each.row + 1:,}", each.asset, each.column, each.cell, each.clip)
+    for what, differences in (("differs", fills.differences), ("fill", fills.empty)):
+        for each in sorted(differences, key=by_row):
+            why = f"{each.column}: {reason(facts[each.asset], each.column, each.clip)}."
+            yield Line(what, f"{each.row + 1:,}", each.asset, each.column, each.cell, each.clip, why)
     for row in fills.added:
-        yield Line("new row", "", row.asset, "", "", ", ".join(filter(None, row.cells.values())))
+        known = [f"{name}: {reason(row.facts, name, cell)}" for name, cell in row.cells.items() if name in CONDITIONS and cell]
+        cells = ", ".join(filter(None, row.cells.values()))
+        yield Line("new row", "", row.asset, "", "", cells, "No row names this clip." if not known else "\n".join(known))
 
 
 def _cells(line: Line) -> Sequence[ListCell]:

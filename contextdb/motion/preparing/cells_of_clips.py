@@ -79,6 +79,49 @@ def _grouped(members: Iterable[int], key: Callable[[int], Key]) -> dict[Key, lis
     return dict(groups)
 
 
+# ---- why
+
+
+def reason(facts: ClipFacts, column: str, cell: str) -> str:
+    """Why a clip has its cell in a column, with what was measured; empty for a column that clips say nothing of."""
+    if column == "gait":
+        speed, spot = facts.speed_mps, facts.on_the_spot_mps
+        measured = f"its feet go at {spot:.3g} m/s on the spot" if spot else f"it goes at {_measured(speed, ' m/s', SPEED)}"
+        return f"{measured}, and comes to a stand" if len(facts.gaits) > 1 else measured
+    if column == "style":
+        own = "no style" if facts.style == NORMAL else facts.style
+        lent = " and no clip like it has another style" if cell == ANY else "; also for styles that have no clip of its gait"
+        return f"its name says {own}{'' if cell == facts.style else lent}"
+    if column in _SEEN:
+        return _SEEN[column]
+    if column not in _MEASURED:
+        return ""
+    verb, unit, scale = _MEASURED[column]
+    spread = {"speed": facts.speed_mps, "direction": facts.direction_deg, "turn": facts.turn_dps}[column]
+    if spread is None:
+        return "it stands, and goes to no side"
+    measured = f"it {verb} {_measured(spread, unit, scale)}"
+    low, high = _own(spread, scale)
+    if cell != ANY and cell in {_text(each, scale) for each in ((low, high), (None, high), (low, None))}:
+        return f"{measured}; the cell is what it passes through, and a little more"
+    alike = "of its " + {"speed": "gait, style and turn", "direction": "gait and style", "turn": "gait and style"}[column]
+    if cell == ANY:
+        return f"{measured}; no other clip {alike} differs in {column}"
+    return f"{measured}; the cell ends a little past the middle to the next clip {alike}"
+
+
+_SEEN = {"duration_s": "so long is the clip", "start": "how the clip begins", "end": "how the clip ends"}
+_MEASURED = {"speed": ("goes at", " m/s", SPEED), "direction": ("goes to", "°", DIRECTION), "turn": ("turns by", "°/s", TURN)}
+
+
+def _measured(spread: Spread, unit: str, scale: Scale) -> str:
+    """The middle, and from where to where where that is more than one number."""
+    low, middle, high = (
+        _number(_wrapped(each) if scale.is_circular else each, scale) for each in (spread.low, spread.middle, spread.high)
+    )
+    return f"{middle}{unit}" if low == high else f"{middle}{unit} ({low} to {high})"
+
+
 # ---- style
 
 

@@ -10,7 +10,7 @@ from tui.contrast import LEAST, contrast
 
 PLACES = [["alt+2"], ["alt+4"], ["alt+4", "2"], ["alt+5"], ["alt+c"], ["alt+j"], ["f1"], ["ctrl+p"]]
 ALL = slice(None)
-FRAMES = " │╭╮╰╯─║▏▎▋▌▉▁▂▃▄▅▆▇█▐▊▕▔━┃╸╺"
+FRAMES = " │╭╮╰╯─║▏▎▋▌▉▁▂▃▄▅▆▇█▐▊▕▔━┃╸╺" + "".join(map(chr, range(0x2800, 0x2900)))
 
 
 def faint(app) -> set[tuple[str, str]]:

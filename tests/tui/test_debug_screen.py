@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 import pytest
 from running import run
 from terminal import alone, drive, press, screen_text
+from test_contrast import faint
 from test_debug_parts import recording_of
 from test_motion_measure_command import here, made
 from textual.pilot import Pilot
@@ -22,6 +23,7 @@ from tui.debug.opening import opened
 from tui.debug.recording import Recording
 from tui.debug.screen import DebugScreen
 from tui.debug.timeline import Timeline
+from tui.themes import THEMES
 
 __all__ = ["here", "made"]
 """Fixtures of another file."""
@@ -437,7 +439,7 @@ def test_the_status_is_that_of_replay_once_the_poses_are_made(recording: Recordi
 
     found = shown(recording, script)
     for name, text in status.lines():
-        assert f"{name} {text}" in found
+        assert f"{name} {text}".replace(",", "") in found  # what is compared stands in columns
 
 
 def test_the_pose_is_the_one_that_was_shown_and_the_pane_says_so(recording: Recording):
@@ -453,6 +455,20 @@ def test_the_pose_is_the_one_that_was_shown_and_the_pane_says_so(recording: Reco
     assert "not blended" in of_clips
     assert "as shown, blended" in blended
     assert is_other
+
+
+@pytest.mark.parametrize("size", [SMALL, LARGE])
+def test_every_text_has_the_contrast_of_wcag_in_every_theme(recording: Recording, size: tuple[int, int]):
+    async def script(screen: DebugScreen, pilot: Pilot[Any]) -> set[tuple[str, str]]:
+        screen.go(FIRST)
+        found = set[tuple[str, str]]()
+        for theme in THEMES:
+            screen.app.theme = theme.name
+            await pilot.pause()
+            found |= faint(screen.app)
+        return found
+
+    assert shown(recording, script, size) == set()
 
 
 # ---- looking and measuring by hand

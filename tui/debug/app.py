@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from textual.filter import LineFilter
+
+from ..contrast import READABLE
 from ..one_key import OneKeyAtATime
 from ..themes import DARK, THEMES
 from .game import Live
@@ -25,6 +30,10 @@ class DebugApp(OneKeyAtATime):
         for one in THEMES:
             self.register_theme(one)
         self.theme = theme or DARK
+
+    def get_line_filters(self) -> Sequence[LineFilter]:
+        """What is read is readable in every theme."""
+        return [*super().get_line_filters(), READABLE]
 
     def on_row_wanted(self, message: RowWanted) -> None:
         """Leave, so that the editor can show the row."""

@@ -19,6 +19,7 @@ from textual.widgets import Input, Static
 from contextdb.console import printable
 from contextdb.motion.output.bank import PoseBank
 from contextdb.motion.selection.decision import Action
+from contextdb.motion.trace.status import Status
 
 from . import reasons
 from .bars import Bars
@@ -53,7 +54,7 @@ class MomentScreen(Screen[None]):
         #head, #reason, #figures, #message, #detail { text-wrap: nowrap; text-overflow: ellipsis; }
         #head { height: 1; background: $panel; text-style: bold; padding: 0 1; }
         #reason { height: 2; padding: 0 1; background: $surface; }
-        #status { height: 2; padding: 0 1; background: $surface; color: $text-muted; }
+        #status { height: 3; padding: 0 1; background: $surface; color: $text-muted; }
         #figures { height: 1; padding: 0 1; color: $text-muted; background: $surface; }
         #message { height: 1; padding: 0 1; }
         #detail { height: 2; padding: 0 1; color: $text-muted; }
@@ -245,10 +246,10 @@ class MomentScreen(Screen[None]):
         return printable(" · ".join(filter(None, (f"m/s {speed}" if speed else "", facts))))
 
     def _show_status(self) -> None:
-        """Speeds and angles, on a line of their own where there is room."""
-        self._status = list(self.recording.status_at(self.index).lines())
-        text = Text(" · ".join(f"{name} {state}" for name, state in self._status))
-        self.query_one("#status", Static).update(text)
+        """Speeds and angles, in lines of their own where there is room."""
+        status = self.recording.status_at(self.index)
+        self._status = list(status.lines())
+        self.query_one("#status", Static).update(Text("\n".join(_in_lines(status))))
 
     def _show_bars(self) -> None:
         moment, bars = self.moment, self.bars
@@ -373,3 +374,12 @@ class MomentScreen(Screen[None]):
         self.message = text
         line = self.query_one("#message", Static)
         line.update(Text(printable(text), style="bold" if is_error else ""))
+
+
+def _in_lines(status: Status) -> Iterator[str]:
+    """Three lines: what is compared in columns, and the other numbers to its right."""
+    numbers = [f"{name} {state}" for name, state in status.numbers()]
+    right = [*numbers[:2], " · ".join(numbers[2:])]
+    for (name, compared), more in zip(status.compared, right, strict=False):
+        cells = [part.ljust(width) for part, width in zip(compared.parts, (14, 20, 20), strict=True)]
+        yield f"{name:<7}{''.join(cells)}{more}".rstrip()

@@ -208,7 +208,7 @@ class Timeline(Widget):
         smooth = np.convolve(counts, np.ones(3) / 3.0, "same") if len(counts) > 2 else counts
         style = self.get_component_rich_style("timeline--search")
         levels = _levels(smooth, 0.0, float(smooth.max(initial=0.0)) or 1.0)
-        return self._label("jumps/s"), [(BARS[level], style) for level in levels]
+        return self._label(" jumps/s"), [(BARS[level], style) for level in levels]
 
     def _ruler(self, edges: Ints) -> tuple[tuple[str, Style], list[tuple[str, Style]]]:
         line, style = self.recording.line, self.get_component_rich_style("timeline--label")
@@ -222,7 +222,7 @@ class Timeline(Widget):
             if column + len(text) <= self._n_columns:
                 cells[column : column + len(text)] = [(letter, style) for letter in text]
             at_s += step
-        return self._label("time"), cells
+        return self._label(" time"), cells
 
     def _assets(self, edges: Ints) -> tuple[tuple[str, Style], list[tuple[str, Style]]]:
         line = self.recording.line
@@ -238,7 +238,7 @@ class Timeline(Widget):
             text = _tail(name, width - 1) if width >= LEAST_NAME else ""
             style = blank if asset < 0 else styles[asset % N_COLOURS]
             cells += [(letter, style) for letter in f"▏{text}".ljust(width)[:width]]
-        return self._label("plays"), cells
+        return self._label(" plays"), cells
 
     def _events(self, edges: Ints) -> tuple[tuple[str, Style], list[tuple[str, Style]]]:
         line = self.recording.line
@@ -255,7 +255,7 @@ class Timeline(Widget):
             end = max(stop, start + 1) if stop > start else start
             kind = next((i for i, levels in enumerate(counts) if levels[min(end, len(line))] > levels[start]), None)
             cells.append((" ", self.rich_style) if kind is None else (kinds[kind][1], styles[kinds[kind][2]]))
-        return self._label("events"), cells
+        return self._label(" events"), cells
 
     def _strip(self, name: str, edges: Ints) -> tuple[tuple[str, Style], list[tuple[str, Style]]]:
         values = np.nan_to_num(self.strips[name], nan=0.0)

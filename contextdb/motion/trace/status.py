@@ -50,8 +50,8 @@ class Compared:
         return {name: None if value is None else round(value, 4) for name, value in document.items()}
 
     @property
-    def text(self) -> str:
-        """In a line; "" where nothing is known."""
+    def parts(self) -> list[str]:
+        """ "wanted 3.00", "clip 2.50 (-0.50)", "got 3.00 (+0.00)"; of a part that is not known ""."""
         form, sign, digits = ("{:.0f}°", "{:+.0f}", 0) if self.is_angle else ("{:.2f}", "{:+.2f}", 2)
         parts = []
         for name, value, off in (
@@ -59,12 +59,14 @@ class Compared:
             ("clip", self.clip, self.clip_off),
             ("got", self.got, self.got_off),
         ):
-            if value is not None:
-                parts.append(
-                    f"{name} {form.format(_rounded(value, digits))}"
-                    + ("" if off is None else f" ({sign.format(_rounded(off, digits))})")
-                )
-        return ", ".join(parts)
+            number = "" if value is None else f"{name} {form.format(_rounded(value, digits))}"
+            parts.append(number if value is None or off is None else f"{number} ({sign.format(_rounded(off, digits))})")
+        return parts
+
+    @property
+    def text(self) -> str:
+        """In a line; "" where nothing is known."""
+        return ", ".join(filter(None, self.parts))
 
     def _off(self, value: float | None) -> float | None:
         if value is None or self.wanted is None:
@@ -101,9 +103,18 @@ class Status:
 
     def lines(self) -> Iterator[tuple[str, str]]:
         """What is known, each with its name."""
-        for name, compared in (("m/s", self.speed), ("moves", self.move), ("faces", self.facing)):
+        for name, compared in self.compared:
             if compared.text:
                 yield name, compared.text
+        yield from self.numbers()
+
+    @property
+    def compared(self) -> list[tuple[str, Compared]]:
+        """What is wanted, shown by the clip and got, each with its name."""
+        return [("m/s", self.speed), ("moves", self.move), ("faces", self.facing)]
+
+    def numbers(self) -> Iterator[tuple[str, str]]:
+        """What else is known, each with its name."""
         if self.frames_evaluated is not None:
             yield "frames evaluated", f"{self.frames_evaluated:,}"
         yield "play rate", f"{self.time_scale:.2f}"

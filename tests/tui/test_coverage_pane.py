@@ -124,6 +124,25 @@ def test_the_one_cell_that_would_close_a_gap_stands_in_its_line():
     assert "Nearest: row 1 Anim_0. It would do to change speed from ..5 to <6." in screen
 
 
+@pytest.mark.parametrize(("size", "seen"), [((80, 24), 24), ((160, 48), 90)])
+def test_of_more_than_a_hundred_gaps_the_most_is_seen_and_where_they_are_summed_up(size, seen):
+    names = [f"speed_{c}" for c in range(7)]
+    cells = {
+        name: [f"{(c * r + c) % 9}..{(c * r + c) % 9 + 2}" if (r + c) % 3 else "Any" for r in range(14)]
+        for c, name in enumerate(names)
+    }
+    open_ = cdb.Table.from_columns(
+        {"Asset": [f"Anim_{r}" for r in range(14)]} | cells, {key: {"type": "number", "min": 0, "max": 12} for key in names}
+    )
+    _, screen = shown(of=open_, size=size)
+    lines = screen.splitlines()
+    assert "100+ gaps (2 by pairs, 6 as played), on average" in lines[1]
+    assert "1 Gaps 100+" in lines[3]
+    assert lines[4].index("Nearest row") - lines[4].index("Contexts") >= seen
+    assert "Gap 1 of 100+: " in screen
+    assert lines[1].rstrip().endswith("rows valid")
+
+
 def test_enter_on_a_gap_asks_for_a_new_row_of_its_cells():
     app, _ = shown(keys=("enter",))
     assert app.told == [FillGap({"speed": "(5..10]"}, below=0)]

@@ -101,6 +101,24 @@ def test_the_legend_is_whole_beside_long_labels():
     assert "100  % covered" in screen
 
 
+def test_without_colour_the_less_is_covered_the_brighter_is_the_square(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("NO_COLOR", "1")
+
+    async def script(pilot: Pilot[None]) -> list[int]:
+        strips = pilot.app.screen._compositor.render_strips()
+        legend = next(strip for strip in strips if "<20" in "".join(segment.text for segment in strip))
+        grounds = [
+            s.style.bgcolor
+            for s in legend
+            if s.style and s.style.bgcolor and s.text.strip() in ("0", "<20", "<40", "<60", "<80", "<100", "100")
+        ]
+        return [ground.get_truecolor().red for ground in grounds]
+
+    shades = drive(MapApp(NAMES, NUMBERS), script, (80, 16))
+    assert len(shades) == 7
+    assert sorted(set(shades), reverse=True) == shades
+
+
 def test_arrows_stay_on_the_map_and_tell_each_square():
     app = MapApp(NAMES, NUMBERS)
     played(app, "up", "left", "down", "right", "end", "pagedown", "pagedown", "pagedown", "home")

@@ -66,7 +66,8 @@ def unknown_text(run: CoverageRun) -> str:
 
 def summary_text(report: CoverageReport) -> str:
     """What else there is, in a few numbers."""
-    n_gaps = plural(len(report.gaps), "gap") if report.gaps_complete else f"{len(report.gaps)}+ gaps"
+    many = f"{len(report.gaps)}+ gaps (2 by pairs, 6 as played)"
+    n_gaps = plural(len(report.gaps), "gap") if report.gaps_complete else many
     return f"{n_gaps}, on average {report.overlap.mean:.3g} rows valid"
 
 
@@ -118,7 +119,8 @@ def gap_text(gap: Gap, number: int, report: CoverageReport, table: Table) -> str
     about = "" if gap.is_exact else "about "
     size = f"{about}{format_percent(gap.share)} of the contexts" if gap.share else "single points, of no volume"
     new = f", {format_percent(gap.new_share)} in no gap above" if gap.new_share != gap.share else ""
-    lines = [f"Gap {number + 1} of {len(report.gaps)}: {size}{new}", cells_text(gap.cells)]
+    of = f"{len(report.gaps)}{'' if report.gaps_complete else '+'}"
+    lines = [f"Gap {number + 1} of {of}: {size}{new}", cells_text(gap.cells)]
     if gap.nearest is not None:
         lines.append(_nearest_sentence(gap.nearest, table))
     return "\n".join(lines)

@@ -186,7 +186,7 @@ class CoveragePane(Pane):
 
     def _show_bar(self) -> None:
         shown = self.query_one("#coverage-bar", Static)
-        shown.update(places.bar_text(self.run, max(10, min(40, shown.size.width - 46))))
+        shown.update(places.bar_text(self.run, shown.size.width))
 
     def _fill(self, result: Result) -> None:
         report = result.report

@@ -22,6 +22,7 @@ NAMES = ("Gaps", "Pairs", "Crowded", "Rows", "About", "Played", "Unused")
 OF_PLAY = ("played", "unused")
 OF_GAPS = ("gaps", "played")
 TONES = {"open": "warning", "animating": "info", "done": "muted"}
+MOST_BAR = 40
 MOST_WORK = 20
 """The widest column of work."""
 COLUMNS = {
@@ -85,12 +86,17 @@ def play_text(played: PlayedRun, table: Table) -> str:
 
 
 def bar_text(run: CoverageRun, width: int) -> str:
-    """How far the run is, or how much is covered, as a bar so wide and in words."""
-    if run.state == "running":
-        share = run.progress[1]
-        return f"{bar(share, share, width)}  Esc stops"
+    """How far the run is, or how much is covered, as a bar and in words, in a line so wide."""
     report = None if run.result is None else run.result.report
-    return "" if report is None else f"{bar(report.lower, report.upper, width)}  {lines.summary_text(report)}"
+    if run.state != "running" and report is None:
+        return ""
+    share = run.progress[1]
+    low, high, text = (
+        (share, share, "Esc stops")
+        if run.state == "running" or report is None
+        else (report.lower, report.upper, lines.summary_text(report))
+    )
+    return f"{bar(low, high, max(8, min(MOST_BAR, width - max(46, len(text) + 2))))}  {text}"
 
 
 def place_of_play(section: str, play: Played, at: int) -> Place:
@@ -124,7 +130,7 @@ def gap_columns(section: str, works: Sequence[Work | None] = ()) -> tuple[ListCo
     what, widest = "Moments" if section == "played" else "Contexts", max((len(one.text) for one in works if one), default=0)
     work = [ListColumn("Work", min(max(widest, 9), MOST_WORK))] if widest else []
     cells = ListColumn(f"{what} without a valid row", 24 if widest else 27, 3)
-    return ListColumn("Share", 8, 0, True), ListColumn("Adds", 8, 0, True), cells, *work, ListColumn("Nearest row", 13, 2)
+    return ListColumn("Share", 8, 0, True), ListColumn("Adds", 8, 0, True), cells, *work, ListColumn("Nearest row", 13, 1)
 
 
 def gap_line(gap: Gap | SeenGap, work: Work | None, has_work: bool) -> Sequence[ListCell]:

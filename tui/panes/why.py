@@ -19,6 +19,7 @@ WIDE = 140
 """The pane stands beside the table on screens of so many columns; on others F12 opens a dialog."""
 OFTEN_S = 0.2
 """While a game runs the pane is written again so often; nobody reads faster, and it costs more than all the rest."""
+MUTED = "$foreground 60%"
 NO_FACTS = "The test row is empty: F6 goes there, F9 loads a context."
 
 
@@ -102,8 +103,14 @@ class WhyPane(ScrollView, can_focus=False):
         before, self._wrapped = self._wrapped, {}
         for one in self._lines_of_why:
             of = one.plain, tuple(one.spans)
-            self._wrapped[of] = before.get(of) or self._wrapped.get(of) or Visual.to_strips(self, one, width, None, style)
+            self._wrapped[of] = before.get(of) or self._wrapped.get(of) or self._strips_of(one, width, style)
         return [strip for one in self._lines_of_why for strip in self._wrapped[one.plain, tuple(one.spans)]]
+
+    def _strips_of(self, line: Content, width: int, style: Style) -> list[Strip]:
+        """A line in as many as it takes, each as far in as the first."""
+        indent = len(line.plain) - len(line.plain.lstrip())
+        strips = Visual.to_strips(self, line[indent:], max(1, width - indent), None, style)
+        return [Strip.join([Strip.blank(indent, style.rich_style), strip]) for strip in strips]
 
     def render_line(self, y: int) -> Strip:
         y += self.scroll_offset.y
@@ -119,9 +126,9 @@ def _why_lines(why: RowWhy, gives: Sequence[str]) -> list[Content]:
             lines += _cell_lines(cell)
     holds = [cell.column for cell in why.cells if cell.state == "holds"]
     missing = [cell.column for cell in why.cells if cell.state == "not given"]
-    lines += [Content.styled(f"✓ {', '.join(holds)}", "$text-muted"), Content("")] if holds else []
-    lines += [Content.styled(f"not given: {', '.join(missing)}", "$text-muted"), Content("")] if missing else []
-    lines.append(Content.styled("F12 closes · Shift+F12 nearest rows, correct", "$text-muted"))
+    lines += [Content.styled(f"✓ {', '.join(holds)}", MUTED), Content("")] if holds else []
+    lines += [Content.styled(f"not given: {', '.join(missing)}", MUTED), Content("")] if missing else []
+    lines.append(Content.styled("F12 closes · Shift+F12 nearest rows, correct", MUTED))
     return lines
 
 

@@ -105,6 +105,15 @@ class HeatMap(ScrollView, can_focus=True):
         & .heat-map--step-3 { background: $success 16%; color: $foreground; }
         & .heat-map--step-4 { background: $success 32%; color: $foreground; }
         & .heat-map--full { background: $success 55%; color: $foreground; }
+        &:nocolor {
+            & .heat-map--step-0 { background: $foreground 30%; }
+            & .heat-map--empty { background: $foreground 38%; }
+            & .heat-map--step-1 { background: $foreground 23%; }
+            & .heat-map--step-2 { background: $foreground 17%; }
+            & .heat-map--step-3 { background: $foreground 11%; }
+            & .heat-map--step-4 { background: $foreground 6%; }
+            & .heat-map--full { background: $surface; }
+        }
         &:ansi {
             & .heat-map--empty { background: ansi_default; color: ansi_red; text-style: bold; }
             & .heat-map--step-0, & .heat-map--step-1 { background: ansi_default; color: ansi_red; }

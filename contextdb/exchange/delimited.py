@@ -17,7 +17,7 @@ from itertools import islice
 
 from contextdb.columns import TextColumn
 from contextdb.errors import Fault, Place, TableError, in_quotes, no_such, plural
-from contextdb.exchange.grid import MOST_ABOVE, Block, columns_of, is_header
+from contextdb.exchange.grid import MOST_ABOVE, Block, columns_of, is_grouped, is_header
 from contextdb.exchange.reading import Reading, Remark, require_no_conflicts, with_points
 from contextdb.files.csv_source import MOST_CHARACTERS
 from contextdb.files.strangers import line_of, other_kind
@@ -58,9 +58,12 @@ def read_delimited(
     require_no_conflicts(text, file)
     dialect = dialect_of(text, wanted)
     grid, notes = _records(text[dialect.first :], dialect.delimiter, file, has_titles=block is None)
-    all_cells = Block(0, 0, len(grid), len(grid[0]) if grid else 0)
+    top = int(block is None and is_grouped(grid[:2]))
+    all_cells = Block(top, 0, len(grid), len(grid[0]) if grid else 0)
     read = columns_of(grid, file, block or all_cells, "line", takes_all=block is not None and not block.is_open)
     columns, decimals = with_points(read.columns, dialect.delimiter, is_decimal_comma)
+    lost = [group for group in filter(None, grid[0]) if not any(c.name.startswith(group) for c in columns)] if top else []
+    notes += [Remark(f"left out above the header: {in_quotes(', '.join(lost))}.")] if lost else []
     name = "tsv" if dialect.delimiter == "\t" else "csv"
     return Reading(tuple(columns), name, (*dialect.remarks, *notes, *read.remarks, *decimals), has_whole_names=True)
 
@@ -141,9 +144,14 @@ def _records(text: str, delimiter: str, file: str, has_titles: bool = True) -> t
     return grid, [*remarks, *short]
 
 
-def _titles(grid: Sequence[Sequence[str]]) -> range:
-    """The first records, where they are a title: at most one field each that says something, then a header of several columns."""
+def _titles(grid: Sequence[list[str]]) -> range:
+    """The first records, where they are a title: at most one field each that says something, then a header of several columns, or
+    groups of them above it, which become as wide."""
     n = next((at for at, record in enumerate(grid[:MOST_ABOVE]) if sum(map(bool, record)) > 1), 0)
+    top = next((at for at in (n - 1, n) if at >= 0 and is_grouped(grid[at : at + 2])), None)
+    if top is not None and len(grid[top + 1]) >= LEAST_BELOW_TITLE:
+        grid[top] += [""] * (len(grid[top + 1]) - len(grid[top]))
+        return range(top)
     return range(n if n and len(grid[n]) >= LEAST_BELOW_TITLE and is_header(grid[n]) else 0)
 
 

@@ -228,14 +228,27 @@ def is_title(row: Sequence[str]) -> bool:
 
 def _is_groups(rows: Grid, is_wide: bool) -> bool:
     """Whether the first of two rows groups the columns of the second: its first cell is blank, or merged with the next one, or
-    names a column whose cell below is blank; and a group that is not merged has blank cells behind it."""
+    names a column whose cell below is blank; and a group that is not merged has blank cells behind it. Over nothing but "min" and
+    "max" also the names of the other columns may stand in the first."""
     first, *_ = rows
     if len(rows) < 2 or len(first) < 2:
         return False
     if is_wide:
         return first[0] in ("", first[1], rows[-1][0]) or rows[-1][0] == ""
+    below = {text.casefold() for text in rows[-1] if text}
+    if below & LOWS and below & HIGHS and below <= LOWS | HIGHS:
+        return not all(first) and all(map(any, zip(*rows, strict=True))) and not set(map(str.casefold, first)) & below
     texts = [text for text in first if text]
     return first[0] == "" and 0 < len(set(texts)) == len(texts) and len(texts) <= len(first) // 2 and all(rows[-1])
+
+
+def is_grouped(rows: Grid) -> bool:
+    """Whether the first of some rows groups the columns that the second names; the shorter of the two ends in blank cells."""
+    if len(rows) < 2:
+        return False
+    width = max(map(len, rows[:2]))
+    even = [[*row, *[""] * (width - len(row))] for row in rows[:2]]
+    return _is_groups(even, is_wide=False) and is_header(_names_at(even, Block(0, 0, 2, width), 1, ()))
 
 
 def _groups_above(grid: Grid, block: Block, wide: Collection[int]) -> Sequence[str]:

@@ -12,7 +12,7 @@ from contextdb.errors import TableError
 from contextdb.exchange.formats import ReadOptions, read
 from contextdb.exchange.importing import whole_names_sentence
 from contextdb.exchange.mapping import Mapped, propose
-from contextdb.exchange.reading import Reading
+from contextdb.exchange.reading import Reading, with_intervals
 from contextdb.schema.settings import EMPTY, TableSettings
 
 ROWS: list[list[Any]] = [["Asset", "speed", "pos"], ["jog", 1.5, "CB"], ["run", 2.5, "FS"]]
@@ -141,6 +141,30 @@ def test_a_title_above_a_csv_is_left_out_and_said(form: str, mark: str):
     reading = read(text.encode(), "x.csv")
     assert texts(reading) == {"Asset": ["jog", "run"], "speed": ["1.5", "2.5"], "pos": ["CB", "FS"]}
     assert "line 1: left out above the header" in told(reading)
+
+
+@pytest.mark.parametrize("title", ["", "Moves of 2026\n\n"])
+@pytest.mark.parametrize(
+    "header",
+    [
+        "Clip,Speed,,pos\n,min,max,",
+        ",Speed\nClip,min,max,pos",
+        ",Speed,,\nClip,from,to,pos",
+        ",Speed,,Body\nClip,Min,Max,pos",
+        "Clip,Speed,,pos\n,von,bis",
+    ],
+)
+def test_a_group_over_the_first_of_min_and_max_of_a_csv_makes_one_interval(title: str, header: str):
+    reading = with_intervals(read(f"{title}{header}\njog,1.5,2.5,CB\nrun,2.5,4,FS\n".encode(), "x.csv"))
+    assert texts(reading) == {"Clip": ["jog", "run"], "Speed": ["1.5..2.5", "2.5..4"], "pos": ["CB", "FS"]}
+    assert "are one interval" in told(reading)
+    assert ('left out above the header: "Body"' in told(reading)) == ("Body" in header)
+
+
+@pytest.mark.parametrize("row", [",low,high", "jog,low,high"])
+def test_cells_that_say_low_and_high_are_no_ends(row: str):
+    reading = read(f"Clip,danger,risk\n{row}\nrun,high,low\n".encode(), "x.csv")
+    assert texts(reading) == {"Clip": [row.split(",")[0], "run"], "danger": ["low", "high"], "risk": ["high", "low"]}
 
 
 @pytest.mark.parametrize("has_title", [False, True])
